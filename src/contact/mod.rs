@@ -1,0 +1,83 @@
+//! Contact of a ball in its socket: pure functions of gap, rates and parameters. SI units, f64.
+
+/// Normal-force law of a contact.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NormalLaw {
+    /// Lankarani & Nikravesh (1990), paper eq. (19). Right for a restitution near 1 only.
+    LankaraniNikravesh,
+    /// Hertz without damping: elastic.
+    Hertz,
+    /// Hunt & Crossley (1975).
+    HuntCrossley,
+    /// Flores, Machado, Silva & Martins (2011): right for low restitution too.
+    Flores,
+    /// Gonthier, McPhee, Lange & Piedbœuf (2004): exact restitution over the whole range 0 < ce <= 1.
+    Gonthier,
+}
+
+/// Friction law of a contact.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FrictionLaw {
+    /// Modified Coulomb of Ambrósio, paper eqs. (20)-(21).
+    ModifiedCoulomb,
+    /// No friction.
+    None,
+}
+
+/// Which sliding velocity the friction law reads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FrictionVelocity {
+    /// Relative velocity of the two centres, paper eqs. (15)-(16).
+    Centres,
+    /// Relative velocity of the two material points in contact.
+    Surface,
+}
+
+/// What a ball joint's contact is made of. SI units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parameters {
+    /// Radial clearance c = R - r, m; 0 makes the joint ideal.
+    pub clearance: f64,
+    /// Coulomb coefficient cf.
+    pub friction: f64,
+    /// Restitution ce asked for, 0..=1.
+    pub restitution: f64,
+    /// Young's modulus E of both bodies, Pa.
+    pub youngs_modulus: f64,
+    /// Poisson's ratio nu of both bodies.
+    pub poisson_ratio: f64,
+    /// Ball radius r, m.
+    pub ball_radius: f64,
+    /// Which sliding velocity friction reads.
+    pub friction_velocity: FrictionVelocity,
+    /// v_a: below it there is no friction, m/s.
+    pub slip_speed_low: f64,
+    /// v_theta: above it friction is full, m/s.
+    pub slip_speed_high: f64,
+    /// Least approach speed that the damping term divides by, m/s.
+    pub impact_speed_floor: f64,
+    /// Normal-force law.
+    pub normal_law: NormalLaw,
+    /// Friction law.
+    pub friction_law: FrictionLaw,
+}
+
+impl Default for Parameters {
+    /// The paper's values (Table 2) with the default scene's clearance and friction.
+    fn default() -> Self {
+        Self {
+            clearance: 0.3e-3,
+            friction: 0.15,
+            restitution: 0.9,
+            youngs_modulus: 206e9,
+            poisson_ratio: 0.3,
+            ball_radius: 0.010,
+            friction_velocity: FrictionVelocity::Surface,
+            slip_speed_low: 1e-6,
+            slip_speed_high: 1e-4,
+            impact_speed_floor: 1e-3,
+            normal_law: NormalLaw::LankaraniNikravesh,
+            friction_law: FrictionLaw::ModifiedCoulomb,
+        }
+    }
+}

@@ -1,0 +1,381 @@
+//! What a scene is, typed and in SI units. `read.rs` makes one from a file, `parameters.rs` changes one by key.
+
+use crate::contact;
+use crate::integrate::Method;
+
+/// A vector in three dimensions, f64.
+pub type Vec3 = nalgebra::Vector3<f64>;
+/// A 3 x 3 matrix, f64.
+pub type Mat3 = nalgebra::Matrix3<f64>;
+/// An orientation, f64.
+pub type Quat = nalgebra::UnitQuaternion<f64>;
+
+/// A mechanism and everything needed to simulate and draw it.
+///
+/// Cut every ball joint and what is left is a forest: each body hangs on its parent by exactly one entry of
+/// `joints`, and parents come before children.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// Short name: that of the built-in scene, or of the file without its ending.
+    pub name: String,
+    /// One line for a list.
+    pub title: String,
+    /// A paragraph for a person.
+    pub description: String,
+    /// Gravity, world axes, m/s^2.
+    pub gravity: Vec3,
+    /// Contact parameters of every ball joint that does not override them.
+    pub contact: contact::Parameters,
+    /// Equations of motion.
+    pub formulation: Formulation,
+    /// Stepper settings.
+    pub solver: Solver,
+    /// Set in scenes whose sliders follow the paper's inverse kinematics.
+    pub spcmm: Option<Spcmm>,
+    /// Set in scenes made of repeated links.
+    pub chain: Option<Chain>,
+    /// How to look at it.
+    pub view: ViewSettings,
+    /// What the pose columns report.
+    pub output: Output,
+    /// Moving bodies, parents before children.
+    pub bodies: Vec<Body>,
+    /// One tree joint for each body, in body order: `joints[i].child == i`.
+    pub joints: Vec<Joint>,
+    /// The cut joints.
+    pub ball_joints: Vec<BallJoint>,
+    /// Shapes that do not move (rails, frame), world axes.
+    pub fixed_shapes: Vec<Shape>,
+    /// Text the scene was read from, and where: a reset reads it again with the changes.
+    pub source: Source,
+    /// Parameters changed since the file, in order: key and value as a user would write it.
+    pub changes: Vec<(String, String)>,
+}
+
+/// Where a scene's text came from.
+#[derive(Clone, Debug, Default)]
+pub struct Source {
+    /// The file as the user named it; `None` for a built-in scene.
+    pub file: Option<String>,
+    /// The TOML text.
+    pub text: String,
+}
+
+/// Equations of motion (`physics.md` section 3).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Formulation {
+    /// Spanning forest coordinates.
+    Tree,
+    /// All bodies, multipliers, Baumgarte stabilisation; paper eqs. (44)-(58).
+    Lagrange,
+}
+
+/// Named point on the front of speed against accuracy.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Preset {
+    /// Fast, rough.
+    Preview,
+    /// The fastest that keeps impacts resolved.
+    RealTime,
+    /// For figures.
+    Accurate,
+    /// To measure the others against.
+    Reference,
+}
+
+/// Stepper settings. An explicit method, step or tolerance beats the preset.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Solver {
+    /// Named point; fills what is not given.
+    pub preset: Option<Preset>,
+    /// Method in force.
+    pub method: Method,
+    /// Fixed step, s; the first step of an adaptive method.
+    pub step: f64,
+    /// Relative tolerance of an adaptive method.
+    pub tolerance: f64,
+}
+
+/// The paper's mechanism: dimensions and trajectory that its slider laws need. SI units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spcmm {
+    /// a1, distance along +X from O_A to the slider plane, m.
+    pub slider_plane: f64,
+    /// Amplitude of x, m (59).
+    pub amplitude_x: f64,
+    /// Amplitude of beta, rad (59).
+    pub amplitude_beta: f64,
+    /// Drive frequency, Hz (59): 0.5 Hz is the paper's period of 2 s.
+    pub frequency: f64,
+    /// Mean of x, m (59).
+    pub mean_x: f64,
+    /// gamma, rad (59).
+    pub gamma: f64,
+    /// b, hinge radius on the platform, m.
+    pub hinge_radius: f64,
+    /// L1, driving rod, m.
+    pub driving_rod: f64,
+    /// L2, driven rod, m.
+    pub driven_rod: f64,
+}
+
+/// A row of equal links.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Chain {
+    /// Number of links.
+    pub links: usize,
+}
+
+/// A world axis with its sign.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum SignedAxis {
+    PlusX,
+    MinusX,
+    PlusY,
+    MinusY,
+    PlusZ,
+    MinusZ,
+}
+
+impl SignedAxis {
+    /// Unit vector, world axes.
+    pub fn unit(self) -> Vec3 {
+        match self {
+            Self::PlusX => Vec3::x(),
+            Self::MinusX => -Vec3::x(),
+            Self::PlusY => Vec3::y(),
+            Self::MinusY => -Vec3::y(),
+            Self::PlusZ => Vec3::z(),
+            Self::MinusZ => -Vec3::z(),
+        }
+    }
+}
+
+/// How the scene asks to be looked at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ViewSettings {
+    /// World axis that points down on the screen.
+    pub down: SignedAxis,
+    /// Where the floor grid lies: coordinate along `down`, m; `None` lets the view choose.
+    pub floor: Option<f64>,
+}
+
+/// What the pose columns report.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Output {
+    /// Index of the body whose frame is reported.
+    pub body: usize,
+    /// Probe tip in that body's frame, m.
+    pub probe: Option<Vec3>,
+}
+
+/// A rigid body. Its frame is where the file puts it; the centroid may lie elsewhere.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Body {
+    /// Unique name.
+    pub name: String,
+    /// Mass, kg.
+    pub mass: f64,
+    /// Centroid in the body frame, m.
+    pub centre: Vec3,
+    /// Inertia about the centroid, body axes, kg m^2; symmetric positive definite.
+    pub inertia: Mat3,
+    /// What to draw, body frame.
+    pub shapes: Vec<Shape>,
+}
+
+/// What a shape stands for: the view picks its colour and material.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Role {
+    Slider,
+    DrivingRod,
+    DrivenRod,
+    Platform,
+    Pin,
+    Probe,
+    Rail,
+    Frame,
+}
+
+/// A drawn shape in its body's frame (or the world's).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shape {
+    /// Form and place.
+    pub geometry: Geometry,
+    /// What it stands for.
+    pub role: Role,
+}
+
+/// Form and place of a shape, m.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Geometry {
+    /// Round bar with hemispherical ends.
+    Capsule {
+        /// One end of the axis.
+        from: Vec3,
+        /// Other end of the axis.
+        to: Vec3,
+        /// Radius.
+        radius: f64,
+    },
+    /// Round bar with flat ends.
+    Cylinder {
+        /// Centre of one end.
+        from: Vec3,
+        /// Centre of the other end.
+        to: Vec3,
+        /// Radius.
+        radius: f64,
+    },
+    /// Cone with its base at `from` and its tip at `to`.
+    Cone {
+        /// Centre of the base.
+        from: Vec3,
+        /// Tip.
+        to: Vec3,
+        /// Radius of the base.
+        radius: f64,
+    },
+    /// Box along the body axes.
+    Box {
+        /// Centre.
+        centre: Vec3,
+        /// Full edge lengths.
+        size: Vec3,
+    },
+    /// Ball.
+    Sphere {
+        /// Centre.
+        centre: Vec3,
+        /// Radius.
+        radius: f64,
+    },
+    /// Flat plate: a convex polygon pushed to both sides of its plane.
+    Plate {
+        /// Corners in order, in one plane.
+        corners: Vec<Vec3>,
+        /// Thickness.
+        thickness: f64,
+    },
+}
+
+/// The tree joint by which `child` hangs on `parent`.
+///
+/// Pose of the child for joint coordinate q, with R the parent's (world: identity) rotation, `rotation` = R0:
+/// revolute `R_child = R Rot(axis, q) R0`, the two points coincide; prismatic `R_child = R R0`, the child's point
+/// is at the parent's point + q axis; fixed as prismatic with q = 0; free (parent is the world): see `start`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Joint {
+    /// Unique name.
+    pub name: String,
+    /// Kind of motion.
+    pub kind: JointKind,
+    /// Parent body; `None` is the world.
+    pub parent: Option<usize>,
+    /// Child body.
+    pub child: usize,
+    /// Joint point in the parent's frame, m.
+    pub parent_point: Vec3,
+    /// Joint point in the child's frame, m.
+    pub child_point: Vec3,
+    /// Unit axis in the parent's frame (revolute, prismatic).
+    pub axis: Vec3,
+    /// Child's orientation in the parent at q = 0.
+    pub rotation: Quat,
+    /// Prescribes q(t); `None` leaves it to the dynamics.
+    pub drive: Option<Drive>,
+    /// Where it starts.
+    pub start: JointStart,
+}
+
+/// Kind of a tree joint.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JointKind {
+    /// No motion.
+    Fixed,
+    /// Slides along `axis`.
+    Prismatic,
+    /// Turns about `axis`.
+    Revolute,
+    /// Six degrees of freedom.
+    Free,
+}
+
+/// Start of a joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum JointStart {
+    /// Coordinate (m or rad) and rate of a one-degree joint.
+    Scalar {
+        /// q at t = 0.
+        position: f64,
+        /// dq/dt at t = 0.
+        velocity: f64,
+    },
+    /// Pose of the body frame and its motion, world axes.
+    Pose {
+        /// Body frame's origin, m.
+        position: Vec3,
+        /// Orientation.
+        rotation: Quat,
+        /// Velocity of the body frame's origin, m/s.
+        velocity: Vec3,
+        /// Angular velocity, rad/s.
+        angular_velocity: Vec3,
+    },
+}
+
+/// Law of a driven joint: q(t) with exact first and second derivatives.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Drive {
+    /// Slider 1, 2 or 3 of the paper's inverse kinematics (39), (59).
+    Spcmm {
+        /// 1, 2 or 3.
+        slider: u8,
+    },
+    /// q = position + velocity t.
+    Constant {
+        /// q at t = 0, m or rad.
+        position: f64,
+        /// dq/dt, m/s or rad/s.
+        velocity: f64,
+    },
+    /// q = mean + amplitude sin(2 pi frequency t + phase).
+    Harmonic {
+        /// Mean, m or rad.
+        mean: f64,
+        /// Amplitude, m or rad.
+        amplitude: f64,
+        /// Frequency, Hz.
+        frequency: f64,
+        /// Phase, rad.
+        phase: f64,
+    },
+}
+
+/// A point of a body, or of the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Attachment {
+    /// Body; `None` is the world.
+    pub body: Option<usize>,
+    /// Point in that body's frame, m.
+    pub point: Vec3,
+}
+
+/// A ball-and-socket joint: ideal where its clearance is 0, else a contact.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BallJoint {
+    /// Unique name.
+    pub name: String,
+    /// Socket centre Z_i.
+    pub socket: Attachment,
+    /// Ball centre Z_j.
+    pub ball: Attachment,
+    /// Direction in which the drawn socket is cut open, in the socket body's frame.
+    pub opening: Vec3,
+    /// This joint's contact parameters, overrides applied.
+    pub contact: contact::Parameters,
+    /// Keys (without prefix) in which it differs from the scene's `contact.*`.
+    pub overrides: Vec<&'static str>,
+}

@@ -1,0 +1,118 @@
+//! One instant of a simulation as plain data: what the outputs write and the view draws.
+
+use crate::scene::{Mat3, Vec3};
+
+/// Everything that is reported about one instant. SI units, world axes.
+#[derive(Clone, Debug, Default)]
+pub struct Frame {
+    /// Simulated time, s.
+    pub time: f64,
+    /// Bodies in scene order.
+    pub bodies: Vec<BodyMotion>,
+    /// Ball joints in scene order.
+    pub joints: Vec<JointReport>,
+    /// Driven joints in scene order: actuator force, N (or torque, N m), positive along the joint axis's positive sense.
+    pub actuators: Vec<f64>,
+    /// The output body.
+    pub pose: Pose,
+    /// Kinetic energy of all bodies, J.
+    pub kinetic: f64,
+    /// Gravitational plus elastic energy, J; gravity's zero is the world origin.
+    pub potential: f64,
+    /// The elastic part of `potential`: energy stored in the contacts, J.
+    pub elastic: f64,
+    /// Probe tip minus the tip of the ideal mechanism at the same time, m; `None` where the scene has no such reference.
+    pub probe_error: Option<Vec3>,
+}
+
+/// Motion of a body's frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BodyMotion {
+    /// Origin of the body frame, m.
+    pub position: Vec3,
+    /// Body axes as columns.
+    pub rotation: Mat3,
+    /// Velocity of the origin, m/s.
+    pub velocity: Vec3,
+    /// Angular velocity, rad/s.
+    pub angular_velocity: Vec3,
+    /// Acceleration of the origin, m/s^2.
+    pub acceleration: Vec3,
+    /// Angular acceleration, rad/s^2.
+    pub angular_acceleration: Vec3,
+}
+
+/// Pose of the output body with its angles (`physics.md` section 7: R = Rx(alpha) Rz(beta) Ry(gamma)).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Pose {
+    /// Origin, m.
+    pub position: Vec3,
+    /// (alpha, beta, gamma), rad.
+    pub angles: Vec3,
+    /// Velocity of the origin, m/s.
+    pub velocity: Vec3,
+    /// Rates of the angles, rad/s.
+    pub angle_rates: Vec3,
+    /// Acceleration of the origin, m/s^2.
+    pub acceleration: Vec3,
+    /// Second derivatives of the angles, rad/s^2.
+    pub angle_accelerations: Vec3,
+}
+
+/// What a ball joint's contact is doing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ContactState {
+    /// The ball touches nothing.
+    #[default]
+    Free,
+    /// In contact, sliding slower than `slip_speed_high`.
+    Stick,
+    /// In contact and sliding.
+    Slip,
+    /// No clearance: a constraint.
+    Ideal,
+}
+
+/// One ball joint at one instant. SI units, world axes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct JointReport {
+    /// Z_i, m.
+    pub socket_centre: Vec3,
+    /// Z_j, m.
+    pub ball_centre: Vec3,
+    /// e = Z_j - Z_i, m (5).
+    pub eccentricity: Vec3,
+    /// Clearance in force now (a live change moves it at a bounded rate), m.
+    pub clearance: f64,
+    /// delta = |e| - c, m (10); 0 for an ideal joint.
+    pub penetration: f64,
+    /// d(delta)/dt, m/s.
+    pub penetration_rate: f64,
+    /// Normal force on the ball, N. For an ideal joint the whole reaction.
+    pub normal_force: Vec3,
+    /// Friction force on the ball, N.
+    pub friction_force: Vec3,
+    /// Where the forces act on the ball, Z_j + r n, m.
+    pub contact_point: Vec3,
+    /// Speed of sliding that friction reads, m/s.
+    pub slip_speed: f64,
+    /// What the contact is doing.
+    pub state: ContactState,
+}
+
+/// The strongest instant of a ball joint since the peaks were last taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Peak {
+    /// Largest |F_N| in continuous time, N.
+    pub normal: f64,
+    /// When, s.
+    pub time: f64,
+    /// Normal force on the ball at that instant, N, world axes.
+    pub normal_force: Vec3,
+    /// Friction force on the ball at that instant, N, world axes.
+    pub friction_force: Vec3,
+    /// Contacts that began.
+    pub impacts: u32,
+    /// Largest approach speed of those impacts, m/s.
+    pub approach_speed: f64,
+}
