@@ -30,7 +30,7 @@ prepare_packages() {
     fi
     say "installing ${missing[*]}"
     if ! "${root[@]}" apt-get update -qq || ! "${root[@]}" env DEBIAN_FRONTEND=noninteractive "${install[@]}" > /dev/null; then
-        say "that did not work; if something fails below, try it by hand: ${root[*]} ${install[*]}"
+        say "that did not work; if something fails below, try it by hand: ${install[*]}"
     fi
 }
 
