@@ -1,8 +1,14 @@
 //! A running simulation: state, stepping, live changes, recorded channels, divergence guard.
 
+mod channels;
 mod frame;
+mod history;
+mod pace;
 
+pub use channels::*;
 pub use frame::*;
+pub use history::History;
+pub use pace::{LARGEST_BUDGET, LONGEST_FRAME, Pacer, SCALE_RANGE};
 
 use crate::scene::Scene;
 
