@@ -1,1 +1,15 @@
-//! render
+//! Draws a [`crate::view::DrawList`] to a texture with wgpu: the same path in a window, in the browser (WebGPU, WebGL2)
+//! and without a screen.
+//!
+//! The picture is gamma-encoded once, at the end of `shaders/scene.wgsl`; everything after that copies bytes.
+
+mod callback;
+mod offscreen;
+mod renderer;
+mod target;
+
+pub use callback::{Viewport, install};
+pub use eframe::egui_wgpu::wgpu;
+pub use offscreen::{Image, NoAdapter, Offscreen, RenderError};
+pub use renderer::Renderer;
+pub use target::Target;

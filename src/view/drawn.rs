@@ -1,0 +1,1 @@
+//! Where each drawn thing stands.

@@ -1,0 +1,1 @@
+//! Hand-built scenes for tests of view and render.
