@@ -9,11 +9,17 @@ use super::icons::{Icon, icon_button};
 use super::player::Player;
 use super::value;
 use crate::contact::NormalLaw;
-use crate::scene::{Kind, Parameter, Scene, Scope, Value, format_quantity_digits, from_display, to_display};
+use crate::scene::{
+    Kind, Parameter, Scene, Scope, Value, format_quantity_digits, from_display, to_display,
+};
 use crate::simulate::Effect;
 
 /// Parameters that stand first.
-const FIRST: [&str; 3] = ["contact.clearance", "contact.friction", "contact.restitution"];
+const FIRST: [&str; 3] = [
+    "contact.clearance",
+    "contact.friction",
+    "contact.restitution",
+];
 
 /// State of the controls that is not the simulation's: half-typed values and what was wrong with them.
 #[derive(Default)]
@@ -53,7 +59,11 @@ impl Controls {
             }
         }
         for group in groups {
-            let rest = || table.iter().filter(|p| p.group == group && !FIRST.contains(&p.key));
+            let rest = || {
+                table
+                    .iter()
+                    .filter(|p| p.group == group && !FIRST.contains(&p.key))
+            };
             if rest().next().is_none() {
                 continue;
             }
@@ -67,7 +77,12 @@ impl Controls {
 
     /// Contact parameters of one ball joint, which beat the scene's.
     fn one_joint(&mut self, ui: &mut Ui, player: &mut Player, table: &[&'static Parameter]) {
-        let names: Vec<String> = player.wanted().ball_joints.iter().map(|j| j.name.clone()).collect();
+        let names: Vec<String> = player
+            .wanted()
+            .ball_joints
+            .iter()
+            .map(|j| j.name.clone())
+            .collect();
         if names.is_empty() {
             return;
         }
@@ -91,37 +106,76 @@ impl Controls {
                 self.control(ui, player, parameter, &format!("joint.{joint}.{last}"));
             }
         });
-        header.header_response.on_hover_text("Values of one ball joint only; they beat the values of the whole scene.");
+        header.header_response.on_hover_text(
+            "Values of one ball joint only; they beat the values of the whole scene.",
+        );
     }
 
     /// One parameter under `key`, which may be a joint's own.
-    fn control(&mut self, ui: &mut Ui, player: &mut Player, parameter: &'static Parameter, key: &str) {
+    fn control(
+        &mut self,
+        ui: &mut Ui,
+        player: &mut Player,
+        parameter: &'static Parameter,
+        key: &str,
+    ) {
         // A key that the scene lost (a shorter chain) has no control.
         let Ok(now) = player.wanted().get(key) else {
             return;
         };
-        let name = match key.strip_prefix("joint.").and_then(|rest| rest.rsplit_once('.')) {
+        let name = match key
+            .strip_prefix("joint.")
+            .and_then(|rest| rest.rsplit_once('.'))
+        {
             Some((joint, _)) => format!("{} of {joint}", parameter.label),
             None => parameter.label.to_owned(),
         };
         ui.push_id(key, |ui| match &parameter.kind {
             Kind::Number { .. } => self.number(ui, player, parameter, key, &name, &now),
             Kind::Choice(words) => self.choice(ui, player, parameter, key, &name, &now, words),
-            Kind::Count { min, max } => self.count(ui, player, parameter, key, &name, &now, (*min, *max)),
+            Kind::Count { min, max } => {
+                self.count(ui, player, parameter, key, &name, &now, (*min, *max))
+            }
         });
         if let Some(error) = self.drafts.get(key).and_then(|draft| draft.error.as_ref()) {
-            ui.label(RichText::new(error).small().color(ui.visuals().error_fg_color));
+            ui.label(
+                RichText::new(error)
+                    .small()
+                    .color(ui.visuals().error_fg_color),
+            );
         }
         if player.is_waiting(key) {
-            ui.label(RichText::new("Applies at the next reset").small().color(ui.visuals().warn_fg_color));
+            ui.label(
+                RichText::new("Applies at the next reset")
+                    .small()
+                    .color(ui.visuals().warn_fg_color),
+            );
         }
         if let Some(warning) = warning(player.wanted(), key) {
-            ui.label(RichText::new(warning).small().color(ui.visuals().warn_fg_color));
+            ui.label(
+                RichText::new(warning)
+                    .small()
+                    .color(ui.visuals().warn_fg_color),
+            );
         }
     }
 
-    fn number(&mut self, ui: &mut Ui, player: &mut Player, parameter: &'static Parameter, key: &str, name: &str, now: &Value) {
-        let Kind::Number { display, slider, logarithmic, .. } = parameter.kind else {
+    fn number(
+        &mut self,
+        ui: &mut Ui,
+        player: &mut Player,
+        parameter: &'static Parameter,
+        key: &str,
+        name: &str,
+        now: &Value,
+    ) {
+        let Kind::Number {
+            display,
+            slider,
+            logarithmic,
+            ..
+        } = parameter.kind
+        else {
             return;
         };
         let Value::Number(si) = *now else {
@@ -145,7 +199,11 @@ impl Controls {
         let changed = response.changed();
         response.accessible_name(name);
         if changed {
-            self.set(player, key, &format_quantity_digits(from_display(shown, display), display, 4));
+            self.set(
+                player,
+                key,
+                &format_quantity_digits(from_display(shown, display), display, 4),
+            );
         }
     }
 
@@ -167,7 +225,10 @@ impl Controls {
                 .selected_text(value::shown(now, &parameter.kind))
                 .show_ui(ui, |ui| {
                     for word in words {
-                        if ui.selectable_label(*now == Value::Choice(word), *word).clicked() {
+                        if ui
+                            .selectable_label(*now == Value::Choice(word), *word)
+                            .clicked()
+                        {
                             chosen = Some(*word);
                         }
                     }
@@ -197,7 +258,11 @@ impl Controls {
         self.heading(ui, parameter, key, name, |this, ui| {
             this.default_button(ui, player, parameter, key, name, now);
             let response = ui
-                .add(DragValue::new(&mut count).range(min..=max).update_while_editing(false))
+                .add(
+                    DragValue::new(&mut count)
+                        .range(min..=max)
+                        .update_while_editing(false),
+                )
                 .on_hover_ui(|ui| tooltip(ui, parameter, key));
             let changed = response.changed();
             response.accessible_name(name);
@@ -217,24 +282,47 @@ impl Controls {
         rest: impl FnOnce(&mut Self, &mut Ui),
     ) {
         ui.horizontal(|ui| {
-            let text = if FIRST.contains(&key) { RichText::new(name).strong() } else { RichText::new(name) };
+            let text = if FIRST.contains(&key) {
+                RichText::new(name).strong()
+            } else {
+                RichText::new(name)
+            };
             ui.label(text).on_hover_ui(|ui| tooltip(ui, parameter, key));
-            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| rest(self, ui));
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                rest(self, ui)
+            });
         });
     }
 
     /// Typed entry; what cannot be read stays to be mended.
-    fn entry(&mut self, ui: &mut Ui, player: &mut Player, parameter: &'static Parameter, key: &str, name: &str, now: &Value) {
+    fn entry(
+        &mut self,
+        ui: &mut Ui,
+        player: &mut Player,
+        parameter: &'static Parameter,
+        key: &str,
+        name: &str,
+        now: &Value,
+    ) {
         let shown = value::shown(now, &parameter.kind);
-        let mut text = self.drafts.get(key).map_or_else(|| shown.clone(), |draft| draft.text.clone());
+        let mut text = self
+            .drafts
+            .get(key)
+            .map_or_else(|| shown.clone(), |draft| draft.text.clone());
         let response = ui.add(
             TextEdit::singleline(&mut text)
                 .desired_width(84.0)
-                .horizontal_align(egui::Align::Max)
+                .align(egui::Align2::RIGHT_CENTER)
                 .margin(egui::Margin::symmetric(6, 3)),
         );
         if response.changed() {
-            self.drafts.insert(key.to_owned(), Draft { text: text.clone(), error: None });
+            self.drafts.insert(
+                key.to_owned(),
+                Draft {
+                    text: text.clone(),
+                    error: None,
+                },
+            );
         }
         if response.lost_focus() {
             if ui.input(|i| i.key_pressed(egui::Key::Escape)) {
@@ -246,18 +334,33 @@ impl Controls {
                 }
             }
         }
-        response.on_hover_ui(|ui| tooltip(ui, parameter, key)).accessible_name(name);
+        response
+            .on_hover_ui(|ui| tooltip(ui, parameter, key))
+            .accessible_name(name);
     }
 
-    fn default_button(&mut self, ui: &mut Ui, player: &mut Player, parameter: &'static Parameter, key: &str, name: &str, now: &Value) {
+    fn default_button(
+        &mut self,
+        ui: &mut Ui,
+        player: &mut Player,
+        parameter: &'static Parameter,
+        key: &str,
+        name: &str,
+        now: &Value,
+    ) {
         let original = player.original(key);
-        let written = original.as_ref().filter(|o| *o != now).and_then(|o| value::written(o, &parameter.kind));
+        let written = original
+            .as_ref()
+            .filter(|o| *o != now)
+            .and_then(|o| value::written(o, &parameter.kind));
         let size = 22.0;
         // A place kept free where there is nothing to undo: rows stay aligned.
         match (written, original) {
             (Some(written), Some(original)) => {
                 let help = format!("Back to {}", value::shown(&original, &parameter.kind));
-                if icon_button(ui, Icon::Undo, &format!("Reset {name}"), &help, size, false).clicked() {
+                if icon_button(ui, Icon::Undo, &format!("Reset {name}"), &help, size, false)
+                    .clicked()
+                {
                     self.set(player, key, &written);
                 }
             }
@@ -273,7 +376,13 @@ impl Controls {
                 self.drafts.remove(key);
             }
             Err(error) => {
-                self.drafts.insert(key.to_owned(), Draft { text: text.to_owned(), error: Some(error.message) });
+                self.drafts.insert(
+                    key.to_owned(),
+                    Draft {
+                        text: text.to_owned(),
+                        error: Some(error.message),
+                    },
+                );
             }
         }
     }
@@ -294,14 +403,21 @@ fn tooltip(ui: &mut Ui, parameter: &Parameter, key: &str) {
 
 /// What to know about the present value of `key`.
 fn warning(scene: &Scene, key: &str) -> Option<&'static str> {
-    let contact = match key.strip_prefix("joint.").and_then(|rest| rest.rsplit_once('.')) {
+    let contact = match key
+        .strip_prefix("joint.")
+        .and_then(|rest| rest.rsplit_once('.'))
+    {
         Some((joint, _)) => &scene.ball_joints.iter().find(|j| j.name == joint)?.contact,
         None => &scene.contact,
     };
     match key.rsplit('.').next()? {
-        "restitution" if contact.normal_law == NormalLaw::LankaraniNikravesh && contact.restitution < 0.8 => Some(
-            "The Lankarani-Nikravesh law is right only near 1: it rebounds more than asked. Try the Gonthier or Flores law.",
-        ),
+        "restitution"
+            if contact.normal_law == NormalLaw::LankaraniNikravesh && contact.restitution < 0.8 =>
+        {
+            Some(
+                "The Lankarani-Nikravesh law is right only near 1: it rebounds more than asked. Try the Gonthier or Flores law.",
+            )
+        }
         "clearance" if contact.clearance > 0.0 && contact.clearance <= 1e-5 => Some(
             "Hertz contact assumes a contact patch that is small against the ball: below about 0.01 mm it is not.",
         ),

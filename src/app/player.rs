@@ -5,7 +5,9 @@ use std::collections::BTreeSet;
 use web_time::Instant;
 
 use crate::scene::{Scene, SceneError, Value};
-use crate::simulate::{Channels, Effect, Frame, History, Pacer, Peak, Simulation, StartError, Stopped};
+use crate::simulate::{
+    Channels, Effect, Frame, History, Pacer, Peak, Simulation, StartError, Stopped,
+};
 
 /// Narrowest bin of the record, s: shorter than any step that resolves an impact.
 const FINEST_BIN: f64 = 2e-6;
@@ -114,7 +116,9 @@ impl Player {
         if self.playing {
             let target = self.pacer.begin(dt);
             let clock = Instant::now();
-            while self.simulation.time() < target && self.pacer.may_step(clock.elapsed().as_secs_f64()) {
+            while self.simulation.time() < target
+                && self.pacer.may_step(clock.elapsed().as_secs_f64())
+            {
                 if !self.step() {
                     break;
                 }
@@ -141,7 +145,9 @@ impl Player {
         while self.simulation.time() < time && self.stopped.is_none() {
             self.step();
         }
-        let shown = time.min(self.simulation.time()).max(self.simulation.step_start());
+        let shown = time
+            .min(self.simulation.time())
+            .max(self.simulation.step_start());
         self.pacer.jump(shown);
         self.simulation.sample(shown, &mut self.frame);
     }
@@ -170,7 +176,10 @@ impl Player {
     /// As [`Simulation::set`]; nothing has changed then.
     pub fn set(&mut self, key: &str, value: &str) -> Result<Effect, SceneError> {
         let effect = self.simulation.set(key, value)?;
-        self.wanted.set(key, value)?;
+        if self.wanted.set(key, value).is_err() {
+            // The running scene took it: what it now holds is what is wanted.
+            self.wanted = self.simulation.scene().clone();
+        }
         if effect == Effect::AtReset {
             self.waiting.insert(key.to_owned());
         }
@@ -216,7 +225,8 @@ impl Player {
 
     fn show_latest(&mut self) {
         self.pacer.jump(self.simulation.time());
-        self.simulation.sample(self.simulation.time(), &mut self.frame);
+        self.simulation
+            .sample(self.simulation.time(), &mut self.frame);
     }
 
     fn start_record(&mut self) {

@@ -1,16 +1,37 @@
 //! Look of the window: spacing, type sizes and the colours of both themes.
 
-use eframe::egui::{self, Color32, CornerRadius, FontFamily, FontId, Margin, Stroke, TextStyle, Theme, Visuals, vec2};
+use eframe::egui::{
+    self, Color32, CornerRadius, FontFamily, FontId, Margin, Stroke, TextStyle, Theme, Visuals,
+    vec2,
+};
 
 /// Series colours for plots, dark enough on white and light enough on black; apart for the colour-blind
 /// (after Okabe & Ito).
 const SERIES: [(Color32, Color32); 6] = [
-    (Color32::from_rgb(0x00, 0x72, 0xB2), Color32::from_rgb(0x56, 0xB4, 0xE9)),
-    (Color32::from_rgb(0xD5, 0x5E, 0x00), Color32::from_rgb(0xFF, 0x8C, 0x3A)),
-    (Color32::from_rgb(0x00, 0x8F, 0x68), Color32::from_rgb(0x2C, 0xD0, 0xA0)),
-    (Color32::from_rgb(0xB8, 0x4E, 0x90), Color32::from_rgb(0xE4, 0x93, 0xC4)),
-    (Color32::from_rgb(0xA8, 0x7B, 0x00), Color32::from_rgb(0xF0, 0xD0, 0x42)),
-    (Color32::from_rgb(0x5B, 0x5F, 0xC7), Color32::from_rgb(0xA5, 0xA8, 0xF5)),
+    (
+        Color32::from_rgb(0x00, 0x72, 0xB2),
+        Color32::from_rgb(0x56, 0xB4, 0xE9),
+    ),
+    (
+        Color32::from_rgb(0xD5, 0x5E, 0x00),
+        Color32::from_rgb(0xFF, 0x8C, 0x3A),
+    ),
+    (
+        Color32::from_rgb(0x00, 0x8F, 0x68),
+        Color32::from_rgb(0x2C, 0xD0, 0xA0),
+    ),
+    (
+        Color32::from_rgb(0xB8, 0x4E, 0x90),
+        Color32::from_rgb(0xE4, 0x93, 0xC4),
+    ),
+    (
+        Color32::from_rgb(0xA8, 0x7B, 0x00),
+        Color32::from_rgb(0xF0, 0xD0, 0x42),
+    ),
+    (
+        Color32::from_rgb(0x5B, 0x5F, 0xC7),
+        Color32::from_rgb(0xA5, 0xA8, 0xF5),
+    ),
 ];
 
 /// Colour of the `index`th series of a plot.
@@ -34,11 +55,23 @@ pub fn apply(ctx: &egui::Context) {
         spacing.menu_margin = Margin::same(8);
         spacing.window_margin = Margin::same(16);
         style.text_styles = [
-            (TextStyle::Heading, FontId::new(18.0, FontFamily::Proportional)),
+            (
+                TextStyle::Heading,
+                FontId::new(18.0, FontFamily::Proportional),
+            ),
             (TextStyle::Body, FontId::new(14.0, FontFamily::Proportional)),
-            (TextStyle::Button, FontId::new(14.0, FontFamily::Proportional)),
-            (TextStyle::Monospace, FontId::new(13.0, FontFamily::Monospace)),
-            (TextStyle::Small, FontId::new(12.0, FontFamily::Proportional)),
+            (
+                TextStyle::Button,
+                FontId::new(14.0, FontFamily::Proportional),
+            ),
+            (
+                TextStyle::Monospace,
+                FontId::new(13.0, FontFamily::Monospace),
+            ),
+            (
+                TextStyle::Small,
+                FontId::new(12.0, FontFamily::Proportional),
+            ),
         ]
         .into();
     });
@@ -55,7 +88,8 @@ fn light() -> Visuals {
     visuals.hyperlink_color = Color32::from_rgb(0x15, 0x62, 0xB8);
     visuals.warn_fg_color = Color32::from_rgb(0x9A, 0x55, 0x00);
     visuals.error_fg_color = Color32::from_rgb(0xC0, 0x1C, 0x28);
-    visuals.widgets.noninteractive.bg_stroke = Stroke::new(1.0, Color32::from_rgb(0xDC, 0xE2, 0xE8));
+    visuals.widgets.noninteractive.bg_stroke =
+        Stroke::new(1.0, Color32::from_rgb(0xDC, 0xE2, 0xE8));
     visuals.widgets.noninteractive.fg_stroke.color = Color32::from_rgb(0x1E, 0x2A, 0x36);
     visuals.weak_text_color = Some(Color32::from_rgb(0x57, 0x64, 0x70));
     visuals.widgets.inactive.weak_bg_fill = Color32::from_rgb(0xE9, 0xED, 0xF1);
@@ -78,7 +112,8 @@ fn dark() -> Visuals {
     visuals.hyperlink_color = Color32::from_rgb(0x6C, 0xB8, 0xFF);
     visuals.warn_fg_color = Color32::from_rgb(0xFF, 0xB8, 0x4D);
     visuals.error_fg_color = Color32::from_rgb(0xFF, 0x7B, 0x72);
-    visuals.widgets.noninteractive.bg_stroke = Stroke::new(1.0, Color32::from_rgb(0x33, 0x3B, 0x44));
+    visuals.widgets.noninteractive.bg_stroke =
+        Stroke::new(1.0, Color32::from_rgb(0x33, 0x3B, 0x44));
     visuals.widgets.noninteractive.fg_stroke.color = Color32::from_rgb(0xD9, 0xE0, 0xE7);
     visuals.weak_text_color = Some(Color32::from_rgb(0x9A, 0xA7, 0xB4));
     visuals.widgets.inactive.weak_bg_fill = Color32::from_rgb(0x2C, 0x33, 0x3B);

@@ -1,6 +1,6 @@
 //! Parameter values as text: the same words and units that files and the command line take.
 
-use crate::scene::{Kind, Value, format_quantity, si_unit, to_display};
+use crate::scene::{Kind, Value, format_quantity, format_quantity_digits, si_unit, to_display};
 
 /// `value` for a person: display unit, six digits.
 pub fn shown(value: &Value, kind: &Kind) -> String {
@@ -17,7 +17,9 @@ pub fn shown(value: &Value, kind: &Kind) -> String {
 pub fn written(value: &Value, kind: &Kind) -> Option<String> {
     Some(match (value, kind) {
         (Value::Number(si), Kind::Number { dimension, .. }) => {
-            format!("{si:e} {}", si_unit(*dimension)).trim_end().to_owned()
+            format!("{si:e} {}", si_unit(*dimension))
+                .trim_end()
+                .to_owned()
         }
         (Value::Number(si), _) => format!("{si:e}"),
         (Value::Count(count), _) => count.to_string(),
@@ -40,12 +42,23 @@ pub fn completed(typed: &str, kind: &Kind) -> String {
 /// Range of a kind, for a tooltip.
 pub fn range(kind: &Kind) -> String {
     match kind {
-        Kind::Number { min, max, display, .. } => {
-            format!("{} to {}", format_quantity(to_display(*min, display), ""), format_quantity(*max, display))
+        Kind::Number {
+            min, max, display, ..
+        } => {
+            format!(
+                "{} to {}",
+                format_quantity(to_display(*min, display), ""),
+                format_quantity(*max, display)
+            )
         }
         Kind::Count { min, max } => format!("{min} to {max}"),
         Kind::Choice(words) => words.join(", "),
     }
+}
+
+/// A bare number with at most `digits` significant digits.
+pub fn number(value: f64, digits: usize) -> String {
+    format_quantity_digits(value, "", digits)
 }
 
 /// A time with the unit that suits its size.
@@ -75,7 +88,11 @@ pub fn time_scale(scale: f64) -> String {
 
 /// A count with a thin space between thousands.
 fn grouped(count: u64) -> String {
-    if count < 10_000 { count.to_string() } else { format!("{}\u{202f}{:03}", count / 1000, count % 1000) }
+    if count < 10_000 {
+        count.to_string()
+    } else {
+        format!("{}\u{202f}{:03}", count / 1000, count % 1000)
+    }
 }
 
 #[cfg(test)]
@@ -102,7 +119,10 @@ mod tests {
     #[test]
     fn values_read_as_people_write_them() {
         assert_eq!(shown(&Value::Number(3e-4), &LENGTH), "0.3 mm");
-        assert_eq!(written(&Value::Number(3e-4), &LENGTH).as_deref(), Some("3e-4 m"));
+        assert_eq!(
+            written(&Value::Number(3e-4), &LENGTH).as_deref(),
+            Some("3e-4 m")
+        );
         assert_eq!(range(&LENGTH), "0 to 2 mm");
     }
 
