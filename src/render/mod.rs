@@ -4,7 +4,9 @@
 //! The picture is gamma-encoded once, at the end of `shaders/scene.wgsl`; everything after that copies bytes.
 
 mod callback;
+mod meshes;
 mod offscreen;
+mod pipelines;
 mod renderer;
 mod target;
 

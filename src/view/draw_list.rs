@@ -44,7 +44,8 @@ impl Mesh {
 /// Triangles of one mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshData {
-    /// Position (x, y, z) and, fourth, 1 where the vertex lies on a socket's inner face, else 0; then the normal.
+    /// Position (x, y, z) and a mark: 0, but on sockets 1 for the inner face, 2 and 3 for the cut face's outer and inner
+    /// edge; then the normal.
     pub vertices: Vec<([f32; 4], [f32; 3])>,
     /// Three per triangle, counter-clockwise seen from outside.
     pub indices: Vec<u32>,
@@ -128,6 +129,8 @@ pub struct Eye {
 pub struct Light {
     /// Unit vector from the scene towards the light.
     pub direction: Vec3,
+    /// Unit vector up: sky light comes from there.
+    pub up: Vec3,
     /// Centre of what must have shadows, m.
     pub centre: Vec3,
     /// Radius of what must have shadows, m.
@@ -148,8 +151,6 @@ pub struct Background {
 pub struct Floor {
     /// Middle of the grid, m: grid lines pass through it.
     pub centre: Vec3,
-    /// Unit vector up, from the floor.
-    pub up: Vec3,
     /// Unit vector along one set of lines.
     pub along: Vec3,
     /// Distance between thin lines, m; every tenth is thick.
@@ -271,6 +272,7 @@ impl Default for DrawList {
             },
             light: Light {
                 direction: Vec3::Z,
+                up: Vec3::Z,
                 centre: Vec3::ZERO,
                 radius: 1.0,
             },
