@@ -8,9 +8,8 @@ use eframe::egui::{self, ComboBox, DragValue, RichText, Slider, SliderClamping, 
 use super::icons::{Icon, icon_button};
 use super::player::Player;
 use super::value;
-use crate::contact::NormalLaw;
 use crate::scene::{
-    Kind, Parameter, Scene, Scope, Value, format_quantity_digits, from_display, to_display,
+    Kind, Parameter, Scope, Value, format_quantity_digits, from_display, to_display,
 };
 use crate::simulate::Effect;
 
@@ -151,7 +150,7 @@ impl Controls {
                     .color(ui.visuals().warn_fg_color),
             );
         }
-        if let Some(warning) = warning(player.wanted(), key) {
+        if let Some(warning) = player.warning(key) {
             ui.label(
                 RichText::new(warning)
                     .small()
@@ -401,26 +400,3 @@ fn tooltip(ui: &mut Ui, parameter: &Parameter, key: &str) {
     }
 }
 
-/// What to know about the present value of `key`.
-fn warning(scene: &Scene, key: &str) -> Option<&'static str> {
-    let contact = match key
-        .strip_prefix("joint.")
-        .and_then(|rest| rest.rsplit_once('.'))
-    {
-        Some((joint, _)) => &scene.ball_joints.iter().find(|j| j.name == joint)?.contact,
-        None => &scene.contact,
-    };
-    match key.rsplit('.').next()? {
-        "restitution"
-            if contact.normal_law == NormalLaw::LankaraniNikravesh && contact.restitution < 0.8 =>
-        {
-            Some(
-                "The Lankarani-Nikravesh law is right only near 1: it rebounds more than asked. Try the Gonthier or Flores law.",
-            )
-        }
-        "clearance" if contact.clearance > 0.0 && contact.clearance <= 1e-5 => Some(
-            "Hertz contact assumes a contact patch that is small against the ball: below about 0.01 mm it is not.",
-        ),
-        _ => None,
-    }
-}

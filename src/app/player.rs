@@ -22,6 +22,8 @@ pub struct Player {
     /// The scene as its file gives it.
     original: Scene,
     waiting: BTreeSet<String>,
+    /// What is allowed but may not mean what the user expects.
+    warnings: Vec<String>,
     playing: bool,
     stopped: Option<Stopped>,
     frame: Frame,
@@ -48,6 +50,7 @@ impl Player {
             wanted: scene.clone(),
             original,
             waiting: BTreeSet::new(),
+            warnings: scene.warnings(),
             playing: false,
             stopped: None,
             frame: Frame::default(),
@@ -160,6 +163,7 @@ impl Player {
         self.simulation.reset()?;
         self.wanted = self.simulation.scene().clone();
         self.waiting.clear();
+        self.warnings = self.wanted.warnings();
         self.stopped = None;
         let channels = Channels::of(&self.wanted);
         if channels.list() != self.channels.list() {
@@ -180,6 +184,7 @@ impl Player {
             // The running scene took it: what it now holds is what is wanted.
             self.wanted = self.simulation.scene().clone();
         }
+        self.warnings = self.wanted.warnings();
         if effect == Effect::AtReset {
             self.waiting.insert(key.to_owned());
         }
@@ -194,6 +199,17 @@ impl Player {
     /// Whether any change waits for a reset.
     pub fn has_waiting(&self) -> bool {
         !self.waiting.is_empty()
+    }
+
+    /// What to know about the present value of `key`, if anything.
+    pub fn warning(&self, key: &str) -> Option<&str> {
+        let last = key.rsplit('.').next().unwrap_or(key);
+        let of_joint = format!(": {last} ");
+        let of_scene = format!("{key} ");
+        self.warnings
+            .iter()
+            .find(|warning| warning.contains(&of_joint) || warning.starts_with(&of_scene))
+            .map(String::as_str)
     }
 
     /// Value that the scene's file gives `key`.

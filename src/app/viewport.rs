@@ -120,8 +120,8 @@ impl Viewport {
     pub fn close_up(&mut self, player: &Player, joint: usize) {
         if joint < player.frame().joints.len() {
             let mut goal = self.camera;
-            self.view
-                .close_up(&mut goal, joint, player.frame(), &self.options);
+            let scene = player.simulation().scene();
+            self.view.close_up(&mut goal, joint, scene, player.frame(), &self.options);
             self.goal = Some(goal);
             self.fit_pending = false;
             self.follow(None);
@@ -171,36 +171,26 @@ impl Viewport {
             ui.ctx().request_repaint();
         }
         self.drag(ui, &response, rect, size, scale);
-        let pixel =
-            |pos: Pos2| Vec2::new((pos.x - rect.min.x) * scale, (pos.y - rect.min.y) * scale);
+        let shot = Shot {
+            scene: player.simulation().scene(),
+            frame: player.frame(),
+            arrows: &self.arrows,
+            options: &self.options,
+            camera: &self.camera,
+            trail: &self.trail,
+            size,
+            pixels_per_point: scale,
+        };
         let hovered = response
             .hover_pos()
             .filter(|_| !response.dragged())
-            .and_then(|pos| {
-                self.view.pick(
-                    player.frame(),
-                    &self.options,
-                    &self.camera,
-                    pixel(pos),
-                    size,
-                )
-            });
+            .map(|pos| (pos - rect.min) * scale)
+            .and_then(|pixel| self.view.pick(&shot, Vec2::new(pixel.x, pixel.y)));
+        // egui has dropped the clone of the frame before: nothing is copied.
+        self.view.build(&shot, Arc::make_mut(&mut self.list));
         if response.double_clicked() {
             self.follow(hovered.map(|hit| hit.what));
         }
-
-        let list = Arc::make_mut(&mut self.list);
-        self.view.build(
-            &Shot {
-                frame: player.frame(),
-                arrows: &self.arrows,
-                options: &self.options,
-                camera: &self.camera,
-                trail: &self.trail,
-                size,
-            },
-            list,
-        );
         let painter = ui.painter_at(rect);
         painter.add(render::Viewport::shape(rect, self.list.clone()));
         overlay::labels(&painter, rect, scale, &self.list);
