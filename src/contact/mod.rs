@@ -1,5 +1,9 @@
 //! Contact of a ball in its socket: pure functions of gap, rates and parameters. SI units, f64.
 
+mod law;
+
+pub use law::{Coefficients, damping_factor, hertz_stiffness, restitution_given, settled_penetration};
+
 /// Normal-force law of a contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NormalLaw {

@@ -1,4 +1,17 @@
 //! Time steppers and event location for any system of ordinary differential equations.
+//!
+//! A [`Stepper`] only *attempts* a step: it leaves the end state, an error estimate and an interpolant; whether the
+//! step counts is the caller's decision ([`Controller`] helps an adaptive one). Nothing here allocates after `new`.
+
+mod controller;
+mod dormand_prince;
+mod fixed;
+mod root;
+
+pub use controller::Controller;
+pub use dormand_prince::DormandPrince;
+pub use fixed::{RungeKutta4, SemiImplicitEuler};
+pub use root::find_root;
 
 /// Time-stepping method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,5 +28,123 @@ impl Method {
     /// Whether the step size is controlled by an error estimate.
     pub fn is_adaptive(self) -> bool {
         matches!(self, Self::DormandPrince5)
+    }
+}
+
+/// A first-order system y' = f(t, y) whose first [`System::positions`] components are positions.
+pub trait System {
+    /// Number of components of y.
+    fn dimension(&self) -> usize;
+    /// Number of leading components that are positions; the others are velocities.
+    fn positions(&self) -> usize;
+    /// f(t, y) into `dy`.
+    fn derivative(&mut self, t: f64, y: &[f64], dy: &mut [f64]);
+    /// The position part of f alone, into the first [`System::positions`] components of `dy`; evaluates no force.
+    fn position_rate(&mut self, t: f64, y: &[f64], dy: &mut [f64]);
+    /// Absolute scale of each component: an error of `tolerance * scale` is acceptable.
+    fn scale(&self) -> &[f64];
+}
+
+/// One-step method.
+pub trait Stepper {
+    /// Tries a step of size `h` from (`t`, `y`), where `k` = f(t, y), into `y_end`.
+    ///
+    /// On return `k_end` is f(t + h, y_end) if [`Self::ends_with_derivative`]. Returns the error estimate relative to
+    /// the system's scales (largest component; 0 for a fixed-step method), not yet divided by the tolerance.
+    fn attempt<S: System>(
+        &mut self,
+        system: &mut S,
+        t: f64,
+        h: f64,
+        y: &[f64],
+        k: &[f64],
+        y_end: &mut [f64],
+        k_end: &mut [f64],
+    ) -> f64;
+
+    /// Whether `attempt` leaves f(t + h, y_end) in `k_end`.
+    fn ends_with_derivative(&self) -> bool;
+
+    /// State at `t + theta h` of the latest attempt, 0 <= theta <= 1, given its ends.
+    fn interpolate(&self, theta: f64, h: f64, y: &[f64], k: &[f64], y_end: &[f64], k_end: &[f64], out: &mut [f64]);
+}
+
+/// Cubic Hermite interpolation between two states with their derivatives; error O(h^4).
+pub fn hermite(theta: f64, h: f64, y: &[f64], k: &[f64], y_end: &[f64], k_end: &[f64], out: &mut [f64]) {
+    let s = 1.0 - theta;
+    for i in 0..out.len() {
+        let d = y_end[i] - y[i];
+        out[i] = s * y[i]
+            + theta * y_end[i]
+            + theta * (theta - 1.0) * ((1.0 - 2.0 * theta) * d + (theta - 1.0) * h * k[i] + theta * h * k_end[i]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// x'' = -x with x(0) = 1, x'(0) = 0.
+    struct Oscillator;
+
+    impl System for Oscillator {
+        fn dimension(&self) -> usize {
+            2
+        }
+        fn positions(&self) -> usize {
+            1
+        }
+        fn derivative(&mut self, _t: f64, y: &[f64], dy: &mut [f64]) {
+            dy[0] = y[1];
+            dy[1] = -y[0];
+        }
+        fn position_rate(&mut self, _t: f64, y: &[f64], dy: &mut [f64]) {
+            dy[0] = y[1];
+        }
+        fn scale(&self) -> &[f64] {
+            &[1.0, 1.0]
+        }
+    }
+
+    fn end_error(stepper: &mut impl Stepper, steps: u32) -> f64 {
+        let (mut y, mut k, mut y1, mut k1) = ([1.0, 0.0], [0.0; 2], [0.0; 2], [0.0; 2]);
+        let h = 2.0 / f64::from(steps);
+        for n in 0..steps {
+            let t = f64::from(n) * h;
+            Oscillator.derivative(t, &y, &mut k);
+            stepper.attempt(&mut Oscillator, t, h, &y, &k, &mut y1, &mut k1);
+            y = y1;
+        }
+        (y[0] - libm::cos(2.0)).abs().max((y[1] + libm::sin(2.0)).abs())
+    }
+
+    fn observed_order(stepper: &mut impl Stepper, steps: u32) -> f64 {
+        libm::log2(end_error(stepper, steps) / end_error(stepper, 2 * steps))
+    }
+
+    #[test]
+    fn each_stepper_shows_its_order() {
+        let euler = observed_order(&mut SemiImplicitEuler::new(2), 400);
+        let rk4 = observed_order(&mut RungeKutta4::new(2), 40);
+        let dopri = observed_order(&mut DormandPrince::new(2), 20);
+        assert!((euler - 1.0).abs() < 0.1, "semi-implicit Euler: {euler}");
+        assert!((rk4 - 4.0).abs() < 0.1, "Runge-Kutta 4: {rk4}");
+        assert!((dopri - 5.0).abs() < 0.2, "Dormand-Prince: {dopri}");
+    }
+
+    fn interpolation_error(h: f64) -> f64 {
+        let (mut k, mut y1, mut k1, mut out) = ([0.0; 2], [0.0; 2], [0.0; 2], [0.0; 2]);
+        let y = [1.0, 0.0];
+        let mut stepper = DormandPrince::new(2);
+        Oscillator.derivative(0.0, &y, &mut k);
+        stepper.attempt(&mut Oscillator, 0.0, h, &y, &k, &mut y1, &mut k1);
+        stepper.interpolate(0.37, h, &y, &k, &y1, &k1, &mut out);
+        (out[0] - libm::cos(0.37 * h)).abs().max((out[1] + libm::sin(0.37 * h)).abs())
+    }
+
+    #[test]
+    fn dormand_prince_interpolates_to_fourth_order() {
+        let order = libm::log2(interpolation_error(0.4) / interpolation_error(0.2));
+        assert!(order > 4.5, "local order {order}: a continuous extension of order 4 has 5");
     }
 }

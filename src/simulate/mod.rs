@@ -1,25 +1,32 @@
 //! A running simulation: state, stepping, live changes, recorded channels, divergence guard.
 
+mod angles;
+mod channels;
 mod frame;
+mod history;
+mod pace;
+mod peaks;
+mod report;
+mod simulation;
+mod stepper;
 
+pub use angles::angles_of;
+pub use channels::*;
 pub use frame::*;
+pub use history::History;
+pub use pace::{LARGEST_BUDGET, LONGEST_FRAME, Pacer, SCALE_RANGE};
+pub use simulation::{CLEARANCE_SPEED, Simulation};
 
+use crate::mechanism::MechanismError;
 use crate::scene::Scene;
 
-/// A scene in motion.
-///
-/// Depends on no clock: the same scene and the same calls give the same bits.
-pub struct Simulation {
-    scene: Scene,
-}
-
 /// Why a simulation could not start.
-#[derive(Debug, Clone, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{0}")]
-pub struct StartError(pub String);
+pub struct StartError(#[from] pub MechanismError);
 
 /// Why a simulation stopped: the divergence guard. The state is the last good one.
-#[derive(Debug, Clone, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("stopped at t = {time:.6e} s: {what}; {advice}")]
 pub struct Stopped {
     /// Time of the last good state, s.
@@ -40,7 +47,7 @@ pub enum Effect {
 }
 
 /// Counters since the last reset.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default)]
 pub struct Statistics {
     /// Accepted steps.
     pub steps: u64,
@@ -56,108 +63,34 @@ pub struct Statistics {
     pub peak_time: Vec<f64>,
     /// Time of the last separation, per ball joint, s; NaN if none.
     pub last_separation: Vec<f64>,
-    /// Largest constraint drift seen, m (rad for orientation rows); 0 where the scene has no constraint.
+    /// Largest constraint violation of the `lagrange` form so far, m (rad for orientation rows).
     pub constraint_drift: f64,
 }
 
-/// The whole state: restoring it resumes with the same bits.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Snapshot {
-    // filled by the simulation core
+impl PartialEq for Statistics {
+    /// Bit by bit, so that "no separation yet" equals itself.
+    fn eq(&self, other: &Self) -> bool {
+        let bits = |v: &[f64]| v.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+        (self.steps, self.evaluations, self.rejected) == (other.steps, other.evaluations, other.rejected)
+            && self.impacts == other.impacts
+            && bits(&self.peak_normal) == bits(&other.peak_normal)
+            && bits(&self.peak_time) == bits(&other.peak_time)
+            && bits(&self.last_separation) == bits(&other.last_separation)
+            && self.constraint_drift.to_bits() == other.constraint_drift.to_bits()
+    }
 }
 
-impl Simulation {
-    /// Starts `scene` at t = 0.
-    ///
-    /// # Errors
-    /// Ball joints that do not close, a trajectory that the rods cannot reach, a scene the formulation cannot hold.
-    pub fn new(_scene: &Scene) -> Result<Self, StartError> {
-        todo!()
-    }
+/// The whole state of a simulation: restoring it resumes with the same bits.
+#[derive(Debug, Clone)]
+pub struct Snapshot {
+    scene: Scene,
+    running: Scene,
+    state: simulation::State,
+}
 
-    /// The scene as it runs, live changes applied.
+impl Snapshot {
+    /// The scene it belongs to, as it ran.
     pub fn scene(&self) -> &Scene {
-        &self.scene
-    }
-
-    /// Time of the latest state, s.
-    pub fn time(&self) -> f64 {
-        todo!()
-    }
-
-    /// Time at the start of the latest step, s: [`Self::sample`] accepts times from here to [`Self::time`].
-    pub fn step_start(&self) -> f64 {
-        todo!()
-    }
-
-    /// One accepted step.
-    ///
-    /// # Errors
-    /// The divergence guard; the state is then the last good one.
-    pub fn step(&mut self) -> Result<(), Stopped> {
-        todo!()
-    }
-
-    /// Steps until [`Self::time`] is at least `time`, never shortening a step.
-    ///
-    /// # Errors
-    /// As [`Self::step`].
-    pub fn advance_to(&mut self, _time: f64) -> Result<(), Stopped> {
-        todo!()
-    }
-
-    /// One step that ends at `end` at the latest, exactly there if it would pass it.
-    ///
-    /// # Errors
-    /// As [`Self::step`].
-    pub fn step_until(&mut self, _end: f64) -> Result<(), Stopped> {
-        todo!()
-    }
-
-    /// Everything at `time`, interpolated within the latest step; forces come from the interpolated state.
-    /// Allocates only while `out` is too small.
-    pub fn sample(&mut self, _time: f64, _out: &mut Frame) {
-        todo!()
-    }
-
-    /// Peaks per ball joint since the last call, written to `out` in joint order, and forgotten here.
-    pub fn take_peaks(&mut self, _out: &mut Vec<Peak>) {
-        todo!()
-    }
-
-    /// Changes a parameter (`contact.clearance`, `joint.S1.friction`, …) to a value as a user writes it.
-    ///
-    /// # Errors
-    /// Unknown key, bad unit, out of range: the running simulation is unchanged.
-    pub fn set(&mut self, _key: &str, _value: &str) -> Result<Effect, crate::scene::SceneError> {
-        todo!()
-    }
-
-    /// Back to t = 0 with the parameters as they are now, those that wait for a reset included.
-    ///
-    /// # Errors
-    /// As [`Self::new`]; the simulation is then unchanged.
-    pub fn reset(&mut self) -> Result<(), StartError> {
-        todo!()
-    }
-
-    /// The whole state.
-    pub fn snapshot(&self) -> Snapshot {
-        todo!()
-    }
-
-    /// Goes back to a state of this scene.
-    pub fn restore(&mut self, _snapshot: &Snapshot) {
-        todo!()
-    }
-
-    /// Counters since the last reset.
-    pub fn statistics(&self) -> &Statistics {
-        todo!()
-    }
-
-    /// FNV-1a (64 bit) over the bits of the whole state, contact memory included.
-    pub fn state_hash(&self) -> u64 {
-        todo!()
+        &self.running
     }
 }

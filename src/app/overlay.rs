@@ -1,0 +1,172 @@
+//! What the interface paints over a picture: labels, the legend of the arrows, the time. Used by the viewport and
+//! by headless frames.
+
+use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, pos2, vec2};
+
+use super::value;
+use super::viewport::lower_right;
+use crate::scene::{Scene, format_quantity_digits};
+use crate::simulate::{ContactState, Frame};
+use crate::view::{Colour, DrawList, LabelKind, Legend, Palette, Scaling, Theme};
+
+/// Distance of overlays from the edge, points.
+const MARGIN: f32 = 14.0;
+
+fn colour(colour: Colour) -> Color32 {
+    let [r, g, b, a] = colour.to_rgba8();
+    Color32::from_rgba_unmultiplied(r, g, b, a)
+}
+
+/// Text with a halo in the colour of the ground, readable over anything.
+fn text(
+    painter: &Painter,
+    at: Pos2,
+    anchor: Align2,
+    text: &str,
+    size: f32,
+    ink: Color32,
+    halo: Color32,
+) -> Rect {
+    let font = FontId::proportional(size);
+    let halo = halo.gamma_multiply(0.75);
+    for (dx, dy) in [(-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0)] {
+        painter.text(at + vec2(dx, dy), anchor, text, font.clone(), halo);
+    }
+    painter.text(at, anchor, text, font, ink)
+}
+
+/// Names of joints and axes at their places.
+pub fn labels(painter: &Painter, rect: Rect, scale: f32, list: &DrawList) {
+    let halo = colour(list.background.bottom);
+    for label in &list.labels {
+        let at = rect.min + vec2(label.pixel.x, label.pixel.y) / scale;
+        let (anchor, shift, size) = match label.kind {
+            LabelKind::Joint(_) => (Align2::LEFT_BOTTOM, vec2(8.0, -8.0), 13.0),
+            LabelKind::Axis | LabelKind::Gravity => (Align2::CENTER_CENTER, vec2(0.0, 0.0), 12.0),
+        };
+        text(
+            painter,
+            at + shift,
+            anchor,
+            &label.text,
+            size,
+            colour(label.colour),
+            halo,
+        );
+    }
+}
+
+/// Simulated time in the upper left corner, with notes below it.
+pub fn time(painter: &Painter, rect: Rect, time: f64, notes: &[String], theme: Theme) {
+    let palette = Palette::of(theme);
+    let (ink, halo) = (colour(palette.text), colour(palette.sky));
+    let mut at = rect.min + vec2(MARGIN, MARGIN);
+    let line = format!("t = {}", value::time(time));
+    at.y = text(painter, at, Align2::LEFT_TOP, &line, 18.0, ink, halo)
+        .max
+        .y
+        + 2.0;
+    for note in notes.iter().filter(|note| !note.is_empty()) {
+        at.y = text(
+            painter,
+            at,
+            Align2::LEFT_TOP,
+            note,
+            13.0,
+            ink.gamma_multiply(0.8),
+            halo,
+        )
+        .max
+        .y + 1.0;
+    }
+}
+
+/// One line per ball joint: its forces as the step reported them.
+pub fn force_notes(scene: &Scene, frame: &Frame) -> Vec<String> {
+    let newtons = |force: &crate::scene::Vec3| format_quantity_digits(force.norm(), "N", 4);
+    scene
+        .ball_joints
+        .iter()
+        .zip(&frame.joints)
+        .map(|(joint, report)| match report.state {
+            ContactState::Free => format!("{}  free", joint.name),
+            ContactState::Ideal => {
+                format!("{}  reaction {}", joint.name, newtons(&report.normal_force))
+            }
+            ContactState::Stick | ContactState::Slip => format!(
+                "{}  normal {}, friction {}",
+                joint.name,
+                newtons(&report.normal_force),
+                newtons(&report.friction_force)
+            ),
+        })
+        .collect()
+}
+
+/// How to read the arrows, in the lower right corner.
+pub fn legend(painter: &Painter, rect: Rect, scale: f32, legend: &Legend, theme: Theme) {
+    let palette = Palette::of(theme);
+    let (ink, halo) = (colour(palette.text), colour(palette.sky));
+    let full = legend.pixels / scale;
+    let longest = rect.width() * 0.4;
+    // Seen from near, the reference arrow may be wider than the view: show the part that fits.
+    let shown = full.min(longest);
+    let corner = lower_right(rect, MARGIN);
+    let axis = corner.y - 18.0;
+    let left = corner.x - shown;
+    painter.line_segment(
+        [pos2(left, axis), pos2(corner.x, axis)],
+        Stroke::new(1.5, ink),
+    );
+    let mut free_from = f32::NEG_INFINITY;
+    for tick in legend
+        .ticks
+        .iter()
+        .filter(|tick| tick.fraction * full <= shown + 0.5)
+    {
+        let x = left + tick.fraction * full;
+        painter.line_segment(
+            [pos2(x, axis - 4.0), pos2(x, axis + 4.0)],
+            Stroke::new(1.5, ink),
+        );
+        let words = format_quantity_digits(f64::from(tick.force), "", 3);
+        // Left out where it would touch the mark before it.
+        if x - 12.0 >= free_from {
+            let placed = text(
+                painter,
+                pos2(x, axis + 5.0),
+                Align2::CENTER_TOP,
+                &words,
+                11.0,
+                ink,
+                halo,
+            );
+            free_from = placed.max.x + 4.0;
+        }
+    }
+    let mut at = pos2(corner.x, axis - 8.0);
+    let mut title = match legend.scaling {
+        Scaling::Linear => "Force on the ball, N".to_owned(),
+        Scaling::Logarithmic => "Force on the ball, N (logarithmic)".to_owned(),
+    };
+    if legend.clipped {
+        title.push_str(", longer ones cut");
+    }
+    at.y = text(painter, at, Align2::RIGHT_BOTTOM, &title, 12.0, ink, halo)
+        .min
+        .y
+        - 2.0;
+    for (name, hue) in [("friction", legend.friction), ("normal", legend.normal)] {
+        let Some(hue) = hue else {
+            continue;
+        };
+        let placed = text(painter, at, Align2::RIGHT_BOTTOM, name, 12.0, ink, halo);
+        let y = placed.center().y;
+        painter.arrow(
+            pos2(placed.min.x - 30.0, y),
+            vec2(24.0, 0.0),
+            Stroke::new(2.5, colour(hue)),
+        );
+        at.y = placed.min.y - 1.0;
+    }
+}

@@ -1,0 +1,265 @@
+//! A running scene with its transport: playing, pacing, recording, peaks and what went wrong. No egui here.
+
+use std::collections::BTreeSet;
+
+use web_time::Instant;
+
+use crate::scene::{Scene, SceneError, Value};
+use crate::simulate::{
+    Channels, Effect, Frame, History, Pacer, Peak, Simulation, StartError, Stopped,
+};
+
+/// Narrowest bin of the record, s: shorter than any step that resolves an impact.
+const FINEST_BIN: f64 = 2e-6;
+
+/// A simulation and everything needed to play and plot it.
+pub struct Player {
+    /// How fast simulated time passes.
+    pub pacer: Pacer,
+    simulation: Simulation,
+    /// The scene as the user wants it: with the changes that still wait for a reset.
+    wanted: Scene,
+    /// The scene as its file gives it.
+    original: Scene,
+    waiting: BTreeSet<String>,
+    /// What is allowed but may not mean what the user expects.
+    warnings: Vec<String>,
+    playing: bool,
+    stopped: Option<Stopped>,
+    frame: Frame,
+    peaks: Vec<Peak>,
+    channels: Channels,
+    history: History,
+    recorded: Frame,
+    values: Vec<f64>,
+}
+
+impl Player {
+    /// Starts `scene` at t = 0, paused.
+    ///
+    /// # Errors
+    /// As [`Simulation::new`].
+    pub fn new(scene: &Scene) -> Result<Self, StartError> {
+        let simulation = Simulation::new(scene)?;
+        // The text was read once already; should it no longer read, a control's default is its present value.
+        let original = Scene::parse(&scene.source.text, scene.source.file.as_deref(), &[])
+            .unwrap_or_else(|_| scene.clone());
+        let channels = Channels::of(scene);
+        let mut player = Self {
+            pacer: Pacer::default(),
+            wanted: scene.clone(),
+            original,
+            waiting: BTreeSet::new(),
+            warnings: scene.warnings(),
+            playing: false,
+            stopped: None,
+            frame: Frame::default(),
+            peaks: Vec::new(),
+            history: History::new(channels.len(), FINEST_BIN),
+            channels,
+            recorded: Frame::default(),
+            values: Vec::new(),
+            simulation,
+        };
+        player.start_record();
+        Ok(player)
+    }
+
+    /// The simulation.
+    pub fn simulation(&self) -> &Simulation {
+        &self.simulation
+    }
+
+    /// The scene as the user wants it: with the changes that still wait for a reset.
+    pub fn wanted(&self) -> &Scene {
+        &self.wanted
+    }
+
+    /// What is on show.
+    pub fn frame(&self) -> &Frame {
+        &self.frame
+    }
+
+    /// Strongest instants since the frame before, per ball joint.
+    pub fn peaks(&self) -> &[Peak] {
+        &self.peaks
+    }
+
+    /// Which channels are recorded.
+    pub fn channels(&self) -> &Channels {
+        &self.channels
+    }
+
+    /// The recorded past.
+    pub fn history(&self) -> &History {
+        &self.history
+    }
+
+    /// Whether time passes.
+    pub fn is_playing(&self) -> bool {
+        self.playing
+    }
+
+    /// Lets time pass, or stand still. A stopped run does not start again before a reset.
+    pub fn set_playing(&mut self, playing: bool) {
+        self.playing = playing && self.stopped.is_none();
+        if self.playing {
+            // The average of the reached speed starts anew.
+            self.pacer.jump(self.pacer.shown());
+        }
+    }
+
+    /// Why the divergence guard stopped the run.
+    pub fn stopped(&self) -> Option<&Stopped> {
+        self.stopped.as_ref()
+    }
+
+    /// Moves on by one frame that comes `dt` seconds after the last, and refreshes what is on show.
+    pub fn advance(&mut self, dt: f64) {
+        if self.playing {
+            let target = self.pacer.begin(dt);
+            let clock = Instant::now();
+            while self.simulation.time() < target
+                && self.pacer.may_step(clock.elapsed().as_secs_f64())
+            {
+                if !self.step() {
+                    break;
+                }
+            }
+            self.pacer.end(dt, target, self.simulation.time());
+            self.simulation.sample(self.pacer.shown(), &mut self.frame);
+        }
+        self.take_peaks();
+    }
+
+    /// One accepted step, shown at once.
+    pub fn single_step(&mut self) {
+        self.playing = false;
+        if self.stopped.is_some() {
+            return;
+        }
+        self.step();
+        self.show_latest();
+    }
+
+    /// Pauses and runs on until `time`, s, whatever it takes: the start of a headless frame.
+    pub fn run_to(&mut self, time: f64) {
+        self.playing = false;
+        while self.simulation.time() < time && self.stopped.is_none() {
+            self.step();
+        }
+        let shown = time
+            .min(self.simulation.time())
+            .max(self.simulation.step_start());
+        self.pacer.jump(shown);
+        self.simulation.sample(shown, &mut self.frame);
+    }
+
+    /// Back to t = 0 with every change applied.
+    ///
+    /// # Errors
+    /// As [`Simulation::reset`]; nothing has changed then.
+    pub fn reset(&mut self) -> Result<(), StartError> {
+        self.simulation.reset()?;
+        self.wanted = self.simulation.scene().clone();
+        self.waiting.clear();
+        self.warnings = self.wanted.warnings();
+        self.stopped = None;
+        let channels = Channels::of(&self.wanted);
+        if channels.list() != self.channels.list() {
+            self.history = History::new(channels.len(), FINEST_BIN);
+            self.channels = channels;
+        }
+        self.start_record();
+        Ok(())
+    }
+
+    /// Changes a parameter to a value as a user writes it.
+    ///
+    /// # Errors
+    /// As [`Simulation::set`]; nothing has changed then.
+    pub fn set(&mut self, key: &str, value: &str) -> Result<Effect, SceneError> {
+        let effect = self.simulation.set(key, value)?;
+        if self.wanted.set(key, value).is_err() {
+            // The running scene took it: what it now holds is what is wanted.
+            self.wanted = self.simulation.scene().clone();
+        }
+        self.warnings = self.wanted.warnings();
+        if effect == Effect::AtReset {
+            self.waiting.insert(key.to_owned());
+        }
+        Ok(effect)
+    }
+
+    /// Whether `key` was changed and waits for a reset.
+    pub fn is_waiting(&self, key: &str) -> bool {
+        self.waiting.contains(key)
+    }
+
+    /// Whether any change waits for a reset.
+    pub fn has_waiting(&self) -> bool {
+        !self.waiting.is_empty()
+    }
+
+    /// What to know about the present value of `key`, if anything.
+    pub fn warning(&self, key: &str) -> Option<&str> {
+        let last = key.rsplit('.').next().unwrap_or(key);
+        let of_joint = format!(": {last} ");
+        let of_scene = format!("{key} ");
+        self.warnings
+            .iter()
+            .find(|warning| warning.contains(&of_joint) || warning.starts_with(&of_scene))
+            .map(String::as_str)
+    }
+
+    /// Value that the scene's file gives `key`.
+    pub fn original(&self, key: &str) -> Option<Value> {
+        self.original.get(key).ok()
+    }
+
+    /// One step with its record; false when the guard stopped it.
+    fn step(&mut self) -> bool {
+        match self.simulation.step() {
+            Ok(()) => {
+                self.record();
+                true
+            }
+            Err(stopped) => {
+                self.playing = false;
+                self.stopped = Some(stopped);
+                false
+            }
+        }
+    }
+
+    fn record(&mut self) {
+        let time = self.simulation.time();
+        self.simulation.sample(time, &mut self.recorded);
+        self.channels.read(&self.recorded, &mut self.values);
+        self.history.push(time, &self.values);
+    }
+
+    fn show_latest(&mut self) {
+        self.pacer.jump(self.simulation.time());
+        self.simulation
+            .sample(self.simulation.time(), &mut self.frame);
+    }
+
+    fn start_record(&mut self) {
+        self.history.clear();
+        self.show_latest();
+        self.record();
+        self.simulation.take_peaks(&mut self.peaks);
+    }
+
+    fn take_peaks(&mut self) {
+        self.simulation.take_peaks(&mut self.peaks);
+        for (joint, peak) in self.peaks.iter().enumerate() {
+            if let Some(channel) = self.channels.normal_force(joint)
+                && peak.normal > 0.0
+            {
+                self.history.widen(peak.time, channel, peak.normal);
+            }
+        }
+    }
+}

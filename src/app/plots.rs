@@ -1,0 +1,289 @@
+//! Live plots of the recorded channels: one plot per quantity, one line per joint, axis or kind.
+
+use eframe::egui::{self, ComboBox, RichText, Ui, Vec2b, vec2};
+use egui_plot::{
+    Corner, HLine, HoverPosition, Legend, Line, LineStyle, Plot, PlotPoint, PlotPoints,
+};
+
+use super::player::Player;
+use super::{theme, value};
+use crate::simulate::{Quantity, RECORDED_JOINTS};
+
+/// Bins asked of the record for one line: two points each.
+const BINS: usize = 400;
+/// Seconds of viewing that the automatic window shows.
+const AUTOMATIC: f64 = 5.0;
+/// Windows to choose from, s.
+const WINDOWS: [f64; 6] = [1e-3, 1e-2, 0.05, 0.1, 1.0, 10.0];
+/// Height below which a plot says nothing.
+const LEAST_HEIGHT: f32 = 110.0;
+
+/// How much of the past the plots show.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Window {
+    /// The last seconds of viewing, whatever the time scale.
+    Automatic,
+    /// The last so many simulated seconds.
+    Last(f64),
+    /// Since the reset.
+    Everything,
+}
+
+/// Which plots are shown and how.
+pub struct Plots {
+    /// Quantities on show, in the order of [`Quantity::ALL`].
+    pub chosen: Vec<Quantity>,
+    /// Time window.
+    pub window: Window,
+    points: Vec<[f64; 2]>,
+    lines: Vec<Vec<PlotPoint>>,
+}
+
+impl Default for Plots {
+    fn default() -> Self {
+        Self {
+            chosen: vec![Quantity::NormalForce, Quantity::Eccentricity],
+            window: Window::Automatic,
+            points: Vec::new(),
+            lines: Vec::new(),
+        }
+    }
+}
+
+impl Plots {
+    /// Which quantities and how much of the past.
+    pub fn header(&mut self, ui: &mut Ui, player: &Player) {
+        ui.horizontal_wrapped(|ui| {
+            ui.label(RichText::new("Plots").strong());
+            let menu = egui::containers::menu::MenuConfig::new()
+                .close_behavior(egui::PopupCloseBehavior::CloseOnClickOutside);
+            egui::containers::menu::MenuButton::new("Choose plots")
+                .config(menu)
+                .ui(ui, |ui| self.menu(ui, player));
+            ui.label("Window");
+            ComboBox::from_id_salt("window")
+                .width(110.0)
+                .selected_text(self.window.label())
+                .show_ui(ui, |ui| {
+                    let all = [Window::Automatic]
+                        .into_iter()
+                        .chain(WINDOWS.map(Window::Last))
+                        .chain([Window::Everything]);
+                    for window in all {
+                        ui.selectable_value(&mut self.window, window, window.label());
+                    }
+                })
+                .response
+                .on_hover_text("Simulated time that the plots show")
+                .accessible_name("Window");
+        });
+    }
+
+    fn menu(&mut self, ui: &mut Ui, player: &Player) {
+        for quantity in Quantity::ALL {
+            if !player
+                .channels()
+                .list()
+                .iter()
+                .any(|c| c.quantity == quantity)
+            {
+                continue;
+            }
+            let mut on = self.chosen.contains(&quantity);
+            let label = format!("{}, {}", quantity.label(), quantity.unit().0);
+            if ui
+                .checkbox(&mut on, label)
+                .on_hover_text(quantity.help())
+                .changed()
+            {
+                self.chosen.retain(|q| *q != quantity);
+                if on {
+                    self.chosen.push(quantity);
+                    self.chosen
+                        .sort_by_key(|q| Quantity::ALL.iter().position(|a| a == q));
+                }
+            }
+        }
+        if player.simulation().scene().ball_joints.len() > RECORDED_JOINTS {
+            ui.label(
+                RichText::new(format!(
+                    "The first {RECORDED_JOINTS} ball joints are recorded"
+                ))
+                .small()
+                .weak(),
+            );
+        }
+    }
+
+    /// The chosen plots, beside each other where there is room, else below each other.
+    pub fn ui(&mut self, ui: &mut Ui, player: &Player) {
+        let chosen: Vec<Quantity> = self
+            .chosen
+            .iter()
+            .copied()
+            .filter(|q| player.channels().list().iter().any(|c| c.quantity == *q))
+            .collect();
+        if chosen.is_empty() {
+            ui.label(RichText::new("No plot chosen").weak());
+            return;
+        }
+        let space = ui.available_size();
+        let columns = ((space.x / 300.0).floor() as usize).clamp(1, chosen.len());
+        let rows = chosen.len().div_ceil(columns);
+        let gap = ui.spacing().item_spacing;
+        let width = (space.x - gap.x * (columns - 1) as f32) / columns as f32;
+        let height = ((space.y - gap.y * (rows - 1) as f32) / rows as f32).max(LEAST_HEIGHT);
+        egui::ScrollArea::vertical()
+            .id_salt("plots")
+            .show(ui, |ui| {
+                for row in chosen.chunks(columns) {
+                    ui.horizontal(|ui| {
+                        for quantity in row {
+                            ui.allocate_ui(vec2(width, height), |ui| {
+                                self.plot(ui, player, *quantity, height)
+                            });
+                        }
+                    });
+                }
+            });
+    }
+
+    fn plot(&mut self, ui: &mut Ui, player: &Player, quantity: Quantity, height: f32) {
+        let (unit, size) = quantity.unit();
+        let end = player.pacer.shown();
+        let length = match self.window {
+            Window::Automatic => AUTOMATIC * player.pacer.scale(),
+            Window::Last(length) => length,
+            Window::Everything => end.max(1e-4),
+        };
+        // A window that starts before t = 0 fills from the left.
+        let (from, to) = if end < length {
+            (0.0, length)
+        } else {
+            (end - length, end)
+        };
+        let (time_unit, time_size) = time_axis(length);
+
+        let members: Vec<(usize, &str)> = player
+            .channels()
+            .list()
+            .iter()
+            .enumerate()
+            .filter(|(_, channel)| channel.quantity == quantity)
+            .map(|(index, channel)| (index, channel.member.as_str()))
+            .collect();
+        self.lines
+            .resize_with(members.len().max(self.lines.len()), Vec::new);
+        for ((channel, _), line) in members.iter().zip(&mut self.lines) {
+            self.points.clear();
+            player
+                .history()
+                .query(*channel, from, to, BINS, &mut self.points);
+            line.clear();
+            line.extend(
+                self.points
+                    .iter()
+                    .map(|p| PlotPoint::new(p[0] / time_size, p[1] / size)),
+            );
+        }
+
+        ui.vertical(|ui| {
+            ui.label(RichText::new(format!("{}, {unit}", quantity.label())).small())
+                .on_hover_text(quantity.help());
+            let dark = ui.visuals().dark_mode;
+            let mut plot = Plot::new(("plot", quantity))
+                .height((height - 20.0).max(60.0))
+                .allow_drag(false)
+                .allow_zoom(false)
+                .allow_scroll(false)
+                .allow_boxed_zoom(false)
+                .allow_axis_zoom_drag(false)
+                .allow_double_click_reset(false)
+                .auto_bounds(Vec2b::new(false, true))
+                .x_axis_formatter(move |mark, _| format!("{} {time_unit}", short(mark.value)))
+                .y_axis_formatter(|mark, _| short(mark.value))
+                .y_axis_min_width(44.0)
+                .label_formatter(move |position| match position {
+                    HoverPosition::NearDataPoint {
+                        plot_name,
+                        position,
+                        ..
+                    } => Some(format!(
+                        "{plot_name}\n{} {unit}\nat {} {time_unit}",
+                        significant(position.y),
+                        significant(position.x)
+                    )),
+                    HoverPosition::Elsewhere { .. } => None,
+                })
+                .legend(
+                    Legend::default()
+                        .position(Corner::LeftTop)
+                        .background_alpha(0.6),
+                );
+            if matches!(
+                quantity,
+                Quantity::NormalForce | Quantity::FrictionForce | Quantity::Eccentricity
+            ) {
+                plot = plot.include_y(0.0);
+            }
+            plot.show(ui, |plot| {
+                plot.set_plot_bounds_x(from / time_size..=to / time_size);
+                if quantity == Quantity::Eccentricity {
+                    let clearance = player.simulation().scene().contact.clearance / size;
+                    plot.hline(
+                        HLine::new("clearance", clearance)
+                            .color(egui::Color32::GRAY)
+                            .style(LineStyle::dashed_loose())
+                            .width(1.0),
+                    );
+                }
+                for (index, ((_, member), line)) in members.iter().zip(&self.lines).enumerate() {
+                    plot.line(
+                        Line::new(*member, PlotPoints::Borrowed(line))
+                            .color(theme::series(index, dark))
+                            .width(1.4),
+                    );
+                }
+            });
+        });
+    }
+}
+
+impl Window {
+    fn label(self) -> String {
+        match self {
+            Self::Automatic => "Automatic".to_owned(),
+            Self::Last(length) => {
+                let (unit, size) = time_axis(length * 0.1);
+                format!("{} {unit}", significant(length / size))
+            }
+            Self::Everything => "Everything".to_owned(),
+        }
+    }
+}
+
+/// Unit of a time axis of this length, and its size in seconds.
+fn time_axis(length: f64) -> (&'static str, f64) {
+    if length >= 0.5 {
+        ("s", 1.0)
+    } else if length >= 5e-4 {
+        ("ms", 1e-3)
+    } else {
+        ("µs", 1e-6)
+    }
+}
+
+/// A mark on an axis.
+fn short(mark: f64) -> String {
+    value_text(mark, 5)
+}
+
+fn significant(number: f64) -> String {
+    value_text(number, 4)
+}
+
+fn value_text(number: f64, digits: usize) -> String {
+    // The grid's own rounding leaves dust where zero is meant.
+    let number = if number.abs() < 1e-12 { 0.0 } else { number };
+    value::number(number, digits)
+}

@@ -1,0 +1,232 @@
+//! Normal-force and friction laws.
+//!
+//! Every law here has the form F_N = K delta^1.5 (1 + chi delta_dot / delta_dot0), cut at 0 from below: they differ
+//! in the damping factor chi(ce) alone, so the force itself is one kernel.
+
+use super::{FrictionLaw, FrictionVelocity, NormalLaw, Parameters};
+
+/// Hertz stiffness K of a ball of radius `r` in a socket of radius `r + c`, N/m^1.5 (19):
+/// K = 4 / (3 (s_i + s_j)) sqrt(R r / (R - r)), s = (1 - nu^2) / E.
+pub fn hertz_stiffness(parameters: &Parameters, clearance: f64) -> f64 {
+    let r = parameters.ball_radius;
+    let s = (1.0 - parameters.poisson_ratio * parameters.poisson_ratio) / parameters.youngs_modulus;
+    4.0 / (6.0 * s) * ((r + clearance) * r / clearance).sqrt()
+}
+
+/// Penetration at which the undamped law carries `force` (N), m: where a settled contact of this load rests.
+pub fn settled_penetration(stiffness: f64, force: f64) -> f64 {
+    libm::cbrt((force / stiffness) * (force / stiffness))
+}
+
+/// Damping factor chi of a law for the restitution asked for.
+///
+/// - Lankarani & Nikravesh (1990): 3 (1 - ce^2) / 4, derived for ce near 1.
+/// - Hertz: 0.
+/// - Hunt & Crossley (1975): 3 (1 - ce) / 2.
+/// - Flores et al. (2011): 8 (1 - ce) / (5 ce).
+/// - Gonthier et al. (2004): the chi for which an undisturbed impact rebounds with exactly ce, the root of
+///   chi (1 + ce) = ln((1 + chi) / (1 - ce chi)).
+///
+/// Infinite where a law that divides by ce is given 0.
+pub fn damping_factor(law: NormalLaw, restitution: f64) -> f64 {
+    let ce = restitution;
+    match law {
+        NormalLaw::LankaraniNikravesh => 0.75 * (1.0 - ce * ce),
+        NormalLaw::Hertz => 0.0,
+        NormalLaw::HuntCrossley => 1.5 * (1.0 - ce),
+        NormalLaw::Flores => 8.0 * (1.0 - ce) / (5.0 * ce),
+        NormalLaw::Gonthier => exact_damping_factor(ce),
+    }
+}
+
+/// Excess of chi (1 + ce) over ln((1 + chi) / (1 - ce chi)): from dv/ddelta of m v dv = -K delta^1.5 (1 + chi v / v0)
+/// ddelta, whose right side integrates to zero over a whole impact whatever K and m.
+fn impact_balance(chi: f64, ce: f64) -> f64 {
+    chi * (1.0 + ce) - libm::log1p(chi) + libm::log1p(-ce * chi)
+}
+
+fn exact_damping_factor(ce: f64) -> f64 {
+    if ce >= 1.0 {
+        return 0.0;
+    }
+    // The balance is positive for small chi > 0 and falls to minus infinity at chi = 1 / ce.
+    let (mut low, mut high) = (0.0, 1.0 / ce);
+    for _ in 0..200 {
+        let middle = 0.5 * (low + high);
+        if impact_balance(middle, ce) > 0.0 {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    0.5 * (low + high)
+}
+
+/// Restitution that an undisturbed impact really gives under damping factor `chi`, from the closed integral of the law.
+pub fn restitution_given(chi: f64) -> f64 {
+    if chi <= 0.0 {
+        return 1.0;
+    }
+    let (mut low, mut high) = (0.0, (1.0 / chi).min(1.0));
+    for _ in 0..200 {
+        let middle = 0.5 * (low + high);
+        if impact_balance(chi, middle) > 0.0 {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    0.5 * (low + high)
+}
+
+/// What the force kernel reads, made once from [`Parameters`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Coefficients {
+    /// Hertz stiffness K, N/m^1.5.
+    pub stiffness: f64,
+    /// Damping factor chi.
+    pub damping: f64,
+    /// Coulomb coefficient; 0 where the friction law is none.
+    pub friction: f64,
+    /// v_a, m/s.
+    pub slip_low: f64,
+    /// v_theta, m/s.
+    pub slip_high: f64,
+    /// Least approach speed the damping term divides by, m/s.
+    pub speed_floor: f64,
+    /// Ball radius r, m.
+    pub ball_radius: f64,
+    /// Friction reads the surfaces' relative velocity, not the centres'.
+    pub surface: bool,
+}
+
+impl Coefficients {
+    /// For a joint whose clearance is `clearance` > 0 just now.
+    pub fn new(parameters: &Parameters, clearance: f64) -> Self {
+        Self {
+            stiffness: hertz_stiffness(parameters, clearance),
+            damping: damping_factor(parameters.normal_law, parameters.restitution),
+            friction: match parameters.friction_law {
+                FrictionLaw::ModifiedCoulomb => parameters.friction,
+                FrictionLaw::None => 0.0,
+            },
+            slip_low: parameters.slip_speed_low,
+            slip_high: parameters.slip_speed_high,
+            speed_floor: parameters.impact_speed_floor,
+            ball_radius: parameters.ball_radius,
+            surface: parameters.friction_velocity == FrictionVelocity::Surface,
+        }
+    }
+
+    /// Normal force F_N >= 0, N (19), for penetration (m), its rate (m/s) and the approach speed delta_dot0 (m/s).
+    #[inline]
+    pub fn normal_force(&self, penetration: f64, rate: f64, approach_speed: f64) -> f64 {
+        if penetration <= 0.0 {
+            return 0.0;
+        }
+        let elastic = self.stiffness * penetration * penetration.sqrt();
+        (elastic * (1.0 + self.damping * rate / approach_speed)).max(0.0)
+    }
+
+    /// Energy stored by the elastic part, 2/5 K delta^2.5, J.
+    #[inline]
+    pub fn elastic_energy(&self, penetration: f64) -> f64 {
+        if penetration <= 0.0 {
+            return 0.0;
+        }
+        0.4 * self.stiffness * penetration * penetration * penetration.sqrt()
+    }
+
+    /// F_T / F_N: Coulomb coefficient times the dynamic correction cd of (21), for a sliding speed in m/s.
+    #[inline]
+    pub fn friction_ratio(&self, slip_speed: f64) -> f64 {
+        if slip_speed >= self.slip_high {
+            self.friction
+        } else if slip_speed <= self.slip_low {
+            0.0
+        } else {
+            self.friction * (slip_speed - self.slip_low) / (self.slip_high - self.slip_low)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LAWS: [NormalLaw; 5] = [
+        NormalLaw::LankaraniNikravesh,
+        NormalLaw::Hertz,
+        NormalLaw::HuntCrossley,
+        NormalLaw::Flores,
+        NormalLaw::Gonthier,
+    ];
+
+    /// Rebound over approach speed of a unit mass against the law's own force, by Runge-Kutta 4 in small steps.
+    fn simulated_restitution(law: NormalLaw, ce: f64) -> f64 {
+        let parameters = Parameters { normal_law: law, restitution: ce, ..Parameters::default() };
+        let c = Coefficients { stiffness: 1e10, ..Coefficients::new(&parameters, 3e-4) };
+        let v0 = 0.1;
+        let force = |x: f64, v: f64| -c.normal_force(x, v, v0);
+        let (mut x, mut v, h) = (0.0, v0, 2e-9);
+        loop {
+            let (k1x, k1v) = (v, force(x, v));
+            let (k2x, k2v) = (v + 0.5 * h * k1v, force(x + 0.5 * h * k1x, v + 0.5 * h * k1v));
+            let (k3x, k3v) = (v + 0.5 * h * k2v, force(x + 0.5 * h * k2x, v + 0.5 * h * k2v));
+            let (k4x, k4v) = (v + h * k3v, force(x + h * k3x, v + h * k3v));
+            x += h / 6.0 * (k1x + 2.0 * k2x + 2.0 * k3x + k4x);
+            v += h / 6.0 * (k1v + 2.0 * k2v + 2.0 * k3v + k4v);
+            if x <= 0.0 || v < -0.999_999 * v0 * 1.001 {
+                return -v / v0;
+            }
+        }
+    }
+
+    #[test]
+    fn stiffness_is_the_contract_s_at_three_tenths_of_a_millimetre() {
+        let k = hertz_stiffness(&Parameters::default(), 0.3e-3);
+        assert!((k / 8.84e10 - 1.0).abs() < 1e-3, "{k:e}");
+    }
+
+    #[test]
+    fn closed_integral_agrees_with_simulating_the_impact() {
+        for law in LAWS {
+            for ce in [0.3, 0.6, 0.9] {
+                let chi = damping_factor(law, ce);
+                let expected = restitution_given(chi);
+                let got = simulated_restitution(law, ce);
+                assert!((got - expected).abs() < 2e-5, "{law:?} ce {ce}: {got} against {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn gonthier_gives_the_restitution_asked_for() {
+        for ce in [0.05, 0.2, 0.5, 0.8, 0.99] {
+            let given = restitution_given(damping_factor(NormalLaw::Gonthier, ce));
+            assert!((given - ce).abs() < 1e-9, "{ce}: {given}");
+        }
+    }
+
+    #[test]
+    fn lankarani_nikravesh_asked_for_zero_rebounds_with_two_thirds() {
+        let given = restitution_given(damping_factor(NormalLaw::LankaraniNikravesh, 0.0));
+        assert!((given - 0.66).abs() < 5e-3, "{given}");
+    }
+
+    #[test]
+    fn friction_rises_between_its_two_speeds_and_is_full_above() {
+        let c = Coefficients::new(&Parameters::default(), 3e-4);
+        assert_eq!(c.friction_ratio(1e-6), 0.0);
+        assert_eq!(c.friction_ratio(1e-3), 0.15);
+        let half = c.friction_ratio(0.5 * (1e-6 + 1e-4));
+        assert!((half - 0.075).abs() < 1e-12);
+    }
+
+    #[test]
+    fn force_never_pulls() {
+        let c = Coefficients::new(&Parameters { restitution: 0.0, ..Parameters::default() }, 3e-4);
+        assert_eq!(c.normal_force(1e-6, -1.0, 1e-3), 0.0);
+        assert_eq!(c.normal_force(-1e-6, 1.0, 1e-3), 0.0);
+    }
+}

@@ -1,0 +1,103 @@
+//! Fixed-step methods.
+
+use super::{Stepper, System, hermite};
+
+/// v1 = v + h a(t, q, v), q1 = q + h q_dot(q, v1): order 1, keeps the energy of oscillations bounded.
+pub struct SemiImplicitEuler {
+    rate: Vec<f64>,
+}
+
+impl SemiImplicitEuler {
+    /// For `dimension` components.
+    pub fn new(dimension: usize) -> Self {
+        Self { rate: vec![0.0; dimension] }
+    }
+}
+
+impl Stepper for SemiImplicitEuler {
+    fn attempt<S: System>(
+        &mut self,
+        system: &mut S,
+        t: f64,
+        h: f64,
+        y: &[f64],
+        k: &[f64],
+        y_end: &mut [f64],
+        _k_end: &mut [f64],
+    ) -> f64 {
+        let positions = system.positions();
+        y_end[..positions].copy_from_slice(&y[..positions]);
+        for i in positions..y.len() {
+            y_end[i] = y[i] + h * k[i];
+        }
+        system.position_rate(t, y_end, &mut self.rate);
+        for i in 0..positions {
+            y_end[i] += h * self.rate[i];
+        }
+        0.0
+    }
+
+    fn ends_with_derivative(&self) -> bool {
+        false
+    }
+
+    fn interpolate(&self, theta: f64, h: f64, y: &[f64], k: &[f64], y_end: &[f64], k_end: &[f64], out: &mut [f64]) {
+        hermite(theta, h, y, k, y_end, k_end, out);
+    }
+}
+
+/// Kutta's classical method of order 4 (1901).
+pub struct RungeKutta4 {
+    k2: Vec<f64>,
+    k3: Vec<f64>,
+    k4: Vec<f64>,
+    stage: Vec<f64>,
+}
+
+impl RungeKutta4 {
+    /// For `dimension` components.
+    pub fn new(dimension: usize) -> Self {
+        let zeros = || vec![0.0; dimension];
+        Self { k2: zeros(), k3: zeros(), k4: zeros(), stage: zeros() }
+    }
+}
+
+impl Stepper for RungeKutta4 {
+    fn attempt<S: System>(
+        &mut self,
+        system: &mut S,
+        t: f64,
+        h: f64,
+        y: &[f64],
+        k: &[f64],
+        y_end: &mut [f64],
+        _k_end: &mut [f64],
+    ) -> f64 {
+        let n = y.len();
+        let Self { k2, k3, k4, stage } = self;
+        for i in 0..n {
+            stage[i] = y[i] + 0.5 * h * k[i];
+        }
+        system.derivative(t + 0.5 * h, stage, k2);
+        for i in 0..n {
+            stage[i] = y[i] + 0.5 * h * k2[i];
+        }
+        system.derivative(t + 0.5 * h, stage, k3);
+        for i in 0..n {
+            stage[i] = y[i] + h * k3[i];
+        }
+        system.derivative(t + h, stage, k4);
+        for i in 0..n {
+            y_end[i] = y[i] + h / 6.0 * (k[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
+        }
+        0.0
+    }
+
+    fn ends_with_derivative(&self) -> bool {
+        false
+    }
+
+    fn interpolate(&self, theta: f64, h: f64, y: &[f64], k: &[f64], y_end: &[f64], k_end: &[f64], out: &mut [f64]) {
+        hermite(theta, h, y, k, y_end, k_end, out);
+    }
+}

@@ -1,0 +1,251 @@
+//! Ideal ball joints in tree coordinates: three rows each, (45), solved for their multipliers, and the projection that
+//! keeps closed loops closed.
+
+use super::factor::Skyline;
+use super::kinematics::Kinematics;
+use super::model::{BallJoint, BodyIndex, Model};
+use super::tree::{Tree, visit_columns};
+use crate::scene::Vec3;
+
+/// The rows of one joint in one block: Jacobian J and W = M^-1 J^T, both 3 x n row-major from `offset`.
+struct Side {
+    block: usize,
+    offset: usize,
+    n: usize,
+}
+
+/// Constraint rows of some ball joints.
+pub struct Constraints {
+    joints: Vec<usize>,
+    sides: Vec<Vec<Side>>,
+    /// (i, j, side of i, side of j) with j <= i for every shared block.
+    pairs: Vec<(usize, usize, usize, usize)>,
+    jacobian: Vec<f64>,
+    weighted: Vec<f64>,
+    matrix: Skyline,
+    /// Multipliers of the latest solve: force on the ball, N, three per joint.
+    multipliers: Vec<f64>,
+    step: Vec<f64>,
+    /// Smallest pivot ratio of the latest factorisation.
+    pub least_pivot: f64,
+}
+
+impl Constraints {
+    /// Rows of the joints with these indices.
+    pub fn new(model: &Model, joints: &[usize]) -> Self {
+        let mut total = 0;
+        let block_of = |b: BodyIndex| {
+            (b < model.bodies.len() && !model.bodies[b].driven_only).then(|| model.block_of[b])
+        };
+        let sides: Vec<Vec<Side>> = joints
+            .iter()
+            .map(|&j| {
+                let joint = &model.joints[j];
+                let mut blocks: Vec<usize> =
+                    [joint.ball.body, joint.socket.body].into_iter().filter_map(block_of).collect();
+                blocks.dedup();
+                blocks
+                    .into_iter()
+                    .map(|block| {
+                        let n = model.blocks[block].n;
+                        let side = Side { block, offset: total, n };
+                        total += 3 * n;
+                        side
+                    })
+                    .collect()
+            })
+            .collect();
+        let mut pairs = Vec::new();
+        let mut first: Vec<usize> = (0..joints.len()).collect();
+        for i in 0..joints.len() {
+            for j in 0..=i {
+                for (si, a) in sides[i].iter().enumerate() {
+                    for (sj, b) in sides[j].iter().enumerate() {
+                        if a.block == b.block {
+                            pairs.push((i, j, si, sj));
+                            first[i] = first[i].min(j);
+                        }
+                    }
+                }
+            }
+        }
+        let rows = first.iter().flat_map(|&f| [3 * f; 3]).collect();
+        Self {
+            joints: joints.to_vec(),
+            sides,
+            pairs,
+            jacobian: vec![0.0; total],
+            weighted: vec![0.0; total],
+            matrix: Skyline::new(rows),
+            multipliers: vec![0.0; 3 * joints.len()],
+            step: vec![0.0; model.nv],
+            least_pivot: f64::INFINITY,
+        }
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        3 * self.joints.len()
+    }
+
+    /// Force on the ball of the `k`-th constrained joint, N.
+    pub fn reaction(&self, k: usize) -> Vec3 {
+        Vec3::from_column_slice(&self.multipliers[3 * k..3 * k + 3])
+    }
+
+    /// Jacobians and J M^-1 J^T, factored, for a tree that has been moved forward and assembled.
+    fn factor(&mut self, model: &Model, tree: &Tree) {
+        self.jacobian.fill(0.0);
+        for (k, &j) in self.joints.iter().enumerate() {
+            let joint = &model.joints[j];
+            for (anchor, sign) in [(&joint.ball, 1.0), (&joint.socket, -1.0)] {
+                let m = &tree.motion[anchor.body];
+                let point = m.position + m.rotation * anchor.offset;
+                let Some(side) = self.sides[k].iter().find(|s| {
+                    anchor.body < model.bodies.len()
+                        && !model.bodies[anchor.body].driven_only
+                        && s.block == model.block_of[anchor.body]
+                }) else {
+                    continue;
+                };
+                let rows = &mut self.jacobian[side.offset..][..3 * side.n];
+                visit_columns(model, &tree.motion, anchor.body, &point, |column, velocity| {
+                    for i in 0..3 {
+                        rows[i * side.n + column] += sign * velocity[i];
+                    }
+                });
+            }
+        }
+        self.weighted.copy_from_slice(&self.jacobian);
+        for side in self.sides.iter().flatten() {
+            for i in 0..3 {
+                let row = &mut self.weighted[side.offset + i * side.n..][..side.n];
+                tree.solve_block(model, side.block, row);
+            }
+        }
+        self.matrix.clear();
+        for &(i, j, si, sj) in &self.pairs {
+            let (a, b) = (&self.sides[i][si], &self.sides[j][sj]);
+            for r in 0..3 {
+                let limit = if i == j { r + 1 } else { 3 };
+                for c in 0..limit {
+                    let left = &self.jacobian[a.offset + r * a.n..][..a.n];
+                    let right = &self.weighted[b.offset + c * b.n..][..b.n];
+                    let dot: f64 = left.iter().zip(right).map(|(x, y)| x * y).sum();
+                    self.matrix.add(3 * i + r, 3 * j + c, dot);
+                }
+            }
+        }
+        self.least_pivot = self.matrix.factor();
+    }
+
+    /// x = J v for the rows of joint `k`.
+    fn apply(&self, model: &Model, k: usize, v: &[f64]) -> Vec3 {
+        let mut sum = Vec3::zeros();
+        for side in &self.sides[k] {
+            let v = &v[model.blocks[side.block].v..][..side.n];
+            for i in 0..3 {
+                let row = &self.jacobian[side.offset + i * side.n..][..side.n];
+                sum[i] += row.iter().zip(v).map(|(x, y)| x * y).sum::<f64>();
+            }
+        }
+        sum
+    }
+
+    /// v += M^-1 J^T x.
+    fn add_weighted(&self, model: &Model, x: &[f64], v: &mut [f64]) {
+        for (k, sides) in self.sides.iter().enumerate() {
+            for side in sides {
+                let v = &mut v[model.blocks[side.block].v..][..side.n];
+                for i in 0..3 {
+                    let row = &self.weighted[side.offset + i * side.n..][..side.n];
+                    for (v, w) in v.iter_mut().zip(row) {
+                        *v += w * x[3 * k + i];
+                    }
+                }
+            }
+        }
+    }
+
+    /// Corrects the unconstrained accelerations `vdot` so that the joints stay closed, and keeps the multipliers.
+    /// The tree must have been moved forward (bias accelerations) and assembled at the same state.
+    pub fn correct(&mut self, model: &Model, tree: &Tree, vdot: &mut [f64]) {
+        self.factor(model, tree);
+        for k in 0..self.joints.len() {
+            let bias = relative(&model.joints[self.joints[k]], &tree.motion, Kinematics::point_acceleration);
+            let residual = bias + self.apply(model, k, vdot);
+            for i in 0..3 {
+                self.multipliers[3 * k + i] = -residual[i];
+            }
+        }
+        self.matrix.solve(&mut self.multipliers);
+        self.add_weighted(model, &self.multipliers, vdot);
+    }
+
+    /// Projects positions, then velocities, onto the constraints in the metric of the mass matrix.
+    ///
+    /// Returns the closure error that is left, m: above `1e-12` the loops could not be closed.
+    pub fn project(&mut self, model: &Model, tree: &mut Tree, t: f64, y: &mut [f64]) -> f64 {
+        let gravity = Vec3::zeros();
+        let mut error = f64::INFINITY;
+        for _ in 0..30 {
+            tree.forward(model, t, y);
+            let mut largest: f64 = 0.0;
+            for (k, &j) in self.joints.iter().enumerate() {
+                let e = eccentricity(&model.joints[j], &tree.motion);
+                largest = largest.max(e.norm());
+                for i in 0..3 {
+                    self.multipliers[3 * k + i] = -e[i];
+                }
+            }
+            // Newton converges quadratically: stop where another step only stirs rounding.
+            if largest <= 1e-15 || (largest < 1e-13 && largest >= 0.5 * error) || largest.is_nan() {
+                error = largest;
+                break;
+            }
+            error = largest;
+            self.prepare(model, tree, &gravity);
+            self.matrix.solve(&mut self.multipliers);
+            let mut step = std::mem::take(&mut self.step);
+            step.fill(0.0);
+            self.add_weighted(model, &self.multipliers, &mut step);
+            Tree::displace(model, y, &step);
+            self.step = step;
+        }
+        self.prepare(model, tree, &gravity);
+        for (k, &j) in self.joints.iter().enumerate() {
+            let rate = relative(&model.joints[j], &tree.motion, Kinematics::point_velocity);
+            for i in 0..3 {
+                self.multipliers[3 * k + i] = -rate[i];
+            }
+        }
+        self.matrix.solve(&mut self.multipliers);
+        let mut step = std::mem::take(&mut self.step);
+        step.fill(0.0);
+        self.add_weighted(model, &self.multipliers, &mut step);
+        for (v, d) in y[model.nq..].iter_mut().zip(&step) {
+            *v += d;
+        }
+        self.step = step;
+        error
+    }
+
+    fn prepare(&mut self, model: &Model, tree: &mut Tree, gravity: &Vec3) {
+        let mut scratch = std::mem::take(&mut self.step);
+        tree.assemble(model, gravity, &mut scratch);
+        self.step = scratch;
+        self.factor(model, tree);
+    }
+}
+
+/// Z_j - Z_i, m.
+pub fn eccentricity(joint: &BallJoint, motion: &[Kinematics]) -> Vec3 {
+    let at = |a: &super::model::Anchor| motion[a.body].position + motion[a.body].rotation * a.offset;
+    at(&joint.ball) - at(&joint.socket)
+}
+
+/// Ball's minus socket's `rate` at the centres.
+fn relative(joint: &BallJoint, motion: &[Kinematics], rate: fn(&Kinematics, &Vec3) -> Vec3) -> Vec3 {
+    let at = |a: &super::model::Anchor| rate(&motion[a.body], &(motion[a.body].rotation * a.offset));
+    at(&joint.ball) - at(&joint.socket)
+}

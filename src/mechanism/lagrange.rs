@@ -1,0 +1,412 @@
+//! The paper's formulation (44)-(58): every body with six velocity coordinates, constraints with multipliers, Baumgarte
+//! stabilisation. Orientations are unit quaternions, so nothing is singular; gyroscopic terms are kept.
+//!
+//! The KKT system (55) is solved by its Schur complement J M^-1 J^T. Allocates nothing after `new`.
+
+use super::contacts::Contacts;
+use super::factor::Skyline;
+use super::kinematics::{self, Driven, Kinematics, Wrench};
+use super::model::{BodyIndex, Model, Motion};
+use crate::scene::{JointKind, Mat3, Scene, Vec3};
+
+/// Baumgarte parameters of the paper: Phi'' + 2 alpha Phi' + beta^2 Phi = 0, 1/s.
+const BAUMGARTE: (f64, f64) = (5.0, 5.0);
+
+/// One kind of row, of a child against a parent.
+#[derive(Clone, Copy, Debug)]
+enum Rows {
+    /// Two points coincide: 3 rows, (45) and the first three of (47).
+    Point { child: Vec3, parent: Vec3 },
+    /// A vector of the child stays perpendicular to one of the parent: 1 row, as in (46), (47).
+    Perpendicular { child: Vec3, parent: Vec3 },
+    /// The child's point stays at `parent + s along`, s = 0 or the driven coordinate: 1 row, (46) and Phi_D of (48).
+    Offset { child: Vec3, parent: Vec3, along: Vec3, drive: Option<usize> },
+    /// Angle from the parent's `zero` to the child's `child` about `axis` is the driven coordinate: 1 row.
+    Angle { child: Vec3, zero: Vec3, axis: Vec3, drive: usize },
+}
+
+impl Rows {
+    fn count(&self) -> usize {
+        if matches!(self, Self::Point { .. }) { 3 } else { 1 }
+    }
+}
+
+struct Group {
+    rows: Rows,
+    child: BodyIndex,
+    parent: BodyIndex,
+    first: usize,
+}
+
+/// J of one row for its two bodies: (velocity, angular velocity) of the child, then of the parent.
+#[derive(Clone, Copy)]
+struct Row {
+    child: [Vec3; 2],
+    parent: [Vec3; 2],
+}
+
+/// Equations of motion with multipliers.
+pub struct Lagrange {
+    /// Bodies, then the world.
+    pub motion: Vec<Kinematics>,
+    /// External loads of the latest evaluation.
+    pub wrench: Vec<Wrench>,
+    /// Driven coordinates.
+    pub driven: Driven,
+    groups: Vec<Group>,
+    /// Group index of each driven coordinate's row.
+    driver_row: Vec<usize>,
+    /// First row of each ideal ball joint.
+    ideal_row: Vec<usize>,
+    rows: Vec<Row>,
+    /// Group of each row.
+    group_of: Vec<usize>,
+    /// Rows that share a body with a row, at or before it.
+    pairs: Vec<(usize, usize)>,
+    matrix: Skyline,
+    multipliers: Vec<f64>,
+    residual: Vec<f64>,
+    inverse_inertia: Vec<Mat3>,
+    scale: Vec<f64>,
+    /// Largest constraint violation at the latest evaluation: m, or rad for orientation rows.
+    pub drift: f64,
+    /// Smallest pivot ratio of the latest factorisation.
+    pub least_pivot: f64,
+}
+
+impl Lagrange {
+    /// For `scene` compiled as `model`.
+    pub fn new(scene: &Scene, model: &Model) -> Self {
+        let mut groups: Vec<Group> = Vec::new();
+        let mut rows = 0;
+        let mut driver_row = vec![0; model.drives.len()];
+        let mut add = |rows_of: Rows, child: BodyIndex, parent: BodyIndex| {
+            let first = rows;
+            rows += rows_of.count();
+            groups.push(Group { rows: rows_of, child, parent, first });
+            first
+        };
+        for (b, (body, joint)) in model.bodies.iter().zip(&scene.joints).enumerate() {
+            let parent = body.parent;
+            // Vectors of the parent, and the same vectors as the child sees them at q = 0.
+            let x = joint.axis;
+            let across = if x.x.abs() < 0.7 { Vec3::x() } else { Vec3::y() };
+            let y = x.cross(&across).normalize();
+            let z = x.cross(&y);
+            let seen = |v: &Vec3| joint.rotation.inverse() * v;
+            let (child_point, parent_point) = (-body.to_centroid, body.from_parent);
+            let point = Rows::Point { child: child_point, parent: parent_point };
+            let perpendicular = |c: &Vec3, p: &Vec3| Rows::Perpendicular { child: seen(c), parent: *p };
+            let offset =
+                |along: &Vec3, drive| Rows::Offset { child: child_point, parent: parent_point, along: *along, drive };
+            let drive = match body.motion {
+                Motion::Driven { drive, .. } => Some(drive),
+                _ => None,
+            };
+            match joint.kind {
+                JointKind::Free => {}
+                JointKind::Fixed => {
+                    add(point, b, parent);
+                    for (c, p) in [(&x, &y), (&x, &z), (&y, &z)] {
+                        add(perpendicular(c, p), b, parent);
+                    }
+                }
+                JointKind::Revolute => {
+                    add(point, b, parent);
+                    add(perpendicular(&x, &y), b, parent);
+                    add(perpendicular(&x, &z), b, parent);
+                    if let Some(drive) = drive {
+                        driver_row[drive] = add(Rows::Angle { child: seen(&y), zero: y, axis: x, drive }, b, parent);
+                    }
+                }
+                JointKind::Prismatic => {
+                    add(offset(&y, None), b, parent);
+                    add(offset(&z, None), b, parent);
+                    for (c, p) in [(&x, &y), (&x, &z), (&y, &z)] {
+                        add(perpendicular(c, p), b, parent);
+                    }
+                    if let Some(drive) = drive {
+                        driver_row[drive] = add(offset(&x, Some(drive)), b, parent);
+                    }
+                }
+            }
+        }
+        let ideal_row = model
+            .ideal_joints
+            .iter()
+            .map(|&j| {
+                let joint = &model.joints[j];
+                let point = Rows::Point { child: joint.ball.offset, parent: joint.socket.offset };
+                add(point, joint.ball.body, joint.socket.body)
+            })
+            .collect();
+        let group_of: Vec<usize> =
+            groups.iter().enumerate().flat_map(|(g, group)| std::iter::repeat_n(g, group.rows.count())).collect();
+        let world = model.world();
+        let shares = |a: &Group, b: &Group| {
+            [a.child, a.parent].iter().any(|&x| x != world && (x == b.child || x == b.parent))
+        };
+        let mut pairs = Vec::new();
+        let mut first: Vec<usize> = (0..rows).collect();
+        for i in 0..rows {
+            for j in 0..=i {
+                if shares(&groups[group_of[i]], &groups[group_of[j]]) {
+                    pairs.push((i, j));
+                    first[i] = first[i].min(j);
+                }
+            }
+        }
+        let n = model.bodies.len();
+        let empty = Row { child: [Vec3::zeros(); 2], parent: [Vec3::zeros(); 2] };
+        // Bodies that depend on time alone are states here too.
+        let mut driven = Driven::new(model);
+        driven.only_coordinates();
+        Self {
+            motion: vec![Kinematics::rest(); n + 1],
+            wrench: vec![Wrench::zero(); n + 1],
+            driven,
+            groups,
+            driver_row,
+            ideal_row,
+            rows: vec![empty; rows],
+            group_of,
+            pairs,
+            matrix: Skyline::new(first),
+            multipliers: vec![0.0; rows],
+            residual: vec![0.0; rows],
+            inverse_inertia: vec![Mat3::zeros(); n],
+            scale: body_scales(model),
+            drift: 0.0,
+            least_pivot: f64::INFINITY,
+        }
+    }
+
+    /// Constraint rows.
+    pub fn row_count(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Absolute scale of each component of (positions, velocities).
+    pub fn scale(&self) -> &[f64] {
+        &self.scale
+    }
+
+    /// Actuator force (N) or torque (N m) of a driven coordinate at the latest evaluation.
+    pub fn actuator(&self, drive: usize) -> f64 {
+        self.multipliers[self.driver_row[drive]]
+    }
+
+    /// Force on the ball of the `k`-th ideal joint, N.
+    pub fn reaction(&self, k: usize) -> Vec3 {
+        Vec3::from_column_slice(&self.multipliers[self.ideal_row[k]..][..3])
+    }
+
+    /// State of all bodies from their motion.
+    pub fn state_of(motion: &[Kinematics], bodies: usize) -> Vec<f64> {
+        let mut y = Vec::with_capacity(13 * bodies);
+        for m in &motion[..bodies] {
+            let q = kinematics::quaternion_of(&m.rotation);
+            y.extend(m.position.iter());
+            y.extend([q.w, q.i, q.j, q.k]);
+        }
+        for m in &motion[..bodies] {
+            y.extend(m.velocity.iter());
+            y.extend(m.angular_velocity.iter());
+        }
+        y
+    }
+
+    /// Poses and velocities at (t, y).
+    #[inline]
+    pub fn forward(&mut self, model: &Model, t: f64, y: &[f64]) {
+        self.driven.update(model, t, &mut self.motion);
+        let n = model.bodies.len();
+        let (qs, vs) = y.split_at(7 * n);
+        for b in 0..n {
+            let (q, v) = (&qs[7 * b..7 * b + 7], &vs[6 * b..6 * b + 6]);
+            let m = &mut self.motion[b];
+            m.position = Vec3::new(q[0], q[1], q[2]);
+            m.rotation = kinematics::rotation_of(&q[3..7]);
+            m.velocity = Vec3::new(v[0], v[1], v[2]);
+            m.angular_velocity = Vec3::new(v[3], v[4], v[5]);
+        }
+    }
+
+    /// dq/dt from the velocities in `y`.
+    #[inline]
+    pub fn position_rate(n: usize, y: &[f64], dq: &mut [f64]) {
+        let (qs, vs) = y.split_at(7 * n);
+        for b in 0..n {
+            dq[7 * b..7 * b + 3].copy_from_slice(&vs[6 * b..6 * b + 3]);
+            kinematics::quaternion_rate(
+                &qs[7 * b + 3..7 * b + 7],
+                &vs[6 * b + 3..6 * b + 6],
+                &mut dq[7 * b + 3..7 * b + 7],
+            );
+        }
+    }
+
+    /// Keeps quaternions at length 1.
+    pub fn normalise(n: usize, y: &mut [f64]) {
+        for b in 0..n {
+            kinematics::normalise_quaternion(&mut y[7 * b + 3..7 * b + 7]);
+        }
+    }
+
+    /// Accelerations into `vdot` for the latest [`Self::forward`]; leaves them in `motion` too.
+    pub fn accelerations(
+        &mut self,
+        model: &Model,
+        contacts: &mut Contacts,
+        gravity: &Vec3,
+        t: f64,
+        vdot: &mut [f64],
+    ) {
+        self.wrench.fill(Wrench::zero());
+        contacts.evaluate(t, &self.motion, &mut self.wrench);
+        for (b, body) in model.bodies.iter().enumerate() {
+            let m = &mut self.motion[b];
+            let load = &self.wrench[b];
+            let w_body = m.rotation.tr_mul(&m.angular_velocity);
+            let gyroscopic = w_body.cross(&(body.inertia * w_body));
+            let torque = m.rotation.tr_mul(&load.torque) - gyroscopic;
+            m.acceleration = load.force / body.mass + gravity;
+            m.angular_acceleration = m.rotation * (body.inertia_inverse * torque);
+            self.inverse_inertia[b] = m.rotation * body.inertia_inverse * m.rotation.transpose();
+        }
+        self.linearise();
+        self.matrix.clear();
+        for &(i, j) in &self.pairs {
+            let value = self.mobility(model, i, j);
+            self.matrix.add(i, j, value);
+        }
+        self.least_pivot = self.matrix.factor();
+        self.multipliers.copy_from_slice(&self.residual);
+        self.matrix.solve(&mut self.multipliers);
+        for (i, row) in self.rows.iter().enumerate() {
+            let group = &self.groups[self.group_of[i]];
+            let lambda = self.multipliers[i];
+            for (b, j) in [(group.child, &row.child), (group.parent, &row.parent)] {
+                if b < model.bodies.len() {
+                    let m = &mut self.motion[b];
+                    m.acceleration += j[0] * (lambda / model.bodies[b].mass);
+                    m.angular_acceleration += self.inverse_inertia[b] * j[1] * lambda;
+                }
+            }
+        }
+        for (b, m) in self.motion[..model.bodies.len()].iter().enumerate() {
+            vdot[6 * b..6 * b + 3].copy_from_slice(m.acceleration.as_slice());
+            vdot[6 * b + 3..6 * b + 6].copy_from_slice(m.angular_acceleration.as_slice());
+        }
+    }
+
+    /// J_i M^-1 J_j^T.
+    #[inline]
+    fn mobility(&self, model: &Model, i: usize, j: usize) -> f64 {
+        let (gi, gj) = (&self.groups[self.group_of[i]], &self.groups[self.group_of[j]]);
+        let (ri, rj) = (&self.rows[i], &self.rows[j]);
+        let mut sum = 0.0;
+        for (bi, ji) in [(gi.child, &ri.child), (gi.parent, &ri.parent)] {
+            if bi == model.bodies.len() {
+                continue;
+            }
+            for (bj, jj) in [(gj.child, &rj.child), (gj.parent, &rj.parent)] {
+                if bi == bj {
+                    sum += ji[0].dot(&jj[0]) / model.bodies[bi].mass
+                        + ji[1].dot(&(self.inverse_inertia[bi] * jj[1]));
+                }
+            }
+        }
+        sum
+    }
+
+    /// Jacobian rows, and what is missing from the free accelerations: -(J a0 + bias) - 2 alpha Phi' - beta^2 Phi.
+    fn linearise(&mut self) {
+        self.drift = 0.0;
+        let zero = Vec3::zeros();
+        for group in &self.groups {
+            let (c, p) = (&self.motion[group.child], &self.motion[group.parent]);
+            let (wc, wp) = (c.angular_velocity, p.angular_velocity);
+            let at = group.first;
+            match group.rows {
+                Rows::Point { child, parent } => {
+                    let (dc, dp) = (c.rotation * child, p.rotation * parent);
+                    let phi = (c.position + dc) - (p.position + dp);
+                    let rate = c.point_velocity(&dc) - p.point_velocity(&dp);
+                    let acceleration = c.point_acceleration(&dc) - p.point_acceleration(&dp);
+                    for i in 0..3 {
+                        let mut e = zero;
+                        e[i] = 1.0;
+                        self.rows[at + i] = Row { child: [e, dc.cross(&e)], parent: [-e, e.cross(&dp)] };
+                        self.residual[at + i] = stabilised(phi[i], rate[i], acceleration[i]);
+                        self.drift = self.drift.max(phi[i].abs());
+                    }
+                }
+                Rows::Perpendicular { child, parent } => {
+                    let (a, b) = (c.rotation * child, p.rotation * parent);
+                    let cross = a.cross(&b);
+                    let phi = a.dot(&b);
+                    let relative = wc - wp;
+                    let turning = wc.cross(&a).cross(&b) + a.cross(&wp.cross(&b));
+                    let acceleration =
+                        (c.angular_acceleration - p.angular_acceleration).dot(&cross) + relative.dot(&turning);
+                    self.rows[at] = Row { child: [zero, cross], parent: [zero, -cross] };
+                    self.residual[at] = stabilised(phi, relative.dot(&cross), acceleration);
+                    self.drift = self.drift.max(phi.abs());
+                }
+                Rows::Offset { child, parent, along, drive } => {
+                    let (dc, dp, b) = (c.rotation * child, p.rotation * parent, p.rotation * along);
+                    let f = drive.map_or(super::jet::Jet::default(), |d| self.driven.coordinates[d]);
+                    let d = (c.position + dc) - (p.position + dp);
+                    let d1 = c.point_velocity(&dc) - p.point_velocity(&dp);
+                    let d2 = c.point_acceleration(&dc) - p.point_acceleration(&dp);
+                    let b1 = wp.cross(&b);
+                    let b2 = p.angular_acceleration.cross(&b) + wp.cross(&b1);
+                    let phi = b.dot(&d) - f.value;
+                    let rate = b1.dot(&d) + b.dot(&d1) - f.rate;
+                    let acceleration = b2.dot(&d) + 2.0 * b1.dot(&d1) + b.dot(&d2) - f.acceleration;
+                    self.rows[at] =
+                        Row { child: [b, dc.cross(&b)], parent: [-b, b.cross(&dp) + b.cross(&d)] };
+                    self.residual[at] = stabilised(phi, rate, acceleration);
+                    self.drift = self.drift.max(phi.abs());
+                }
+                Rows::Angle { child, zero: reference, axis, drive } => {
+                    let (a, b, x) = (c.rotation * child, p.rotation * reference, p.rotation * axis);
+                    let f = self.driven.coordinates[drive];
+                    let angle = libm::atan2(b.cross(&a).dot(&x), b.dot(&a));
+                    // A driven crank turns many times: compare modulo a turn.
+                    let turns = libm::round((f.value - angle) / std::f64::consts::TAU);
+                    let phi = angle + turns * std::f64::consts::TAU - f.value;
+                    let relative = wc - wp;
+                    let acceleration = (c.angular_acceleration - p.angular_acceleration).dot(&x)
+                        + relative.dot(&wp.cross(&x))
+                        - f.acceleration;
+                    self.rows[at] = Row { child: [zero, x], parent: [zero, -x] };
+                    self.residual[at] = stabilised(phi, relative.dot(&x) - f.rate, acceleration);
+                    self.drift = self.drift.max(phi.abs());
+                }
+            }
+        }
+    }
+}
+
+/// What the constraint acceleration must change by: -(Phi'' + 2 alpha Phi' + beta^2 Phi).
+#[inline]
+fn stabilised(phi: f64, rate: f64, acceleration: f64) -> f64 {
+    let (alpha, beta) = BAUMGARTE;
+    -(acceleration + 2.0 * alpha * rate + beta * beta * phi)
+}
+
+/// Scales of body coordinates: those that a free body has in the tree, taken from the model's smallest.
+fn body_scales(model: &Model) -> Vec<f64> {
+    let n = model.bodies.len();
+    let (length, speed) = (model.length_scale, model.length_scale / 0.1);
+    let mut scale = Vec::with_capacity(13 * n);
+    for _ in 0..n {
+        scale.extend([length, length, length, 0.05, 0.05, 0.05, 0.05]);
+    }
+    for _ in 0..n {
+        scale.extend([speed, speed, speed, 1.0, 1.0, 1.0]);
+    }
+    scale
+}

@@ -1,0 +1,348 @@
+//! A scene compiled for the equations of motion: centroid frames, coordinate numbers, trees, drives.
+
+use super::jet::Jet;
+use super::spcmm::Trajectory;
+use crate::contact;
+use crate::scene::{Drive, JointKind, JointStart, Mat3, Quat, Scene, StartRule, Vec3};
+
+/// Index that stands for the world among bodies: one past the last.
+pub type BodyIndex = usize;
+
+/// A body in its centroid frame: axes of the scene's body frame, origin at the centroid.
+#[derive(Clone, Debug)]
+pub struct Body {
+    pub mass: f64,
+    /// About the centroid, body axes, kg m^2.
+    pub inertia: Mat3,
+    pub inertia_inverse: Mat3,
+    /// Parent body; the world's index where it hangs on the world.
+    pub parent: BodyIndex,
+    pub motion: Motion,
+    /// Joint point from the parent's centroid, parent axes (world: absolute), m.
+    pub from_parent: Vec3,
+    /// Centroid from the joint point, body axes, m.
+    pub to_centroid: Vec3,
+    /// Joint axis, parent axes.
+    pub axis: Vec3,
+    /// Relative rotation = `fixed` + cos q `cosine` + sin q `sine` (`fixed` alone unless revolute).
+    pub fixed: Mat3,
+    pub cosine: Mat3,
+    pub sine: Mat3,
+    /// Scene body frame's origin from the centroid, body axes, m.
+    pub origin: Vec3,
+    /// Whether its motion depends on time alone.
+    pub driven_only: bool,
+}
+
+/// How a body moves against its parent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Motion {
+    Fixed,
+    /// Prescribed by drive `drive`.
+    Driven { drive: usize, revolute: bool },
+    /// One coordinate.
+    Prismatic { q: usize, v: usize },
+    /// One coordinate.
+    Revolute { q: usize, v: usize },
+    /// Centroid position and quaternion (w, x, y, z) from q; centroid velocity and angular velocity from v.
+    Free { q: usize, v: usize },
+}
+
+/// A set of bodies whose coordinates couple through the mass matrix.
+#[derive(Clone, Debug)]
+pub struct TreeBlock {
+    /// First velocity coordinate.
+    pub v: usize,
+    /// Number of velocity coordinates.
+    pub n: usize,
+    /// Parent coordinate of each coordinate within the block; `NONE` at the root.
+    pub parent: Vec<usize>,
+    /// The one free body of this block, where it is a lone one: its mass matrix is block diagonal.
+    pub lone: Option<BodyIndex>,
+}
+
+/// No parent coordinate.
+pub const NONE: usize = usize::MAX;
+
+/// A point fixed to a body.
+#[derive(Clone, Copy, Debug)]
+pub struct Anchor {
+    pub body: BodyIndex,
+    /// From the body's centroid, body axes, m (world: absolute).
+    pub offset: Vec3,
+}
+
+/// A cut ball joint.
+#[derive(Clone, Copy, Debug)]
+pub struct BallJoint {
+    pub socket: Anchor,
+    pub ball: Anchor,
+    /// Index among the ideal joints, if it is one.
+    pub ideal: Option<usize>,
+}
+
+/// A driven coordinate.
+#[derive(Clone, Copy, Debug)]
+pub struct DriveLaw {
+    pub law: Drive,
+    pub body: BodyIndex,
+}
+
+/// The compiled scene.
+#[derive(Clone, Debug)]
+pub struct Model {
+    pub bodies: Vec<Body>,
+    /// Position coordinates.
+    pub nq: usize,
+    /// Velocity coordinates.
+    pub nv: usize,
+    pub blocks: Vec<TreeBlock>,
+    /// Block of each body; meaningless where it has no coordinate.
+    pub block_of: Vec<usize>,
+    pub joints: Vec<BallJoint>,
+    pub ideal_joints: Vec<usize>,
+    pub drives: Vec<DriveLaw>,
+    pub trajectory: Option<Trajectory>,
+    pub start: StartRule,
+    /// Position and velocity coordinates at t = 0 as the scene gives them.
+    pub start_state: Vec<f64>,
+    /// What an error of one tolerance means for each coordinate of (q, v).
+    pub scale: Vec<f64>,
+    /// Length behind the position scales, m.
+    pub length_scale: f64,
+    pub output_body: BodyIndex,
+    /// Probe tip from the output body's centroid, body axes.
+    pub probe: Option<Vec3>,
+    pub revolute_drives: Vec<bool>,
+}
+
+impl Model {
+    /// Compiles `scene`.
+    pub fn new(scene: &Scene) -> Self {
+        let world = scene.bodies.len();
+        let trajectory = scene.spcmm.as_ref().map(Trajectory::new);
+        let mut drives = Vec::new();
+        let mut bodies: Vec<Body> = Vec::new();
+        let mut root = vec![usize::MAX; world];
+        for (index, (body, joint)) in scene.bodies.iter().zip(&scene.joints).enumerate() {
+            let parent = joint.parent.unwrap_or(world);
+            let parent_centre = joint.parent.map_or(Vec3::zeros(), |p| scene.bodies[p].centre);
+            let motion = match (joint.kind, joint.drive) {
+                (JointKind::Fixed, _) => Motion::Fixed,
+                (JointKind::Prismatic | JointKind::Revolute, Some(law)) => {
+                    drives.push(DriveLaw { law, body: index });
+                    Motion::Driven { drive: drives.len() - 1, revolute: joint.kind == JointKind::Revolute }
+                }
+                // Numbered below, tree by tree.
+                (JointKind::Prismatic, None) => Motion::Prismatic { q: 0, v: 0 },
+                (JointKind::Revolute, None) => Motion::Revolute { q: 0, v: 0 },
+                (JointKind::Free, _) => Motion::Free { q: 0, v: 0 },
+            };
+            let moves_freely =
+                matches!(motion, Motion::Prismatic { .. } | Motion::Revolute { .. } | Motion::Free { .. });
+            let parent_root = if parent == world { usize::MAX } else { root[parent] };
+            root[index] = if parent_root != usize::MAX {
+                parent_root
+            } else if moves_freely {
+                index
+            } else {
+                usize::MAX
+            };
+            // Rot(axis, q) R0 = (a a^T + cos q (1 - a a^T) + sin q [a]x) R0.
+            let rest = joint.rotation.to_rotation_matrix().into_inner();
+            let revolute = joint.kind == JointKind::Revolute;
+            let along = joint.axis * joint.axis.transpose();
+            let (fixed, cosine, sine) = if revolute {
+                (along * rest, (Mat3::identity() - along) * rest, joint.axis.cross_matrix() * rest)
+            } else {
+                (rest, Mat3::zeros(), Mat3::zeros())
+            };
+            let inertia = body.inertia;
+            bodies.push(Body {
+                mass: body.mass,
+                inertia,
+                inertia_inverse: inertia.try_inverse().unwrap_or_else(Mat3::zeros),
+                parent,
+                motion,
+                from_parent: joint.parent_point - parent_centre,
+                to_centroid: body.centre - joint.child_point,
+                axis: joint.axis,
+                fixed,
+                cosine,
+                sine,
+                origin: -body.centre,
+                driven_only: root[index] == usize::MAX,
+            });
+        }
+
+        let mut model = Self {
+            bodies,
+            nq: 0,
+            nv: 0,
+            blocks: Vec::new(),
+            block_of: vec![0; world],
+            joints: Vec::new(),
+            ideal_joints: Vec::new(),
+            revolute_drives: Vec::new(),
+            drives,
+            trajectory,
+            start: scene.start,
+            start_state: Vec::new(),
+            scale: Vec::new(),
+            length_scale: Scales::of(scene).length,
+            output_body: scene.output.body,
+            probe: scene.output.probe.map(|p| p - scene.bodies[scene.output.body].centre),
+        };
+        for drive in &model.drives {
+            model
+                .revolute_drives
+                .push(matches!(model.bodies[drive.body].motion, Motion::Driven { revolute: true, .. }));
+        }
+        model.number_coordinates(scene, &root);
+        let anchor = |a: &crate::scene::Attachment| Anchor {
+            body: a.body.unwrap_or(world),
+            offset: a.body.map_or(a.point, |b| a.point - scene.bodies[b].centre),
+        };
+        for (index, joint) in scene.ball_joints.iter().enumerate() {
+            let ideal = (joint.contact.clearance == 0.0).then(|| {
+                model.ideal_joints.push(index);
+                model.ideal_joints.len() - 1
+            });
+            model.joints.push(BallJoint { socket: anchor(&joint.socket), ball: anchor(&joint.ball), ideal });
+        }
+        model
+    }
+
+    /// Numbers coordinates tree by tree, so that each tree's are contiguous, and lays out the start and the scales.
+    fn number_coordinates(&mut self, scene: &Scene, root: &[usize]) {
+        let scales = Scales::of(scene);
+        let mut start_q: Vec<f64> = Vec::new();
+        let mut start_v: Vec<f64> = Vec::new();
+        let mut scale_q: Vec<f64> = Vec::new();
+        let mut scale_v: Vec<f64> = Vec::new();
+        let roots = (0..self.bodies.len()).filter(|&b| root[b] == b);
+        for tree in roots.collect::<Vec<_>>() {
+            let first = start_v.len();
+            let mut parent_coordinate = Vec::new();
+            // Last coordinate on the path to each body.
+            let mut last = vec![NONE; self.bodies.len()];
+            let mut count = 0;
+            for b in tree..self.bodies.len() {
+                if root[b] != tree {
+                    continue;
+                }
+                self.block_of[b] = self.blocks.len();
+                let parent = self.bodies[b].parent;
+                let above = if b == tree || parent >= last.len() { NONE } else { last[parent] };
+                last[b] = above;
+                count += 1;
+                let (q, v) = (start_q.len(), start_v.len());
+                let mut one = |length: f64, speed: f64, start: JointStart| {
+                    let (position, velocity) = match start {
+                        JointStart::Scalar { position, velocity } => (position, velocity),
+                        JointStart::Pose { .. } => (0.0, 0.0),
+                    };
+                    start_q.push(position);
+                    start_v.push(velocity);
+                    scale_q.push(length);
+                    scale_v.push(speed);
+                    parent_coordinate.push(above);
+                };
+                match &mut self.bodies[b].motion {
+                    Motion::Prismatic { q: at_q, v: at_v } => {
+                        (*at_q, *at_v) = (q, v);
+                        one(scales.length, scales.speed, scene.joints[b].start);
+                        last[b] = v - first;
+                    }
+                    Motion::Revolute { q: at_q, v: at_v } => {
+                        (*at_q, *at_v) = (q, v);
+                        one(scales.angle, scales.angular_speed, scene.joints[b].start);
+                        last[b] = v - first;
+                    }
+                    Motion::Free { q: at_q, v: at_v } => {
+                        (*at_q, *at_v) = (q, v);
+                        let (position, rotation, velocity, spin) = free_start(scene.joints[b].start);
+                        let centre = rotation * scene.bodies[b].centre;
+                        start_q.extend((position + centre).iter());
+                        start_q.extend([rotation.w, rotation.i, rotation.j, rotation.k]);
+                        start_v.extend((velocity + spin.cross(&centre)).iter());
+                        start_v.extend(spin.iter());
+                        scale_q.extend([scales.length; 3]);
+                        // A quaternion component moves by half the angle.
+                        scale_q.extend([0.5 * scales.angle; 4]);
+                        scale_v.extend([scales.speed; 3]);
+                        scale_v.extend([scales.angular_speed; 3]);
+                        for i in 0..6 {
+                            parent_coordinate.push(if i == 0 { NONE } else { v - first + i - 1 });
+                        }
+                        last[b] = v - first + 5;
+                    }
+                    Motion::Fixed | Motion::Driven { .. } => {}
+                }
+            }
+            let lone = (count == 1 && matches!(self.bodies[tree].motion, Motion::Free { .. })).then_some(tree);
+            self.blocks.push(TreeBlock {
+                v: first,
+                n: parent_coordinate.len(),
+                parent: parent_coordinate,
+                lone,
+            });
+        }
+        self.nq = start_q.len();
+        self.nv = start_v.len();
+        start_q.extend(start_v);
+        self.start_state = start_q;
+        scale_q.extend(scale_v);
+        self.scale = scale_q;
+    }
+
+    /// The world's index among bodies.
+    pub fn world(&self) -> BodyIndex {
+        self.bodies.len()
+    }
+
+    /// Driven coordinate `drive` at `t`.
+    pub fn drive(&self, drive: usize, t: f64, ideal: Option<&super::spcmm::Ideal>) -> Jet {
+        match self.drives[drive].law {
+            Drive::Spcmm { slider } => match ideal {
+                Some(ideal) => ideal.sliders[usize::from(slider) - 1],
+                None => Jet::default(),
+            },
+            Drive::Constant { position, velocity } => Jet::new(position + velocity * t, velocity, 0.0),
+            Drive::Harmonic { mean, amplitude, frequency, phase } => {
+                let omega = std::f64::consts::TAU * frequency;
+                Jet::constant(mean) + amplitude * Jet::new(omega * t + phase, omega, 0.0).sin_cos().0
+            }
+        }
+    }
+}
+
+fn free_start(start: JointStart) -> (Vec3, Quat, Vec3, Vec3) {
+    match start {
+        JointStart::Pose { position, rotation, velocity, angular_velocity } => {
+            (position, rotation, velocity, angular_velocity)
+        }
+        JointStart::Scalar { .. } => (Vec3::zeros(), Quat::identity(), Vec3::zeros(), Vec3::zeros()),
+    }
+}
+
+/// Scales that the relative tolerance multiplies: documented in `docs/numerics.md`.
+struct Scales {
+    length: f64,
+    speed: f64,
+    angle: f64,
+    angular_speed: f64,
+}
+
+impl Scales {
+    /// Length: the smallest ball radius. Speed: that length in a tenth of a second. Angles: 0.1 rad, 1 rad/s.
+    fn of(scene: &Scene) -> Self {
+        let length = scene
+            .ball_joints
+            .iter()
+            .map(|j| j.contact.ball_radius)
+            .fold(f64::INFINITY, f64::min)
+            .min(contact::Parameters::default().ball_radius * 100.0);
+        Self { length, speed: length / 0.1, angle: 0.1, angular_speed: 1.0 }
+    }
+}

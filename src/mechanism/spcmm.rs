@@ -1,0 +1,205 @@
+//! The paper's mechanism: trajectory (59), accompanying motion and slider laws (39), all with exact derivatives.
+//!
+//! Square roots that turn imaginary mean that a rod is too short for the trajectory.
+
+use super::jet::Jet;
+use crate::scene::{Spcmm, Vec3};
+use nalgebra::Matrix3;
+
+/// The ideal mechanism at one instant: everything a function of time alone.
+#[derive(Clone, Copy, Debug)]
+pub struct Ideal {
+    /// Slider coordinates f1, f2, f3, m, positive outward.
+    pub sliders: [Jet; 3],
+    /// o7, m.
+    pub position: [Jet; 3],
+    /// Rotation of the platform, R = Rx(0) Rz(beta) Ry(gamma).
+    pub rotation: Matrix3<f64>,
+    /// Angular velocity, rad/s: gamma is constant and alpha 0, so it is beta's rate about Z.
+    pub angular_velocity: Vec3,
+    /// Angular acceleration, rad/s^2.
+    pub angular_acceleration: Vec3,
+}
+
+/// A trajectory that a rod cannot follow.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("slider {slider}: rod too short at t = {time:.4} s: needs {needs:.4} m, has {has:.4} m")]
+pub struct Unreachable {
+    /// 1, 2 or 3.
+    pub slider: u8,
+    /// Time, s.
+    pub time: f64,
+    /// Length that the rod would need, m.
+    pub needs: f64,
+    /// L2, m.
+    pub has: f64,
+}
+
+/// What depends on the parameters alone.
+#[derive(Clone, Copy, Debug)]
+pub struct Trajectory {
+    p: Spcmm,
+    cos_gamma: f64,
+    sin_gamma: f64,
+    tan_gamma: f64,
+    socket_plane: f64,
+}
+
+impl Trajectory {
+    /// For these dimensions and amplitudes.
+    pub fn new(parameters: &Spcmm) -> Self {
+        let (sin_gamma, cos_gamma) = libm::sincos(parameters.gamma);
+        Self {
+            p: *parameters,
+            cos_gamma,
+            sin_gamma,
+            tan_gamma: sin_gamma / cos_gamma,
+            socket_plane: parameters.slider_plane + parameters.driving_rod,
+        }
+    }
+
+    /// Period of the drive, s; infinite where nothing moves.
+    pub fn period(&self) -> f64 {
+        1.0 / self.p.frequency
+    }
+
+    /// Squares that the three rods have left for their slider direction: L2^2 minus the squared offset across it, m^2,
+    /// with everything needed to go on. Negative where the rod is too short.
+    fn evaluate(&self, t: f64) -> ([Jet; 3], Parts) {
+        let p = &self.p;
+        let omega = std::f64::consts::TAU * p.frequency;
+        let phase = Jet::new(omega * t, omega, 0.0).sin_cos().0;
+        let x_relative = Jet::constant(p.mean_x - self.socket_plane) + p.amplitude_x * phase;
+        let beta = p.amplitude_beta * phase;
+        let (sb, cb) = beta.sin_cos();
+        let b = p.hinge_radius;
+
+        let y = x_relative * sb * cb.recip();
+        let (a_, c_) = (y + b * cb, self.tan_gamma * sb);
+        let d_ = -(c_ * y + self.tan_gamma * (x_relative * cb));
+        let across = x_relative - b * sb;
+        let rod2 = Jet::constant(p.driven_rod * p.driven_rod);
+        // (C^2 + 1) f^2 + (2 C D - 2 A) f + A^2 - B + D^2 = 0 with B = L2^2 - across^2: quarter of the discriminant.
+        let lead = c_ * c_ + Jet::constant(1.0);
+        let half = a_ - c_ * d_;
+        let b_ = rod2 - across * across;
+        let quarter = half * half - lead * (a_ * a_ - b_ + d_ * d_);
+
+        // w = (cos b sin g, sin b sin g, cos g), third column of R at alpha = 0.
+        let (wx, wy, wz) = (self.sin_gamma * cb, self.sin_gamma * sb, self.cos_gamma);
+        let (x1, y1) = (x_relative + b * wx, y + b * wy);
+        let (x2, y2) = (x_relative - b * wx, y - b * wy);
+        let left = [rod2 - x1 * x1 - y1 * y1, rod2 - x2 * x2 - y2 * y2, quarter];
+        (left, Parts { x_relative, y, sb, cb, beta, c_, lead, half, wz })
+    }
+
+    /// Sliders, pose and motion of the ideal mechanism at `t`. NaN where a rod is too short.
+    pub fn at(&self, t: f64) -> Ideal {
+        let (left, parts) = self.evaluate(t);
+        let Parts { x_relative, y, sb, cb, beta, c_, lead, half, wz } = parts;
+        let f3 = (half + left[2].sqrt()) * lead.recip();
+        let z = c_ * (f3 - y) - self.tan_gamma * (x_relative * cb);
+        let along = Jet::constant(self.p.hinge_radius * wz);
+        let f1 = along + z + left[0].sqrt();
+        let f2 = along - z + left[1].sqrt();
+        let (cg, sg) = (self.cos_gamma, self.sin_gamma);
+        let (s, c) = (sb.value, cb.value);
+        Ideal {
+            sliders: [f1, f2, f3],
+            position: [x_relative + Jet::constant(self.socket_plane), y, z],
+            rotation: Matrix3::new(c * cg, -s, c * sg, s * cg, c, s * sg, -sg, 0.0, cg),
+            angular_velocity: Vec3::new(0.0, 0.0, beta.rate),
+            angular_acceleration: Vec3::new(0.0, 0.0, beta.acceleration),
+        }
+    }
+
+    /// Looks along one whole period for a rod that is too short.
+    ///
+    /// # Errors
+    /// The first rod and instant found.
+    pub fn check(&self) -> Result<(), Unreachable> {
+        const SAMPLES: u32 = 4000;
+        let period = if self.p.frequency > 0.0 { self.period() } else { 0.0 };
+        for n in 0..=SAMPLES {
+            let time = period * f64::from(n) / f64::from(SAMPLES);
+            let (left, parts) = self.evaluate(time);
+            for (i, square) in left.iter().enumerate() {
+                if square.value > 0.0 {
+                    continue;
+                }
+                // Slider 3 sees a slanted line: its quarter discriminant is `lead` times the missing square.
+                let missing = if i == 2 { square.value / parts.lead.value } else { square.value };
+                let has = self.p.driven_rod;
+                return Err(Unreachable { slider: i as u8 + 1, time, needs: (has * has - missing).sqrt(), has });
+            }
+        }
+        Ok(())
+    }
+}
+
+struct Parts {
+    x_relative: Jet,
+    y: Jet,
+    sb: Jet,
+    cb: Jet,
+    beta: Jet,
+    c_: Jet,
+    lead: Jet,
+    half: Jet,
+    wz: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn paper() -> Spcmm {
+        Spcmm {
+            slider_plane: 0.032,
+            amplitude_x: 0.025,
+            amplitude_beta: 0.025,
+            frequency: 0.5,
+            mean_x: 0.203,
+            gamma: std::f64::consts::PI / 12.0,
+            hinge_radius: 0.052,
+            driving_rod: 0.028,
+            driven_rod: 0.2,
+        }
+    }
+
+    #[test]
+    fn anchors_of_the_contract_hold() {
+        let ideal = Trajectory::new(&paper()).at(0.0);
+        let expected = [
+            (0.1364935480, -0.11575599, -0.13201567),
+            (0.2409227735, -0.04964883, -0.0671871),
+            (0.1864724056, -0.07282449, -0.08487076),
+        ];
+        for (f, (value, rate, acceleration)) in ideal.sliders.iter().zip(expected) {
+            assert!((f.value - value).abs() < 1e-10, "{f:?}");
+            assert!((f.rate - rate).abs() < 1e-8, "{f:?}");
+            assert!((f.acceleration - acceleration).abs() < 1e-8, "{f:?}");
+        }
+        assert!((ideal.position[2].value + 0.0383167264).abs() < 1e-10);
+        let half = Trajectory::new(&paper()).at(0.5);
+        for (f, value) in half.sliders.iter().zip([0.0902403840, 0.2210909323, 0.1575618239]) {
+            assert!((f.value - value).abs() < 1e-10, "{f:?}");
+        }
+    }
+
+    #[test]
+    fn square_roots_stay_real_in_the_range_the_contract_gives() {
+        for (socket_plane, reachable) in [(0.041518, true), (0.041516, false), (0.364482, true), (0.364484, false)] {
+            let p = Spcmm { slider_plane: socket_plane - 0.028, ..paper() };
+            assert_eq!(Trajectory::new(&p).check().is_ok(), reachable, "x_s = {socket_plane}");
+        }
+    }
+
+    #[test]
+    fn names_the_slider_whose_rod_is_too_short() {
+        let p = Spcmm { slider_plane: 0.0, ..paper() };
+        let error = Trajectory::new(&p).check().unwrap_err();
+        assert_eq!(error.slider, 1);
+        assert!(error.needs > 0.2, "{error}");
+    }
+}

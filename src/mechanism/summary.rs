@@ -1,0 +1,61 @@
+//! What a scene contains and what will be computed for it.
+
+use super::{Form, Mechanism};
+
+/// Counts for `jointplay check` and for tests that a scene pays only for what it has.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Summary {
+    /// Moving bodies.
+    pub bodies: usize,
+    /// Bodies whose motion is prescribed by time alone.
+    pub driven_bodies: usize,
+    /// Driven coordinates.
+    pub drives: usize,
+    /// Velocity coordinates of the formulation.
+    pub velocity_coordinates: usize,
+    /// Position coordinates of the formulation.
+    pub position_coordinates: usize,
+    /// Constraint rows of the formulation.
+    pub constraint_rows: usize,
+    /// Degrees of freedom left.
+    pub degrees_of_freedom: usize,
+    /// Ideal ball joints.
+    pub ideal_joints: usize,
+    /// Ball joints with clearance: contacts evaluated at every step.
+    pub contacts: usize,
+    /// Contacts with friction.
+    pub frictional_contacts: usize,
+    /// Blocks of the mass matrix that are a single free body each.
+    pub lone_bodies: usize,
+    /// Whether a differential equation is solved at all.
+    pub solves_differential_equation: bool,
+}
+
+impl Summary {
+    pub(super) fn new(mechanism: &Mechanism) -> Self {
+        let model = &mechanism.model;
+        let (velocity_coordinates, position_coordinates, constraint_rows) = match &mechanism.form {
+            Form::Tree { constraints, .. } => (model.nv, model.nq, constraints.as_ref().map_or(0, |c| c.rows())),
+            Form::Lagrange(l) => (6 * model.bodies.len(), 7 * model.bodies.len(), l.row_count()),
+        };
+        let contacts: Vec<usize> =
+            (0..model.joints.len()).filter(|&j| mechanism.contacts.has_clearance(j)).collect();
+        Self {
+            bodies: model.bodies.len(),
+            driven_bodies: model.bodies.iter().filter(|b| b.driven_only).count(),
+            drives: model.drives.len(),
+            velocity_coordinates,
+            position_coordinates,
+            constraint_rows,
+            degrees_of_freedom: velocity_coordinates.saturating_sub(constraint_rows),
+            ideal_joints: model.ideal_joints.len(),
+            frictional_contacts: contacts
+                .iter()
+                .filter(|&&j| mechanism.contacts.coefficients(j).friction > 0.0)
+                .count(),
+            contacts: contacts.len(),
+            lone_bodies: model.blocks.iter().filter(|b| b.lone.is_some()).count(),
+            solves_differential_equation: !mechanism.is_kinematic(),
+        }
+    }
+}

@@ -1,0 +1,401 @@
+//! The tree formulation: coordinates of the spanning forest that remains when every ball joint is cut.
+//!
+//! Mass matrix by composite rigid bodies, bias by one pass outward and one inward (Featherstone 2008, chapters 5 and 6),
+//! in world axes with each body's own centroid as reference. Allocates nothing after `new`.
+
+use super::contacts::Contacts;
+use super::factor;
+use super::kinematics::{self, Driven, Kinematics, Wrench};
+use super::model::{Model, Motion};
+use crate::scene::{Mat3, Vec3};
+
+/// Mass, first moment and inertia of a body with all that hangs on it, about that body's centroid.
+#[derive(Clone, Copy)]
+struct Composite {
+    mass: f64,
+    moment: Vec3,
+    inertia: Mat3,
+    force: Vec3,
+    torque: Vec3,
+}
+
+/// Equations of motion in tree coordinates.
+pub struct Tree {
+    /// Bodies, then the world.
+    pub motion: Vec<Kinematics>,
+    /// External loads of the latest evaluation, same order.
+    pub wrench: Vec<Wrench>,
+    /// Motion prescribed by time.
+    pub driven: Driven,
+    composite: Vec<Composite>,
+    dynamic: Vec<usize>,
+    /// Mass matrices of the blocks, factored, row-major, one after the other.
+    mass: Vec<f64>,
+    mass_offset: Vec<usize>,
+    inverse_diagonal: Vec<f64>,
+    /// World inertia of each dynamic body.
+    inertia: Vec<Mat3>,
+    diagonal: Vec<bool>,
+}
+
+impl Tree {
+    /// For `model`.
+    pub fn new(model: &Model) -> Self {
+        let n = model.bodies.len();
+        let mut mass_offset = Vec::new();
+        let mut total = 0;
+        for block in &model.blocks {
+            mass_offset.push(total);
+            total += if block.lone.is_some() { 0 } else { block.n * block.n };
+        }
+        let empty = Composite {
+            mass: 0.0,
+            moment: Vec3::zeros(),
+            inertia: Mat3::zeros(),
+            force: Vec3::zeros(),
+            torque: Vec3::zeros(),
+        };
+        Self {
+            motion: vec![Kinematics::rest(); n + 1],
+            wrench: vec![Wrench::zero(); n + 1],
+            driven: Driven::new(model),
+            composite: vec![empty; n],
+            dynamic: (0..n).filter(|&b| !model.bodies[b].driven_only).collect(),
+            mass: vec![0.0; total],
+            mass_offset,
+            inverse_diagonal: vec![0.0; model.nv],
+            inertia: vec![Mat3::zeros(); n],
+            diagonal: model
+                .bodies
+                .iter()
+                .map(|b| b.inertia == Mat3::from_diagonal(&b.inertia.diagonal()))
+                .collect(),
+        }
+    }
+
+    /// Poses, velocities and bias accelerations (those with zero coordinate accelerations) at (t, y).
+    #[inline]
+    pub fn forward(&mut self, model: &Model, t: f64, y: &[f64]) {
+        self.driven.update(model, t, &mut self.motion);
+        let (qs, vs) = y.split_at(model.nq);
+        for &b in &self.dynamic {
+            let body = &model.bodies[b];
+            self.motion[b] = match body.motion {
+                Motion::Free { q, v } => Kinematics {
+                    rotation: kinematics::rotation_of(&qs[q + 3..q + 7]),
+                    position: Vec3::new(qs[q], qs[q + 1], qs[q + 2]),
+                    velocity: Vec3::new(vs[v], vs[v + 1], vs[v + 2]),
+                    angular_velocity: Vec3::new(vs[v + 3], vs[v + 4], vs[v + 5]),
+                    ..Kinematics::rest()
+                },
+                Motion::Revolute { q, v } => {
+                    kinematics::follow(body, &self.motion[body.parent], true, qs[q], vs[v], 0.0)
+                }
+                Motion::Prismatic { q, v } => {
+                    kinematics::follow(body, &self.motion[body.parent], false, qs[q], vs[v], 0.0)
+                }
+                Motion::Driven { drive, revolute } => {
+                    let q = self.driven.coordinates[drive];
+                    kinematics::follow(body, &self.motion[body.parent], revolute, q.value, q.rate, q.acceleration)
+                }
+                Motion::Fixed => kinematics::follow(body, &self.motion[body.parent], false, 0.0, 0.0, 0.0),
+            };
+        }
+    }
+
+    /// Contact forces of the latest [`Self::forward`] as loads on the bodies.
+    #[inline]
+    pub fn load(&mut self, t: f64, contacts: &mut Contacts) {
+        self.wrench.fill(Wrench::zero());
+        contacts.evaluate(t, &self.motion, &mut self.wrench);
+    }
+
+    /// Mass matrices, factored, and generalised forces (loads, gravity, bias) into `out`.
+    #[inline]
+    pub fn assemble(&mut self, model: &Model, gravity: &Vec3, out: &mut [f64]) {
+        for &b in &self.dynamic {
+            let body = &model.bodies[b];
+            let m = &self.motion[b];
+            let inertia = world_inertia(&m.rotation, &body.inertia, self.diagonal[b]);
+            self.inertia[b] = inertia;
+            let w = m.angular_velocity;
+            let load = &self.wrench[b];
+            self.composite[b] = Composite {
+                mass: body.mass,
+                moment: Vec3::zeros(),
+                inertia,
+                force: load.force + (gravity - m.acceleration) * body.mass,
+                torque: load.torque - inertia * m.angular_acceleration - w.cross(&(inertia * w)),
+            };
+        }
+        let Self { motion, composite, mass, mass_offset, .. } = self;
+        for &b in self.dynamic.iter().rev() {
+            let body = &model.bodies[b];
+            let c = composite[b];
+            let m = &motion[b];
+            let block_index = model.block_of[b];
+            let block = &model.blocks[block_index];
+            let n = block.n;
+            match body.motion {
+                Motion::Revolute { v, .. } => {
+                    let a = m.axis;
+                    out[v] = a.dot(&(c.torque + m.arm.cross(&c.force)));
+                    let centre = a.cross(&m.arm);
+                    let momentum = centre * c.mass + a.cross(&c.moment);
+                    let angular = c.moment.cross(&centre) + c.inertia * a;
+                    let row = v - block.v;
+                    let h = &mut mass[mass_offset[block_index]..][..n * n];
+                    h[row * n + row] = momentum.dot(&centre) + angular.dot(&a);
+                    fill_row(model, motion, h, n, block.v, row, b, momentum, angular);
+                }
+                Motion::Prismatic { v, .. } => {
+                    let a = m.axis;
+                    out[v] = a.dot(&c.force);
+                    let momentum = a * c.mass;
+                    let angular = c.moment.cross(&a);
+                    let row = v - block.v;
+                    let h = &mut mass[mass_offset[block_index]..][..n * n];
+                    h[row * n + row] = c.mass;
+                    fill_row(model, motion, h, n, block.v, row, b, momentum, angular);
+                }
+                Motion::Free { v, .. } => {
+                    out[v..v + 3].copy_from_slice(c.force.as_slice());
+                    out[v + 3..v + 6].copy_from_slice(c.torque.as_slice());
+                    if block.lone.is_none() {
+                        let h = &mut mass[mass_offset[block_index]..][..n * n];
+                        let k = c.moment;
+                        for i in 0..3 {
+                            for j in 0..=i {
+                                h[i * n + j] = if i == j { c.mass } else { 0.0 };
+                                h[(3 + i) * n + 3 + j] = c.inertia[(i, j)];
+                            }
+                        }
+                        // Angular rows, linear columns: the matrix [k]x of the first moment.
+                        let lower = [[0.0, -k.z, k.y], [k.z, 0.0, -k.x], [-k.y, k.x, 0.0]];
+                        for i in 0..3 {
+                            h[(3 + i) * n..(3 + i) * n + 3].copy_from_slice(&lower[i]);
+                        }
+                    }
+                }
+                Motion::Fixed | Motion::Driven { .. } => {}
+            }
+            let parent = body.parent;
+            if parent < model.bodies.len() && !model.bodies[parent].driven_only {
+                let d = m.position - motion[parent].position;
+                let p = &mut composite[parent];
+                p.mass += c.mass;
+                p.moment += c.moment + d * c.mass;
+                add_shifted_inertia(&mut p.inertia, &c.inertia, c.mass, &c.moment, &d);
+                p.force += c.force;
+                p.torque += c.torque + d.cross(&c.force);
+            }
+        }
+        for (index, block) in model.blocks.iter().enumerate() {
+            if block.lone.is_none() {
+                let h = &mut self.mass[self.mass_offset[index]..][..block.n * block.n];
+                let d = &mut self.inverse_diagonal[block.v..][..block.n];
+                factor::factor(h, block.n, &block.parent, d);
+            }
+        }
+    }
+
+    /// x = M^-1 x for the coordinates of block `index`, after [`Self::assemble`].
+    #[inline]
+    pub fn solve_block(&self, model: &Model, index: usize, x: &mut [f64]) {
+        let block = &model.blocks[index];
+        if let Some(b) = block.lone {
+            let body = &model.bodies[b];
+            let rotation = &self.motion[b].rotation;
+            let torque = Vec3::new(x[3], x[4], x[5]);
+            let alpha = rotation * (body.inertia_inverse * rotation.tr_mul(&torque));
+            for i in 0..3 {
+                x[i] /= body.mass;
+            }
+            x[3..6].copy_from_slice(alpha.as_slice());
+        } else {
+            let h = &self.mass[self.mass_offset[index]..][..block.n * block.n];
+            factor::solve(h, block.n, &block.parent, &self.inverse_diagonal[block.v..][..block.n], x);
+        }
+    }
+
+    /// x = M^-1 x for all coordinates.
+    #[inline]
+    pub fn solve(&self, model: &Model, x: &mut [f64]) {
+        for (index, block) in model.blocks.iter().enumerate() {
+            self.solve_block(model, index, &mut x[block.v..][..block.n]);
+        }
+    }
+
+    /// Replaces the bias accelerations of the bodies by the true ones for coordinate accelerations `vdot`.
+    pub fn accelerate(&mut self, model: &Model, y: &[f64], vdot: &[f64]) {
+        let vs = &y[model.nq..];
+        for &b in &self.dynamic {
+            let body = &model.bodies[b];
+            let parent = self.motion[body.parent];
+            let child = &mut self.motion[b];
+            match body.motion {
+                Motion::Free { v, .. } => {
+                    child.acceleration = Vec3::new(vdot[v], vdot[v + 1], vdot[v + 2]);
+                    child.angular_acceleration = Vec3::new(vdot[v + 3], vdot[v + 4], vdot[v + 5]);
+                }
+                Motion::Revolute { v, .. } => kinematics::accelerate(child, &parent, true, vs[v], vdot[v]),
+                Motion::Prismatic { v, .. } => kinematics::accelerate(child, &parent, false, vs[v], vdot[v]),
+                Motion::Driven { drive, revolute } => {
+                    let q = self.driven.coordinates[drive];
+                    kinematics::accelerate(child, &parent, revolute, q.rate, q.acceleration);
+                }
+                Motion::Fixed => kinematics::accelerate(child, &parent, false, 0.0, 0.0),
+            }
+        }
+    }
+
+    /// dq/dt from the velocities in `y`.
+    #[inline]
+    pub fn position_rate(model: &Model, y: &[f64], dq: &mut [f64]) {
+        let (qs, vs) = y.split_at(model.nq);
+        for body in &model.bodies {
+            match body.motion {
+                Motion::Free { q, v } => {
+                    dq[q..q + 3].copy_from_slice(&vs[v..v + 3]);
+                    kinematics::quaternion_rate(&qs[q + 3..q + 7], &vs[v + 3..v + 6], &mut dq[q + 3..q + 7]);
+                }
+                Motion::Revolute { q, v } | Motion::Prismatic { q, v } => dq[q] = vs[v],
+                Motion::Fixed | Motion::Driven { .. } => {}
+            }
+        }
+    }
+
+    /// Moves the positions in `y` by the velocity-space displacement `step` (rotations by their rotation vectors).
+    pub fn displace(model: &Model, y: &mut [f64], step: &[f64]) {
+        for body in &model.bodies {
+            match body.motion {
+                Motion::Free { q, v } => {
+                    for i in 0..3 {
+                        y[q + i] += step[v + i];
+                    }
+                    let turn = Vec3::new(step[v + 3], step[v + 4], step[v + 5]);
+                    kinematics::turn_quaternion(&mut y[q + 3..q + 7], &turn);
+                }
+                Motion::Revolute { q, v } | Motion::Prismatic { q, v } => y[q] += step[v],
+                Motion::Fixed | Motion::Driven { .. } => {}
+            }
+        }
+    }
+
+    /// Keeps quaternions at length 1.
+    #[inline]
+    pub fn normalise(model: &Model, y: &mut [f64]) {
+        for body in &model.bodies {
+            if let Motion::Free { q, .. } = body.motion {
+                kinematics::normalise_quaternion(&mut y[q + 3..q + 7]);
+            }
+        }
+    }
+}
+
+/// R I R^T.
+#[inline]
+fn world_inertia(r: &Mat3, inertia: &Mat3, diagonal: bool) -> Mat3 {
+    let t = if diagonal {
+        let mut t = *r;
+        for j in 0..3 {
+            let d = inertia[(j, j)];
+            for i in 0..3 {
+                t[(i, j)] *= d;
+            }
+        }
+        t
+    } else {
+        r * inertia
+    };
+    let entry = |i: usize, j: usize| t[(i, 0)] * r[(j, 0)] + t[(i, 1)] * r[(j, 1)] + t[(i, 2)] * r[(j, 2)];
+    let (xx, xy, xz, yy, yz, zz) = (entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2));
+    Mat3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
+}
+
+/// Adds to `sum` the inertia of a composite (inertia about its own reference, mass, first moment) seen from a reference
+/// that lies `d` before its own: I + m (d.d 1 - d d^T) + 2 (d.k) 1 - d k^T - k d^T.
+#[inline]
+fn add_shifted_inertia(sum: &mut Mat3, inertia: &Mat3, mass: f64, k: &Vec3, d: &Vec3) {
+    // With h = k + m d / 2 the whole shift is 2 (d.h) 1 - d h^T - h d^T.
+    let h = k + d * (0.5 * mass);
+    let trace = 2.0 * d.dot(&h);
+    let (xy, xz, yz) = (d.x * h.y + h.x * d.y, d.x * h.z + h.x * d.z, d.y * h.z + h.y * d.z);
+    sum.m11 += inertia.m11 + trace - 2.0 * d.x * h.x;
+    sum.m22 += inertia.m22 + trace - 2.0 * d.y * h.y;
+    sum.m33 += inertia.m33 + trace - 2.0 * d.z * h.z;
+    let (ixy, ixz, iyz) = (inertia.m12 - xy, inertia.m13 - xz, inertia.m23 - yz);
+    sum.m12 += ixy;
+    sum.m21 += ixy;
+    sum.m13 += ixz;
+    sum.m31 += ixz;
+    sum.m23 += iyz;
+    sum.m32 += iyz;
+}
+
+/// Couples coordinate `row` (momentum, angular momentum about body `b`'s centroid for unit rate) with its ancestors.
+#[inline]
+fn fill_row(
+    model: &Model,
+    motion: &[Kinematics],
+    h: &mut [f64],
+    n: usize,
+    first: usize,
+    row: usize,
+    b: usize,
+    momentum: Vec3,
+    mut angular: Vec3,
+) {
+    let mut below = b;
+    loop {
+        let a = model.bodies[below].parent;
+        if a >= model.bodies.len() || model.bodies[a].driven_only {
+            return;
+        }
+        angular += (motion[below].position - motion[a].position).cross(&momentum);
+        match model.bodies[a].motion {
+            Motion::Revolute { v, .. } => {
+                let axis = motion[a].axis;
+                h[row * n + v - first] = axis.dot(&(angular + motion[a].arm.cross(&momentum)));
+            }
+            Motion::Prismatic { v, .. } => h[row * n + v - first] = motion[a].axis.dot(&momentum),
+            Motion::Free { v, .. } => {
+                let at = row * n + v - first;
+                h[at..at + 3].copy_from_slice(momentum.as_slice());
+                h[at + 3..at + 6].copy_from_slice(angular.as_slice());
+            }
+            Motion::Fixed | Motion::Driven { .. } => {}
+        }
+        below = a;
+    }
+}
+
+/// Column-wise walk over the coordinates that move body `b`: calls `visit(coordinate within block, point velocity per
+/// unit rate)` for a point at `point` (world).
+#[inline]
+pub fn visit_columns(model: &Model, motion: &[Kinematics], b: usize, point: &Vec3, mut visit: impl FnMut(usize, Vec3)) {
+    let mut at = b;
+    while at < model.bodies.len() && !model.bodies[at].driven_only {
+        let first = model.blocks[model.block_of[at]].v;
+        let m = &motion[at];
+        match model.bodies[at].motion {
+            Motion::Revolute { v, .. } => {
+                let joint = m.position - m.arm;
+                visit(v - first, m.axis.cross(&(point - joint)));
+            }
+            Motion::Prismatic { v, .. } => visit(v - first, m.axis),
+            Motion::Free { v, .. } => {
+                let d = point - m.position;
+                let v = v - first;
+                visit(v, Vec3::x());
+                visit(v + 1, Vec3::y());
+                visit(v + 2, Vec3::z());
+                visit(v + 3, Vec3::new(0.0, -d.z, d.y));
+                visit(v + 4, Vec3::new(d.z, 0.0, -d.x));
+                visit(v + 5, Vec3::new(-d.y, d.x, 0.0));
+            }
+            Motion::Fixed | Motion::Driven { .. } => {}
+        }
+        at = model.bodies[at].parent;
+    }
+}

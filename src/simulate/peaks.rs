@@ -1,0 +1,125 @@
+//! Peaks in continuous time: the largest force between two steps, from the cubic through penetration and rate at both ends.
+
+use crate::contact::Coefficients;
+
+/// Penetration and its rate at one instant.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Approach {
+    pub penetration: f64,
+    pub rate: f64,
+}
+
+/// Cubic Hermite polynomial of the penetration over one step.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Course {
+    start: Approach,
+    end: Approach,
+    h: f64,
+}
+
+impl Course {
+    pub(super) fn new(start: Approach, end: Approach, h: f64) -> Self {
+        Self { start, end, h }
+    }
+
+    /// Penetration, rate and second derivative at `theta` in 0..=1.
+    pub(super) fn at(&self, theta: f64) -> (f64, f64, f64) {
+        let (p0, p1) = (self.start.penetration, self.end.penetration);
+        let (m0, m1) = (self.h * self.start.rate, self.h * self.end.rate);
+        // p0 + m0 s + a s^2 + b s^3
+        let d = p1 - p0;
+        let (a, b) = (3.0 * d - 2.0 * m0 - m1, m0 + m1 - 2.0 * d);
+        let s = theta;
+        (
+            p0 + s * (m0 + s * (a + s * b)),
+            (m0 + s * (2.0 * a + 3.0 * b * s)) / self.h,
+            (2.0 * a + 6.0 * b * s) / (self.h * self.h),
+        )
+    }
+
+    /// Where the penetration has an extremum inside the step (rates of opposite sign at its ends).
+    pub(super) fn extremum(&self) -> f64 {
+        let (mut low, mut high) = (0.0, 1.0);
+        let rising = self.start.rate > 0.0;
+        for _ in 0..40 {
+            let middle = 0.5 * (low + high);
+            if (self.at(middle).1 > 0.0) == rising {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        0.5 * (low + high)
+    }
+
+    /// Where the penetration passes zero, given that it changes sign over the step.
+    pub(super) fn crossing(&self) -> f64 {
+        let (mut low, mut high) = (0.0, 1.0);
+        let end_sign = self.end.penetration > 0.0;
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if (self.at(middle).0 > 0.0) == end_sign {
+                high = middle;
+            } else {
+                low = middle;
+            }
+        }
+        high
+    }
+
+    /// Largest normal force over the step and where: (N, theta).
+    pub(super) fn strongest(&self, c: &Coefficients, approach_speed: f64) -> (f64, f64) {
+        let force = |theta: f64| {
+            let (p, v, _) = self.at(theta);
+            c.normal_force(p, v, approach_speed)
+        };
+        // Sign of dF/dt, F = K p^1.5 (1 + chi v / v0): 1.5 v (1 + chi v / v0) + p chi a / v0.
+        let slope = |theta: f64| {
+            let (p, v, a) = self.at(theta);
+            if p <= 0.0 {
+                return v;
+            }
+            let chi = c.damping / approach_speed;
+            1.5 * v * (1.0 + chi * v) + p * chi * a
+        };
+        let (f0, f1) = (force(0.0), force(1.0));
+        let ends = if f1 >= f0 { (f1, 1.0) } else { (f0, 0.0) };
+        if !(slope(0.0) > 0.0 && slope(1.0) < 0.0) {
+            return ends;
+        }
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..30 {
+            let middle = 0.5 * (low + high);
+            if slope(middle) > 0.0 {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        let theta = 0.5 * (low + high);
+        let inside = force(theta);
+        if inside > ends.0 { (inside, theta) } else { ends }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::Parameters;
+
+    #[test]
+    fn finds_the_peak_of_an_impact_between_coarse_samples() {
+        // penetration = a sin(pi t / T): undamped peak at T / 2.
+        let c = Coefficients { damping: 0.0, ..Coefficients::new(&Parameters::default(), 3e-4) };
+        let (a, t_end) = (4e-6, 1e-4);
+        let at = |t: f64| {
+            let (s, k) = libm::sincos(std::f64::consts::PI * t / t_end);
+            Approach { penetration: a * s, rate: a * std::f64::consts::PI / t_end * k }
+        };
+        let (start, end) = (0.43e-4, 0.53e-4);
+        let (force, theta) = Course::new(at(start), at(end), end - start).strongest(&c, 0.1);
+        let exact = c.normal_force(a, 0.0, 0.1);
+        assert!((force / exact - 1.0).abs() < 2e-5, "{force} {exact}");
+        assert!((start + theta * (end - start) - 0.5e-4).abs() < 1e-8);
+    }
+}

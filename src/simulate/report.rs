@@ -1,0 +1,89 @@
+//! From the equations' latest evaluation to a [`Frame`].
+
+use super::angles::pose_of;
+use super::frame::{BodyMotion, ContactState, Frame, JointReport};
+use crate::mechanism::Mechanism;
+use crate::scene::{Scene, Vec3};
+
+/// Fills `out` after [`Mechanism::evaluate_fully`] at `time`.
+pub(super) fn fill(mechanism: &mut Mechanism, scene: &Scene, time: f64, out: &mut Frame) {
+    out.time = time;
+    out.bodies.clear();
+    for (b, m) in mechanism.motion()[..scene.bodies.len()].iter().enumerate() {
+        let arm = m.rotation * mechanism.frame_origin(b);
+        out.bodies.push(BodyMotion {
+            position: m.position + arm,
+            rotation: m.rotation,
+            velocity: m.point_velocity(&arm),
+            angular_velocity: m.angular_velocity,
+            acceleration: m.point_acceleration(&arm),
+            angular_acceleration: m.angular_acceleration,
+        });
+    }
+    out.pose = pose_of(&out.bodies[scene.output.body]);
+    out.joints.clear();
+    out.elastic = 0.0;
+    for (j, joint) in scene.ball_joints.iter().enumerate() {
+        let report = joint_report(mechanism, joint, j);
+        if mechanism.contacts.has_clearance(j) {
+            out.elastic += mechanism.contacts.coefficients(j).elastic_energy(report.penetration);
+        }
+        out.joints.push(report);
+    }
+    let (kinetic, gravitational) = mechanism.energies();
+    out.kinetic = kinetic;
+    out.potential = gravitational + out.elastic;
+    out.probe_error = probe_error(mechanism, scene, out);
+    out.actuators.resize(mechanism.drives(), 0.0);
+    mechanism.actuators(&mut out.actuators);
+}
+
+fn joint_report(mechanism: &Mechanism, joint: &crate::scene::BallJoint, j: usize) -> JointReport {
+    let motion = mechanism.motion();
+    let centre = |a: &crate::scene::Attachment| match a.body {
+        None => a.point,
+        Some(b) => {
+            let m = &motion[b];
+            m.position + m.rotation * (a.point + mechanism.frame_origin(b))
+        }
+    };
+    let gap = &mechanism.contacts.gaps()[j];
+    let contacts = &mechanism.contacts;
+    let coefficients = contacts.coefficients(j);
+    let ball_centre = centre(&joint.ball);
+    let mut report = JointReport {
+        socket_centre: centre(&joint.socket),
+        ball_centre,
+        eccentricity: gap.eccentricity,
+        clearance: contacts.clearance(j),
+        penetration: gap.penetration,
+        penetration_rate: gap.rate,
+        contact_point: ball_centre + gap.normal * coefficients.ball_radius,
+        slip_speed: gap.slip_speed,
+        ..JointReport::default()
+    };
+    if let Some(reaction) = mechanism.reaction(j) {
+        report.normal_force = reaction;
+        report.contact_point = ball_centre;
+        report.state = ContactState::Ideal;
+        return report;
+    }
+    report.normal_force = gap.normal * -gap.normal_force;
+    report.friction_force = gap.friction;
+    report.state = if !contacts.memory()[j].active && gap.normal_force == 0.0 {
+        ContactState::Free
+    } else if gap.slip_speed < coefficients.slip_high {
+        ContactState::Stick
+    } else {
+        ContactState::Slip
+    };
+    report
+}
+
+/// Probe tip minus the tip of the ideal mechanism at the same time, m.
+fn probe_error(mechanism: &Mechanism, scene: &Scene, frame: &Frame) -> Option<Vec3> {
+    let (probe, ideal) = (scene.output.probe?, mechanism.ideal()?);
+    let body = &frame.bodies[scene.output.body];
+    let ideal_tip = Vec3::from_fn(|i, _| ideal.position[i].value) + ideal.rotation * probe;
+    Some(body.position + body.rotation * probe - ideal_tip)
+}

@@ -1,0 +1,775 @@
+//! A scene in motion: stepping, events, live changes, snapshots. Depends on no clock.
+
+use super::peaks::{Approach, Course};
+use super::stepper::AnyStepper;
+use super::{Effect, Frame, Peak, Snapshot, StartError, Statistics, Stopped, report};
+use crate::integrate::{Controller, Stepper, System, find_root};
+use crate::mechanism::{Mechanism, Memory, Ramp, Switching};
+use crate::scene::{Scene, SceneError};
+
+/// Speed at which the clearance closes when a jump would put a ball inside its socket wall, m/s: an impact at this speed
+/// is of the order of the settled forces.
+pub const CLEARANCE_SPEED: f64 = 2e-3;
+/// Longest step of an adaptive method, s.
+const LONGEST_STEP: f64 = 10e-3;
+/// Shortest step of an adaptive method, s.
+const SHORTEST_STEP: f64 = 1e-14;
+/// Step of a scene that is a function of time alone, s: nothing accumulates, so it only spaces the peaks that are seen.
+const KINEMATIC_STEP: f64 = 2e-3;
+/// First step after a contact begins, before one is known to work, s: a tenth of a usual impact.
+const FIRST_CONTACT_STEP: f64 = 1e-5;
+/// Speed beyond which a state is absurd, m/s and rad/s.
+const ABSURD_SPEED: f64 = 1e6;
+/// Loops that are open by more than this after projection have come apart, m.
+const OPEN_LOOP: f64 = 1e-7;
+
+/// A scene in motion.
+///
+/// The same scene and the same calls give the same bits.
+pub struct Simulation {
+    /// With changes that wait for a reset.
+    scene: Scene,
+    /// As it runs.
+    running: Scene,
+    mechanism: Mechanism,
+    stepper: AnyStepper,
+    state: State,
+    peaks: Vec<Peak>,
+    /// Scratch of the step's end.
+    y_end: Vec<f64>,
+    k_end: Vec<f64>,
+    scratch_y: Vec<f64>,
+    scratch_k: Vec<f64>,
+    gaps_end: Vec<Approach>,
+    scratch_memory: Vec<Memory>,
+}
+
+/// What a snapshot copies.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct State {
+    /// Start of the latest step.
+    t0: f64,
+    y0: Vec<f64>,
+    k0: Vec<f64>,
+    gaps0: Vec<Approach>,
+    /// Contact memory that was in force during the latest step.
+    memory0: Vec<Memory>,
+    /// Now.
+    t: f64,
+    y: Vec<f64>,
+    k: Vec<f64>,
+    gaps: Vec<Approach>,
+    memory: Vec<Memory>,
+    ramps: Vec<Option<Ramp>>,
+    /// Clearances in force.
+    clearances: Vec<f64>,
+    /// Next step of an adaptive method.
+    h_next: f64,
+    /// Step that worked after the latest contact began.
+    h_contact: f64,
+    /// A contact began at the latest event.
+    contact_began: bool,
+    controller: Controller,
+    /// Fixed steps are counted from here, so that times do not accumulate rounding.
+    grid_origin: f64,
+    grid_count: u64,
+    statistics: Statistics,
+}
+
+impl Simulation {
+    /// Starts `scene` at t = 0.
+    ///
+    /// # Errors
+    /// Ball joints that do not close, a trajectory that the rods cannot reach.
+    pub fn new(scene: &Scene) -> Result<Self, StartError> {
+        let mut mechanism = Mechanism::new(scene)?;
+        let y = mechanism.start()?;
+        let n = y.len();
+        let joints = mechanism.contacts.len();
+        let mut simulation = Self {
+            scene: scene.clone(),
+            running: scene.clone(),
+            stepper: AnyStepper::new(scene.solver.method, n),
+            state: State {
+                t0: 0.0,
+                y0: y.clone(),
+                k0: vec![0.0; n],
+                gaps0: vec![Approach::default(); joints],
+                memory0: vec![Memory::default(); joints],
+                t: 0.0,
+                y,
+                k: vec![0.0; n],
+                gaps: vec![Approach::default(); joints],
+                memory: vec![Memory::default(); joints],
+                ramps: vec![None; joints],
+                clearances: (0..joints).map(|j| mechanism.contacts.clearance(j)).collect(),
+                h_next: scene.solver.step.min(LONGEST_STEP),
+                h_contact: FIRST_CONTACT_STEP,
+                contact_began: false,
+                controller: Controller::new(4),
+                grid_origin: 0.0,
+                grid_count: 0,
+                statistics: Statistics {
+                    impacts: vec![0; joints],
+                    peak_normal: vec![0.0; joints],
+                    peak_time: vec![0.0; joints],
+                    last_separation: vec![f64::NAN; joints],
+                    ..Statistics::default()
+                },
+            },
+            peaks: vec![Peak::default(); joints],
+            y_end: vec![0.0; n],
+            k_end: vec![0.0; n],
+            scratch_y: vec![0.0; n],
+            scratch_k: vec![0.0; n],
+            gaps_end: vec![Approach::default(); joints],
+            scratch_memory: vec![Memory::default(); joints],
+            mechanism,
+        };
+        simulation.mechanism.contacts.switching = switching_of(scene);
+        simulation.begin_contacts_at_start();
+        simulation.refresh();
+        Ok(simulation)
+    }
+
+    /// Contacts that exist at the start take the floor as their approach speed (`physics.md` section 2).
+    fn begin_contacts_at_start(&mut self) {
+        self.mechanism.measure(self.state.t, &self.state.y);
+        for j in 0..self.state.memory.len() {
+            if self.mechanism.contacts.has_clearance(j) && self.mechanism.contacts.gaps()[j].penetration > 0.0 {
+                let approach_speed = self.mechanism.contacts.coefficients(j).speed_floor;
+                self.state.memory[j] = Memory { active: true, approach_speed, floored: true };
+                self.state.statistics.impacts[j] += 1;
+            }
+        }
+    }
+
+    /// Recomputes derivative and gaps of the current state after anything but a step changed it; forgets the step before.
+    fn refresh(&mut self) {
+        let Self { mechanism, state, .. } = self;
+        mechanism.contacts.memory_mut().copy_from_slice(&state.memory);
+        let evaluations = mechanism.evaluations;
+        mechanism.derivative(state.t, &state.y, &mut state.k);
+        mechanism.evaluations = evaluations;
+        mechanism.contacts.finish(state.t);
+        store_gaps(mechanism, &mut state.gaps);
+        state.t0 = state.t;
+        state.y0.copy_from_slice(&state.y);
+        state.k0.copy_from_slice(&state.k);
+        state.gaps0.copy_from_slice(&state.gaps);
+        state.memory0.copy_from_slice(&state.memory);
+        state.grid_origin = state.t;
+        state.grid_count = 0;
+    }
+
+    /// The scene with every change, those that wait for a reset included.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// The scene as it runs now: without the changes that wait for a reset.
+    pub fn running_scene(&self) -> &Scene {
+        &self.running
+    }
+
+    /// Equations of motion.
+    pub fn mechanism(&self) -> &Mechanism {
+        &self.mechanism
+    }
+
+    /// Time of the latest state, s.
+    pub fn time(&self) -> f64 {
+        self.state.t
+    }
+
+    /// Time at the start of the latest step, s: [`Self::sample`] accepts times from here to [`Self::time`].
+    pub fn step_start(&self) -> f64 {
+        self.state.t0
+    }
+
+    /// Counters since the last reset.
+    pub fn statistics(&self) -> &Statistics {
+        &self.state.statistics
+    }
+
+    /// One accepted step.
+    ///
+    /// # Errors
+    /// The divergence guard; the state is then the last good one.
+    pub fn step(&mut self) -> Result<(), Stopped> {
+        self.advance(f64::INFINITY)
+    }
+
+    /// One step that ends at `end` at the latest, exactly there if it would pass it.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn step_until(&mut self, end: f64) -> Result<(), Stopped> {
+        if self.state.t >= end {
+            return Ok(());
+        }
+        self.advance(end)
+    }
+
+    /// Steps until [`Self::time`] is at least `time`, never shortening a step.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn advance_to(&mut self, time: f64) -> Result<(), Stopped> {
+        while self.state.t < time {
+            self.step()?;
+        }
+        Ok(())
+    }
+
+    fn advance(&mut self, end: f64) -> Result<(), Stopped> {
+        let ramp_end = self.ramp_end();
+        let limit = end.min(ramp_end);
+        if self.mechanism.is_kinematic() {
+            self.kinematic_step(limit)?;
+        } else if self.running.solver.method.is_adaptive() {
+            self.adaptive_step(limit)?;
+        } else {
+            self.fixed_step(limit)?;
+        }
+        if self.state.t >= ramp_end {
+            self.finish_ramps();
+        }
+        Ok(())
+    }
+
+    /// A step whose size follows the error estimate, cut at the first contact start or end inside it.
+    fn adaptive_step(&mut self, limit: f64) -> Result<(), Stopped> {
+        let Self { mechanism, stepper, state, y_end, k_end, .. } = self;
+        let tolerance = self.running.solver.tolerance;
+        let evaluations = mechanism.evaluations;
+        mechanism.contacts.memory_mut().copy_from_slice(&state.memory);
+        let t = state.t;
+        let (mut h, mut t_end);
+        let factor = loop {
+            h = state.h_next.min(LONGEST_STEP);
+            t_end = t + h;
+            let cut = t_end >= limit - 1e-6 * h;
+            if cut {
+                t_end = limit;
+                h = limit - t;
+            }
+            let error = stepper.attempt(mechanism, t, h, &state.y, &state.k, y_end, k_end) / tolerance;
+            if error <= 1.0 {
+                let factor = state.controller.after_accept(error);
+                if cut {
+                    // A step cut short says nothing against the longer one.
+                    state.h_next = state.h_next.max(h * factor);
+                    break None;
+                }
+                break Some(factor);
+            }
+            state.statistics.rejected += 1;
+            state.h_next = h * state.controller.after_reject(error);
+            if !(state.h_next >= SHORTEST_STEP.max(4.0 * f64::EPSILON * t)) {
+                state.statistics.evaluations += mechanism.evaluations - evaluations;
+                state.h_next = self.running.solver.step;
+                return Err(self.stopped("the step size that the tolerance asks for fell below 1e-14 s"));
+            }
+        };
+        let contact_began = state.contact_began;
+        if let Some(factor) = factor {
+            state.h_next = h * factor;
+        }
+        state.contact_began = false;
+        mechanism.contacts.finish(t_end);
+        store_gaps(mechanism, &mut self.gaps_end);
+        if let Some(theta) = self.first_event(h) {
+            // The step is taken again, shorter, so that its end carries the method's error and not the interpolant's.
+            t_end = t + theta * h;
+            h *= theta;
+            let Self { mechanism, stepper, state, y_end, k_end, .. } = self;
+            stepper.attempt(mechanism, t, h, &state.y, &state.k, y_end, k_end);
+            mechanism.contacts.finish(t_end);
+            store_gaps(mechanism, &mut self.gaps_end);
+        } else if contact_began {
+            self.state.h_contact = h.max(1e-9);
+        }
+        self.accept(t_end, h, evaluations)
+    }
+
+    /// Fraction of the step just attempted at which the first contact starts or ends, if one does.
+    fn first_event(&mut self, h: f64) -> Option<f64> {
+        let mut first: Option<f64> = None;
+        for j in 0..self.gaps_end.len() {
+            if !self.mechanism.contacts.has_clearance(j) {
+                continue;
+            }
+            let (start, end) = (self.state.gaps[j], self.gaps_end[j]);
+            let course = Course::new(start, end, h);
+            // Positive where the contact is in the other state than its memory says.
+            let sign = if self.state.memory[j].active { -1.0 } else { 1.0 };
+            let (from, to) = (sign * start.penetration, sign * end.penetration);
+            let (from_rate, to_rate) = (sign * start.rate, sign * end.rate);
+            let bracket = if to > 0.0 {
+                if from < 0.0 {
+                    Some((0.0, from, 1.0, to))
+                } else if from_rate < 0.0 && to_rate > 0.0 {
+                    // Switched at the start of this step, went the right way and came back.
+                    let theta = course.extremum();
+                    let value = sign * self.penetration_at(j, theta, h);
+                    (value < 0.0).then_some((theta, value, 1.0, to))
+                } else {
+                    None
+                }
+            } else if from < 0.0 && from_rate > 0.0 && to_rate < 0.0 {
+                // Grazes between two steps.
+                let theta = course.extremum();
+                let value = if sign * course.at(theta).0 > 0.0 { sign * self.penetration_at(j, theta, h) } else { -1.0 };
+                (value > 0.0).then_some((0.0, from, theta, value))
+            } else {
+                None
+            };
+            let theta = match bracket {
+                Some((a, fa, b, fb)) => {
+                    let width = (1e-15 / h).max(1e-12);
+                    find_root(a, fa, b, fb, width, 1e-16, |theta| sign * self.penetration_at(j, theta, h))
+                }
+                // Wrong all along: switch as soon as a step allows it.
+                None if to > 0.0 => 1.0,
+                None => continue,
+            };
+            first = Some(first.map_or(theta, |f: f64| f.min(theta)));
+        }
+        first.filter(|&theta| theta < 1.0)
+    }
+
+    /// Penetration of joint `j` on the interpolant of the attempted step.
+    fn penetration_at(&mut self, j: usize, theta: f64, h: f64) -> f64 {
+        let Self { mechanism, stepper, state, y_end, k_end, scratch_y, .. } = self;
+        stepper.interpolate(theta, h, &state.y, &state.k, y_end, k_end, scratch_y);
+        mechanism.measure(state.t + theta * h, scratch_y);
+        mechanism.contacts.gaps()[j].penetration
+    }
+
+    fn fixed_step(&mut self, limit: f64) -> Result<(), Stopped> {
+        let Self { mechanism, stepper, state, y_end, k_end, .. } = self;
+        let evaluations = mechanism.evaluations;
+        mechanism.contacts.memory_mut().copy_from_slice(&state.memory);
+        let (t, step) = (state.t, self.running.solver.step);
+        let mut t_end = state.grid_origin + (state.grid_count + 1) as f64 * step;
+        if t_end >= limit - 1e-6 * step {
+            t_end = limit;
+        }
+        let h = t_end - t;
+        stepper.attempt(mechanism, t, h, &state.y, &state.k, y_end, k_end);
+        if t_end == limit {
+            // The next grid begins where this one was cut.
+            state.grid_origin = t_end;
+            state.grid_count = u64::MAX;
+        }
+        let result = self.accept(t_end, h, evaluations);
+        if result.is_ok() {
+            self.state.grid_count = self.state.grid_count.wrapping_add(1);
+        }
+        result
+    }
+
+    /// A step of a scene whose motion is a function of time alone: predict, close the loops, read the reactions.
+    fn kinematic_step(&mut self, limit: f64) -> Result<(), Stopped> {
+        let Self { mechanism, state, y_end, .. } = self;
+        let evaluations = mechanism.evaluations;
+        let t = state.t;
+        let mut t_end = t + KINEMATIC_STEP;
+        if t_end >= limit - 1e-6 * KINEMATIC_STEP {
+            t_end = limit;
+        }
+        let h = t_end - t;
+        for i in 0..y_end.len() {
+            y_end[i] = state.y[i] + h * state.k[i];
+        }
+        self.accept(t_end, h, evaluations)
+    }
+
+    /// Makes the attempted step count: projection, guard, contact memory, peaks.
+    fn accept(&mut self, t_end: f64, h: f64, evaluations: u64) -> Result<(), Stopped> {
+        let Self { mechanism, stepper, state, y_end, k_end, gaps_end, .. } = self;
+        let open = mechanism.project(t_end, y_end);
+        if !stepper.ends_with_derivative() || mechanism.projects() {
+            mechanism.derivative(t_end, y_end, k_end);
+            mechanism.contacts.finish(t_end);
+            store_gaps(mechanism, gaps_end);
+        }
+        state.statistics.evaluations += mechanism.evaluations - evaluations;
+        if let Some(what) = self.objection(open) {
+            return Err(self.stopped(&what));
+        }
+        let Self { mechanism, state, y_end, k_end, gaps_end, .. } = self;
+        state.t0 = state.t;
+        std::mem::swap(&mut state.y0, &mut state.y);
+        std::mem::swap(&mut state.k0, &mut state.k);
+        std::mem::swap(&mut state.gaps0, &mut state.gaps);
+        state.memory0.copy_from_slice(&state.memory);
+        state.t = t_end;
+        std::mem::swap(&mut state.y, y_end);
+        std::mem::swap(&mut state.k, k_end);
+        std::mem::swap(&mut state.gaps, gaps_end);
+        state.statistics.steps += 1;
+        state.statistics.constraint_drift = state.statistics.constraint_drift.max(mechanism.constraint_drift());
+        self.track_peaks(h);
+        if self.switch_contacts(h) && self.mechanism.contacts.switching == Switching::Immediate {
+            // The force now divides by the approach speed just found.
+            let Self { mechanism, state, .. } = self;
+            mechanism.contacts.memory_mut().copy_from_slice(&state.memory);
+            mechanism.derivative(state.t, &state.y, &mut state.k);
+            state.statistics.evaluations += 1;
+        }
+        Ok(())
+    }
+
+    /// Starts and ends contacts whose penetration changed sign over the step just accepted.
+    fn switch_contacts(&mut self, h: f64) -> bool {
+        let Self { mechanism, state, peaks, .. } = self;
+        let mut switched = false;
+        for j in 0..state.gaps.len() {
+            if !mechanism.contacts.has_clearance(j) {
+                continue;
+            }
+            let (start, end) = (state.gaps0[j], state.gaps[j]);
+            let touching = end.penetration > 0.0
+                // Located a hair before the wall.
+                || (!state.memory[j].active && end.penetration > -1e-15 && end.rate > 0.0);
+            if touching == state.memory[j].active {
+                continue;
+            }
+            switched = true;
+            if touching {
+                let rate = if start.penetration < 0.0 && end.penetration > 0.0 {
+                    let course = Course::new(start, end, h);
+                    course.at(course.crossing()).1
+                } else {
+                    end.rate
+                };
+                let floor = mechanism.contacts.coefficients(j).speed_floor;
+                state.memory[j] = Memory { active: true, approach_speed: rate.max(floor), floored: rate < floor };
+                state.statistics.impacts[j] += 1;
+                peaks[j].impacts += 1;
+                peaks[j].approach_speed = peaks[j].approach_speed.max(rate);
+                state.contact_began = true;
+                state.h_next = state.h_next.min(state.h_contact);
+            } else {
+                state.memory[j] = Memory::default();
+                state.statistics.last_separation[j] = state.t;
+            }
+        }
+        switched
+    }
+
+    /// Largest forces of the step just accepted, in continuous time.
+    fn track_peaks(&mut self, h: f64) {
+        let Self { mechanism, state, peaks, .. } = self;
+        for j in 0..state.gaps.len() {
+            if !mechanism.contacts.has_clearance(j) {
+                if let Some(reaction) = mechanism.reaction(j) {
+                    let force = reaction.norm();
+                    if force > state.statistics.peak_normal[j] {
+                        state.statistics.peak_normal[j] = force;
+                        state.statistics.peak_time[j] = state.t;
+                    }
+                    if force > peaks[j].normal {
+                        peaks[j].normal = force;
+                        peaks[j].time = state.t;
+                        peaks[j].normal_force = reaction;
+                    }
+                }
+                continue;
+            }
+            let (start, end) = (state.gaps0[j], state.gaps[j]);
+            if start.penetration <= 0.0 && end.penetration <= 0.0 {
+                continue;
+            }
+            let coefficients = mechanism.contacts.coefficients(j);
+            let approach = if state.memory0[j].active {
+                state.memory0[j].approach_speed
+            } else {
+                start.rate.max(end.rate).max(coefficients.speed_floor)
+            };
+            let (force, theta) = Course::new(start, end, h).strongest(coefficients, approach);
+            let time = state.t0 + theta * h;
+            if force > state.statistics.peak_normal[j] {
+                state.statistics.peak_normal[j] = force;
+                state.statistics.peak_time[j] = time;
+            }
+            if force > peaks[j].normal {
+                let gap = &mechanism.contacts.gaps()[j];
+                let n = if gap.eccentricity.norm() > 0.0 { gap.eccentricity.normalize() } else { gap.eccentricity };
+                peaks[j].normal = force;
+                peaks[j].time = time;
+                peaks[j].normal_force = n * -force;
+                // Friction follows the normal force within a step: its ratio at the step's end serves for the peak.
+                peaks[j].friction_force = if gap.normal_force > 0.0 {
+                    gap.friction * (force / gap.normal_force)
+                } else {
+                    gap.friction
+                };
+            }
+        }
+    }
+
+    /// What is wrong with the step just attempted, if anything.
+    fn objection(&self, open: f64) -> Option<String> {
+        if !(open <= OPEN_LOOP) {
+            return Some(format!("the loops through the ideal ball joints came apart by {open:.1e} m"));
+        }
+        for j in 0..self.gaps_end.len() {
+            if !self.mechanism.contacts.has_clearance(j) {
+                continue;
+            }
+            let penetration = self.gaps_end[j].penetration;
+            let radius = self.mechanism.contacts.coefficients(j).ball_radius;
+            if !(penetration <= radius) {
+                let name = &self.running.ball_joints[j].name;
+                return Some(format!(
+                    "ball joint {name}: the ball is {penetration:.3e} m inside its socket wall, more than its radius"
+                ));
+            }
+        }
+        for (m, body) in self.mechanism.motion().iter().zip(&self.running.bodies) {
+            let (v, w) = (m.velocity.norm(), m.angular_velocity.norm());
+            if !(v <= ABSURD_SPEED && w <= ABSURD_SPEED) || !m.position.iter().all(|x| x.is_finite()) {
+                return Some(format!("body {}: speed {v:.3e} m/s, angular speed {w:.3e} rad/s", body.name));
+            }
+        }
+        if self.k_end.iter().chain(&self.y_end).any(|x| !x.is_finite()) {
+            return Some("the accelerations are not finite".to_owned());
+        }
+        None
+    }
+
+    fn stopped(&self, what: &str) -> Stopped {
+        let solver = &self.running.solver;
+        let advice = if self.mechanism.least_pivot() < 1e-12 {
+            "the ideal joints are (nearly) dependent here: keep clear of this pose, or give a joint a clearance".to_owned()
+        } else if solver.method.is_adaptive() {
+            format!("try a looser solver.tolerance (now {:e}) or a softer or heavier scene", solver.tolerance)
+        } else {
+            format!("try a smaller solver.step (now {:e} s) or solver.method = dopri5", solver.step)
+        };
+        Stopped { time: self.state.t, what: what.to_owned(), advice }
+    }
+
+    /// Everything at `time`, interpolated within the latest step; forces come from the interpolated state.
+    /// Allocates only while `out` is too small.
+    pub fn sample(&mut self, time: f64, out: &mut Frame) {
+        let Self { mechanism, stepper, state, scratch_y, scratch_k, scratch_memory, .. } = self;
+        let counts = (mechanism.evaluations, mechanism.contacts.evaluations);
+        let h = state.t - state.t0;
+        let time = time.clamp(state.t0, state.t);
+        let inside = h > 0.0 && time < state.t;
+        if inside {
+            let theta = (time - state.t0) / h;
+            stepper.interpolate(theta, h, &state.y0, &state.k0, &state.y, &state.k, scratch_y);
+            mechanism.project(time, scratch_y);
+        } else {
+            scratch_y.copy_from_slice(&state.y);
+        }
+        let memory = if inside { &state.memory0 } else { &state.memory };
+        scratch_memory.copy_from_slice(memory);
+        mechanism.contacts.memory_mut().copy_from_slice(scratch_memory);
+        mechanism.evaluate_fully(time, scratch_y, scratch_k);
+        report::fill(mechanism, &self.running, time, out);
+        (mechanism.evaluations, mechanism.contacts.evaluations) = counts;
+    }
+
+    /// Peaks per ball joint since the last call, written to `out` in joint order, and forgotten here.
+    pub fn take_peaks(&mut self, out: &mut Vec<Peak>) {
+        out.clear();
+        out.extend_from_slice(&self.peaks);
+        self.peaks.fill(Peak::default());
+    }
+
+    /// Changes a parameter (`contact.clearance`, `joint.S1.friction`, …) to a value as a user writes it.
+    ///
+    /// # Errors
+    /// Unknown key, bad unit, out of range: the running simulation is unchanged.
+    pub fn set(&mut self, key: &str, value: &str) -> Result<Effect, SceneError> {
+        let mut next = self.scene.clone();
+        let waits = next.set(key, value)?.at_reset;
+        self.adopt(next, |running| running.set(key, value).map(|_| ()), waits)
+    }
+
+    /// As [`Self::set`], with a value in SI units.
+    ///
+    /// # Errors
+    /// As [`Self::set`].
+    pub fn set_value(&mut self, key: &str, value: crate::scene::Value) -> Result<Effect, SceneError> {
+        let mut next = self.scene.clone();
+        let waits = next.set_value(key, value.clone())?.at_reset;
+        self.adopt(next, |running| running.set_value(key, value).map(|_| ()), waits)
+    }
+
+    fn adopt(
+        &mut self,
+        next: Scene,
+        change: impl FnOnce(&mut Scene) -> Result<(), SceneError>,
+        waits: bool,
+    ) -> Result<Effect, SceneError> {
+        let mut running = self.running.clone();
+        let becomes_other = || {
+            self.running
+                .ball_joints
+                .iter()
+                .zip(&next.ball_joints)
+                .any(|(a, b)| (a.contact.clearance == 0.0) != (b.contact.clearance == 0.0))
+        };
+        // A joint that turns ideal, or stops being so, changes the equations.
+        if waits || becomes_other() {
+            self.scene = next;
+            return Ok(Effect::AtReset);
+        }
+        change(&mut running)?;
+        self.scene = next;
+        let before = std::mem::replace(&mut self.running, running);
+        self.mechanism.gravity = self.running.gravity;
+        for j in 0..self.running.ball_joints.len() {
+            let contact = self.running.ball_joints[j].contact;
+            if contact != before.ball_joints[j].contact {
+                self.change_contact(j, &contact);
+            }
+        }
+        if self.running.solver != before.solver {
+            let solver = &self.running.solver;
+            if solver.method != before.solver.method {
+                self.stepper = AnyStepper::new(solver.method, self.state.y.len());
+                self.mechanism.contacts.switching = switching_of(&self.running);
+            }
+            self.state.h_next = self.state.h_next.min(solver.step);
+        }
+        self.refresh();
+        Ok(Effect::Now)
+    }
+
+    /// New contact parameters at this instant; a clearance that would put the ball inside the wall starts to move.
+    fn change_contact(&mut self, j: usize, contact: &crate::contact::Parameters) {
+        if contact.clearance == 0.0 {
+            return;
+        }
+        let Self { mechanism, state, .. } = self;
+        mechanism.measure(state.t, &state.y);
+        let now = mechanism.contacts.clearance(j);
+        let gap = mechanism.contacts.gaps()[j];
+        let distance = gap.penetration + now;
+        let clearance = if contact.clearance < now && distance > contact.clearance {
+            let ramp = Ramp { start: state.t, from: now, rate: -CLEARANCE_SPEED, to: contact.clearance };
+            state.ramps[j] = Some(ramp);
+            now
+        } else {
+            state.ramps[j] = None;
+            contact.clearance
+        };
+        mechanism.contacts.set_ramp(j, state.ramps[j]);
+        mechanism.contacts.set_parameters(j, contact, clearance);
+        state.clearances[j] = clearance;
+        if state.memory[j].active && distance <= clearance {
+            state.memory[j] = Memory::default();
+        }
+    }
+
+    /// When the first clearance under way arrives, s.
+    fn ramp_end(&self) -> f64 {
+        let end = |r: &Ramp| r.start + (r.to - r.from) / r.rate;
+        self.state.ramps.iter().flatten().map(end).fold(f64::INFINITY, f64::min)
+    }
+
+    fn finish_ramps(&mut self) {
+        let t = self.state.t;
+        let mut finished = false;
+        for j in 0..self.state.ramps.len() {
+            let Some(ramp) = self.state.ramps[j] else { continue };
+            if t >= ramp.start + (ramp.to - ramp.from) / ramp.rate {
+                self.state.ramps[j] = None;
+                self.state.clearances[j] = ramp.to;
+                self.mechanism.contacts.set_ramp(j, None);
+                let contact = self.running.ball_joints[j].contact;
+                self.mechanism.contacts.set_parameters(j, &contact, ramp.to);
+                finished = true;
+            }
+        }
+        if finished {
+            self.refresh();
+        }
+    }
+
+    /// Back to t = 0 with the parameters as they are now, those that wait for a reset included.
+    ///
+    /// # Errors
+    /// As [`Self::new`]; the simulation is then unchanged.
+    pub fn reset(&mut self) -> Result<(), StartError> {
+        *self = Self::new(&self.scene)?;
+        Ok(())
+    }
+
+    /// The whole state.
+    pub fn snapshot(&self) -> Snapshot {
+        Snapshot { scene: self.scene.clone(), running: self.running.clone(), state: self.state.clone() }
+    }
+
+    /// Goes back to a state that this simulation, or another of the same scene, was in. Resuming gives the same bits.
+    ///
+    /// # Errors
+    /// A snapshot of a scene whose equations cannot be set up.
+    pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), StartError> {
+        let mut fresh = Self::new(&snapshot.running)?;
+        fresh.scene = snapshot.scene.clone();
+        fresh.state = snapshot.state.clone();
+        for j in 0..fresh.state.ramps.len() {
+            fresh.mechanism.contacts.set_ramp(j, fresh.state.ramps[j]);
+            let contact = fresh.running.ball_joints[j].contact;
+            if contact.clearance > 0.0 {
+                fresh.mechanism.contacts.set_parameters(j, &contact, fresh.state.clearances[j]);
+            }
+        }
+        // The interpolant of the step before is not part of a state.
+        let state = &mut fresh.state;
+        state.t0 = state.t;
+        state.y0.copy_from_slice(&state.y);
+        state.k0.copy_from_slice(&state.k);
+        state.gaps0.copy_from_slice(&state.gaps);
+        state.memory0.copy_from_slice(&state.memory);
+        *self = fresh;
+        Ok(())
+    }
+
+    /// FNV-1a, 64 bit, over the whole state: little-endian bits of time, coordinates, velocities, then for each ball
+    /// joint whether it is in contact, its approach speed, and its clearance in force.
+    pub fn state_hash(&self) -> u64 {
+        let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+        let mut add = |bits: u64| {
+            for byte in bits.to_le_bytes() {
+                hash = (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
+            }
+        };
+        let state = &self.state;
+        add(state.t.to_bits());
+        for y in &state.y {
+            add(y.to_bits());
+        }
+        for (j, m) in state.memory.iter().enumerate() {
+            add(u64::from(m.active));
+            add(m.approach_speed.to_bits());
+            let clearance = state.ramps[j].map_or(state.clearances[j], |r| r.at(state.t).0);
+            add(clearance.to_bits());
+        }
+        hash
+    }
+
+    /// Contact memory of ball joint `j`: whether it is in contact, with which approach speed.
+    pub fn contact_memory(&self, j: usize) -> Memory {
+        self.state.memory[j]
+    }
+}
+
+fn switching_of(scene: &Scene) -> Switching {
+    if scene.solver.method.is_adaptive() { Switching::Located } else { Switching::Immediate }
+}
+
+fn store_gaps(mechanism: &Mechanism, out: &mut [Approach]) {
+    for (out, gap) in out.iter_mut().zip(mechanism.contacts.gaps()) {
+        *out = Approach { penetration: gap.penetration, rate: gap.rate };
+    }
+}
