@@ -261,7 +261,7 @@ impl Scene {
     /// As [`Self::set`] with a value in SI units, for sliders: the text recorded reads back to the same bits.
     ///
     /// # Errors
-    /// As [`Self::set`]; [`Value::Unset`] is only for `solver.preset` and takes the preset away.
+    /// As [`Self::set`]; [`Value::Unset`] takes the change back, as [`Self::undo_change`].
     pub fn set_value(
         &mut self,
         key: &str,
@@ -504,7 +504,10 @@ impl Fault {
             Some(joint) if joint.overrides.contains(part) => format!("joint.{}.{part}", joint.name),
             _ => format!("contact.{part}"),
         };
-        self.parts.iter().map(key).collect()
+        let mut keys: Vec<String> = self.parts.iter().map(key).collect();
+        // What one joint has of its own departs from what holds for all.
+        keys.sort_by_key(|key| !key.starts_with("joint."));
+        keys
     }
 
     fn text(&self, scene: &Scene, key: &str) -> String {
