@@ -157,7 +157,10 @@ fn freedoms(contents: &Summary) -> String {
     if rows == 0 {
         return free.to_string();
     }
-    format!("{free} ({} velocity coordinates less {rows} constraint rows)", contents.velocity_coordinates)
+    format!(
+        "{free} ({} velocity coordinates less {rows} constraint rows)",
+        contents.velocity_coordinates
+    )
 }
 
 fn method(scene: &Scene) -> Result<String, Failure> {

@@ -57,6 +57,6 @@ impl From<SceneError> for Failure {
 
 impl From<StartError> for Failure {
     fn from(error: StartError) -> Self {
-        Self::usage(error.0)
+        Self::usage(error.to_string())
     }
 }

@@ -5,7 +5,7 @@ mod studio;
 
 use std::fs;
 
-use serde_json::{Value as Json, json};
+use serde_json::{Map, Value as Json, json};
 
 use self::studio::{ApplicationStudio, SceneStudio, Studio};
 use super::args::RenderArguments;
@@ -87,8 +87,14 @@ pub fn render(arguments: &RenderArguments) -> Result<(), Failure> {
             .for_each(|warning| warn(warning));
     }
 
+    let meta = provenance::meta(&scene)?;
     interrupt::listen();
     let bar = progress::bar(!arguments.quiet, times.instants.len() as u64);
+    let labels = labels(&meta);
+    let labels: Vec<(&str, &str)> = labels
+        .iter()
+        .map(|(key, text)| (*key, text.as_str()))
+        .collect();
     let mut frames = vec![Json::Null; times.instants.len()];
     let mut status = Status::Done;
     let mut failure = None;
@@ -103,7 +109,10 @@ pub fn render(arguments: &RenderArguments) -> Result<(), Failure> {
             failure = Some(stop);
             break;
         }
-        let png = studio.draw(instant, times.frame_time)?.png();
+        let png = studio
+            .draw(instant, times.frame_time)?
+            .png(&labels)
+            .map_err(|error| Failure::io(error.to_string()))?;
         let file = format!("frame_{number:05}.png");
         let path = folder.scratch().join(&file);
         fs::write(&path, png).map_err(|error| {
@@ -124,7 +133,7 @@ pub fn render(arguments: &RenderArguments) -> Result<(), Failure> {
 
     frames.retain(|frame| !frame.is_null());
     let count = frames.len();
-    let mut manifest = provenance::meta(&scene)?;
+    let mut manifest = meta;
     manifest.insert("parameters".into(), provenance::parameters(&scene)?);
     manifest.insert("status".into(), json!(status.word()));
     manifest.insert("size".into(), json!([arguments.size.0, arguments.size.1]));
@@ -146,4 +155,18 @@ pub fn render(arguments: &RenderArguments) -> Result<(), Failure> {
         arguments.out.display()
     ))?;
     failure.map_or(Ok(()), Err)
+}
+
+/// What made a picture, as texts inside it: a frame that has lost its manifest still tells.
+fn labels(meta: &Map<String, Json>) -> Vec<(&'static str, String)> {
+    // PNG texts are Latin-1.
+    let latin = |text: String| {
+        text.chars()
+            .map(|c| if u32::from(c) < 256 { c } else { '?' })
+            .collect()
+    };
+    vec![
+        ("Software", format!("jointplay {}", crate::VERSION)),
+        ("Description", latin(Json::Object(meta.clone()).to_string())),
+    ]
 }

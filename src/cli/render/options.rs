@@ -50,7 +50,7 @@ pub fn camera(
                         names.join(", ")
                     ))
                 })?;
-            view.close_up(&mut camera, joint, frame, options);
+            view.close_up(&mut camera, joint, scene, frame, options);
         }
         None => camera.fit(
             view.bounds(),

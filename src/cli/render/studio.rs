@@ -1,9 +1,10 @@
 //! What takes the pictures: the scene alone, or the whole application.
 
+use std::sync::Arc;
+
 use super::options;
-use crate::app::{App, AppOptions, Headless};
+use crate::app::{App, AppOptions, Headless, Overlay, force_notes};
 use crate::cli::args::{RenderArguments, ThemeChoice};
-use crate::cli::output::significant;
 use crate::cli::{Failure, interrupt};
 use crate::render::{Image, NoAdapter, Offscreen, RenderError};
 use crate::scene::{Scene, Vec3};
@@ -32,6 +33,14 @@ pub trait Studio {
     fn adapter(&self) -> String;
 }
 
+/// What the picture is drawn on.
+enum Screen {
+    /// The scene and nothing else.
+    Plain(Box<Offscreen>),
+    /// The scene with text over it.
+    Written(Box<Headless>),
+}
+
 /// The scene alone, with text over it where asked.
 pub struct SceneStudio {
     simulation: Simulation,
@@ -40,14 +49,13 @@ pub struct SceneStudio {
     /// Body and point of the probe tip.
     probe: Option<(usize, Vec3)>,
     trail: Vec<glam::Vec3>,
-    names: Vec<String>,
-    offscreen: Offscreen,
-    overlay: Option<Headless>,
+    screen: Screen,
+    overlay: bool,
     view: SceneView,
     camera: Camera,
     options: ViewOptions,
     arrows: ArrowMemory,
-    list: DrawList,
+    list: Arc<DrawList>,
     size: [u32; 2],
 }
 
@@ -67,14 +75,15 @@ impl SceneStudio {
         let view = SceneView::new(scene, &frame);
         let camera = options::camera(arguments, scene, &view, &frame, &options)?;
         let size = [arguments.size.0, arguments.size.1];
-        let offscreen = Offscreen::new().map_err(|error| no_adapter(&error))?;
-        offscreen
-            .check_size(size)
-            .map_err(|error| Failure::usage(error.to_string()))?;
-        let overlay = if arguments.overlay {
-            Some(Headless::new().map_err(|error| no_adapter(&error))?)
+        // Magnified play is never shown without saying so.
+        let screen = if arguments.overlay || options.magnification != 1.0 {
+            Screen::Written(Box::new(
+                Headless::new().map_err(|error| no_adapter(&error))?,
+            ))
         } else {
-            None
+            let offscreen = Offscreen::new().map_err(|error| no_adapter(&error))?;
+            offscreen.check_size(size).map_err(|error| failed(&error))?;
+            Screen::Plain(Box::new(offscreen))
         };
         Ok(Self {
             simulation,
@@ -82,38 +91,15 @@ impl SceneStudio {
             peaks: Vec::new(),
             probe: scene.output.probe.map(|tip| (scene.output.body, tip)),
             trail: Vec::new(),
-            names: scene
-                .ball_joints
-                .iter()
-                .map(|joint| joint.name.clone())
-                .collect(),
-            offscreen,
-            overlay,
+            screen,
+            overlay: arguments.overlay,
             view,
             camera,
             options,
             arrows: ArrowMemory::new(),
-            list: DrawList::default(),
+            list: Arc::default(),
             size,
         })
-    }
-
-    /// Forces at the instant on show, a line for each ball joint, and how much the play is magnified.
-    fn notes(&self) -> Vec<String> {
-        let mut notes = vec![self.list.magnification_text.clone()];
-        notes.extend(
-            self.names
-                .iter()
-                .zip(&self.frame.joints)
-                .map(|(name, joint)| {
-                    format!(
-                        "{name}: normal {} N, friction {} N",
-                        significant(joint.normal_force.norm(), 4),
-                        significant(joint.friction_force.norm(), 4)
-                    )
-                }),
-        );
-        notes
     }
 }
 
@@ -152,25 +138,32 @@ impl Studio for SceneStudio {
             }
         }
         let shot = Shot {
+            scene: self.simulation.scene(),
             frame: &self.frame,
             arrows: &self.arrows,
             options: &self.options,
             camera: &self.camera,
             trail: &self.trail,
             size: self.size,
+            pixels_per_point: 1.0,
         };
-        self.view.build(&shot, &mut self.list);
-        let image = self
-            .offscreen
-            .render(&self.list)
-            .map_err(|error| failed(&error))?;
-        let notes = self.notes();
-        match &mut self.overlay {
-            Some(overlay) => overlay
-                .over(&image, &self.list, instant, &notes, self.options.theme)
-                .map_err(|error| failed(&error)),
-            None => Ok(image),
+        self.view.build(&shot, Arc::make_mut(&mut self.list));
+        match &mut self.screen {
+            Screen::Plain(offscreen) => offscreen.render(&self.list),
+            Screen::Written(headless) => {
+                let mut overlay = Overlay {
+                    time: Some(instant),
+                    ..Overlay::default()
+                };
+                if self.overlay {
+                    overlay.notes = force_notes(self.simulation.scene(), &self.frame);
+                    overlay.legend = true;
+                    overlay.labels = true;
+                }
+                headless.picture(&self.list, &overlay, self.options.theme, 1.0)
+            }
         }
+        .map_err(|error| failed(&error))
     }
 
     fn simulation(&self) -> &Simulation {
@@ -178,7 +171,10 @@ impl Studio for SceneStudio {
     }
 
     fn adapter(&self) -> String {
-        self.offscreen.adapter()
+        match &self.screen {
+            Screen::Plain(offscreen) => offscreen.adapter(),
+            Screen::Written(headless) => headless.adapter(),
+        }
     }
 }
 
