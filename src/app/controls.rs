@@ -9,7 +9,7 @@ use super::icons::{Icon, icon_button};
 use super::player::Player;
 use super::value;
 use crate::scene::{
-    Kind, Parameter, Scope, Value, format_quantity_digits, from_display, to_display,
+    Kind, Parameter, SceneError, Scope, Value, format_quantity_digits, from_display, to_display,
 };
 use crate::simulate::Effect;
 
@@ -347,41 +347,41 @@ impl Controls {
         name: &str,
         now: &Value,
     ) {
-        let original = player.original(key);
-        let written = original
-            .as_ref()
-            .filter(|o| *o != now)
-            .and_then(|o| value::written(o, &parameter.kind));
         let size = 22.0;
         // A place kept free where there is nothing to undo: rows stay aligned.
-        match (written, original) {
-            (Some(written), Some(original)) => {
-                let help = format!("Back to {}", value::shown(&original, &parameter.kind));
-                if icon_button(ui, Icon::Undo, &format!("Reset {name}"), &help, size, false)
-                    .clicked()
-                {
-                    self.set(player, key, &written);
-                }
-            }
-            _ => {
-                ui.allocate_space(egui::Vec2::splat(size));
-            }
+        let Some(original) = player.original(key).filter(|original| original != now) else {
+            ui.allocate_space(egui::Vec2::splat(size));
+            return;
+        };
+        let help = format!("Back to {}", value::shown(&original, &parameter.kind));
+        let label = format!("Reset {name}");
+        if icon_button(ui, Icon::Undo, &label, &help, size, false).clicked() {
+            let done = player.set_original(key);
+            self.settle(key, "", done);
         }
     }
 
     fn set(&mut self, player: &mut Player, key: &str, text: &str) {
-        match player.set(key, text) {
+        let done = player.set(key, text);
+        self.settle(key, text, done);
+    }
+
+    /// A value that was taken leaves no draft; one that was not stays with the reason.
+    fn settle(&mut self, key: &str, text: &str, done: Result<Effect, SceneError>) {
+        match done {
             Ok(Effect::Now | Effect::AtReset) => {
                 self.drafts.remove(key);
             }
             Err(error) => {
-                self.drafts.insert(
-                    key.to_owned(),
-                    Draft {
-                        text: text.to_owned(),
-                        error: Some(error.message),
-                    },
-                );
+                let reason = match &error.value {
+                    Some(value) => format!("{value}: {}", error.message),
+                    None => error.message,
+                };
+                let draft = Draft {
+                    text: text.to_owned(),
+                    error: Some(reason),
+                };
+                self.drafts.insert(key.to_owned(), draft);
             }
         }
     }
@@ -399,4 +399,3 @@ fn tooltip(ui: &mut Ui, parameter: &Parameter, key: &str) {
         ui.label(RichText::new("Applies at the next reset").small());
     }
 }
-

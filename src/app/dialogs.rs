@@ -86,7 +86,7 @@ fn about(ui: &mut Ui, player: &Player) {
     ui.label(format!("Version {}", crate::VERSION));
     ui.label("A 3D laboratory that shows what play in a ball joint does to a machine.");
     ui.add_space(6.0);
-    let scene = player.simulation().scene();
+    let scene = player.scene();
     ui.label(RichText::new(&scene.title).strong());
     ui.label(&scene.description);
     ui.add_space(6.0);

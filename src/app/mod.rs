@@ -361,7 +361,7 @@ impl App {
                 ui.label(RichText::new("Jointplay").heading().strong());
                 ui.add_space(8.0);
             }
-            let name = self.player.simulation().scene().name.clone();
+            let name = self.player.scene().name.clone();
             let mut wanted = None;
             ComboBox::from_id_salt("scene")
                 .width(if narrow { 110.0 } else { 170.0 })
@@ -374,7 +374,7 @@ impl App {
                     }
                 })
                 .response
-                .on_hover_text(&self.player.simulation().scene().title)
+                .on_hover_text(&self.player.scene().title)
                 .accessible_name("Scene");
             if let Some(wanted) = wanted {
                 self.problem = self.open(wanted).err();

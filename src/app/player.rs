@@ -1,7 +1,5 @@
 //! A running scene with its transport: playing, pacing, recording, peaks and what went wrong. No egui here.
 
-use std::collections::BTreeSet;
-
 use web_time::Instant;
 
 use crate::scene::{Scene, SceneError, Value};
@@ -17,11 +15,8 @@ pub struct Player {
     /// How fast simulated time passes.
     pub pacer: Pacer,
     simulation: Simulation,
-    /// The scene as the user wants it: with the changes that still wait for a reset.
-    wanted: Scene,
     /// The scene as its file gives it.
     original: Scene,
-    waiting: BTreeSet<String>,
     /// What is allowed but may not mean what the user expects.
     warnings: Vec<String>,
     playing: bool,
@@ -47,9 +42,7 @@ impl Player {
         let channels = Channels::of(scene);
         let mut player = Self {
             pacer: Pacer::default(),
-            wanted: scene.clone(),
             original,
-            waiting: BTreeSet::new(),
             warnings: scene.warnings(),
             playing: false,
             stopped: None,
@@ -72,7 +65,12 @@ impl Player {
 
     /// The scene as the user wants it: with the changes that still wait for a reset.
     pub fn wanted(&self) -> &Scene {
-        &self.wanted
+        self.simulation.scene()
+    }
+
+    /// The scene as it runs.
+    pub fn scene(&self) -> &Scene {
+        self.simulation.running_scene()
     }
 
     /// What is on show.
@@ -161,11 +159,8 @@ impl Player {
     /// As [`Simulation::reset`]; nothing has changed then.
     pub fn reset(&mut self) -> Result<(), StartError> {
         self.simulation.reset()?;
-        self.wanted = self.simulation.scene().clone();
-        self.waiting.clear();
-        self.warnings = self.wanted.warnings();
         self.stopped = None;
-        let channels = Channels::of(&self.wanted);
+        let channels = Channels::of(self.simulation.running_scene());
         if channels.list() != self.channels.list() {
             self.history = History::new(channels.len(), FINEST_BIN);
             self.channels = channels;
@@ -180,25 +175,32 @@ impl Player {
     /// As [`Simulation::set`]; nothing has changed then.
     pub fn set(&mut self, key: &str, value: &str) -> Result<Effect, SceneError> {
         let effect = self.simulation.set(key, value)?;
-        if self.wanted.set(key, value).is_err() {
-            // The running scene took it: what it now holds is what is wanted.
-            self.wanted = self.simulation.scene().clone();
-        }
-        self.warnings = self.wanted.warnings();
-        if effect == Effect::AtReset {
-            self.waiting.insert(key.to_owned());
-        }
+        self.warnings = self.wanted().warnings();
+        Ok(effect)
+    }
+
+    /// Gives a parameter the value that the scene's file has.
+    ///
+    /// # Errors
+    /// As [`Simulation::set_value`]; nothing has changed then.
+    pub fn set_original(&mut self, key: &str) -> Result<Effect, SceneError> {
+        let value = self.original.get(key)?;
+        let effect = self.simulation.set_value(key, &value)?;
+        self.warnings = self.wanted().warnings();
         Ok(effect)
     }
 
     /// Whether `key` was changed and waits for a reset.
     pub fn is_waiting(&self, key: &str) -> bool {
-        self.waiting.contains(key)
+        self.wanted().get(key).ok() != self.scene().get(key).ok()
     }
 
     /// Whether any change waits for a reset.
     pub fn has_waiting(&self) -> bool {
-        !self.waiting.is_empty()
+        self.wanted()
+            .changes
+            .iter()
+            .any(|(key, _)| self.is_waiting(key))
     }
 
     /// What to know about the present value of `key`, if anything.

@@ -104,7 +104,7 @@ impl Plots {
                 }
             }
         }
-        if player.simulation().scene().ball_joints.len() > RECORDED_JOINTS {
+        if player.scene().ball_joints.len() > RECORDED_JOINTS {
             ui.label(
                 RichText::new(format!(
                     "The first {RECORDED_JOINTS} ball joints are recorded"
@@ -229,7 +229,7 @@ impl Plots {
             plot.show(ui, |plot| {
                 plot.set_plot_bounds_x(from / time_size..=to / time_size);
                 if quantity == Quantity::Eccentricity {
-                    let clearance = player.simulation().scene().contact.clearance / size;
+                    let clearance = player.scene().contact.clearance / size;
                     plot.hline(
                         HLine::new("clearance", clearance)
                             .color(egui::Color32::GRAY)

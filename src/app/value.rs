@@ -1,6 +1,6 @@
 //! Parameter values as text: the same words and units that files and the command line take.
 
-use crate::scene::{Kind, Value, format_quantity, format_quantity_digits, si_unit, to_display};
+use crate::scene::{Kind, Value, format_quantity, format_quantity_digits, to_display};
 
 /// `value` for a person: display unit, six digits.
 pub fn shown(value: &Value, kind: &Kind) -> String {
@@ -11,21 +11,6 @@ pub fn shown(value: &Value, kind: &Kind) -> String {
         (Value::Choice(word), _) => (*word).to_owned(),
         (Value::Unset, _) => "not set".to_owned(),
     }
-}
-
-/// `value` as `--set` takes it, every digit kept; `None` for what cannot be written.
-pub fn written(value: &Value, kind: &Kind) -> Option<String> {
-    Some(match (value, kind) {
-        (Value::Number(si), Kind::Number { dimension, .. }) => {
-            format!("{si:e} {}", si_unit(*dimension))
-                .trim_end()
-                .to_owned()
-        }
-        (Value::Number(si), _) => format!("{si:e}"),
-        (Value::Count(count), _) => count.to_string(),
-        (Value::Choice(word), _) => (*word).to_owned(),
-        (Value::Unset, _) => return None,
-    })
 }
 
 /// What a user typed, with the display unit added to a bare number.
@@ -119,10 +104,6 @@ mod tests {
     #[test]
     fn values_read_as_people_write_them() {
         assert_eq!(shown(&Value::Number(3e-4), &LENGTH), "0.3 mm");
-        assert_eq!(
-            written(&Value::Number(3e-4), &LENGTH).as_deref(),
-            Some("3e-4 m")
-        );
         assert_eq!(range(&LENGTH), "0 to 2 mm");
     }
 

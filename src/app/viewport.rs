@@ -39,7 +39,7 @@ pub struct Viewport {
 impl Viewport {
     /// A viewport that shows all of the player's scene.
     pub fn new(player: &Player, options: ViewOptions) -> Self {
-        let view = SceneView::new(player.simulation().scene(), player.frame());
+        let view = SceneView::new(player.scene(), player.frame());
         Self {
             camera: view.camera(),
             goal: None,
@@ -61,7 +61,7 @@ impl Viewport {
 
     /// After a reset: the same shapes at t = 0.
     pub fn restart(&mut self, player: &Player) {
-        self.view = SceneView::new(player.simulation().scene(), player.frame());
+        self.view = SceneView::new(player.scene(), player.frame());
         self.arrows.clear();
         self.trail.clear();
         self.followed = None;
@@ -120,8 +120,9 @@ impl Viewport {
     pub fn close_up(&mut self, player: &Player, joint: usize) {
         if joint < player.frame().joints.len() {
             let mut goal = self.camera;
-            let scene = player.simulation().scene();
-            self.view.close_up(&mut goal, joint, scene, player.frame(), &self.options);
+            let scene = player.scene();
+            self.view
+                .close_up(&mut goal, joint, scene, player.frame(), &self.options);
             self.goal = Some(goal);
             self.fit_pending = false;
             self.follow(None);
@@ -172,7 +173,7 @@ impl Viewport {
         }
         self.drag(ui, &response, rect, size, scale);
         let shot = Shot {
-            scene: player.simulation().scene(),
+            scene: player.scene(),
             frame: player.frame(),
             arrows: &self.arrows,
             options: &self.options,
@@ -324,7 +325,7 @@ impl Viewport {
     }
 
     fn extend_trail(&mut self, player: &Player) {
-        let output = &player.simulation().scene().output;
+        let output = &player.scene().output;
         let (Some(probe), Some(body)) = (output.probe, player.frame().bodies.get(output.body))
         else {
             return;
@@ -343,7 +344,7 @@ fn pixels(length: f32) -> u32 {
 }
 
 fn name_of(player: &Player, picked: Picked) -> Option<&str> {
-    let scene = player.simulation().scene();
+    let scene = player.scene();
     match picked {
         Picked::Body(index) => scene.bodies.get(index).map(|body| body.name.as_str()),
         Picked::Joint(index) => scene
@@ -367,10 +368,9 @@ fn describe(ui: &mut Ui, player: &Player, picked: Picked) {
     ui.strong(name);
     match picked {
         Picked::Body(index) => {
-            if let (Some(body), Some(motion)) = (
-                player.simulation().scene().bodies.get(index),
-                frame.bodies.get(index),
-            ) {
+            if let (Some(body), Some(motion)) =
+                (player.scene().bodies.get(index), frame.bodies.get(index))
+            {
                 row(ui, "Mass", body.mass, "kg");
                 row(ui, "Speed", motion.velocity.norm(), "m/s");
                 row(ui, "Angular speed", motion.angular_velocity.norm(), "rad/s");

@@ -597,9 +597,9 @@ impl Simulation {
     ///
     /// # Errors
     /// As [`Self::set`].
-    pub fn set_value(&mut self, key: &str, value: crate::scene::Value) -> Result<Effect, SceneError> {
+    pub fn set_value(&mut self, key: &str, value: &crate::scene::Value) -> Result<Effect, SceneError> {
         let mut next = self.scene.clone();
-        let waits = next.set_value(key, value.clone())?.at_reset;
+        let waits = next.set_value(key, value)?.at_reset;
         self.adopt(next, |running| running.set_value(key, value).map(|_| ()), waits)
     }
 
