@@ -185,14 +185,9 @@ pub struct RenderArguments {
     /// Force whose arrow has the reference length, e.g. `500N`; follows the forces if not given.
     #[arg(long, value_name = "FORCE", help_heading = "Picture")]
     pub arrow_reference: Option<String>,
-    /// Factor on eccentricity and clearance together, 1 to 100.
-    #[arg(
-        long,
-        value_name = "FACTOR",
-        default_value_t = 1.0,
-        help_heading = "Picture"
-    )]
-    pub magnification: f32,
+    /// Factor on eccentricity and clearance together, 1 to 100 [default: 1; with --ui as the window starts].
+    #[arg(long, value_name = "FACTOR", help_heading = "Picture")]
+    pub magnification: Option<f32>,
     /// Colours.
     #[arg(
         long,

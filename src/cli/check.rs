@@ -85,6 +85,7 @@ fn report(scene: &Scene, contents: &Summary, start: &Frame) -> Result<String, Fa
     left_out.iter().for_each(|item| line("Not computed", item));
     warnings(scene)
         .iter()
+        .chain(&near_singular(scene))
         .for_each(|warning| line("Warning", warning));
     Ok(out)
 }
@@ -275,4 +276,48 @@ pub fn warnings(scene: &Scene) -> Vec<String> {
         ));
     }
     warnings
+}
+
+/// Instants of the drive's period at which the ideal mechanism is looked at.
+const INSTANTS: u32 = 400;
+
+/// Reactions above this many times the weight of all bodies mean that the mechanism is about to lose its stiffness.
+const MOST_WEIGHTS: f64 = 5.0;
+
+/// Rods that reach do not make a good mechanism yet: near a singular pose the reactions of the ideal joints explode.
+fn near_singular(scene: &Scene) -> Option<String> {
+    let mut rigid = scene.clone();
+    let drive = rigid.spcmm.as_mut()?;
+    // Slow, so that weight alone makes the reactions: the poses are the same.
+    drive.frequency = drive.frequency.min(0.5);
+    let period = 1.0 / drive.frequency;
+    for joint in &mut rigid.ball_joints {
+        joint.contact.clearance = 0.0;
+    }
+    let limit = MOST_WEIGHTS * 9.81 * rigid.bodies.iter().map(|body| body.mass).sum::<f64>();
+    let mut simulation = Simulation::new(&rigid).ok()?;
+    let mut frame = Frame::default();
+    let (mut largest, mut when) = (0.0, 0.0);
+    for k in 0..=INSTANTS {
+        let time = period * f64::from(k) / f64::from(INSTANTS);
+        if simulation.advance_to(time).is_err() {
+            let time = simulation.time();
+            return Some(format!(
+                "the ideal mechanism has a singular pose near t = {time:.3} s"
+            ));
+        }
+        simulation.sample(time, &mut frame);
+        for joint in &frame.joints {
+            if joint.normal_force.norm() > largest {
+                (largest, when) = (joint.normal_force.norm(), time);
+            }
+        }
+    }
+    (largest > limit).then(|| {
+        format!(
+            "the mechanism comes near a singular pose: with ideal joints and a slow drive a reaction reaches {} N at \
+             t = {when:.3} s, more than {MOST_WEIGHTS} times the weight of all bodies",
+            significant(largest, 4)
+        )
+    })
 }

@@ -63,8 +63,21 @@ fn view(scene: &str, changes: &[(String, String)]) -> Result<(), Failure> {
             WindowError::NoAdapter(_) => Failure::NO_ADAPTER,
             WindowError::Window(_) => Failure::INPUT_OUTPUT,
         };
-        Failure::new(code, error.to_string())
+        // The window system's own words do not say what works instead.
+        let message = if matches!(error, WindowError::Window(_)) && no_display() {
+            "cannot open a window: there is no display; `jointplay render` draws frames without one"
+                .to_owned()
+        } else {
+            error.to_string()
+        };
+        Failure::new(code, message)
     })
+}
+
+#[cfg(feature = "gui")]
+fn no_display() -> bool {
+    let unset = |name| std::env::var_os(name).is_none_or(|value| value.is_empty());
+    cfg!(target_os = "linux") && unset("DISPLAY") && unset("WAYLAND_DISPLAY")
 }
 
 #[cfg(not(feature = "gui"))]

@@ -66,10 +66,10 @@ pub fn camera(
 /// # Errors
 /// Usage.
 pub fn view_options(arguments: &RenderArguments) -> Result<ViewOptions, Failure> {
-    if !(1.0..=100.0).contains(&arguments.magnification) {
+    let magnification = arguments.magnification.unwrap_or(1.0);
+    if !(1.0..=100.0).contains(&magnification) {
         return Err(Failure::usage(format!(
-            "--magnification {}: allowed 1 to 100",
-            arguments.magnification
+            "--magnification {magnification}: allowed 1 to 100"
         )));
     }
     let shown = |thing| !arguments.hide.contains(&thing);
@@ -78,7 +78,7 @@ pub fn view_options(arguments: &RenderArguments) -> Result<ViewOptions, Failure>
             ThemeChoice::Light => Theme::Light,
             ThemeChoice::Dark => Theme::Dark,
         },
-        magnification: arguments.magnification,
+        magnification,
         arrows: ArrowOptions {
             normal: matches!(arguments.arrows, ArrowChoice::Both | ArrowChoice::Normal),
             friction: matches!(arguments.arrows, ArrowChoice::Both | ArrowChoice::Friction),

@@ -201,7 +201,10 @@ impl ApplicationStudio {
         let headless = Headless::new().map_err(|error| no_adapter(&error))?;
         let mut start = AppOptions::new(scene.clone());
         start.playing = false;
-        start.view = options;
+        start.view = ViewOptions {
+            magnification: arguments.magnification.unwrap_or(start.view.magnification),
+            ..options
+        };
         start.theme = match arguments.theme {
             ThemeChoice::Light => eframe::egui::ThemePreference::Light,
             ThemeChoice::Dark => eframe::egui::ThemePreference::Dark,
