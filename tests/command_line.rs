@@ -771,6 +771,34 @@ mod frames {
     }
 
     #[test]
+    fn a_film_holds_the_impacts_between_its_frames_and_a_single_picture_does_not() {
+        let folder = folder();
+        // At 9 ms every ball flies free; each joint was hit 1.2 ms before.
+        let common = "--size 320x180 --hide trail,flash";
+        for (name, arrows) in [("with", "both"), ("without", "none")] {
+            let film = format!(
+                "render spcmm --duration 9ms --fps 1000 --slow 0.1111111111111111 {common} --arrows {arrows} --out film_{name}"
+            );
+            jointplay(folder.path(), &film).expect(0);
+            let single =
+                format!("render spcmm --at 9ms {common} --arrows {arrows} --out single_{name}");
+            jointplay(folder.path(), &single).expect(0);
+        }
+        let frames = manifest(&folder.path().join("film_with"))["frames"].clone();
+        assert_eq!(frames[1]["time_s"], 0.009);
+        let last = |name: &str, frame: &str| picture(&folder.path().join(name).join(frame)).2;
+        let (film, single) = ("frame_00001.png", "frame_00000.png");
+        assert!(
+            last("film_with", film) != last("single_with", single),
+            "held forces are drawn"
+        );
+        assert!(
+            last("film_without", film) == last("single_without", single),
+            "and are all that differs"
+        );
+    }
+
+    #[test]
     fn the_whole_application_can_be_drawn() {
         let folder = folder();
         jointplay(
