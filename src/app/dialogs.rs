@@ -113,10 +113,10 @@ fn open(ui: &mut Ui, path: &mut String, error: Option<&str>) -> Option<Answer> {
             .desired_width(f32::INFINITY)
             .hint_text("scene.toml"),
     );
-    if ui.memory(|memory| memory.focused().is_none()) {
+    let entered = field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
+    if !entered && ui.memory(|memory| memory.focused().is_none()) {
         field.request_focus();
     }
-    let entered = field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
     field.accessible_name("Path");
     if let Some(error) = error {
         ui.label(RichText::new(error).color(ui.visuals().error_fg_color));

@@ -4,6 +4,7 @@
 
 mod controls;
 mod dialogs;
+mod framing;
 mod headless;
 mod icons;
 mod keys;
@@ -336,17 +337,17 @@ impl App {
             .max_rect(inner)
             .layout(egui::Layout::right_to_left(egui::Align::Min));
         ui.scope_builder(buttons, |ui| {
-            ui.menu_button("View", |ui| {
+            ui.menu_button("View options", |ui| {
                 ui.set_min_width(230.0);
                 if narrow {
-                    ui.horizontal_wrapped(|ui| self.viewport.camera_buttons(ui));
+                    ui.horizontal_wrapped(|ui| self.viewport.camera_buttons(ui, false));
                     ui.separator();
                 }
                 self.viewport.options_ui(ui);
             });
             if !narrow {
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Min), |ui| {
-                    self.viewport.camera_buttons(ui)
+                    self.viewport.camera_buttons(ui, true)
                 });
             }
         });
