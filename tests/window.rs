@@ -480,3 +480,63 @@ fn pictures() {
         results.extend_harness(&mut harness);
     }
 }
+
+#[test]
+#[ignore = "writes pictures to look at, to $JOINTPLAY_LOOK"]
+fn look() {
+    let Ok(folder) = std::env::var("JOINTPLAY_LOOK") else {
+        return;
+    };
+    let mut save = |harness: &mut Harness<'_, App>, name: &str| {
+        harness
+            .render()
+            .expect("drawn")
+            .save(format!("{folder}/{name}.png"))
+            .expect("written");
+    };
+    let mut h = sized("spcmm", [1280.0, 800.0], egui::Theme::Light);
+    h.state_mut().player_mut().set_playing(true);
+    h.run_steps(100);
+    h.state_mut().player_mut().set_playing(false);
+    h.run();
+    save(&mut h, "played");
+    h.key_press(Key::Num5);
+    h.run();
+    save(&mut h, "closeup");
+    h.key_press(Key::Questionmark);
+    h.run();
+    save(&mut h, "keys");
+    h.key_press(Key::Escape);
+    h.run();
+    for group in ["Contact", "Solver", "One joint"] {
+        h.get_by_label(group).click();
+        h.run();
+    }
+    type_into(&mut h, "Clearance", "0.4 kg");
+    h.get_by_role_and_label(Role::Slider, "Restitution")
+        .set_value_accesskit(0.3);
+    h.state_mut()
+        .player_mut()
+        .set("spcmm.frequency", "0.4 Hz")
+        .expect("ok");
+    h.run();
+    save(&mut h, "groups");
+    let mut h = sized("spcmm", [1280.0, 800.0], egui::Theme::Dark);
+    h.state_mut().player_mut().pacer.set_scale(1.0);
+    h.state_mut().player_mut().set_playing(true);
+    h.run_steps(60);
+    h.get_by_label("View options").click();
+    h.run_steps(5);
+    save(&mut h, "playing");
+    let player = h.state_mut().player_mut();
+    player.set("solver.method", "rk4").expect("a method");
+    player.set("solver.step", "1 ms").expect("in range");
+    player.run_to(2.5);
+    h.run();
+    save(&mut h, "stopped");
+    let mut h = sized("slider-crank", [420.0, 800.0], egui::Theme::Dark);
+    h.state_mut().player_mut().run_to(0.05);
+    h.get_by_label("Choose plots").scroll_to_me();
+    h.run();
+    save(&mut h, "narrow_dark");
+}

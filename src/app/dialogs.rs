@@ -34,25 +34,28 @@ pub enum Answer {
 pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player) -> Option<Answer> {
     let mut answer = None;
     let widest = (ctx.content_rect().width() - 48.0).min(520.0);
-    let modal = Modal::new(Id::unique("dialog")).show(ctx, |ui| {
-        ui.set_width(widest);
-        let title = match dialog {
-            Dialog::Help => "Keys",
-            Dialog::About => "About Jointplay",
-            Dialog::Open { .. } => "Open a scene file",
-        };
-        ui.heading(title);
-        ui.add_space(6.0);
-        match dialog {
-            Dialog::Help => help(ui),
-            Dialog::About => about(ui, player),
-            Dialog::Open { path, error } => answer = open(ui, path, error.as_deref()),
-        }
-        ui.add_space(8.0);
-        if ui.button("Close").clicked() {
-            answer = Some(Answer::Close);
-        }
-    });
+    let frame = egui::Frame::window(&ctx.global_style());
+    let modal = Modal::new(Id::unique("dialog"))
+        .frame(frame)
+        .show(ctx, |ui| {
+            ui.set_width(widest);
+            let title = match dialog {
+                Dialog::Help => "Keys",
+                Dialog::About => "About Jointplay",
+                Dialog::Open { .. } => "Open a scene file",
+            };
+            ui.heading(title);
+            ui.add_space(6.0);
+            match dialog {
+                Dialog::Help => help(ui),
+                Dialog::About => about(ui, player),
+                Dialog::Open { path, error } => answer = open(ui, path, error.as_deref()),
+            }
+            ui.add_space(8.0);
+            if ui.button("Close").clicked() {
+                answer = Some(Answer::Close);
+            }
+        });
     if modal.should_close() {
         answer = Some(Answer::Close);
     }
@@ -60,6 +63,7 @@ pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player) -> Option<A
 }
 
 fn help(ui: &mut Ui) {
+    ui.spacing_mut().interact_size.y = 18.0;
     let rows = BINDINGS
         .iter()
         .filter(|b| !b.written.is_empty())

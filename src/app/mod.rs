@@ -5,6 +5,7 @@
 mod controls;
 mod dialogs;
 mod framing;
+#[cfg(not(target_arch = "wasm32"))]
 mod headless;
 mod icons;
 mod keys;
@@ -28,6 +29,7 @@ use crate::view::{Preset, ViewOptions};
 
 use controls::Controls;
 use dialogs::{Answer, Dialog};
+#[cfg(not(target_arch = "wasm32"))]
 pub use headless::{Headless, HeadlessError, Overlay, UiFrame};
 use keys::Action;
 pub use overlay::force_notes;
@@ -273,6 +275,8 @@ impl App {
             .default_size(230.0)
             .size_range(150.0..=600.0)
             .show_collapsible(ui, show_plots, |ui| {
+                // Else the panel would shrink to what the plots leave of it.
+                ui.take_available_space();
                 plots.header(ui, player);
                 plots.ui(ui, player);
             });

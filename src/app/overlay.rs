@@ -62,28 +62,25 @@ pub fn labels(painter: &Painter, rect: Rect, scale: f32, list: &DrawList) {
     }
 }
 
-/// Simulated time in the upper left corner, with notes below it.
+/// Simulated time in the upper left corner, with notes below it, on a plate of their own.
 pub fn time(painter: &Painter, rect: Rect, time: f64, notes: &[String], theme: Theme) {
     let palette = Palette::of(theme);
-    let (ink, halo) = (colour(palette.text), colour(palette.sky));
-    let mut at = rect.min + vec2(MARGIN, MARGIN);
-    let line = format!("t = {}", value::time(time));
-    at.y = text(painter, at, Align2::LEFT_TOP, &line, 18.0, ink, halo)
-        .max
-        .y
-        + 2.0;
-    for note in notes.iter().filter(|note| !note.is_empty()) {
-        at.y = text(
-            painter,
-            at,
-            Align2::LEFT_TOP,
-            note,
-            13.0,
-            ink.gamma_multiply(0.8),
-            halo,
-        )
-        .max
-        .y + 1.0;
+    let ink = colour(palette.text);
+    let line =
+        |words: String, size: f32| painter.layout_no_wrap(words, FontId::proportional(size), ink);
+    let mut lines = vec![line(format!("t = {}", value::time(time)), 18.0)];
+    let notes = notes.iter().filter(|note| !note.is_empty());
+    lines.extend(notes.map(|note| line(note.clone(), 13.0)));
+    let width = lines.iter().map(|l| l.size().x).fold(0.0, f32::max);
+    let height: f32 = lines.iter().map(|l| l.size().y + 1.0).sum();
+    let corner = rect.min + vec2(MARGIN, MARGIN);
+    let plate = Rect::from_min_size(corner, vec2(width, height)).expand2(vec2(8.0, 4.0));
+    painter.rect_filled(plate, 6.0, colour(palette.sky).gamma_multiply(0.75));
+    let mut at = corner;
+    for line in lines {
+        let step = line.size().y + 1.0;
+        painter.galley(at, line, ink);
+        at.y += step;
     }
 }
 

@@ -133,7 +133,8 @@ impl Plots {
         let columns = ((space.x / 300.0).floor() as usize).clamp(1, chosen.len());
         let rows = chosen.len().div_ceil(columns);
         let gap = ui.spacing().item_spacing;
-        let width = (space.x - gap.x * (columns - 1) as f32) / columns as f32;
+        // The last mark of the axis below reaches beyond the plot.
+        let width = (space.x - 16.0 - gap.x * (columns - 1) as f32) / columns as f32;
         let height = ((space.y - gap.y * (rows - 1) as f32) / rows as f32).max(LEAST_HEIGHT);
         egui::ScrollArea::vertical()
             .id_salt("plots")
@@ -142,7 +143,7 @@ impl Plots {
                     ui.horizontal_top(|ui| {
                         for quantity in row {
                             ui.allocate_ui(vec2(width, height), |ui| {
-                                self.plot(ui, player, *quantity, height)
+                                self.plot(ui, player, *quantity, vec2(width, height))
                             });
                         }
                     });
@@ -150,7 +151,7 @@ impl Plots {
             });
     }
 
-    fn plot(&mut self, ui: &mut Ui, player: &Player, quantity: Quantity, height: f32) {
+    fn plot(&mut self, ui: &mut Ui, player: &Player, quantity: Quantity, space: egui::Vec2) {
         let (unit, size) = quantity.unit();
         let end = player.pacer.shown();
         let length = match self.window {
@@ -205,7 +206,8 @@ impl Plots {
                 .label_spacing(egui::Rangef::new(14.0, 18.0))
                 .formatter(|mark, _| tick(mark.value));
             let mut plot = Plot::new(("plot", quantity))
-                .height((height - 38.0).max(60.0))
+                .width(space.x - 12.0)
+                .height((space.y - 38.0).max(60.0))
                 .allow_drag(false)
                 .allow_zoom(false)
                 .allow_scroll(false)
@@ -216,7 +218,7 @@ impl Plots {
                 .custom_x_axes(vec![across])
                 .custom_y_axes(vec![up])
                 .x_grid_spacer(|input| marks(&input, 5.0))
-                .y_grid_spacer(|input| marks(&input, 4.0))
+                .y_grid_spacer(|input| marks(&input, 5.0))
                 .grid_color(faint.gamma_multiply(0.35))
                 .grid_fade(0.0)
                 .label_formatter(move |position| match position {

@@ -157,7 +157,7 @@ pub fn banner(ui: &mut Ui, player: &Player) -> Option<Asked> {
     let mut asked = None;
     let colour = ui.visuals().error_fg_color;
     egui::Frame::new()
-        .fill(colour.gamma_multiply(0.14))
+        .fill(ui.visuals().window_fill)
         .stroke(egui::Stroke::new(1.0, colour))
         .corner_radius(6.0)
         .inner_margin(10.0)

@@ -350,13 +350,24 @@ impl Viewport {
         }
         ui.add_space(4.0);
         ui.label("Show");
-        ui.checkbox(&mut options.flash, "Flash joints that are hit");
-        ui.checkbox(&mut options.joint_names, "Joint names");
-        ui.checkbox(&mut options.sockets, "Sockets");
-        ui.checkbox(&mut options.floor, "Floor grid");
-        ui.checkbox(&mut options.triad, "Axes and gravity");
-        ui.checkbox(&mut options.trail, "Trail of the probe tip");
-        if self.followed.is_some() && ui.button("Stop following").clicked() {
+        ui.checkbox(&mut options.flash, "Flash joints that are hit")
+            .on_hover_text("A joint lights up when its ball strikes, brighter for a harder blow");
+        ui.checkbox(&mut options.joint_names, "Joint names")
+            .on_hover_text("Names beside the ball joints");
+        ui.checkbox(&mut options.sockets, "Sockets")
+            .on_hover_text("The cut-open sockets; without them the balls stand free");
+        ui.checkbox(&mut options.floor, "Floor grid")
+            .on_hover_text("The floor with its grid and the shadows on it");
+        ui.checkbox(&mut options.triad, "Axes and gravity")
+            .on_hover_text("World axes X, Y, Z and the direction of gravity g");
+        ui.checkbox(&mut options.trail, "Trail of the probe tip")
+            .on_hover_text("Where the tip of the probe was");
+        if self.followed.is_some()
+            && ui
+                .button("Stop following")
+                .on_hover_text("Let the view go (double-click on the ground)")
+                .clicked()
+        {
             self.follow(None);
         }
     }
