@@ -540,3 +540,42 @@ fn look() {
     h.run();
     save(&mut h, "narrow_dark");
 }
+
+#[test]
+fn hovering_names_a_part_and_a_double_click_follows_it() {
+    let mut harness = window("spcmm");
+    // The middle of the platform, in the isometric view that the window starts with.
+    let view = harness.get_by_label("3D view").rect();
+    let platform = view.lerp_inside(egui::vec2(0.37, 0.74));
+    harness.hover_at(platform);
+    harness.run_steps(60);
+    harness.get_by_label("Double-click to follow");
+    harness.get_by_label_contains("Angular speed");
+
+    for _ in 0..2 {
+        harness.drag_at(platform);
+        harness.drop_at(platform);
+        harness.step();
+    }
+    harness.remove_cursor();
+    harness.run();
+    harness.get_by_label("View options").click();
+    harness.run();
+    harness.get_by_label("Stop following").click();
+    harness.run();
+    assert!(harness.query_by_label("Stop following").is_none());
+}
+
+#[test]
+fn the_chosen_plots_are_shown_with_their_units() {
+    let mut harness = window("spcmm");
+    harness.get_by_label("Normal force, N");
+    assert!(harness.query_by_label("Energy, mJ").is_none());
+    harness.get_by_label("Choose plots").click();
+    harness.run();
+    harness.get_by_role_and_label(Role::CheckBox, "Energy, mJ").click();
+    harness.run();
+    harness.key_press(Key::Escape);
+    harness.run();
+    harness.get_by_role_and_label(Role::Label, "Energy, mJ");
+}
