@@ -320,7 +320,7 @@ impl Scene {
     ) -> Result<&'static Parameter, SceneError> {
         let text = text.trim();
         let Resolved { parameter, joint } = self.resolve(key).map_err(|mut error| {
-            error.value = Some(text.to_owned());
+            error.value = Some(text.into());
             error
         })?;
         let value = parameter

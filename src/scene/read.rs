@@ -380,14 +380,22 @@ fn read_output(
 /// "No such body", with the nearest name and all names.
 pub(super) fn no_body<'a>(wanted: &str, names: impl Iterator<Item = &'a str> + Clone) -> String {
     let near = super::error::nearest(wanted, names.clone());
-    let listed: Vec<&str> = names.take(12).collect();
-    format!("no body `{wanted}`{near}; bodies: {}", listed.join(", "))
+    let listed: Vec<&str> = names.clone().take(12).collect();
+    let more = if names.count() > listed.len() {
+        ", …"
+    } else {
+        ""
+    };
+    format!(
+        "no body `{wanted}`{near}; bodies: {}{more}",
+        listed.join(", ")
+    )
 }
 
 /// Names seen so far, with their lines: no two may be equal.
 #[derive(Default)]
 struct Names {
-    lines: HashMap<String, usize>,
+    lines: HashMap<String, u32>,
 }
 
 impl Names {
