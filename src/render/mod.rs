@@ -4,11 +4,15 @@
 //! The picture is gamma-encoded once, at the end of `shaders/scene.wgsl`; everything after that copies bytes.
 
 mod callback;
+#[cfg(test)]
+mod look;
 mod meshes;
 mod offscreen;
 mod pipelines;
 mod renderer;
 mod target;
+#[cfg(test)]
+mod tests;
 
 pub use callback::{Viewport, install};
 pub use eframe::egui_wgpu::wgpu;

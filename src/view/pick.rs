@@ -93,6 +93,9 @@ fn cast(solid: &Solid<'_>, ray: &Ray) -> Option<f32> {
             ..
         } => {
             let half = from.distance(to) / 2.0;
+            if half == 0.0 {
+                return None;
+            }
             // parry's cylinder and cone stand along Y.
             let turn = Quat::from_rotation_arc(Vec3::Y, (to - from).normalize_or(Vec3::Y));
             let pose = ParryPose::from_parts((from + to) / 2.0, turn);
