@@ -85,3 +85,40 @@ fn look() {
         }
     }
 }
+
+/// Cost of a picture on this processor: the list, and recording its passes.
+#[test]
+#[ignore = "prints times for a person to read"]
+fn time() {
+    let mut offscreen = Offscreen::new().expect("a graphics adapter");
+    let (scene, frame) = fixture::three_legs();
+    let view = SceneView::new(&scene, &frame);
+    let (options, camera) = (ViewOptions::default(), view.camera());
+    let mut arrows = ArrowMemory::new();
+    arrows.update(&frame, &fixture::hits(&frame), 0.016, &options.arrows);
+    let trail = vec![glam::Vec3::ZERO; 1000];
+    let mut list = DrawList::default();
+    let (mut build, mut record) = (Vec::new(), Vec::new());
+    for _ in 0..100 {
+        let start = web_time::Instant::now();
+        let shot = Shot {
+            scene: &scene,
+            frame: &frame,
+            arrows: &arrows,
+            options: &options,
+            camera: &camera,
+            trail: &trail,
+            size: [64, 48],
+            pixels_per_point: 1.0,
+        };
+        view.build(&shot, &mut list);
+        build.push(start.elapsed());
+        record.push(offscreen.record_only(&list));
+    }
+    build.sort();
+    record.sort();
+    println!(
+        "draw list {:?}, recording {:?} (median of 100)",
+        build[50], record[50]
+    );
+}

@@ -350,3 +350,51 @@ fn a_size_that_cannot_be_drawn_is_refused_with_the_limit() {
         assert!(error.to_string().contains("1 to "), "{error}");
     }
 }
+
+/// An application that is nothing but the viewport.
+struct OnlyViewport(std::sync::Arc<DrawList>);
+
+impl eframe::App for OnlyViewport {
+    fn ui(&mut self, ui: &mut eframe::egui::Ui, _frame: &mut eframe::Frame) {
+        eframe::egui::CentralPanel::no_frame().show(ui, |ui| {
+            let rect = ui.available_rect_before_wrap();
+            ui.painter()
+                .add(super::Viewport::shape(rect, self.0.clone()));
+        });
+    }
+}
+
+#[test]
+fn the_interface_shows_the_very_picture_that_is_drawn_without_a_window() {
+    let (scene, frame) = fixture::three_legs();
+    let view = SceneView::new(&scene, &frame);
+    let options = ViewOptions {
+        magnification: 10.0,
+        ..Default::default()
+    };
+    let mut camera = view.camera();
+    view.fit(&mut camera, &scene, &frame, &options, SIZE);
+    let list = picture(&scene, &frame, &options, &camera, false);
+    let alone = offscreen().render(&list).expect("a picture");
+    let mut harness = egui_kittest::Harness::builder()
+        .with_size(eframe::egui::vec2(SIZE[0] as f32, SIZE[1] as f32))
+        .with_pixels_per_point(1.0)
+        .wgpu()
+        .build_eframe(|context| {
+            super::install(context.wgpu_render_state.as_ref().expect("wgpu"));
+            OnlyViewport(std::sync::Arc::new(list.clone()))
+        });
+    harness.run();
+    let shown = harness.render().expect("a picture");
+    assert_eq!((shown.width(), shown.height()), (SIZE[0], SIZE[1]));
+    let worst = shown
+        .as_raw()
+        .iter()
+        .zip(&alone.rgba)
+        .map(|(a, b)| a.abs_diff(*b))
+        .max();
+    assert!(
+        worst.is_some_and(|worst| worst <= 1),
+        "bytes are copied: {worst:?}"
+    );
+}
