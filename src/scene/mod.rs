@@ -9,13 +9,7 @@ pub use model::*;
 pub use parameters::*;
 
 /// Names of the built-in scenes.
-pub const BUILT_IN: [&str; 5] = [
-    "spcmm",
-    "pendulum",
-    "slider-crank",
-    "slider-crank-driven",
-    "chain",
-];
+pub const BUILT_IN: [&str; 5] = ["spcmm", "pendulum", "slider-crank", "slider-crank-driven", "chain"];
 
 impl Scene {
     /// A built-in scene by name, or a file (contains `/` or ends in `.toml`), with changes applied in order.
@@ -30,11 +24,7 @@ impl Scene {
     ///
     /// # Errors
     /// As [`Self::load`].
-    pub fn parse(
-        _text: &str,
-        _file: Option<&str>,
-        _changes: &[(String, String)],
-    ) -> Result<Self, SceneError> {
+    pub fn parse(_text: &str, _file: Option<&str>, _changes: &[(String, String)]) -> Result<Self, SceneError> {
         todo!()
     }
 
