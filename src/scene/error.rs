@@ -1,15 +1,95 @@
 //! Errors in scenes and parameters: file, line, column, key, value, range, unit.
 
+use std::fmt;
+
 /// What is wrong with a scene or a parameter value, in a form a person can act on.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{message}")]
+///
+/// Its text is complete: place, key, value, reason, and the line of the file with a mark under the fault.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SceneError {
     /// File as the user named it; `None` for a built-in scene or the command line.
     pub file: Option<String>,
     /// Line and column, from 1.
-    pub position: Option<(usize, usize)>,
+    pub position: Option<(u32, u32)>,
     /// Key at fault, e.g. `joint.S1.clearance`.
     pub key: Option<String>,
-    /// The whole story in one or two lines.
+    /// Value at fault, as written.
+    pub value: Option<Box<str>>,
+    /// What is wrong and what is allowed.
     pub message: String,
+    /// The line of the file at `position`.
+    pub line_text: Option<Box<str>>,
+    /// The file could not be read at all (rather than being wrong).
+    pub unreadable: bool,
+}
+
+impl std::error::Error for SceneError {}
+
+impl SceneError {
+    /// An error about a key and its value, outside any file.
+    pub(super) fn about(key: &str, value: Option<&str>, message: impl Into<String>) -> Self {
+        Self {
+            key: Some(key.to_owned()),
+            value: value.map(Box::from),
+            message: message.into(),
+            ..Self::default()
+        }
+    }
+}
+
+impl fmt::Display for SceneError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (&self.file, self.position) {
+            (Some(file), Some((line, column))) => write!(f, "{file}:{line}:{column}: ")?,
+            (Some(file), None) => write!(f, "{file}: ")?,
+            (None, Some((line, column))) => write!(f, "line {line}, column {column}: ")?,
+            (None, None) => {}
+        }
+        match (&self.key, &self.value) {
+            (Some(key), Some(value)) => write!(f, "{key} = {value}: ")?,
+            (Some(key), None) => write!(f, "{key}: ")?,
+            _ => {}
+        }
+        f.write_str(&self.message)?;
+        if let (Some(text), Some((line, column))) = (&self.line_text, self.position) {
+            let number = line.to_string();
+            let mark = column.saturating_sub(1) as usize;
+            write!(
+                f,
+                "\n {number} | {text}\n {:width$} | {:mark$}^",
+                "",
+                "",
+                width = number.len()
+            )?;
+        }
+        Ok(())
+    }
+}
+
+/// Line and column, from 1, of what follows `before`. A scene's text is short: the counts fit.
+pub(super) fn line_and_column(before: &str) -> (u32, u32) {
+    let line_start = before.rfind('\n').map_or(0, |at| at + 1);
+    let from_one = |count: usize| u32::try_from(count + 1).unwrap_or(u32::MAX);
+    (
+        from_one(before.matches('\n').count()),
+        from_one(before[line_start..].chars().count()),
+    )
+}
+
+/// The nearest of `names` to `wrong`, in brackets; "" if none is near.
+pub(super) fn nearest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> String {
+    let wrong_lower = wrong.to_lowercase();
+    names
+        .into_iter()
+        .map(|name| {
+            (
+                strsim::jaro_winkler(&wrong_lower, &name.to_lowercase()),
+                name,
+            )
+        })
+        .filter(|(score, _)| *score > 0.7)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map_or_else(String::new, |(_, name)| {
+            format!(" (did you mean `{name}`?)")
+        })
 }

@@ -38,6 +38,8 @@ pub struct Scene {
     pub view: ViewSettings,
     /// What the pose columns report.
     pub output: Output,
+    /// How the file's start values are meant.
+    pub start: StartRule,
     /// Moving bodies, parents before children.
     pub bodies: Vec<Body>,
     /// One tree joint for each body, in body order: `joints[i].child == i`.
@@ -50,6 +52,17 @@ pub struct Scene {
     pub source: Source,
     /// Parameters changed since the file, in order: key and value as a user would write it.
     pub changes: Vec<(String, String)>,
+}
+
+/// How the start values of the joints are meant.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum StartRule {
+    /// Exactly as the file gives them.
+    #[default]
+    AsGiven,
+    /// Guesses: the mechanism is assembled with every ball concentric with its socket at t = 0, and velocities
+    /// that follow from the drives.
+    Ideal,
 }
 
 /// Where a scene's text came from.
@@ -94,6 +107,18 @@ pub struct Solver {
     pub step: f64,
     /// Relative tolerance of an adaptive method.
     pub tolerance: f64,
+}
+
+impl Preset {
+    /// Method, step (s) and tolerance of the preset.
+    pub fn point(self) -> (Method, f64, f64) {
+        match self {
+            Self::Preview => (Method::RungeKutta4, 20e-6, 1e-4),
+            Self::RealTime => (Method::DormandPrince5, 10e-6, 1e-4),
+            Self::Accurate => (Method::DormandPrince5, 10e-6, 1e-7),
+            Self::Reference => (Method::DormandPrince5, 10e-6, 1e-11),
+        }
+    }
 }
 
 /// The paper's mechanism: dimensions and trajectory that its slider laws need. SI units.
@@ -372,7 +397,8 @@ pub struct BallJoint {
     pub socket: Attachment,
     /// Ball centre Z_j.
     pub ball: Attachment,
-    /// Direction in which the drawn socket is cut open, in the socket body's frame.
+    /// Unit vector in the socket body's frame: the drawn socket is cut open on that side, so that the rod can
+    /// leave and the ball inside is seen. It has no effect on the motion.
     pub opening: Vec3,
     /// This joint's contact parameters, overrides applied.
     pub contact: contact::Parameters,

@@ -1,5 +1,9 @@
 //! The one table of scene parameters: files, `--set`, sliders, tooltips and the reference page are made from it.
 
+use super::error::nearest;
+use super::table::table;
+use super::units::{exact_quantity, format_quantity, parse_quantity, unit_names};
+
 /// A parameter's value in SI units.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
@@ -82,6 +86,18 @@ pub enum Scope {
     Chain,
 }
 
+impl Scope {
+    /// Where the scope's keys exist, for people.
+    pub fn describe(self) -> &'static str {
+        match self {
+            Self::Every => "every scene",
+            Self::Contact => "every scene; also `joint.<name>.<key>` for one ball joint",
+            Self::Spcmm => "scenes with the paper's inverse kinematics",
+            Self::Chain => "chains",
+        }
+    }
+}
+
 /// One row of the table.
 #[derive(Clone, Debug)]
 pub struct Parameter {
@@ -93,6 +109,8 @@ pub struct Parameter {
     pub group: &'static str,
     /// Values it takes.
     pub kind: Kind,
+    /// Value where neither the file nor a change gives one.
+    pub default: Value,
     /// Where it exists.
     pub scope: Scope,
     /// Takes effect only at the next reset (it would move a drive in mid-run, or change the equations).
@@ -101,4 +119,169 @@ pub struct Parameter {
     pub help: &'static str,
     /// Which equation it enters, e.g. "paper eqs. (9), (10)".
     pub equation: &'static str,
+}
+
+impl Parameter {
+    /// Unit in which values are shown; "" for pure numbers, counts and choices.
+    pub fn display_unit(&self) -> &'static str {
+        match self.kind {
+            Kind::Number { display, .. } => display,
+            _ => "",
+        }
+    }
+
+    /// A value as people read it, with its unit: `0.3 mm`.
+    pub fn show(&self, value: &Value) -> String {
+        match value {
+            Value::Number(si) => format_quantity(*si, self.display_unit()),
+            Value::Count(count) => count.to_string(),
+            Value::Choice(word) => (*word).to_owned(),
+            Value::Unset => "none".to_owned(),
+        }
+    }
+
+    /// The range or the choices, in words: `0 Hz to 50 Hz`.
+    pub fn range(&self) -> String {
+        match self.kind {
+            // The table's upper end is that of the ball; what counts is this joint's.
+            Kind::Number { min, display, .. } if self.key == "contact.clearance" => {
+                format!("{} to below the ball radius", format_quantity(min, display))
+            }
+            Kind::Number {
+                min, max, display, ..
+            } => {
+                format!(
+                    "{} to {}",
+                    format_quantity(min, display),
+                    format_quantity(max, display)
+                )
+            }
+            Kind::Count { min, max } => format!("{min} to {max}"),
+            Kind::Choice(words) => words.join(", "),
+        }
+    }
+
+    /// The units it may be written in, in words; "" for a choice.
+    pub fn units(&self) -> String {
+        match self.kind {
+            Kind::Number { dimension, .. } => match unit_names(dimension).as_slice() {
+                [] => "a pure number, no unit".to_owned(),
+                names => format!("units {}", names.join(", ")),
+            },
+            Kind::Count { .. } => "a whole number, no unit".to_owned(),
+            Kind::Choice(_) => String::new(),
+        }
+    }
+
+    /// What may be given, in words, with the units it may be written in.
+    pub fn allowed(&self) -> String {
+        let units = self.units();
+        let separator = if units.is_empty() { "" } else { "; " };
+        format!("allowed {}{separator}{units}", self.range())
+    }
+
+    /// Reads a value as people write it, and checks its range.
+    ///
+    /// # Errors
+    /// What is wrong and what is allowed, without the key.
+    pub fn read(&self, text: &str) -> Result<Value, String> {
+        let text = text.trim();
+        let value = match self.kind {
+            Kind::Number { dimension, .. } => {
+                let number = parse_quantity(text, dimension)
+                    .map_err(|error| format!("{error}; allowed {}", self.range()))?;
+                Value::Number(number)
+            }
+            Kind::Count { .. } => match text.parse::<u64>() {
+                Ok(count) => Value::Count(count),
+                Err(_) => {
+                    let whole = text.parse::<i128>().is_ok();
+                    let what = if whole {
+                        "out of range"
+                    } else {
+                        "is not a whole number"
+                    };
+                    return Err(format!("{what}; {}", self.allowed()));
+                }
+            },
+            Kind::Choice(words) => {
+                // "+x" is also what "x" means.
+                let word = text.to_lowercase();
+                match words.iter().find(|choice| {
+                    **choice == word || choice.strip_prefix('+') == Some(word.as_str())
+                }) {
+                    Some(choice) => Value::Choice(choice),
+                    None => {
+                        return Err(format!(
+                            "is not one of the choices{}; {}",
+                            nearest(text, words.iter().copied()),
+                            self.allowed()
+                        ));
+                    }
+                }
+            }
+        };
+        self.check(&value)?;
+        Ok(value)
+    }
+
+    /// Whether a value is of this parameter's kind and in its range.
+    ///
+    /// # Errors
+    /// What is wrong and what is allowed, without the key.
+    pub fn check(&self, value: &Value) -> Result<(), String> {
+        let fine = match (self.kind, value) {
+            (Kind::Number { min, max, .. }, Value::Number(number)) => (min..=max).contains(number),
+            (Kind::Count { min, max }, Value::Count(count)) => (min..=max).contains(count),
+            (Kind::Choice(words), Value::Choice(word)) => words.contains(word),
+            _ => return Err(format!("is of the wrong kind; {}", self.allowed())),
+        };
+        if fine {
+            Ok(())
+        } else {
+            Err(format!("out of range; {}", self.allowed()))
+        }
+    }
+
+    /// A text that [`Self::read`] turns back into exactly this value.
+    pub fn write(&self, value: &Value) -> String {
+        match (self.kind, value) {
+            (
+                Kind::Number {
+                    dimension, display, ..
+                },
+                Value::Number(si),
+            ) => exact_quantity(*si, display, dimension),
+            _ => self.show(value),
+        }
+    }
+}
+
+/// The parameter table as a Markdown page.
+pub fn reference_page() -> String {
+    let mut page = String::from(
+        "# Scene parameters\n\nEvery key works in a scene file (a section and a name), as `--set key=value`, and in the window. \
+         A quantity is written with its unit, `0.3 mm` or `0.3mm`; a bare 0 needs none.\n\n\
+         | Key | Name | Default | Range | Unit | Where | Takes effect | What it is | Equation |\n|---|---|---|---|---|---|---|---|---|\n",
+    );
+    for parameter in table() {
+        let effect = if parameter.at_reset {
+            "at reset"
+        } else {
+            "at once"
+        };
+        let cells = [
+            format!("`{}`", parameter.key),
+            parameter.label.to_owned(),
+            parameter.show(&parameter.default),
+            parameter.range(),
+            parameter.units(),
+            parameter.scope.describe().to_owned(),
+            effect.to_owned(),
+            parameter.help.to_owned(),
+            parameter.equation.to_owned(),
+        ];
+        page.push_str(&format!("| {} |\n", cells.join(" | ")));
+    }
+    page
 }

@@ -1,0 +1,114 @@
+//! A row of equal links from one template.
+
+use super::document::Node;
+use super::read_bodies::{BODY_KEYS, read_rigid_body};
+use super::read_joints::read_rotation;
+use super::*;
+
+/// Adds the bodies, free joints and ball joints of the `[chain]` in `node`: link 1 hangs from a fixed socket at
+/// `hang`, every other from the socket at the lower end of the one before; all start straight, at rest, turned by
+/// `rotation`.
+///
+/// # Errors
+/// Anything wrong in the section, or a name that the file has already taken.
+pub(super) fn expand(node: &Node<'_>, scene: &mut Scene) -> Result<(), SceneError> {
+    let section = node.section(&["links", "hang", "rotation", "link"])?;
+    let hang = section
+        .get("hang")
+        .map_or(Ok(Vec3::zeros()), |node| node.vector(Dimension::Length))?;
+    let rotation = section
+        .get("rotation")
+        .map_or(Ok(Quat::identity()), |node| read_rotation(&node))?;
+    let known: Vec<&str> = ["ball", "socket", "opening"]
+        .into_iter()
+        .chain(BODY_KEYS)
+        .collect();
+    let link_node = section.require("link", "{ mass = \"0.384 kg\", … }")?;
+    let link = link_node.section(&known)?;
+    let template = read_rigid_body(&link, String::new())?;
+    let ball = link
+        .require("ball", "\"0 0 100 mm\"")?
+        .vector(Dimension::Length)?;
+    let socket = link
+        .require("socket", "\"0 0 -100 mm\"")?
+        .vector(Dimension::Length)?;
+    let opening = link
+        .get("opening")
+        .map_or(Ok(scene.view.down.unit()), |node| node.direction())?;
+    let links = scene.chain.map_or(0, |chain| chain.links);
+
+    let used = |name: &str, prefix: &str| {
+        let number = name
+            .strip_prefix(prefix)
+            .and_then(|rest| rest.parse::<usize>().ok());
+        number.is_some_and(|number| (1..=links).contains(&number))
+    };
+    let joint_used = |name: &str| used(name, "free") || used(name, "J");
+    if scene.bodies.iter().any(|body| used(&body.name, "link"))
+        || scene.joints.iter().any(|joint| joint_used(&joint.name))
+        || scene
+            .ball_joints
+            .iter()
+            .any(|joint| joint_used(&joint.name))
+    {
+        let message = "the file already uses a name that the chain needs: bodies link1, link2, …, joints free1, free2, … \
+                       and J1, J2, …";
+        return Err(link.error("", message));
+    }
+
+    let first = scene.bodies.len();
+    let step = rotation * (socket - ball);
+    for index in 0..links {
+        let number = index + 1;
+        let body = Body {
+            name: format!("link{number}"),
+            ..template.clone()
+        };
+        let ball_joint = BallJoint {
+            name: format!("J{number}"),
+            socket: match index {
+                0 => Attachment {
+                    body: None,
+                    point: hang,
+                },
+                _ => Attachment {
+                    body: Some(first + index - 1),
+                    point: socket,
+                },
+            },
+            ball: Attachment {
+                body: Some(first + index),
+                point: ball,
+            },
+            // The world's socket has world axes, the links' sockets turn with them.
+            opening: if index == 0 {
+                rotation * opening
+            } else {
+                opening
+            },
+            contact: scene.contact,
+            overrides: Vec::new(),
+        };
+        let joint = Joint {
+            name: format!("free{number}"),
+            kind: JointKind::Free,
+            parent: None,
+            child: first + index,
+            parent_point: Vec3::zeros(),
+            child_point: Vec3::zeros(),
+            axis: Vec3::x(),
+            rotation: Quat::identity(),
+            drive: None,
+            start: JointStart::Pose {
+                position: hang + step * index as f64 - rotation * ball,
+                rotation,
+                velocity: Vec3::zeros(),
+                angular_velocity: Vec3::zeros(),
+            },
+        };
+        scene.bodies.push(body);
+        scene.joints.push(joint);
+        scene.ball_joints.push(ball_joint);
+    }
+    Ok(())
+}

@@ -1,0 +1,361 @@
+//! TOML with places: every value knows its key and its line and column, so that every error can name them.
+
+use super::error::{line_and_column, nearest};
+use super::units::{QuantityError, parse_quantity};
+use super::{Dimension, SceneError, Vec3, find};
+use std::ops::Range;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// Largest length, speed, angle, … in SI units that a file may give.
+const MAX_SI: f64 = 1e6;
+
+/// The text being read, and the name that errors give it.
+#[derive(Clone, Copy)]
+pub(super) struct Document<'d> {
+    pub file: Option<&'d str>,
+    pub text: &'d str,
+}
+
+/// A table with the path of its keys.
+#[derive(Clone)]
+pub(super) struct Section<'d> {
+    pub document: Document<'d>,
+    pub path: String,
+    pub table: &'d DeTable<'d>,
+    pub span: Range<usize>,
+}
+
+/// A value with its key.
+#[derive(Clone)]
+pub(super) struct Node<'d> {
+    pub document: Document<'d>,
+    pub key: String,
+    pub value: &'d Spanned<DeValue<'d>>,
+}
+
+impl<'d> Document<'d> {
+    /// An error at a place in the text.
+    pub fn error(
+        &self,
+        span: Range<usize>,
+        key: &str,
+        value: Option<&str>,
+        message: impl Into<String>,
+    ) -> SceneError {
+        let start = self.text.floor_char_boundary(span.start);
+        let before = &self.text[..start];
+        let line_start = before.rfind('\n').map_or(0, |at| at + 1);
+        let line_text = self.text[line_start..].lines().next().unwrap_or("");
+        let mut error = SceneError::about(key, value, message);
+        if key.is_empty() {
+            error.key = None;
+        }
+        error.file = self.file.map(str::to_owned);
+        error.position = Some(line_and_column(before));
+        // A line too long for a terminal, or one with control characters in it, helps nobody.
+        if line_text.len() <= 160 && !line_text.chars().any(|c| c.is_control() && c != '\t') {
+            error.line_text = Some(line_text.replace('\t', " ").into());
+        }
+        error
+    }
+
+    /// The text of a value, cut to what fits in a line.
+    pub fn excerpt(&self, span: Range<usize>) -> String {
+        let text = self.text.get(span).unwrap_or("");
+        let mut short: String = text.lines().next().unwrap_or("").chars().take(60).collect();
+        if short.len() < text.len() {
+            short.push('…');
+        }
+        short
+    }
+}
+
+impl<'d> Section<'d> {
+    /// A table whose keys are all among `known`.
+    pub fn new(
+        document: Document<'d>,
+        path: String,
+        table: &'d DeTable<'d>,
+        span: Range<usize>,
+        known: &[&str],
+    ) -> Result<Self, SceneError> {
+        let section = Self {
+            document,
+            path,
+            table,
+            span,
+        };
+        let unknown = table
+            .keys()
+            .filter(|key| !known.contains(&key.get_ref().as_ref()))
+            .min_by_key(|key| key.span().start);
+        match unknown {
+            None => Ok(section),
+            Some(key) => {
+                let near = nearest(key.get_ref(), known.iter().copied());
+                let message = format!("unknown key{near}; allowed here: {}", known.join(", "));
+                Err(document.error(key.span(), &section.key(key.get_ref()), None, message))
+            }
+        }
+    }
+
+    /// Full path of a key in here.
+    pub fn key(&self, name: &str) -> String {
+        if self.path.is_empty() {
+            name.to_owned()
+        } else {
+            format!("{}.{name}", self.path)
+        }
+    }
+
+    /// A value that may be left out.
+    pub fn get(&self, name: &str) -> Option<Node<'d>> {
+        let value = self.table.get(name)?;
+        Some(Node {
+            document: self.document,
+            key: self.key(name),
+            value,
+        })
+    }
+
+    /// A value that must be there; `like` shows how one is written.
+    pub fn require(&self, name: &str, like: &str) -> Result<Node<'d>, SceneError> {
+        self.get(name).ok_or_else(|| {
+            self.error(
+                name,
+                format!("missing; write for example `{name} = {like}`"),
+            )
+        })
+    }
+
+    /// An error about this table as a whole, or about a key that it lacks.
+    pub fn error(&self, name: &str, message: impl Into<String>) -> SceneError {
+        let key = if name.is_empty() {
+            self.path.clone()
+        } else {
+            self.key(name)
+        };
+        self.document.error(self.span.clone(), &key, None, message)
+    }
+
+    /// Refuses a key that makes no sense here.
+    pub fn refuse(&self, name: &str, why: &str) -> Result<(), SceneError> {
+        self.get(name).map_or(Ok(()), |node| {
+            Err(node.error(format!("not allowed here: {why}")))
+        })
+    }
+}
+
+impl<'d> Node<'d> {
+    /// An error about this value.
+    pub fn error(&self, message: impl Into<String>) -> SceneError {
+        let span = self.value.span();
+        self.document.error(
+            span.clone(),
+            &self.key,
+            Some(&self.document.excerpt(span)),
+            message,
+        )
+    }
+
+    fn wrong_type(&self, wanted: &str) -> SceneError {
+        self.error(format!(
+            "must be {wanted}, not {} {}",
+            article(self.value.get_ref()),
+            self.value.get_ref().type_str()
+        ))
+    }
+
+    /// A number or a text, as a person wrote it.
+    pub fn scalar(&self) -> Result<&'d str, SceneError> {
+        match self.value.get_ref() {
+            DeValue::String(text) => Ok(text),
+            DeValue::Float(number) => Ok(number.as_str()),
+            DeValue::Integer(number) if number.radix() == 10 => Ok(number.as_str()),
+            _ => Err(self.wrong_type("a number or a text")),
+        }
+    }
+
+    /// A text.
+    pub fn text(&self) -> Result<&'d str, SceneError> {
+        self.value
+            .get_ref()
+            .as_str()
+            .ok_or_else(|| self.wrong_type("a text in quotes"))
+    }
+
+    /// A yes or no.
+    pub fn flag(&self) -> Result<bool, SceneError> {
+        self.value
+            .get_ref()
+            .as_bool()
+            .ok_or_else(|| self.wrong_type("true or false"))
+    }
+
+    /// A finite quantity, SI.
+    pub fn quantity(&self, dimension: Dimension) -> Result<f64, SceneError> {
+        self.limited(parse_quantity(self.scalar()?, dimension), dimension)
+    }
+
+    /// Refuses what no mechanism has, before its squares overflow in the equations of motion.
+    fn limited(
+        &self,
+        read: Result<f64, QuantityError>,
+        dimension: Dimension,
+    ) -> Result<f64, SceneError> {
+        let value = read.map_err(|error| self.error(error.to_string()))?;
+        let moves = !matches!(
+            dimension,
+            Dimension::Mass | Dimension::Inertia | Dimension::Stress
+        );
+        if moves && value.abs() > MAX_SI {
+            let limit = super::format_quantity(MAX_SI, super::si_unit(dimension));
+            return Err(self.error(format!("out of range; allowed -{limit} to {limit}")));
+        }
+        Ok(value)
+    }
+
+    /// A quantity above 0 and at most `max` (SI, shown in `unit`).
+    pub fn positive(&self, dimension: Dimension, max: f64, unit: &str) -> Result<f64, SceneError> {
+        let value = self.quantity(dimension)?;
+        if value > 0.0 && value <= max {
+            return Ok(value);
+        }
+        let units = super::unit_names(dimension).join(", ");
+        let top = super::format_quantity(max, unit);
+        Err(self.error(format!(
+            "out of range; allowed above 0 up to {top}; units {units}"
+        )))
+    }
+
+    /// One of some words, as its place among them.
+    pub fn choice(&self, words: &[&str]) -> Result<usize, SceneError> {
+        let text = self.text()?;
+        words.iter().position(|word| *word == text).ok_or_else(|| {
+            let near = nearest(text, words.iter().copied());
+            self.error(format!(
+                "is not one of the choices{near}; allowed {}",
+                words.join(", ")
+            ))
+        })
+    }
+
+    /// A name: letters, digits, `_` and `-`, because keys and column names are made from it.
+    pub fn name(&self) -> Result<&'d str, SceneError> {
+        let name = self.text()?;
+        let fine = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-');
+        if !name.is_empty() && name.len() <= 40 && name.chars().all(fine) {
+            return Ok(name);
+        }
+        Err(self.error("is not a name; allowed 1 to 40 letters (a to z), digits, `_` and `-`"))
+    }
+
+    /// The elements of an array, keyed `key[0]`, `key[1]`, …
+    pub fn elements(&self) -> Result<Vec<Node<'d>>, SceneError> {
+        let array = self
+            .value
+            .get_ref()
+            .as_array()
+            .ok_or_else(|| self.wrong_type("an array"))?;
+        let node = |(index, value)| Node {
+            document: self.document,
+            key: format!("{}[{index}]", self.key),
+            value,
+        };
+        Ok(array.iter().enumerate().map(node).collect())
+    }
+
+    /// Three or so quantities: `["1 mm", 0, "3 mm"]`, or with one unit for all, `"1 0 3 mm"`.
+    pub fn quantities<const N: usize>(&self, dimension: Dimension) -> Result<[f64; N], SceneError> {
+        let mut values = [0.0; N];
+        if let Some(text) = self.value.get_ref().as_str() {
+            let words: Vec<&str> = text.split_whitespace().collect();
+            let count = words
+                .iter()
+                .take_while(|word| word.parse::<f64>().is_ok())
+                .count();
+            if count != N {
+                return Err(self.error(format!(
+                    "needs {N} numbers, then one unit for all; has {count} numbers"
+                )));
+            }
+            let (numbers, unit) = words.split_at(N);
+            let unit = unit.join(" ");
+            for (value, number) in values.iter_mut().zip(numbers) {
+                *value = self.limited(
+                    parse_quantity(&format!("{number} {unit}"), dimension),
+                    dimension,
+                )?;
+            }
+            return Ok(values);
+        }
+        let elements = self.elements()?;
+        if elements.len() != N {
+            return Err(self.error(format!("needs {N} values, has {}", elements.len())));
+        }
+        for (value, element) in values.iter_mut().zip(&elements) {
+            *value = element.quantity(dimension)?;
+        }
+        Ok(values)
+    }
+
+    /// A vector with a dimension, SI.
+    pub fn vector(&self, dimension: Dimension) -> Result<Vec3, SceneError> {
+        self.quantities::<3>(dimension).map(Vec3::from)
+    }
+
+    /// A direction, normalised.
+    pub fn direction(&self) -> Result<Vec3, SceneError> {
+        let vector = self.vector(Dimension::None)?;
+        // Scaled first: squares of huge or tiny components would leave the range of f64.
+        let size = vector.amax();
+        if size > 0.0 {
+            Ok((vector / size).normalize())
+        } else {
+            Err(self.error("a direction must not be zero"))
+        }
+    }
+
+    /// A table whose keys are all among `known`.
+    pub fn section(&self, known: &[&str]) -> Result<Section<'d>, SceneError> {
+        self.section_as(self.key.clone(), known)
+    }
+
+    /// As [`Self::section`], with another path for its keys.
+    pub fn section_as(&self, path: String, known: &[&str]) -> Result<Section<'d>, SceneError> {
+        let table = self
+            .value
+            .get_ref()
+            .as_table()
+            .ok_or_else(|| self.wrong_type("a table"))?;
+        Section::new(self.document, path, table, self.value.span(), known)
+    }
+
+    /// Text of the `name` key of a table, for the paths of its keys; the array index where there is none yet.
+    pub fn title(&self, prefix: &str) -> String {
+        let name = self
+            .value
+            .get_ref()
+            .get("name")
+            .and_then(|name| name.get_ref().as_str());
+        name.map_or_else(|| self.key.clone(), |name| format!("{prefix}.{name}"))
+    }
+
+    /// A parameter's value, read and checked by its row of the table.
+    pub fn parameter(&self, key: &str) -> Result<super::Value, SceneError> {
+        let parameter = find(key).expect("only keys of the table are asked for");
+        // A count and a pure number may stand bare; text and bare numbers read alike.
+        parameter
+            .read(self.scalar()?)
+            .map_err(|message| self.error(message))
+    }
+}
+
+fn article(value: &DeValue<'_>) -> &'static str {
+    if value.is_integer() || value.is_array() {
+        "an"
+    } else {
+        "a"
+    }
+}

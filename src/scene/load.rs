@@ -1,0 +1,98 @@
+//! Where scenes come from: the built-in ones, and files.
+
+use super::error::{line_and_column, nearest};
+use super::{Scene, SceneError};
+use std::io::Read;
+
+/// Names of the built-in scenes.
+pub const BUILT_IN: [&str; 5] = [
+    "spcmm",
+    "pendulum",
+    "slider-crank",
+    "slider-crank-driven",
+    "chain",
+];
+
+/// The largest file that is read, bytes: a scene is a few kilobytes.
+const MAX_BYTES: u64 = 4 << 20;
+
+/// TOML text of a built-in scene.
+pub fn built_in_text(name: &str) -> Option<&'static str> {
+    Some(match name {
+        "spcmm" => include_str!("../../assets/scenes/spcmm.toml"),
+        "pendulum" => include_str!("../../assets/scenes/pendulum.toml"),
+        "slider-crank" => include_str!("../../assets/scenes/slider-crank.toml"),
+        "slider-crank-driven" => include_str!("../../assets/scenes/slider-crank-driven.toml"),
+        "chain" => include_str!("../../assets/scenes/chain.toml"),
+        _ => return None,
+    })
+}
+
+impl Scene {
+    /// A built-in scene by name, or a file (contains `/` or ends in `.toml`), with changes applied in order; of two
+    /// changes of one key the last wins.
+    ///
+    /// # Errors
+    /// Unreadable file, anything wrong in it, or a bad change.
+    pub fn load(argument: &str, changes: &[(String, String)]) -> Result<Self, SceneError> {
+        if argument.contains('/') || argument.ends_with(".toml") {
+            return Self::parse(&read_file(argument)?, Some(argument), changes);
+        }
+        match built_in_text(argument) {
+            Some(text) => Self::parse(text, None, changes),
+            None => {
+                let near = nearest(argument, BUILT_IN);
+                let message = format!(
+                    "no built-in scene `{argument}`{near}; built in: {}; the name of a file contains `/` or ends in `.toml`",
+                    BUILT_IN.join(", ")
+                );
+                Err(SceneError {
+                    message,
+                    ..SceneError::default()
+                })
+            }
+        }
+    }
+}
+
+fn read_file(name: &str) -> Result<String, SceneError> {
+    let error = |message: String| SceneError {
+        file: Some(name.to_owned()),
+        message,
+        unreadable: true,
+        ..SceneError::default()
+    };
+    let metadata = std::fs::metadata(name).map_err(|cause| {
+        let stem = name.rsplit('/').next().unwrap_or(name).trim_end_matches(".toml");
+        let near = nearest(stem, BUILT_IN);
+        error(format!("cannot read this file: {cause}; built-in scenes, named without `/` and `.toml`: {}{near}", BUILT_IN.join(", ")))
+    })?;
+    if metadata.is_dir() {
+        return Err(error("this is a directory, not a scene file".to_owned()));
+    }
+    let mut bytes = Vec::new();
+    // One byte more than allowed: a pipe or a device does not tell its size.
+    std::fs::File::open(name)
+        .and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes))
+        .map_err(|cause| error(format!("cannot read this file: {cause}")))?;
+    if bytes.len() as u64 > MAX_BYTES {
+        return Err(SceneError {
+            unreadable: false,
+            ..error(format!(
+                "too large for a scene file: more than {} MiB",
+                MAX_BYTES >> 20
+            ))
+        });
+    }
+    String::from_utf8(bytes).map_err(|cause| {
+        let good = &cause.as_bytes()[..cause.utf8_error().valid_up_to()];
+        let good = std::str::from_utf8(good).unwrap_or("");
+        SceneError {
+            position: Some(line_and_column(good)),
+            unreadable: false,
+            ..error(
+                "not a text file: this byte is not valid UTF-8, so it is no scene file".to_owned(),
+            )
+        }
+    })
+}

@@ -1,0 +1,412 @@
+//! A scene from its TOML text: settings first, then bodies, joints and ball joints.
+
+use super::document::{Document, Node, Section};
+use super::read_bodies::{read_body, read_shape};
+use super::read_joints::{BallJointText, JointText, read_ball_joint, read_joint, sort_forest};
+use super::*;
+use std::collections::HashMap;
+use std::path::Path;
+use toml::de::DeTable;
+
+/// Keys at the top of a file.
+const TOP: [&str; 16] = [
+    "name",
+    "title",
+    "description",
+    "start",
+    "formulation",
+    "gravity",
+    "contact",
+    "solver",
+    "spcmm",
+    "chain",
+    "view",
+    "output",
+    "body",
+    "joint",
+    "ball_joint",
+    "fixed_shape",
+];
+
+/// Keys of `[spcmm]` that are no parameters: the file's bodies are built to these dimensions.
+const SPCMM_DIMENSIONS: [&str; 5] = [
+    "mean_x",
+    "gamma",
+    "hinge_radius",
+    "driving_rod",
+    "driven_rod",
+];
+
+/// Where a value of a parameter stands in the file.
+type Places<'d> = HashMap<String, Node<'d>>;
+
+impl Scene {
+    /// A scene from TOML text; `file` is the name that errors give.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn parse(
+        text: &str,
+        file: Option<&str>,
+        changes: &[(String, String)],
+    ) -> Result<Self, SceneError> {
+        let document = Document { file, text };
+        if text.trim().is_empty() {
+            return Err(document.error(
+                0..0,
+                "",
+                None,
+                "the file is empty; a scene needs at least one body",
+            ));
+        }
+        let parsed = DeTable::parse(text).map_err(|error| {
+            let span = error.span().unwrap_or(0..0);
+            document.error(
+                span,
+                "",
+                None,
+                format!("not valid TOML: {}", error.message()),
+            )
+        })?;
+        let top = Section::new(document, String::new(), parsed.get_ref(), 0..0, &TOP)?;
+        let mut scene = read_settings(&top)?;
+        let mut places = read_parameters(&top, &mut scene)?;
+        // These two decide what the bodies are, so they come before them.
+        for (key, value) in changes
+            .iter()
+            .filter(|(key, _)| matches!(key.as_str(), "chain.links" | "spcmm.slider_plane"))
+        {
+            scene.change(key, value)?;
+        }
+        read_mechanism(&top, &mut scene, &mut places)?;
+        for (key, value) in changes {
+            scene.change(key, value)?;
+        }
+        scene.check_contacts().map_err(|fault| {
+            let place = || {
+                fault
+                    .keys(&scene)
+                    .iter()
+                    .find_map(|key| places.get(key))
+                    .map(|node| node.error(&*fault.message))
+            };
+            let message = || SceneError {
+                file: file.map(str::to_owned),
+                message: fault.message.clone(),
+                ..Default::default()
+            };
+            fault
+                .blame_changes(&scene)
+                .or_else(place)
+                .unwrap_or_else(message)
+        })?;
+        Ok(scene)
+    }
+}
+
+/// Everything that is neither a parameter nor a part of the mechanism; the rest at its defaults.
+fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
+    let document = top.document;
+    let text = |name: &str| top.get(name).map(|node| node.text()).transpose();
+    let stem = document
+        .file
+        .and_then(|file| Path::new(file).file_stem())
+        .and_then(|stem| stem.to_str());
+    let name = match top.get("name") {
+        Some(node) => node.name()?.to_owned(),
+        None => stem.unwrap_or("scene").to_owned(),
+    };
+    let start = match top
+        .get("start")
+        .map(|node| node.choice(&["as-given", "ideal"]))
+        .transpose()?
+    {
+        Some(1) => StartRule::Ideal,
+        _ => StartRule::AsGiven,
+    };
+    let spcmm = match top.get("spcmm") {
+        None => None,
+        Some(node) => {
+            let section = node.section(&keys_with("spcmm", &SPCMM_DIMENSIONS))?;
+            let length = |name| {
+                section
+                    .require(name, "\"52 mm\"")?
+                    .positive(Dimension::Length, 100.0, "m")
+            };
+            Some(Spcmm {
+                slider_plane: 0.0,
+                amplitude_x: 0.0,
+                amplitude_beta: 0.0,
+                frequency: 0.0,
+                mean_x: section
+                    .require("mean_x", "\"203 mm\"")?
+                    .quantity(Dimension::Length)?,
+                gamma: section
+                    .require("gamma", "\"15 deg\"")?
+                    .quantity(Dimension::Angle)?,
+                hinge_radius: length("hinge_radius")?,
+                driving_rod: length("driving_rod")?,
+                driven_rod: length("driven_rod")?,
+            })
+        }
+    };
+    let floor = match top.get("view") {
+        None => None,
+        Some(view) => {
+            let section = view.section(&keys_with("view", &["floor"]))?;
+            section
+                .get("floor")
+                .map(|node| node.quantity(Dimension::Length))
+                .transpose()?
+        }
+    };
+    Ok(Scene {
+        title: text("title")?.unwrap_or(&name).to_owned(),
+        description: text("description")?.unwrap_or("").trim().to_owned(),
+        name,
+        gravity: Vec3::zeros(),
+        contact: crate::contact::Parameters::default(),
+        formulation: Formulation::Tree,
+        solver: Solver {
+            preset: None,
+            method: crate::integrate::Method::DormandPrince5,
+            step: 0.0,
+            tolerance: 0.0,
+        },
+        spcmm,
+        chain: top.get("chain").map(|_| Chain { links: 0 }),
+        view: ViewSettings {
+            down: SignedAxis::MinusZ,
+            floor,
+        },
+        output: Output {
+            body: 0,
+            probe: None,
+        },
+        start,
+        bodies: Vec::new(),
+        joints: Vec::new(),
+        ball_joints: Vec::new(),
+        fixed_shapes: Vec::new(),
+        source: Source {
+            file: document.file.map(str::to_owned),
+            text: document.text.to_owned(),
+        },
+        changes: Vec::new(),
+    })
+}
+
+/// Names of the table's keys in a section, with some more.
+fn keys_with<'a>(section: &str, more: &[&'a str]) -> Vec<&'a str> {
+    let parts = table()
+        .iter()
+        .filter_map(|parameter| parameter.key.strip_prefix(section)?.strip_prefix('.'));
+    parts.chain(more.iter().copied()).collect()
+}
+
+/// Every parameter from the file, or its default; returns where each stands.
+fn read_parameters<'d>(top: &Section<'d>, scene: &mut Scene) -> Result<Places<'d>, SceneError> {
+    let mut places = Places::new();
+    let mut sections: HashMap<&str, Section<'d>> = HashMap::new();
+    for (name, more) in [
+        ("gravity", &[][..]),
+        ("contact", &[]),
+        ("solver", &[]),
+        ("spcmm", &SPCMM_DIMENSIONS),
+        ("chain", &["hang", "rotation", "link"]),
+        ("view", &["floor"]),
+    ] {
+        if let Some(node) = top.get(name) {
+            sections.insert(name, node.section(&keys_with(name, more))?);
+        }
+    }
+    let find_node = |key: &'static str| match key.split_once('.') {
+        Some((section, name)) => sections.get(section).and_then(|section| section.get(name)),
+        None => top.get(key),
+    };
+    // The preset first: what the file gives besides wins over it.
+    let preset = table()
+        .iter()
+        .filter(|parameter| parameter.key == "solver.preset");
+    let others = || {
+        table()
+            .iter()
+            .filter(|parameter| parameter.key != "solver.preset")
+    };
+    for parameter in others() {
+        write(scene, parameter.key, &default_of(parameter, &sections));
+    }
+    for parameter in preset.chain(others()) {
+        let Some(node) = find_node(parameter.key) else {
+            continue;
+        };
+        write(scene, parameter.key, &node.parameter(parameter.key)?);
+        places.insert(parameter.key.to_owned(), node);
+    }
+    Ok(places)
+}
+
+fn default_of(parameter: &Parameter, sections: &HashMap<&str, Section<'_>>) -> Value {
+    // Half a gravity vector would be a surprise: a section that names one component has 0 for the others.
+    if parameter.key.starts_with("gravity.") && sections.contains_key("gravity") {
+        Value::Number(0.0)
+    } else {
+        parameter.default.clone()
+    }
+}
+
+fn write(scene: &mut Scene, key: &'static str, value: &Value) {
+    let there = match find(key).map(|parameter| parameter.scope) {
+        Some(Scope::Spcmm) => scene.spcmm.is_some(),
+        Some(Scope::Chain) => scene.chain.is_some(),
+        _ => true,
+    };
+    match key.strip_prefix("contact.") {
+        Some(part) => scene.set_contact(part, value),
+        None if there => scene.write(key, value),
+        None => {}
+    }
+}
+
+/// Bodies, joints, ball joints, fixed shapes and what is reported.
+fn read_mechanism<'d>(
+    top: &Section<'d>,
+    scene: &mut Scene,
+    places: &mut Places<'d>,
+) -> Result<(), SceneError> {
+    let list = |name: &str| top.get(name).map_or(Ok(Vec::new()), |node| node.elements());
+    let mut names = Names::default();
+
+    let mut bodies = Vec::new();
+    let mut body_sections = Vec::new();
+    for node in list("body")? {
+        let (body, section) = read_body(&node)?;
+        names.add(&section, "body", &body.name)?;
+        bodies.push(body);
+        body_sections.push(section);
+    }
+    let file_order: Vec<String> = bodies.iter().map(|body| body.name.clone()).collect();
+    let mut joint_names = Names::default();
+    let mut joints: Vec<JointText<'d>> = Vec::new();
+    for node in list("joint")? {
+        let joint = read_joint(&node, scene, &file_order)?;
+        joint_names.add(&joint.section, "joint", &joint.name)?;
+        joints.push(joint);
+    }
+    (scene.bodies, scene.joints) = sort_forest(bodies, joints, &body_sections)?;
+    for (index, joint) in scene.joints.iter().enumerate() {
+        if let Some(Drive::Spcmm { slider }) = joint.drive
+            && scene.joints[..index]
+                .iter()
+                .any(|other| other.drive == joint.drive)
+        {
+            return Err(top.error(
+                "joint",
+                format!("slider {slider} of the law spcmm drives two joints"),
+            ));
+        }
+    }
+
+    let by_name: HashMap<String, usize> = scene
+        .bodies
+        .iter()
+        .enumerate()
+        .map(|(index, body)| (body.name.clone(), index))
+        .collect();
+    for node in list("ball_joint")? {
+        let BallJointText {
+            joint,
+            section,
+            places: own,
+        } = read_ball_joint(&node, scene, &by_name)?;
+        joint_names.add(&section, "joint", &joint.name)?;
+        scene.ball_joints.push(joint);
+        places.extend(own);
+    }
+    for node in list("fixed_shape")? {
+        let shape = read_shape(&node, scene.spcmm.as_ref())?;
+        scene.fixed_shapes.push(shape);
+    }
+    if let Some(node) = top.get("chain") {
+        super::chain::expand(&node, scene)?;
+    }
+    if scene.bodies.is_empty() {
+        return Err(top.document.error(
+            0..0,
+            "body",
+            None,
+            "a scene needs at least one [[body]], or a [chain]",
+        ));
+    }
+    read_output(top, scene, &file_order)
+}
+
+fn read_output(
+    top: &Section<'_>,
+    scene: &mut Scene,
+    file_order: &[String],
+) -> Result<(), SceneError> {
+    // Where nothing is said, the last body: the end of a chain, the platform of most files.
+    let last = scene.bodies.last().map_or("", |body| body.name.as_str());
+    let last = if scene.chain.is_some() {
+        last
+    } else {
+        file_order.last().map_or(last, String::as_str)
+    }
+    .to_owned();
+    let section = top
+        .get("output")
+        .map(|node| node.section(&["body", "probe"]))
+        .transpose()?;
+    let node = section.as_ref().and_then(|section| section.get("body"));
+    let wanted = node
+        .as_ref()
+        .map_or(Ok(last.as_str()), |node| node.text())?;
+    let found = scene.bodies.iter().position(|body| body.name == wanted);
+    let names = || scene.bodies.iter().map(|body| body.name.as_str());
+    let body = match (found, node) {
+        (Some(body), _) => body,
+        (None, Some(node)) => return Err(node.error(no_body(wanted, names()))),
+        (None, None) => 0,
+    };
+    let probe = section
+        .and_then(|section| section.get("probe"))
+        .map(|node| node.vector(Dimension::Length))
+        .transpose()?;
+    scene.output = Output { body, probe };
+    Ok(())
+}
+
+/// "No such body", with the nearest name and all names.
+pub(super) fn no_body<'a>(wanted: &str, names: impl Iterator<Item = &'a str> + Clone) -> String {
+    let near = super::error::nearest(wanted, names.clone());
+    let listed: Vec<&str> = names.clone().take(12).collect();
+    let more = if names.count() > listed.len() {
+        ", …"
+    } else {
+        ""
+    };
+    format!(
+        "no body `{wanted}`{near}; bodies: {}{more}",
+        listed.join(", ")
+    )
+}
+
+/// Names seen so far, with their lines: no two may be equal.
+#[derive(Default)]
+struct Names {
+    lines: HashMap<String, u32>,
+}
+
+impl Names {
+    fn add(&mut self, section: &Section<'_>, what: &str, name: &str) -> Result<(), SceneError> {
+        let node = section.require("name", "\"rod\"")?;
+        let line = node.error("").position.map_or(0, |(line, _)| line);
+        match self.lines.insert(name.to_owned(), line) {
+            None => Ok(()),
+            Some(first) => Err(node.error(format!(
+                "there is already a {what} of this name, in line {first}; names must differ, for example `{name}2`"
+            ))),
+        }
+    }
+}

@@ -1,0 +1,223 @@
+//! Bodies and shapes of a scene file.
+
+use super::document::{Node, Section};
+use super::*;
+
+/// Words of [`Role`], in its order.
+const ROLE_WORDS: [&str; 8] = [
+    "slider",
+    "driving-rod",
+    "driven-rod",
+    "platform",
+    "pin",
+    "probe",
+    "rail",
+    "frame",
+];
+const ROLES: [Role; 8] = [
+    Role::Slider,
+    Role::DrivingRod,
+    Role::DrivenRod,
+    Role::Platform,
+    Role::Pin,
+    Role::Probe,
+    Role::Rail,
+    Role::Frame,
+];
+
+const FORMS: [&str; 6] = ["capsule", "cylinder", "cone", "box", "sphere", "plate"];
+
+/// Largest mass, kg, and inertia, kg m^2, that a file may give: beyond them only typing slips lie.
+const MAX_MASS: f64 = 1e9;
+const MAX_INERTIA: f64 = 1e12;
+
+/// Moments of inertia are printed to three digits: the triangle inequality gets this relative slack.
+const TRIANGLE_SLACK: f64 = 1e-9;
+
+/// Keys of mass and shape, for bodies and links.
+pub(super) const BODY_KEYS: [&str; 5] = ["mass", "centre", "inertia", "products", "shapes"];
+
+/// One `[[body]]`.
+pub(super) fn read_body<'d>(node: &Node<'d>) -> Result<(Body, Section<'d>), SceneError> {
+    let known: Vec<&str> = ["name"].into_iter().chain(BODY_KEYS).collect();
+    let section = node.section_as(node.title("body"), &known)?;
+    let name = section.require("name", "\"rod\"")?.name()?.to_owned();
+    if name == "world" {
+        return Err(section
+            .require("name", "")?
+            .error("`world` is the frame that everything stands on; choose another name"));
+    }
+    Ok((read_rigid_body(&section, name)?, section))
+}
+
+/// Mass, centroid, inertia and shapes.
+pub(super) fn read_rigid_body(section: &Section<'_>, name: String) -> Result<Body, SceneError> {
+    let mass =
+        section
+            .require("mass", "\"0.384 kg\"")?
+            .positive(Dimension::Mass, MAX_MASS, "kg")?;
+    let centre = match section.get("centre") {
+        Some(node) => node.vector(Dimension::Length)?,
+        None => Vec3::zeros(),
+    };
+    let inertia = read_inertia(section)?;
+    let shapes = match section.get("shapes") {
+        Some(node) => node
+            .elements()?
+            .iter()
+            .map(|shape| read_shape(shape, None))
+            .collect::<Result<_, _>>()?,
+        None => Vec::new(),
+    };
+    Ok(Body {
+        name,
+        mass,
+        centre,
+        inertia,
+        shapes,
+    })
+}
+
+/// The inertia matrix about the centroid in body axes: `inertia` = Ixx, Iyy, Izz and, where the axes are not
+/// principal, `products` = the integrals of xy, xz, yz over the mass.
+fn read_inertia(section: &Section<'_>) -> Result<Mat3, SceneError> {
+    let node = section.require("inertia", "\"1.58e-5 1.92e-3 1.93e-3 kg m^2\"")?;
+    let [xx, yy, zz] = node.quantities::<3>(Dimension::Inertia)?;
+    let [xy, xz, yz] = match section.get("products") {
+        Some(products) => products.quantities::<3>(Dimension::Inertia)?,
+        None => [0.0; 3],
+    };
+    let inertia = Mat3::new(xx, -xy, -xz, -xy, yy, -yz, -xz, -yz, zz);
+    if inertia.amax() > MAX_INERTIA {
+        return Err(node.error("out of range; allowed above 0 up to 1e12 kg m^2"));
+    }
+    let mut principal: Vec<f64> = inertia.symmetric_eigenvalues().iter().copied().collect();
+    principal.sort_by(f64::total_cmp);
+    let [small, middle, large] = [principal[0], principal[1], principal[2]];
+    let units = unit_names(Dimension::Inertia).join(", ");
+    if small <= 0.0 {
+        return Err(node.error(format!(
+            "no body has this inertia: its smallest principal moment is {}, allowed above 0; units {units}",
+            format_quantity(small, "kg m^2")
+        )));
+    }
+    if large > (small + middle) * (1.0 + TRIANGLE_SLACK) {
+        return Err(node.error(format!(
+            "no body has this inertia: its largest principal moment {} exceeds the sum of the other two, {}, which is the \
+             most allowed; units {units}",
+            format_quantity(large, "kg m^2"),
+            format_quantity(small + middle, "kg m^2"),
+        )));
+    }
+    Ok(inertia)
+}
+
+/// One shape. With `spcmm` it is a fixed shape, which may keep with the slider plane.
+pub(super) fn read_shape(node: &Node<'_>, spcmm: Option<&Spcmm>) -> Result<Shape, SceneError> {
+    let mut known = vec![
+        "form",
+        "role",
+        "from",
+        "to",
+        "radius",
+        "centre",
+        "size",
+        "corners",
+        "thickness",
+    ];
+    known.extend(spcmm.map(|_| "at_slider_plane"));
+    let section = node.section(&known)?;
+    let role_node = section.require("role", "\"frame\"")?;
+    let role = ROLES[role_node.choice(&ROLE_WORDS)?];
+    let form_node = section.require("form", "\"capsule\"")?;
+    let form = FORMS[form_node.choice(&FORMS)?];
+
+    let needs: &[&str] = match form {
+        "box" => &["centre", "size"],
+        "sphere" => &["centre", "radius"],
+        "plate" => &["corners", "thickness"],
+        _ => &["from", "to", "radius"],
+    };
+    for name in [
+        "from",
+        "to",
+        "radius",
+        "centre",
+        "size",
+        "corners",
+        "thickness",
+    ] {
+        if !needs.contains(&name) {
+            section.refuse(name, &format!("a {form} has {}", needs.join(", ")))?;
+        }
+    }
+    let shift = match (
+        section
+            .get("at_slider_plane")
+            .map(|node| node.flag())
+            .transpose()?,
+        spcmm,
+    ) {
+        (Some(true), Some(spcmm)) => Vec3::new(spcmm.slider_plane, 0.0, 0.0),
+        _ => Vec3::zeros(),
+    };
+    let point = |name| -> Result<Vec3, SceneError> {
+        Ok(section
+            .require(name, "\"0 0 10 mm\"")?
+            .vector(Dimension::Length)?
+            + shift)
+    };
+    let size = |name| {
+        section
+            .require(name, "\"4 mm\"")?
+            .positive(Dimension::Length, 1000.0, "m")
+    };
+    let geometry = match form {
+        "box" => {
+            let node = section.require("size", "\"10 20 30 mm\"")?;
+            let size = node.vector(Dimension::Length)?;
+            if size.min() <= 0.0 {
+                return Err(node.error("edge lengths must be above 0; units m, mm, um"));
+            }
+            Geometry::Box {
+                centre: point("centre")?,
+                size,
+            }
+        }
+        "sphere" => Geometry::Sphere {
+            centre: point("centre")?,
+            radius: size("radius")?,
+        },
+        "plate" => {
+            let node =
+                section.require("corners", "[\"0 0 0 mm\", \"10 0 0 mm\", \"0 10 0 mm\"]")?;
+            let corners = node
+                .elements()?
+                .iter()
+                .map(|corner| Ok(corner.vector(Dimension::Length)? + shift))
+                .collect::<Result<Vec<_>, SceneError>>()?;
+            if corners.len() < 3 {
+                return Err(node.error(format!(
+                    "a plate needs at least 3 corners, has {}",
+                    corners.len()
+                )));
+            }
+            Geometry::Plate {
+                corners,
+                thickness: size("thickness")?,
+            }
+        }
+        _ => {
+            let (from, to, radius) = (point("from")?, point("to")?, size("radius")?);
+            if from == to && form != "capsule" {
+                return Err(section.error("to", format!("a {form} needs two different ends")));
+            }
+            match form {
+                "capsule" => Geometry::Capsule { from, to, radius },
+                "cylinder" => Geometry::Cylinder { from, to, radius },
+                _ => Geometry::Cone { from, to, radius },
+            }
+        }
+    };
+    Ok(Shape { geometry, role })
+}

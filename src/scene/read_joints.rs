@@ -1,0 +1,508 @@
+//! Tree joints and ball joints of a scene file, and the forest they make.
+
+use super::access::set_contact_value;
+use super::document::{Node, Section};
+use super::read::no_body;
+use super::table::contact_part;
+use super::*;
+use std::collections::{BTreeSet, HashMap};
+use std::f64::consts::TAU;
+
+const KINDS: [&str; 4] = ["fixed", "prismatic", "revolute", "free"];
+
+/// A tree joint whose bodies are still places in the file.
+pub(super) struct JointText<'d> {
+    pub name: String,
+    pub section: Section<'d>,
+    /// `parent` and `child` count bodies in file order.
+    pub joint: Joint,
+}
+
+/// A ball joint with the places of its contact keys.
+pub(super) struct BallJointText<'d> {
+    pub joint: BallJoint,
+    pub section: Section<'d>,
+    pub places: HashMap<String, Node<'d>>,
+}
+
+/// One `[[joint]]`; `bodies` are the names in file order.
+pub(super) fn read_joint<'d>(
+    node: &Node<'d>,
+    scene: &Scene,
+    bodies: &[String],
+) -> Result<JointText<'d>, SceneError> {
+    let known = [
+        "name",
+        "kind",
+        "parent",
+        "child",
+        "axis",
+        "parent_point",
+        "child_point",
+        "rotation",
+        "drive",
+        "start",
+    ];
+    let section = node.section_as(node.title("joint"), &known)?;
+    let name = section.require("name", "\"P1\"")?.name()?.to_owned();
+    let kind = match KINDS[section.require("kind", "\"revolute\"")?.choice(&KINDS)?] {
+        "fixed" => JointKind::Fixed,
+        "prismatic" => JointKind::Prismatic,
+        "revolute" => JointKind::Revolute,
+        _ => JointKind::Free,
+    };
+    let child_node = section.require("child", "\"rod\"")?;
+    let child = place_of(&child_node, bodies, None)?;
+    let parent = match section.get("parent") {
+        Some(node) if node.text()? != "world" => Some(place_of(&node, bodies, Some("world"))?),
+        _ => None,
+    };
+    let point = |name| {
+        section
+            .get(name)
+            .map_or(Ok(Vec3::zeros()), |node| node.vector(Dimension::Length))
+    };
+    let mut joint = Joint {
+        name: name.clone(),
+        kind,
+        parent,
+        child,
+        parent_point: point("parent_point")?,
+        child_point: point("child_point")?,
+        axis: Vec3::x(),
+        rotation: section
+            .get("rotation")
+            .map_or(Ok(Quat::identity()), |node| read_rotation(&node))?,
+        drive: None,
+        start: JointStart::Scalar {
+            position: 0.0,
+            velocity: 0.0,
+        },
+    };
+    match kind {
+        JointKind::Free => read_free(&section, &mut joint)?,
+        JointKind::Fixed => {
+            for key in ["axis", "drive", "start"] {
+                section.refuse(key, "a fixed joint does not move")?;
+            }
+        }
+        JointKind::Prismatic | JointKind::Revolute => read_moving(&section, scene, &mut joint)?,
+    }
+    Ok(JointText {
+        name,
+        section,
+        joint,
+    })
+}
+
+/// Place of the body that a text names; `also` is a name that would have been allowed as well.
+fn place_of(node: &Node<'_>, bodies: &[String], also: Option<&str>) -> Result<usize, SceneError> {
+    let wanted = node.text()?;
+    let names = also.into_iter().chain(bodies.iter().map(String::as_str));
+    let place = bodies.iter().position(|name| name == wanted);
+    place.ok_or_else(|| node.error(no_body(wanted, names)))
+}
+
+/// A free body: where it starts and how it moves.
+fn read_free(section: &Section<'_>, joint: &mut Joint) -> Result<(), SceneError> {
+    if joint.parent.is_some() {
+        let node = section.require("parent", "\"world\"")?;
+        return Err(node.error("a free joint has the world as its parent; allowed \"world\""));
+    }
+    for key in ["axis", "parent_point", "drive", "rotation"] {
+        section.refuse(key, "a free joint has only `child_point` and `start`")?;
+    }
+    let node = section.require("start", "{ position = \"0 0 100 mm\" }")?;
+    let start = node.section(&["position", "rotation", "velocity", "angular_velocity"])?;
+    let vector = |name, dimension| {
+        start
+            .get(name)
+            .map_or(Ok(Vec3::zeros()), |node| node.vector(dimension))
+    };
+    let rotation = start
+        .get("rotation")
+        .map_or(Ok(Quat::identity()), |node| read_rotation(&node))?;
+    let angular_velocity = vector("angular_velocity", Dimension::AngularSpeed)?;
+    // The file places and moves the joint point; the model wants the frame's origin.
+    let arm = rotation * joint.child_point;
+    joint.start = JointStart::Pose {
+        position: start
+            .require("position", "\"0 0 100 mm\"")?
+            .vector(Dimension::Length)?
+            - arm,
+        rotation,
+        velocity: vector("velocity", Dimension::Speed)? - angular_velocity.cross(&arm),
+        angular_velocity,
+    };
+    joint.child_point = Vec3::zeros();
+    Ok(())
+}
+
+/// A slide or a hinge: axis, and a drive or a start.
+fn read_moving(section: &Section<'_>, scene: &Scene, joint: &mut Joint) -> Result<(), SceneError> {
+    let (place, rate) = match joint.kind {
+        JointKind::Revolute => (Dimension::Angle, Dimension::AngularSpeed),
+        _ => (Dimension::Length, Dimension::Speed),
+    };
+    if let Some(node) = section.get("drive") {
+        section.refuse("start", "the drive says where the joint starts")?;
+        let drive = read_drive(&node, joint.kind, scene, place, rate)?;
+        joint.drive = Some(drive);
+        joint.start = drive_start(drive);
+        if let (Drive::Spcmm { slider }, Some(spcmm)) = (drive, scene.spcmm.as_ref()) {
+            for key in ["axis", "parent_point", "parent", "rotation"] {
+                section.refuse(
+                    key,
+                    "the law spcmm places this joint: in the slider plane, along its own axis",
+                )?;
+            }
+            joint.axis = [Vec3::z(), -Vec3::z(), Vec3::y()][usize::from(slider - 1)];
+            joint.parent_point = Vec3::new(spcmm.slider_plane, 0.0, 0.0);
+            return Ok(());
+        }
+    } else if let Some(node) = section.get("start") {
+        let start = node.section(&["position", "velocity"])?;
+        let number = |name, dimension| {
+            start
+                .get(name)
+                .map_or(Ok(0.0), |node| node.quantity(dimension))
+        };
+        joint.start = JointStart::Scalar {
+            position: number("position", place)?,
+            velocity: number("velocity", rate)?,
+        };
+    }
+    joint.axis = section.require("axis", "[0, 0, 1]")?.direction()?;
+    Ok(())
+}
+
+fn read_drive(
+    node: &Node<'_>,
+    kind: JointKind,
+    scene: &Scene,
+    place: Dimension,
+    rate: Dimension,
+) -> Result<Drive, SceneError> {
+    let all = [
+        "law",
+        "slider",
+        "position",
+        "velocity",
+        "mean",
+        "amplitude",
+        "frequency",
+        "phase",
+    ];
+    let law = node.section(&all)?.require("law", "\"constant\"")?;
+    Ok(match law.choice(&["spcmm", "constant", "harmonic"])? {
+        0 => {
+            let section = node.section(&["law", "slider"])?;
+            if kind != JointKind::Prismatic {
+                return Err(law.error("the law spcmm drives prismatic joints only"));
+            }
+            if scene.spcmm.is_none() {
+                return Err(law.error("the law spcmm needs a section [spcmm] in the file"));
+            }
+            let slider = section.require("slider", "1")?;
+            match slider.scalar()?.parse::<u8>() {
+                Ok(number @ 1..=3) => Drive::Spcmm { slider: number },
+                _ => {
+                    return Err(
+                        slider.error("out of range; allowed 1, 2 or 3; a whole number, no unit")
+                    );
+                }
+            }
+        }
+        1 => {
+            let section = node.section(&["law", "position", "velocity"])?;
+            Drive::Constant {
+                position: section
+                    .get("position")
+                    .map_or(Ok(0.0), |node| node.quantity(place))?,
+                velocity: section.require("velocity", "\"6 rad/s\"")?.quantity(rate)?,
+            }
+        }
+        _ => {
+            let section = node.section(&["law", "mean", "amplitude", "frequency", "phase"])?;
+            Drive::Harmonic {
+                mean: section
+                    .get("mean")
+                    .map_or(Ok(0.0), |node| node.quantity(place))?,
+                amplitude: section.require("amplitude", "\"10 mm\"")?.quantity(place)?,
+                frequency: section
+                    .require("frequency", "\"1 Hz\"")?
+                    .quantity(Dimension::Frequency)?,
+                phase: section
+                    .get("phase")
+                    .map_or(Ok(0.0), |node| node.quantity(Dimension::Angle))?,
+            }
+        }
+    })
+}
+
+/// Where a law starts; the inverse kinematics say it for the spcmm law, which is 0 here.
+fn drive_start(drive: Drive) -> JointStart {
+    let (position, velocity) = match drive {
+        Drive::Spcmm { .. } => (0.0, 0.0),
+        Drive::Constant { position, velocity } => (position, velocity),
+        Drive::Harmonic {
+            mean,
+            amplitude,
+            frequency,
+            phase,
+        } => (
+            mean + amplitude * libm::sin(phase),
+            amplitude * TAU * frequency * libm::cos(phase),
+        ),
+    };
+    JointStart::Scalar { position, velocity }
+}
+
+/// An orientation in one of four forms:
+/// `{ axis = [0, 1, 0], angle = "15 deg" }`;
+/// `{ sequence = "xzy", angles = ["0 deg", "2 deg", "15 deg"] }`, R = Rx Rz Ry as in paper eq. (2);
+/// `{ x = [1, 0, 0], y = [0, 1, 0] }`, the body's x axis, and the side on which its y axis lies;
+/// `{ quaternion = [w, x, y, z] }`.
+pub(super) fn read_rotation(node: &Node<'_>) -> Result<Quat, SceneError> {
+    let section = node.section(&[
+        "axis",
+        "angle",
+        "sequence",
+        "angles",
+        "x",
+        "y",
+        "quaternion",
+    ])?;
+    let forms = ["axis", "sequence", "x", "quaternion"];
+    let given: Vec<&str> = forms
+        .into_iter()
+        .filter(|name| section.get(name).is_some())
+        .collect();
+    let [form] = given[..] else {
+        return Err(node.error(
+            "needs exactly one form: axis and angle, sequence and angles, x and y, or quaternion",
+        ));
+    };
+    let partner = match form {
+        "axis" => "angle",
+        "sequence" => "angles",
+        "x" => "y",
+        _ => "",
+    };
+    for name in ["angle", "angles", "y"] {
+        if name != partner {
+            section.refuse(name, &format!("it does not go with {form}"))?;
+        }
+    }
+    let turn =
+        |axis: Vec3, angle: f64| Quat::from_axis_angle(&nalgebra::Unit::new_normalize(axis), angle);
+    match form {
+        "axis" => {
+            let axis = section.require("axis", "[0, 1, 0]")?.direction()?;
+            Ok(turn(
+                axis,
+                section
+                    .require("angle", "\"15 deg\"")?
+                    .quantity(Dimension::Angle)?,
+            ))
+        }
+        "sequence" => {
+            let node = section.require("sequence", "\"xzy\"")?;
+            let letters = node.text()?;
+            let angles = section
+                .require("angles", "\"0 2 15 deg\"")?
+                .quantities::<3>(Dimension::Angle)?;
+            if letters.chars().count() != 3 {
+                return Err(
+                    node.error("must be three of the letters x, y and z, for example \"xzy\"")
+                );
+            }
+            letters
+                .chars()
+                .zip(angles)
+                .try_fold(Quat::identity(), |so_far, (letter, angle)| {
+                    let axis = match letter {
+                        'x' => Vec3::x(),
+                        'y' => Vec3::y(),
+                        'z' => Vec3::z(),
+                        _ => {
+                            return Err(node.error(
+                                "must be three of the letters x, y and z, for example \"xzy\"",
+                            ));
+                        }
+                    };
+                    Ok(so_far * turn(axis, angle))
+                })
+        }
+        "x" => {
+            let x = section.require("x", "[1, 0, 0]")?.direction()?;
+            let y_node = section.require("y", "[0, 1, 0]")?;
+            let z = x.cross(&y_node.direction()?);
+            if z.norm() < 1e-6 {
+                return Err(y_node.error("must not be parallel to x"));
+            }
+            let z = z.normalize();
+            let matrix = Mat3::from_columns(&[x, z.cross(&x), z]);
+            Ok(Quat::from_rotation_matrix(
+                &nalgebra::Rotation3::from_matrix_unchecked(matrix),
+            ))
+        }
+        _ => {
+            let node = section.require("quaternion", "[1, 0, 0, 0]")?;
+            let [w, x, y, z] = node.quantities::<4>(Dimension::None)?;
+            let size = w.abs().max(x.abs()).max(y.abs()).max(z.abs());
+            if size == 0.0 {
+                return Err(node.error("a quaternion must not be zero"));
+            }
+            Ok(Quat::new_normalize(
+                nalgebra::Quaternion::new(w, x, y, z) / size,
+            ))
+        }
+    }
+}
+
+/// Bodies parents first, else in file order, and their joints in the same order with `parent` and `child` renamed.
+pub(super) fn sort_forest(
+    bodies: Vec<Body>,
+    joints: Vec<JointText<'_>>,
+    sections: &[Section<'_>],
+) -> Result<(Vec<Body>, Vec<Joint>), SceneError> {
+    let closing = "each body hangs on exactly one joint; close loops with a [[ball_joint]]";
+    let mut of_child: Vec<Option<&JointText<'_>>> = vec![None; bodies.len()];
+    for text in &joints {
+        let child = text.joint.child;
+        if let Some(first) = of_child[child].replace(text) {
+            let node = text.section.require("child", "")?;
+            return Err(node.error(format!(
+                "this body already hangs on joint `{}`: {closing}",
+                first.name
+            )));
+        }
+    }
+    let mut children: Vec<Vec<usize>> = vec![Vec::new(); bodies.len()];
+    let mut ready = BTreeSet::new();
+    for (index, text) in of_child.iter().enumerate() {
+        match text {
+            None => {
+                let name = &bodies[index].name;
+                return Err(sections[index].error(
+                    "",
+                    format!("no [[joint]] has this body as its child: {closing}; write for example a joint with `child = \"{name}\"`, kind \"free\""),
+                ));
+            }
+            Some(text) => match text.joint.parent {
+                Some(parent) => children[parent].push(index),
+                None => {
+                    ready.insert(index);
+                }
+            },
+        }
+    }
+    let mut order = Vec::with_capacity(bodies.len());
+    while let Some(index) = ready.pop_first() {
+        order.push(index);
+        ready.extend(&children[index]);
+    }
+    let mut place = vec![usize::MAX; bodies.len()];
+    for (new, &old) in order.iter().enumerate() {
+        place[old] = new;
+    }
+    if let Some(text) = joints
+        .iter()
+        .find(|text| place[text.joint.child] == usize::MAX)
+    {
+        let node = text.section.require("parent", "\"world\"")?;
+        return Err(node.error(format!(
+            "these joints go round in a circle and never reach the world: {closing}"
+        )));
+    }
+    let mut sorted_joints: Vec<Joint> = joints.into_iter().map(|text| text.joint).collect();
+    for joint in &mut sorted_joints {
+        joint.child = place[joint.child];
+        joint.parent = joint.parent.map(|parent| place[parent]);
+    }
+    sorted_joints.sort_by_key(|joint| joint.child);
+    let mut sorted_bodies: Vec<(usize, Body)> = bodies
+        .into_iter()
+        .enumerate()
+        .map(|(old, body)| (place[old], body))
+        .collect();
+    sorted_bodies.sort_by_key(|(new, _)| *new);
+    Ok((
+        sorted_bodies.into_iter().map(|(_, body)| body).collect(),
+        sorted_joints,
+    ))
+}
+
+/// One `[[ball_joint]]`; `bodies` maps names to places in the sorted scene.
+pub(super) fn read_ball_joint<'d>(
+    node: &Node<'d>,
+    scene: &Scene,
+    bodies: &HashMap<String, usize>,
+) -> Result<BallJointText<'d>, SceneError> {
+    let parts: Vec<&'static str> = table().iter().filter_map(contact_part).collect();
+    let known: Vec<&str> = ["name", "socket", "ball", "opening"]
+        .into_iter()
+        .chain(parts.iter().copied())
+        .collect();
+    let section = node.section_as(node.title("joint"), &known)?;
+    let name = section.require("name", "\"S1\"")?.name()?.to_owned();
+    let attachment = |key: &str| {
+        let part = section
+            .require(key, "{ body = \"rod\", at = \"0 0 100 mm\" }")?
+            .section(&["body", "at"])?;
+        let body_node = part.require("body", "\"rod\"")?;
+        let body = match body_node.text()? {
+            "world" => None,
+            wanted => match bodies.get(wanted) {
+                Some(&index) => Some(index),
+                None => {
+                    let names = scene.bodies.iter().map(|body| body.name.as_str());
+                    return Err(
+                        body_node.error(no_body(wanted, std::iter::once("world").chain(names)))
+                    );
+                }
+            },
+        };
+        let point = part
+            .get("at")
+            .map_or(Ok(Vec3::zeros()), |node| node.vector(Dimension::Length))?;
+        Ok(Attachment { body, point })
+    };
+    let (socket, ball) = (attachment("socket")?, attachment("ball")?);
+    if socket.body == ball.body {
+        return Err(section.error(
+            "ball",
+            "socket and ball are on the same body: a ball joint needs two",
+        ));
+    }
+    let opening = section
+        .get("opening")
+        .map_or(Ok(scene.view.down.unit()), |node| node.direction())?;
+    let mut contact = scene.contact;
+    let mut overrides = Vec::new();
+    let mut places = HashMap::new();
+    for part in parts {
+        if let Some(node) = section.get(part) {
+            set_contact_value(
+                &mut contact,
+                part,
+                &node.parameter(&format!("contact.{part}"))?,
+            );
+            overrides.push(part);
+            places.insert(format!("joint.{name}.{part}"), node);
+        }
+    }
+    Ok(BallJointText {
+        joint: BallJoint {
+            name,
+            socket,
+            ball,
+            opening,
+            contact,
+            overrides,
+        },
+        section,
+        places,
+    })
+}

@@ -1,0 +1,401 @@
+//! The rows of the parameter table.
+
+use super::{Dimension, Kind, Parameter, Scope, Value};
+use Dimension as D;
+
+/// Every parameter there is, in the order the interface shows.
+pub fn table() -> &'static [Parameter] {
+    &TABLE
+}
+
+/// Words of `contact.friction_velocity`, `contact.normal_law`, … in the order of the menus.
+pub(super) const FRICTION_VELOCITIES: [&str; 2] = ["centres", "surface"];
+pub(super) const NORMAL_LAWS: [&str; 5] = [
+    "lankarani-nikravesh",
+    "hertz",
+    "hunt-crossley",
+    "flores",
+    "gonthier",
+];
+pub(super) const FRICTION_LAWS: [&str; 2] = ["modified-coulomb", "none"];
+pub(super) const FORMULATIONS: [&str; 2] = ["tree", "lagrange"];
+pub(super) const METHODS: [&str; 3] = ["semi-implicit-euler", "rk4", "dopri5"];
+pub(super) const PRESETS: [&str; 4] = ["preview", "real-time", "accurate", "reference"];
+pub(super) const AXES: [&str; 6] = ["+x", "-x", "+y", "-y", "+z", "-z"];
+
+/// A row that takes effect at once; the functions below change that where it is otherwise.
+const fn row(
+    key: &'static str,
+    label: &'static str,
+    group: &'static str,
+    kind: Kind,
+    default: Value,
+    scope: Scope,
+    help: &'static str,
+    equation: &'static str,
+) -> Parameter {
+    Parameter {
+        key,
+        label,
+        group,
+        kind,
+        default,
+        scope,
+        at_reset: false,
+        help,
+        equation,
+    }
+}
+
+const fn contact(
+    key: &'static str,
+    label: &'static str,
+    kind: Kind,
+    default: Value,
+    help: &'static str,
+    equation: &'static str,
+) -> Parameter {
+    row(
+        key,
+        label,
+        "Contact",
+        kind,
+        default,
+        Scope::Contact,
+        help,
+        equation,
+    )
+}
+
+const fn drive(
+    key: &'static str,
+    label: &'static str,
+    kind: Kind,
+    default: Value,
+    help: &'static str,
+    equation: &'static str,
+) -> Parameter {
+    at_reset(row(
+        key,
+        label,
+        "Drive",
+        kind,
+        default,
+        Scope::Spcmm,
+        help,
+        equation,
+    ))
+}
+
+const fn at_reset(mut parameter: Parameter) -> Parameter {
+    parameter.at_reset = true;
+    parameter
+}
+
+const fn number(
+    dimension: D,
+    min: f64,
+    max: f64,
+    display: &'static str,
+    slider: (f64, f64),
+) -> Kind {
+    Kind::Number {
+        dimension,
+        min,
+        max,
+        display,
+        slider,
+        logarithmic: false,
+    }
+}
+
+const fn logarithmic(
+    dimension: D,
+    min: f64,
+    max: f64,
+    display: &'static str,
+    slider: (f64, f64),
+) -> Kind {
+    Kind::Number {
+        dimension,
+        min,
+        max,
+        display,
+        slider,
+        logarithmic: true,
+    }
+}
+
+const fn gravity(
+    key: &'static str,
+    label: &'static str,
+    default: f64,
+    help: &'static str,
+) -> Parameter {
+    let kind = number(D::Acceleration, -1000.0, 1000.0, "m/s^2", (-20.0, 20.0));
+    row(
+        key,
+        label,
+        "Gravity",
+        kind,
+        Value::Number(default),
+        Scope::Every,
+        help,
+        "Weight in the force vector of paper eqs. (52), (53)",
+    )
+}
+
+static TABLE: [Parameter; 26] = [
+    contact(
+        "contact.clearance",
+        "Clearance",
+        number(D::Length, 0.0, 1.0, "mm", (0.0, 1e-3)),
+        Value::Number(0.3e-3),
+        "Radial gap c = R - r between socket and ball. With 0 the joint is ideal: a constraint instead of a contact. \
+         It must stay below the ball radius. Larger gaps give longer free flights and harder impacts; at 0.01 mm and \
+         below, the contact patch is no longer small against the ball, which Hertz's theory assumes.",
+        "Paper eqs. (9), (10); stiffness in (19)",
+    ),
+    contact(
+        "contact.friction",
+        "Friction coefficient",
+        number(D::None, 0.0, 10.0, "", (0.0, 1.0)),
+        Value::Number(0.15),
+        "Coulomb coefficient cf of ball on socket. Steel on steel lies between 0.1 (oiled) and 0.8 (dry). With 0 \
+         the rattling lasts much longer.",
+        "Paper eq. (20)",
+    ),
+    contact(
+        "contact.restitution",
+        "Restitution",
+        number(D::None, 0.0, 1.0, "", (0.0, 1.0)),
+        Value::Number(0.9),
+        "Rebound speed over approach speed that the normal law is asked for: 1 loses no energy. The law of Lankarani \
+         and Nikravesh is right only near 1 (asked for 0, it gives about 0.66); for low values choose flores or \
+         gonthier, which divide by this number and refuse 0.",
+        "Paper eq. (19)",
+    ),
+    contact(
+        "contact.youngs_modulus",
+        "Young's modulus",
+        logarithmic(D::Stress, 1e6, 1e12, "GPa", (1e9, 1e12)),
+        Value::Number(206e9),
+        "Stiffness E of the material of ball and socket. Steel has 206 GPa. A softer material gives longer, gentler \
+         impacts and deeper penetration, and lets the solver take larger steps.",
+        "Paper eq. (19), stiffness K",
+    ),
+    contact(
+        "contact.poisson_ratio",
+        "Poisson's ratio",
+        number(D::None, 0.0, 0.499, "", (0.0, 0.499)),
+        Value::Number(0.3),
+        "Sideways shrinking of the material when stretched, nu. Metals have about 0.3. It changes the contact \
+         stiffness by at most a third.",
+        "Paper eq. (19), stiffness K",
+    ),
+    contact(
+        "contact.ball_radius",
+        "Ball radius",
+        logarithmic(D::Length, 1e-4, 1.0, "mm", (1e-3, 0.1)),
+        Value::Number(0.010),
+        "Radius r of the ball; the socket has R = r + c. A larger ball in the same gap fits more closely, so the \
+         contact is stiffer.",
+        "Paper eqs. (9), (12), (19)",
+    ),
+    contact(
+        "contact.friction_velocity",
+        "Friction velocity",
+        Kind::Choice(&FRICTION_VELOCITIES),
+        Value::Choice("surface"),
+        "Which sliding velocity friction reads. centres is the paper's: the relative velocity of the two centres, \
+         which leaves out the turning of the ball. surface is what the contact feels: the relative velocity of the \
+         two touching points.",
+        "Paper eqs. (15), (16) for centres; (13), (14) with the bodies' rotation for surface",
+    ),
+    contact(
+        "contact.slip_speed_low",
+        "Low slip speed",
+        logarithmic(D::Speed, 0.0, 1.0, "mm/s", (1e-7, 1e-3)),
+        Value::Number(1e-6),
+        "v_a: below this sliding speed there is no friction, so that its direction never jumps at rest. It must stay \
+         below the high slip speed.",
+        "Paper eq. (21)",
+    ),
+    contact(
+        "contact.slip_speed_high",
+        "High slip speed",
+        logarithmic(D::Speed, 1e-9, 10.0, "mm/s", (1e-5, 1e-1)),
+        Value::Number(1e-4),
+        "v_theta: above this sliding speed friction is full; below it the joint counts as sticking. A smaller value \
+         is closer to true sticking and stiffer to compute.",
+        "Paper eq. (21)",
+    ),
+    contact(
+        "contact.impact_speed_floor",
+        "Impact speed floor",
+        logarithmic(D::Speed, 1e-9, 10.0, "mm/s", (1e-5, 0.1)),
+        Value::Number(1e-3),
+        "Least approach speed that the damping term divides by. Without a floor the last, softest touches would be \
+         infinitely stiff. A contact that begins more slowly than this rebounds higher than asked.",
+        "Paper eq. (19), the speed at the start of contact",
+    ),
+    contact(
+        "contact.normal_law",
+        "Normal law",
+        Kind::Choice(&NORMAL_LAWS),
+        Value::Choice("lankarani-nikravesh"),
+        "Normal force as a function of penetration and its rate. lankarani-nikravesh is the paper's; hertz is \
+         elastic; hunt-crossley, flores and gonthier differ in their damping, and flores and gonthier suit low \
+         restitution.",
+        "Paper eq. (19) for lankarani-nikravesh",
+    ),
+    contact(
+        "contact.friction_law",
+        "Friction law",
+        Kind::Choice(&FRICTION_LAWS),
+        Value::Choice("modified-coulomb"),
+        "Friction force as a function of normal force and sliding velocity. modified-coulomb rises linearly between \
+         the two slip speeds; none leaves friction out.",
+        "Paper eqs. (20), (21)",
+    ),
+    gravity(
+        "gravity.x",
+        "Gravity along X",
+        0.0,
+        "World X component of gravity. In the paper's machine X points down: +9.81 m/s^2. A file that gives any component has 0 for the others.",
+    ),
+    gravity(
+        "gravity.y",
+        "Gravity along Y",
+        0.0,
+        "World Y component of gravity. A file that gives any component has 0 for the others.",
+    ),
+    gravity(
+        "gravity.z",
+        "Gravity along Z",
+        -9.81,
+        "World Z component of gravity: -9.81 m/s^2 where Z points up. A file that gives any component has 0 for the others.",
+    ),
+    drive(
+        "spcmm.slider_plane",
+        "Slider plane",
+        number(D::Length, -1.0, 1.0, "mm", (0.0, 0.1)),
+        Value::Number(0.032),
+        "a1: distance along +X from the origin to the plane in which the sliders move. The paper does not print it; \
+         32 mm keeps the trajectory feasible all period long. Much larger values bring the rods near a singular \
+         position, where reactions grow without bound.",
+        "Paper eqs. (37) to (39), in x - (a1 + L1)",
+    ),
+    drive(
+        "spcmm.amplitude_x",
+        "Amplitude of x",
+        number(D::Length, 0.0, 1.0, "mm", (0.0, 0.05)),
+        Value::Number(0.025),
+        "Amplitude of the platform's commanded travel along X. With 0 and no beta amplitude the sliders rest.",
+        "Paper eq. (59)",
+    ),
+    drive(
+        "spcmm.amplitude_beta",
+        "Amplitude of beta",
+        number(D::Angle, 0.0, 1.0, "rad", (0.0, 0.1)),
+        Value::Number(0.025),
+        "Amplitude of the platform's commanded swing in beta.",
+        "Paper eq. (59)",
+    ),
+    drive(
+        "spcmm.frequency",
+        "Drive frequency",
+        number(D::Frequency, 0.0, 50.0, "Hz", (0.0, 5.0)),
+        Value::Number(0.5),
+        "How many times a second the trajectory repeats: 0.5 Hz is the paper's period of 2 s. Accelerations grow \
+         with its square. With 0 the sliders rest.",
+        "Paper eq. (59)",
+    ),
+    at_reset(row(
+        "chain.links",
+        "Links",
+        "Chain",
+        Kind::Count { min: 1, max: 4096 },
+        Value::Count(8),
+        Scope::Chain,
+        "Number of equal links, each hung on the one above by a ball joint with clearance. The cost of a step grows \
+         in proportion.",
+        "Newton-Euler equations of each link; the mass matrix is block diagonal",
+    )),
+    at_reset(row(
+        "formulation",
+        "Formulation",
+        "Solver",
+        Kind::Choice(&FORMULATIONS),
+        Value::Choice("tree"),
+        Scope::Every,
+        "Equations of motion. tree uses as few coordinates as there are freedoms once the ball joints are cut. \
+         lagrange is the paper's: all bodies free, every joint a constraint with a multiplier, stabilised after \
+         Baumgarte. Both give the same motion; tree is faster.",
+        "Paper eqs. (44) to (58) for lagrange",
+    )),
+    row(
+        "solver.method",
+        "Method",
+        "Solver",
+        Kind::Choice(&METHODS),
+        Value::Choice("dopri5"),
+        Scope::Every,
+        "Time stepper. semi-implicit-euler (order 1) and rk4 (order 4) keep a fixed step; dopri5 (Dormand-Prince, \
+         order 5) chooses its steps by the tolerance and finds the instants at which contacts begin and end.",
+        "Solves paper eqs. (55), (58) in time",
+    ),
+    row(
+        "solver.step",
+        "Step",
+        "Solver",
+        logarithmic(D::Time, 1e-7, 1e-2, "us", (1e-6, 1e-3)),
+        Value::Number(10e-6),
+        Scope::Every,
+        "Step of a fixed-step method, first step of an adaptive one. An impact lasts about 0.1 ms: a fixed step \
+         above 20 us no longer resolves it.",
+        "Solves paper eqs. (55), (58) in time",
+    ),
+    row(
+        "solver.tolerance",
+        "Tolerance",
+        "Solver",
+        logarithmic(D::None, 1e-13, 1e-2, "", (1e-12, 1e-3)),
+        Value::Number(1e-6),
+        Scope::Every,
+        "Relative error that an adaptive method allows itself in one step. The motion between impacts is sensitive: \
+         use 1e-9 or less to compare single impacts.",
+        "Solves paper eqs. (55), (58) in time",
+    ),
+    row(
+        "solver.preset",
+        "Preset",
+        "Solver",
+        Kind::Choice(&PRESETS),
+        Value::Unset,
+        Scope::Every,
+        "Method, step and tolerance by name: preview (rk4, 20 us), real-time (dopri5, 1e-4), accurate (dopri5, 1e-7), \
+         reference (dopri5, 1e-11). A method, step or tolerance that is set as well wins over the preset.",
+        "Solves paper eqs. (55), (58) in time",
+    ),
+    row(
+        "view.down",
+        "Down on screen",
+        "View",
+        Kind::Choice(&AXES),
+        Value::Choice("-z"),
+        Scope::Every,
+        "World axis that points down on the screen. It moves the camera only; gravity has its own keys.",
+        "No equation: display only",
+    ),
+];
+
+/// The row of a key (without a joint's name).
+pub(super) fn find(key: &str) -> Option<&'static Parameter> {
+    TABLE.iter().find(|parameter| parameter.key == key)
+}
+
+/// Last part of a contact key: `clearance` of `contact.clearance`.
+pub(super) fn contact_part(parameter: &'static Parameter) -> Option<&'static str> {
+    parameter.key.strip_prefix("contact.")
+}

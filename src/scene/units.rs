@@ -1,0 +1,501 @@
+//! Quantities as people write them: "0.3 mm", "206 GPa", "15 deg".
+//!
+//! Decimal prefixes are applied to the decimal exponent of the text, not by a multiplication, so that
+//! "0.3 mm", "0.3mm" and "3e-4 m" are the same bits.
+
+use super::Dimension;
+use std::f64::consts::PI;
+
+/// Why a text is no quantity of the wanted dimension.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum QuantityError {
+    /// No number at the start.
+    #[error("is not a number{}", example(*.0))]
+    NotANumber(Dimension),
+    /// Infinite, not a number, or beyond the range of double precision.
+    #[error("must be a finite number{}", example(*.0))]
+    NotFinite(Dimension),
+    /// A bare number other than 0 for a quantity that has a dimension.
+    #[error("needs a unit{}", example(*.0))]
+    MissingUnit(Dimension),
+    /// A unit of another dimension, or none known.
+    #[error("wrong unit `{unit}`{}{}", foreign(unit), example(*.dimension))]
+    WrongUnit {
+        /// The unit as written.
+        unit: String,
+        /// The dimension that was wanted.
+        dimension: Dimension,
+    },
+}
+
+/// How a unit turns into SI.
+#[derive(Clone, Copy)]
+enum Scale {
+    /// 10 to this power.
+    Decimal(i32),
+    /// value * numerator / denominator.
+    Ratio(f64, f64),
+}
+
+use Scale::{Decimal, Ratio};
+
+/// A unit's name and size.
+type Unit = (&'static str, Scale);
+
+/// Every dimension with its name and its units; the first unit is the SI one.
+const UNITS: [(Dimension, &str, &[Unit]); 11] = [
+    (
+        Dimension::Length,
+        "length",
+        &[
+            ("m", Decimal(0)),
+            ("cm", Decimal(-2)),
+            ("mm", Decimal(-3)),
+            ("um", Decimal(-6)),
+            ("nm", Decimal(-9)),
+            ("km", Decimal(3)),
+        ],
+    ),
+    (
+        Dimension::Time,
+        "time",
+        &[
+            ("s", Decimal(0)),
+            ("ms", Decimal(-3)),
+            ("us", Decimal(-6)),
+            ("ns", Decimal(-9)),
+            ("min", Ratio(60.0, 1.0)),
+        ],
+    ),
+    (
+        Dimension::Mass,
+        "mass",
+        &[
+            ("kg", Decimal(0)),
+            ("g", Decimal(-3)),
+            ("mg", Decimal(-6)),
+            ("t", Decimal(3)),
+        ],
+    ),
+    (
+        Dimension::Inertia,
+        "moment of inertia",
+        &[
+            ("kg m^2", Decimal(0)),
+            ("kg cm^2", Decimal(-4)),
+            ("kg mm^2", Decimal(-6)),
+            ("g cm^2", Decimal(-7)),
+            ("g mm^2", Decimal(-9)),
+        ],
+    ),
+    (
+        Dimension::Stress,
+        "stress",
+        &[
+            ("Pa", Decimal(0)),
+            ("kPa", Decimal(3)),
+            ("MPa", Decimal(6)),
+            ("GPa", Decimal(9)),
+            ("N/mm^2", Decimal(6)),
+        ],
+    ),
+    (
+        Dimension::Angle,
+        "angle",
+        &[
+            ("rad", Decimal(0)),
+            ("mrad", Decimal(-3)),
+            ("deg", Ratio(PI, 180.0)),
+        ],
+    ),
+    (
+        Dimension::Speed,
+        "speed",
+        &[
+            ("m/s", Decimal(0)),
+            ("cm/s", Decimal(-2)),
+            ("mm/s", Decimal(-3)),
+            ("um/s", Decimal(-6)),
+            ("nm/s", Decimal(-9)),
+            ("km/h", Ratio(1.0, 3.6)),
+        ],
+    ),
+    (
+        Dimension::AngularSpeed,
+        "angular speed",
+        &[
+            ("rad/s", Decimal(0)),
+            ("mrad/s", Decimal(-3)),
+            ("deg/s", Ratio(PI, 180.0)),
+            ("rpm", Ratio(PI, 30.0)),
+        ],
+    ),
+    (
+        Dimension::Acceleration,
+        "acceleration",
+        &[
+            ("m/s^2", Decimal(0)),
+            ("cm/s^2", Decimal(-2)),
+            ("mm/s^2", Decimal(-3)),
+        ],
+    ),
+    (
+        Dimension::Frequency,
+        "frequency",
+        &[
+            ("Hz", Decimal(0)),
+            ("mHz", Decimal(-3)),
+            ("kHz", Decimal(3)),
+            ("1/s", Decimal(0)),
+        ],
+    ),
+    (Dimension::None, "pure number", &[]),
+];
+
+/// Names of the units that a quantity of this dimension may be written in, SI first; empty for a pure number.
+pub fn unit_names(dimension: Dimension) -> Vec<&'static str> {
+    units(dimension).iter().map(|(name, _)| *name).collect()
+}
+
+/// SI unit of a dimension; "" for a pure number.
+pub fn si_unit(dimension: Dimension) -> &'static str {
+    units(dimension).first().map_or("", |(name, _)| *name)
+}
+
+/// A quantity as a person writes it, in SI units. A bare 0 needs no unit; pure numbers take none.
+///
+/// # Errors
+/// Not a number, not finite, no unit, or a unit of another dimension.
+pub fn parse_quantity(text: &str, dimension: Dimension) -> Result<f64, QuantityError> {
+    let text = text.trim();
+    let (number, unit) = split_number(text);
+    if number.is_empty() {
+        let word = text.trim_start_matches(['+', '-']).to_ascii_lowercase();
+        return Err(if word.starts_with("inf") || word.starts_with("nan") {
+            QuantityError::NotFinite(dimension)
+        } else {
+            QuantityError::NotANumber(dimension)
+        });
+    }
+    let bare: f64 = number
+        .parse()
+        .map_err(|_| QuantityError::NotANumber(dimension))?;
+    let value = if unit.is_empty() {
+        if dimension != Dimension::None && bare != 0.0 {
+            return Err(QuantityError::MissingUnit(dimension));
+        }
+        bare
+    } else {
+        let wanted = normalise(unit);
+        let scale = units(dimension)
+            .iter()
+            .find(|(name, _)| normalise(name) == wanted)
+            .map(|(_, scale)| *scale)
+            .ok_or_else(|| QuantityError::WrongUnit {
+                unit: unit.to_owned(),
+                dimension,
+            })?;
+        apply(number, bare, scale)
+    };
+    if !value.is_finite() {
+        return Err(QuantityError::NotFinite(dimension));
+    }
+    // A negative zero would only make two equal scenes hash differently.
+    Ok(value + 0.0)
+}
+
+/// An SI value in `unit`; unchanged for a unit that is not known or "".
+pub fn to_display(si: f64, unit: &str) -> f64 {
+    match scale_of(unit) {
+        Some(Decimal(exponent)) => shift(&format!("{si:e}"), -exponent).unwrap_or(f64::NAN),
+        Some(Ratio(numerator, denominator)) => si * denominator / numerator,
+        None => si,
+    }
+}
+
+/// A value in `unit` as SI; unchanged for a unit that is not known or "".
+pub fn from_display(value: f64, unit: &str) -> f64 {
+    scale_of(unit).map_or(value, |scale| apply(&format!("{value:e}"), value, scale))
+}
+
+/// An SI value with its unit, at most `digits` significant digits, no needless zeros: `0.3 mm`.
+pub fn format_quantity_digits(si: f64, unit: &str, digits: usize) -> String {
+    let number = format_number(to_display(si, unit), digits);
+    if unit.is_empty() {
+        number
+    } else {
+        format!("{number} {unit}")
+    }
+}
+
+/// An SI value with its unit for people: six significant digits.
+pub fn format_quantity(si: f64, unit: &str) -> String {
+    format_quantity_digits(si, unit, 6)
+}
+
+/// A text that [`parse_quantity`] reads back to the same bits, in `unit` where that is possible, else in SI.
+pub(super) fn exact_quantity(si: f64, unit: &str, dimension: Dimension) -> String {
+    let friendly = format_quantity_digits(si, unit, 15);
+    if parse_quantity(&friendly, dimension).map(f64::to_bits) == Ok((si + 0.0).to_bits()) {
+        return friendly;
+    }
+    let unit = si_unit(dimension);
+    if unit.is_empty() {
+        format!("{si:e}")
+    } else {
+        format!("{si:e} {unit}")
+    }
+}
+
+/// At most `digits` significant digits, plain notation where it is short.
+fn format_number(value: f64, digits: usize) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return if value == 0.0 {
+            "0".to_owned()
+        } else {
+            format!("{value}")
+        };
+    }
+    let rounded: f64 = format!("{value:.*e}", digits.saturating_sub(1))
+        .parse()
+        .unwrap_or(value);
+    let size = rounded.abs();
+    if (1e-4..1e9).contains(&size) {
+        format!("{rounded}")
+    } else {
+        format!("{rounded:e}")
+    }
+}
+
+fn units(dimension: Dimension) -> &'static [Unit] {
+    UNITS
+        .iter()
+        .find(|(d, _, _)| *d == dimension)
+        .map_or(&[], |(_, _, units)| units)
+}
+
+fn scale_of(unit: &str) -> Option<Scale> {
+    UNITS
+        .iter()
+        .flat_map(|(_, _, units)| units.iter())
+        .find(|(name, _)| *name == unit)
+        .map(|(_, scale)| *scale)
+}
+
+fn apply(number: &str, bare: f64, scale: Scale) -> f64 {
+    match scale {
+        Decimal(exponent) => shift(number, exponent).unwrap_or(f64::NAN),
+        Ratio(numerator, denominator) => bare * numerator / denominator,
+    }
+}
+
+/// The decimal number `text` times 10^`by`, rounded once.
+fn shift(text: &str, by: i32) -> Option<f64> {
+    let (mantissa, exponent) = match text.find(['e', 'E']) {
+        Some(at) => (&text[..at], text[at + 1..].parse::<i64>().ok()?),
+        None => (text, 0),
+    };
+    format!("{mantissa}e{}", exponent.saturating_add(i64::from(by)))
+        .parse()
+        .ok()
+}
+
+/// Splits "0.3 mm" into "0.3" and "mm"; the number is "" where the text starts with none.
+fn split_number(text: &str) -> (&str, &str) {
+    let bytes = text.as_bytes();
+    let digits = |mut at: usize| {
+        while bytes.get(at).is_some_and(u8::is_ascii_digit) {
+            at += 1;
+        }
+        at
+    };
+    let start = usize::from(matches!(bytes.first(), Some(b'+' | b'-')));
+    let mut end = digits(start);
+    let mut count = end - start;
+    if bytes.get(end) == Some(&b'.') {
+        let fraction = digits(end + 1);
+        count += fraction - end - 1;
+        end = fraction;
+    }
+    if count == 0 {
+        return ("", text);
+    }
+    // An exponent only where digits follow: the `e` of a unit stays with the unit.
+    if matches!(bytes.get(end), Some(b'e' | b'E')) {
+        let sign = usize::from(matches!(bytes.get(end + 1), Some(b'+' | b'-')));
+        let exponent = digits(end + 1 + sign);
+        if exponent > end + 1 + sign {
+            end = exponent;
+        }
+    }
+    (&text[..end], text[end..].trim())
+}
+
+/// "kg·m²", "kg m^2" and "kg m2" are one unit, and so are the two signs for micro.
+fn normalise(unit: &str) -> String {
+    unit.chars()
+        .filter(|c| !c.is_whitespace() && !matches!(c, '^' | '*' | '·' | '⋅'))
+        .map(|c| match c {
+            'µ' | 'μ' => 'u',
+            '²' => '2',
+            other => other,
+        })
+        .collect::<String>()
+        .replace('°', "deg")
+}
+
+/// The units to choose from, as the end of a sentence.
+fn example(dimension: Dimension) -> String {
+    let names = unit_names(dimension);
+    match names.first() {
+        None => "; a pure number takes no unit".to_owned(),
+        Some(_) => format!(
+            "; units of {}: {}",
+            dimension_name(dimension),
+            names.join(", ")
+        ),
+    }
+}
+
+fn dimension_name(dimension: Dimension) -> &'static str {
+    UNITS
+        .iter()
+        .find(|(d, _, _)| *d == dimension)
+        .map_or("", |(_, name, _)| name)
+}
+
+/// Says what a unit would measure, if it measures anything.
+fn foreign(unit: &str) -> String {
+    let wanted = normalise(unit);
+    UNITS
+        .iter()
+        .find(|(_, _, units)| units.iter().any(|(name, _)| normalise(name) == wanted))
+        .map_or_else(String::new, |(_, name, _)| format!(" (a unit of {name})"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_quantity_in_three_spellings_has_the_same_bits() {
+        for text in [
+            "0.3 mm",
+            "0.3mm",
+            "3e-4 m",
+            "300 µm",
+            "300μm",
+            "300 um",
+            "  0.3  mm ",
+        ] {
+            assert_eq!(
+                parse_quantity(text, Dimension::Length).map(f64::to_bits),
+                Ok(3e-4_f64.to_bits()),
+                "{text}"
+            );
+        }
+    }
+
+    #[test]
+    fn every_dimension_reads_its_units() {
+        let cases = [
+            ("206 GPa", Dimension::Stress, 206e9),
+            ("5 us", Dimension::Time, 5e-6),
+            ("20ms", Dimension::Time, 0.02),
+            ("180 deg", Dimension::Angle, PI),
+            ("0.168 kg", Dimension::Mass, 0.168),
+            ("168 g", Dimension::Mass, 0.168),
+            ("4.44e-4 kg m^2", Dimension::Inertia, 4.44e-4),
+            ("4.44e-4 kg m2", Dimension::Inertia, 4.44e-4),
+            ("4.44e-4 kg·m²", Dimension::Inertia, 4.44e-4),
+            ("9.81 m/s^2", Dimension::Acceleration, 9.81),
+            ("9.81m/s2", Dimension::Acceleration, 9.81),
+            ("0.5 Hz", Dimension::Frequency, 0.5),
+            ("6 rad/s", Dimension::AngularSpeed, 6.0),
+            ("30 rpm", Dimension::AngularSpeed, PI),
+            ("-2 mm/s", Dimension::Speed, -2e-3),
+            ("0.15", Dimension::None, 0.15),
+            (".5", Dimension::None, 0.5),
+            ("0", Dimension::Length, 0.0),
+            ("-0.0", Dimension::Length, 0.0),
+            ("1e-3", Dimension::None, 1e-3),
+        ];
+        for (text, dimension, si) in cases {
+            let read = parse_quantity(text, dimension).unwrap();
+            // One rounding of pi on the way.
+            assert!(
+                (read - si).abs() <= f64::EPSILON * si.abs(),
+                "{text}: {read}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_is_no_quantity_is_refused_with_the_reason() {
+        let cases = [
+            ("0.3", Dimension::Length, "needs a unit"),
+            (
+                "0.3 s",
+                Dimension::Length,
+                "wrong unit `s` (a unit of time)",
+            ),
+            (
+                "0.3 furlong",
+                Dimension::Length,
+                "wrong unit `furlong`; units of length: m, cm, mm",
+            ),
+            (
+                "0.3 mm",
+                Dimension::None,
+                "wrong unit `mm` (a unit of length); a pure number takes no unit",
+            ),
+            ("inf", Dimension::None, "finite"),
+            ("nan m", Dimension::Length, "finite"),
+            ("-inf mm", Dimension::Length, "finite"),
+            ("1e999 m", Dimension::Length, "finite"),
+            ("1e99999999999999999999 m", Dimension::Length, "finite"),
+            ("", Dimension::Length, "not a number"),
+            ("mm", Dimension::Length, "not a number"),
+            ("1.2.3 mm", Dimension::Length, "wrong unit"),
+            ("-", Dimension::None, "not a number"),
+            ("0x10 m", Dimension::Length, "wrong unit"),
+        ];
+        for (text, dimension, fragment) in cases {
+            let error = parse_quantity(text, dimension).unwrap_err().to_string();
+            assert!(error.contains(fragment), "{text}: {error}");
+        }
+    }
+
+    #[test]
+    fn display_goes_there_and_back() {
+        for (si, unit, shown) in [
+            (3e-4, "mm", "0.3 mm"),
+            (206e9, "GPa", "206 GPa"),
+            (1e-6, "mm/s", "0.001 mm/s"),
+            (0.15, "", "0.15"),
+            (1e-11, "", "1e-11"),
+        ] {
+            assert_eq!(format_quantity(si, unit), shown);
+            assert_eq!(
+                from_display(to_display(si, unit), unit).to_bits(),
+                f64::to_bits(si)
+            );
+        }
+        assert_eq!(to_display(PI, "deg"), 180.0);
+    }
+
+    #[test]
+    fn exact_text_keeps_every_bit() {
+        let mut x = 1.234_567_890_123_456_7e-4_f64;
+        for _ in 0..200 {
+            let text = exact_quantity(x, "mm", Dimension::Length);
+            assert_eq!(
+                parse_quantity(&text, Dimension::Length).unwrap().to_bits(),
+                x.to_bits(),
+                "{text}"
+            );
+            x *= 1.017_3;
+        }
+        assert_eq!(exact_quantity(3e-4, "mm", Dimension::Length), "0.3 mm");
+    }
+}
