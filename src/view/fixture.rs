@@ -1,10 +1,9 @@
 //! Hand-built scenes and frames for tests of view and render: nothing here is simulated.
 
 use crate::contact;
-use crate::integrate::Method;
 use crate::scene::{
-    Attachment, BallJoint, Body, Formulation, Geometry, Mat3, Output, Quat, Role, Scene, Shape,
-    SignedAxis, Solver, Source, Vec3, ViewSettings,
+    Attachment, BallJoint, Body, Geometry, Mat3, Output, Quat, Role, Scene, Shape, SignedAxis,
+    Vec3, ViewSettings,
 };
 use crate::simulate::{BodyMotion, ContactState, Frame, JointReport, Peak};
 
@@ -38,19 +37,7 @@ fn scene(
 ) -> Scene {
     Scene {
         name: name.to_owned(),
-        title: name.to_owned(),
-        description: String::new(),
         gravity: down.unit() * 9.81,
-        contact: contact::Parameters::default(),
-        formulation: Formulation::Tree,
-        solver: Solver {
-            preset: None,
-            method: Method::RungeKutta4,
-            step: 1e-5,
-            tolerance: 1e-8,
-        },
-        spcmm: None,
-        chain: None,
         view: ViewSettings { down, floor: None },
         output: Output {
             body: 0,
@@ -60,8 +47,7 @@ fn scene(
         joints: Vec::new(),
         ball_joints,
         fixed_shapes,
-        source: Source::default(),
-        changes: Vec::new(),
+        ..Scene::load("pendulum", &[]).expect("a built-in scene")
     }
 }
 
