@@ -509,6 +509,23 @@ fn additions_that_contradict_the_scene_are_refused() {
 }
 
 #[test]
+fn one_slider_law_drives_one_joint() {
+    let text = jointplay::scene::built_in_text("spcmm").unwrap();
+    let error = parse(&text.replace("slider = 2", "slider = 1")).unwrap_err();
+    holds(
+        "slider twice",
+        &error,
+        &["joint.P2.drive", "slider 1 already drives joint `P1`"],
+    );
+    let error = parse(&text.replace("slider = 2", "slider = 4")).unwrap_err();
+    holds(
+        "slider 4",
+        &error,
+        &["joint.P2.drive.slider = 4", "allowed 1, 2 or 3"],
+    );
+}
+
+#[test]
 fn changes_are_refused_with_key_value_and_range() {
     let cases: &[(&str, &str, &str, &[&str])] = &[
         (
