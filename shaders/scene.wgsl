@@ -184,7 +184,7 @@ fn mark(in: Surface) -> vec3<f32> {
     let colour = shade(base, in.surface.x, in.surface.y, n, v, 1.0) + rim * 0.15;
     let flash = to_linear(globals.flash.rgb);
     let glow = in.surface.z;
-    let opacity = mix(in.colour.a + 0.45 * rim, 0.72, cut);
+    let opacity = in.colour.a * mix(1.0 + 2.25 * rim, 3.6, cut);
     return finish(mix(colour, flash, 0.6 * glow), in.clip.xy, min(opacity + 0.35 * glow, 0.95));
 }
 

@@ -7,6 +7,7 @@ mod callback;
 #[cfg(test)]
 mod look;
 mod meshes;
+#[cfg(not(target_arch = "wasm32"))]
 mod offscreen;
 mod pipelines;
 mod renderer;
@@ -16,6 +17,7 @@ mod tests;
 
 pub use callback::{Viewport, install};
 pub use eframe::egui_wgpu::wgpu;
+#[cfg(not(target_arch = "wasm32"))]
 pub use offscreen::{Image, NoAdapter, Offscreen, RenderError};
 pub use renderer::Renderer;
 pub use target::Target;

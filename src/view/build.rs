@@ -168,13 +168,30 @@ impl SceneView {
                 out.halos.push(Instance { glow, ..halo });
             }
             if options.sockets {
-                let turn = Mat3::from_quat(Quat::from_rotation_arc(Vec3::Z, joint.opening));
-                let socket = placed(turn * joint.outer, joint.socket_centre, palette.socket);
+                let half = |opening, material| {
+                    let turn = Mat3::from_quat(Quat::from_rotation_arc(Vec3::Z, opening));
+                    let socket = placed(turn * joint.outer, joint.socket_centre, material);
+                    Instance {
+                        inner_radius: joint.inner / joint.outer,
+                        ..socket
+                    }
+                };
                 out.sockets.push(Instance {
                     glow,
-                    inner_radius: joint.inner / joint.outer,
-                    ..socket
+                    ..half(joint.opening, palette.socket)
                 });
+                // The half that is cut away stays as a breath: a ball that touches there is still in its socket.
+                let colour = palette
+                    .socket
+                    .colour
+                    .with_opacity(0.15 * palette.socket.colour.0[3]);
+                out.sockets.push(half(
+                    -joint.opening,
+                    Material {
+                        colour,
+                        ..palette.socket
+                    },
+                ));
             }
         }
         let eye = camera.eye();

@@ -82,7 +82,7 @@ impl Camera {
             Preset::Front => (0.0, 0.0),
             Preset::Side => (STEEPEST, 0.0),
             Preset::Top => (0.0, STEEPEST),
-            Preset::Isometric => (0.6, 0.42),
+            Preset::Isometric => (0.6, 0.32),
         };
     }
 

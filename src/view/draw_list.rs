@@ -246,7 +246,7 @@ pub struct DrawList {
     pub arrows: Layer,
     /// Balls of light about joints that were hit.
     pub halos: Vec<Instance>,
-    /// Sockets, farthest first.
+    /// Sockets, farthest first: for each the half that stands and, fainter, the half that is cut away.
     pub sockets: Vec<Instance>,
     /// Solid things before all others: the triad.
     pub overlay: Layer,
