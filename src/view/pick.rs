@@ -84,6 +84,12 @@ impl SceneView {
 
 /// Distance along `ray` to the solid.
 fn cast(solid: &Solid<'_>, ray: &Ray) -> Option<f32> {
+    // A broken frame must not reach parry's iterations.
+    let mut finite = true;
+    solid.extent(|centre, radius| finite &= centre.is_finite() && radius.is_finite());
+    if !finite {
+        return None;
+    }
     match *solid {
         Solid::Bar {
             from,

@@ -342,6 +342,20 @@ fn a_frame_with_broken_numbers_draws_without_a_panic() {
         },
     );
     assert_eq!(drawn.magnification, 1.0);
+    let (view, arrows, options) = (
+        SceneView::new(&scene, &frame),
+        ArrowMemory::new(),
+        ViewOptions::default(),
+    );
+    let mut camera = view.camera();
+    view.fit(&mut camera, &scene, &frame, &options, SIZE);
+    assert!(camera.eye().is_finite());
+    for x in (0..SIZE[0]).step_by(40) {
+        view.pick(
+            &shot(&scene, &frame, &arrows, &options, &camera),
+            Vec2::new(x as f32, 360.0),
+        );
+    }
     let empty = Frame::default();
     assert!(
         list(&scene, &empty, &ViewOptions::default())
