@@ -1,1 +1,48 @@
-//! view
+//! From a scene and one instant of it to a plain list of things to draw; camera and picking. No GPU here.
+//!
+//! Lengths are metres in world axes, f32. The view recomputes no physics: forces, gaps and contact points are
+//! those that the step reported. Usage, once per frame:
+//!
+//! ```ignore
+//! let view = SceneView::new(&scene, &first_frame);            // once per scene
+//! arrows.update(&frame, &peaks, dt, &options.arrows);         // holds peaks, fades them
+//! view.build(&Shot { frame: &frame, arrows: &arrows, options: &options, camera: &camera, trail: &[], size }, &mut list);
+//! ```
+
+mod arrows;
+mod build;
+mod camera;
+mod draw_list;
+mod drawn;
+#[cfg(test)]
+pub(crate) mod fixture;
+mod options;
+mod pick;
+#[cfg(test)]
+mod tests;
+mod theme;
+
+pub use arrows::{ArrowMemory, HeldForce};
+pub use build::{SceneView, Shot};
+pub use camera::{Camera, Preset};
+pub use draw_list::{
+    Background, DrawList, Eye, Floor, Instance, Label, LabelKind, Layer, Legend, Light, Line, Mesh,
+    MeshData, Tick,
+};
+pub use options::{ArrowOptions, Scaling, ViewOptions};
+pub use pick::{Hit, Picked};
+pub use theme::{Colour, Palette, Theme};
+
+/// A physics vector as the view's.
+pub fn to_f32(v: &crate::scene::Vec3) -> glam::Vec3 {
+    glam::Vec3::new(v.x as f32, v.y as f32, v.z as f32)
+}
+
+/// Ball around everything drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// Centre, m, world axes.
+    pub centre: glam::Vec3,
+    /// Radius, m.
+    pub radius: f32,
+}

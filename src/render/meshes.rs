@@ -1,0 +1,156 @@
+//! Triangles of the shared meshes.
+
+use std::f32::consts::{PI, TAU};
+
+use crate::view::{Mesh, MeshData};
+
+/// Around a bar or a ball.
+const SECTORS: u32 = 64;
+/// From pole to pole of a ball.
+const STACKS: u32 = 32;
+
+/// The shared meshes, by [`Mesh::index`].
+pub(super) fn shared() -> [MeshData; Mesh::SHARED] {
+    [sphere(), cylinder(), cone(), cube(), socket()]
+}
+
+/// Adds a patch: `point(u, v)` for u, v in 0..=1 gives position and normal; u runs around, v from bottom to top, so that
+/// (u, v, outside) is right-handed.
+fn patch(mesh: &mut MeshData, nu: u32, nv: u32, point: impl Fn(f32, f32) -> ([f32; 4], [f32; 3])) {
+    let first = mesh.vertices.len() as u32;
+    for j in 0..=nv {
+        for i in 0..=nu {
+            mesh.vertices
+                .push(point(i as f32 / nu as f32, j as f32 / nv as f32));
+        }
+    }
+    for j in 0..nv {
+        for i in 0..nu {
+            let a = first + j * (nu + 1) + i;
+            let b = a + nu + 1;
+            mesh.indices.extend([a, a + 1, b, b, a + 1, b + 1]);
+        }
+    }
+}
+
+/// Point of the unit circle at turn `u`; exactly closed.
+fn circle(u: f32) -> (f32, f32) {
+    let angle = if u >= 1.0 { 0.0 } else { u * TAU };
+    (angle.cos(), angle.sin())
+}
+
+/// Point of the unit ball: turn `u`, height angle from the south pole `theta`.
+fn on_ball(u: f32, theta: f32) -> [f32; 3] {
+    let (x, y) = circle(u);
+    [theta.sin() * x, theta.sin() * y, -theta.cos()]
+}
+
+fn sphere() -> MeshData {
+    let mut mesh = MeshData::default();
+    patch(&mut mesh, SECTORS, STACKS, |u, v| {
+        let n = on_ball(u, v * PI);
+        ([n[0], n[1], n[2], 0.0], n)
+    });
+    mesh
+}
+
+/// Disc of radius 1 at height `z`, facing up or down.
+fn disc(mesh: &mut MeshData, z: f32, up: bool) {
+    patch(mesh, SECTORS, 1, |u, v| {
+        let (x, y) = circle(u);
+        let r = if up { 1.0 - v } else { v };
+        (
+            [r * x, r * y, z, 0.0],
+            [0.0, 0.0, if up { 1.0 } else { -1.0 }],
+        )
+    });
+}
+
+fn cylinder() -> MeshData {
+    let mut mesh = MeshData::default();
+    patch(&mut mesh, SECTORS, 1, |u, v| {
+        let (x, y) = circle(u);
+        ([x, y, v, 0.0], [x, y, 0.0])
+    });
+    disc(&mut mesh, 0.0, false);
+    disc(&mut mesh, 1.0, true);
+    mesh
+}
+
+fn cone() -> MeshData {
+    let mut mesh = MeshData::default();
+    let slope = std::f32::consts::FRAC_1_SQRT_2;
+    patch(&mut mesh, SECTORS, 1, |u, v| {
+        let (x, y) = circle(u);
+        (
+            [x * (1.0 - v), y * (1.0 - v), v, 0.0],
+            [x * slope, y * slope, slope],
+        )
+    });
+    disc(&mut mesh, 0.0, false);
+    mesh
+}
+
+fn cube() -> MeshData {
+    let mut mesh = MeshData::default();
+    for axis in 0..3 {
+        for sign in [-1.0_f32, 1.0] {
+            patch(&mut mesh, 1, 1, |u, v| {
+                let mut p = [0.0, 0.0, 0.0, 0.0];
+                let mut n = [0.0; 3];
+                p[axis] = 0.5 * sign;
+                n[axis] = sign;
+                p[(axis + 1) % 3] = (u - 0.5) * sign;
+                p[(axis + 2) % 3] = v - 0.5;
+                (p, n)
+            });
+        }
+    }
+    mesh
+}
+
+/// Half shell, open towards +z: outer face, inner face (fourth coordinate 1), cut face (2 outside, 3 inside).
+fn socket() -> MeshData {
+    let mut mesh = MeshData::default();
+    let half = STACKS / 2;
+    patch(&mut mesh, SECTORS, half, |u, v| {
+        let n = on_ball(u, v * PI / 2.0);
+        ([n[0], n[1], n[2], 0.0], n)
+    });
+    patch(&mut mesh, SECTORS, half, |u, v| {
+        let n = on_ball(u, (1.0 - v) * PI / 2.0);
+        ([n[0], n[1], n[2], 1.0], n.map(|x| -x))
+    });
+    patch(&mut mesh, SECTORS, 1, |u, v| {
+        let (x, y) = circle(u);
+        ([x, y, 0.0, 2.0 + v], [0.0, 0.0, 1.0])
+    });
+    mesh
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+
+    #[test]
+    fn triangles_wind_counter_clockwise_seen_from_outside() {
+        for (i, mesh) in shared().iter().enumerate() {
+            for triangle in mesh.indices.chunks(3) {
+                let corner = |k: usize| {
+                    let (p, n) = mesh.vertices[triangle[k] as usize];
+                    // A socket's inner face and edge, at half the outer radius.
+                    let scale = if p[3] == 1.0 || p[3] == 3.0 { 0.5 } else { 1.0 };
+                    (Vec3::new(p[0], p[1], p[2]) * scale, Vec3::from(n))
+                };
+                let (a, b, c) = (corner(0), corner(1), corner(2));
+                let face = (b.0 - a.0).cross(c.0 - a.0);
+                let outward = a.1 + b.1 + c.1;
+                assert!(
+                    face.dot(outward) >= -1e-6,
+                    "mesh {i}: a triangle faces inwards"
+                );
+            }
+        }
+    }
+}

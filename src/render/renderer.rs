@@ -1,0 +1,383 @@
+//! Buffers and passes.
+
+use std::mem::size_of;
+use std::sync::Arc;
+
+use bytemuck::{Pod, Zeroable};
+use glam::{Mat4, Vec3};
+use wgpu::util::DeviceExt as _;
+
+use super::meshes;
+use super::pipelines::{Pipelines, SHADOW};
+use super::{Target, wgpu};
+use crate::view::{DrawList, Instance, Layer, Line, Mesh, MeshData};
+
+/// Side of the shadow map, pixels: within WebGL2's least limit of 2048.
+const SHADOW_SIZE: u32 = 1536;
+
+/// `Globals` of `shaders/scene.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Globals {
+    clip_from_world: [[f32; 4]; 4],
+    light_from_world: [[f32; 4]; 4],
+    eye: [f32; 4],
+    light: [f32; 4],
+    up: [f32; 4],
+    background_top: [f32; 4],
+    background_bottom: [f32; 4],
+    flash: [f32; 4],
+    picture: [f32; 4],
+    floor_centre: [f32; 4],
+    floor_along: [f32; 4],
+    floor_colour: [f32; 4],
+    floor_lines: [f32; 4],
+}
+
+/// A mesh on the device.
+struct Loaded {
+    vertices: wgpu::Buffer,
+    indices: wgpu::Buffer,
+    count: u32,
+}
+
+/// A buffer that grows to what is written to it.
+struct Growing {
+    label: &'static str,
+    buffer: wgpu::Buffer,
+}
+
+/// Instances of one mesh within the instance buffer.
+struct Batch {
+    mesh: usize,
+    first: u64,
+    count: u32,
+}
+
+/// Draws draw lists; keeps pipelines, meshes and instance buffers between pictures.
+pub struct Renderer {
+    pipelines: Pipelines,
+    globals: wgpu::Buffer,
+    globals_group: wgpu::BindGroup,
+    shadow_map: wgpu::TextureView,
+    shadow_group: wgpu::BindGroup,
+    meshes: Vec<Loaded>,
+    plates: Arc<[MeshData]>,
+    instances: Growing,
+    lines: Growing,
+    /// All instances of a picture, layer by layer.
+    packed: Vec<Instance>,
+}
+
+impl Renderer {
+    /// Pipelines and shared meshes on `device`.
+    pub fn new(device: &wgpu::Device) -> Self {
+        let pipelines = Pipelines::new(device);
+        let globals = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("globals"),
+            size: size_of::<Globals>() as u64,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let globals_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("globals"),
+            layout: &pipelines.globals,
+            entries: &[wgpu::BindGroupEntry {
+                binding: 0,
+                resource: globals.as_entire_binding(),
+            }],
+        });
+        let shadow_map = device
+            .create_texture(&wgpu::TextureDescriptor {
+                label: Some("shadow map"),
+                size: wgpu::Extent3d {
+                    width: SHADOW_SIZE,
+                    height: SHADOW_SIZE,
+                    depth_or_array_layers: 1,
+                },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: SHADOW,
+                usage: wgpu::TextureUsages::RENDER_ATTACHMENT
+                    | wgpu::TextureUsages::TEXTURE_BINDING,
+                view_formats: &[],
+            })
+            .create_view(&Default::default());
+        let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
+            label: Some("shadow"),
+            mag_filter: wgpu::FilterMode::Linear,
+            min_filter: wgpu::FilterMode::Linear,
+            compare: Some(wgpu::CompareFunction::LessEqual),
+            ..Default::default()
+        });
+        let shadow_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("shadow"),
+            layout: &pipelines.shadow,
+            entries: &[
+                wgpu::BindGroupEntry {
+                    binding: 0,
+                    resource: wgpu::BindingResource::TextureView(&shadow_map),
+                },
+                wgpu::BindGroupEntry {
+                    binding: 1,
+                    resource: wgpu::BindingResource::Sampler(&sampler),
+                },
+            ],
+        });
+        Self {
+            globals,
+            globals_group,
+            shadow_map,
+            shadow_group,
+            meshes: meshes::shared()
+                .iter()
+                .map(|mesh| load(device, mesh))
+                .collect(),
+            plates: Arc::new([]),
+            instances: Growing::new(device, "instances"),
+            lines: Growing::new(device, "lines"),
+            packed: Vec::new(),
+            pipelines,
+        }
+    }
+
+    /// Records the passes that draw `list` to `target`. One picture for each submission: the buffers are shared.
+    pub fn draw(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        encoder: &mut wgpu::CommandEncoder,
+        target: &Target,
+        list: &DrawList,
+    ) {
+        if !Arc::ptr_eq(&self.plates, &list.plates) {
+            self.plates = list.plates.clone();
+            self.meshes.truncate(Mesh::SHARED);
+            self.meshes
+                .extend(list.plates.iter().map(|mesh| load(device, mesh)));
+        }
+        self.packed.clear();
+        let solid = self.pack(&list.solid);
+        let arrows = self.pack(&list.arrows);
+        let overlay = self.pack(&list.overlay);
+        let halos = [self.pack_one(Mesh::Sphere.index(), &list.halos)];
+        let sockets = [self.pack_one(Mesh::Socket.index(), &list.sockets)];
+        self.instances
+            .write(device, queue, bytemuck::cast_slice(&self.packed));
+        self.lines
+            .write(device, queue, bytemuck::cast_slice(&list.lines));
+        queue.write_buffer(
+            &self.globals,
+            0,
+            bytemuck::bytes_of(&globals(list, target.size())),
+        );
+
+        {
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("shadow"),
+                color_attachments: &[],
+                depth_stencil_attachment: Some(depth_attachment(
+                    &self.shadow_map,
+                    wgpu::StoreOp::Store,
+                )),
+                ..Default::default()
+            });
+            pass.set_bind_group(0, &self.globals_group, &[]);
+            self.draw_meshes(&mut pass, &self.pipelines.cast_shadow, &solid);
+        }
+
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("picture"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &target.samples,
+                depth_slice: None,
+                resolve_target: Some(&target.picture_view),
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                    store: wgpu::StoreOp::Discard,
+                },
+            })],
+            depth_stencil_attachment: Some(depth_attachment(&target.depth, wgpu::StoreOp::Discard)),
+            ..Default::default()
+        });
+        let pipelines = &self.pipelines;
+        pass.set_bind_group(0, &self.globals_group, &[]);
+        pass.set_bind_group(1, &self.shadow_group, &[]);
+        pass.set_pipeline(&pipelines.background);
+        pass.draw(0..3, 0..1);
+        self.draw_meshes(&mut pass, &pipelines.solid, &solid);
+        if list.floor.is_some() {
+            pass.set_pipeline(&pipelines.floor);
+            pass.draw(0..4, 0..1);
+        }
+        if !list.lines.is_empty() {
+            pass.set_pipeline(&pipelines.line);
+            let bytes = (list.lines.len() * size_of::<Line>()) as u64;
+            pass.set_vertex_buffer(0, self.lines.buffer.slice(..bytes));
+            pass.draw(0..4, 0..list.lines.len() as u32);
+        }
+        self.draw_meshes(&mut pass, &pipelines.halo, &halos);
+        self.draw_meshes(&mut pass, &pipelines.socket_far, &sockets);
+        self.draw_meshes(&mut pass, &pipelines.socket_near, &sockets);
+        // After the sockets, so that glass does not dim a force.
+        self.draw_meshes(&mut pass, &pipelines.mark_behind, &arrows);
+        self.draw_meshes(&mut pass, &pipelines.mark, &arrows);
+        self.draw_meshes(&mut pass, &pipelines.overlay, &overlay);
+    }
+
+    fn pack(&mut self, layer: &Layer) -> Vec<Batch> {
+        let filled = layer
+            .by_mesh
+            .iter()
+            .enumerate()
+            .filter(|(_, instances)| !instances.is_empty());
+        filled
+            .map(|(mesh, instances)| self.pack_one(mesh, instances))
+            .collect()
+    }
+
+    fn pack_one(&mut self, mesh: usize, instances: &[Instance]) -> Batch {
+        let first = (self.packed.len() * size_of::<Instance>()) as u64;
+        self.packed.extend_from_slice(instances);
+        Batch {
+            mesh,
+            first,
+            count: instances.len() as u32,
+        }
+    }
+
+    fn draw_meshes(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        pipeline: &wgpu::RenderPipeline,
+        batches: &[Batch],
+    ) {
+        pass.set_pipeline(pipeline);
+        for batch in batches.iter().filter(|batch| batch.count > 0) {
+            let Some(mesh) = self.meshes.get(batch.mesh) else {
+                continue;
+            };
+            pass.set_vertex_buffer(0, mesh.vertices.slice(..));
+            // An offset slice, because WebGL2 has no first instance.
+            let end = batch.first + u64::from(batch.count) * size_of::<Instance>() as u64;
+            pass.set_vertex_buffer(1, self.instances.buffer.slice(batch.first..end));
+            pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
+            pass.draw_indexed(0..mesh.count, 0, 0..batch.count);
+        }
+    }
+}
+
+impl Growing {
+    fn new(device: &wgpu::Device, label: &'static str) -> Self {
+        Self {
+            label,
+            buffer: Self::make(device, label, 4096),
+        }
+    }
+
+    fn make(device: &wgpu::Device, label: &str, size: u64) -> wgpu::Buffer {
+        let usage = wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST;
+        device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size,
+            usage,
+            mapped_at_creation: false,
+        })
+    }
+
+    fn write(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, bytes: &[u8]) {
+        if bytes.is_empty() {
+            return;
+        }
+        let needed = bytes.len() as u64;
+        if self.buffer.size() < needed {
+            self.buffer = Self::make(device, self.label, needed.next_power_of_two());
+        }
+        queue.write_buffer(&self.buffer, 0, bytes);
+    }
+}
+
+fn depth_attachment(
+    view: &wgpu::TextureView,
+    store: wgpu::StoreOp,
+) -> wgpu::RenderPassDepthStencilAttachment<'_> {
+    wgpu::RenderPassDepthStencilAttachment {
+        view,
+        depth_ops: Some(wgpu::Operations {
+            load: wgpu::LoadOp::Clear(1.0),
+            store,
+        }),
+        stencil_ops: None,
+    }
+}
+
+fn load(device: &wgpu::Device, mesh: &MeshData) -> Loaded {
+    let vertices: Vec<f32> = mesh
+        .vertices
+        .iter()
+        .flat_map(|(p, n)| p.iter().chain(n).copied())
+        .collect();
+    let buffer = |label, contents, usage| {
+        device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: Some(label),
+            contents,
+            usage,
+        })
+    };
+    Loaded {
+        vertices: buffer(
+            "vertices",
+            bytemuck::cast_slice(&vertices),
+            wgpu::BufferUsages::VERTEX,
+        ),
+        indices: buffer(
+            "indices",
+            bytemuck::cast_slice(&mesh.indices),
+            wgpu::BufferUsages::INDEX,
+        ),
+        count: mesh.indices.len() as u32,
+    }
+}
+
+fn globals(list: &DrawList, size: [u32; 2]) -> Globals {
+    let light = &list.light;
+    let floor = list.floor;
+    let with = |v: Vec3, w: f32| v.extend(w).to_array();
+    Globals {
+        clip_from_world: list.eye.clip_from_world.to_cols_array_2d(),
+        light_from_world: light_from_world(light.direction, light.centre, light.radius)
+            .to_cols_array_2d(),
+        eye: with(list.eye.position, 1.0),
+        light: with(light.direction, list.exposure),
+        up: with(light.up, 2.0 * light.radius / SHADOW_SIZE as f32),
+        background_top: list.background.top.0,
+        background_bottom: list.background.bottom.0,
+        flash: list.flash.0,
+        picture: [
+            size[0] as f32,
+            size[1] as f32,
+            1.0 / SHADOW_SIZE as f32,
+            0.0,
+        ],
+        floor_centre: floor.map_or([0.0; 4], |f| with(f.centre, f.radius)),
+        floor_along: floor.map_or([0.0; 4], |f| with(f.along, f.spacing)),
+        floor_colour: floor.map_or([0.0; 4], |f| f.colour.0),
+        floor_lines: floor.map_or([0.0; 4], |f| f.lines.0),
+    }
+}
+
+/// Orthographic view along the light of the ball that must have shadows.
+fn light_from_world(direction: Vec3, centre: Vec3, radius: f32) -> Mat4 {
+    let up = direction.any_orthonormal_vector();
+    let view =
+        glam::camera::rh::view::look_to_mat4(centre + direction * (2.0 * radius), -direction, up);
+    glam::camera::rh::proj::directx::orthographic(
+        -radius,
+        radius,
+        -radius,
+        radius,
+        0.5 * radius,
+        4.0 * radius,
+    ) * view
+}

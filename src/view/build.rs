@@ -1,0 +1,552 @@
+//! Scene and frame to draw list.
+
+use std::sync::Arc;
+
+use glam::{Mat3, Quat, Vec2, Vec3};
+
+use super::arrows::ArrowMemory;
+use super::drawn::{self, BarKind, DrawnJoint, Part, Solid};
+use super::theme::Material;
+use super::{
+    ArrowOptions, Background, Bounds, Camera, Colour, DrawList, Floor, Instance, Label, LabelKind,
+    Layer, Legend, Light, Line, Mesh, MeshData, Palette, Scaling, Tick, ViewOptions, to_f32,
+};
+use crate::scene::{Scene, SignedAxis};
+use crate::simulate::Frame;
+
+/// What the view keeps of a scene: made once for each scene, and again when its bodies or shapes change.
+pub struct SceneView {
+    pub(super) parts: Vec<Part>,
+    plates: Arc<[MeshData]>,
+    joint_names: Vec<Arc<str>>,
+    axis_names: [Arc<str>; 4],
+    bounds: Bounds,
+    down: SignedAxis,
+    /// Coordinate of the floor along `down`, m.
+    floor: f32,
+}
+
+/// One picture: everything [`SceneView::build`] reads.
+#[derive(Clone, Copy)]
+pub struct Shot<'a> {
+    /// The scene as it runs.
+    pub scene: &'a Scene,
+    /// The instant.
+    pub frame: &'a Frame,
+    /// Held forces.
+    pub arrows: &'a ArrowMemory,
+    /// Choices.
+    pub options: &'a ViewOptions,
+    /// Point of view.
+    pub camera: &'a Camera,
+    /// Trail of the probe tip, oldest point first, m, world axes.
+    pub trail: &'a [Vec3],
+    /// Size of the picture, physical pixels.
+    pub size: [u32; 2],
+    /// Physical pixels per point of the interface; 1 without one. Scales lines and the triad.
+    pub pixels_per_point: f32,
+}
+
+/// Reference length of arrows, in heights of the picture.
+const ARROW_LENGTH: f32 = 0.22;
+/// Longest arrow, in reference lengths.
+const LONGEST_ARROW: f32 = 2.5;
+
+impl SceneView {
+    /// Prepares the meshes and bounds of `scene`; `frame` is any frame of it, best the first.
+    pub fn new(scene: &Scene, frame: &Frame) -> Self {
+        let (parts, plates) = drawn::parts(scene);
+        let joints = drawn::joints(scene, frame, 1.0);
+        let down = to_f32(&scene.view.down.unit());
+        let extents = extents(&parts, frame, &joints);
+        let bounds = bounds(&extents);
+        let lowest = extents
+            .iter()
+            .map(|(p, r)| p.dot(down) + r)
+            .fold(f32::NEG_INFINITY, f32::max);
+        let floor = match scene.view.floor {
+            Some(floor) => floor as f32,
+            // Room for a machine that moves.
+            None if lowest.is_finite() => lowest + 0.15 * bounds.radius,
+            None => bounds.radius,
+        };
+        Self {
+            parts,
+            plates: plates.into(),
+            joint_names: scene
+                .ball_joints
+                .iter()
+                .map(|joint| joint.name.as_str().into())
+                .collect(),
+            axis_names: ["X", "Y", "Z", "g"].map(Arc::from),
+            bounds,
+            down: scene.view.down,
+            floor,
+        }
+    }
+
+    /// Ball around everything drawn at the frame given to [`Self::new`].
+    pub fn bounds(&self) -> Bounds {
+        self.bounds
+    }
+
+    /// Isometric camera that shows the whole scene.
+    pub fn camera(&self) -> Camera {
+        Camera::new(self.down, self.bounds)
+    }
+
+    /// Moves `camera` so that everything drawn in `frame` fills a picture of `size`; the direction stays.
+    pub fn fit(
+        &self,
+        camera: &mut Camera,
+        scene: &Scene,
+        frame: &Frame,
+        options: &ViewOptions,
+        size: [u32; 2],
+    ) {
+        let m = drawn::magnification(scene, frame, options.magnification);
+        let joints = drawn::joints(scene, frame, m);
+        camera.fit_balls(&extents(&self.parts, frame, &joints), size);
+    }
+
+    /// Turns `camera` to a close-up of ball joint `joint`, looking into its opening.
+    pub fn close_up(
+        &self,
+        camera: &mut Camera,
+        joint: usize,
+        scene: &Scene,
+        frame: &Frame,
+        options: &ViewOptions,
+    ) {
+        let m = drawn::magnification(scene, frame, options.magnification);
+        if let Some(drawn) = drawn::joints(scene, frame, m).get(joint) {
+            camera.close_up(drawn.socket_centre, drawn.opening, 2.2 * drawn.outer);
+        }
+    }
+
+    /// Rebuilds `out` in its own buffers.
+    pub fn build(&self, shot: &Shot<'_>, out: &mut DrawList) {
+        let Shot {
+            scene,
+            frame,
+            options,
+            camera,
+            ..
+        } = *shot;
+        let palette = Palette::of(options.theme);
+        self.start(shot, &palette, out);
+
+        let m = drawn::magnification(scene, frame, options.magnification);
+        out.magnification = m;
+        out.magnification_text = magnification_text(m, options.magnification);
+        let joints = drawn::joints(scene, frame, m);
+        for part in &self.parts {
+            push_solid(
+                &mut out.solid,
+                &part.place(frame, &joints),
+                palette.material(part.role),
+            );
+        }
+        for (i, joint) in joints.iter().enumerate() {
+            let glow = if options.flash {
+                shot.arrows.joints().get(i).map_or(0.0, |held| held.flash)
+            } else {
+                0.0
+            };
+            let ball = placed(
+                Mat3::from_diagonal(Vec3::splat(joint.ball_radius)),
+                joint.ball_centre,
+                palette.ball,
+            );
+            out.solid.push(Mesh::Sphere, Instance { glow, ..ball });
+            if glow > 0.02 {
+                let halo = placed(
+                    Mat3::from_diagonal(Vec3::splat(1.7 * joint.outer)),
+                    joint.socket_centre,
+                    palette.ball,
+                );
+                out.halos.push(Instance { glow, ..halo });
+            }
+            if options.sockets {
+                let half = |opening, material| {
+                    let turn = Mat3::from_quat(Quat::from_rotation_arc(Vec3::Z, opening));
+                    let socket = placed(turn * joint.outer, joint.socket_centre, material);
+                    Instance {
+                        inner_radius: joint.inner / joint.outer,
+                        ..socket
+                    }
+                };
+                out.sockets.push(Instance {
+                    glow,
+                    ..half(joint.opening, palette.socket)
+                });
+                // The half that is cut away stays as a breath: a ball that touches there is still in its socket.
+                let colour = palette
+                    .socket
+                    .colour
+                    .with_opacity(0.15 * palette.socket.colour.0[3]);
+                out.sockets.push(half(
+                    -joint.opening,
+                    Material {
+                        colour,
+                        ..palette.socket
+                    },
+                ));
+            }
+        }
+        let eye = camera.eye();
+        let distance = |socket: &Instance| {
+            let [x, y, z] = socket.world_from_mesh;
+            Vec3::new(x[3], y[3], z[3]).distance_squared(eye)
+        };
+        out.sockets
+            .sort_by(|a, b| distance(b).total_cmp(&distance(a)));
+
+        push_arrows(shot, &joints, &palette, out);
+        if options.trail {
+            push_trail(shot, &palette, &mut out.lines);
+        }
+        if options.triad {
+            self.push_triad(shot, &palette, out);
+        }
+        if options.joint_names {
+            let up = camera.axes().1;
+            for (i, (joint, name)) in joints.iter().zip(&self.joint_names).enumerate() {
+                let anchor = joint.socket_centre + up * (1.15 * joint.outer);
+                push_label(out, name, LabelKind::Joint(i), anchor, palette.text);
+            }
+        }
+    }
+
+    fn start(&self, shot: &Shot<'_>, palette: &Palette, out: &mut DrawList) {
+        let meshes = Mesh::SHARED + self.plates.len();
+        for layer in [&mut out.solid, &mut out.arrows, &mut out.overlay] {
+            layer.clear(meshes);
+        }
+        out.halos.clear();
+        out.sockets.clear();
+        out.lines.clear();
+        out.labels.clear();
+        out.legend = None;
+        out.size = shot.size;
+        out.eye = shot.camera.view(shot.size);
+        out.background = Background {
+            top: palette.sky,
+            bottom: palette.ground,
+        };
+        out.exposure = palette.exposure;
+        out.flash = palette.flash;
+        if !Arc::ptr_eq(&out.plates, &self.plates) {
+            out.plates = self.plates.clone();
+        }
+
+        let Bounds { centre, radius } = self.bounds;
+        let (up, right) = (shot.camera.up(), shot.camera.front_right());
+        let back = right.cross(up);
+        // From above, the left and the front: fixed to the scene, so that shadows stay when the camera turns.
+        out.light = Light {
+            direction: (up - 0.45 * right + 0.55 * back).normalize(),
+            up,
+            centre,
+            radius: 1.25 * radius,
+        };
+        out.floor = shot.options.floor.then(|| {
+            let spacing = 10_f32.powf(radius.log10().floor() - 1.0);
+            let snap = |x: f32| (x / (10.0 * spacing)).round() * 10.0 * spacing;
+            Floor {
+                centre: right * snap(centre.dot(right)) + back * snap(centre.dot(back))
+                    - up * self.floor,
+                along: right,
+                spacing,
+                radius: 4.5 * radius,
+                colour: palette.floor,
+                lines: palette.grid,
+            }
+        });
+    }
+
+    /// Axes and gravity in the lower left corner, of constant size on the screen.
+    fn push_triad(&self, shot: &Shot<'_>, palette: &Palette, out: &mut DrawList) {
+        let camera = shot.camera;
+        let scale = shot.pixels_per_point * camera.metres_per_pixel(shot.size);
+        let (right, up, _) = camera.axes();
+        let corner = {
+            let [width, height] = shot
+                .size
+                .map(|n| n as f32 * camera.metres_per_pixel(shot.size) / 2.0);
+            camera.target - right * (width - 62.0 * scale) - up * (height - 62.0 * scale)
+        };
+        for (i, axis) in Vec3::AXES.into_iter().enumerate() {
+            let colour = palette.axes[i];
+            push_arrow(
+                &mut out.overlay,
+                corner,
+                axis * (38.0 * scale),
+                1.9 * scale,
+                colour,
+            );
+            push_label(
+                out,
+                &self.axis_names[i],
+                LabelKind::Axis,
+                corner + axis * (47.0 * scale),
+                colour,
+            );
+        }
+        if let Some(gravity) = to_f32(&shot.scene.gravity).try_normalize() {
+            let length = gravity * (34.0 * scale);
+            let start = corner + right * (74.0 * scale) - length * 0.5;
+            push_arrow(
+                &mut out.overlay,
+                start,
+                length,
+                1.9 * scale,
+                palette.gravity,
+            );
+            let anchor = start + length * 0.5 + right * (13.0 * scale);
+            push_label(
+                out,
+                &self.axis_names[3],
+                LabelKind::Gravity,
+                anchor,
+                palette.gravity,
+            );
+        }
+    }
+}
+
+/// Balls (centre, radius) whose hull holds everything drawn.
+fn extents(parts: &[Part], frame: &Frame, joints: &[DrawnJoint]) -> Vec<(Vec3, f32)> {
+    let mut extents = Vec::new();
+    for part in parts {
+        part.place(frame, joints)
+            .extent(|centre, radius| extents.push((centre, radius)));
+    }
+    extents.extend(
+        joints
+            .iter()
+            .map(|joint| (joint.socket_centre, joint.outer)),
+    );
+    extents.retain(|(centre, radius)| centre.is_finite() && radius.is_finite());
+    extents
+}
+
+fn bounds(extents: &[(Vec3, f32)]) -> Bounds {
+    let low = extents.iter().map(|&(p, r)| p - r).reduce(Vec3::min);
+    let high = extents.iter().map(|&(p, r)| p + r).reduce(Vec3::max);
+    let (Some(low), Some(high)) = (low, high) else {
+        return Bounds {
+            centre: Vec3::ZERO,
+            radius: 0.1,
+        };
+    };
+    let centre = (low + high) / 2.0;
+    let radius = extents
+        .iter()
+        .map(|&(p, r)| p.distance(centre) + r)
+        .fold(0.0, f32::max);
+    Bounds {
+        centre,
+        radius: radius.max(1e-4),
+    }
+}
+
+fn magnification_text(drawn: f32, asked: f32) -> String {
+    let number = |x: f32| {
+        if (x - x.round()).abs() < 0.05 {
+            format!("{x:.0}")
+        } else {
+            format!("{x:.1}")
+        }
+    };
+    if drawn < asked * 0.999 {
+        format!("play ×{} (×{} does not fit)", number(drawn), number(asked))
+    } else {
+        format!("play ×{}", number(drawn))
+    }
+}
+
+/// Instance of a mesh under the linear map `linear`, then moved to `at`.
+fn placed(linear: Mat3, at: Vec3, material: Material) -> Instance {
+    let row = |i: usize| [linear.x_axis[i], linear.y_axis[i], linear.z_axis[i], at[i]];
+    Instance {
+        world_from_mesh: [row(0), row(1), row(2)],
+        colour: material.colour.0,
+        roughness: material.roughness,
+        metal: material.metal,
+        glow: 0.0,
+        inner_radius: 0.0,
+    }
+}
+
+/// A bar mesh (axis z from 0 to 1) from `from` along `along`.
+fn bar(from: Vec3, along: Vec3, radius: f32, material: Material) -> Instance {
+    let turn = Mat3::from_quat(Quat::from_rotation_arc(
+        Vec3::Z,
+        along.normalize_or(Vec3::Z),
+    ));
+    placed(
+        turn * Mat3::from_diagonal(Vec3::new(radius, radius, along.length())),
+        from,
+        material,
+    )
+}
+
+fn push_solid(layer: &mut Layer, solid: &Solid<'_>, material: Material) {
+    let ball =
+        |centre, radius: f32| placed(Mat3::from_diagonal(Vec3::splat(radius)), centre, material);
+    match *solid {
+        Solid::Bar {
+            from,
+            to,
+            radius,
+            kind,
+            capped,
+        } => {
+            if from == to {
+                return;
+            }
+            let mesh = if kind == BarKind::Cone {
+                Mesh::Cone
+            } else {
+                Mesh::Cylinder
+            };
+            layer.push(mesh, bar(from, to - from, radius, material));
+            if kind == BarKind::Capsule {
+                for (end, _) in [from, to]
+                    .into_iter()
+                    .zip(capped)
+                    .filter(|(_, capped)| *capped)
+                {
+                    layer.push(Mesh::Sphere, ball(end, radius));
+                }
+            }
+        }
+        Solid::Box {
+            centre,
+            size,
+            rotation,
+        } => {
+            layer.push(
+                Mesh::Cube,
+                placed(rotation * Mat3::from_diagonal(size), centre, material),
+            );
+        }
+        Solid::Ball { centre, radius } => layer.push(Mesh::Sphere, ball(centre, radius)),
+        Solid::Plate { mesh, pose, .. } => {
+            layer.push(mesh, placed(pose.rotation, pose.position, material))
+        }
+    }
+}
+
+/// Shaft and head; a short arrow is all head.
+fn push_arrow(layer: &mut Layer, tail: Vec3, along: Vec3, radius: f32, colour: Colour) {
+    let length = along.length();
+    if length.is_nan() || length < 0.2 * radius {
+        return;
+    }
+    let material = Material {
+        colour,
+        roughness: 0.55,
+        metal: 0.0,
+    };
+    let head = (5.5 * radius).min(length);
+    let neck = along * ((length - head) / length);
+    // Where there is no room for a shaft the head shrinks in all directions, so that length still tells the force.
+    let head_radius = 2.3 * radius * (head / (5.5 * radius));
+    if length > head {
+        layer.push(Mesh::Cylinder, bar(tail, neck, radius, material));
+    }
+    layer.push(
+        Mesh::Cone,
+        bar(tail + neck, along - neck, head_radius, material),
+    );
+}
+
+/// Length of an arrow in reference lengths, and whether it had to be cut.
+fn arrow_length(force: f32, reference: f32, scaling: Scaling) -> (f32, bool) {
+    let ratio = force / reference;
+    let length = match scaling {
+        Scaling::Linear => ratio,
+        Scaling::Logarithmic => (1.0 + 999.0 * ratio).log10() / 3.0,
+    };
+    (length.min(LONGEST_ARROW), length > LONGEST_ARROW)
+}
+
+fn push_arrows(shot: &Shot<'_>, joints: &[DrawnJoint], palette: &Palette, out: &mut DrawList) {
+    let options: &ArrowOptions = &shot.options.arrows;
+    if !(options.normal || options.friction) || joints.is_empty() {
+        return;
+    }
+    let height = shot.camera.metres_per_pixel(shot.size) * shot.size[1] as f32;
+    let reference = shot.arrows.reference(options);
+    let reference_length = ARROW_LENGTH * height;
+    let radius = 0.0045 * height;
+    let mut any_clipped = false;
+    for (joint, held) in joints.iter().zip(shot.arrows.joints()) {
+        // The wall pushes the ball away from the point of contact, so that lies against the normal force.
+        let contact = joint.ball_centre - held.normal.normalize_or_zero() * joint.ball_radius;
+        let shown = [
+            (options.normal, held.normal, palette.normal),
+            (options.friction, held.friction, palette.friction),
+        ];
+        for (_, force, colour) in shown.into_iter().filter(|(shown, ..)| *shown) {
+            let (length, clipped) = arrow_length(force.length(), reference, options.scaling);
+            any_clipped |= clipped;
+            let along = force.normalize_or_zero() * (length * reference_length);
+            push_arrow(&mut out.arrows, contact, along, radius, colour);
+        }
+    }
+    let marks: &[f32] = match options.scaling {
+        Scaling::Linear => &[0.5, 1.0],
+        Scaling::Logarithmic => &[0.001, 0.01, 0.1, 1.0],
+    };
+    let tick = |mark: &f32| {
+        let force = mark * reference;
+        Tick {
+            force,
+            fraction: arrow_length(force, reference, options.scaling).0,
+        }
+    };
+    out.legend = Some(Legend {
+        reference,
+        length: reference_length,
+        pixels: ARROW_LENGTH * shot.size[1] as f32,
+        scaling: options.scaling,
+        automatic: options.reference.is_none(),
+        clipped: any_clipped,
+        ticks: marks.iter().map(tick).collect(),
+        normal: options.normal.then_some(palette.normal),
+        friction: options.friction.then_some(palette.friction),
+    });
+}
+
+/// The older, the fainter.
+fn push_trail(shot: &Shot<'_>, palette: &Palette, lines: &mut Vec<Line>) {
+    let last = shot.trail.len().saturating_sub(1) as f32;
+    let colour = |i: usize| palette.trail.with_opacity(0.9 * (i as f32 / last).sqrt()).0;
+    lines.extend(shot.trail.windows(2).enumerate().map(|(i, ends)| Line {
+        from: ends[0].to_array(),
+        width: 2.2 * shot.pixels_per_point,
+        to: ends[1].to_array(),
+        pad: 0.0,
+        from_colour: colour(i),
+        to_colour: colour(i + 1),
+    }));
+}
+
+fn push_label(out: &mut DrawList, text: &Arc<str>, kind: LabelKind, anchor: Vec3, colour: Colour) {
+    let Some(pixel) = out.eye.project(anchor, out.size) else {
+        return;
+    };
+    let size = Vec2::new(out.size[0] as f32, out.size[1] as f32);
+    if pixel.cmpge(Vec2::ZERO).all() && pixel.cmple(size).all() {
+        out.labels.push(Label {
+            text: text.clone(),
+            kind,
+            anchor,
+            pixel,
+            colour,
+        });
+    }
+}

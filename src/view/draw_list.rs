@@ -1,0 +1,301 @@
+//! The plain list that `render` draws: no handle, no GPU type; equal lists give equal pictures.
+
+use std::sync::Arc;
+
+use bytemuck::{Pod, Zeroable};
+use glam::{Mat4, Vec2, Vec3};
+
+use super::Colour;
+
+/// A mesh that many instances share.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Mesh {
+    /// Unit ball about the origin.
+    Sphere,
+    /// Radius 1, flat ends at z = 0 and z = 1.
+    Cylinder,
+    /// Base of radius 1 at z = 0, tip at z = 1.
+    Cone,
+    /// Cube of edge 1 about the origin.
+    Cube,
+    /// Half of a spherical shell of outer radius 1, open towards +z; [`Instance::inner_radius`] is its inner radius.
+    Socket,
+    /// `DrawList::plates[i]`.
+    Plate(u16),
+}
+
+impl Mesh {
+    /// Number of meshes before the first plate.
+    pub const SHARED: usize = 5;
+
+    /// Position in [`Layer`]: shared meshes first, then plates.
+    pub fn index(self) -> usize {
+        match self {
+            Self::Sphere => 0,
+            Self::Cylinder => 1,
+            Self::Cone => 2,
+            Self::Cube => 3,
+            Self::Socket => 4,
+            Self::Plate(i) => Self::SHARED + usize::from(i),
+        }
+    }
+}
+
+/// Triangles of one mesh.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MeshData {
+    /// Position (x, y, z) and a mark: 0, but on sockets 1 for the inner face, 2 and 3 for the cut face's outer and inner
+    /// edge; then the normal.
+    pub vertices: Vec<([f32; 4], [f32; 3])>,
+    /// Three per triangle, counter-clockwise seen from outside.
+    pub indices: Vec<u32>,
+}
+
+/// One placed mesh.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct Instance {
+    /// Rows of the affine transform from mesh to world.
+    pub world_from_mesh: [[f32; 4]; 3],
+    /// Red, green, blue (sRGB-encoded), opacity.
+    pub colour: [f32; 4],
+    /// 0 mirror, 1 chalk.
+    pub roughness: f32,
+    /// 0 plastic, 1 metal.
+    pub metal: f32,
+    /// Own light of the flash colour, 0..=1.
+    pub glow: f32,
+    /// Inner radius of a socket, in units of its outer radius; unused elsewhere.
+    pub inner_radius: f32,
+}
+
+/// Instances by mesh ([`Mesh::index`]).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Layer {
+    /// One list for each mesh.
+    pub by_mesh: Vec<Vec<Instance>>,
+}
+
+impl Layer {
+    pub(super) fn clear(&mut self, meshes: usize) {
+        self.by_mesh.resize_with(meshes, Vec::new);
+        self.by_mesh.iter_mut().for_each(Vec::clear);
+    }
+
+    pub(super) fn push(&mut self, mesh: Mesh, instance: Instance) {
+        self.by_mesh[mesh.index()].push(instance);
+    }
+
+    /// Number of instances.
+    pub fn len(&self) -> usize {
+        self.by_mesh.iter().map(Vec::len).sum()
+    }
+
+    /// Whether there is nothing to draw.
+    pub fn is_empty(&self) -> bool {
+        self.by_mesh.iter().all(Vec::is_empty)
+    }
+}
+
+/// A straight line of constant width on the screen.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct Line {
+    /// One end, m.
+    pub from: [f32; 3],
+    /// Width, pixels.
+    pub width: f32,
+    /// Other end, m.
+    pub to: [f32; 3],
+    /// Unused.
+    pub pad: f32,
+    /// Colour at `from`.
+    pub from_colour: [f32; 4],
+    /// Colour at `to`.
+    pub to_colour: [f32; 4],
+}
+
+/// Where the picture is taken from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Eye {
+    /// World to clip space (z in 0..1, y up).
+    pub clip_from_world: Mat4,
+    /// Eye point, m.
+    pub position: Vec3,
+}
+
+/// The one light that casts shadows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Light {
+    /// Unit vector from the scene towards the light.
+    pub direction: Vec3,
+    /// Unit vector up: sky light comes from there.
+    pub up: Vec3,
+    /// Centre of what must have shadows, m.
+    pub centre: Vec3,
+    /// Radius of what must have shadows, m.
+    pub radius: f32,
+}
+
+/// Ground of the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Background {
+    /// At the top edge.
+    pub top: Colour,
+    /// At the bottom edge.
+    pub bottom: Colour,
+}
+
+/// Floor with its grid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Floor {
+    /// Middle of the grid, m: grid lines pass through it.
+    pub centre: Vec3,
+    /// Unit vector along one set of lines.
+    pub along: Vec3,
+    /// Distance between thin lines, m; every tenth is thick.
+    pub spacing: f32,
+    /// Where it has faded out, m from `centre`.
+    pub radius: f32,
+    /// Colour of the plane.
+    pub colour: Colour,
+    /// Colour of the lines.
+    pub lines: Colour,
+}
+
+/// What a label names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LabelKind {
+    /// An axis of the triad.
+    Axis,
+    /// The gravity arrow.
+    Gravity,
+    /// A ball joint, by index.
+    Joint(usize),
+}
+
+/// Text that the interface paints over the picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Label {
+    /// What it says.
+    pub text: Arc<str>,
+    /// What it names.
+    pub kind: LabelKind,
+    /// World point, m.
+    pub anchor: Vec3,
+    /// Pixel of the anchor, from the top left; labels that cannot be seen are left out.
+    pub pixel: Vec2,
+    /// Colour of the text.
+    pub colour: Colour,
+}
+
+/// One step of the arrow legend.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tick {
+    /// Force, N.
+    pub force: f32,
+    /// Length of its arrow in units of the reference length.
+    pub fraction: f32,
+}
+
+/// How to read the arrows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Legend {
+    /// Force whose arrow has the reference length, N.
+    pub reference: f32,
+    /// Reference length, m.
+    pub length: f32,
+    /// Reference length at the distance of the camera's target, pixels.
+    pub pixels: f32,
+    /// Length against force.
+    pub scaling: super::Scaling,
+    /// Whether the reference follows the forces.
+    pub automatic: bool,
+    /// Whether some arrow would be longer than is drawn (a fixed reference far too small).
+    pub clipped: bool,
+    /// Marks on the scale, rising.
+    pub ticks: Vec<Tick>,
+    /// Colour of normal forces; `None` where they are not drawn.
+    pub normal: Option<Colour>,
+    /// Colour of friction; `None` where it is not drawn.
+    pub friction: Option<Colour>,
+}
+
+/// Everything to draw.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DrawList {
+    /// Size of the picture for which `eye` and label pixels hold.
+    pub size: [u32; 2],
+    /// Where from.
+    pub eye: Eye,
+    /// Light.
+    pub light: Light,
+    /// Behind everything.
+    pub background: Background,
+    /// Factor on all light.
+    pub exposure: f32,
+    /// Colour of glowing instances.
+    pub flash: Colour,
+    /// Floor, if any.
+    pub floor: Option<Floor>,
+    /// Meshes of this scene's own; shared, so that a renderer can tell by the pointer whether it has them.
+    pub plates: Arc<[MeshData]>,
+    /// Solid things that cast shadows.
+    pub solid: Layer,
+    /// Solid things seen through all others where these stand before them: force arrows.
+    pub arrows: Layer,
+    /// Balls of light about joints that were hit.
+    pub halos: Vec<Instance>,
+    /// Sockets, farthest first: for each the half that stands and, fainter, the half that is cut away.
+    pub sockets: Vec<Instance>,
+    /// Solid things before all others: the triad.
+    pub overlay: Layer,
+    /// Lines.
+    pub lines: Vec<Line>,
+    /// Text for the interface to paint.
+    pub labels: Vec<Label>,
+    /// How to read the arrows; `None` where none are drawn.
+    pub legend: Option<Legend>,
+    /// Magnification of the play that was drawn.
+    pub magnification: f32,
+    /// What to write about it: "play ×50"; says so where less was drawn than asked.
+    pub magnification_text: String,
+}
+
+impl Default for DrawList {
+    /// An empty picture; its buffers are kept from build to build.
+    fn default() -> Self {
+        let ground = Colour::hex(0xFFFFFF);
+        Self {
+            size: [1, 1],
+            eye: Eye {
+                clip_from_world: Mat4::IDENTITY,
+                position: Vec3::ZERO,
+            },
+            light: Light {
+                direction: Vec3::Z,
+                up: Vec3::Z,
+                centre: Vec3::ZERO,
+                radius: 1.0,
+            },
+            background: Background {
+                top: ground,
+                bottom: ground,
+            },
+            exposure: 1.0,
+            flash: ground,
+            floor: None,
+            plates: Arc::new([]),
+            solid: Layer::default(),
+            arrows: Layer::default(),
+            halos: Vec::new(),
+            sockets: Vec::new(),
+            overlay: Layer::default(),
+            lines: Vec::new(),
+            labels: Vec::new(),
+            legend: None,
+            magnification: 1.0,
+            magnification_text: String::new(),
+        }
+    }
+}

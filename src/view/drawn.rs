@@ -1,0 +1,445 @@
+//! Where each drawn thing stands at one instant: the one source for drawing, picking and bounds.
+//!
+//! With a magnification m of the play, the ball of a joint is drawn at Z_i + m e in a socket of inner radius r + m c, so
+//! it touches the drawn wall exactly when it touches the real one. Bodies stay where they are; only the end of a bar
+//! that carries a ball goes along with it, so that nothing comes apart.
+
+use std::sync::Arc;
+
+use glam::{Mat3, Vec3};
+use parry3d::shape::ConvexPolyhedron;
+
+use super::{Mesh, MeshData, to_f32};
+use crate::scene::{Geometry, Role, Scene, Shape};
+use crate::simulate::{BodyMotion, Frame};
+
+/// Greatest drawn inner radius of a socket, in ball radii: beyond it the magnification is held back.
+const LARGEST_SOCKET: f32 = 4.2;
+/// Thickness of a drawn socket, in ball radii.
+const WALL: f32 = 0.26;
+/// Gap drawn in an ideal joint, in ball radii: ball and socket must not share a surface.
+const IDEAL_GAP: f32 = 0.02;
+
+/// A shape as the scene gives it, in its body's frame.
+pub(super) struct Part {
+    /// Body; `None` is the world.
+    pub body: Option<usize>,
+    /// Position among `fixed_shapes`, or among the body's shapes.
+    pub index: usize,
+    pub role: Role,
+    form: Form,
+}
+
+enum Form {
+    Bar {
+        ends: [End; 2],
+        radius: f32,
+        kind: BarKind,
+    },
+    Box {
+        centre: Vec3,
+        size: Vec3,
+    },
+    Ball {
+        centre: Vec3,
+        radius: f32,
+    },
+    Plate {
+        mesh: Mesh,
+        hull: Option<Arc<ConvexPolyhedron>>,
+        points: Vec<Vec3>,
+    },
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum BarKind {
+    Capsule,
+    Cylinder,
+    Cone,
+}
+
+/// End of a bar and the ball joint it reaches into.
+struct End {
+    point: Vec3,
+    at: Option<Reach>,
+}
+
+#[derive(Clone, Copy)]
+enum Reach {
+    /// The joint's ball sits on this end.
+    Ball(usize),
+    /// The joint's socket stands before this end.
+    Socket(usize),
+}
+
+/// A ball joint as drawn, world axes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct DrawnJoint {
+    pub socket_centre: Vec3,
+    pub ball_centre: Vec3,
+    /// Drawn less real place of the ball.
+    pub shift: Vec3,
+    pub ball_radius: f32,
+    pub inner: f32,
+    pub outer: f32,
+    /// Unit vector.
+    pub opening: Vec3,
+}
+
+/// A part where it stands, world axes.
+pub(super) enum Solid<'a> {
+    /// `capped[i]`: whether end i of a capsule shows its round end.
+    Bar {
+        from: Vec3,
+        to: Vec3,
+        radius: f32,
+        kind: BarKind,
+        capped: [bool; 2],
+    },
+    Box {
+        centre: Vec3,
+        size: Vec3,
+        rotation: Mat3,
+    },
+    Ball {
+        centre: Vec3,
+        radius: f32,
+    },
+    Plate {
+        mesh: Mesh,
+        hull: Option<&'a ConvexPolyhedron>,
+        points: &'a [Vec3],
+        pose: Pose,
+    },
+}
+
+/// Pose of a body frame.
+#[derive(Clone, Copy)]
+pub(super) struct Pose {
+    pub position: Vec3,
+    pub rotation: Mat3,
+}
+
+impl Pose {
+    pub const WORLD: Self = Self {
+        position: Vec3::ZERO,
+        rotation: Mat3::IDENTITY,
+    };
+
+    fn of(motion: &BodyMotion) -> Self {
+        let column = |i: usize| to_f32(&motion.rotation.column(i).into_owned());
+        Self {
+            position: to_f32(&motion.position),
+            rotation: Mat3::from_cols(column(0), column(1), column(2)),
+        }
+    }
+
+    pub fn in_frame(frame: &Frame, body: Option<usize>) -> Self {
+        body.and_then(|b| frame.bodies.get(b))
+            .map_or(Self::WORLD, Self::of)
+    }
+
+    pub fn apply(&self, point: Vec3) -> Vec3 {
+        self.position + self.rotation * point
+    }
+}
+
+/// Shapes of `scene`, and the meshes of its plates.
+pub(super) fn parts(scene: &Scene) -> (Vec<Part>, Vec<MeshData>) {
+    let mut meshes = Vec::new();
+    let mut parts = Vec::new();
+    let fixed = scene
+        .fixed_shapes
+        .iter()
+        .enumerate()
+        .map(|(i, shape)| (None, i, shape));
+    let moving = scene.bodies.iter().enumerate().flat_map(|(b, body)| {
+        body.shapes
+            .iter()
+            .enumerate()
+            .map(move |(i, shape)| (Some(b), i, shape))
+    });
+    for (body, index, shape) in fixed.chain(moving) {
+        if let Some(form) = form(scene, body, shape, &mut meshes) {
+            parts.push(Part {
+                body,
+                index,
+                role: shape.role,
+                form,
+            });
+        }
+    }
+    let probe_drawn = parts.iter().any(|part| part.role == Role::Probe);
+    if let (Some(tip), false) = (&scene.output.probe, probe_drawn) {
+        let size = scene
+            .ball_joints
+            .first()
+            .map_or(0.01, |joint| joint.contact.ball_radius) as f32;
+        let form = Form::Ball {
+            centre: to_f32(tip),
+            radius: 0.4 * size,
+        };
+        parts.push(Part {
+            body: Some(scene.output.body),
+            index: 0,
+            role: Role::Probe,
+            form,
+        });
+    }
+    (parts, meshes)
+}
+
+fn form(
+    scene: &Scene,
+    body: Option<usize>,
+    shape: &Shape,
+    meshes: &mut Vec<MeshData>,
+) -> Option<Form> {
+    let bar = |from, to, radius: f64, kind| {
+        let ends = [from, to].map(|point| {
+            let point = to_f32(point);
+            End {
+                point,
+                at: reach(scene, body, point),
+            }
+        });
+        Some(Form::Bar {
+            ends,
+            radius: radius as f32,
+            kind,
+        })
+    };
+    match &shape.geometry {
+        Geometry::Capsule { from, to, radius } => bar(from, to, *radius, BarKind::Capsule),
+        Geometry::Cylinder { from, to, radius } => bar(from, to, *radius, BarKind::Cylinder),
+        Geometry::Cone { from, to, radius } => bar(from, to, *radius, BarKind::Cone),
+        Geometry::Box { centre, size } => Some(Form::Box {
+            centre: to_f32(centre),
+            size: to_f32(size),
+        }),
+        Geometry::Sphere { centre, radius } => {
+            // The joint draws its own ball.
+            let is_joint_ball = scene.ball_joints.iter().any(|j| {
+                j.ball.body == body && (j.ball.point - centre).norm() < 0.1 * j.contact.ball_radius
+            });
+            (!is_joint_ball).then(|| Form::Ball {
+                centre: to_f32(centre),
+                radius: *radius as f32,
+            })
+        }
+        Geometry::Plate { corners, thickness } => {
+            let corners: Vec<Vec3> = corners.iter().map(to_f32).collect();
+            let mesh = plate(&corners, *thickness as f32)?;
+            let points: Vec<Vec3> = mesh
+                .vertices
+                .iter()
+                .map(|(p, _)| Vec3::new(p[0], p[1], p[2]))
+                .collect();
+            let hull = ConvexPolyhedron::from_convex_hull(&points).map(Arc::new);
+            let id = u16::try_from(meshes.len()).ok()?;
+            meshes.push(mesh);
+            Some(Form::Plate {
+                mesh: Mesh::Plate(id),
+                hull,
+                points,
+            })
+        }
+    }
+}
+
+/// The ball joint that a bar's end reaches into, if any.
+fn reach(scene: &Scene, body: Option<usize>, end: Vec3) -> Option<Reach> {
+    for (i, joint) in scene.ball_joints.iter().enumerate() {
+        let radius = joint.contact.ball_radius as f32;
+        if joint.ball.body == body && to_f32(&joint.ball.point).distance(end) < 1.3 * radius {
+            return Some(Reach::Ball(i));
+        }
+        if joint.socket.body == body
+            && to_f32(&joint.socket.point).distance(end) < (LARGEST_SOCKET + WALL) * radius
+        {
+            return Some(Reach::Socket(i));
+        }
+    }
+    None
+}
+
+/// Prism over a convex polygon, pushed half the thickness to both sides.
+fn plate(corners: &[Vec3], thickness: f32) -> Option<MeshData> {
+    let n = corners.len();
+    let normal = (1..n.saturating_sub(1))
+        .map(|i| (corners[i] - corners[0]).cross(corners[i + 1] - corners[0]))
+        .sum::<Vec3>()
+        .try_normalize()?;
+    let mut mesh = MeshData::default();
+    let mut face = |points: &[Vec3], normal: Vec3| {
+        let first = mesh.vertices.len() as u32;
+        mesh.vertices.extend(
+            points
+                .iter()
+                .map(|p| ([p.x, p.y, p.z, 0.0], normal.to_array())),
+        );
+        for i in 1..points.len() as u32 - 1 {
+            mesh.indices.extend([first, first + i, first + i + 1]);
+        }
+    };
+    let half = normal * (thickness / 2.0);
+    let top: Vec<Vec3> = corners.iter().map(|&c| c + half).collect();
+    let bottom: Vec<Vec3> = corners.iter().rev().map(|&c| c - half).collect();
+    face(&top, normal);
+    face(&bottom, -normal);
+    for i in 0..n {
+        let (a, b) = (corners[i], corners[(i + 1) % n]);
+        let out = (b - a).cross(normal).normalize_or_zero();
+        face(&[a - half, b - half, b + half, a + half], out);
+    }
+    Some(mesh)
+}
+
+/// Magnification that is drawn where `asked` is wanted: no socket may outgrow [`LARGEST_SOCKET`] ball radii.
+pub(super) fn magnification(scene: &Scene, frame: &Frame, asked: f32) -> f32 {
+    let asked = if asked.is_finite() {
+        asked.clamp(1.0, 100.0)
+    } else {
+        1.0
+    };
+    let drawable = scene
+        .ball_joints
+        .iter()
+        .zip(&frame.joints)
+        .map(|(joint, now)| {
+            let gap = (now.clearance as f32).max(to_f32(&now.eccentricity).length());
+            if gap > 0.0 {
+                (LARGEST_SOCKET - 1.0) * joint.contact.ball_radius as f32 / gap
+            } else {
+                f32::INFINITY
+            }
+        });
+    drawable.fold(asked, f32::min).max(1.0)
+}
+
+/// Every ball joint as drawn at magnification `m`.
+pub(super) fn joints(scene: &Scene, frame: &Frame, m: f32) -> Vec<DrawnJoint> {
+    let drawn = scene
+        .ball_joints
+        .iter()
+        .zip(&frame.joints)
+        .map(|(joint, now)| {
+            let socket_centre = to_f32(&now.socket_centre);
+            let ball_radius = joint.contact.ball_radius as f32;
+            let eccentricity = to_f32(&now.eccentricity);
+            let gap = if now.clearance > 0.0 {
+                m * now.clearance as f32
+            } else {
+                IDEAL_GAP * ball_radius
+            };
+            let opening =
+                Pose::in_frame(frame, joint.socket.body).rotation * to_f32(&joint.opening);
+            DrawnJoint {
+                socket_centre,
+                ball_centre: socket_centre + m * eccentricity,
+                shift: (m - 1.0) * eccentricity,
+                ball_radius,
+                inner: ball_radius + gap,
+                outer: ball_radius + gap + WALL * ball_radius,
+                opening: opening.normalize_or(Vec3::Z),
+            }
+        });
+    drawn.collect()
+}
+
+impl Part {
+    /// The part where it stands in `frame`, its ends fitted to the drawn joints.
+    pub fn place(&self, frame: &Frame, joints: &[DrawnJoint]) -> Solid<'_> {
+        let pose = Pose::in_frame(frame, self.body);
+        match &self.form {
+            Form::Bar { ends, radius, kind } => {
+                let mut points = [pose.apply(ends[0].point), pose.apply(ends[1].point)];
+                let mut capped = [true; 2];
+                for i in 0..2 {
+                    match ends[i].at {
+                        Some(Reach::Ball(j)) => {
+                            points[i] += joints.get(j).map_or(Vec3::ZERO, |joint| joint.shift)
+                        }
+                        Some(Reach::Socket(j)) => {
+                            let cut = joints
+                                .get(j)
+                                .and_then(|joint| leave_socket(points[1 - i], points[i], joint));
+                            if let Some(point) = cut {
+                                (points[i], capped[i]) = (point, false);
+                            }
+                        }
+                        None => {}
+                    }
+                }
+                Solid::Bar {
+                    from: points[0],
+                    to: points[1],
+                    radius: *radius,
+                    kind: *kind,
+                    capped,
+                }
+            }
+            Form::Box { centre, size } => Solid::Box {
+                centre: pose.apply(*centre),
+                size: *size,
+                rotation: pose.rotation,
+            },
+            Form::Ball { centre, radius } => Solid::Ball {
+                centre: pose.apply(*centre),
+                radius: *radius,
+            },
+            Form::Plate { mesh, hull, points } => Solid::Plate {
+                mesh: *mesh,
+                hull: hull.as_deref(),
+                points,
+                pose,
+            },
+        }
+    }
+}
+
+/// New end of a bar from `start` to `end` that reaches into a drawn socket: on the outer face.
+fn leave_socket(start: Vec3, end: Vec3, joint: &DrawnJoint) -> Option<Vec3> {
+    let radius = 0.99 * joint.outer;
+    let to_end = end - joint.socket_centre;
+    if to_end.length() >= radius {
+        return None;
+    }
+    if start.distance(joint.socket_centre) <= radius {
+        // All of it is inside: nothing is left to draw.
+        return Some(start);
+    }
+    // |to_end + s along| = radius for the s > 0 that goes back towards the start.
+    let along = (start - end).normalize_or_zero();
+    let b = to_end.dot(along);
+    let s = -b + (b * b + radius * radius - to_end.length_squared()).sqrt();
+    Some(end + along * s)
+}
+
+impl Solid<'_> {
+    /// Calls `visit` with balls (centre, radius) whose hull holds the solid: for bounds.
+    pub fn extent(&self, mut visit: impl FnMut(Vec3, f32)) {
+        match self {
+            Solid::Bar {
+                from, to, radius, ..
+            } => [from, to].into_iter().for_each(|&p| visit(p, *radius)),
+            Solid::Box {
+                centre,
+                size,
+                rotation,
+            } => {
+                for i in 0..8 {
+                    let sign = |bit: u32| if i >> bit & 1 == 1 { 0.5 } else { -0.5 };
+                    visit(
+                        *centre + *rotation * (*size * Vec3::new(sign(0), sign(1), sign(2))),
+                        0.0,
+                    );
+                }
+            }
+            Solid::Ball { centre, radius } => visit(*centre, *radius),
+            Solid::Plate { points, pose, .. } => {
+                points.iter().for_each(|&p| visit(pose.apply(p), 0.0))
+            }
+        }
+    }
+}

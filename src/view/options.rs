@@ -1,0 +1,79 @@
+//! What a person may choose about the picture.
+
+use super::Theme;
+
+/// Everything about the picture that is a matter of choice.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ViewOptions {
+    /// Light or dark.
+    pub theme: Theme,
+    /// Factor on eccentricity and clearance together, 1..=100. What is drawn may be less where the socket would
+    /// outgrow the picture ([`super::DrawList::magnification`]).
+    pub magnification: f32,
+    /// Contact-force arrows.
+    pub arrows: ArrowOptions,
+    /// Whether a joint that was hit lights up.
+    pub flash: bool,
+    /// Floor grid.
+    pub floor: bool,
+    /// Axis triad with gravity, in the lower left corner.
+    pub triad: bool,
+    /// Names of the ball joints beside them.
+    pub joint_names: bool,
+    /// Draw sockets; without them the balls stand free.
+    pub sockets: bool,
+    /// Draw the caller's trail.
+    pub trail: bool,
+}
+
+impl Default for ViewOptions {
+    fn default() -> Self {
+        Self {
+            theme: Theme::Light,
+            magnification: 1.0,
+            arrows: ArrowOptions::default(),
+            flash: true,
+            floor: true,
+            triad: true,
+            joint_names: true,
+            sockets: true,
+            trail: true,
+        }
+    }
+}
+
+/// How contact forces are drawn.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ArrowOptions {
+    /// Draw normal forces (the reaction of an ideal joint counts as one).
+    pub normal: bool,
+    /// Draw friction forces.
+    pub friction: bool,
+    /// Length against force.
+    pub scaling: Scaling,
+    /// Force of the reference length, N; `None` follows the largest force held.
+    pub reference: Option<f32>,
+    /// Time in which a held peak falls to half, s of viewing time.
+    pub half_life: f32,
+}
+
+impl Default for ArrowOptions {
+    fn default() -> Self {
+        Self {
+            normal: true,
+            friction: true,
+            scaling: Scaling::Linear,
+            reference: None,
+            half_life: 0.12,
+        }
+    }
+}
+
+/// Length of an arrow against its force.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scaling {
+    /// Proportional.
+    Linear,
+    /// Logarithmic over the three decades below the reference force.
+    Logarithmic,
+}

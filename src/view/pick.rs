@@ -1,0 +1,140 @@
+//! What lies under the cursor: a ray against the shapes that are drawn.
+
+use glam::{Quat, Vec2, Vec3};
+use parry3d::math::Pose as ParryPose;
+use parry3d::query::{Ray, RayCast};
+use parry3d::shape::{Ball, Capsule, Cone, Cuboid, Cylinder};
+
+use super::drawn::{self, BarKind, Pose, Solid};
+use super::{SceneView, Shot};
+use crate::simulate::Frame;
+
+/// A thing that can be hovered or followed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Picked {
+    /// A body, by index.
+    Body(usize),
+    /// A ball joint, by index.
+    Joint(usize),
+    /// A fixed shape, by index.
+    Fixed(usize),
+}
+
+/// Where the cursor's ray first meets the scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// What was met.
+    pub what: Picked,
+    /// Where, m, world axes.
+    pub point: Vec3,
+    /// Distance from the eye, m.
+    pub distance: f32,
+}
+
+impl SceneView {
+    /// Nearest drawn thing under `pixel` of the picture that `shot` describes, or `None`.
+    pub fn pick(&self, shot: &Shot<'_>, pixel: Vec2) -> Option<Hit> {
+        let (origin, direction) = shot.camera.ray(pixel, shot.size);
+        let ray = Ray::new(origin, direction);
+        let m = drawn::magnification(shot.scene, shot.frame, shot.options.magnification);
+        let joints = drawn::joints(shot.scene, shot.frame, m);
+        let parts = self.parts.iter().filter_map(|part| {
+            let what = part.body.map_or(Picked::Fixed(part.index), Picked::Body);
+            Some((cast(&part.place(shot.frame, &joints), &ray)?, what))
+        });
+        let balls = joints.iter().enumerate().filter_map(|(i, joint)| {
+            let ball = cast_ball(joint.ball_centre, joint.ball_radius, &ray);
+            let socket = shot
+                .options
+                .sockets
+                .then(|| cast_ball(joint.socket_centre, joint.outer, &ray))
+                .flatten();
+            // A ray through the missing half of the socket passes on to what is inside.
+            let socket = socket
+                .filter(|&t| (ray.point_at(t) - joint.socket_centre).dot(joint.opening) <= 0.0);
+            let distance = [ball, socket]
+                .into_iter()
+                .flatten()
+                .min_by(f32::total_cmp)?;
+            Some((distance, Picked::Joint(i)))
+        });
+        let (distance, what) = parts.chain(balls).min_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some(Hit {
+            what,
+            point: ray.point_at(distance),
+            distance,
+        })
+    }
+
+    /// Point to follow: a body's origin or a joint's socket centre, m; `None` for fixed shapes.
+    pub fn anchor(&self, frame: &Frame, picked: Picked) -> Option<Vec3> {
+        match picked {
+            Picked::Body(i) => frame
+                .bodies
+                .get(i)
+                .map(|body| super::to_f32(&body.position)),
+            Picked::Joint(i) => frame
+                .joints
+                .get(i)
+                .map(|joint| super::to_f32(&joint.socket_centre)),
+            Picked::Fixed(_) => None,
+        }
+    }
+}
+
+/// Distance along `ray` to the solid.
+fn cast(solid: &Solid<'_>, ray: &Ray) -> Option<f32> {
+    // A broken frame must not reach parry's iterations.
+    let mut finite = true;
+    solid.extent(|centre, radius| finite &= centre.is_finite() && radius.is_finite());
+    if !finite {
+        return None;
+    }
+    match *solid {
+        Solid::Bar {
+            from,
+            to,
+            radius,
+            kind,
+            ..
+        } => {
+            let half = from.distance(to) / 2.0;
+            if half == 0.0 {
+                return None;
+            }
+            // parry's cylinder and cone stand along Y.
+            let turn = Quat::from_rotation_arc(Vec3::Y, (to - from).normalize_or(Vec3::Y));
+            let pose = ParryPose::from_parts((from + to) / 2.0, turn);
+            match kind {
+                BarKind::Capsule => {
+                    Capsule::new(from, to, radius).cast_local_ray(ray, f32::MAX, true)
+                }
+                BarKind::Cylinder => {
+                    Cylinder::new(half, radius).cast_ray(&pose, ray, f32::MAX, true)
+                }
+                BarKind::Cone => Cone::new(half, radius).cast_ray(&pose, ray, f32::MAX, true),
+            }
+        }
+        Solid::Box {
+            centre,
+            size,
+            rotation,
+        } => {
+            let pose = ParryPose::from_parts(centre, Quat::from_mat3(&rotation));
+            Cuboid::new(size / 2.0).cast_ray(&pose, ray, f32::MAX, true)
+        }
+        Solid::Ball { centre, radius } => cast_ball(centre, radius, ray),
+        Solid::Plate {
+            hull,
+            pose: Pose { position, rotation },
+            ..
+        } => {
+            let pose = ParryPose::from_parts(position, Quat::from_mat3(&rotation));
+            hull?.cast_ray(&pose, ray, f32::MAX, true)
+        }
+    }
+}
+
+fn cast_ball(centre: Vec3, radius: f32, ray: &Ray) -> Option<f32> {
+    Ball::new(radius).cast_ray(&ParryPose::from_translation(centre), ray, f32::MAX, true)
+}

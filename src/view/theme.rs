@@ -1,0 +1,161 @@
+//! Colours of the picture, light and dark. Colours are sRGB-encoded here; the shader linearises them.
+
+use crate::scene::Role;
+
+/// Light or dark.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Theme {
+    /// Dark things on a light ground.
+    #[default]
+    Light,
+    /// Light things on a dark ground.
+    Dark,
+}
+
+/// A colour: red, green, blue (sRGB-encoded) and opacity, each 0..=1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Colour(pub [f32; 4]);
+
+impl Colour {
+    /// From `0xRRGGBB`, opaque.
+    pub const fn hex(rgb: u32) -> Self {
+        Self([
+            ((rgb >> 16) & 255) as f32 / 255.0,
+            ((rgb >> 8) & 255) as f32 / 255.0,
+            (rgb & 255) as f32 / 255.0,
+            1.0,
+        ])
+    }
+
+    /// The same colour with another opacity.
+    pub const fn with_opacity(self, opacity: f32) -> Self {
+        Self([self.0[0], self.0[1], self.0[2], opacity])
+    }
+
+    /// As 8-bit red, green, blue, opacity (not premultiplied): what a 2D painter wants.
+    pub fn to_rgba8(self) -> [u8; 4] {
+        self.0.map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8)
+    }
+}
+
+/// Colour with its surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Material {
+    /// Base colour.
+    pub colour: Colour,
+    /// 0 mirror, 1 chalk.
+    pub roughness: f32,
+    /// 0 plastic, 1 metal.
+    pub metal: f32,
+}
+
+const fn material(rgb: u32, roughness: f32, metal: f32) -> Material {
+    Material {
+        colour: Colour::hex(rgb),
+        roughness,
+        metal,
+    }
+}
+
+/// All colours of one theme.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Palette {
+    /// Top of the background.
+    pub sky: Colour,
+    /// Bottom of the background.
+    pub ground: Colour,
+    /// Floor plane.
+    pub floor: Colour,
+    /// Grid lines.
+    pub grid: Colour,
+    /// 2D text.
+    pub text: Colour,
+    /// Normal-force arrows.
+    pub normal: Colour,
+    /// Friction arrows.
+    pub friction: Colour,
+    /// Light of a joint that was hit.
+    pub flash: Colour,
+    /// Gravity arrow.
+    pub gravity: Colour,
+    /// X, Y, Z of the triad.
+    pub axes: [Colour; 3],
+    /// Trail of the probe tip.
+    pub trail: Colour,
+    /// Balls.
+    pub ball: Material,
+    /// Sockets (opacity applies).
+    pub socket: Material,
+    /// Factor on all light.
+    pub exposure: f32,
+}
+
+impl Palette {
+    /// Colours of `theme`. Orange and blue stay apart for the colour-blind.
+    pub const fn of(theme: Theme) -> Self {
+        match theme {
+            Theme::Light => Self {
+                sky: Colour::hex(0xF5F7F9),
+                ground: Colour::hex(0xD5DCE3),
+                floor: Colour::hex(0xE3E8ED),
+                grid: Colour::hex(0x8C99A6),
+                text: Colour::hex(0x1E2A36),
+                normal: Colour::hex(0xD9480F),
+                friction: Colour::hex(0x1769C9),
+                flash: Colour::hex(0xFFC61A),
+                gravity: Colour::hex(0x6B3FA0),
+                axes: [
+                    Colour::hex(0xC92A2A),
+                    Colour::hex(0x2B8A3E),
+                    Colour::hex(0x1864AB),
+                ],
+                trail: Colour::hex(0xA61E4D),
+                ball: material(0xD8DCE0, 0.22, 0.75),
+                socket: Material {
+                    colour: Colour::hex(0x6FA8DC).with_opacity(0.20),
+                    roughness: 0.15,
+                    metal: 0.0,
+                },
+                exposure: 1.0,
+            },
+            Theme::Dark => Self {
+                sky: Colour::hex(0x2A3138),
+                ground: Colour::hex(0x181D22),
+                floor: Colour::hex(0x2A323A),
+                grid: Colour::hex(0x697785),
+                text: Colour::hex(0xE6EBF0),
+                normal: Colour::hex(0xFF7A33),
+                friction: Colour::hex(0x4DABF7),
+                flash: Colour::hex(0xFFE27A),
+                gravity: Colour::hex(0xB197FC),
+                axes: [
+                    Colour::hex(0xFF6B6B),
+                    Colour::hex(0x69DB7C),
+                    Colour::hex(0x4DABF7),
+                ],
+                trail: Colour::hex(0xF783AC),
+                ball: material(0xE3E7EB, 0.22, 0.75),
+                socket: Material {
+                    colour: Colour::hex(0x8CC4F0).with_opacity(0.17),
+                    roughness: 0.15,
+                    metal: 0.0,
+                },
+                exposure: 0.92,
+            },
+        }
+    }
+
+    /// Surface of a shape by what it stands for; the same in both themes, so that a part keeps its colour.
+    pub const fn material(&self, role: Role) -> Material {
+        match role {
+            Role::Slider => material(0x4C6A88, 0.45, 0.25),
+            Role::DrivingRod => material(0x9AA9B8, 0.35, 0.55),
+            Role::DrivenRod => material(0xE0A030, 0.40, 0.25),
+            Role::Platform => material(0x2F9E8F, 0.50, 0.10),
+            Role::Pin => material(0x59636E, 0.30, 0.70),
+            Role::Probe => material(0xC2255C, 0.35, 0.10),
+            Role::Rail => material(0x8A949E, 0.35, 0.60),
+            Role::Frame => material(0x6C7680, 0.60, 0.20),
+        }
+    }
+}
