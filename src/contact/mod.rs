@@ -2,7 +2,9 @@
 
 mod law;
 
-pub use law::{Coefficients, damping_factor, hertz_stiffness, restitution_given, settled_penetration};
+pub use law::{
+    Coefficients, damping_factor, hertz_stiffness, restitution_given, settled_penetration,
+};
 
 /// Normal-force law of a contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -8,14 +8,38 @@ const A: [[f64; 5]; 5] = [
     [0.2, 0.0, 0.0, 0.0, 0.0],
     [3.0 / 40.0, 9.0 / 40.0, 0.0, 0.0, 0.0],
     [44.0 / 45.0, -56.0 / 15.0, 32.0 / 9.0, 0.0, 0.0],
-    [19372.0 / 6561.0, -25360.0 / 2187.0, 64448.0 / 6561.0, -212.0 / 729.0, 0.0],
-    [9017.0 / 3168.0, -355.0 / 33.0, 46732.0 / 5247.0, 49.0 / 176.0, -5103.0 / 18656.0],
+    [
+        19372.0 / 6561.0,
+        -25360.0 / 2187.0,
+        64448.0 / 6561.0,
+        -212.0 / 729.0,
+        0.0,
+    ],
+    [
+        9017.0 / 3168.0,
+        -355.0 / 33.0,
+        46732.0 / 5247.0,
+        49.0 / 176.0,
+        -5103.0 / 18656.0,
+    ],
 ];
 /// Weights of k1, k3, k4, k5, k6.
-const B: [f64; 5] = [35.0 / 384.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0];
+const B: [f64; 5] = [
+    35.0 / 384.0,
+    500.0 / 1113.0,
+    125.0 / 192.0,
+    -2187.0 / 6784.0,
+    11.0 / 84.0,
+];
 /// Fifth minus fourth order weights of k1, k3, k4, k5, k6, k7.
-const E: [f64; 6] =
-    [71.0 / 57600.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0];
+const E: [f64; 6] = [
+    71.0 / 57600.0,
+    -71.0 / 16695.0,
+    71.0 / 1920.0,
+    -17253.0 / 339200.0,
+    22.0 / 525.0,
+    -1.0 / 40.0,
+];
 /// Continuous extension: weights of k1, k3, k4, k5, k6, k7.
 const D: [f64; 6] = [
     -12715105075.0 / 11282082432.0,
@@ -68,7 +92,16 @@ impl Stepper for DormandPrince {
         k_end: &mut [f64],
     ) -> f64 {
         let n = y.len();
-        let Self { k2, k3, k4, k5, k6, stage, raw_end, raw_k_end } = self;
+        let Self {
+            k2,
+            k3,
+            k4,
+            k5,
+            k6,
+            stage,
+            raw_end,
+            raw_k_end,
+        } = self;
         for i in 0..n {
             stage[i] = y[i] + h * (A[0][0] * k[i]);
         }
@@ -82,16 +115,22 @@ impl Stepper for DormandPrince {
         }
         system.derivative(t + C[2] * h, stage, k4);
         for i in 0..n {
-            stage[i] = y[i] + h * (A[3][0] * k[i] + A[3][1] * k2[i] + A[3][2] * k3[i] + A[3][3] * k4[i]);
+            stage[i] =
+                y[i] + h * (A[3][0] * k[i] + A[3][1] * k2[i] + A[3][2] * k3[i] + A[3][3] * k4[i]);
         }
         system.derivative(t + C[3] * h, stage, k5);
         for i in 0..n {
             stage[i] = y[i]
-                + h * (A[4][0] * k[i] + A[4][1] * k2[i] + A[4][2] * k3[i] + A[4][3] * k4[i] + A[4][4] * k5[i]);
+                + h * (A[4][0] * k[i]
+                    + A[4][1] * k2[i]
+                    + A[4][2] * k3[i]
+                    + A[4][3] * k4[i]
+                    + A[4][4] * k5[i]);
         }
         system.derivative(t + C[4] * h, stage, k6);
         for i in 0..n {
-            y_end[i] = y[i] + h * (B[0] * k[i] + B[1] * k3[i] + B[2] * k4[i] + B[3] * k5[i] + B[4] * k6[i]);
+            y_end[i] = y[i]
+                + h * (B[0] * k[i] + B[1] * k3[i] + B[2] * k4[i] + B[3] * k5[i] + B[4] * k6[i]);
         }
         system.derivative(t + h, y_end, k_end);
         raw_end.copy_from_slice(y_end);
@@ -100,7 +139,13 @@ impl Stepper for DormandPrince {
         let mut error = 0.0;
         for i in 0..n {
             let e = h
-                * (E[0] * k[i] + E[1] * k3[i] + E[2] * k4[i] + E[3] * k5[i] + E[4] * k6[i] + E[5] * k_end[i]).abs();
+                * (E[0] * k[i]
+                    + E[1] * k3[i]
+                    + E[2] * k4[i]
+                    + E[3] * k5[i]
+                    + E[4] * k6[i]
+                    + E[5] * k_end[i])
+                    .abs();
             let e = e / scale[i];
             // `max` would drop a NaN.
             if e > error || e.is_nan() {
@@ -114,7 +159,16 @@ impl Stepper for DormandPrince {
         true
     }
 
-    fn interpolate(&self, theta: f64, h: f64, y: &[f64], k: &[f64], _y_end: &[f64], _k_end: &[f64], out: &mut [f64]) {
+    fn interpolate(
+        &self,
+        theta: f64,
+        h: f64,
+        y: &[f64],
+        k: &[f64],
+        _y_end: &[f64],
+        _k_end: &[f64],
+        out: &mut [f64],
+    ) {
         let s = 1.0 - theta;
         for i in 0..out.len() {
             let d = self.raw_end[i] - y[i];

@@ -10,7 +10,9 @@ pub struct SemiImplicitEuler {
 impl SemiImplicitEuler {
     /// For `dimension` components.
     pub fn new(dimension: usize) -> Self {
-        Self { rate: vec![0.0; dimension] }
+        Self {
+            rate: vec![0.0; dimension],
+        }
     }
 }
 
@@ -41,7 +43,16 @@ impl Stepper for SemiImplicitEuler {
         false
     }
 
-    fn interpolate(&self, theta: f64, h: f64, y: &[f64], k: &[f64], y_end: &[f64], k_end: &[f64], out: &mut [f64]) {
+    fn interpolate(
+        &self,
+        theta: f64,
+        h: f64,
+        y: &[f64],
+        k: &[f64],
+        y_end: &[f64],
+        k_end: &[f64],
+        out: &mut [f64],
+    ) {
         hermite(theta, h, y, k, y_end, k_end, out);
     }
 }
@@ -58,7 +69,12 @@ impl RungeKutta4 {
     /// For `dimension` components.
     pub fn new(dimension: usize) -> Self {
         let zeros = || vec![0.0; dimension];
-        Self { k2: zeros(), k3: zeros(), k4: zeros(), stage: zeros() }
+        Self {
+            k2: zeros(),
+            k3: zeros(),
+            k4: zeros(),
+            stage: zeros(),
+        }
     }
 }
 
@@ -97,7 +113,16 @@ impl Stepper for RungeKutta4 {
         false
     }
 
-    fn interpolate(&self, theta: f64, h: f64, y: &[f64], k: &[f64], y_end: &[f64], k_end: &[f64], out: &mut [f64]) {
+    fn interpolate(
+        &self,
+        theta: f64,
+        h: f64,
+        y: &[f64],
+        k: &[f64],
+        y_end: &[f64],
+        k_end: &[f64],
+        out: &mut [f64],
+    ) {
         hermite(theta, h, y, k, y_end, k_end, out);
     }
 }

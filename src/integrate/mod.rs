@@ -66,17 +66,36 @@ pub trait Stepper {
     fn ends_with_derivative(&self) -> bool;
 
     /// State at `t + theta h` of the latest attempt, 0 <= theta <= 1, given its ends.
-    fn interpolate(&self, theta: f64, h: f64, y: &[f64], k: &[f64], y_end: &[f64], k_end: &[f64], out: &mut [f64]);
+    fn interpolate(
+        &self,
+        theta: f64,
+        h: f64,
+        y: &[f64],
+        k: &[f64],
+        y_end: &[f64],
+        k_end: &[f64],
+        out: &mut [f64],
+    );
 }
 
 /// Cubic Hermite interpolation between two states with their derivatives; error O(h^4).
-pub fn hermite(theta: f64, h: f64, y: &[f64], k: &[f64], y_end: &[f64], k_end: &[f64], out: &mut [f64]) {
+pub fn hermite(
+    theta: f64,
+    h: f64,
+    y: &[f64],
+    k: &[f64],
+    y_end: &[f64],
+    k_end: &[f64],
+    out: &mut [f64],
+) {
     let s = 1.0 - theta;
     for i in 0..out.len() {
         let d = y_end[i] - y[i];
         out[i] = s * y[i]
             + theta * y_end[i]
-            + theta * (theta - 1.0) * ((1.0 - 2.0 * theta) * d + (theta - 1.0) * h * k[i] + theta * h * k_end[i]);
+            + theta
+                * (theta - 1.0)
+                * ((1.0 - 2.0 * theta) * d + (theta - 1.0) * h * k[i] + theta * h * k_end[i]);
     }
 }
 
@@ -115,7 +134,9 @@ mod tests {
             stepper.attempt(&mut Oscillator, t, h, &y, &k, &mut y1, &mut k1);
             y = y1;
         }
-        (y[0] - libm::cos(2.0)).abs().max((y[1] + libm::sin(2.0)).abs())
+        (y[0] - libm::cos(2.0))
+            .abs()
+            .max((y[1] + libm::sin(2.0)).abs())
     }
 
     fn observed_order(stepper: &mut impl Stepper, steps: u32) -> f64 {
@@ -139,12 +160,17 @@ mod tests {
         Oscillator.derivative(0.0, &y, &mut k);
         stepper.attempt(&mut Oscillator, 0.0, h, &y, &k, &mut y1, &mut k1);
         stepper.interpolate(0.37, h, &y, &k, &y1, &k1, &mut out);
-        (out[0] - libm::cos(0.37 * h)).abs().max((out[1] + libm::sin(0.37 * h)).abs())
+        (out[0] - libm::cos(0.37 * h))
+            .abs()
+            .max((out[1] + libm::sin(0.37 * h)).abs())
     }
 
     #[test]
     fn dormand_prince_interpolates_to_fourth_order() {
         let order = libm::log2(interpolation_error(0.4) / interpolation_error(0.2));
-        assert!(order > 4.5, "local order {order}: a continuous extension of order 4 has 5");
+        assert!(
+            order > 4.5,
+            "local order {order}: a continuous extension of order 4 has 5"
+        );
     }
 }

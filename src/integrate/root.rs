@@ -4,7 +4,15 @@
 /// (Dowell & Jarratt 1971), to an interval of `width` or until `|f|` <= `small`.
 ///
 /// Returns the end of the last interval on the side of `b`'s sign, so that the event has happened there.
-pub fn find_root(mut a: f64, mut fa: f64, mut b: f64, mut fb: f64, width: f64, small: f64, mut f: impl FnMut(f64) -> f64) -> f64 {
+pub fn find_root(
+    mut a: f64,
+    mut fa: f64,
+    mut b: f64,
+    mut fb: f64,
+    width: f64,
+    small: f64,
+    mut f: impl FnMut(f64) -> f64,
+) -> f64 {
     if fb == 0.0 {
         return b;
     }
@@ -17,7 +25,11 @@ pub fn find_root(mut a: f64, mut fa: f64, mut b: f64, mut fb: f64, width: f64, s
         let x = b - fb * (b - a) / (fb - fa);
         // Keeps off the ends, where regula falsi would stall.
         let inset = 1e-3 * (b - a);
-        let x = if x.is_finite() { x.clamp(a + inset, b - inset) } else { 0.5 * (a + b) };
+        let x = if x.is_finite() {
+            x.clamp(a + inset, b - inset)
+        } else {
+            0.5 * (a + b)
+        };
         let fx = f(x);
         if (fx > 0.0) == (fb > 0.0) {
             b = x;

@@ -41,14 +41,20 @@ impl Constraints {
             .iter()
             .map(|&j| {
                 let joint = &model.joints[j];
-                let mut blocks: Vec<usize> =
-                    [joint.ball.body, joint.socket.body].into_iter().filter_map(block_of).collect();
+                let mut blocks: Vec<usize> = [joint.ball.body, joint.socket.body]
+                    .into_iter()
+                    .filter_map(block_of)
+                    .collect();
                 blocks.dedup();
                 blocks
                     .into_iter()
                     .map(|block| {
                         let n = model.blocks[block].n;
-                        let side = Side { block, offset: total, n };
+                        let side = Side {
+                            block,
+                            offset: total,
+                            n,
+                        };
                         total += 3 * n;
                         side
                     })
@@ -109,11 +115,17 @@ impl Constraints {
                     continue;
                 };
                 let rows = &mut self.jacobian[side.offset..][..3 * side.n];
-                visit_columns(model, &tree.motion, anchor.body, &point, |column, velocity| {
-                    for i in 0..3 {
-                        rows[i * side.n + column] += sign * velocity[i];
-                    }
-                });
+                visit_columns(
+                    model,
+                    &tree.motion,
+                    anchor.body,
+                    &point,
+                    |column, velocity| {
+                        for i in 0..3 {
+                            rows[i * side.n + column] += sign * velocity[i];
+                        }
+                    },
+                );
             }
         }
         self.weighted.copy_from_slice(&self.jacobian);
@@ -172,7 +184,11 @@ impl Constraints {
     pub fn correct(&mut self, model: &Model, tree: &Tree, vdot: &mut [f64]) {
         self.factor(model, tree);
         for k in 0..self.joints.len() {
-            let bias = relative(&model.joints[self.joints[k]], &tree.motion, Kinematics::point_acceleration);
+            let bias = relative(
+                &model.joints[self.joints[k]],
+                &tree.motion,
+                Kinematics::point_acceleration,
+            );
             let residual = bias + self.apply(model, k, vdot);
             for i in 0..3 {
                 self.multipliers[3 * k + i] = -residual[i];
@@ -240,12 +256,18 @@ impl Constraints {
 
 /// Z_j - Z_i, m.
 pub fn eccentricity(joint: &BallJoint, motion: &[Kinematics]) -> Vec3 {
-    let at = |a: &super::model::Anchor| motion[a.body].position + motion[a.body].rotation * a.offset;
+    let at =
+        |a: &super::model::Anchor| motion[a.body].position + motion[a.body].rotation * a.offset;
     at(&joint.ball) - at(&joint.socket)
 }
 
 /// Ball's minus socket's `rate` at the centres.
-fn relative(joint: &BallJoint, motion: &[Kinematics], rate: fn(&Kinematics, &Vec3) -> Vec3) -> Vec3 {
-    let at = |a: &super::model::Anchor| rate(&motion[a.body], &(motion[a.body].rotation * a.offset));
+fn relative(
+    joint: &BallJoint,
+    motion: &[Kinematics],
+    rate: fn(&Kinematics, &Vec3) -> Vec3,
+) -> Vec3 {
+    let at =
+        |a: &super::model::Anchor| rate(&motion[a.body], &(motion[a.body].rotation * a.offset));
     at(&joint.ball) - at(&joint.socket)
 }

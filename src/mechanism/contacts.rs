@@ -33,7 +33,11 @@ impl Ramp {
     /// Clearance and its rate at `t`.
     pub fn at(&self, t: f64) -> (f64, f64) {
         let value = self.from + self.rate * (t - self.start);
-        if (self.rate < 0.0) == (value <= self.to) { (self.to, 0.0) } else { (value, self.rate) }
+        if (self.rate < 0.0) == (value <= self.to) {
+            (self.to, 0.0)
+        } else {
+            (value, self.rate)
+        }
     }
 }
 
@@ -192,7 +196,11 @@ impl Contacts {
 
     #[inline]
     fn clearance_rate(&self, i: usize, t: f64) -> f64 {
-        if self.any_ramp { self.ramps[i].map_or(0.0, |r| r.at(t).1) } else { 0.0 }
+        if self.any_ramp {
+            self.ramps[i].map_or(0.0, |r| r.at(t).1)
+        } else {
+            0.0
+        }
     }
 
     /// Gaps and forces at `t`; forces are added to `wrench` (about each body's centroid).
@@ -203,7 +211,11 @@ impl Contacts {
         self.update_ramps(t);
         self.evaluations += 1;
         for i in 0..self.joints.len() {
-            let Joint { joint, coefficients, clearance } = &self.joints[i];
+            let Joint {
+                joint,
+                coefficients,
+                clearance,
+            } = &self.joints[i];
             if joint.ideal.is_some() {
                 continue;
             }
@@ -231,9 +243,17 @@ impl Contacts {
             let distance = square.sqrt();
             let n = e / distance;
             let rate = n.dot(&centre_velocity)
-                - if self.any_ramp { self.ramps[i].map_or(0.0, |r| r.at(t).1) } else { 0.0 };
+                - if self.any_ramp {
+                    self.ramps[i].map_or(0.0, |r| r.at(t).1)
+                } else {
+                    0.0
+                };
             let penetration = distance - clearance;
-            let approach = if memory.active { memory.approach_speed } else { rate.max(coefficients.speed_floor) };
+            let approach = if memory.active {
+                memory.approach_speed
+            } else {
+                rate.max(coefficients.speed_floor)
+            };
             let normal_force = coefficients.normal_force(penetration, rate, approach);
             gap.normal_force = normal_force;
             if normal_force == 0.0 {
@@ -292,14 +312,21 @@ impl Contacts {
             let clearance = self.joints[i].clearance;
             let gap = &mut self.gaps[i];
             let distance = gap.eccentricity.norm();
-            gap.normal = if distance > 0.0 { gap.eccentricity / distance } else { Vec3::zeros() };
+            gap.normal = if distance > 0.0 {
+                gap.eccentricity / distance
+            } else {
+                Vec3::zeros()
+            };
             if ideal {
                 (gap.penetration, gap.rate) = (0.0, 0.0);
             } else {
                 gap.penetration = distance - clearance;
                 // A ball at rest at the centre leaves it in the direction in which it moves.
-                let opening =
-                    if distance > 0.0 { gap.normal.dot(&gap.eccentricity_rate) } else { gap.eccentricity_rate.norm() };
+                let opening = if distance > 0.0 {
+                    gap.normal.dot(&gap.eccentricity_rate)
+                } else {
+                    gap.eccentricity_rate.norm()
+                };
                 gap.rate = opening - clearance_rate;
             }
         }

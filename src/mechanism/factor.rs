@@ -63,7 +63,11 @@ impl Skyline {
             offset.push(total);
             total += i - f + 1;
         }
-        Self { first, offset, values: vec![0.0; total] }
+        Self {
+            first,
+            offset,
+            values: vec![0.0; total],
+        }
     }
 
     /// Number of rows.
@@ -138,7 +142,9 @@ mod tests {
     fn branched_tree_solves_like_a_dense_matrix() {
         // Coordinates 0-1 at the root, 2 and 3 two branches on 1.
         let parent = [NONE, 0, 1, 1];
-        let dense = nalgebra::Matrix4::new(9., 1., 2., 3., 1., 8., -1., 1., 2., -1., 7., 0., 3., 1., 0., 6.);
+        let dense = nalgebra::Matrix4::new(
+            9., 1., 2., 3., 1., 8., -1., 1., 2., -1., 7., 0., 3., 1., 0., 6.,
+        );
         let b = nalgebra::Vector4::new(1., -2., 3., 4.);
         let expected = dense.lu().solve(&b).unwrap();
         let mut h: Vec<f64> = dense.transpose().as_slice().to_vec();
@@ -156,7 +162,11 @@ mod tests {
         let mut dense = nalgebra::DMatrix::<f64>::zeros(n, n);
         for i in 0..n {
             for j in i.saturating_sub(2)..=i {
-                let value = if i == j { 5.0 + i as f64 } else { 1.0 / (1.0 + i as f64 + j as f64) };
+                let value = if i == j {
+                    5.0 + i as f64
+                } else {
+                    1.0 / (1.0 + i as f64 + j as f64)
+                };
                 a.add(i, j, value);
                 dense[(i, j)] = value;
                 dense[(j, i)] = value;

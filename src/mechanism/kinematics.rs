@@ -52,7 +52,9 @@ impl Kinematics {
     pub fn point_acceleration(&self, arm: &Vec3) -> Vec3 {
         self.acceleration
             + self.angular_acceleration.cross(arm)
-            + self.angular_velocity.cross(&self.angular_velocity.cross(arm))
+            + self
+                .angular_velocity
+                .cross(&self.angular_velocity.cross(arm))
     }
 }
 
@@ -68,7 +70,10 @@ pub struct Wrench {
 impl Wrench {
     /// No load.
     pub fn zero() -> Self {
-        Self { force: Vec3::zeros(), torque: Vec3::zeros() }
+        Self {
+            force: Vec3::zeros(),
+            torque: Vec3::zeros(),
+        }
     }
 }
 
@@ -132,7 +137,14 @@ pub fn quaternion_of(rotation: &Mat3) -> Quat {
 
 /// Motion of a body that hangs on `parent`, for a coordinate (q, rate, acceleration) of its joint.
 #[inline]
-pub fn follow(body: &Body, parent: &Kinematics, revolute: bool, q: f64, rate: f64, acceleration: f64) -> Kinematics {
+pub fn follow(
+    body: &Body,
+    parent: &Kinematics,
+    revolute: bool,
+    q: f64,
+    rate: f64,
+    acceleration: f64,
+) -> Kinematics {
     let from_parent = parent.rotation * body.from_parent;
     let axis = parent.rotation * body.axis;
     let wp = parent.angular_velocity;
@@ -148,7 +160,9 @@ pub fn follow(body: &Body, parent: &Kinematics, revolute: bool, q: f64, rate: f6
             position: parent.position + from_parent + arm,
             velocity: parent.velocity + wp.cross(&from_parent) + omega.cross(&arm),
             angular_velocity: omega,
-            acceleration: parent.point_acceleration(&from_parent) + alpha.cross(&arm) + omega.cross(&omega.cross(&arm)),
+            acceleration: parent.point_acceleration(&from_parent)
+                + alpha.cross(&arm)
+                + omega.cross(&omega.cross(&arm)),
             angular_acceleration: alpha,
             axis,
             arm,
@@ -165,7 +179,9 @@ pub fn follow(body: &Body, parent: &Kinematics, revolute: bool, q: f64, rate: f6
             position: parent.position + offset,
             velocity: parent.point_velocity(&offset) + velocity,
             angular_velocity: wp,
-            acceleration: parent.point_acceleration(&offset) + 2.0 * wp.cross(&velocity) + axis * acceleration,
+            acceleration: parent.point_acceleration(&offset)
+                + 2.0 * wp.cross(&velocity)
+                + axis * acceleration,
             angular_acceleration: parent.angular_acceleration,
             axis,
             arm,
@@ -175,13 +191,21 @@ pub fn follow(body: &Body, parent: &Kinematics, revolute: bool, q: f64, rate: f6
 
 /// Adds to a body's acceleration what its own coordinate's acceleration and its parent's full acceleration contribute.
 #[inline]
-pub fn accelerate(child: &mut Kinematics, parent: &Kinematics, revolute: bool, rate: f64, acceleration: f64) {
+pub fn accelerate(
+    child: &mut Kinematics,
+    parent: &Kinematics,
+    revolute: bool,
+    rate: f64,
+    acceleration: f64,
+) {
     let offset = child.position - parent.position;
     let wp = parent.angular_velocity;
     if revolute {
         let from_parent = offset - child.arm;
         let omega = child.angular_velocity;
-        let alpha = parent.angular_acceleration + wp.cross(&(child.axis * rate)) + child.axis * acceleration;
+        let alpha = parent.angular_acceleration
+            + wp.cross(&(child.axis * rate))
+            + child.axis * acceleration;
         child.angular_acceleration = alpha;
         child.acceleration = parent.point_acceleration(&from_parent)
             + alpha.cross(&child.arm)
@@ -211,18 +235,15 @@ impl Driven {
             time: f64::NAN,
             coordinates: vec![super::jet::Jet::default(); model.drives.len()],
             ideal: None,
-            bodies: (0..model.bodies.len()).filter(|&b| model.bodies[b].driven_only).collect(),
+            bodies: (0..model.bodies.len())
+                .filter(|&b| model.bodies[b].driven_only)
+                .collect(),
         }
     }
 
     /// From now on moves no body: their motion is part of the state.
     pub fn only_coordinates(&mut self) {
         self.bodies.clear();
-    }
-
-    /// Forgets the instant, so that the next update computes.
-    pub fn invalidate(&mut self) {
-        self.time = f64::NAN;
     }
 
     /// Moves the bodies that depend on time alone to `t`.

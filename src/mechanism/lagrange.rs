@@ -20,14 +20,28 @@ enum Rows {
     /// A vector of the child stays perpendicular to one of the parent: 1 row, as in (46), (47).
     Perpendicular { child: Vec3, parent: Vec3 },
     /// The child's point stays at `parent + s along`, s = 0 or the driven coordinate: 1 row, (46) and Phi_D of (48).
-    Offset { child: Vec3, parent: Vec3, along: Vec3, drive: Option<usize> },
+    Offset {
+        child: Vec3,
+        parent: Vec3,
+        along: Vec3,
+        drive: Option<usize>,
+    },
     /// Angle from the parent's `zero` to the child's `child` about `axis` is the driven coordinate: 1 row.
-    Angle { child: Vec3, zero: Vec3, axis: Vec3, drive: usize },
+    Angle {
+        child: Vec3,
+        zero: Vec3,
+        axis: Vec3,
+        drive: usize,
+    },
 }
 
 impl Rows {
     fn count(&self) -> usize {
-        if matches!(self, Self::Point { .. }) { 3 } else { 1 }
+        if matches!(self, Self::Point { .. }) {
+            3
+        } else {
+            1
+        }
     }
 }
 
@@ -83,22 +97,41 @@ impl Lagrange {
         let mut add = |rows_of: Rows, child: BodyIndex, parent: BodyIndex| {
             let first = rows;
             rows += rows_of.count();
-            groups.push(Group { rows: rows_of, child, parent, first });
+            groups.push(Group {
+                rows: rows_of,
+                child,
+                parent,
+                first,
+            });
             first
         };
         for (b, (body, joint)) in model.bodies.iter().zip(&scene.joints).enumerate() {
             let parent = body.parent;
             // Vectors of the parent, and the same vectors as the child sees them at q = 0.
             let x = joint.axis;
-            let across = if x.x.abs() < 0.7 { Vec3::x() } else { Vec3::y() };
+            let across = if x.x.abs() < 0.7 {
+                Vec3::x()
+            } else {
+                Vec3::y()
+            };
             let y = x.cross(&across).normalize();
             let z = x.cross(&y);
             let seen = |v: &Vec3| joint.rotation.inverse() * v;
             let (child_point, parent_point) = (-body.to_centroid, body.from_parent);
-            let point = Rows::Point { child: child_point, parent: parent_point };
-            let perpendicular = |c: &Vec3, p: &Vec3| Rows::Perpendicular { child: seen(c), parent: *p };
-            let offset =
-                |along: &Vec3, drive| Rows::Offset { child: child_point, parent: parent_point, along: *along, drive };
+            let point = Rows::Point {
+                child: child_point,
+                parent: parent_point,
+            };
+            let perpendicular = |c: &Vec3, p: &Vec3| Rows::Perpendicular {
+                child: seen(c),
+                parent: *p,
+            };
+            let offset = |along: &Vec3, drive| Rows::Offset {
+                child: child_point,
+                parent: parent_point,
+                along: *along,
+                drive,
+            };
             let drive = match body.motion {
                 Motion::Driven { drive, .. } => Some(drive),
                 _ => None,
@@ -116,7 +149,16 @@ impl Lagrange {
                     add(perpendicular(&x, &y), b, parent);
                     add(perpendicular(&x, &z), b, parent);
                     if let Some(drive) = drive {
-                        driver_row[drive] = add(Rows::Angle { child: seen(&y), zero: y, axis: x, drive }, b, parent);
+                        driver_row[drive] = add(
+                            Rows::Angle {
+                                child: seen(&y),
+                                zero: y,
+                                axis: x,
+                                drive,
+                            },
+                            b,
+                            parent,
+                        );
                     }
                 }
                 JointKind::Prismatic => {
@@ -136,15 +178,23 @@ impl Lagrange {
             .iter()
             .map(|&j| {
                 let joint = &model.joints[j];
-                let point = Rows::Point { child: joint.ball.offset, parent: joint.socket.offset };
+                let point = Rows::Point {
+                    child: joint.ball.offset,
+                    parent: joint.socket.offset,
+                };
                 add(point, joint.ball.body, joint.socket.body)
             })
             .collect();
-        let group_of: Vec<usize> =
-            groups.iter().enumerate().flat_map(|(g, group)| std::iter::repeat_n(g, group.rows.count())).collect();
+        let group_of: Vec<usize> = groups
+            .iter()
+            .enumerate()
+            .flat_map(|(g, group)| std::iter::repeat_n(g, group.rows.count()))
+            .collect();
         let world = model.world();
         let shares = |a: &Group, b: &Group| {
-            [a.child, a.parent].iter().any(|&x| x != world && (x == b.child || x == b.parent))
+            [a.child, a.parent]
+                .iter()
+                .any(|&x| x != world && (x == b.child || x == b.parent))
         };
         let mut pairs = Vec::new();
         let mut first: Vec<usize> = (0..rows).collect();
@@ -157,7 +207,10 @@ impl Lagrange {
             }
         }
         let n = model.bodies.len();
-        let empty = Row { child: [Vec3::zeros(); 2], parent: [Vec3::zeros(); 2] };
+        let empty = Row {
+            child: [Vec3::zeros(); 2],
+            parent: [Vec3::zeros(); 2],
+        };
         // Bodies that depend on time alone are states here too.
         let mut driven = Driven::new(model);
         driven.only_coordinates();
@@ -303,7 +356,10 @@ impl Lagrange {
     /// J_i M^-1 J_j^T.
     #[inline]
     fn mobility(&self, model: &Model, i: usize, j: usize) -> f64 {
-        let (gi, gj) = (&self.groups[self.group_of[i]], &self.groups[self.group_of[j]]);
+        let (gi, gj) = (
+            &self.groups[self.group_of[i]],
+            &self.groups[self.group_of[j]],
+        );
         let (ri, rj) = (&self.rows[i], &self.rows[j]);
         let mut sum = 0.0;
         for (bi, ji) in [(gi.child, &ri.child), (gi.parent, &ri.parent)] {
@@ -337,7 +393,10 @@ impl Lagrange {
                     for i in 0..3 {
                         let mut e = zero;
                         e[i] = 1.0;
-                        self.rows[at + i] = Row { child: [e, dc.cross(&e)], parent: [-e, e.cross(&dp)] };
+                        self.rows[at + i] = Row {
+                            child: [e, dc.cross(&e)],
+                            parent: [-e, e.cross(&dp)],
+                        };
                         self.residual[at + i] = stabilised(phi[i], rate[i], acceleration[i]);
                         self.drift = self.drift.max(phi[i].abs());
                     }
@@ -348,15 +407,25 @@ impl Lagrange {
                     let phi = a.dot(&b);
                     let relative = wc - wp;
                     let turning = wc.cross(&a).cross(&b) + a.cross(&wp.cross(&b));
-                    let acceleration =
-                        (c.angular_acceleration - p.angular_acceleration).dot(&cross) + relative.dot(&turning);
-                    self.rows[at] = Row { child: [zero, cross], parent: [zero, -cross] };
+                    let acceleration = (c.angular_acceleration - p.angular_acceleration)
+                        .dot(&cross)
+                        + relative.dot(&turning);
+                    self.rows[at] = Row {
+                        child: [zero, cross],
+                        parent: [zero, -cross],
+                    };
                     self.residual[at] = stabilised(phi, relative.dot(&cross), acceleration);
                     self.drift = self.drift.max(phi.abs());
                 }
-                Rows::Offset { child, parent, along, drive } => {
+                Rows::Offset {
+                    child,
+                    parent,
+                    along,
+                    drive,
+                } => {
                     let (dc, dp, b) = (c.rotation * child, p.rotation * parent, p.rotation * along);
-                    let f = drive.map_or(super::jet::Jet::default(), |d| self.driven.coordinates[d]);
+                    let f =
+                        drive.map_or(super::jet::Jet::default(), |d| self.driven.coordinates[d]);
                     let d = (c.position + dc) - (p.position + dp);
                     let d1 = c.point_velocity(&dc) - p.point_velocity(&dp);
                     let d2 = c.point_acceleration(&dc) - p.point_acceleration(&dp);
@@ -365,13 +434,24 @@ impl Lagrange {
                     let phi = b.dot(&d) - f.value;
                     let rate = b1.dot(&d) + b.dot(&d1) - f.rate;
                     let acceleration = b2.dot(&d) + 2.0 * b1.dot(&d1) + b.dot(&d2) - f.acceleration;
-                    self.rows[at] =
-                        Row { child: [b, dc.cross(&b)], parent: [-b, b.cross(&dp) + b.cross(&d)] };
+                    self.rows[at] = Row {
+                        child: [b, dc.cross(&b)],
+                        parent: [-b, b.cross(&dp) + b.cross(&d)],
+                    };
                     self.residual[at] = stabilised(phi, rate, acceleration);
                     self.drift = self.drift.max(phi.abs());
                 }
-                Rows::Angle { child, zero: reference, axis, drive } => {
-                    let (a, b, x) = (c.rotation * child, p.rotation * reference, p.rotation * axis);
+                Rows::Angle {
+                    child,
+                    zero: reference,
+                    axis,
+                    drive,
+                } => {
+                    let (a, b, x) = (
+                        c.rotation * child,
+                        p.rotation * reference,
+                        p.rotation * axis,
+                    );
                     let f = self.driven.coordinates[drive];
                     let angle = libm::atan2(b.cross(&a).dot(&x), b.dot(&a));
                     // A driven crank turns many times: compare modulo a turn.
@@ -381,7 +461,10 @@ impl Lagrange {
                     let acceleration = (c.angular_acceleration - p.angular_acceleration).dot(&x)
                         + relative.dot(&wp.cross(&x))
                         - f.acceleration;
-                    self.rows[at] = Row { child: [zero, x], parent: [zero, -x] };
+                    self.rows[at] = Row {
+                        child: [zero, x],
+                        parent: [zero, -x],
+                    };
                     self.residual[at] = stabilised(phi, relative.dot(&x) - f.rate, acceleration);
                     self.drift = self.drift.max(phi.abs());
                 }

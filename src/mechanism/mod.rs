@@ -34,7 +34,9 @@ pub enum MechanismError {
     #[error("{0}")]
     Unreachable(#[from] Unreachable),
     /// An ideal ball joint, or one that is to start concentric, is open at the start.
-    #[error("ball joint {joint}: ball and socket centres are {distance:.3e} m apart at the start and cannot be closed")]
+    #[error(
+        "ball joint {joint}: ball and socket centres are {distance:.3e} m apart at the start and cannot be closed"
+    )]
     Open {
         /// Name of the joint.
         joint: String,
@@ -60,7 +62,10 @@ pub enum MechanismError {
 }
 
 enum Form {
-    Tree { tree: Box<Tree>, constraints: Option<Box<Constraints>> },
+    Tree {
+        tree: Box<Tree>,
+        constraints: Option<Box<Constraints>>,
+    },
     Lagrange(Box<Lagrange>),
 }
 
@@ -123,16 +128,25 @@ impl Mechanism {
             StartRule::AsGiven => model.ideal_joints.clone(),
         };
         tree.forward(model, T, &y);
-        let distance = |tree: &Tree, j: usize| constraints::eccentricity(&model.joints[j], &tree.motion).norm();
+        let distance = |tree: &Tree, j: usize| {
+            constraints::eccentricity(&model.joints[j], &tree.motion).norm()
+        };
         for j in 0..model.joints.len() {
             let d = distance(&tree, j);
             let coefficients = self.contacts.coefficients(j);
             let clearance = self.contacts.clearance(j);
             if all.contains(&j) {
                 // Newton starts from the scene's guess: anything like closed will do for an assembled start.
-                let limit = if model.start == StartRule::Ideal { f64::INFINITY } else { 1e-5 };
+                let limit = if model.start == StartRule::Ideal {
+                    f64::INFINITY
+                } else {
+                    1e-5
+                };
                 if d > limit {
-                    return Err(MechanismError::Open { joint: self.joint_names[j].clone(), distance: d });
+                    return Err(MechanismError::Open {
+                        joint: self.joint_names[j].clone(),
+                        distance: d,
+                    });
                 }
             } else if d > clearance + 0.1 * coefficients.ball_radius {
                 return Err(MechanismError::OutsideSocket {
@@ -147,10 +161,16 @@ impl Mechanism {
             let error = constraints.project(model, &mut tree, T, &mut y);
             tree.forward(model, T, &y);
             if !(error <= 1e-9) {
-                let worst = all.iter().copied().max_by(|&a, &b| distance(&tree, a).total_cmp(&distance(&tree, b)));
+                let worst = all
+                    .iter()
+                    .copied()
+                    .max_by(|&a, &b| distance(&tree, a).total_cmp(&distance(&tree, b)));
                 let joint = worst.unwrap_or(0);
                 let distance = distance(&tree, joint);
-                return Err(MechanismError::Open { joint: self.joint_names[joint].clone(), distance });
+                return Err(MechanismError::Open {
+                    joint: self.joint_names[joint].clone(),
+                    distance,
+                });
             }
             // The rows of a start that is only assembled need not be independent later.
             if model.start == StartRule::AsGiven && constraints.least_pivot < 1e-13 {
@@ -167,7 +187,13 @@ impl Mechanism {
 
     /// Whether positions and velocities are projected back onto constraints after a step.
     pub fn projects(&self) -> bool {
-        matches!(&self.form, Form::Tree { constraints: Some(_), .. })
+        matches!(
+            &self.form,
+            Form::Tree {
+                constraints: Some(_),
+                ..
+            }
+        )
     }
 
     /// Whether the motion is a function of time alone: as many independent constraint rows as coordinates.
@@ -186,7 +212,9 @@ impl Mechanism {
         match form {
             Form::Tree { tree, constraints } => {
                 Tree::normalise(model, y);
-                constraints.as_mut().map_or(0.0, |c| c.project(model, tree, t, y))
+                constraints
+                    .as_mut()
+                    .map_or(0.0, |c| c.project(model, tree, t, y))
             }
             Form::Lagrange(_) => {
                 Lagrange::normalise(model.bodies.len(), y);
@@ -197,7 +225,12 @@ impl Mechanism {
 
     /// Poses, velocities and gaps at (t, y), without forces.
     pub fn measure(&mut self, t: f64, y: &[f64]) {
-        let Self { model, form, contacts, .. } = self;
+        let Self {
+            model,
+            form,
+            contacts,
+            ..
+        } = self;
         match form {
             Form::Tree { tree, .. } => {
                 tree.forward(model, t, y);
@@ -215,7 +248,12 @@ impl Mechanism {
     pub fn evaluate_fully(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
         self.derivative(t, y, dy);
         let nq = self.positions();
-        let Self { model, form, contacts, .. } = self;
+        let Self {
+            model,
+            form,
+            contacts,
+            ..
+        } = self;
         if let Form::Tree { tree, .. } = form {
             tree.accelerate(model, y, &dy[nq..]);
         }
@@ -264,7 +302,9 @@ impl Mechanism {
     /// one another. Infinite without constraints.
     pub fn least_pivot(&self) -> f64 {
         match &self.form {
-            Form::Tree { constraints, .. } => constraints.as_ref().map_or(f64::INFINITY, |c| c.least_pivot),
+            Form::Tree { constraints, .. } => constraints
+                .as_ref()
+                .map_or(f64::INFINITY, |c| c.least_pivot),
             Form::Lagrange(lagrange) => lagrange.least_pivot,
         }
     }
@@ -281,7 +321,12 @@ impl Mechanism {
 
     /// Force (N) or torque (N m) of every actuator after [`Self::evaluate_fully`], positive along the joint's axis.
     pub fn actuators(&mut self, out: &mut [f64]) {
-        let Self { model, form, gravity, .. } = self;
+        let Self {
+            model,
+            form,
+            gravity,
+            ..
+        } = self;
         match form {
             Form::Lagrange(lagrange) => {
                 for (i, out) in out.iter_mut().enumerate() {
@@ -339,7 +384,8 @@ fn place_output_body(model: &Model, trajectory: &Trajectory, y: &mut [f64]) {
         let rotation = kinematics::quaternion_of(&ideal.rotation);
         y[q..q + 3].copy_from_slice(position.as_slice());
         y[q + 3..q + 7].copy_from_slice(&[rotation.w, rotation.i, rotation.j, rotation.k]);
-        let velocity = Vec3::from_fn(|i, _| ideal.position[i].rate) + ideal.angular_velocity.cross(&to_centroid);
+        let velocity = Vec3::from_fn(|i, _| ideal.position[i].rate)
+            + ideal.angular_velocity.cross(&to_centroid);
         let v = model.nq + v;
         y[v..v + 3].copy_from_slice(velocity.as_slice());
         y[v + 3..v + 6].copy_from_slice(ideal.angular_velocity.as_slice());
@@ -393,7 +439,13 @@ impl System for Mechanism {
 
     fn derivative(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
         self.evaluations += 1;
-        let Self { model, form, contacts, gravity, .. } = self;
+        let Self {
+            model,
+            form,
+            contacts,
+            gravity,
+            ..
+        } = self;
         match form {
             Form::Tree { tree, constraints } => {
                 tree.forward(model, t, y);

@@ -39,13 +39,25 @@ pub struct Body {
 pub enum Motion {
     Fixed,
     /// Prescribed by drive `drive`.
-    Driven { drive: usize, revolute: bool },
+    Driven {
+        drive: usize,
+        revolute: bool,
+    },
     /// One coordinate.
-    Prismatic { q: usize, v: usize },
+    Prismatic {
+        q: usize,
+        v: usize,
+    },
     /// One coordinate.
-    Revolute { q: usize, v: usize },
+    Revolute {
+        q: usize,
+        v: usize,
+    },
     /// Centroid position and quaternion (w, x, y, z) from q; centroid velocity and angular velocity from v.
-    Free { q: usize, v: usize },
+    Free {
+        q: usize,
+        v: usize,
+    },
 }
 
 /// A set of bodies whose coordinates couple through the mass matrix.
@@ -126,21 +138,32 @@ impl Model {
         let mut root = vec![usize::MAX; world];
         for (index, (body, joint)) in scene.bodies.iter().zip(&scene.joints).enumerate() {
             let parent = joint.parent.unwrap_or(world);
-            let parent_centre = joint.parent.map_or(Vec3::zeros(), |p| scene.bodies[p].centre);
+            let parent_centre = joint
+                .parent
+                .map_or(Vec3::zeros(), |p| scene.bodies[p].centre);
             let motion = match (joint.kind, joint.drive) {
                 (JointKind::Fixed, _) => Motion::Fixed,
                 (JointKind::Prismatic | JointKind::Revolute, Some(law)) => {
                     drives.push(DriveLaw { law, body: index });
-                    Motion::Driven { drive: drives.len() - 1, revolute: joint.kind == JointKind::Revolute }
+                    Motion::Driven {
+                        drive: drives.len() - 1,
+                        revolute: joint.kind == JointKind::Revolute,
+                    }
                 }
                 // Numbered below, tree by tree.
                 (JointKind::Prismatic, None) => Motion::Prismatic { q: 0, v: 0 },
                 (JointKind::Revolute, None) => Motion::Revolute { q: 0, v: 0 },
                 (JointKind::Free, _) => Motion::Free { q: 0, v: 0 },
             };
-            let moves_freely =
-                matches!(motion, Motion::Prismatic { .. } | Motion::Revolute { .. } | Motion::Free { .. });
-            let parent_root = if parent == world { usize::MAX } else { root[parent] };
+            let moves_freely = matches!(
+                motion,
+                Motion::Prismatic { .. } | Motion::Revolute { .. } | Motion::Free { .. }
+            );
+            let parent_root = if parent == world {
+                usize::MAX
+            } else {
+                root[parent]
+            };
             root[index] = if parent_root != usize::MAX {
                 parent_root
             } else if moves_freely {
@@ -153,7 +176,11 @@ impl Model {
             let revolute = joint.kind == JointKind::Revolute;
             let along = joint.axis * joint.axis.transpose();
             let (fixed, cosine, sine) = if revolute {
-                (along * rest, (Mat3::identity() - along) * rest, joint.axis.cross_matrix() * rest)
+                (
+                    along * rest,
+                    (Mat3::identity() - along) * rest,
+                    joint.axis.cross_matrix() * rest,
+                )
             } else {
                 (rest, Mat3::zeros(), Mat3::zeros())
             };
@@ -191,12 +218,16 @@ impl Model {
             scale: Vec::new(),
             length_scale: Scales::of(scene).length,
             output_body: scene.output.body,
-            probe: scene.output.probe.map(|p| p - scene.bodies[scene.output.body].centre),
+            probe: scene
+                .output
+                .probe
+                .map(|p| p - scene.bodies[scene.output.body].centre),
         };
         for drive in &model.drives {
-            model
-                .revolute_drives
-                .push(matches!(model.bodies[drive.body].motion, Motion::Driven { revolute: true, .. }));
+            model.revolute_drives.push(matches!(
+                model.bodies[drive.body].motion,
+                Motion::Driven { revolute: true, .. }
+            ));
         }
         model.number_coordinates(scene, &root);
         let anchor = |a: &crate::scene::Attachment| Anchor {
@@ -208,7 +239,11 @@ impl Model {
                 model.ideal_joints.push(index);
                 model.ideal_joints.len() - 1
             });
-            model.joints.push(BallJoint { socket: anchor(&joint.socket), ball: anchor(&joint.ball), ideal });
+            model.joints.push(BallJoint {
+                socket: anchor(&joint.socket),
+                ball: anchor(&joint.ball),
+                ideal,
+            });
         }
         model
     }
@@ -233,7 +268,11 @@ impl Model {
                 }
                 self.block_of[b] = self.blocks.len();
                 let parent = self.bodies[b].parent;
-                let above = if b == tree || parent >= last.len() { NONE } else { last[parent] };
+                let above = if b == tree || parent >= last.len() {
+                    NONE
+                } else {
+                    last[parent]
+                };
                 last[b] = above;
                 count += 1;
                 let (q, v) = (start_q.len(), start_v.len());
@@ -261,7 +300,8 @@ impl Model {
                     }
                     Motion::Free { q: at_q, v: at_v } => {
                         (*at_q, *at_v) = (q, v);
-                        let (position, rotation, velocity, spin) = free_start(scene.joints[b].start);
+                        let (position, rotation, velocity, spin) =
+                            free_start(scene.joints[b].start);
                         let centre = rotation * scene.bodies[b].centre;
                         start_q.extend((position + centre).iter());
                         start_q.extend([rotation.w, rotation.i, rotation.j, rotation.k]);
@@ -280,7 +320,8 @@ impl Model {
                     Motion::Fixed | Motion::Driven { .. } => {}
                 }
             }
-            let lone = (count == 1 && matches!(self.bodies[tree].motion, Motion::Free { .. })).then_some(tree);
+            let lone = (count == 1 && matches!(self.bodies[tree].motion, Motion::Free { .. }))
+                .then_some(tree);
             self.blocks.push(TreeBlock {
                 v: first,
                 n: parent_coordinate.len(),
@@ -308,10 +349,18 @@ impl Model {
                 Some(ideal) => ideal.sliders[usize::from(slider) - 1],
                 None => Jet::default(),
             },
-            Drive::Constant { position, velocity } => Jet::new(position + velocity * t, velocity, 0.0),
-            Drive::Harmonic { mean, amplitude, frequency, phase } => {
+            Drive::Constant { position, velocity } => {
+                Jet::new(position + velocity * t, velocity, 0.0)
+            }
+            Drive::Harmonic {
+                mean,
+                amplitude,
+                frequency,
+                phase,
+            } => {
                 let omega = std::f64::consts::TAU * frequency;
-                Jet::constant(mean) + amplitude * Jet::new(omega * t + phase, omega, 0.0).sin_cos().0
+                Jet::constant(mean)
+                    + amplitude * Jet::new(omega * t + phase, omega, 0.0).sin_cos().0
             }
         }
     }
@@ -319,10 +368,18 @@ impl Model {
 
 fn free_start(start: JointStart) -> (Vec3, Quat, Vec3, Vec3) {
     match start {
-        JointStart::Pose { position, rotation, velocity, angular_velocity } => {
-            (position, rotation, velocity, angular_velocity)
-        }
-        JointStart::Scalar { .. } => (Vec3::zeros(), Quat::identity(), Vec3::zeros(), Vec3::zeros()),
+        JointStart::Pose {
+            position,
+            rotation,
+            velocity,
+            angular_velocity,
+        } => (position, rotation, velocity, angular_velocity),
+        JointStart::Scalar { .. } => (
+            Vec3::zeros(),
+            Quat::identity(),
+            Vec3::zeros(),
+            Vec3::zeros(),
+        ),
     }
 }
 
@@ -343,6 +400,11 @@ impl Scales {
             .map(|j| j.contact.ball_radius)
             .fold(f64::INFINITY, f64::min)
             .min(contact::Parameters::default().ball_radius * 100.0);
-        Self { length, speed: length / 0.1, angle: 0.1, angular_speed: 1.0 }
+        Self {
+            length,
+            speed: length / 0.1,
+            angle: 0.1,
+            angular_speed: 1.0,
+        }
     }
 }

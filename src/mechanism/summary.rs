@@ -35,11 +35,20 @@ impl Summary {
     pub(super) fn new(mechanism: &Mechanism) -> Self {
         let model = &mechanism.model;
         let (velocity_coordinates, position_coordinates, constraint_rows) = match &mechanism.form {
-            Form::Tree { constraints, .. } => (model.nv, model.nq, constraints.as_ref().map_or(0, |c| c.rows())),
-            Form::Lagrange(l) => (6 * model.bodies.len(), 7 * model.bodies.len(), l.row_count()),
+            Form::Tree { constraints, .. } => (
+                model.nv,
+                model.nq,
+                constraints.as_ref().map_or(0, |c| c.rows()),
+            ),
+            Form::Lagrange(l) => (
+                6 * model.bodies.len(),
+                7 * model.bodies.len(),
+                l.row_count(),
+            ),
         };
-        let contacts: Vec<usize> =
-            (0..model.joints.len()).filter(|&j| mechanism.contacts.has_clearance(j)).collect();
+        let contacts: Vec<usize> = (0..model.joints.len())
+            .filter(|&j| mechanism.contacts.has_clearance(j))
+            .collect();
         Self {
             bodies: model.bodies.len(),
             driven_bodies: model.bodies.iter().filter(|b| b.driven_only).count(),

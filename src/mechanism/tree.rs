@@ -46,7 +46,11 @@ impl Tree {
         let mut total = 0;
         for block in &model.blocks {
             mass_offset.push(total);
-            total += if block.lone.is_some() { 0 } else { block.n * block.n };
+            total += if block.lone.is_some() {
+                0
+            } else {
+                block.n * block.n
+            };
         }
         let empty = Composite {
             mass: 0.0,
@@ -96,9 +100,18 @@ impl Tree {
                 }
                 Motion::Driven { drive, revolute } => {
                     let q = self.driven.coordinates[drive];
-                    kinematics::follow(body, &self.motion[body.parent], revolute, q.value, q.rate, q.acceleration)
+                    kinematics::follow(
+                        body,
+                        &self.motion[body.parent],
+                        revolute,
+                        q.value,
+                        q.rate,
+                        q.acceleration,
+                    )
                 }
-                Motion::Fixed => kinematics::follow(body, &self.motion[body.parent], false, 0.0, 0.0, 0.0),
+                Motion::Fixed => {
+                    kinematics::follow(body, &self.motion[body.parent], false, 0.0, 0.0, 0.0)
+                }
             };
         }
     }
@@ -128,7 +141,13 @@ impl Tree {
                 torque: load.torque - inertia * m.angular_acceleration - w.cross(&(inertia * w)),
             };
         }
-        let Self { motion, composite, mass, mass_offset, .. } = self;
+        let Self {
+            motion,
+            composite,
+            mass,
+            mass_offset,
+            ..
+        } = self;
         for &b in self.dynamic.iter().rev() {
             let body = &model.bodies[b];
             let c = composite[b];
@@ -214,7 +233,13 @@ impl Tree {
             x[3..6].copy_from_slice(alpha.as_slice());
         } else {
             let h = &self.mass[self.mass_offset[index]..][..block.n * block.n];
-            factor::solve(h, block.n, &block.parent, &self.inverse_diagonal[block.v..][..block.n], x);
+            factor::solve(
+                h,
+                block.n,
+                &block.parent,
+                &self.inverse_diagonal[block.v..][..block.n],
+                x,
+            );
         }
     }
 
@@ -238,8 +263,12 @@ impl Tree {
                     child.acceleration = Vec3::new(vdot[v], vdot[v + 1], vdot[v + 2]);
                     child.angular_acceleration = Vec3::new(vdot[v + 3], vdot[v + 4], vdot[v + 5]);
                 }
-                Motion::Revolute { v, .. } => kinematics::accelerate(child, &parent, true, vs[v], vdot[v]),
-                Motion::Prismatic { v, .. } => kinematics::accelerate(child, &parent, false, vs[v], vdot[v]),
+                Motion::Revolute { v, .. } => {
+                    kinematics::accelerate(child, &parent, true, vs[v], vdot[v])
+                }
+                Motion::Prismatic { v, .. } => {
+                    kinematics::accelerate(child, &parent, false, vs[v], vdot[v])
+                }
                 Motion::Driven { drive, revolute } => {
                     let q = self.driven.coordinates[drive];
                     kinematics::accelerate(child, &parent, revolute, q.rate, q.acceleration);
@@ -257,7 +286,11 @@ impl Tree {
             match body.motion {
                 Motion::Free { q, v } => {
                     dq[q..q + 3].copy_from_slice(&vs[v..v + 3]);
-                    kinematics::quaternion_rate(&qs[q + 3..q + 7], &vs[v + 3..v + 6], &mut dq[q + 3..q + 7]);
+                    kinematics::quaternion_rate(
+                        &qs[q + 3..q + 7],
+                        &vs[v + 3..v + 6],
+                        &mut dq[q + 3..q + 7],
+                    );
                 }
                 Motion::Revolute { q, v } | Motion::Prismatic { q, v } => dq[q] = vs[v],
                 Motion::Fixed | Motion::Driven { .. } => {}
@@ -308,8 +341,16 @@ fn world_inertia(r: &Mat3, inertia: &Mat3, diagonal: bool) -> Mat3 {
     } else {
         r * inertia
     };
-    let entry = |i: usize, j: usize| t[(i, 0)] * r[(j, 0)] + t[(i, 1)] * r[(j, 1)] + t[(i, 2)] * r[(j, 2)];
-    let (xx, xy, xz, yy, yz, zz) = (entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2));
+    let entry =
+        |i: usize, j: usize| t[(i, 0)] * r[(j, 0)] + t[(i, 1)] * r[(j, 1)] + t[(i, 2)] * r[(j, 2)];
+    let (xx, xy, xz, yy, yz, zz) = (
+        entry(0, 0),
+        entry(0, 1),
+        entry(0, 2),
+        entry(1, 1),
+        entry(1, 2),
+        entry(2, 2),
+    );
     Mat3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
 }
 
@@ -320,7 +361,11 @@ fn add_shifted_inertia(sum: &mut Mat3, inertia: &Mat3, mass: f64, k: &Vec3, d: &
     // With h = k + m d / 2 the whole shift is 2 (d.h) 1 - d h^T - h d^T.
     let h = k + d * (0.5 * mass);
     let trace = 2.0 * d.dot(&h);
-    let (xy, xz, yz) = (d.x * h.y + h.x * d.y, d.x * h.z + h.x * d.z, d.y * h.z + h.y * d.z);
+    let (xy, xz, yz) = (
+        d.x * h.y + h.x * d.y,
+        d.x * h.z + h.x * d.z,
+        d.y * h.z + h.y * d.z,
+    );
     sum.m11 += inertia.m11 + trace - 2.0 * d.x * h.x;
     sum.m22 += inertia.m22 + trace - 2.0 * d.y * h.y;
     sum.m33 += inertia.m33 + trace - 2.0 * d.z * h.z;
@@ -373,7 +418,13 @@ fn fill_row(
 /// Column-wise walk over the coordinates that move body `b`: calls `visit(coordinate within block, point velocity per
 /// unit rate)` for a point at `point` (world).
 #[inline]
-pub fn visit_columns(model: &Model, motion: &[Kinematics], b: usize, point: &Vec3, mut visit: impl FnMut(usize, Vec3)) {
+pub fn visit_columns(
+    model: &Model,
+    motion: &[Kinematics],
+    b: usize,
+    point: &Vec3,
+    mut visit: impl FnMut(usize, Vec3),
+) {
     let mut at = b;
     while at < model.bodies.len() && !model.bodies[at].driven_only {
         let first = model.blocks[model.block_of[at]].v;

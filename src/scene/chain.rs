@@ -37,6 +37,25 @@ pub(super) fn expand(node: &Node<'_>, scene: &mut Scene) -> Result<(), SceneErro
         .map_or(Ok(scene.view.down.unit()), |node| node.direction())?;
     let links = scene.chain.map_or(0, |chain| chain.links);
 
+    let used = |name: &str, prefix: &str| {
+        let number = name
+            .strip_prefix(prefix)
+            .and_then(|rest| rest.parse::<usize>().ok());
+        number.is_some_and(|number| (1..=links).contains(&number))
+    };
+    let joint_used = |name: &str| used(name, "free") || used(name, "J");
+    if scene.bodies.iter().any(|body| used(&body.name, "link"))
+        || scene.joints.iter().any(|joint| joint_used(&joint.name))
+        || scene
+            .ball_joints
+            .iter()
+            .any(|joint| joint_used(&joint.name))
+    {
+        let message = "the file already uses a name that the chain needs: bodies link1, link2, …, joints free1, free2, … \
+                       and J1, J2, …";
+        return Err(link.error("", message));
+    }
+
     let first = scene.bodies.len();
     let step = rotation * (socket - ball);
     for index in 0..links {
@@ -87,19 +106,6 @@ pub(super) fn expand(node: &Node<'_>, scene: &mut Scene) -> Result<(), SceneErro
                 angular_velocity: Vec3::zeros(),
             },
         };
-        let taken = index < first + scene.ball_joints.len()
-            && (scene.bodies[..first]
-                .iter()
-                .any(|other| other.name == body.name)
-                || scene.joints[..first]
-                    .iter()
-                    .any(|other| other.name == joint.name || other.name == ball_joint.name)
-                || scene.ball_joints[..scene.ball_joints.len() - index]
-                    .iter()
-                    .any(|other| other.name == ball_joint.name));
-        if taken {
-            return Err(link.error("", format!("the chain names its bodies and joints {}, {} and {}: the file uses one of these already", body.name, ball_joint.name, joint.name)));
-        }
         scene.bodies.push(body);
         scene.joints.push(joint);
         scene.ball_joints.push(ball_joint);

@@ -73,3 +73,360 @@ fn joints_follow_their_bodies_and_parents_come_first() {
         }
     }
 }
+
+fn changed(name: &str, changes: &[(&str, &str)]) -> Scene {
+    let changes: Vec<_> = changes
+        .iter()
+        .map(|(key, value)| ((*key).to_owned(), (*value).to_owned()))
+        .collect();
+    Scene::load(name, &changes).unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+fn every_row_of_the_table_reads_writes_and_shows_its_default() {
+    for parameter in table() {
+        if parameter.default != Value::Unset {
+            let text = parameter.write(&parameter.default);
+            assert_eq!(
+                parameter.read(&text),
+                Ok(parameter.default.clone()),
+                "{}",
+                parameter.key
+            );
+        }
+        assert!(parameter.help.ends_with('.'), "{}", parameter.key);
+        if let Kind::Number {
+            min,
+            max,
+            slider: (low, high),
+            dimension,
+            display,
+            logarithmic,
+            ..
+        } = parameter.kind
+        {
+            assert!(min <= low && low < high && high <= max, "{}", parameter.key);
+            assert!(!logarithmic || low > 0.0, "{}", parameter.key);
+            let units = unit_names(dimension);
+            assert!(units.contains(&display) || units.is_empty() && display.is_empty());
+        }
+        assert_eq!(
+            table()
+                .iter()
+                .filter(|other| other.key == parameter.key)
+                .count(),
+            1
+        );
+        assert!(reference_page().contains(&format!("| `{}` |", parameter.key)));
+    }
+}
+
+#[test]
+fn every_parameter_of_every_scene_can_be_read_and_set_to_what_it_is() {
+    for name in BUILT_IN {
+        let original = Scene::load(name, &[]).unwrap();
+        for parameter in original.parameters() {
+            let mut scene = original.clone();
+            let value = scene.get(parameter.key).unwrap();
+            if value == Value::Unset {
+                continue;
+            }
+            scene.set_value(parameter.key, &value).unwrap();
+            assert_eq!(
+                scene.get(parameter.key).unwrap(),
+                value,
+                "{name}: {}",
+                parameter.key
+            );
+            assert_eq!(scene.changes.len(), 1);
+            assert_eq!(scene.bodies, original.bodies);
+            assert_eq!(scene.solver.method, original.solver.method);
+        }
+    }
+}
+
+#[test]
+fn a_joint_s_own_value_beats_the_scene_s_whichever_is_set_last() {
+    let orders = [
+        ["joint.S1.clearance", "contact.clearance"],
+        ["contact.clearance", "joint.S1.clearance"],
+    ];
+    for [first, second] in orders {
+        let value = |key: &str| {
+            if key.starts_with("joint") {
+                "0.7 mm"
+            } else {
+                "0.1 mm"
+            }
+        };
+        let scene = changed("spcmm", &[(first, value(first)), (second, value(second))]);
+        let clearances: Vec<f64> = scene
+            .ball_joints
+            .iter()
+            .map(|joint| joint.contact.clearance)
+            .collect();
+        assert_eq!(clearances, [0.7e-3, 0.1e-3, 0.1e-3]);
+        assert_eq!(scene.get("contact.clearance"), Ok(Value::Number(0.1e-3)));
+        assert_eq!(scene.get("joint.S2.clearance"), Ok(Value::Number(0.1e-3)));
+        assert_eq!(scene.ball_joints[0].overrides, ["clearance"]);
+    }
+    // The file's own override at B stays.
+    let scene = changed("slider-crank", &[("contact.clearance", "0.5 mm")]);
+    assert_eq!(scene.ball_joints[0].contact.clearance, 0.0);
+    assert_eq!(scene.ball_joints[1].contact.clearance, 0.5e-3);
+}
+
+#[test]
+fn the_last_of_two_changes_wins_and_only_the_result_is_checked() {
+    let scene = changed(
+        "spcmm",
+        &[("contact.friction", "0.2"), ("contact.friction", "0.3")],
+    );
+    assert_eq!(scene.contact.friction, 0.3);
+    assert_eq!(
+        scene.changes,
+        [("contact.friction".to_owned(), "0.3".to_owned())]
+    );
+    // A gap wider than the file's ball is fine with the bigger ball that comes with it.
+    let scene = changed(
+        "spcmm",
+        &[
+            ("contact.clearance", "12 mm"),
+            ("contact.ball_radius", "20 mm"),
+        ],
+    );
+    assert_eq!(scene.ball_joints[2].contact.clearance, 0.012);
+}
+
+#[test]
+fn explicit_solver_settings_beat_a_preset_in_either_order() {
+    let preset = ("solver.preset", "reference");
+    let method = ("solver.method", "rk4");
+    for changes in [[preset, method], [method, preset]] {
+        let solver = changed("spcmm", &changes).solver;
+        assert_eq!(solver.method, crate::integrate::Method::RungeKutta4);
+        assert_eq!(solver.tolerance, 1e-11);
+        assert_eq!(solver.preset, Some(Preset::Reference));
+    }
+    let text = |solver: &str| format!("{}\n{solver}", built_in_text("pendulum").unwrap());
+    let file = text("[solver]\ntolerance = 1e-5\npreset = \"accurate\"");
+    assert_eq!(
+        Scene::parse(&file, None, &[]).unwrap().solver.tolerance,
+        1e-5
+    );
+    // A preset that is asked for later replaces all that the file says.
+    let ask = [("solver.preset".to_owned(), "accurate".to_owned())];
+    assert_eq!(
+        Scene::parse(&file, None, &ask).unwrap().solver.tolerance,
+        1e-7
+    );
+}
+
+#[test]
+fn presets_say_in_their_help_what_they_are() {
+    let help = table()
+        .iter()
+        .find(|p| p.key == "solver.preset")
+        .unwrap()
+        .help;
+    for preset in [Preset::RealTime, Preset::Accurate, Preset::Reference] {
+        assert!(
+            help.contains(&format!("{:e}", preset.point().2)),
+            "{preset:?}"
+        );
+    }
+    assert!(help.contains(&format_quantity(Preset::Preview.point().1, "us")));
+}
+
+#[test]
+fn a_change_can_be_taken_back() {
+    let mut scene = changed(
+        "spcmm",
+        &[("joint.S1.friction", "0"), ("contact.friction", "0.4")],
+    );
+    scene.undo_change("joint.S1.friction").unwrap();
+    assert_eq!(scene.get("joint.S1.friction"), Ok(Value::Number(0.4)));
+    scene.undo_change("contact.friction").unwrap();
+    assert_eq!(scene.get("contact.friction"), Ok(Value::Number(0.15)));
+    assert!(scene.changes.is_empty());
+}
+
+#[test]
+fn a_chain_is_rebuilt_with_its_links() {
+    let mut scene = changed(
+        "chain",
+        &[("joint.J2.friction", "0.4"), ("joint.J7.friction", "0.5")],
+    );
+    assert_eq!((scene.bodies.len(), scene.ball_joints.len()), (8, 8));
+    scene.set("chain.links", "3").unwrap();
+    assert_eq!(
+        (
+            scene.bodies.len(),
+            scene.joints.len(),
+            scene.ball_joints.len()
+        ),
+        (3, 3, 3)
+    );
+    assert_eq!(scene.ball_joints[1].contact.friction, 0.4);
+    assert_eq!(scene.output.body, 2);
+    assert_eq!(scene.get("chain.links"), Ok(Value::Count(3)));
+    // The change of a joint that is gone goes with it.
+    assert!(scene.get("joint.J7.friction").is_err());
+    assert_eq!(scene.changes.len(), 2);
+    assert_eq!(
+        changed("chain", &[("chain.links", "256")]).bodies.len(),
+        256
+    );
+}
+
+#[test]
+fn the_slider_plane_moves_sliders_and_rails() {
+    let mut scene = changed("spcmm", &[]);
+    scene.set("spcmm.slider_plane", "40mm").unwrap();
+    assert_eq!(scene.joints[0].parent_point, Vec3::new(0.040, 0.0, 0.0));
+    let Geometry::Box { centre, .. } = scene.fixed_shapes[0].geometry else {
+        panic!("a rail is a box")
+    };
+    assert!((centre.x - 0.018).abs() < 1e-15);
+    assert_eq!(scene.spcmm.map(|spcmm| spcmm.slider_plane), Some(0.040));
+}
+
+#[test]
+fn doubtful_choices_are_warned_of() {
+    assert!(changed("spcmm", &[]).warnings().is_empty());
+    let warnings = changed("spcmm", &[("contact.restitution", "0.3")]).warnings();
+    assert!(
+        warnings.len() == 1 && warnings[0].contains("S1, S2, S3: restitution 0.3"),
+        "{warnings:?}"
+    );
+    let fine = [
+        ("contact.restitution", "0.3"),
+        ("contact.normal_law", "gonthier"),
+    ];
+    assert!(changed("spcmm", &fine).warnings().is_empty());
+    let warnings = changed("spcmm", &[("joint.S2.clearance", "0.01 mm")]).warnings();
+    assert!(
+        warnings.len() == 1 && warnings[0].starts_with("S2: clearance 0.01 mm"),
+        "{warnings:?}"
+    );
+    assert!(
+        changed("spcmm", &[("contact.clearance", "0")])
+            .warnings()
+            .is_empty()
+    );
+    let coarse = [("solver.method", "rk4"), ("solver.step", "50 us")];
+    assert!(changed("spcmm", &coarse).warnings()[0].contains("50 us"));
+}
+
+#[test]
+fn the_built_in_scenes_carry_the_published_numbers() {
+    let scene = changed("spcmm", &[]);
+    let find = |name: &str| scene.bodies.iter().find(|body| body.name == name).unwrap();
+    assert_eq!(
+        find("platform").inertia.diagonal(),
+        Vec3::new(4.44e-4, 3.31e-4, 1.35e-4)
+    );
+    // 1.92e-3 about the hinge axis: y for rods 1 and 2, z for rod 3.
+    for (rod, hinge) in [
+        ("rod1", Vec3::y()),
+        ("rod2", Vec3::y()),
+        ("rod3", Vec3::z()),
+    ] {
+        let body = find(rod);
+        assert_eq!(hinge.dot(&(body.inertia * hinge)), 1.92e-3);
+        let child = scene
+            .bodies
+            .iter()
+            .position(|other| other.name == rod)
+            .unwrap();
+        assert_eq!(scene.joints[child].axis, hinge);
+    }
+    let mass: f64 = scene.bodies.iter().map(|body| body.mass).sum();
+    assert!((mass - (3.0 * 0.168 + 3.0 * 0.384 + 0.490)).abs() < 1e-15);
+    assert_eq!(scene.gravity, Vec3::new(9.81, 0.0, 0.0));
+    assert_eq!(scene.start, StartRule::Ideal);
+    assert_eq!(scene.bodies[scene.output.body].name, "platform");
+    assert_eq!(
+        scene.contact.friction_velocity,
+        crate::contact::FrictionVelocity::Centres
+    );
+}
+
+#[test]
+fn the_slider_crank_starts_with_velocities_that_fit_together() {
+    let scene = changed("slider-crank", &[]);
+    let rod = scene
+        .bodies
+        .iter()
+        .position(|body| body.name == "rod")
+        .unwrap();
+    let JointStart::Pose {
+        rotation,
+        velocity,
+        angular_velocity,
+        ..
+    } = scene.joints[rod].start
+    else {
+        panic!("the rod is free")
+    };
+    let end = |x: f64| velocity + angular_velocity.cross(&(rotation * Vec3::new(x, 0.0, 0.0)));
+    // Crank pin: 6 rad/s times 0.08 m against Y; slider: 0.24 m/s along X.
+    assert!((end(-0.15) - Vec3::new(0.0, -0.48, 0.0)).norm() < 1e-15);
+    assert!((end(0.15) - Vec3::new(0.24, 0.0, 0.0)).norm() < 1e-15);
+    assert!(angular_velocity.dot(&(rotation * Vec3::x())).abs() < 1e-15);
+    let driven = changed("slider-crank-driven", &[]);
+    let constant = Drive::Constant {
+        position: 0.0,
+        velocity: 6.0,
+    };
+    assert!(
+        driven
+            .joints
+            .iter()
+            .any(|joint| joint.name == "crank" && joint.drive == Some(constant))
+    );
+    // Otherwise they are one machine.
+    assert_eq!(driven.bodies, scene.bodies);
+    assert_eq!(driven.ball_joints, scene.ball_joints);
+}
+
+#[test]
+fn all_forms_of_a_rotation_agree() {
+    let rotation = |form: &str| {
+        let text = format!(
+            "[[body]]\nname = \"a\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n[[joint]]\nname = \"a\"\nkind = \"free\"\n\
+             child = \"a\"\nchild_point = \"1 0 0 m\"\nstart = {{ position = \"0 0 0 m\", rotation = {form}, \
+             angular_velocity = \"0 0 2 rad/s\" }}"
+        );
+        let scene = Scene::parse(&text, None, &[]).unwrap_or_else(|error| panic!("{error}"));
+        let JointStart::Pose {
+            position,
+            rotation,
+            velocity,
+            ..
+        } = scene.joints[0].start
+        else {
+            panic!()
+        };
+        // The joint point, 1 m out on the body's x axis, is at the origin and at rest.
+        assert!((position + rotation * Vec3::x()).norm() < 1e-15);
+        assert!((velocity - Vec3::new(0.0, 0.0, 2.0).cross(&position)).norm() < 1e-15);
+        rotation.to_rotation_matrix().into_inner()
+    };
+    let expected = Mat3::new(0.0, 0.0, 1.0, 0.0, 1.0, 0.0, -1.0, 0.0, 0.0);
+    for form in [
+        "{ axis = [0, 2, 0], angle = \"90 deg\" }",
+        "{ sequence = \"xzy\", angles = [0, 0, \"90 deg\"] }",
+        "{ x = [0, 0, -3], y = [0, 1, -1] }",
+        "{ quaternion = [1, 0, 1, 0] }",
+    ] {
+        assert!((rotation(form) - expected).norm() < 1e-15, "{form}");
+    }
+    // R = Rx Rz Ry, paper eq. (2): R12 = -sin beta.
+    let r = rotation("{ sequence = \"xzy\", angles = \"10 20 30 deg\" }");
+    assert!((r[(0, 1)] + libm::sin(20.0_f64.to_radians())).abs() < 1e-15);
+    assert!(
+        (r[(1, 1)] - libm::cos(10.0_f64.to_radians()) * libm::cos(20.0_f64.to_radians())).abs()
+            < 1e-15
+    );
+}

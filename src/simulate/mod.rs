@@ -71,7 +71,8 @@ impl PartialEq for Statistics {
     /// Bit by bit, so that "no separation yet" equals itself.
     fn eq(&self, other: &Self) -> bool {
         let bits = |v: &[f64]| v.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
-        (self.steps, self.evaluations, self.rejected) == (other.steps, other.evaluations, other.rejected)
+        (self.steps, self.evaluations, self.rejected)
+            == (other.steps, other.evaluations, other.rejected)
             && self.impacts == other.impacts
             && bits(&self.peak_normal) == bits(&other.peak_normal)
             && bits(&self.peak_time) == bits(&other.peak_time)

@@ -98,7 +98,11 @@ impl Course {
         }
         let theta = 0.5 * (low + high);
         let inside = force(theta);
-        if inside > ends.0 { (inside, theta) } else { ends }
+        if inside > ends.0 {
+            (inside, theta)
+        } else {
+            ends
+        }
     }
 }
 
@@ -110,16 +114,23 @@ mod tests {
     #[test]
     fn finds_the_peak_of_an_impact_between_coarse_samples() {
         // penetration = a sin(pi t / T): undamped peak at T / 2.
-        let c = Coefficients { damping: 0.0, ..Coefficients::new(&Parameters::default(), 3e-4) };
+        let c = Coefficients {
+            damping: 0.0,
+            ..Coefficients::new(&Parameters::default(), 3e-4)
+        };
         let (a, t_end) = (4e-6, 1e-4);
         let at = |t: f64| {
             let (s, k) = libm::sincos(std::f64::consts::PI * t / t_end);
-            Approach { penetration: a * s, rate: a * std::f64::consts::PI / t_end * k }
+            Approach {
+                penetration: a * s,
+                rate: a * std::f64::consts::PI / t_end * k,
+            }
         };
         let (start, end) = (0.43e-4, 0.53e-4);
         let (force, theta) = Course::new(at(start), at(end), end - start).strongest(&c, 0.1);
         let exact = c.normal_force(a, 0.0, 0.1);
-        assert!((force / exact - 1.0).abs() < 2e-5, "{force} {exact}");
+        // Hermite's error of the penetration, (pi h / T)^4 / 384 = 2.5e-5, enters the force by its 1.5th power.
+        assert!((force / exact - 1.0).abs() < 3.8e-5, "{force} {exact}");
         assert!((start + theta * (end - start) - 0.5e-4).abs() < 1e-8);
     }
 }

@@ -26,7 +26,10 @@ pub(super) fn fill(mechanism: &mut Mechanism, scene: &Scene, time: f64, out: &mu
     for (j, joint) in scene.ball_joints.iter().enumerate() {
         let report = joint_report(mechanism, joint, j);
         if mechanism.contacts.has_clearance(j) {
-            out.elastic += mechanism.contacts.coefficients(j).elastic_energy(report.penetration);
+            out.elastic += mechanism
+                .contacts
+                .coefficients(j)
+                .elastic_energy(report.penetration);
         }
         out.joints.push(report);
     }

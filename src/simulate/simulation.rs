@@ -3,7 +3,7 @@
 use super::peaks::{Approach, Course};
 use super::stepper::AnyStepper;
 use super::{Effect, Frame, Peak, Snapshot, StartError, Statistics, Stopped, report};
-use crate::integrate::{Controller, Stepper, System, find_root};
+use crate::integrate::{Controller, Stepper, System, find_root, hermite};
 use crate::mechanism::{Mechanism, Memory, Ramp, Switching};
 use crate::scene::{Scene, SceneError};
 
@@ -102,7 +102,9 @@ impl Simulation {
                 gaps: vec![Approach::default(); joints],
                 memory: vec![Memory::default(); joints],
                 ramps: vec![None; joints],
-                clearances: (0..joints).map(|j| mechanism.contacts.clearance(j)).collect(),
+                clearances: (0..joints)
+                    .map(|j| mechanism.contacts.clearance(j))
+                    .collect(),
                 h_next: scene.solver.step.min(LONGEST_STEP),
                 h_contact: FIRST_CONTACT_STEP,
                 contact_began: false,
@@ -136,9 +138,15 @@ impl Simulation {
     fn begin_contacts_at_start(&mut self) {
         self.mechanism.measure(self.state.t, &self.state.y);
         for j in 0..self.state.memory.len() {
-            if self.mechanism.contacts.has_clearance(j) && self.mechanism.contacts.gaps()[j].penetration > 0.0 {
+            if self.mechanism.contacts.has_clearance(j)
+                && self.mechanism.contacts.gaps()[j].penetration > 0.0
+            {
                 let approach_speed = self.mechanism.contacts.coefficients(j).speed_floor;
-                self.state.memory[j] = Memory { active: true, approach_speed, floored: true };
+                self.state.memory[j] = Memory {
+                    active: true,
+                    approach_speed,
+                    floored: true,
+                };
                 self.state.statistics.impacts[j] += 1;
             }
         }
@@ -146,8 +154,13 @@ impl Simulation {
 
     /// Recomputes derivative and gaps of the current state after anything but a step changed it; forgets the step before.
     fn refresh(&mut self) {
-        let Self { mechanism, state, .. } = self;
-        mechanism.contacts.memory_mut().copy_from_slice(&state.memory);
+        let Self {
+            mechanism, state, ..
+        } = self;
+        mechanism
+            .contacts
+            .memory_mut()
+            .copy_from_slice(&state.memory);
         let evaluations = mechanism.evaluations;
         mechanism.derivative(state.t, &state.y, &mut state.k);
         mechanism.evaluations = evaluations;
@@ -240,10 +253,20 @@ impl Simulation {
 
     /// A step whose size follows the error estimate, cut at the first contact start or end inside it.
     fn adaptive_step(&mut self, limit: f64) -> Result<(), Stopped> {
-        let Self { mechanism, stepper, state, y_end, k_end, .. } = self;
+        let Self {
+            mechanism,
+            stepper,
+            state,
+            y_end,
+            k_end,
+            ..
+        } = self;
         let tolerance = self.running.solver.tolerance;
         let evaluations = mechanism.evaluations;
-        mechanism.contacts.memory_mut().copy_from_slice(&state.memory);
+        mechanism
+            .contacts
+            .memory_mut()
+            .copy_from_slice(&state.memory);
         let t = state.t;
         let (mut h, mut t_end);
         let factor = loop {
@@ -254,7 +277,8 @@ impl Simulation {
                 t_end = limit;
                 h = limit - t;
             }
-            let error = stepper.attempt(mechanism, t, h, &state.y, &state.k, y_end, k_end) / tolerance;
+            let error =
+                stepper.attempt(mechanism, t, h, &state.y, &state.k, y_end, k_end) / tolerance;
             if error <= 1.0 {
                 let factor = state.controller.after_accept(error);
                 if cut {
@@ -269,7 +293,9 @@ impl Simulation {
             if !(state.h_next >= SHORTEST_STEP.max(4.0 * f64::EPSILON * t)) {
                 state.statistics.evaluations += mechanism.evaluations - evaluations;
                 state.h_next = self.running.solver.step;
-                return Err(self.stopped("the step size that the tolerance asks for fell below 1e-14 s"));
+                return Err(
+                    self.stopped("the step size that the tolerance asks for fell below 1e-14 s")
+                );
             }
         };
         let contact_began = state.contact_began;
@@ -283,7 +309,14 @@ impl Simulation {
             // The step is taken again, shorter, so that its end carries the method's error and not the interpolant's.
             t_end = t + theta * h;
             h *= theta;
-            let Self { mechanism, stepper, state, y_end, k_end, .. } = self;
+            let Self {
+                mechanism,
+                stepper,
+                state,
+                y_end,
+                k_end,
+                ..
+            } = self;
             stepper.attempt(mechanism, t, h, &state.y, &state.k, y_end, k_end);
             mechanism.contacts.finish(t_end);
             store_gaps(mechanism, &mut self.gaps_end);
@@ -303,7 +336,11 @@ impl Simulation {
             let (start, end) = (self.state.gaps[j], self.gaps_end[j]);
             let course = Course::new(start, end, h);
             // Positive where the contact is in the other state than its memory says.
-            let sign = if self.state.memory[j].active { -1.0 } else { 1.0 };
+            let sign = if self.state.memory[j].active {
+                -1.0
+            } else {
+                1.0
+            };
             let (from, to) = (sign * start.penetration, sign * end.penetration);
             let (from_rate, to_rate) = (sign * start.rate, sign * end.rate);
             let bracket = if to > 0.0 {
@@ -320,7 +357,11 @@ impl Simulation {
             } else if from < 0.0 && from_rate > 0.0 && to_rate < 0.0 {
                 // Grazes between two steps.
                 let theta = course.extremum();
-                let value = if sign * course.at(theta).0 > 0.0 { sign * self.penetration_at(j, theta, h) } else { -1.0 };
+                let value = if sign * course.at(theta).0 > 0.0 {
+                    sign * self.penetration_at(j, theta, h)
+                } else {
+                    -1.0
+                };
                 (value > 0.0).then_some((0.0, from, theta, value))
             } else {
                 None
@@ -328,7 +369,9 @@ impl Simulation {
             let theta = match bracket {
                 Some((a, fa, b, fb)) => {
                     let width = (1e-15 / h).max(1e-12);
-                    find_root(a, fa, b, fb, width, 1e-16, |theta| sign * self.penetration_at(j, theta, h))
+                    find_root(a, fa, b, fb, width, 1e-16, |theta| {
+                        sign * self.penetration_at(j, theta, h)
+                    })
                 }
                 // Wrong all along: switch as soon as a step allows it.
                 None if to > 0.0 => 1.0,
@@ -341,16 +384,34 @@ impl Simulation {
 
     /// Penetration of joint `j` on the interpolant of the attempted step.
     fn penetration_at(&mut self, j: usize, theta: f64, h: f64) -> f64 {
-        let Self { mechanism, stepper, state, y_end, k_end, scratch_y, .. } = self;
+        let Self {
+            mechanism,
+            stepper,
+            state,
+            y_end,
+            k_end,
+            scratch_y,
+            ..
+        } = self;
         stepper.interpolate(theta, h, &state.y, &state.k, y_end, k_end, scratch_y);
         mechanism.measure(state.t + theta * h, scratch_y);
         mechanism.contacts.gaps()[j].penetration
     }
 
     fn fixed_step(&mut self, limit: f64) -> Result<(), Stopped> {
-        let Self { mechanism, stepper, state, y_end, k_end, .. } = self;
+        let Self {
+            mechanism,
+            stepper,
+            state,
+            y_end,
+            k_end,
+            ..
+        } = self;
         let evaluations = mechanism.evaluations;
-        mechanism.contacts.memory_mut().copy_from_slice(&state.memory);
+        mechanism
+            .contacts
+            .memory_mut()
+            .copy_from_slice(&state.memory);
         let (t, step) = (state.t, self.running.solver.step);
         let mut t_end = state.grid_origin + (state.grid_count + 1) as f64 * step;
         if t_end >= limit - 1e-6 * step {
@@ -372,7 +433,12 @@ impl Simulation {
 
     /// A step of a scene whose motion is a function of time alone: predict, close the loops, read the reactions.
     fn kinematic_step(&mut self, limit: f64) -> Result<(), Stopped> {
-        let Self { mechanism, state, y_end, .. } = self;
+        let Self {
+            mechanism,
+            state,
+            y_end,
+            ..
+        } = self;
         let evaluations = mechanism.evaluations;
         let t = state.t;
         let mut t_end = t + KINEMATIC_STEP;
@@ -388,7 +454,15 @@ impl Simulation {
 
     /// Makes the attempted step count: projection, guard, contact memory, peaks.
     fn accept(&mut self, t_end: f64, h: f64, evaluations: u64) -> Result<(), Stopped> {
-        let Self { mechanism, stepper, state, y_end, k_end, gaps_end, .. } = self;
+        let Self {
+            mechanism,
+            stepper,
+            state,
+            y_end,
+            k_end,
+            gaps_end,
+            ..
+        } = self;
         let open = mechanism.project(t_end, y_end);
         if !stepper.ends_with_derivative() || mechanism.projects() {
             mechanism.derivative(t_end, y_end, k_end);
@@ -399,7 +473,14 @@ impl Simulation {
         if let Some(what) = self.objection(open) {
             return Err(self.stopped(&what));
         }
-        let Self { mechanism, state, y_end, k_end, gaps_end, .. } = self;
+        let Self {
+            mechanism,
+            state,
+            y_end,
+            k_end,
+            gaps_end,
+            ..
+        } = self;
         state.t0 = state.t;
         std::mem::swap(&mut state.y0, &mut state.y);
         std::mem::swap(&mut state.k0, &mut state.k);
@@ -410,12 +491,20 @@ impl Simulation {
         std::mem::swap(&mut state.k, k_end);
         std::mem::swap(&mut state.gaps, gaps_end);
         state.statistics.steps += 1;
-        state.statistics.constraint_drift = state.statistics.constraint_drift.max(mechanism.constraint_drift());
+        state.statistics.constraint_drift = state
+            .statistics
+            .constraint_drift
+            .max(mechanism.constraint_drift());
         self.track_peaks(h);
         if self.switch_contacts(h) && self.mechanism.contacts.switching == Switching::Immediate {
             // The force now divides by the approach speed just found.
-            let Self { mechanism, state, .. } = self;
-            mechanism.contacts.memory_mut().copy_from_slice(&state.memory);
+            let Self {
+                mechanism, state, ..
+            } = self;
+            mechanism
+                .contacts
+                .memory_mut()
+                .copy_from_slice(&state.memory);
             mechanism.derivative(state.t, &state.y, &mut state.k);
             state.statistics.evaluations += 1;
         }
@@ -424,7 +513,12 @@ impl Simulation {
 
     /// Starts and ends contacts whose penetration changed sign over the step just accepted.
     fn switch_contacts(&mut self, h: f64) -> bool {
-        let Self { mechanism, state, peaks, .. } = self;
+        let Self {
+            mechanism,
+            state,
+            peaks,
+            ..
+        } = self;
         let mut switched = false;
         for j in 0..state.gaps.len() {
             if !mechanism.contacts.has_clearance(j) {
@@ -446,7 +540,11 @@ impl Simulation {
                     end.rate
                 };
                 let floor = mechanism.contacts.coefficients(j).speed_floor;
-                state.memory[j] = Memory { active: true, approach_speed: rate.max(floor), floored: rate < floor };
+                state.memory[j] = Memory {
+                    active: true,
+                    approach_speed: rate.max(floor),
+                    floored: rate < floor,
+                };
                 state.statistics.impacts[j] += 1;
                 peaks[j].impacts += 1;
                 peaks[j].approach_speed = peaks[j].approach_speed.max(rate);
@@ -462,7 +560,12 @@ impl Simulation {
 
     /// Largest forces of the step just accepted, in continuous time.
     fn track_peaks(&mut self, h: f64) {
-        let Self { mechanism, state, peaks, .. } = self;
+        let Self {
+            mechanism,
+            state,
+            peaks,
+            ..
+        } = self;
         for j in 0..state.gaps.len() {
             if !mechanism.contacts.has_clearance(j) {
                 if let Some(reaction) = mechanism.reaction(j) {
@@ -497,7 +600,11 @@ impl Simulation {
             }
             if force > peaks[j].normal {
                 let gap = &mechanism.contacts.gaps()[j];
-                let n = if gap.eccentricity.norm() > 0.0 { gap.eccentricity.normalize() } else { gap.eccentricity };
+                let n = if gap.eccentricity.norm() > 0.0 {
+                    gap.eccentricity.normalize()
+                } else {
+                    gap.eccentricity
+                };
                 peaks[j].normal = force;
                 peaks[j].time = time;
                 peaks[j].normal_force = n * -force;
@@ -514,7 +621,9 @@ impl Simulation {
     /// What is wrong with the step just attempted, if anything.
     fn objection(&self, open: f64) -> Option<String> {
         if !(open <= OPEN_LOOP) {
-            return Some(format!("the loops through the ideal ball joints came apart by {open:.1e} m"));
+            return Some(format!(
+                "the loops through the ideal ball joints came apart by {open:.1e} m"
+            ));
         }
         for j in 0..self.gaps_end.len() {
             if !self.mechanism.contacts.has_clearance(j) {
@@ -531,8 +640,13 @@ impl Simulation {
         }
         for (m, body) in self.mechanism.motion().iter().zip(&self.running.bodies) {
             let (v, w) = (m.velocity.norm(), m.angular_velocity.norm());
-            if !(v <= ABSURD_SPEED && w <= ABSURD_SPEED) || !m.position.iter().all(|x| x.is_finite()) {
-                return Some(format!("body {}: speed {v:.3e} m/s, angular speed {w:.3e} rad/s", body.name));
+            if !(v <= ABSURD_SPEED && w <= ABSURD_SPEED)
+                || !m.position.iter().all(|x| x.is_finite())
+            {
+                return Some(format!(
+                    "body {}: speed {v:.3e} m/s, angular speed {w:.3e} rad/s",
+                    body.name
+                ));
             }
         }
         if self.k_end.iter().chain(&self.y_end).any(|x| !x.is_finite()) {
@@ -546,31 +660,64 @@ impl Simulation {
         let advice = if self.mechanism.least_pivot() < 1e-12 {
             "the ideal joints are (nearly) dependent here: keep clear of this pose, or give a joint a clearance".to_owned()
         } else if solver.method.is_adaptive() {
-            format!("try a looser solver.tolerance (now {:e}) or a softer or heavier scene", solver.tolerance)
+            format!(
+                "try a looser solver.tolerance (now {:e}) or a softer or heavier scene",
+                solver.tolerance
+            )
         } else {
-            format!("try a smaller solver.step (now {:e} s) or solver.method = dopri5", solver.step)
+            format!(
+                "try a smaller solver.step (now {:e} s) or solver.method = dopri5",
+                solver.step
+            )
         };
-        Stopped { time: self.state.t, what: what.to_owned(), advice }
+        Stopped {
+            time: self.state.t,
+            what: what.to_owned(),
+            advice,
+        }
     }
 
     /// Everything at `time`, interpolated within the latest step; forces come from the interpolated state.
     /// Allocates only while `out` is too small.
     pub fn sample(&mut self, time: f64, out: &mut Frame) {
-        let Self { mechanism, stepper, state, scratch_y, scratch_k, scratch_memory, .. } = self;
+        let Self {
+            mechanism,
+            stepper,
+            state,
+            scratch_y,
+            scratch_k,
+            scratch_memory,
+            ..
+        } = self;
         let counts = (mechanism.evaluations, mechanism.contacts.evaluations);
         let h = state.t - state.t0;
         let time = time.clamp(state.t0, state.t);
         let inside = h > 0.0 && time < state.t;
         if inside {
             let theta = (time - state.t0) / h;
-            stepper.interpolate(theta, h, &state.y0, &state.k0, &state.y, &state.k, scratch_y);
+            if mechanism.is_kinematic() {
+                hermite(
+                    theta, h, &state.y0, &state.k0, &state.y, &state.k, scratch_y,
+                );
+            } else {
+                stepper.interpolate(
+                    theta, h, &state.y0, &state.k0, &state.y, &state.k, scratch_y,
+                );
+            }
             mechanism.project(time, scratch_y);
         } else {
             scratch_y.copy_from_slice(&state.y);
         }
-        let memory = if inside { &state.memory0 } else { &state.memory };
+        let memory = if inside {
+            &state.memory0
+        } else {
+            &state.memory
+        };
         scratch_memory.copy_from_slice(memory);
-        mechanism.contacts.memory_mut().copy_from_slice(scratch_memory);
+        mechanism
+            .contacts
+            .memory_mut()
+            .copy_from_slice(scratch_memory);
         mechanism.evaluate_fully(time, scratch_y, scratch_k);
         report::fill(mechanism, &self.running, time, out);
         (mechanism.evaluations, mechanism.contacts.evaluations) = counts;
@@ -597,10 +744,18 @@ impl Simulation {
     ///
     /// # Errors
     /// As [`Self::set`].
-    pub fn set_value(&mut self, key: &str, value: &crate::scene::Value) -> Result<Effect, SceneError> {
+    pub fn set_value(
+        &mut self,
+        key: &str,
+        value: &crate::scene::Value,
+    ) -> Result<Effect, SceneError> {
         let mut next = self.scene.clone();
         let waits = next.set_value(key, value)?.at_reset;
-        self.adopt(next, |running| running.set_value(key, value).map(|_| ()), waits)
+        self.adopt(
+            next,
+            |running| running.set_value(key, value).map(|_| ()),
+            waits,
+        )
     }
 
     fn adopt(
@@ -649,13 +804,20 @@ impl Simulation {
         if contact.clearance == 0.0 {
             return;
         }
-        let Self { mechanism, state, .. } = self;
+        let Self {
+            mechanism, state, ..
+        } = self;
         mechanism.measure(state.t, &state.y);
         let now = mechanism.contacts.clearance(j);
         let gap = mechanism.contacts.gaps()[j];
         let distance = gap.penetration + now;
         let clearance = if contact.clearance < now && distance > contact.clearance {
-            let ramp = Ramp { start: state.t, from: now, rate: -CLEARANCE_SPEED, to: contact.clearance };
+            let ramp = Ramp {
+                start: state.t,
+                from: now,
+                rate: -CLEARANCE_SPEED,
+                to: contact.clearance,
+            };
             state.ramps[j] = Some(ramp);
             now
         } else {
@@ -673,14 +835,21 @@ impl Simulation {
     /// When the first clearance under way arrives, s.
     fn ramp_end(&self) -> f64 {
         let end = |r: &Ramp| r.start + (r.to - r.from) / r.rate;
-        self.state.ramps.iter().flatten().map(end).fold(f64::INFINITY, f64::min)
+        self.state
+            .ramps
+            .iter()
+            .flatten()
+            .map(end)
+            .fold(f64::INFINITY, f64::min)
     }
 
     fn finish_ramps(&mut self) {
         let t = self.state.t;
         let mut finished = false;
         for j in 0..self.state.ramps.len() {
-            let Some(ramp) = self.state.ramps[j] else { continue };
+            let Some(ramp) = self.state.ramps[j] else {
+                continue;
+            };
             if t >= ramp.start + (ramp.to - ramp.from) / ramp.rate {
                 self.state.ramps[j] = None;
                 self.state.clearances[j] = ramp.to;
@@ -706,7 +875,11 @@ impl Simulation {
 
     /// The whole state.
     pub fn snapshot(&self) -> Snapshot {
-        Snapshot { scene: self.scene.clone(), running: self.running.clone(), state: self.state.clone() }
+        Snapshot {
+            scene: self.scene.clone(),
+            running: self.running.clone(),
+            state: self.state.clone(),
+        }
     }
 
     /// Goes back to a state that this simulation, or another of the same scene, was in. Resuming gives the same bits.
@@ -721,7 +894,10 @@ impl Simulation {
             fresh.mechanism.contacts.set_ramp(j, fresh.state.ramps[j]);
             let contact = fresh.running.ball_joints[j].contact;
             if contact.clearance > 0.0 {
-                fresh.mechanism.contacts.set_parameters(j, &contact, fresh.state.clearances[j]);
+                fresh
+                    .mechanism
+                    .contacts
+                    .set_parameters(j, &contact, fresh.state.clearances[j]);
             }
         }
         // The interpolant of the step before is not part of a state.
@@ -758,6 +934,11 @@ impl Simulation {
         hash
     }
 
+    /// Coordinates, then velocities, as the formulation orders them.
+    pub fn state(&self) -> &[f64] {
+        &self.state.y
+    }
+
     /// Contact memory of ball joint `j`: whether it is in contact, with which approach speed.
     pub fn contact_memory(&self, j: usize) -> Memory {
         self.state.memory[j]
@@ -765,11 +946,18 @@ impl Simulation {
 }
 
 fn switching_of(scene: &Scene) -> Switching {
-    if scene.solver.method.is_adaptive() { Switching::Located } else { Switching::Immediate }
+    if scene.solver.method.is_adaptive() {
+        Switching::Located
+    } else {
+        Switching::Immediate
+    }
 }
 
 fn store_gaps(mechanism: &Mechanism, out: &mut [Approach]) {
     for (out, gap) in out.iter_mut().zip(mechanism.contacts.gaps()) {
-        *out = Approach { penetration: gap.penetration, rate: gap.rate };
+        *out = Approach {
+            penetration: gap.penetration,
+            rate: gap.rate,
+        };
     }
 }

@@ -47,7 +47,16 @@ impl Stepper for AnyStepper {
         each!(self, s => s.ends_with_derivative())
     }
 
-    fn interpolate(&self, theta: f64, h: f64, y: &[f64], k: &[f64], y_end: &[f64], k_end: &[f64], out: &mut [f64]) {
+    fn interpolate(
+        &self,
+        theta: f64,
+        h: f64,
+        y: &[f64],
+        k: &[f64],
+        y_end: &[f64],
+        k_end: &[f64],
+        out: &mut [f64],
+    ) {
         each!(self, s => s.interpolate(theta, h, y, k, y_end, k_end, out));
     }
 }

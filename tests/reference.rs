@@ -1,0 +1,260 @@
+//! The numbers of the contract: anchors, reference trajectories, and agreement between the two formulations.
+
+use jointplay::scene::Scene;
+use jointplay::simulate::{Frame, Simulation};
+
+fn scene(name: &str, changes: &[(&str, &str)]) -> Scene {
+    let changes: Vec<(String, String)> = changes
+        .iter()
+        .map(|(k, v)| ((*k).to_owned(), (*v).to_owned()))
+        .collect();
+    Scene::load(name, &changes).unwrap()
+}
+
+fn simulation(name: &str, changes: &[(&str, &str)]) -> Simulation {
+    Simulation::new(&scene(name, changes)).unwrap()
+}
+
+/// Rows of `shared/reference`-style files: 16 columns.
+fn reference(file: &str) -> Vec<[f64; 16]> {
+    let path = format!("{}/tests/reference/{file}", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(path).unwrap();
+    text.lines()
+        .skip(1)
+        .map(|line| {
+            let mut row = [0.0; 16];
+            for (slot, field) in row.iter_mut().zip(line.split(',')) {
+                *slot = field.parse().unwrap();
+            }
+            row
+        })
+        .collect()
+}
+
+fn compare(file: &str, changes: &[(&str, &str)]) -> (f64, f64) {
+    let mut changes = changes.to_vec();
+    changes.push(("solver.tolerance", "1e-11"));
+    let mut simulation = simulation("spcmm", &changes);
+    let mut frame = Frame::default();
+    let (mut early, mut late) = (0.0_f64, 0.0_f64);
+    for row in reference(file) {
+        simulation.advance_to(row[0]).unwrap();
+        simulation.sample(row[0], &mut frame);
+        let error = (0..3)
+            .map(|i| (frame.pose.position[i] - row[1 + i]).abs())
+            .fold(0.0, f64::max);
+        if row[0] <= 0.012 {
+            early = early.max(error);
+        }
+        late = late.max(error);
+    }
+    (early, late)
+}
+
+#[test]
+fn positions_follow_the_reference_trajectories() {
+    let cases: [(&str, &[(&str, &str)]); 2] = [
+        ("spcmm_c0.30_cf0.15_ce0.90_centres.csv", &[]),
+        (
+            "spcmm_c0.50_cf0.20_ce0.90_surface.csv",
+            &[
+                ("contact.clearance", "0.5 mm"),
+                ("contact.friction", "0.2"),
+                ("contact.friction_velocity", "surface"),
+            ],
+        ),
+    ];
+    for (file, changes) in cases {
+        let (early, late) = compare(file, changes);
+        println!("{file}: {early:.2e} m to 12 ms, {late:.2e} m to 20 ms");
+        assert!(early < 1e-7, "{file}: {early:e} m up to 12 ms");
+        assert!(late < 1e-6, "{file}: {late:e} m up to 20 ms");
+    }
+}
+
+#[test]
+fn ideal_reactions_are_the_anchors() {
+    let mut simulation = simulation("spcmm", &[("contact.clearance", "0")]);
+    let mut frame = Frame::default();
+    let anchors = [
+        (0.0, [8.28797785, 8.5687895, 2.83010815]),
+        (0.5, [7.83492554, 7.20329026, 3.07470177]),
+    ];
+    for (time, expected) in anchors {
+        simulation.advance_to(time).unwrap();
+        simulation.sample(time, &mut frame);
+        for (joint, expected) in frame.joints.iter().zip(expected) {
+            assert!(
+                (joint.normal_force.norm() - expected).abs() < 1e-7,
+                "{time}: {}",
+                joint.normal_force.norm()
+            );
+            assert!(
+                joint.eccentricity.norm() < 1e-14,
+                "{:e}",
+                joint.eccentricity.norm()
+            );
+        }
+    }
+}
+
+#[test]
+fn first_impacts_have_the_anchors_speeds_and_peaks() {
+    let mut simulation = simulation("spcmm", &[("solver.tolerance", "1e-9")]);
+    // (joint, start, approach speed, peak): `physics.md` section 5.
+    let expected = [
+        (0, 7.801422908e-3, 0.07690900, 621.35),
+        (1, 7.807677416e-3, 0.07687389, 560.67),
+        (2, 7.807810294e-3, 0.07682235, 533.36),
+        (1, 10.01967e-3, 0.06366, 870.58),
+        (0, 10.50063e-3, 0.07533, 771.13),
+        (2, 12.38051e-3, 0.04730, 321.29),
+    ];
+    let mut found: Vec<(usize, f64, f64, f64)> = Vec::new();
+    let mut open: [Option<usize>; 3] = [None; 3];
+    let mut peaks = Vec::new();
+    while simulation.time() < 0.013 {
+        simulation.step().unwrap();
+        simulation.take_peaks(&mut peaks);
+        for j in 0..3 {
+            if peaks[j].impacts > 0 {
+                open[j] = Some(found.len());
+                found.push((j, simulation.time(), peaks[j].approach_speed, 0.0));
+            }
+            if let Some(at) = open[j] {
+                found[at].3 = found[at].3.max(peaks[j].normal);
+            }
+            if !simulation.contact_memory(j).active {
+                open[j] = None;
+            }
+        }
+    }
+    assert!(found.len() >= expected.len());
+    for (got, want) in found.iter().zip(expected) {
+        assert_eq!(got.0, want.0);
+        assert!(
+            (got.1 - want.1).abs() < 2e-8,
+            "start {got:?} against {want:?}"
+        );
+        assert!(
+            (got.2 / want.2 - 1.0).abs() < 1e-3,
+            "speed {got:?} against {want:?}"
+        );
+        assert!(
+            (got.3 / want.3 - 1.0).abs() < 5e-4,
+            "peak {got:?} against {want:?}"
+        );
+    }
+}
+
+#[test]
+fn both_formulations_agree_over_the_first_ten_milliseconds() {
+    let changes = [("solver.tolerance", "1e-9")];
+    let mut tree = simulation("spcmm", &changes);
+    let mut lagrange = simulation("spcmm", &[changes[0], ("formulation", "lagrange")]);
+    let (mut a, mut b) = (Frame::default(), Frame::default());
+    let mut worst = 0.0_f64;
+    for n in 0..=100 {
+        let t = f64::from(n) * 1e-4;
+        tree.advance_to(t).unwrap();
+        lagrange.advance_to(t).unwrap();
+        tree.sample(t, &mut a);
+        lagrange.sample(t, &mut b);
+        worst = worst.max((a.pose.position - b.pose.position).amax());
+        let actuators = a
+            .actuators
+            .iter()
+            .zip(&b.actuators)
+            .map(|(x, y)| (x - y).abs())
+            .fold(0.0, f64::max);
+        assert!(
+            actuators < 1e-2 * (1.0 + a.actuators[0].abs()),
+            "{t}: {:?} {:?}",
+            a.actuators,
+            b.actuators
+        );
+    }
+    println!(
+        "formulations differ by {worst:.2e} m, drift {:.2e}",
+        lagrange.statistics().constraint_drift
+    );
+    assert!(worst < 1e-7, "{worst:e}");
+}
+
+#[test]
+fn settled_contact_carries_the_ideal_reaction() {
+    let mut play = simulation("spcmm", &[]);
+    let mut ideal = simulation("spcmm", &[("contact.clearance", "0")]);
+    let (mut a, mut b) = (Frame::default(), Frame::default());
+    for (from, to) in [(0.3, 0.4), (1.0, 1.2)] {
+        let (mut force, mut reaction) = ([0.0; 3], [0.0; 3]);
+        for n in 0..=1000 {
+            let t = from + (to - from) * f64::from(n) / 1000.0;
+            play.advance_to(t).unwrap();
+            ideal.advance_to(t).unwrap();
+            play.sample(t, &mut a);
+            ideal.sample(t, &mut b);
+            for j in 0..3 {
+                force[j] += (a.joints[j].normal_force + a.joints[j].friction_force).norm();
+                reaction[j] += b.joints[j].normal_force.norm();
+            }
+        }
+        for j in 0..3 {
+            let ratio = force[j] / reaction[j];
+            println!("{from}-{to} s, joint {j}: settled over ideal {ratio:.5}");
+            assert!(
+                (ratio - 1.0).abs() < 0.01,
+                "{from}-{to} s, joint {j}: {ratio}"
+            );
+        }
+    }
+}
+
+#[test]
+fn free_slider_crank_passes_through_its_anchors_and_keeps_its_energy() {
+    let mut simulation = simulation(
+        "slider-crank",
+        &[
+            ("contact.clearance", "0"),
+            ("joint.C.clearance", "0"),
+            ("solver.tolerance", "1e-10"),
+        ],
+    );
+    let mut frame = Frame::default();
+    simulation.sample(0.0, &mut frame);
+    let energy = frame.kinetic + frame.potential;
+    let crank = simulation
+        .scene()
+        .bodies
+        .iter()
+        .position(|b| b.name == "crank")
+        .unwrap();
+    let slider = simulation
+        .scene()
+        .bodies
+        .iter()
+        .position(|b| b.name == "slider")
+        .unwrap();
+    for (time, theta, theta_rate, x) in [
+        (0.1, 0.55187518, None, 0.22636019),
+        (0.2, 1.23040441, Some(8.77212174), 0.26052243),
+    ] {
+        simulation.advance_to(time).unwrap();
+        simulation.sample(time, &mut frame);
+        let r = frame.bodies[crank].rotation;
+        let angle = libm::atan2(r[(2, 1)], r[(1, 1)]);
+        assert!((angle - theta).abs() < 1e-7, "{time}: {angle}");
+        assert!(
+            (frame.bodies[slider].position.x - x).abs() < 1e-7,
+            "{time}: {}",
+            frame.bodies[slider].position.x
+        );
+        if let Some(rate) = theta_rate {
+            assert!((frame.bodies[crank].angular_velocity.x - rate).abs() < 1e-6);
+        }
+        assert!(
+            (frame.kinetic + frame.potential - energy).abs() < 1e-8,
+            "{time}"
+        );
+    }
+}

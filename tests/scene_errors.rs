@@ -1,0 +1,729 @@
+//! Whatever is wrong with a scene, the error names the place, the key, the value, and what is allowed.
+
+use jointplay::scene::{BUILT_IN, Scene, SceneError};
+
+/// A scene of one rod on one ball joint; the cases below break one line of it.
+const GOOD: &str = r#"name = "test"
+start = "as-given"
+[contact]
+clearance = "0.3 mm"
+friction = 0.15
+[[body]]
+name = "rod"
+mass = "0.384 kg"
+inertia = "1.92e-3 1.92e-3 1.58e-5 kg m^2"
+shapes = [{ form = "sphere", centre = "0 0 1 mm", radius = "4 mm", role = "driven-rod" }]
+[[joint]]
+name = "free"
+kind = "free"
+child = "rod"
+start = { position = [0, 0, "-100 mm"] }
+[[ball_joint]]
+name = "S1"
+socket = { body = "world" }
+ball = { body = "rod", at = "0 0 100 mm" }
+restitution = 0.9
+"#;
+
+fn parse(text: &str) -> Result<Scene, SceneError> {
+    Scene::parse(text, Some("my.toml"), &[])
+}
+
+/// Checks that `error` holds every fragment.
+fn holds(case: &str, error: &SceneError, fragments: &[&str]) {
+    let text = error.to_string();
+    for fragment in fragments {
+        assert!(
+            text.contains(fragment),
+            "{case}\n  should say `{fragment}`, says:\n{text}"
+        );
+    }
+}
+
+#[test]
+fn the_unbroken_scene_is_read() {
+    let scene = parse(GOOD).unwrap();
+    assert_eq!(scene.bodies[0].mass, 0.384);
+    assert_eq!(scene.ball_joints[0].overrides, ["restitution"]);
+}
+
+#[test]
+fn every_broken_line_is_named_with_its_remedy() {
+    // (line as it should be, line as written, what the error must say)
+    let cases: &[(&str, &str, &[&str])] = &[
+        (
+            "friction = 0.15",
+            "fricton = 0.15",
+            &[
+                "my.toml:5:1",
+                "contact.fricton",
+                "unknown key",
+                "did you mean `friction`",
+            ],
+        ),
+        (
+            "mass = \"0.384 kg\"",
+            "mas = \"0.384 kg\"",
+            &["my.toml:8:1", "body.rod.mas", "did you mean `mass`"],
+        ),
+        (
+            "clearance = \"0.3 mm\"",
+            "clearance = \"0.3 kg\"",
+            &[
+                "my.toml:4:13",
+                "contact.clearance = \"0.3 kg\"",
+                "wrong unit `kg` (a unit of mass)",
+                "m, cm, mm, um",
+                "0 mm to below the ball radius",
+            ],
+        ),
+        (
+            "clearance = \"0.3 mm\"",
+            "clearance = 0.3",
+            &[
+                "my.toml:4:13",
+                "contact.clearance = 0.3",
+                "needs a unit",
+                "mm",
+            ],
+        ),
+        (
+            "clearance = \"0.3 mm\"",
+            "clearance = \"-1 mm\"",
+            &[
+                "my.toml:4:13",
+                "contact.clearance = \"-1 mm\"",
+                "out of range",
+                "0 mm to below the ball radius",
+                "units m",
+            ],
+        ),
+        (
+            "clearance = \"0.3 mm\"",
+            "clearance = nan",
+            &["my.toml:4:13", "contact.clearance = nan", "finite"],
+        ),
+        (
+            "clearance = \"0.3 mm\"",
+            "clearance = \"inf mm\"",
+            &["my.toml:4:13", "finite"],
+        ),
+        (
+            "clearance = \"0.3 mm\"",
+            "clearance = \"12 mm\"",
+            &[
+                "my.toml:4:13",
+                "contact.clearance = \"12 mm\"",
+                "below the ball radius, 10 mm",
+                "mm, um",
+            ],
+        ),
+        (
+            "clearance = \"0.3 mm\"",
+            "clearance = \"10 mm\"",
+            &["my.toml:4:13", "below the ball radius"],
+        ),
+        (
+            "clearance = \"0.3 mm\"",
+            "clearance = true",
+            &["my.toml:4:13", "must be a number or a text, not a boolean"],
+        ),
+        (
+            "friction = 0.15",
+            "friction = inf",
+            &[
+                "my.toml:5:12",
+                "contact.friction = inf",
+                "finite",
+                "0 to 10",
+            ],
+        ),
+        (
+            "friction = 0.15",
+            "friction = \"0.15 mm\"",
+            &["my.toml:5:12", "pure number"],
+        ),
+        (
+            "friction = 0.15",
+            "friction = 11",
+            &["my.toml:5:12", "contact.friction = 11", "allowed 0 to 10"],
+        ),
+        (
+            "friction = 0.15",
+            "normal_law = \"herz\"",
+            &[
+                "my.toml:5:14",
+                "contact.normal_law",
+                "did you mean `hertz`",
+                "lankarani-nikravesh",
+            ],
+        ),
+        (
+            "restitution = 0.9",
+            "clearance = \"12 mm\"",
+            &[
+                "my.toml:20:13",
+                "joint.S1.clearance = \"12 mm\"",
+                "below the ball radius, 10 mm",
+            ],
+        ),
+        (
+            "restitution = 0.9",
+            "ball_radius = \"0.2 mm\"",
+            &[
+                "my.toml:20:15",
+                "joint.S1.ball_radius",
+                "below the ball radius, 0.2 mm",
+            ],
+        ),
+        (
+            "restitution = 0.9",
+            "restitution = 0\nnormal_law = \"flores\"",
+            &[
+                "my.toml:20:15",
+                "joint.S1.restitution = 0",
+                "flores divides by",
+                "above 0 to 1",
+            ],
+        ),
+        (
+            "restitution = 0.9",
+            "slip_speed_low = \"1 mm/s\"",
+            &[
+                "my.toml:20:18",
+                "joint.S1.slip_speed_low",
+                "below slip_speed_high 0.1 mm/s",
+            ],
+        ),
+        (
+            "restitution = 0.9",
+            "gap = 1",
+            &["my.toml:20:1", "joint.S1.gap", "unknown key", "clearance"],
+        ),
+        (
+            "mass = \"0.384 kg\"",
+            "mass = 0",
+            &["my.toml:8:8", "body.rod.mass = 0", "above 0", "kg"],
+        ),
+        (
+            "mass = \"0.384 kg\"",
+            "mass = \"-2 kg\"",
+            &["my.toml:8:8", "body.rod.mass = \"-2 kg\"", "above 0"],
+        ),
+        (
+            "mass = \"0.384 kg\"\n",
+            "",
+            &["my.toml:6:1", "body.rod.mass", "missing", "0.384 kg"],
+        ),
+        (
+            "inertia = \"1.92e-3 1.92e-3 1.58e-5 kg m^2\"",
+            "inertia = \"1e-3 1e-3 3e-3 kg m^2\"",
+            &[
+                "my.toml:9:11",
+                "body.rod.inertia",
+                "no body has this inertia",
+                "0.003 kg m^2",
+                "0.002 kg m^2",
+            ],
+        ),
+        (
+            "inertia = \"1.92e-3 1.92e-3 1.58e-5 kg m^2\"",
+            "inertia = \"1e-3 1e-3 0 kg m^2\"",
+            &["body.rod.inertia", "above 0"],
+        ),
+        (
+            "inertia = \"1.92e-3 1.92e-3 1.58e-5 kg m^2\"",
+            "inertia = \"1e-3 1e-3 1e-3 kg m^2\"\nproducts = \"2e-3 0 0 kg m^2\"",
+            &[
+                "body.rod.inertia",
+                "no body has this inertia",
+                "-0.001 kg m^2",
+            ],
+        ),
+        (
+            "inertia = \"1.92e-3 1.92e-3 1.58e-5 kg m^2\"",
+            "inertia = \"1e-3 1e-3 kg m^2\"",
+            &[
+                "my.toml:9:11",
+                "body.rod.inertia",
+                "needs 3 numbers",
+                "has 2 numbers",
+            ],
+        ),
+        (
+            "inertia = \"1.92e-3 1.92e-3 1.58e-5 kg m^2\"",
+            "inertia = [\"1e-3 kg m^2\", \"1e-3 kg m^2\"]",
+            &["needs 3 values, has 2"],
+        ),
+        (
+            "form = \"sphere\"",
+            "form = \"shere\"",
+            &["my.toml:10:20", "did you mean `sphere`"],
+        ),
+        (
+            "radius = \"4 mm\"",
+            "radius = \"-4 mm\"",
+            &["body.rod.shapes[0].radius", "above 0"],
+        ),
+        (
+            "centre = \"0 0 1 mm\"",
+            "size = \"1 1 1 mm\"",
+            &["body.rod.shapes[0].size", "a sphere has centre, radius"],
+        ),
+        (
+            "role = \"driven-rod\"",
+            "role = \"rod\"",
+            &["body.rod.shapes[0].role", "driven-rod"],
+        ),
+        (
+            "kind = \"free\"",
+            "kind = \"ball\"",
+            &[
+                "my.toml:13:8",
+                "joint.free.kind = \"ball\"",
+                "fixed, prismatic, revolute, free",
+            ],
+        ),
+        (
+            "kind = \"free\"",
+            "kind = \"revolute\"\naxis = [0, 0, 0]",
+            &["my.toml:", "joint.free"],
+        ),
+        (
+            "child = \"rod\"",
+            "child = \"rot\"",
+            &[
+                "my.toml:14:9",
+                "joint.free.child = \"rot\"",
+                "no body `rot`",
+                "did you mean `rod`",
+            ],
+        ),
+        (
+            "start = { position = [0, 0, \"-100 mm\"] }\n",
+            "",
+            &["my.toml:11:1", "joint.free.start", "missing"],
+        ),
+        (
+            "start = { position = [0, 0, \"-100 mm\"] }",
+            "start = { position = [0, 0, \"-100 s\"] }",
+            &[
+                "my.toml:15:29",
+                "joint.free.start.position[2]",
+                "wrong unit `s`",
+            ],
+        ),
+        (
+            "start = { position = [0, 0, \"-100 mm\"] }",
+            "start = { position = [0, 0] }",
+            &["joint.free.start.position", "needs 3 values, has 2"],
+        ),
+        (
+            "socket = { body = \"world\" }",
+            "socket = { body = \"wold\" }",
+            &[
+                "my.toml:18:19",
+                "joint.S1.socket.body = \"wold\"",
+                "no body `wold`",
+                "did you mean `world`",
+            ],
+        ),
+        (
+            "socket = { body = \"world\" }",
+            "socket = { body = \"rod\" }",
+            &["joint.S1.ball", "same body"],
+        ),
+        (
+            "socket = { body = \"world\" }\n",
+            "",
+            &["my.toml:16:1", "joint.S1.socket", "missing"],
+        ),
+        (
+            "name = \"S1\"",
+            "name = \"S.1\"",
+            &["my.toml:17:8", "joint.S.1.name", "is not a name"],
+        ),
+        (
+            "name = \"S1\"",
+            "name = \"free\"",
+            &["my.toml:17:8", "already a joint of this name, in line 12"],
+        ),
+        (
+            "start = \"as-given\"",
+            "start = \"idea\"",
+            &["my.toml:2:9", "did you mean `ideal`"],
+        ),
+        (
+            "start = \"as-given\"",
+            "formulation = \"trees\"",
+            &[
+                "my.toml:2:15",
+                "formulation = \"trees\"",
+                "did you mean `tree`",
+            ],
+        ),
+        (
+            "start = \"as-given\"",
+            "chain.links = 0",
+            &["my.toml:2:15", "chain.links = 0", "allowed 1 to 4096"],
+        ),
+        (
+            "start = \"as-given\"",
+            "chain.links = 2.5",
+            &["chain.links = 2.5", "whole number"],
+        ),
+        (
+            "start = \"as-given\"",
+            "gravity.z = \"9.81 m/s\"",
+            &[
+                "my.toml:2:13",
+                "gravity.z",
+                "wrong unit `m/s` (a unit of speed)",
+            ],
+        ),
+        (
+            "start = \"as-given\"",
+            "solver.step = \"1 s\"",
+            &["solver.step = \"1 s\"", "0.1 us to 10000 us"],
+        ),
+        (
+            "start = \"as-given\"",
+            "view.down = \"down\"",
+            &["view.down", "+x, -x, +y, -y, +z, -z"],
+        ),
+        (
+            "start = \"as-given\"",
+            "output.body = \"rop\"",
+            &[
+                "my.toml:2:15",
+                "output.body = \"rop\"",
+                "did you mean `rod`",
+            ],
+        ),
+        (
+            "start = \"as-given\"",
+            "start = ",
+            &["my.toml:2:", "not valid TOML"],
+        ),
+        ("[contact]", "[contact", &["my.toml:3:", "not valid TOML"]),
+        (
+            "friction = 0.15",
+            "clearance = 0",
+            &["my.toml:5:1", "duplicate key"],
+        ),
+        (
+            "[contact]",
+            "[contacts]",
+            &["my.toml:3:2", "contacts", "did you mean `contact`"],
+        ),
+    ];
+    for (good, bad, fragments) in cases {
+        assert!(GOOD.contains(good), "the case `{good}` breaks nothing");
+        match parse(&GOOD.replacen(good, bad, 1)) {
+            Ok(_) => panic!("`{bad}` was accepted"),
+            Err(error) => holds(bad, &error, fragments),
+        }
+    }
+}
+
+#[test]
+fn additions_that_contradict_the_scene_are_refused() {
+    let body = "[[body]]\nname = \"arm\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n";
+    let cases: &[(&str, &[&str])] = &[
+        (
+            "[[body]]\nname = \"rod\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n",
+            &["my.toml:22:8", "already a body of this name, in line 7"],
+        ),
+        (
+            body,
+            &[
+                "my.toml:21:1",
+                "body.arm",
+                "no [[joint]] has this body as its child",
+                "ball_joint",
+            ],
+        ),
+        (
+            "[[joint]]\nname = \"again\"\nkind = \"free\"\nchild = \"rod\"\nstart = { position = \"0 0 0 m\" }\n",
+            &[
+                "my.toml:24:9",
+                "joint.again.child",
+                "already hangs on joint `free`",
+                "[[ball_joint]]",
+            ],
+        ),
+        (
+            &format!(
+                "{body}[[joint]]\nname = \"hinge\"\nkind = \"revolute\"\nparent = \"arm\"\nchild = \"arm\"\naxis = [0, 0, 1]\n"
+            ),
+            &["joint.hinge.parent", "circle", "[[ball_joint]]"],
+        ),
+        (
+            &format!(
+                "{body}[[joint]]\nname = \"hinge\"\nkind = \"revolute\"\nchild = \"arm\"\naxis = [0, 0, 0]\n"
+            ),
+            &[
+                "my.toml:29:8",
+                "joint.hinge.axis = [0, 0, 0]",
+                "must not be zero",
+            ],
+        ),
+        (
+            &format!("{body}[[joint]]\nname = \"hinge\"\nkind = \"revolute\"\nchild = \"arm\"\n"),
+            &["my.toml:25:1", "joint.hinge.axis", "missing"],
+        ),
+        (
+            &format!(
+                "{body}[[joint]]\nname = \"slide\"\nkind = \"prismatic\"\nchild = \"arm\"\ndrive = {{ law = \"spcmm\", slider = 1 }}\n"
+            ),
+            &["joint.slide.drive.law", "[spcmm]"],
+        ),
+        (
+            &format!(
+                "{body}[[joint]]\nname = \"slide\"\nkind = \"prismatic\"\nchild = \"arm\"\naxis = [1, 0, 0]\ndrive = {{ law = \"constant\", velocity = \"6 rad/s\" }}\n"
+            ),
+            &[
+                "joint.slide.drive.velocity = \"6 rad/s\"",
+                "a unit of angular speed",
+            ],
+        ),
+        (
+            &format!(
+                "{body}[[joint]]\nname = \"hinge\"\nkind = \"revolute\"\nchild = \"arm\"\naxis = [1, 0, 0]\nrotation = {{ axis = [1, 0, 0] }}\n"
+            ),
+            &["joint.hinge.rotation.angle", "missing"],
+        ),
+        (
+            &format!(
+                "{body}[[joint]]\nname = \"hinge\"\nkind = \"revolute\"\nchild = \"arm\"\naxis = [1, 0, 0]\nrotation = {{ axis = [1, 0, 0], quaternion = [1, 0, 0, 0] }}\n"
+            ),
+            &["joint.hinge.rotation", "exactly one form"],
+        ),
+    ];
+    for (more, fragments) in cases {
+        match parse(&format!("{GOOD}{more}")) {
+            Ok(_) => panic!("`{more}` was accepted"),
+            Err(error) => holds(more, &error, fragments),
+        }
+    }
+}
+
+#[test]
+fn one_slider_law_drives_one_joint() {
+    let text = jointplay::scene::built_in_text("spcmm").unwrap();
+    let error = parse(&text.replace("slider = 2", "slider = 1")).unwrap_err();
+    holds(
+        "slider twice",
+        &error,
+        &["joint.P2.drive", "slider 1 already drives joint `P1`"],
+    );
+    let error = parse(&text.replace("slider = 2", "slider = 4")).unwrap_err();
+    holds(
+        "slider 4",
+        &error,
+        &["joint.P2.drive.slider = 4", "allowed 1, 2 or 3"],
+    );
+}
+
+#[test]
+fn changes_are_refused_with_key_value_and_range() {
+    let cases: &[(&str, &str, &str, &[&str])] = &[
+        (
+            "spcmm",
+            "contact.clearance",
+            "12 mm",
+            &["contact.clearance = 12 mm", "below the ball radius, 10 mm"],
+        ),
+        (
+            "spcmm",
+            "contact.clearance",
+            "0.3",
+            &["contact.clearance = 0.3", "needs a unit", "mm"],
+        ),
+        (
+            "spcmm",
+            "contact.clearence",
+            "0.3mm",
+            &[
+                "contact.clearence = 0.3mm",
+                "did you mean `contact.clearance`",
+            ],
+        ),
+        (
+            "spcmm",
+            "clearance",
+            "0.3mm",
+            &["did you mean `contact.clearance`"],
+        ),
+        (
+            "spcmm",
+            "joint.S4.clearance",
+            "0.3mm",
+            &["joint.S4.clearance", "no ball joint `S4`", "S1, S2, S3"],
+        ),
+        (
+            "spcmm",
+            "joint.S1.clearence",
+            "0.3mm",
+            &["did you mean `clearance`"],
+        ),
+        (
+            "spcmm",
+            "chain.links",
+            "4",
+            &["chain.links = 4", "has no such key", "chains"],
+        ),
+        (
+            "chain",
+            "chain.links",
+            "-4",
+            &["chain.links = -4", "allowed 1 to 4096"],
+        ),
+        (
+            "pendulum",
+            "spcmm.frequency",
+            "1 Hz",
+            &["has no such key", "inverse kinematics"],
+        ),
+        (
+            "spcmm",
+            "spcmm.frequency",
+            "51 Hz",
+            &["allowed 0 Hz to 50 Hz"],
+        ),
+        (
+            "spcmm",
+            "solver.method",
+            "rk5",
+            &["did you mean `rk4`", "dopri5"],
+        ),
+        ("spcmm", "solver.preset", "", &["preview"]),
+        (
+            "spcmm",
+            "joint.S2.ball_radius",
+            "0.3 mm",
+            &["joint.S2.ball_radius = 0.3 mm", "below the ball radius"],
+        ),
+    ];
+    for (scene, key, value, fragments) in cases {
+        let change = [((*key).to_owned(), (*value).to_owned())];
+        let error = Scene::load(scene, &change).expect_err("a bad change was accepted");
+        assert_eq!(error.position, None, "{error}");
+        holds(&format!("{key}={value}"), &error, fragments);
+        // The same change of a running scene leaves it as it was.
+        let mut live = Scene::load(scene, &[]).unwrap();
+        let before = format!("{live:?}");
+        let error = live.set(key, value).expect_err("a bad change was accepted");
+        holds(&format!("live {key}={value}"), &error, fragments);
+        assert_eq!(format!("{live:?}"), before);
+    }
+}
+
+#[test]
+fn what_is_no_scene_file_at_all_is_said_plainly() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let write = |name: &str, bytes: &[u8]| {
+        std::fs::write(path(name), bytes).unwrap();
+        path(name)
+    };
+    let load = |name: &str| Scene::load(name, &[]).expect_err("this is no scene");
+
+    let empty = write("empty.toml", b" \n");
+    holds("empty", &load(&empty), &[&empty, "the file is empty"]);
+    let only_text = write("comment.toml", b"# nothing\n");
+    holds("no body", &load(&only_text), &["at least one [[body]]"]);
+    let junk = write("junk.toml", b"name = \"x\"\n\x7fELF\xff\xfe\x00");
+    holds(
+        "binary",
+        &load(&junk),
+        &["junk.toml:2:5", "not valid UTF-8"],
+    );
+    let zeros = write("zeros.toml", &[0; 4096]);
+    holds("zeros", &load(&zeros), &["zeros.toml:1:", "not valid TOML"]);
+    let huge = write("huge.toml", &vec![b'#'; (4 << 20) + 1]);
+    holds("huge", &load(&huge), &["too large", "4 MiB"]);
+    let deep = write(
+        "deep.toml",
+        format!("a = {}", "[".repeat(100_000)).as_bytes(),
+    );
+    holds("deep", &load(&deep), &["deep.toml:1:", "not valid TOML"]);
+
+    let directory = format!("{}/", folder.path().to_str().unwrap());
+    let error = load(&directory);
+    assert!(error.unreadable);
+    holds("directory", &error, &["is a directory"]);
+    let error = load(&path("missing.toml"));
+    assert!(error.unreadable);
+    holds("missing", &error, &["missing.toml", "cannot read"]);
+    let error = load("spcm");
+    assert!(!error.unreadable);
+    holds(
+        "misspelt",
+        &error,
+        &[
+            "no built-in scene `spcm`",
+            "did you mean `spcmm`",
+            "pendulum",
+        ],
+    );
+    holds(
+        "misspelt file",
+        &load("slider-crnk.toml"),
+        &["did you mean `slider-crank`"],
+    );
+}
+
+#[test]
+fn a_file_works_wherever_a_built_in_name_does() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in BUILT_IN {
+        let path = folder
+            .path()
+            .join(format!("{name}.toml"))
+            .to_str()
+            .unwrap()
+            .to_owned();
+        std::fs::write(&path, jointplay::scene::built_in_text(name).unwrap()).unwrap();
+        let (from_file, built_in) = (
+            Scene::load(&path, &[]).unwrap(),
+            Scene::load(name, &[]).unwrap(),
+        );
+        assert_eq!(from_file.bodies, built_in.bodies);
+        assert_eq!(from_file.joints, built_in.joints);
+        assert_eq!(from_file.ball_joints, built_in.ball_joints);
+        assert_eq!(from_file.source.file.as_deref(), Some(path.as_str()));
+    }
+}
+
+#[test]
+fn a_damaged_file_never_panics_and_its_error_has_a_place() {
+    for name in BUILT_IN {
+        let text = jointplay::scene::built_in_text(name).unwrap();
+        let lines: Vec<&str> = text.lines().collect();
+        for skipped in 0..lines.len() {
+            let without = [&lines[..skipped], &lines[skipped + 1..]]
+                .concat()
+                .join("\n");
+            let doubled = [&lines[..=skipped], &lines[skipped..]].concat().join("\n");
+            // A number where a text was, a text where a number was.
+            let swapped = text.replacen(lines[skipped], &lines[skipped].replace(['"', '{'], ""), 1);
+            for damaged in [without, doubled, swapped] {
+                if let Err(error) = parse(&damaged) {
+                    assert!(
+                        error.position.is_some(),
+                        "{name}, line {}: {error}",
+                        skipped + 1
+                    );
+                    assert_eq!(error.file.as_deref(), Some("my.toml"));
+                }
+            }
+        }
+        for end in (0..text.len()).step_by(101) {
+            let cut = &text[..text.floor_char_boundary(end)];
+            if let Err(error) = parse(cut) {
+                assert!(error.position.is_some(), "{name} cut at {end}: {error}");
+            }
+        }
+    }
+}
