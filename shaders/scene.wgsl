@@ -149,7 +149,7 @@ fn place(in: Vertex) -> Surface {
     let base = to_linear(in.colour.rgb);
     let colour = shade(base, in.surface.x, in.surface.y, n, v, lit(in.world, n));
     let flash = to_linear(globals.flash.rgb) * (0.75 + 0.5 * (1.0 - max(dot(n, v), 0.0)));
-    return finish(mix(colour, flash, 0.8 * in.surface.z), in.clip.xy, 1.0);
+    return finish(mix(colour, flash, 0.45 * in.surface.z), in.clip.xy, 1.0);
 }
 
 // Marks keep their colour: only enough shading to show their form.
@@ -164,7 +164,14 @@ fn mark(in: Surface) -> vec3<f32> {
 }
 
 @fragment fn fs_mark_behind(in: Surface) -> @location(0) vec4<f32> {
-    return finish(mark(in), in.clip.xy, 0.5);
+    return finish(mark(in), in.clip.xy, 0.6);
+}
+
+// Light about a joint that was hit: strongest round the socket, gone at its own edge.
+@fragment fn fs_halo(in: Surface) -> @location(0) vec4<f32> {
+    let facing = max(dot(normalize(in.normal), normalize(globals.eye.xyz - in.world)), 0.0);
+    let opacity = in.surface.z * facing * facing * (1.0 - 0.55 * facing);
+    return finish(to_linear(globals.flash.rgb) * 1.15, in.clip.xy, min(1.5 * opacity, 0.8));
 }
 
 @fragment fn fs_socket(in: Surface, @builtin(front_facing) front: bool) -> @location(0) vec4<f32> {
@@ -177,8 +184,8 @@ fn mark(in: Surface) -> vec3<f32> {
     let colour = shade(base, in.surface.x, in.surface.y, n, v, 1.0) + rim * 0.15;
     let flash = to_linear(globals.flash.rgb);
     let glow = in.surface.z;
-    let opacity = mix(in.colour.a + 0.45 * rim, 0.72, cut);
-    return finish(mix(colour, flash, 0.85 * glow), in.clip.xy, min(opacity + 0.35 * glow, 0.95));
+    let opacity = in.colour.a * mix(1.0 + 2.25 * rim, 3.6, cut);
+    return finish(mix(colour, flash, 0.6 * glow), in.clip.xy, min(opacity + 0.35 * glow, 0.95));
 }
 
 // ---- background
@@ -232,7 +239,7 @@ fn grid(plane: vec2<f32>, spacing: f32, width: f32) -> f32 {
     let light = mix(0.55, 1.0, lit(in.world, globals.up.xyz));
     let plane = to_linear(globals.floor_colour.rgb) * light;
     let lines = to_linear(globals.floor_lines.rgb) * light;
-    let colour = mix(plane, lines, max(0.35 * thin, 0.7 * thick));
+    let colour = mix(plane, lines, max(0.25 * thin, 0.6 * thick));
     return finish(colour, in.clip.xy, fade * select(0.3, 1.0, above));
 }
 

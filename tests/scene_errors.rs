@@ -74,7 +74,7 @@ fn every_broken_line_is_named_with_its_remedy() {
                 "contact.clearance = \"0.3 kg\"",
                 "wrong unit `kg` (a unit of mass)",
                 "m, cm, mm, um",
-                "0 mm to",
+                "0 mm to below the ball radius",
             ],
         ),
         (
@@ -94,7 +94,7 @@ fn every_broken_line_is_named_with_its_remedy() {
                 "my.toml:4:13",
                 "contact.clearance = \"-1 mm\"",
                 "out of range",
-                "0 mm to",
+                "0 mm to below the ball radius",
                 "units m",
             ],
         ),
@@ -243,7 +243,12 @@ fn every_broken_line_is_named_with_its_remedy() {
         (
             "inertia = \"1.92e-3 1.92e-3 1.58e-5 kg m^2\"",
             "inertia = \"1e-3 1e-3 kg m^2\"",
-            &["my.toml:9:11", "body.rod.inertia"],
+            &[
+                "my.toml:9:11",
+                "body.rod.inertia",
+                "needs 3 numbers",
+                "has 2 numbers",
+            ],
         ),
         (
             "inertia = \"1.92e-3 1.92e-3 1.58e-5 kg m^2\"",
@@ -320,6 +325,7 @@ fn every_broken_line_is_named_with_its_remedy() {
                 "my.toml:18:19",
                 "joint.S1.socket.body = \"wold\"",
                 "no body `wold`",
+                "did you mean `world`",
             ],
         ),
         (
@@ -503,6 +509,23 @@ fn additions_that_contradict_the_scene_are_refused() {
 }
 
 #[test]
+fn one_slider_law_drives_one_joint() {
+    let text = jointplay::scene::built_in_text("spcmm").unwrap();
+    let error = parse(&text.replace("slider = 2", "slider = 1")).unwrap_err();
+    holds(
+        "slider twice",
+        &error,
+        &["joint.P2.drive", "slider 1 already drives joint `P1`"],
+    );
+    let error = parse(&text.replace("slider = 2", "slider = 4")).unwrap_err();
+    holds(
+        "slider 4",
+        &error,
+        &["joint.P2.drive.slider = 4", "allowed 1, 2 or 3"],
+    );
+}
+
+#[test]
 fn changes_are_refused_with_key_value_and_range() {
     let cases: &[(&str, &str, &str, &[&str])] = &[
         (
@@ -670,5 +693,37 @@ fn a_file_works_wherever_a_built_in_name_does() {
         assert_eq!(from_file.joints, built_in.joints);
         assert_eq!(from_file.ball_joints, built_in.ball_joints);
         assert_eq!(from_file.source.file.as_deref(), Some(path.as_str()));
+    }
+}
+
+#[test]
+fn a_damaged_file_never_panics_and_its_error_has_a_place() {
+    for name in BUILT_IN {
+        let text = jointplay::scene::built_in_text(name).unwrap();
+        let lines: Vec<&str> = text.lines().collect();
+        for skipped in 0..lines.len() {
+            let without = [&lines[..skipped], &lines[skipped + 1..]]
+                .concat()
+                .join("\n");
+            let doubled = [&lines[..=skipped], &lines[skipped..]].concat().join("\n");
+            // A number where a text was, a text where a number was.
+            let swapped = text.replacen(lines[skipped], &lines[skipped].replace(['"', '{'], ""), 1);
+            for damaged in [without, doubled, swapped] {
+                if let Err(error) = parse(&damaged) {
+                    assert!(
+                        error.position.is_some(),
+                        "{name}, line {}: {error}",
+                        skipped + 1
+                    );
+                    assert_eq!(error.file.as_deref(), Some("my.toml"));
+                }
+            }
+        }
+        for end in (0..text.len()).step_by(101) {
+            let cut = &text[..text.floor_char_boundary(end)];
+            if let Err(error) = parse(cut) {
+                assert!(error.position.is_some(), "{name} cut at {end}: {error}");
+            }
+        }
     }
 }

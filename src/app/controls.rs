@@ -43,6 +43,9 @@ impl Controls {
     /// All controls, one under the other.
     pub fn ui(&mut self, ui: &mut Ui, player: &mut Player) {
         let table = player.wanted().parameters();
+        ui.label(RichText::new(&player.scene().title).small().weak())
+            .on_hover_text(&player.scene().description);
+        ui.add_space(2.0);
         for key in FIRST {
             if let Some(parameter) = table.iter().find(|p| p.key == key) {
                 self.control(ui, player, parameter, key);
@@ -312,6 +315,7 @@ impl Controls {
             TextEdit::singleline(&mut text)
                 .desired_width(84.0)
                 .align(egui::Align2::RIGHT_CENTER)
+                .background_color(ui.visuals().faint_bg_color)
                 .margin(egui::Margin::symmetric(6, 3)),
         );
         if response.changed() {

@@ -34,25 +34,28 @@ pub enum Answer {
 pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player) -> Option<Answer> {
     let mut answer = None;
     let widest = (ctx.content_rect().width() - 48.0).min(520.0);
-    let modal = Modal::new(Id::unique("dialog")).show(ctx, |ui| {
-        ui.set_width(widest);
-        let title = match dialog {
-            Dialog::Help => "Keys",
-            Dialog::About => "About Jointplay",
-            Dialog::Open { .. } => "Open a scene file",
-        };
-        ui.heading(title);
-        ui.add_space(6.0);
-        match dialog {
-            Dialog::Help => help(ui),
-            Dialog::About => about(ui, player),
-            Dialog::Open { path, error } => answer = open(ui, path, error.as_deref()),
-        }
-        ui.add_space(8.0);
-        if ui.button("Close").clicked() {
-            answer = Some(Answer::Close);
-        }
-    });
+    let frame = egui::Frame::window(&ctx.global_style());
+    let modal = Modal::new(Id::unique("dialog"))
+        .frame(frame)
+        .show(ctx, |ui| {
+            ui.set_width(widest);
+            let title = match dialog {
+                Dialog::Help => "Keys",
+                Dialog::About => "About Jointplay",
+                Dialog::Open { .. } => "Open a scene file",
+            };
+            ui.heading(title);
+            ui.add_space(6.0);
+            match dialog {
+                Dialog::Help => help(ui),
+                Dialog::About => about(ui, player),
+                Dialog::Open { path, error } => answer = open(ui, path, error.as_deref()),
+            }
+            ui.add_space(8.0);
+            if ui.button("Close").clicked() {
+                answer = Some(Answer::Close);
+            }
+        });
     if modal.should_close() {
         answer = Some(Answer::Close);
     }
@@ -60,6 +63,7 @@ pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player) -> Option<A
 }
 
 fn help(ui: &mut Ui) {
+    ui.spacing_mut().interact_size.y = 18.0;
     let rows = BINDINGS
         .iter()
         .filter(|b| !b.written.is_empty())
@@ -113,10 +117,10 @@ fn open(ui: &mut Ui, path: &mut String, error: Option<&str>) -> Option<Answer> {
             .desired_width(f32::INFINITY)
             .hint_text("scene.toml"),
     );
-    if ui.memory(|memory| memory.focused().is_none()) {
+    let entered = field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
+    if !entered && ui.memory(|memory| memory.focused().is_none()) {
         field.request_focus();
     }
-    let entered = field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
     field.accessible_name("Path");
     if let Some(error) = error {
         ui.label(RichText::new(error).color(ui.visuals().error_fg_color));

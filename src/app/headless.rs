@@ -1,7 +1,5 @@
 //! Pictures of the interface without a window: the same egui code, painted to a texture.
 
-use std::iter::once;
-
 use eframe::egui::{self, Ui, vec2};
 use eframe::egui_wgpu::{
     self, RenderState, RendererOptions, ScreenDescriptor, WgpuConfiguration, WgpuSetup,
@@ -220,6 +218,42 @@ impl Headless {
         size: [u32; 2],
         scale: f32,
     ) -> Result<Image, RenderError> {
+        let (commands, texture) = self.encode(output, size, scale);
+        self.state.queue.submit(commands);
+        self.read_back(&texture, size)
+    }
+
+    /// Everything that one frame of a running window costs the processor but the stepping: interface, draw list,
+    /// tessellation, upload and encoded commands. For benchmarks.
+    ///
+    /// # Errors
+    /// A size that cannot be drawn.
+    pub fn encode_frame(
+        &mut self,
+        app: &mut App,
+        size: [u32; 2],
+        scale: f32,
+    ) -> Result<(), RenderError> {
+        app.viewport.advance(&app.player, 1.0 / 60.0);
+        let output = self.pass(size, scale, |ui| app.show(ui))?;
+        let (commands, _) = self.encode(output, size, scale);
+        self.state.queue.submit(commands);
+        Ok(())
+    }
+
+    /// Waits until the device has drawn what was submitted.
+    pub fn wait(&self) {
+        if let Err(error) = self.state.device.poll(wgpu::PollType::wait_indefinitely()) {
+            log::warn!("waiting for the device: {error}");
+        }
+    }
+
+    fn encode(
+        &mut self,
+        output: egui::FullOutput,
+        size: [u32; 2],
+        scale: f32,
+    ) -> (Vec<wgpu::CommandBuffer>, wgpu::Texture) {
         let (device, queue) = (&self.state.device, &self.state.queue);
         let screen = ScreenDescriptor {
             pixels_per_point: scale,
@@ -230,7 +264,8 @@ impl Headless {
             label: Some("interface"),
         });
         let mut renderer = self.state.renderer.write();
-        let before = renderer.update_buffers(device, queue, &mut encoder, &primitives, &screen);
+        let mut commands =
+            renderer.update_buffers(device, queue, &mut encoder, &primitives, &screen);
         let texture = device.create_texture(&wgpu::TextureDescriptor {
             label: Some("interface"),
             size: wgpu::Extent3d {
@@ -264,9 +299,8 @@ impl Headless {
                 .forget_lifetime();
             renderer.render(&mut pass, &primitives, &screen);
         }
-        drop(renderer);
-        queue.submit(before.into_iter().chain(once(encoder.finish())));
-        self.read_back(&texture, size)
+        commands.push(encoder.finish());
+        (commands, texture)
     }
 
     fn read_back(

@@ -4,6 +4,8 @@
 
 mod controls;
 mod dialogs;
+mod framing;
+#[cfg(not(target_arch = "wasm32"))]
 mod headless;
 mod icons;
 mod keys;
@@ -27,6 +29,7 @@ use crate::view::{Preset, ViewOptions};
 
 use controls::Controls;
 use dialogs::{Answer, Dialog};
+#[cfg(not(target_arch = "wasm32"))]
 pub use headless::{Headless, HeadlessError, Overlay, UiFrame};
 use keys::Action;
 pub use overlay::force_notes;
@@ -272,6 +275,8 @@ impl App {
             .default_size(230.0)
             .size_range(150.0..=600.0)
             .show_collapsible(ui, show_plots, |ui| {
+                // Else the panel would shrink to what the plots leave of it.
+                ui.take_available_space();
                 plots.header(ui, player);
                 plots.ui(ui, player);
             });
@@ -336,17 +341,17 @@ impl App {
             .max_rect(inner)
             .layout(egui::Layout::right_to_left(egui::Align::Min));
         ui.scope_builder(buttons, |ui| {
-            ui.menu_button("View", |ui| {
+            ui.menu_button("View options", |ui| {
                 ui.set_min_width(230.0);
                 if narrow {
-                    ui.horizontal_wrapped(|ui| self.viewport.camera_buttons(ui));
+                    ui.horizontal_wrapped(|ui| self.viewport.camera_buttons(ui, false));
                     ui.separator();
                 }
                 self.viewport.options_ui(ui);
             });
             if !narrow {
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Min), |ui| {
-                    self.viewport.camera_buttons(ui)
+                    self.viewport.camera_buttons(ui, true)
                 });
             }
         });

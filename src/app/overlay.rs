@@ -40,44 +40,47 @@ pub fn labels(painter: &Painter, rect: Rect, scale: f32, list: &DrawList) {
     let halo = colour(list.background.bottom);
     for label in &list.labels {
         let at = rect.min + vec2(label.pixel.x, label.pixel.y) / scale;
-        let (anchor, shift, size) = match label.kind {
-            LabelKind::Joint(_) => (Align2::LEFT_BOTTOM, vec2(8.0, -8.0), 13.0),
-            LabelKind::Axis | LabelKind::Gravity => (Align2::CENTER_CENTER, vec2(0.0, 0.0), 12.0),
-        };
+        if let LabelKind::Joint(_) = label.kind {
+            // On a plate of its own: it often lies over a dark part.
+            let font = FontId::proportional(13.0);
+            let words = painter.layout_no_wrap(label.text.to_string(), font, colour(label.colour));
+            let place = Align2::LEFT_BOTTOM.anchor_size(at + vec2(10.0, -8.0), words.size());
+            painter.rect_filled(place.expand2(vec2(4.0, 1.0)), 4.0, halo.gamma_multiply(0.8));
+            painter.galley(place.min, words, colour(label.colour));
+            continue;
+        }
+        let ink = colour(label.colour);
         text(
             painter,
-            at + shift,
-            anchor,
+            at,
+            Align2::CENTER_CENTER,
             &label.text,
-            size,
-            colour(label.colour),
+            12.0,
+            ink,
             halo,
         );
     }
 }
 
-/// Simulated time in the upper left corner, with notes below it.
+/// Simulated time in the upper left corner, with notes below it, on a plate of their own.
 pub fn time(painter: &Painter, rect: Rect, time: f64, notes: &[String], theme: Theme) {
     let palette = Palette::of(theme);
-    let (ink, halo) = (colour(palette.text), colour(palette.sky));
-    let mut at = rect.min + vec2(MARGIN, MARGIN);
-    let line = format!("t = {}", value::time(time));
-    at.y = text(painter, at, Align2::LEFT_TOP, &line, 18.0, ink, halo)
-        .max
-        .y
-        + 2.0;
-    for note in notes.iter().filter(|note| !note.is_empty()) {
-        at.y = text(
-            painter,
-            at,
-            Align2::LEFT_TOP,
-            note,
-            13.0,
-            ink.gamma_multiply(0.8),
-            halo,
-        )
-        .max
-        .y + 1.0;
+    let ink = colour(palette.text);
+    let line =
+        |words: String, size: f32| painter.layout_no_wrap(words, FontId::proportional(size), ink);
+    let mut lines = vec![line(format!("t = {}", value::time(time)), 18.0)];
+    let notes = notes.iter().filter(|note| !note.is_empty());
+    lines.extend(notes.map(|note| line(note.clone(), 13.0)));
+    let width = lines.iter().map(|l| l.size().x).fold(0.0, f32::max);
+    let height: f32 = lines.iter().map(|l| l.size().y + 1.0).sum();
+    let corner = rect.min + vec2(MARGIN, MARGIN);
+    let plate = Rect::from_min_size(corner, vec2(width, height)).expand2(vec2(8.0, 4.0));
+    painter.rect_filled(plate, 6.0, colour(palette.sky).gamma_multiply(0.75));
+    let mut at = corner;
+    for line in lines {
+        let step = line.size().y + 1.0;
+        painter.galley(at, line, ink);
+        at.y += step;
     }
 }
 
@@ -111,7 +114,8 @@ pub fn legend(painter: &Painter, rect: Rect, scale: f32, legend: &Legend, theme:
     let longest = rect.width() * 0.4;
     // Seen from near, the reference arrow may be wider than the view: show the part that fits.
     let shown = full.min(longest);
-    let corner = lower_right(rect, MARGIN);
+    // Room for half a number beyond the last mark.
+    let corner = lower_right(rect, MARGIN) - vec2(12.0, 0.0);
     let axis = corner.y - 18.0;
     let left = corner.x - shown;
     painter.line_segment(
@@ -144,7 +148,7 @@ pub fn legend(painter: &Painter, rect: Rect, scale: f32, legend: &Legend, theme:
             free_from = placed.max.x + 4.0;
         }
     }
-    let mut at = pos2(corner.x, axis - 8.0);
+    let mut at = pos2(corner.x + 12.0, axis - 8.0);
     let mut title = match legend.scaling {
         Scaling::Linear => "Force on the ball, N".to_owned(),
         Scaling::Logarithmic => "Force on the ball, N (logarithmic)".to_owned(),

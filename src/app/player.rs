@@ -29,6 +29,12 @@ pub struct Player {
     values: Vec<f64>,
 }
 
+/// Seconds of viewing that the automatic window of the plots shows.
+const VIEWING: f64 = 5.0;
+
+/// Most instants recorded of one long step.
+const MOST_RECORDED: f64 = 64.0;
+
 impl Player {
     /// Starts `scene` at t = 0, paused.
     ///
@@ -91,6 +97,11 @@ impl Player {
     /// The recorded past.
     pub fn history(&self) -> &History {
         &self.history
+    }
+
+    /// Length of the past that plots show unless told otherwise, s: some seconds of viewing.
+    pub fn automatic_window(&self) -> f64 {
+        VIEWING * self.pacer.scale()
     }
 
     /// Whether time passes.
@@ -235,10 +246,21 @@ impl Player {
     }
 
     fn record(&mut self) {
-        let time = self.simulation.time();
-        self.simulation.sample(time, &mut self.recorded);
-        self.channels.read(&self.recorded, &mut self.values);
-        self.history.push(time, &self.values);
+        // A long step is recorded at instants within it, so that a curve stays one on a plot.
+        let (start, end) = (self.simulation.step_start(), self.simulation.time());
+        let parts = ((end - start) / self.automatic_window() * 400.0)
+            .ceil()
+            .clamp(1.0, MOST_RECORDED);
+        for part in 1..=parts as u32 {
+            let time = if f64::from(part) == parts {
+                end
+            } else {
+                start + (end - start) * f64::from(part) / parts
+            };
+            self.simulation.sample(time, &mut self.recorded);
+            self.channels.read(&self.recorded, &mut self.values);
+            self.history.push(time, &self.values);
+        }
     }
 
     fn show_latest(&mut self) {

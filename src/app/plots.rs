@@ -2,7 +2,8 @@
 
 use eframe::egui::{self, ComboBox, RichText, Ui, Vec2b, vec2};
 use egui_plot::{
-    Corner, HLine, HoverPosition, Legend, Line, LineStyle, Plot, PlotPoint, PlotPoints,
+    AxisHints, GridInput, GridMark, HLine, HoverPosition, Line, LineStyle, Plot, PlotPoint,
+    PlotPoints,
 };
 
 use super::player::Player;
@@ -11,8 +12,6 @@ use crate::simulate::{Quantity, RECORDED_JOINTS};
 
 /// Bins asked of the record for one line: two points each.
 const BINS: usize = 400;
-/// Seconds of viewing that the automatic window shows.
-const AUTOMATIC: f64 = 5.0;
 /// Windows to choose from, s.
 const WINDOWS: [f64; 6] = [1e-3, 1e-2, 0.05, 0.1, 1.0, 10.0];
 /// Height below which a plot says nothing.
@@ -35,6 +34,8 @@ pub struct Plots {
     pub chosen: Vec<Quantity>,
     /// Time window.
     pub window: Window,
+    /// Channels whose lines are hidden.
+    hidden: Vec<usize>,
     points: Vec<[f64; 2]>,
     lines: Vec<Vec<PlotPoint>>,
 }
@@ -44,6 +45,7 @@ impl Default for Plots {
         Self {
             chosen: vec![Quantity::NormalForce, Quantity::Eccentricity],
             window: Window::Automatic,
+            hidden: Vec::new(),
             points: Vec::new(),
             lines: Vec::new(),
         }
@@ -131,16 +133,17 @@ impl Plots {
         let columns = ((space.x / 300.0).floor() as usize).clamp(1, chosen.len());
         let rows = chosen.len().div_ceil(columns);
         let gap = ui.spacing().item_spacing;
-        let width = (space.x - gap.x * (columns - 1) as f32) / columns as f32;
+        // The last mark of the axis below reaches beyond the plot.
+        let width = (space.x - 16.0 - gap.x * (columns - 1) as f32) / columns as f32;
         let height = ((space.y - gap.y * (rows - 1) as f32) / rows as f32).max(LEAST_HEIGHT);
         egui::ScrollArea::vertical()
             .id_salt("plots")
             .show(ui, |ui| {
                 for row in chosen.chunks(columns) {
-                    ui.horizontal(|ui| {
+                    ui.horizontal_top(|ui| {
                         for quantity in row {
                             ui.allocate_ui(vec2(width, height), |ui| {
-                                self.plot(ui, player, *quantity, height)
+                                self.plot(ui, player, *quantity, vec2(width, height))
                             });
                         }
                     });
@@ -148,11 +151,11 @@ impl Plots {
             });
     }
 
-    fn plot(&mut self, ui: &mut Ui, player: &Player, quantity: Quantity, height: f32) {
+    fn plot(&mut self, ui: &mut Ui, player: &Player, quantity: Quantity, space: egui::Vec2) {
         let (unit, size) = quantity.unit();
         let end = player.pacer.shown();
         let length = match self.window {
-            Window::Automatic => AUTOMATIC * player.pacer.scale(),
+            Window::Automatic => player.automatic_window(),
             Window::Last(length) => length,
             Window::Everything => end.max(1e-4),
         };
@@ -188,11 +191,23 @@ impl Plots {
         }
 
         ui.vertical(|ui| {
-            ui.label(RichText::new(format!("{}, {unit}", quantity.label())).small())
-                .on_hover_text(quantity.help());
+            self.title(ui, quantity, &members);
             let dark = ui.visuals().dark_mode;
+            let faint = ui.visuals().weak_text_color();
+            let font = egui::TextStyle::Small.resolve(ui.style());
+            let axis = |hints: AxisHints<'static>| {
+                hints.tick_label_color(faint).tick_label_font(font.clone())
+            };
+            let across = axis(AxisHints::new_x())
+                .label_spacing(egui::Rangef::new(20.0, 24.0))
+                .formatter(move |mark, _| format!("{} {time_unit}", tick(mark.value)));
+            let up = axis(AxisHints::new_y())
+                .min_thickness(40.0)
+                .label_spacing(egui::Rangef::new(14.0, 18.0))
+                .formatter(|mark, _| tick(mark.value));
             let mut plot = Plot::new(("plot", quantity))
-                .height((height - 20.0).max(60.0))
+                .width(space.x - 12.0)
+                .height((space.y - 38.0).max(60.0))
                 .allow_drag(false)
                 .allow_zoom(false)
                 .allow_scroll(false)
@@ -200,9 +215,12 @@ impl Plots {
                 .allow_axis_zoom_drag(false)
                 .allow_double_click_reset(false)
                 .auto_bounds(Vec2b::new(false, true))
-                .x_axis_formatter(move |mark, _| format!("{} {time_unit}", short(mark.value)))
-                .y_axis_formatter(|mark, _| short(mark.value))
-                .y_axis_min_width(44.0)
+                .custom_x_axes(vec![across])
+                .custom_y_axes(vec![up])
+                .x_grid_spacer(|input| marks(&input, 5.0))
+                .y_grid_spacer(|input| marks(&input, 5.0))
+                .grid_color(faint.gamma_multiply(0.35))
+                .grid_fade(0.0)
                 .label_formatter(move |position| match position {
                     HoverPosition::NearDataPoint {
                         plot_name,
@@ -210,16 +228,11 @@ impl Plots {
                         ..
                     } => Some(format!(
                         "{plot_name}\n{} {unit}\nat {} {time_unit}",
-                        significant(position.y),
-                        significant(position.x)
+                        value::number(position.y, 4),
+                        value::number(position.x, 5)
                     )),
                     HoverPosition::Elsewhere { .. } => None,
-                })
-                .legend(
-                    Legend::default()
-                        .position(Corner::LeftTop)
-                        .background_alpha(0.6),
-                );
+                });
             if matches!(
                 quantity,
                 Quantity::NormalForce | Quantity::FrictionForce | Quantity::Eccentricity
@@ -229,24 +242,91 @@ impl Plots {
             plot.show(ui, |plot| {
                 plot.set_plot_bounds_x(from / time_size..=to / time_size);
                 if quantity == Quantity::Eccentricity {
-                    let clearance = player.scene().contact.clearance / size;
-                    plot.hline(
-                        HLine::new("clearance", clearance)
-                            .color(egui::Color32::GRAY)
-                            .style(LineStyle::dashed_loose())
-                            .width(1.0),
-                    );
+                    for clearance in clearances(player) {
+                        plot.hline(
+                            HLine::new("clearance", clearance / size)
+                                .color(faint)
+                                .style(LineStyle::dashed_loose())
+                                .width(1.0),
+                        );
+                    }
                 }
-                for (index, ((_, member), line)) in members.iter().zip(&self.lines).enumerate() {
-                    plot.line(
-                        Line::new(*member, PlotPoints::Borrowed(line))
-                            .color(theme::series(index, dark))
-                            .width(1.4),
-                    );
+                for (index, ((channel, member), line)) in
+                    members.iter().zip(&self.lines).enumerate()
+                {
+                    if !self.hidden.contains(channel) {
+                        plot.line(
+                            Line::new(*member, PlotPoints::Borrowed(line))
+                                .color(theme::series(index, dark))
+                                .width(1.4),
+                        );
+                    }
                 }
             });
         });
     }
+
+    /// Quantity with its unit, and its members as switches in the colours of their lines.
+    fn title(&mut self, ui: &mut Ui, quantity: Quantity, members: &[(usize, &str)]) {
+        ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = 4.0;
+            ui.spacing_mut().button_padding = vec2(4.0, 1.0);
+            ui.spacing_mut().interact_size.y = 18.0;
+            ui.label(RichText::new(format!("{}, {}", quantity.label(), quantity.unit().0)).small())
+                .on_hover_text(quantity.help());
+            ui.add_space(4.0);
+            for (index, (channel, member)) in members.iter().enumerate() {
+                let on = !self.hidden.contains(channel);
+                let colour = theme::series(index, ui.visuals().dark_mode);
+                let mut text = RichText::new(*member).small().strong().color(colour);
+                if !on {
+                    text = text.strikethrough().color(ui.visuals().weak_text_color());
+                }
+                let response = ui.add(egui::Button::new(text).frame(false));
+                if response.on_hover_text("Line shown or hidden").clicked() {
+                    if on {
+                        self.hidden.push(*channel);
+                    } else {
+                        self.hidden.retain(|hidden| hidden != channel);
+                    }
+                }
+            }
+        });
+    }
+}
+
+/// The different clearances of the joints now, m.
+fn clearances(player: &Player) -> Vec<f64> {
+    let mut found = Vec::new();
+    for joint in &player.frame().joints {
+        if joint.clearance > 0.0 && !found.contains(&joint.clearance) {
+            found.push(joint.clearance);
+        }
+    }
+    found
+}
+
+/// About `count` marks at 1, 2 or 5 times a power of ten.
+fn marks(input: &GridInput, count: f64) -> Vec<GridMark> {
+    let (least, greatest) = input.bounds;
+    let rough = (greatest - least) / count;
+    if !(rough.is_finite() && rough > 0.0) {
+        return Vec::new();
+    }
+    let power = 10_f64.powf(rough.log10().floor());
+    let step = [1.0, 2.0, 5.0, 10.0]
+        .into_iter()
+        .map(|factor| factor * power)
+        .find(|step| *step >= rough * 0.999)
+        .unwrap_or(10.0 * power);
+    let first = (least / step).ceil() as i64;
+    let last = (greatest / step).floor() as i64;
+    (first..=last)
+        .map(|index| GridMark {
+            value: index as f64 * step,
+            step_size: step,
+        })
+        .collect()
 }
 
 impl Window {
@@ -255,7 +335,7 @@ impl Window {
             Self::Automatic => "Automatic".to_owned(),
             Self::Last(length) => {
                 let (unit, size) = time_axis(length * 0.1);
-                format!("{} {unit}", significant(length / size))
+                format!("{} {unit}", value::number(length / size, 4))
             }
             Self::Everything => "Everything".to_owned(),
         }
@@ -274,16 +354,44 @@ fn time_axis(length: f64) -> (&'static str, f64) {
 }
 
 /// A mark on an axis.
-fn short(mark: f64) -> String {
-    value_text(mark, 5)
+fn tick(mark: f64) -> String {
+    value::number(mark, 6)
 }
 
-fn significant(number: f64) -> String {
-    value_text(number, 4)
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-fn value_text(number: f64, digits: usize) -> String {
-    // The grid's own rounding leaves dust where zero is meant.
-    let number = if number.abs() < 1e-12 { 0.0 } else { number };
-    value::number(number, digits)
+    #[test]
+    fn marks_are_round_and_few() {
+        for bounds in [(0.0, 100.0), (-3.3, 8.1), (202.9, 203.4), (0.0, 871.0)] {
+            let marks = marks(
+                &GridInput {
+                    bounds,
+                    base_step_size: 1.0,
+                },
+                5.0,
+            );
+            assert!(
+                (2..=7).contains(&marks.len()),
+                "{bounds:?}: {}",
+                marks.len()
+            );
+            assert!(
+                marks
+                    .iter()
+                    .all(|m| m.value >= bounds.0 && m.value <= bounds.1)
+            );
+        }
+        assert!(
+            marks(
+                &GridInput {
+                    bounds: (1.0, 1.0),
+                    base_step_size: 1.0
+                },
+                5.0
+            )
+            .is_empty()
+        );
+    }
 }

@@ -116,11 +116,11 @@ fn dark() -> Visuals {
         Stroke::new(1.0, Color32::from_rgb(0x33, 0x3B, 0x44));
     visuals.widgets.noninteractive.fg_stroke.color = Color32::from_rgb(0xD9, 0xE0, 0xE7);
     visuals.weak_text_color = Some(Color32::from_rgb(0x9A, 0xA7, 0xB4));
-    visuals.widgets.inactive.weak_bg_fill = Color32::from_rgb(0x2C, 0x33, 0x3B);
+    visuals.widgets.inactive.weak_bg_fill = Color32::from_rgb(0x35, 0x3E, 0x48);
     visuals.widgets.inactive.bg_fill = Color32::from_rgb(0x3C, 0x45, 0x4F);
     visuals.widgets.inactive.fg_stroke.color = Color32::from_rgb(0xD0, 0xD8, 0xE0);
-    visuals.widgets.hovered.weak_bg_fill = Color32::from_rgb(0x37, 0x42, 0x4E);
-    visuals.widgets.active.weak_bg_fill = Color32::from_rgb(0x3E, 0x52, 0x66);
+    visuals.widgets.hovered.weak_bg_fill = Color32::from_rgb(0x40, 0x4D, 0x5A);
+    visuals.widgets.active.weak_bg_fill = Color32::from_rgb(0x46, 0x5D, 0x74);
     common(&mut visuals);
     visuals
 }

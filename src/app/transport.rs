@@ -10,6 +10,9 @@ use crate::simulate::SCALE_RANGE;
 /// Time scales that a list offers.
 pub const SCALES: [f64; 8] = [1.0, 0.5, 0.1, 0.05, 0.02, 0.01, 1e-3, 1e-4];
 
+/// Size of the button that plays and pauses, points.
+const PLAY: f32 = 40.0;
+
 /// What the user asked the transport for; the caller does it, since a reset touches more than the player.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Asked {
@@ -35,11 +38,13 @@ pub fn next_scale(scale: f64, faster: bool) -> f64 {
     }
 }
 
-/// The bar, in one row that wraps where it is narrow.
+/// The bar: one row, or two where it is narrow.
 pub fn ui(ui: &mut Ui, player: &mut Player) -> Option<Asked> {
     let mut asked = None;
     let narrow = ui.available_width() < 620.0;
-    ui.horizontal_wrapped(|ui| {
+    let row = egui::Layout::left_to_right(egui::Align::Center);
+    let size = egui::vec2(ui.available_width(), PLAY);
+    ui.allocate_ui_with_layout(size, row, |ui| {
         let help = if player.has_waiting() {
             "Back to t = 0; applies the changes that wait for it (key R)"
         } else {
@@ -55,7 +60,7 @@ pub fn ui(ui: &mut Ui, player: &mut Player) -> Option<Asked> {
         };
         let runs = player.stopped().is_none();
         ui.add_enabled_ui(runs, |ui| {
-            if icon_button(ui, icon, name, help, 40.0, true).clicked() {
+            if icon_button(ui, icon, name, help, PLAY, true).clicked() {
                 player.set_playing(!player.is_playing());
             }
             if icon_button(
@@ -78,9 +83,14 @@ pub fn ui(ui: &mut Ui, player: &mut Player) -> Option<Asked> {
                 .strong(),
         )
         .on_hover_text("Simulated time");
-        ui.add_space(6.0);
-        speed(ui, player, narrow);
+        if !narrow {
+            ui.add_space(6.0);
+            speed(ui, player, narrow);
+        }
     });
+    if narrow {
+        ui.horizontal(|ui| speed(ui, player, narrow));
+    }
     asked
 }
 
@@ -147,7 +157,7 @@ pub fn banner(ui: &mut Ui, player: &Player) -> Option<Asked> {
     let mut asked = None;
     let colour = ui.visuals().error_fg_color;
     egui::Frame::new()
-        .fill(colour.gamma_multiply(0.14))
+        .fill(ui.visuals().window_fill)
         .stroke(egui::Stroke::new(1.0, colour))
         .corner_radius(6.0)
         .inner_margin(10.0)

@@ -7,8 +7,8 @@ use eframe::egui::{
 };
 use glam::{Vec2, Vec3};
 
-use super::overlay;
 use super::player::Player;
+use super::{framing, overlay};
 use crate::render;
 use crate::scene::format_quantity_digits;
 use crate::simulate::ContactState;
@@ -19,6 +19,22 @@ use crate::view::{
 
 /// Points of the probe's trail that are kept.
 const TRAIL: usize = 1500;
+
+/// A shot of what the player shows. A macro, since the list that it is drawn to is borrowed beside it.
+macro_rules! shot {
+    ($self:ident, $player:ident, $camera:expr, $size:ident, $scale:ident) => {
+        Shot {
+            scene: $player.scene(),
+            frame: $player.frame(),
+            arrows: &$self.arrows,
+            options: &$self.options,
+            camera: $camera,
+            trail: &$self.trail,
+            size: $size,
+            pixels_per_point: $scale,
+        }
+    };
+}
 
 /// Camera, view options and everything that is remembered between two pictures of one scene.
 pub struct Viewport {
@@ -161,27 +177,18 @@ impl Viewport {
 
         if self.fit_pending {
             self.fit_pending = false;
-            let mut goal = self.goal.unwrap_or(self.camera);
-            goal.fit(self.view.bounds(), rect.aspect_ratio());
-            // The first picture starts where it should be.
-            if self.goal.is_none() && self.list.size == [0, 0] {
+            // The first picture of a scene starts where it should be.
+            let first = self.list.size == [0, 0];
+            let goal = self.framed(player, self.goal.unwrap_or(self.camera), size, scale);
+            if first {
                 self.camera = goal;
             } else {
                 self.goal = Some(goal);
+                ui.ctx().request_repaint();
             }
-            ui.ctx().request_repaint();
         }
         self.drag(ui, &response, rect, size, scale);
-        let shot = Shot {
-            scene: player.scene(),
-            frame: player.frame(),
-            arrows: &self.arrows,
-            options: &self.options,
-            camera: &self.camera,
-            trail: &self.trail,
-            size,
-            pixels_per_point: scale,
-        };
+        let shot = shot!(self, player, &self.camera, size, scale);
         let hovered = response
             .hover_pos()
             .filter(|_| !response.dragged())
@@ -214,6 +221,21 @@ impl Viewport {
         }
     }
 
+    /// `camera` moved so that everything drawn fills the picture.
+    fn framed(
+        &mut self,
+        player: &Player,
+        mut camera: Camera,
+        size: [u32; 2],
+        scale: f32,
+    ) -> Camera {
+        camera.fit(self.view.bounds(), size[0] as f32 / size[1] as f32);
+        let shot = shot!(self, player, &camera, size, scale);
+        self.view.build(&shot, Arc::make_mut(&mut self.list));
+        framing::frame(&mut camera, &self.list, size);
+        camera
+    }
+
     fn drag(&mut self, ui: &Ui, response: &egui::Response, rect: Rect, size: [u32; 2], scale: f32) {
         let shift = ui.input(|i| i.modifiers.shift);
         let delta = response.drag_delta() * scale;
@@ -240,20 +262,35 @@ impl Viewport {
         }
     }
 
-    /// Buttons for points of view, from left to right.
-    pub fn camera_buttons(&mut self, ui: &mut Ui) {
-        for (index, preset) in Preset::ALL.into_iter().enumerate() {
-            let help = format!("Look from here (key {})", index + 1);
-            if ui.button(preset.label()).on_hover_text(help).clicked() {
-                self.preset(preset);
-            }
+    /// Buttons for points of view, each added in turn; `backwards` where the layout runs from right to left.
+    pub fn camera_buttons(&mut self, ui: &mut Ui, backwards: bool) {
+        let mut buttons: Vec<Option<Preset>> =
+            Preset::ALL.into_iter().map(Some).chain([None]).collect();
+        if backwards {
+            buttons.reverse();
         }
-        if ui
-            .button("Fit")
-            .on_hover_text("Show everything (key F)")
-            .clicked()
-        {
-            self.fit();
+        for button in buttons {
+            match button {
+                Some(preset) => {
+                    let key = Preset::ALL
+                        .iter()
+                        .position(|p| *p == preset)
+                        .map_or(0, |i| i + 1);
+                    let help = format!("Look from here (key {key})");
+                    if ui.button(preset.label()).on_hover_text(help).clicked() {
+                        self.preset(preset);
+                    }
+                }
+                None => {
+                    if ui
+                        .button("Fit")
+                        .on_hover_text("Show everything (key F)")
+                        .clicked()
+                    {
+                        self.fit();
+                    }
+                }
+            }
         }
     }
 
@@ -313,13 +350,24 @@ impl Viewport {
         }
         ui.add_space(4.0);
         ui.label("Show");
-        ui.checkbox(&mut options.flash, "Flash joints that are hit");
-        ui.checkbox(&mut options.joint_names, "Joint names");
-        ui.checkbox(&mut options.sockets, "Sockets");
-        ui.checkbox(&mut options.floor, "Floor grid");
-        ui.checkbox(&mut options.triad, "Axes and gravity");
-        ui.checkbox(&mut options.trail, "Trail of the probe tip");
-        if self.followed.is_some() && ui.button("Stop following").clicked() {
+        ui.checkbox(&mut options.flash, "Flash joints that are hit")
+            .on_hover_text("A joint lights up when its ball strikes, brighter for a harder blow");
+        ui.checkbox(&mut options.joint_names, "Joint names")
+            .on_hover_text("Names beside the ball joints");
+        ui.checkbox(&mut options.sockets, "Sockets")
+            .on_hover_text("The cut-open sockets; without them the balls stand free");
+        ui.checkbox(&mut options.floor, "Floor grid")
+            .on_hover_text("The floor with its grid and the shadows on it");
+        ui.checkbox(&mut options.triad, "Axes and gravity")
+            .on_hover_text("World axes X, Y, Z and the direction of gravity g");
+        ui.checkbox(&mut options.trail, "Trail of the probe tip")
+            .on_hover_text("Where the tip of the probe was");
+        if self.followed.is_some()
+            && ui
+                .button("Stop following")
+                .on_hover_text("Let the view go (double-click on the ground)")
+                .clicked()
+        {
             self.follow(None);
         }
     }

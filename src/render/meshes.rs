@@ -147,7 +147,7 @@ mod tests {
                 let face = (b.0 - a.0).cross(c.0 - a.0);
                 let outward = a.1 + b.1 + c.1;
                 assert!(
-                    face.dot(outward) >= -1e-9,
+                    face.dot(outward) >= -1e-6,
                     "mesh {i}: a triangle faces inwards"
                 );
             }

@@ -4,14 +4,20 @@
 //! The picture is gamma-encoded once, at the end of `shaders/scene.wgsl`; everything after that copies bytes.
 
 mod callback;
+#[cfg(test)]
+mod look;
 mod meshes;
+#[cfg(not(target_arch = "wasm32"))]
 mod offscreen;
 mod pipelines;
 mod renderer;
 mod target;
+#[cfg(test)]
+mod tests;
 
 pub use callback::{Viewport, install};
 pub use eframe::egui_wgpu::wgpu;
+#[cfg(not(target_arch = "wasm32"))]
 pub use offscreen::{Image, NoAdapter, Offscreen, RenderError};
 pub use renderer::Renderer;
 pub use target::Target;

@@ -223,6 +223,22 @@ impl Offscreen {
     }
 }
 
+#[cfg(test)]
+impl Offscreen {
+    /// Records a picture and throws it away; the time it took.
+    pub(super) fn record_only(&mut self, list: &DrawList) -> std::time::Duration {
+        let target = Target::new(&self.device, list.size);
+        let start = web_time::Instant::now();
+        let mut encoder = self.device.create_command_encoder(&Default::default());
+        self.renderer
+            .draw(&self.device, &self.queue, &mut encoder, &target, list);
+        let commands = encoder.finish();
+        let spent = start.elapsed();
+        self.queue.submit([commands]);
+        spent
+    }
+}
+
 /// Order of preference: hardware before software, Vulkan and its kin before GL.
 fn rank(info: &wgpu::AdapterInfo) -> u8 {
     let kind = match info.device_type {

@@ -20,6 +20,7 @@ pub(super) struct Pipelines {
     pub solid: wgpu::RenderPipeline,
     pub floor: wgpu::RenderPipeline,
     pub line: wgpu::RenderPipeline,
+    pub halo: wgpu::RenderPipeline,
     pub socket_far: wgpu::RenderPipeline,
     pub socket_near: wgpu::RenderPipeline,
     pub mark_behind: wgpu::RenderPipeline,
@@ -131,11 +132,11 @@ impl Pipelines {
             blend: true,
             ..mesh(label, vertex, Some(fragment))
         };
-        let socket = |label, cull| Recipe {
+        let glass = |label, fragment, cull| Recipe {
             cull: Some(cull),
             write_depth: false,
             blend: true,
-            ..mesh(label, "vs_mesh", Some("fs_socket"))
+            ..mesh(label, "vs_mesh", Some(fragment))
         };
         Self {
             cast_shadow: make(mesh("cast shadow", "vs_shadow", None)),
@@ -150,8 +151,9 @@ impl Pipelines {
                 buffers: &lines,
                 ..flat("line", "vs_line", "fs_line", TriangleStrip)
             }),
-            socket_far: make(socket("socket, far side", Front)),
-            socket_near: make(socket("socket, near side", Back)),
+            halo: make(glass("halo", "fs_halo", Back)),
+            socket_far: make(glass("socket, far side", "fs_socket", Front)),
+            socket_near: make(glass("socket, near side", "fs_socket", Back)),
             mark_behind: make(Recipe {
                 compare: Greater,
                 write_depth: false,

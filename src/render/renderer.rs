@@ -161,6 +161,7 @@ impl Renderer {
         let solid = self.pack(&list.solid);
         let arrows = self.pack(&list.arrows);
         let overlay = self.pack(&list.overlay);
+        let halos = [self.pack_one(Mesh::Sphere.index(), &list.halos)];
         let sockets = [self.pack_one(Mesh::Socket.index(), &list.sockets)];
         self.instances
             .write(device, queue, bytemuck::cast_slice(&self.packed));
@@ -216,6 +217,7 @@ impl Renderer {
             pass.set_vertex_buffer(0, self.lines.buffer.slice(..bytes));
             pass.draw(0..4, 0..list.lines.len() as u32);
         }
+        self.draw_meshes(&mut pass, &pipelines.halo, &halos);
         self.draw_meshes(&mut pass, &pipelines.socket_far, &sockets);
         self.draw_meshes(&mut pass, &pipelines.socket_near, &sockets);
         // After the sockets, so that glass does not dim a force.

@@ -1,11 +1,14 @@
 //! TOML with places: every value knows its key and its line and column, so that every error can name them.
 
-use super::error::nearest;
-use super::units::parse_quantity;
+use super::error::{line_and_column, nearest};
+use super::units::{QuantityError, parse_quantity};
 use super::{Dimension, SceneError, Vec3, find};
 use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
+
+/// Largest length, speed, angle, … in SI units that a file may give.
+const MAX_SI: f64 = 1e6;
 
 /// The text being read, and the name that errors give it.
 #[derive(Clone, Copy)]
@@ -49,13 +52,10 @@ impl<'d> Document<'d> {
             error.key = None;
         }
         error.file = self.file.map(str::to_owned);
-        error.position = Some((
-            before.matches('\n').count() + 1,
-            before[line_start..].chars().count() + 1,
-        ));
+        error.position = Some(line_and_column(before));
         // A line too long for a terminal, or one with control characters in it, helps nobody.
         if line_text.len() <= 160 && !line_text.chars().any(|c| c.is_control() && c != '\t') {
-            error.line_text = Some(line_text.replace('\t', " "));
+            error.line_text = Some(line_text.replace('\t', " ").into());
         }
         error
     }
@@ -195,7 +195,25 @@ impl<'d> Node<'d> {
 
     /// A finite quantity, SI.
     pub fn quantity(&self, dimension: Dimension) -> Result<f64, SceneError> {
-        parse_quantity(self.scalar()?, dimension).map_err(|error| self.error(error.to_string()))
+        self.limited(parse_quantity(self.scalar()?, dimension), dimension)
+    }
+
+    /// Refuses what no mechanism has, before its squares overflow in the equations of motion.
+    fn limited(
+        &self,
+        read: Result<f64, QuantityError>,
+        dimension: Dimension,
+    ) -> Result<f64, SceneError> {
+        let value = read.map_err(|error| self.error(error.to_string()))?;
+        let moves = !matches!(
+            dimension,
+            Dimension::Mass | Dimension::Inertia | Dimension::Stress
+        );
+        if moves && value.abs() > MAX_SI {
+            let limit = super::format_quantity(MAX_SI, super::si_unit(dimension));
+            return Err(self.error(format!("out of range; allowed -{limit} to {limit}")));
+        }
+        Ok(value)
     }
 
     /// A quantity above 0 and at most `max` (SI, shown in `unit`).
@@ -253,17 +271,22 @@ impl<'d> Node<'d> {
         let mut values = [0.0; N];
         if let Some(text) = self.value.get_ref().as_str() {
             let words: Vec<&str> = text.split_whitespace().collect();
-            let (numbers, unit) = words.split_at(N.min(words.len()));
-            let unit = unit.join(" ");
-            if numbers.len() < N {
+            let count = words
+                .iter()
+                .take_while(|word| word.parse::<f64>().is_ok())
+                .count();
+            if count != N {
                 return Err(self.error(format!(
-                    "needs {N} numbers, then the unit; found {}",
-                    numbers.len()
+                    "needs {N} numbers, then one unit for all; has {count} numbers"
                 )));
             }
+            let (numbers, unit) = words.split_at(N);
+            let unit = unit.join(" ");
             for (value, number) in values.iter_mut().zip(numbers) {
-                *value = parse_quantity(&format!("{number} {unit}"), dimension)
-                    .map_err(|error| self.error(error.to_string()))?;
+                *value = self.limited(
+                    parse_quantity(&format!("{number} {unit}"), dimension),
+                    dimension,
+                )?;
             }
             return Ok(values);
         }

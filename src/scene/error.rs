@@ -10,15 +10,15 @@ pub struct SceneError {
     /// File as the user named it; `None` for a built-in scene or the command line.
     pub file: Option<String>,
     /// Line and column, from 1.
-    pub position: Option<(usize, usize)>,
+    pub position: Option<(u32, u32)>,
     /// Key at fault, e.g. `joint.S1.clearance`.
     pub key: Option<String>,
     /// Value at fault, as written.
-    pub value: Option<String>,
+    pub value: Option<Box<str>>,
     /// What is wrong and what is allowed.
     pub message: String,
     /// The line of the file at `position`.
-    pub line_text: Option<String>,
+    pub line_text: Option<Box<str>>,
     /// The file could not be read at all (rather than being wrong).
     pub unreadable: bool,
 }
@@ -30,7 +30,7 @@ impl SceneError {
     pub(super) fn about(key: &str, value: Option<&str>, message: impl Into<String>) -> Self {
         Self {
             key: Some(key.to_owned()),
-            value: value.map(str::to_owned),
+            value: value.map(Box::from),
             message: message.into(),
             ..Self::default()
         }
@@ -53,7 +53,7 @@ impl fmt::Display for SceneError {
         f.write_str(&self.message)?;
         if let (Some(text), Some((line, column))) = (&self.line_text, self.position) {
             let number = line.to_string();
-            let mark = column.saturating_sub(1);
+            let mark = column.saturating_sub(1) as usize;
             write!(
                 f,
                 "\n {number} | {text}\n {:width$} | {:mark$}^",
@@ -66,7 +66,17 @@ impl fmt::Display for SceneError {
     }
 }
 
-/// The nearest of `names` to `wrong`, as the end of a sentence; "" if none is near.
+/// Line and column, from 1, of what follows `before`. A scene's text is short: the counts fit.
+pub(super) fn line_and_column(before: &str) -> (u32, u32) {
+    let line_start = before.rfind('\n').map_or(0, |at| at + 1);
+    let from_one = |count: usize| u32::try_from(count + 1).unwrap_or(u32::MAX);
+    (
+        from_one(before.matches('\n').count()),
+        from_one(before[line_start..].chars().count()),
+    )
+}
+
+/// The nearest of `names` to `wrong`, in brackets; "" if none is near.
 pub(super) fn nearest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> String {
     let wrong_lower = wrong.to_lowercase();
     names
@@ -79,5 +89,7 @@ pub(super) fn nearest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>)
         })
         .filter(|(score, _)| *score > 0.7)
         .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map_or_else(String::new, |(_, name)| format!("; did you mean `{name}`?"))
+        .map_or_else(String::new, |(_, name)| {
+            format!(" (did you mean `{name}`?)")
+        })
 }

@@ -1,6 +1,6 @@
 //! Where scenes come from: the built-in ones, and files.
 
-use super::error::nearest;
+use super::error::{line_and_column, nearest};
 use super::{Scene, SceneError};
 use std::io::Read;
 
@@ -86,14 +86,9 @@ fn read_file(name: &str) -> Result<String, SceneError> {
     }
     String::from_utf8(bytes).map_err(|cause| {
         let good = &cause.as_bytes()[..cause.utf8_error().valid_up_to()];
-        let line = good.iter().filter(|byte| **byte == b'\n').count() + 1;
-        let line_start = good
-            .iter()
-            .rposition(|byte| *byte == b'\n')
-            .map_or(0, |at| at + 1);
-        let column = String::from_utf8_lossy(&good[line_start..]).chars().count() + 1;
+        let good = std::str::from_utf8(good).unwrap_or("");
         SceneError {
-            position: Some((line, column)),
+            position: Some(line_and_column(good)),
             unreadable: false,
             ..error(
                 "not a text file: this byte is not valid UTF-8, so it is no scene file".to_owned(),

@@ -140,29 +140,44 @@ impl Parameter {
         }
     }
 
-    /// What may be given, in words, with the units it may be written in.
-    pub fn allowed(&self) -> String {
+    /// The range or the choices, in words: `0 Hz to 50 Hz`.
+    pub fn range(&self) -> String {
         match self.kind {
+            // The table's upper end is that of the ball; what counts is this joint's.
+            Kind::Number { min, display, .. } if self.key == "contact.clearance" => {
+                format!("{} to below the ball radius", format_quantity(min, display))
+            }
             Kind::Number {
-                dimension,
-                min,
-                max,
-                display,
-                ..
+                min, max, display, ..
             } => {
-                let range = format!(
-                    "allowed {} to {}",
+                format!(
+                    "{} to {}",
                     format_quantity(min, display),
                     format_quantity(max, display)
-                );
-                match unit_names(dimension).as_slice() {
-                    [] => format!("{range}; a pure number, no unit"),
-                    names => format!("{range}; units {}", names.join(", ")),
-                }
+                )
             }
-            Kind::Count { min, max } => format!("allowed {min} to {max}; a whole number, no unit"),
-            Kind::Choice(words) => format!("allowed {}", words.join(", ")),
+            Kind::Count { min, max } => format!("{min} to {max}"),
+            Kind::Choice(words) => words.join(", "),
         }
+    }
+
+    /// The units it may be written in, in words; "" for a choice.
+    pub fn units(&self) -> String {
+        match self.kind {
+            Kind::Number { dimension, .. } => match unit_names(dimension).as_slice() {
+                [] => "a pure number, no unit".to_owned(),
+                names => format!("units {}", names.join(", ")),
+            },
+            Kind::Count { .. } => "a whole number, no unit".to_owned(),
+            Kind::Choice(_) => String::new(),
+        }
+    }
+
+    /// What may be given, in words, with the units it may be written in.
+    pub fn allowed(&self) -> String {
+        let units = self.units();
+        let separator = if units.is_empty() { "" } else { "; " };
+        format!("allowed {}{separator}{units}", self.range())
     }
 
     /// Reads a value as people write it, and checks its range.
@@ -174,12 +189,20 @@ impl Parameter {
         let value = match self.kind {
             Kind::Number { dimension, .. } => {
                 let number = parse_quantity(text, dimension)
-                    .map_err(|error| format!("{error}; {}", self.allowed()))?;
+                    .map_err(|error| format!("{error}; allowed {}", self.range()))?;
                 Value::Number(number)
             }
             Kind::Count { .. } => match text.parse::<u64>() {
                 Ok(count) => Value::Count(count),
-                Err(_) => return Err(format!("is not a whole number; {}", self.allowed())),
+                Err(_) => {
+                    let whole = text.parse::<i128>().is_ok();
+                    let what = if whole {
+                        "out of range"
+                    } else {
+                        "is not a whole number"
+                    };
+                    return Err(format!("{what}; {}", self.allowed()));
+                }
             },
             Kind::Choice(words) => {
                 // "+x" is also what "x" means.
@@ -239,7 +262,7 @@ pub fn reference_page() -> String {
     let mut page = String::from(
         "# Scene parameters\n\nEvery key works in a scene file (a section and a name), as `--set key=value`, and in the window. \
          A quantity is written with its unit, `0.3 mm` or `0.3mm`; a bare 0 needs none.\n\n\
-         | Key | Name | Default | Allowed | Where | Takes effect | What it is | Equation |\n|---|---|---|---|---|---|---|---|\n",
+         | Key | Name | Default | Range | Unit | Where | Takes effect | What it is | Equation |\n|---|---|---|---|---|---|---|---|---|\n",
     );
     for parameter in table() {
         let effect = if parameter.at_reset {
@@ -251,10 +274,8 @@ pub fn reference_page() -> String {
             format!("`{}`", parameter.key),
             parameter.label.to_owned(),
             parameter.show(&parameter.default),
-            parameter
-                .allowed()
-                .trim_start_matches("allowed ")
-                .to_owned(),
+            parameter.range(),
+            parameter.units(),
             parameter.scope.describe().to_owned(),
             effect.to_owned(),
             parameter.help.to_owned(),

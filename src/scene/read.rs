@@ -291,22 +291,20 @@ fn read_mechanism<'d>(
     for node in list("joint")? {
         let joint = read_joint(&node, scene, &file_order)?;
         joint_names.add(&joint.section, "joint", &joint.name)?;
+        if let Some(Drive::Spcmm { slider }) = joint.joint.drive
+            && let Some(other) = joints
+                .iter()
+                .find(|other| other.joint.drive == joint.joint.drive)
+        {
+            let message = format!(
+                "slider {slider} already drives joint `{}`; allowed 1, 2, 3, each once",
+                other.name
+            );
+            return Err(joint.section.error("drive", message));
+        }
         joints.push(joint);
     }
     (scene.bodies, scene.joints) = sort_forest(bodies, joints, &body_sections)?;
-    for (index, joint) in scene.joints.iter().enumerate() {
-        if let Some(Drive::Spcmm { slider }) = joint.drive
-            && scene.joints[..index]
-                .iter()
-                .any(|other| other.drive == joint.drive)
-        {
-            return Err(top.error(
-                "joint",
-                format!("slider {slider} of the law spcmm drives two joints"),
-            ));
-        }
-    }
-
     let by_name: HashMap<String, usize> = scene
         .bodies
         .iter()
@@ -380,14 +378,22 @@ fn read_output(
 /// "No such body", with the nearest name and all names.
 pub(super) fn no_body<'a>(wanted: &str, names: impl Iterator<Item = &'a str> + Clone) -> String {
     let near = super::error::nearest(wanted, names.clone());
-    let listed: Vec<&str> = names.take(12).collect();
-    format!("no body `{wanted}`{near}; bodies: {}", listed.join(", "))
+    let listed: Vec<&str> = names.clone().take(12).collect();
+    let more = if names.count() > listed.len() {
+        ", …"
+    } else {
+        ""
+    };
+    format!(
+        "no body `{wanted}`{near}; bodies: {}{more}",
+        listed.join(", ")
+    )
 }
 
 /// Names seen so far, with their lines: no two may be equal.
 #[derive(Default)]
 struct Names {
-    lines: HashMap<String, usize>,
+    lines: HashMap<String, u32>,
 }
 
 impl Names {

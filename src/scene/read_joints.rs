@@ -51,17 +51,10 @@ pub(super) fn read_joint<'d>(
         "revolute" => JointKind::Revolute,
         _ => JointKind::Free,
     };
-    let body = |node: &Node<'_>| {
-        let wanted = node.text()?;
-        let names = bodies.iter().map(String::as_str);
-        names
-            .clone()
-            .position(|name| name == wanted)
-            .ok_or_else(|| node.error(no_body(wanted, names)))
-    };
-    let child = body(&section.require("child", "\"rod\"")?)?;
+    let child_node = section.require("child", "\"rod\"")?;
+    let child = place_of(&child_node, bodies, None)?;
     let parent = match section.get("parent") {
-        Some(node) if node.text()? != "world" => Some(body(&node)?),
+        Some(node) if node.text()? != "world" => Some(place_of(&node, bodies, Some("world"))?),
         _ => None,
     };
     let point = |name| {
@@ -100,6 +93,14 @@ pub(super) fn read_joint<'d>(
         section,
         joint,
     })
+}
+
+/// Place of the body that a text names; `also` is a name that would have been allowed as well.
+fn place_of(node: &Node<'_>, bodies: &[String], also: Option<&str>) -> Result<usize, SceneError> {
+    let wanted = node.text()?;
+    let names = also.into_iter().chain(bodies.iter().map(String::as_str));
+    let place = bodies.iter().position(|name| name == wanted);
+    place.ok_or_else(|| node.error(no_body(wanted, names)))
 }
 
 /// A free body: where it starts and how it moves.
@@ -456,10 +457,10 @@ pub(super) fn read_ball_joint<'d>(
             wanted => match bodies.get(wanted) {
                 Some(&index) => Some(index),
                 None => {
-                    return Err(body_node.error(no_body(
-                        wanted,
-                        scene.bodies.iter().map(|body| body.name.as_str()),
-                    )));
+                    let names = scene.bodies.iter().map(|body| body.name.as_str());
+                    return Err(
+                        body_node.error(no_body(wanted, std::iter::once("world").chain(names)))
+                    );
                 }
             },
         };

@@ -39,8 +39,11 @@ enum Scale {
 
 use Scale::{Decimal, Ratio};
 
+/// A unit's name and size.
+type Unit = (&'static str, Scale);
+
 /// Every dimension with its name and its units; the first unit is the SI one.
-const UNITS: [(Dimension, &str, &[(&str, Scale)]); 11] = [
+const UNITS: [(Dimension, &str, &[Unit]); 11] = [
     (
         Dimension::Length,
         "length",
@@ -264,7 +267,7 @@ fn format_number(value: f64, digits: usize) -> String {
     }
 }
 
-fn units(dimension: Dimension) -> &'static [(&'static str, Scale)] {
+fn units(dimension: Dimension) -> &'static [Unit] {
     UNITS
         .iter()
         .find(|(d, _, _)| *d == dimension)

@@ -934,6 +934,11 @@ impl Simulation {
         hash
     }
 
+    /// Coordinates, then velocities, as the formulation orders them.
+    pub fn state(&self) -> &[f64] {
+        &self.state.y
+    }
+
     /// Contact memory of ball joint `j`: whether it is in contact, with which approach speed.
     pub fn contact_memory(&self, j: usize) -> Memory {
         self.state.memory[j]

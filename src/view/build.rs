@@ -58,16 +58,7 @@ impl SceneView {
         let (parts, plates) = drawn::parts(scene);
         let joints = drawn::joints(scene, frame, 1.0);
         let down = to_f32(&scene.view.down.unit());
-        let mut extents = Vec::new();
-        for part in &parts {
-            part.place(frame, &joints)
-                .extent(|centre, radius| extents.push((centre, radius)));
-        }
-        extents.extend(
-            joints
-                .iter()
-                .map(|joint| (joint.socket_centre, joint.outer)),
-        );
+        let extents = extents(&parts, frame, &joints);
         let bounds = bounds(&extents);
         let lowest = extents
             .iter()
@@ -102,6 +93,20 @@ impl SceneView {
     /// Isometric camera that shows the whole scene.
     pub fn camera(&self) -> Camera {
         Camera::new(self.down, self.bounds)
+    }
+
+    /// Moves `camera` so that everything drawn in `frame` fills a picture of `size`; the direction stays.
+    pub fn fit(
+        &self,
+        camera: &mut Camera,
+        scene: &Scene,
+        frame: &Frame,
+        options: &ViewOptions,
+        size: [u32; 2],
+    ) {
+        let m = drawn::magnification(scene, frame, options.magnification);
+        let joints = drawn::joints(scene, frame, m);
+        camera.fit_balls(&extents(&self.parts, frame, &joints), size);
     }
 
     /// Turns `camera` to a close-up of ball joint `joint`, looking into its opening.
@@ -154,14 +159,39 @@ impl SceneView {
                 palette.ball,
             );
             out.solid.push(Mesh::Sphere, Instance { glow, ..ball });
+            if glow > 0.02 {
+                let halo = placed(
+                    Mat3::from_diagonal(Vec3::splat(1.7 * joint.outer)),
+                    joint.socket_centre,
+                    palette.ball,
+                );
+                out.halos.push(Instance { glow, ..halo });
+            }
             if options.sockets {
-                let turn = Mat3::from_quat(Quat::from_rotation_arc(Vec3::Z, joint.opening));
-                let socket = placed(turn * joint.outer, joint.socket_centre, palette.socket);
+                let half = |opening, material| {
+                    let turn = Mat3::from_quat(Quat::from_rotation_arc(Vec3::Z, opening));
+                    let socket = placed(turn * joint.outer, joint.socket_centre, material);
+                    Instance {
+                        inner_radius: joint.inner / joint.outer,
+                        ..socket
+                    }
+                };
                 out.sockets.push(Instance {
                     glow,
-                    inner_radius: joint.inner / joint.outer,
-                    ..socket
+                    ..half(joint.opening, palette.socket)
                 });
+                // The half that is cut away stays as a breath: a ball that touches there is still in its socket.
+                let colour = palette
+                    .socket
+                    .colour
+                    .with_opacity(0.15 * palette.socket.colour.0[3]);
+                out.sockets.push(half(
+                    -joint.opening,
+                    Material {
+                        colour,
+                        ..palette.socket
+                    },
+                ));
             }
         }
         let eye = camera.eye();
@@ -193,6 +223,7 @@ impl SceneView {
         for layer in [&mut out.solid, &mut out.arrows, &mut out.overlay] {
             layer.clear(meshes);
         }
+        out.halos.clear();
         out.sockets.clear();
         out.lines.clear();
         out.labels.clear();
@@ -284,14 +315,25 @@ impl SceneView {
     }
 }
 
-fn bounds(extents: &[(Vec3, f32)]) -> Bounds {
-    let finite = || {
-        extents
+/// Balls (centre, radius) whose hull holds everything drawn.
+fn extents(parts: &[Part], frame: &Frame, joints: &[DrawnJoint]) -> Vec<(Vec3, f32)> {
+    let mut extents = Vec::new();
+    for part in parts {
+        part.place(frame, joints)
+            .extent(|centre, radius| extents.push((centre, radius)));
+    }
+    extents.extend(
+        joints
             .iter()
-            .filter(|(p, r)| p.is_finite() && r.is_finite())
-    };
-    let low = finite().map(|&(p, r)| p - r).reduce(Vec3::min);
-    let high = finite().map(|&(p, r)| p + r).reduce(Vec3::max);
+            .map(|joint| (joint.socket_centre, joint.outer)),
+    );
+    extents.retain(|(centre, radius)| centre.is_finite() && radius.is_finite());
+    extents
+}
+
+fn bounds(extents: &[(Vec3, f32)]) -> Bounds {
+    let low = extents.iter().map(|&(p, r)| p - r).reduce(Vec3::min);
+    let high = extents.iter().map(|&(p, r)| p + r).reduce(Vec3::max);
     let (Some(low), Some(high)) = (low, high) else {
         return Bounds {
             centre: Vec3::ZERO,
@@ -299,7 +341,8 @@ fn bounds(extents: &[(Vec3, f32)]) -> Bounds {
         };
     };
     let centre = (low + high) / 2.0;
-    let radius = finite()
+    let radius = extents
+        .iter()
         .map(|&(p, r)| p.distance(centre) + r)
         .fold(0.0, f32::max);
     Bounds {
@@ -360,6 +403,9 @@ fn push_solid(layer: &mut Layer, solid: &Solid<'_>, material: Material) {
             kind,
             capped,
         } => {
+            if from == to {
+                return;
+            }
             let mesh = if kind == BarKind::Cone {
                 Mesh::Cone
             } else {

@@ -82,7 +82,7 @@ impl Camera {
             Preset::Front => (0.0, 0.0),
             Preset::Side => (STEEPEST, 0.0),
             Preset::Top => (0.0, STEEPEST),
-            Preset::Isometric => (0.6, 0.42),
+            Preset::Isometric => (0.6, 0.32),
         };
     }
 
@@ -92,6 +92,36 @@ impl Camera {
         let half_angle = (half * aspect.min(1.0)).atan();
         self.target = bounds.centre;
         self.distance = (bounds.radius.max(1e-6) / half_angle.sin()) * 1.02;
+    }
+
+    /// Moves so that the balls (centre, radius) just fill a picture of `size`, with a small margin; the direction stays.
+    pub(super) fn fit_balls(&mut self, balls: &[(Vec3, f32)], size: [u32; 2]) {
+        const MARGIN: f32 = 1.16;
+        let axes = self.axes();
+        let tan_y = (self.field_of_view / 2.0).tan() / MARGIN;
+        let tan_x = tan_y * size[0].max(1) as f32 / size[1].max(1) as f32;
+        // Along one screen axis, at slope `tan`: a ball at (x, depth z towards the eye) is inside both edges where
+        // |x - x0| + r sqrt(1 + tan^2) <= (d - z) tan. The two tightest edges give x0 and d.
+        let span = |axis: Vec3, tan: f32| {
+            let reach = |sign: f32| {
+                let edge = |&(p, r): &(Vec3, f32)| {
+                    sign * p.dot(axis) + r * (1.0 + tan * tan).sqrt() + p.dot(axes.2) * tan
+                };
+                balls.iter().map(edge).fold(f32::NEG_INFINITY, f32::max)
+            };
+            let (high, low) = (reach(1.0), reach(-1.0));
+            ((high - low) / 2.0, (high + low) / (2.0 * tan))
+        };
+        let ((x, from_x), (y, from_y)) = (span(axes.0, tan_x), span(axes.1, tan_y));
+        let eye_depth = from_x.max(from_y);
+        let depths = || balls.iter().map(|(p, _)| p.dot(axes.2));
+        let middle = (depths().fold(f32::INFINITY, f32::min)
+            + depths().fold(f32::NEG_INFINITY, f32::max))
+            / 2.0;
+        if eye_depth - middle > 0.0 && x.is_finite() && y.is_finite() {
+            self.target = axes.0 * x + axes.1 * y + axes.2 * middle;
+            self.distance = (eye_depth - middle).max(1e-4);
+        }
     }
 
     /// Looks at a ball of `radius` about `centre` from the side to which `opening` points, a little from above.
@@ -229,5 +259,128 @@ impl Eye {
         let x = (clip.x / clip.w * 0.5 + 0.5) * size[0] as f32;
         let y = (0.5 - clip.y / clip.w * 0.5) * size[1] as f32;
         Some(Vec2::new(x, y))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: [u32; 2] = [1280, 720];
+
+    fn camera(down: SignedAxis) -> Camera {
+        Camera::new(
+            down,
+            Bounds {
+                centre: Vec3::new(0.2, -0.1, 0.05),
+                radius: 0.3,
+            },
+        )
+    }
+
+    #[test]
+    fn down_points_down_on_the_screen_from_every_level_side() {
+        use SignedAxis::*;
+        for axis in [PlusX, MinusX, PlusY, MinusY, PlusZ, MinusZ] {
+            for preset in [Preset::Front, Preset::Side, Preset::Isometric] {
+                let mut camera = camera(axis);
+                camera.preset(preset);
+                let down = crate::view::to_f32(&axis.unit());
+                let here = camera.project(camera.target, SIZE).expect("before the eye");
+                let below = camera
+                    .project(camera.target + 0.02 * down, SIZE)
+                    .expect("before the eye");
+                assert!(
+                    below.y > here.y + 5.0,
+                    "{axis:?} {preset:?}: {here} {below}"
+                );
+                assert!((below.x - here.x).abs() < 1e-2, "{axis:?} {preset:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_ray_through_a_pixel_meets_the_point_that_projects_there() {
+        let camera = camera(SignedAxis::PlusX);
+        for point in [
+            Vec3::new(0.1, 0.0, 0.2),
+            Vec3::new(0.3, -0.2, -0.1),
+            camera.target,
+        ] {
+            let pixel = camera.project(point, SIZE).expect("before the eye");
+            let (origin, direction) = camera.ray(pixel, SIZE);
+            let miss = (point - origin).cross(direction).length();
+            assert!(miss < 1e-5, "passes {miss} m beside {point}");
+        }
+    }
+
+    #[test]
+    fn zoom_keeps_the_point_under_the_cursor() {
+        let mut camera = camera(SignedAxis::MinusZ);
+        let cursor = Vec2::new(1000.0, 150.0);
+        let (right, up, _) = camera.axes();
+        let offset = (cursor - Vec2::new(640.0, 360.0)) * camera.metres_per_pixel(SIZE);
+        let under = camera.target + right * offset.x - up * offset.y;
+        for factor in [1.3, 2.0, 0.25] {
+            camera.zoom(factor, cursor, SIZE);
+            let now = camera.project(under, SIZE).expect("before the eye");
+            assert!(now.distance(cursor) < 0.05, "factor {factor}: {now}");
+        }
+        let before = camera;
+        camera.zoom(f32::NAN, cursor, SIZE);
+        camera.zoom(-1.0, cursor, SIZE);
+        assert_eq!(camera, before, "a bad factor changes nothing");
+    }
+
+    #[test]
+    fn pan_moves_the_scene_with_the_cursor() {
+        let mut camera = camera(SignedAxis::MinusZ);
+        let point = camera.target;
+        camera.pan(Vec2::new(100.0, -40.0), SIZE);
+        let now = camera.project(point, SIZE).expect("before the eye");
+        assert!(now.distance(Vec2::new(740.0, 320.0)) < 0.05, "{now}");
+    }
+
+    #[test]
+    fn following_keeps_the_followed_point_in_its_place_on_the_screen() {
+        let mut camera = camera(SignedAxis::MinusZ);
+        let start = Vec3::new(0.25, 0.0, 0.1);
+        camera.follow(Some(start));
+        let before = camera.project(start, SIZE).expect("before the eye");
+        let moved = start + Vec3::new(0.03, -0.02, 0.05);
+        camera.follow(Some(moved));
+        let after = camera.project(moved, SIZE).expect("before the eye");
+        assert!(before.distance(after) < 0.05, "{before} {after}");
+    }
+
+    #[test]
+    fn fitting_touches_an_edge_and_crosses_none() {
+        let balls = [
+            (Vec3::new(0.5, 0.0, 0.0), 0.05),
+            (Vec3::new(-0.3, 0.2, 0.1), 0.1),
+            (Vec3::new(0.0, -0.4, 0.2), 0.0),
+        ];
+        for size in [[1280, 720], [300, 900]] {
+            let mut camera = camera(SignedAxis::MinusZ);
+            camera.fit_balls(&balls, size);
+            let mut least = f32::INFINITY;
+            for (centre, radius) in balls {
+                // Points of each ball, seen from all sides.
+                for k in 0..200 {
+                    let (a, b) = (k as f32 * 0.7, k as f32 * 0.31);
+                    let on =
+                        centre + radius * Vec3::new(a.cos() * b.sin(), a.sin() * b.sin(), b.cos());
+                    let p = camera.project(on, size).expect("before the eye");
+                    let [w, h] = size.map(|n| n as f32);
+                    least = least
+                        .min(p.x / w)
+                        .min(1.0 - p.x / w)
+                        .min(p.y / h)
+                        .min(1.0 - p.y / h);
+                }
+            }
+            // The margin of 16 % leaves 0.5 (1 - 1/1.16) = 6.9 % at the tightest edge.
+            assert!((0.06..0.08).contains(&least), "{size:?}: {least}");
+        }
     }
 }

@@ -244,7 +244,9 @@ pub struct DrawList {
     pub solid: Layer,
     /// Solid things seen through all others where these stand before them: force arrows.
     pub arrows: Layer,
-    /// Sockets, farthest first.
+    /// Balls of light about joints that were hit.
+    pub halos: Vec<Instance>,
+    /// Sockets, farthest first: for each the half that stands and, fainter, the half that is cut away.
     pub sockets: Vec<Instance>,
     /// Solid things before all others: the triad.
     pub overlay: Layer,
@@ -286,6 +288,7 @@ impl Default for DrawList {
             plates: Arc::new([]),
             solid: Layer::default(),
             arrows: Layer::default(),
+            halos: Vec::new(),
             sockets: Vec::new(),
             overlay: Layer::default(),
             lines: Vec::new(),

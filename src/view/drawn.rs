@@ -398,12 +398,16 @@ impl Part {
     }
 }
 
-/// Where a bar from `start` to `end` meets the outer face of a drawn socket that its end lies in.
+/// New end of a bar from `start` to `end` that reaches into a drawn socket: on the outer face.
 fn leave_socket(start: Vec3, end: Vec3, joint: &DrawnJoint) -> Option<Vec3> {
     let radius = 0.99 * joint.outer;
     let to_end = end - joint.socket_centre;
-    if to_end.length() >= radius || start.distance(joint.socket_centre) <= radius {
+    if to_end.length() >= radius {
         return None;
+    }
+    if start.distance(joint.socket_centre) <= radius {
+        // All of it is inside: nothing is left to draw.
+        return Some(start);
     }
     // |to_end + s along| = radius for the s > 0 that goes back towards the start.
     let along = (start - end).normalize_or_zero();

@@ -18,6 +18,8 @@ mod drawn;
 pub(crate) mod fixture;
 mod options;
 mod pick;
+#[cfg(test)]
+mod tests;
 mod theme;
 
 pub use arrows::{ArrowMemory, HeldForce};

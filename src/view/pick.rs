@@ -84,6 +84,12 @@ impl SceneView {
 
 /// Distance along `ray` to the solid.
 fn cast(solid: &Solid<'_>, ray: &Ray) -> Option<f32> {
+    // A broken frame must not reach parry's iterations.
+    let mut finite = true;
+    solid.extent(|centre, radius| finite &= centre.is_finite() && radius.is_finite());
+    if !finite {
+        return None;
+    }
     match *solid {
         Solid::Bar {
             from,
@@ -93,6 +99,9 @@ fn cast(solid: &Solid<'_>, ray: &Ray) -> Option<f32> {
             ..
         } => {
             let half = from.distance(to) / 2.0;
+            if half == 0.0 {
+                return None;
+            }
             // parry's cylinder and cone stand along Y.
             let turn = Quat::from_rotation_arc(Vec3::Y, (to - from).normalize_or(Vec3::Y));
             let pose = ParryPose::from_parts((from + to) / 2.0, turn);

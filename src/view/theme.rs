@@ -102,7 +102,7 @@ impl Palette {
                 text: Colour::hex(0x1E2A36),
                 normal: Colour::hex(0xD9480F),
                 friction: Colour::hex(0x1769C9),
-                flash: Colour::hex(0xFFB52E),
+                flash: Colour::hex(0xFFC61A),
                 gravity: Colour::hex(0x6B3FA0),
                 axes: [
                     Colour::hex(0xC92A2A),
@@ -120,13 +120,13 @@ impl Palette {
             },
             Theme::Dark => Self {
                 sky: Colour::hex(0x2A3138),
-                ground: Colour::hex(0x15191E),
-                floor: Colour::hex(0x20262C),
-                grid: Colour::hex(0x5B6874),
+                ground: Colour::hex(0x181D22),
+                floor: Colour::hex(0x2A323A),
+                grid: Colour::hex(0x697785),
                 text: Colour::hex(0xE6EBF0),
                 normal: Colour::hex(0xFF7A33),
                 friction: Colour::hex(0x4DABF7),
-                flash: Colour::hex(0xFFC94D),
+                flash: Colour::hex(0xFFE27A),
                 gravity: Colour::hex(0xB197FC),
                 axes: [
                     Colour::hex(0xFF6B6B),

@@ -1,0 +1,110 @@
+//! What the equations of motion cost: one evaluation, real time with Runge-Kutta 4, growth with the number of links.
+//!
+//! `cargo bench --bench physics`; figures are ratios of one run or of one machine, never absolute promises.
+
+use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use jointplay::integrate::System;
+use jointplay::mechanism::Mechanism;
+use jointplay::scene::Scene;
+use jointplay::simulate::Simulation;
+use std::hint::black_box;
+
+fn load(name: &str, changes: &[(&str, &str)]) -> Scene {
+    let changes: Vec<_> = changes
+        .iter()
+        .map(|(k, v)| ((*k).to_owned(), (*v).to_owned()))
+        .collect();
+    Scene::load(name, &changes).expect("a built-in scene loads")
+}
+
+/// One derivative of `scene` at its state after `time`, contacts included, with the drive recomputed or not.
+fn evaluation(c: &mut Criterion, label: &str, scene: &Scene, time: f64) {
+    let mut simulation = Simulation::new(scene).expect("a built-in scene starts");
+    simulation.advance_to(time).expect("a built-in scene runs");
+    let t = simulation.time();
+    let y = simulation.state().to_vec();
+    let mut mechanism = Mechanism::new(scene).expect("a built-in scene starts");
+    for j in 0..mechanism.contacts.len() {
+        mechanism.contacts.memory_mut()[j] = simulation.contact_memory(j);
+    }
+    let mut dy = vec![0.0; y.len()];
+    c.bench_function(&format!("{label}: new instant"), |b| {
+        let mut n = 0.0;
+        b.iter(|| {
+            n += 1e-15;
+            mechanism.derivative(black_box(t + n), black_box(&y), &mut dy);
+        });
+    });
+    c.bench_function(&format!("{label}: same instant"), |b| {
+        b.iter(|| mechanism.derivative(black_box(t), black_box(&y), &mut dy));
+    });
+}
+
+fn evaluations(c: &mut Criterion) {
+    // Settled: all three contacts carry load.
+    evaluation(c, "spcmm, tree, three contacts", &load("spcmm", &[]), 0.4);
+    evaluation(
+        c,
+        "spcmm, lagrange, three contacts",
+        &load("spcmm", &[("formulation", "lagrange")]),
+        0.4,
+    );
+    evaluation(
+        c,
+        "spcmm, tree, all ideal",
+        &load("spcmm", &[("contact.clearance", "0")]),
+        0.4,
+    );
+}
+
+fn real_time(c: &mut Criterion) {
+    let mut group = c.benchmark_group("10 ms simulated (spcmm, over the first impacts)");
+    group.sample_size(20);
+    for (label, changes) in [
+        (
+            "rk4 at 10 us",
+            vec![("solver.method", "rk4"), ("solver.step", "10 us")],
+        ),
+        (
+            "dopri5 at 1e-6",
+            vec![("solver.method", "dopri5"), ("solver.tolerance", "1e-6")],
+        ),
+    ] {
+        let scene = load("spcmm", &changes);
+        let mut simulation = Simulation::new(&scene).expect("a built-in scene starts");
+        simulation.advance_to(7e-3).expect("a built-in scene runs");
+        let start = simulation.snapshot();
+        group.bench_function(label, |b| {
+            b.iter_batched(
+                || start.clone(),
+                |start| {
+                    simulation.restore(&start).expect("its own snapshot");
+                    simulation.advance_to(17e-3).expect("a built-in scene runs");
+                },
+                criterion::BatchSize::LargeInput,
+            );
+        });
+    }
+    group.finish();
+}
+
+fn chain(c: &mut Criterion) {
+    let mut group = c.benchmark_group("chain, one evaluation");
+    for links in [4_u64, 16, 64, 256] {
+        let scene = load("chain", &[("chain.links", &links.to_string())]);
+        let mut simulation = Simulation::new(&scene).expect("a built-in scene starts");
+        simulation.advance_to(2e-3).expect("a built-in scene runs");
+        let y = simulation.state().to_vec();
+        let t = simulation.time();
+        let mut mechanism = Mechanism::new(&scene).expect("a built-in scene starts");
+        let mut dy = vec![0.0; y.len()];
+        group.throughput(criterion::Throughput::Elements(links));
+        group.bench_with_input(BenchmarkId::from_parameter(links), &links, |b, _| {
+            b.iter(|| mechanism.derivative(black_box(t), black_box(&y), &mut dy));
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, evaluations, real_time, chain);
+criterion_main!(benches);

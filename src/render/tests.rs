@@ -1,0 +1,400 @@
+//! Pixels, not promises. They need a graphics adapter; software Vulkan will do.
+
+use glam::Vec3;
+
+use super::wgpu::naga;
+use super::{Image, Offscreen, RenderError};
+use crate::scene::Scene;
+use crate::simulate::Frame;
+use crate::view::{
+    ArrowMemory, Camera, DrawList, Preset, SceneView, Shot, Theme, ViewOptions, fixture, to_f32,
+};
+
+const SIZE: [u32; 2] = [480, 360];
+
+fn offscreen() -> Offscreen {
+    Offscreen::new().expect(
+        "a graphics adapter: these tests need one, software is enough (mesa-vulkan-drivers)",
+    )
+}
+
+/// Bare options: nothing but the machine and its floor.
+fn bare() -> ViewOptions {
+    let mut options = ViewOptions {
+        triad: false,
+        magnification: 20.0,
+        ..Default::default()
+    };
+    (options.arrows.normal, options.arrows.friction) = (false, false);
+    options
+}
+
+fn picture(
+    scene: &Scene,
+    frame: &Frame,
+    options: &ViewOptions,
+    camera: &Camera,
+    hit: bool,
+) -> DrawList {
+    let view = SceneView::new(scene, frame);
+    let mut arrows = ArrowMemory::new();
+    let peaks = if hit {
+        fixture::hits(frame)
+    } else {
+        Vec::new()
+    };
+    arrows.update(frame, &peaks, 0.0, &options.arrows);
+    let mut list = DrawList::default();
+    let shot = Shot {
+        scene,
+        frame,
+        arrows: &arrows,
+        options,
+        camera,
+        trail: &[],
+        size: SIZE,
+        pixels_per_point: 1.0,
+    };
+    view.build(&shot, &mut list);
+    list
+}
+
+/// Close-up of the pendulum's joint, and the pixel of a point.
+fn close_up(options: &ViewOptions) -> (Scene, Frame, Camera) {
+    let (scene, frame) = fixture::pendulum();
+    let view = SceneView::new(&scene, &frame);
+    let mut camera = view.camera();
+    view.close_up(&mut camera, 0, &scene, &frame, options);
+    (scene, frame, camera)
+}
+
+fn at(image: &Image, camera: &Camera, point: Vec3) -> [u8; 3] {
+    let pixel = camera.project(point, SIZE).expect("before the eye");
+    image.pixel(pixel.x as u32, pixel.y as u32)
+}
+
+fn brightness(pixel: [u8; 3]) -> i32 {
+    pixel.iter().map(|&c| i32::from(c)).sum()
+}
+
+/// Largest difference of a channel.
+fn difference(a: [u8; 3], b: [u8; 3]) -> u8 {
+    a.iter()
+        .zip(b)
+        .map(|(&a, b)| a.abs_diff(b))
+        .max()
+        .unwrap_or(0)
+}
+
+#[test]
+fn every_shader_is_valid_and_translates_to_what_webgl2_runs() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders");
+    let mut entries = 0;
+    for file in std::fs::read_dir(folder).expect("the folder of shaders") {
+        let path = file.expect("an entry").path();
+        if path.extension().is_none_or(|ending| ending != "wgsl") {
+            continue;
+        }
+        let text = std::fs::read_to_string(&path).expect("a readable shader");
+        let module = naga::front::wgsl::parse_str(&text)
+            .unwrap_or_else(|error| panic!("{}: {}", path.display(), error.emit_to_string(&text)));
+        // No capability beyond the core: the web has none.
+        let flags = naga::valid::ValidationFlags::all();
+        let info = naga::valid::Validator::new(flags, naga::valid::Capabilities::empty())
+            .validate(&module)
+            .unwrap_or_else(|error| panic!("{}: {}", path.display(), error.emit_to_string(&text)));
+        for entry in &module.entry_points {
+            let options = naga::back::glsl::Options {
+                version: naga::back::glsl::Version::new_gles(300),
+                ..Default::default()
+            };
+            let pipeline = naga::back::glsl::PipelineOptions {
+                shader_stage: entry.stage,
+                entry_point: entry.name.clone(),
+                multiview: None,
+            };
+            let mut text = String::new();
+            let policies = naga::proc::BoundsCheckPolicies::default();
+            naga::back::glsl::Writer::new(&mut text, &module, &info, &options, &pipeline, policies)
+                .and_then(|mut writer| writer.write())
+                .unwrap_or_else(|error| panic!("{} {}: {error}", path.display(), entry.name));
+            entries += 1;
+        }
+    }
+    assert!(entries >= 15, "only {entries} entry points found");
+}
+
+#[test]
+fn the_same_list_gives_the_same_bytes() {
+    let (scene, frame) = fixture::three_legs();
+    let view = SceneView::new(&scene, &frame);
+    let options = ViewOptions {
+        magnification: 10.0,
+        ..Default::default()
+    };
+    let mut camera = view.camera();
+    view.fit(&mut camera, &scene, &frame, &options, SIZE);
+    let list = picture(&scene, &frame, &options, &camera, true);
+    let mut device = offscreen();
+    let first = device.render(&list).expect("a picture");
+    assert_eq!(
+        (first.width, first.height, first.rgba.len()),
+        (480, 360, 480 * 360 * 4)
+    );
+    assert!(
+        first.rgba.chunks(4).all(|pixel| pixel[3] == 255),
+        "opaque everywhere"
+    );
+    assert_eq!(
+        device.render(&list).expect("a picture"),
+        first,
+        "on the same device"
+    );
+    assert_eq!(
+        offscreen().render(&list).expect("a picture"),
+        first,
+        "on a new device"
+    );
+    let png = first.png(&[("Title", "three legs")]).expect("a PNG");
+    let mut reader = png::Decoder::new(std::io::Cursor::new(&png))
+        .read_info()
+        .expect("a PNG again");
+    let mut bytes = vec![0; reader.output_buffer_size().expect("a size")];
+    reader.next_frame(&mut bytes).expect("its pixels");
+    assert_eq!(bytes, first.rgba);
+}
+
+#[test]
+fn the_ball_is_where_the_projection_says() {
+    let options = ViewOptions {
+        sockets: false,
+        floor: false,
+        ..bare()
+    };
+    let (scene, frame, camera) = close_up(&options);
+    let list = picture(&scene, &frame, &options, &camera, false);
+    let mut without = list.clone();
+    without.solid.by_mesh.iter_mut().for_each(Vec::clear);
+    let mut device = offscreen();
+    let (with, without) = (
+        device.render(&list).expect("a picture"),
+        device.render(&without).expect("a picture"),
+    );
+    let centre = to_f32(&(frame.joints[0].socket_centre + 20.0 * frame.joints[0].eccentricity));
+    let (right, up, _) = camera.axes();
+    let changed = |point: Vec3| difference(at(&with, &camera, point), at(&without, &camera, point));
+    assert!(changed(centre) > 30, "the ball hides the background");
+    for direction in [right, up, -right] {
+        assert!(
+            changed(centre + direction * 0.009) > 10,
+            "inside its outline"
+        );
+        assert!(
+            changed(centre + direction * 0.0115) <= 1,
+            "outside its outline"
+        );
+    }
+}
+
+#[test]
+fn the_ball_shows_through_its_socket() {
+    let options = ViewOptions {
+        floor: false,
+        ..bare()
+    };
+    let (scene, frame, mut camera) = close_up(&options);
+    // From behind: the closed half of the socket is between the eye and the ball.
+    camera.yaw += std::f32::consts::PI;
+    let list = picture(&scene, &frame, &options, &camera, false);
+    let mut no_ball = list.clone();
+    no_ball.solid.by_mesh[crate::view::Mesh::Sphere.index()].clear();
+    let mut no_socket = list.clone();
+    no_socket.sockets.clear();
+    let mut device = offscreen();
+    let mut draw = |list: &DrawList| device.render(list).expect("a picture");
+    let (both, no_ball, no_socket) = (draw(&list), draw(&no_ball), draw(&no_socket));
+    let centre = to_f32(&(frame.joints[0].socket_centre + 20.0 * frame.joints[0].eccentricity));
+    let through = difference(at(&both, &camera, centre), at(&no_ball, &camera, centre));
+    let tint = difference(at(&both, &camera, centre), at(&no_socket, &camera, centre));
+    assert!(through > 15, "the ball can be seen: {through}");
+    assert!(tint > 10, "the glass can be seen: {tint}");
+}
+
+#[test]
+fn the_machine_casts_a_shadow_on_the_floor() {
+    let (scene, frame) = fixture::three_legs();
+    let view = SceneView::new(&scene, &frame);
+    let options = bare();
+    let mut camera = view.camera();
+    camera.preset(Preset::Top);
+    let list = picture(&scene, &frame, &options, &camera, false);
+    let floor = list.floor.expect("a floor");
+    // Where the light's ray through the platform's middle meets the floor.
+    let (light, up) = (list.light.direction, list.light.up);
+    let platform = to_f32(&frame.bodies[6].position);
+    let shadow = platform - light * ((platform - floor.centre).dot(up) / light.dot(up));
+    camera.target = shadow;
+    camera.pitch = 0.7;
+    let shaded_list = picture(&scene, &frame, &options, &camera, false);
+    let mut lit_list = shaded_list.clone();
+    lit_list.solid.by_mesh.iter_mut().for_each(Vec::clear);
+    let mut device = offscreen();
+    let (shaded, lit) = (
+        device.render(&shaded_list).expect("a picture"),
+        device.render(&lit_list).expect("a picture"),
+    );
+    let (dark, bright) = (
+        brightness(at(&shaded, &camera, shadow)),
+        brightness(at(&lit, &camera, shadow)),
+    );
+    assert!(
+        dark < bright - 90,
+        "{dark} in the shadow, {bright} without it"
+    );
+    let beside = shadow + 0.35 * camera.axes().0;
+    assert!(
+        difference(at(&shaded, &camera, beside), at(&lit, &camera, beside)) <= 1,
+        "light beside it"
+    );
+}
+
+#[test]
+fn an_arrow_inside_a_ball_can_be_seen() {
+    let mut options = ViewOptions {
+        floor: false,
+        ..bare()
+    };
+    let (scene, frame, camera) = close_up(&options);
+    let plain = picture(&scene, &frame, &options, &camera, false);
+    options.arrows.normal = true;
+    let marked = picture(&scene, &frame, &options, &camera, false);
+    let mut device = offscreen();
+    let (plain, marked) = (
+        device.render(&plain).expect("a picture"),
+        device.render(&marked).expect("a picture"),
+    );
+    // The normal force runs from the contact through the centre of the ball.
+    let centre = to_f32(&(frame.joints[0].socket_centre + 20.0 * frame.joints[0].eccentricity));
+    let inside = centre - 0.005 * to_f32(&frame.joints[0].normal_force).normalize();
+    let [red, _, blue] = at(&marked, &camera, inside);
+    assert!(
+        difference(at(&plain, &camera, inside), [red, 0, blue]) > 0
+            && red > blue.saturating_add(40),
+        "{red} {blue}"
+    );
+}
+
+#[test]
+fn a_hit_joint_lights_up_and_themes_differ() {
+    let options = bare();
+    let (scene, frame, camera) = close_up(&options);
+    let mut device = offscreen();
+    let mut draw = |options: &ViewOptions, hit| {
+        device
+            .render(&picture(&scene, &frame, options, &camera, hit))
+            .expect("a picture")
+    };
+    let (quiet, hit) = (draw(&options, false), draw(&options, true));
+    let beside = to_f32(&frame.joints[0].socket_centre) + camera.axes().0 * 0.024;
+    let [r0, _, b0] = at(&quiet, &camera, beside).map(i32::from);
+    let [r1, _, b1] = at(&hit, &camera, beside).map(i32::from);
+    assert!((r1 - b1) - (r0 - b0) > 20, "warm light beside the socket");
+    let dark = draw(
+        &ViewOptions {
+            theme: Theme::Dark,
+            ..options.clone()
+        },
+        false,
+    );
+    assert!(brightness(quiet.pixel(5, 5)) > 600 && brightness(dark.pixel(5, 5)) < 200);
+    let calm = draw(
+        &ViewOptions {
+            flash: false,
+            ..options
+        },
+        true,
+    );
+    assert_eq!(calm, quiet, "no flash where none is wanted");
+}
+
+#[test]
+fn the_background_has_exactly_the_themes_colours() {
+    let mut device = offscreen();
+    let list = DrawList {
+        size: [64, 64],
+        background: crate::view::Background {
+            top: crate::view::Colour::hex(0x406080),
+            bottom: crate::view::Colour::hex(0x406080),
+        },
+        ..Default::default()
+    };
+    let image = device.render(&list).expect("a picture");
+    // Encoded once, not twice and not never; half a step of noise may round to a neighbour.
+    assert!(
+        (0..64).all(|i| difference(image.pixel(i, i), [0x40, 0x60, 0x80]) <= 1),
+        "{:?}",
+        image.pixel(9, 9)
+    );
+}
+
+#[test]
+fn a_size_that_cannot_be_drawn_is_refused_with_the_limit() {
+    let mut device = offscreen();
+    for size in [[0, 10], [10, 0], [1 << 20, 10]] {
+        let list = DrawList {
+            size,
+            ..Default::default()
+        };
+        let error = device.render(&list).expect_err("refused");
+        assert!(matches!(error, RenderError::Size { .. }));
+        assert!(error.to_string().contains("1 to "), "{error}");
+    }
+}
+
+/// An application that is nothing but the viewport.
+struct OnlyViewport(std::sync::Arc<DrawList>);
+
+impl eframe::App for OnlyViewport {
+    fn ui(&mut self, ui: &mut eframe::egui::Ui, _frame: &mut eframe::Frame) {
+        eframe::egui::CentralPanel::no_frame().show(ui, |ui| {
+            let rect = ui.available_rect_before_wrap();
+            ui.painter()
+                .add(super::Viewport::shape(rect, self.0.clone()));
+        });
+    }
+}
+
+#[test]
+fn the_interface_shows_the_very_picture_that_is_drawn_without_a_window() {
+    let (scene, frame) = fixture::three_legs();
+    let view = SceneView::new(&scene, &frame);
+    let options = ViewOptions {
+        magnification: 10.0,
+        ..Default::default()
+    };
+    let mut camera = view.camera();
+    view.fit(&mut camera, &scene, &frame, &options, SIZE);
+    let list = picture(&scene, &frame, &options, &camera, false);
+    let alone = offscreen().render(&list).expect("a picture");
+    let mut harness = egui_kittest::Harness::builder()
+        .with_size(eframe::egui::vec2(SIZE[0] as f32, SIZE[1] as f32))
+        .with_pixels_per_point(1.0)
+        .wgpu()
+        .build_eframe(|context| {
+            super::install(context.wgpu_render_state.as_ref().expect("wgpu"));
+            OnlyViewport(std::sync::Arc::new(list.clone()))
+        });
+    harness.run();
+    let shown = harness.render().expect("a picture");
+    assert_eq!((shown.width(), shown.height()), (SIZE[0], SIZE[1]));
+    let worst = shown
+        .as_raw()
+        .iter()
+        .zip(&alone.rgba)
+        .map(|(a, b)| a.abs_diff(*b))
+        .max();
+    assert!(
+        worst.is_some_and(|worst| worst <= 1),
+        "bytes are copied: {worst:?}"
+    );
+}

@@ -1,0 +1,179 @@
+//! What must hold between the parameters of a scene, and what is allowed but doubtful.
+
+use super::access::contact_value;
+use super::*;
+use crate::contact::{self, FrictionLaw, NormalLaw};
+
+impl Scene {
+    /// What must hold between the contact parameters of one joint.
+    pub(super) fn check_contacts(&self) -> Result<(), Fault> {
+        check_contact(&self.contact).map_err(|(parts, message)| Fault {
+            joint: None,
+            parts,
+            message,
+        })?;
+        for (index, joint) in self.ball_joints.iter().enumerate() {
+            check_contact(&joint.contact).map_err(|(parts, message)| Fault {
+                joint: Some(index),
+                parts,
+                message,
+            })?;
+        }
+        Ok(())
+    }
+
+    /// Choices that are allowed but may not mean what the user expects, one sentence each.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut warnings = Vec::new();
+        for (joints, contact) in self.contact_groups() {
+            let near_one = contact.restitution >= 0.8 || contact.clearance == 0.0;
+            if contact.normal_law == NormalLaw::LankaraniNikravesh && !near_one {
+                warnings.push(format!(
+                    "{joints}: restitution {} with lankarani-nikravesh, which is right only near 1 (asked for 0, it gives \
+                     about 0.66); flores or gonthier suit low restitution.",
+                    contact.restitution
+                ));
+            }
+            if contact.clearance > 0.0 && contact.clearance <= 1e-5 {
+                warnings.push(format!(
+                    "{joints}: clearance {} is so small that the contact patch is no longer small against the ball \
+                     (radius {}), which the contact law assumes.",
+                    format_quantity(contact.clearance, "mm"),
+                    format_quantity(contact.ball_radius, "mm")
+                ));
+            }
+            if contact.clearance > 0.0
+                && contact.slip_speed_high < 1e-6
+                && contact.friction_law == FrictionLaw::ModifiedCoulomb
+            {
+                warnings.push(format!(
+                    "{joints}: slip_speed_high {} makes friction very stiff; expect small steps.",
+                    format_quantity(contact.slip_speed_high, "mm/s")
+                ));
+            }
+        }
+        let rattles = self
+            .ball_joints
+            .iter()
+            .any(|joint| joint.contact.clearance > 0.0);
+        if rattles && !self.solver.method.is_adaptive() && self.solver.step > 20e-6 {
+            warnings.push(format!(
+                "solver.step {}: an impact lasts about 0.1 ms, which a fixed step above 20 us does not resolve.",
+                format_quantity(self.solver.step, "us")
+            ));
+        }
+        warnings
+    }
+
+    /// Ball joints with equal contact parameters, named together.
+    fn contact_groups(&self) -> Vec<(String, contact::Parameters)> {
+        let mut groups: Vec<(Vec<&str>, contact::Parameters)> = Vec::new();
+        for joint in &self.ball_joints {
+            match groups
+                .iter_mut()
+                .find(|(_, contact)| *contact == joint.contact)
+            {
+                Some((names, _)) => names.push(&joint.name),
+                None => groups.push((vec![&joint.name], joint.contact)),
+            }
+        }
+        let title = |names: &[&str]| match names {
+            [first, .., last] if names.len() > 6 => format!("{first} to {last}"),
+            _ => names.join(", "),
+        };
+        groups
+            .into_iter()
+            .map(|(names, contact)| (title(&names), contact))
+            .collect()
+    }
+}
+
+/// Two parameters that do not go together.
+pub(super) struct Fault {
+    pub joint: Option<usize>,
+    /// Last parts of the keys at fault, the likelier first.
+    pub parts: [&'static str; 2],
+    pub message: String,
+}
+
+impl Fault {
+    /// Keys that could be to blame in `scene`, the likelier first.
+    pub fn keys(&self, scene: &Scene) -> Vec<String> {
+        let joint = self.joint.map(|index| &scene.ball_joints[index]);
+        let key = |part: &&'static str| match joint {
+            Some(joint) if joint.overrides.contains(part) => format!("joint.{}.{part}", joint.name),
+            _ => format!("contact.{part}"),
+        };
+        let mut keys: Vec<String> = self.parts.iter().map(key).collect();
+        // What one joint has of its own departs from what holds for all.
+        keys.sort_by_key(|key| !key.starts_with("joint."));
+        keys
+    }
+
+    fn text(&self, scene: &Scene, key: &str) -> String {
+        match self.joint.map(|index| &scene.ball_joints[index].name) {
+            Some(name) if !key.starts_with("joint.") => {
+                format!("{} (in ball joint {name})", self.message)
+            }
+            _ => self.message.clone(),
+        }
+    }
+
+    /// The error of the change of `key` that brought the fault in.
+    pub fn blame_change(&self, scene: &Scene, key: &str) -> SceneError {
+        let value = scene
+            .changes
+            .iter()
+            .rfind(|(changed, _)| changed == key)
+            .map(|(_, value)| value.as_str());
+        SceneError::about(key, value, self.text(scene, key))
+    }
+
+    /// The error of the latest change that has to do with the fault; `None` if it was in the file.
+    pub fn blame_changes(&self, scene: &Scene) -> Option<SceneError> {
+        let keys = self.keys(scene);
+        let (key, _) = scene
+            .changes
+            .iter()
+            .rfind(|(changed, _)| keys.contains(changed))?;
+        Some(self.blame_change(scene, key))
+    }
+}
+
+fn check_contact(contact: &contact::Parameters) -> Result<(), ([&'static str; 2], String)> {
+    if contact.clearance >= contact.ball_radius {
+        return Err((
+            ["clearance", "ball_radius"],
+            format!(
+                "clearance {} must be below the ball radius, {}; allowed 0 mm to below {1}; units {}",
+                format_quantity(contact.clearance, "mm"),
+                format_quantity(contact.ball_radius, "mm"),
+                unit_names(Dimension::Length).join(", ")
+            ),
+        ));
+    }
+    if contact.slip_speed_low >= contact.slip_speed_high {
+        return Err((
+            ["slip_speed_low", "slip_speed_high"],
+            format!(
+                "slip_speed_low {} must be below slip_speed_high {}; units {}",
+                format_quantity(contact.slip_speed_low, "mm/s"),
+                format_quantity(contact.slip_speed_high, "mm/s"),
+                unit_names(Dimension::Speed).join(", ")
+            ),
+        ));
+    }
+    let divides = matches!(contact.normal_law, NormalLaw::Flores | NormalLaw::Gonthier);
+    if divides && contact.restitution == 0.0 {
+        let Value::Choice(law) = contact_value(contact, "normal_law") else {
+            unreachable!("a law is a choice")
+        };
+        return Err((
+            ["restitution", "normal_law"],
+            format!(
+                "the law {law} divides by the restitution: with it, allowed above 0 to 1; a pure number, no unit"
+            ),
+        ));
+    }
+    Ok(())
+}

@@ -1,0 +1,365 @@
+//! What the draw list promises.
+
+use glam::{Vec2, Vec3};
+
+use super::drawn::Pose;
+use super::fixture;
+use super::*;
+use crate::scene::Scene;
+use crate::simulate::Frame;
+
+const SIZE: [u32; 2] = [1280, 720];
+
+fn shot<'a>(
+    scene: &'a Scene,
+    frame: &'a Frame,
+    arrows: &'a ArrowMemory,
+    options: &'a ViewOptions,
+    camera: &'a Camera,
+) -> Shot<'a> {
+    Shot {
+        scene,
+        frame,
+        arrows,
+        options,
+        camera,
+        trail: &[],
+        size: SIZE,
+        pixels_per_point: 1.0,
+    }
+}
+
+/// Draw list of a scene with the present forces held.
+fn list(scene: &Scene, frame: &Frame, options: &ViewOptions) -> DrawList {
+    let view = SceneView::new(scene, frame);
+    let mut arrows = ArrowMemory::new();
+    arrows.update(frame, &[], 0.0, &options.arrows);
+    let mut out = DrawList::default();
+    view.build(
+        &shot(scene, frame, &arrows, options, &view.camera()),
+        &mut out,
+    );
+    out
+}
+
+fn place(instance: &Instance) -> Vec3 {
+    let [x, y, z] = instance.world_from_mesh;
+    Vec3::new(x[3], y[3], z[3])
+}
+
+fn size(instance: &Instance) -> f32 {
+    let [x, y, z] = instance.world_from_mesh;
+    Vec3::new(x[0], y[0], z[0]).length()
+}
+
+/// The drawn ball of joint 0: the sphere of the ball's radius nearest to its socket.
+fn ball(list: &DrawList, radius: f32) -> &Instance {
+    let spheres = &list.solid.by_mesh[Mesh::Sphere.index()];
+    spheres
+        .iter()
+        .find(|s| (size(s) / radius - 1.0).abs() < 1e-4)
+        .expect("a ball")
+}
+
+#[test]
+fn the_ball_stays_in_its_drawn_socket_at_every_magnification() {
+    let (scene, frame) = fixture::pendulum();
+    for magnification in [1.0, 2.0, 7.5, 20.0, 50.0, 100.0] {
+        let options = ViewOptions {
+            magnification,
+            ..Default::default()
+        };
+        let list = list(&scene, &frame, &options);
+        assert_eq!(
+            list.magnification, magnification,
+            "0.3 mm around 10 mm is drawable up to 100"
+        );
+        let (ball, socket) = (ball(&list, 0.010), list.sockets[0]);
+        let inner = size(&socket) * socket.inner_radius;
+        let outermost = place(ball).distance(place(&socket)) + size(ball);
+        // The fixture's ball is pressed 1 um into its wall.
+        assert!(
+            (outermost - inner - 1e-6 * magnification).abs() < 1e-6,
+            "×{magnification}: {outermost} in {inner}"
+        );
+        assert!((inner - 0.010 - 0.3e-3 * magnification).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn a_magnification_that_cannot_be_drawn_is_held_back_and_says_so() {
+    let (scene, mut frame) = fixture::pendulum();
+    frame.joints[0].clearance = 2e-3;
+    frame.joints[0].eccentricity *= 2e-3 / 0.3e-3;
+    let options = ViewOptions {
+        magnification: 100.0,
+        ..Default::default()
+    };
+    let drawn = list(&scene, &frame, &options);
+    assert!(
+        (10.0..20.0).contains(&drawn.magnification),
+        "{}",
+        drawn.magnification
+    );
+    assert!(
+        drawn.magnification_text.contains("×100 does not fit"),
+        "{}",
+        drawn.magnification_text
+    );
+    let options = ViewOptions {
+        magnification: 5.0,
+        ..Default::default()
+    };
+    assert_eq!(list(&scene, &frame, &options).magnification_text, "play ×5");
+}
+
+#[test]
+fn the_rod_goes_along_with_its_magnified_ball() {
+    let (scene, frame) = fixture::pendulum();
+    let options = ViewOptions {
+        magnification: 80.0,
+        ..Default::default()
+    };
+    let list = list(&scene, &frame, &options);
+    let rod = list.solid.by_mesh[Mesh::Cylinder.index()]
+        .iter()
+        .find(|c| (size(c) - 0.004).abs() < 1e-6)
+        .expect("the rod");
+    assert!(
+        place(rod).distance(place(ball(&list, 0.010))) < 1e-6,
+        "its end is the ball's centre"
+    );
+}
+
+#[test]
+fn the_carrier_of_a_socket_ends_at_the_socket() {
+    let (scene, frame) = fixture::pendulum();
+    let carrier = |magnification| {
+        let list = list(
+            &scene,
+            &frame,
+            &ViewOptions {
+                magnification,
+                ..Default::default()
+            },
+        );
+        let bars = &list.solid.by_mesh[Mesh::Cylinder.index()];
+        // It hangs from z = 35 mm.
+        let z = bars
+            .iter()
+            .find(|c| (size(c) - 0.006).abs() < 1e-6)
+            .map(|c| c.world_from_mesh[2]);
+        (z.map(|z| z[3] + z[2]), size(&list.sockets[0]))
+    };
+    for magnification in [1.0, 50.0] {
+        let (end, outer) = carrier(magnification);
+        let end = end.expect("the carrier");
+        assert!(
+            (0.98..=1.0).contains(&(end / outer)),
+            "×{magnification}: {end} at a socket of {outer}"
+        );
+    }
+    assert_eq!(carrier(100.0).0, None, "swallowed by a socket of 43 mm");
+}
+
+#[test]
+fn arrows_start_at_the_contact_and_have_the_legends_length() {
+    let (scene, frame) = fixture::pendulum();
+    let mut options = ViewOptions {
+        magnification: 20.0,
+        triad: false,
+        ..Default::default()
+    };
+    options.arrows.reference = Some(4.0);
+    options.arrows.friction = false;
+    let list = list(&scene, &frame, &options);
+    let legend = list.legend.as_ref().expect("a legend");
+    let shaft = list.arrows.by_mesh[Mesh::Cylinder.index()][0];
+    let head = list.arrows.by_mesh[Mesh::Cone.index()][0];
+    let along = |i: &Instance| {
+        Vec3::new(
+            i.world_from_mesh[0][2],
+            i.world_from_mesh[1][2],
+            i.world_from_mesh[2][2],
+        )
+    };
+    // Force on the ball: up and to +X, against the wall's direction.
+    let force = to_f32(&frame.joints[0].normal_force);
+    let tip = place(&head) + along(&head);
+    let length = tip.distance(place(&shaft));
+    assert!(
+        (length / legend.length - 1.0).abs() < 1e-4,
+        "4 N at 4 N reference: {length} of {}",
+        legend.length
+    );
+    assert!((tip - place(&shaft)).normalize().dot(force.normalize()) > 0.9999);
+    let contact = place(ball(&list, 0.010)) - force.normalize() * 0.010;
+    assert!(
+        place(&shaft).distance(contact) < 1e-6,
+        "on the ball, where it touches"
+    );
+    assert_eq!(
+        (legend.reference, legend.automatic, legend.friction),
+        (4.0, false, None)
+    );
+}
+
+#[test]
+fn a_logarithmic_scale_shortens_three_decades_to_one_length() {
+    let (scene, frame) = fixture::pendulum();
+    let mut options = ViewOptions::default();
+    options.arrows.scaling = Scaling::Logarithmic;
+    options.arrows.reference = Some(1000.0);
+    let legend = list(&scene, &frame, &options).legend.expect("a legend");
+    let fractions: Vec<f32> = legend.ticks.iter().map(|tick| tick.fraction).collect();
+    assert_eq!(
+        legend
+            .ticks
+            .iter()
+            .map(|tick| tick.force.round())
+            .collect::<Vec<_>>(),
+        [1.0, 10.0, 100.0, 1000.0]
+    );
+    for (fraction, expect) in fractions.iter().zip([0.1, 0.347, 0.668, 1.0]) {
+        assert!((fraction - expect).abs() < 2e-3, "{fractions:?}");
+    }
+}
+
+#[test]
+fn what_is_under_the_cursor_is_what_is_drawn_there() {
+    let (scene, frame) = fixture::three_legs();
+    let view = SceneView::new(&scene, &frame);
+    let (arrows, options) = (
+        ArrowMemory::new(),
+        ViewOptions {
+            magnification: 30.0,
+            ..Default::default()
+        },
+    );
+    let mut camera = view.camera();
+    view.fit(&mut camera, &scene, &frame, &options, SIZE);
+    let shot = shot(&scene, &frame, &arrows, &options, &camera);
+    let under = |point: Vec3| {
+        let pixel = camera.project(point, SIZE).expect("before the eye");
+        view.pick(&shot, pixel).map(|hit| hit.what)
+    };
+    let middle_of_rod = Pose::in_frame(&frame, Some(3)).apply(Vec3::new(0.0, 0.0, 0.1));
+    assert_eq!(
+        under(to_f32(&frame.joints[0].socket_centre)),
+        Some(Picked::Joint(0))
+    );
+    assert_eq!(under(middle_of_rod), Some(Picked::Body(3)));
+    assert_eq!(
+        under(to_f32(&frame.bodies[6].position)),
+        Some(Picked::Body(6))
+    );
+    assert_eq!(
+        under(to_f32(&frame.bodies[0].position)),
+        Some(Picked::Body(0))
+    );
+    assert_eq!(under(Vec3::new(0.032, 0.0, 0.29)), Some(Picked::Fixed(0)));
+    assert_eq!(
+        view.pick(&shot, Vec2::new(2.0, 2.0)),
+        None,
+        "the background"
+    );
+    let pixel = camera
+        .project(to_f32(&frame.joints[1].socket_centre), SIZE)
+        .expect("before the eye");
+    let hit = view.pick(&shot, pixel).expect("a socket");
+    assert!((hit.point.distance(camera.eye()) - hit.distance).abs() < 1e-4);
+    assert_eq!(
+        view.anchor(&frame, hit.what),
+        Some(to_f32(&frame.joints[1].socket_centre))
+    );
+}
+
+#[test]
+fn labels_name_the_axes_gravity_and_the_joints_where_they_are() {
+    let (scene, frame) = fixture::three_legs();
+    let list = list(&scene, &frame, &ViewOptions::default());
+    let texts: Vec<&str> = list.labels.iter().map(|label| &*label.text).collect();
+    assert_eq!(texts, ["X", "Y", "Z", "g", "S1", "S2", "S3"]);
+    let label = list
+        .labels
+        .iter()
+        .find(|label| label.kind == LabelKind::Joint(1))
+        .expect("S2");
+    let joint = list
+        .eye
+        .project(to_f32(&frame.joints[1].socket_centre), SIZE)
+        .expect("before the eye");
+    assert!(
+        (label.pixel.x - joint.x).abs() < 2.0 && (5.0..80.0).contains(&(joint.y - label.pixel.y)),
+        "above its socket"
+    );
+    let x = &list.labels[0];
+    let origin = list.overlay.by_mesh[Mesh::Cylinder.index()][0];
+    let corner = list
+        .eye
+        .project(place(&origin), SIZE)
+        .expect("before the eye");
+    assert!(
+        x.pixel.y > corner.y + 10.0,
+        "the X axis of this scene points down"
+    );
+    assert!(
+        (corner - Vec2::new(62.0, 720.0 - 62.0)).length() < 1.0,
+        "in the lower left corner: {corner}"
+    );
+}
+
+#[test]
+fn building_twice_gives_the_same_list_in_the_same_buffers() {
+    let (scene, frame) = fixture::three_legs();
+    let view = SceneView::new(&scene, &frame);
+    let (options, camera) = (ViewOptions::default(), view.camera());
+    let mut arrows = ArrowMemory::new();
+    arrows.update(&frame, &fixture::hits(&frame), 0.016, &options.arrows);
+    let shot = shot(&scene, &frame, &arrows, &options, &camera);
+    let mut list = DrawList::default();
+    view.build(&shot, &mut list);
+    assert_eq!(list.halos.len(), 3, "every joint was hit");
+    let first = list.clone();
+    let buffer = list.solid.by_mesh[0].as_ptr();
+    view.build(&shot, &mut list);
+    assert_eq!(list, first);
+    assert_eq!(list.solid.by_mesh[0].as_ptr(), buffer);
+}
+
+#[test]
+fn a_frame_with_broken_numbers_draws_without_a_panic() {
+    let (scene, mut frame) = fixture::three_legs();
+    frame.bodies[3].position.x = f64::NAN;
+    frame.joints[0].eccentricity.y = f64::NAN;
+    frame.joints[1].normal_force.z = f64::INFINITY;
+    let drawn = list(
+        &scene,
+        &frame,
+        &ViewOptions {
+            magnification: f32::NAN,
+            ..Default::default()
+        },
+    );
+    assert_eq!(drawn.magnification, 1.0);
+    let (view, arrows, options) = (
+        SceneView::new(&scene, &frame),
+        ArrowMemory::new(),
+        ViewOptions::default(),
+    );
+    let mut camera = view.camera();
+    view.fit(&mut camera, &scene, &frame, &options, SIZE);
+    assert!(camera.eye().is_finite());
+    for x in (0..SIZE[0]).step_by(40) {
+        view.pick(
+            &shot(&scene, &frame, &arrows, &options, &camera),
+            Vec2::new(x as f32, 360.0),
+        );
+    }
+    let empty = Frame::default();
+    assert!(
+        list(&scene, &empty, &ViewOptions::default())
+            .sockets
+            .is_empty()
+    );
+}
