@@ -573,7 +573,9 @@ fn the_chosen_plots_are_shown_with_their_units() {
     assert!(harness.query_by_label("Energy, mJ").is_none());
     harness.get_by_label("Choose plots").click();
     harness.run();
-    harness.get_by_role_and_label(Role::CheckBox, "Energy, mJ").click();
+    harness
+        .get_by_role_and_label(Role::CheckBox, "Energy, mJ")
+        .click();
     harness.run();
     harness.key_press(Key::Escape);
     harness.run();
