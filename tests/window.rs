@@ -487,7 +487,7 @@ fn look() {
     let Ok(folder) = std::env::var("JOINTPLAY_LOOK") else {
         return;
     };
-    let mut save = |harness: &mut Harness<'_, App>, name: &str| {
+    let save = |harness: &mut Harness<'_, App>, name: &str| {
         harness
             .render()
             .expect("drawn")

@@ -287,3 +287,84 @@ impl Player {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::Quantity;
+
+    fn player(scene: &str) -> Player {
+        let scene = Scene::load(scene, &[]).expect("built in");
+        Player::new(&scene).expect("starts")
+    }
+
+    fn recorded(player: &Player, quantity: Quantity, to: f64) -> Vec<[f64; 2]> {
+        let list = player.channels().list();
+        let channel = list
+            .iter()
+            .position(|c| c.quantity == quantity)
+            .expect("recorded");
+        let mut points = Vec::new();
+        player.history().query(channel, 0.0, to, 400, &mut points);
+        points
+    }
+
+    #[test]
+    fn the_record_holds_the_peak_of_an_impact_between_steps() {
+        let mut player = player("spcmm");
+        player.run_to(9e-3);
+        player.advance(0.0);
+        let points = recorded(&player, Quantity::NormalForce, 9e-3);
+        let peak = points.iter().map(|p| p[1]).fold(0.0, f64::max);
+        // Peak of the first impact of S1, `physics.md` section 5; the live tolerance is coarser than the reference's.
+        assert!((peak - 621.35).abs() < 0.005 * 621.35, "{peak}");
+    }
+
+    #[test]
+    fn a_long_step_is_recorded_as_a_curve() {
+        // Free fall: half an acceleration times time squared, in steps of milliseconds.
+        let mut player = player("spcmm");
+        player.run_to(7e-3);
+        let points = recorded(&player, Quantity::Eccentricity, 7e-3);
+        assert!(points.len() > 15, "{}", points.len());
+        let last = points[points.len() - 1];
+        for point in points {
+            let fall = last[1] * (point[0] / last[0]).powi(2);
+            assert!(
+                (point[1] - fall).abs() < 0.03 * last[1],
+                "{point:?}: {fall}"
+            );
+        }
+    }
+
+    #[test]
+    fn another_number_of_links_is_recorded_after_the_reset() {
+        let mut player = player("chain");
+        let before = player.channels().len();
+        assert_eq!(
+            player.set("chain.links", "3").expect("in range"),
+            Effect::AtReset
+        );
+        assert!(player.is_waiting("chain.links") && player.has_waiting());
+        assert_eq!(player.channels().len(), before);
+        player.reset().expect("starts");
+        assert!(!player.has_waiting());
+        assert!(player.channels().len() < before);
+        player.run_to(0.01);
+        assert!(!recorded(&player, Quantity::NormalForce, 0.01).is_empty());
+    }
+
+    #[test]
+    fn a_refused_value_changes_nothing() {
+        let mut player = player("spcmm");
+        let before = player.wanted().contact;
+        assert!(player.set("contact.clearance", "-1 mm").is_err());
+        assert!(player.set("contact.clearence", "1 mm").is_err());
+        assert_eq!(player.wanted().contact, before);
+        player.set("contact.clearance", "0.7 mm").expect("in range");
+        player
+            .set_original("contact.clearance")
+            .expect("the scene's own");
+        assert_eq!(player.wanted().contact, before);
+    }
+}

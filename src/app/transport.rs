@@ -169,7 +169,7 @@ pub fn banner(ui: &mut Ui, player: &Player) -> Option<Asked> {
                         .color(colour),
                 );
                 ui.label(&stopped.what);
-                ui.label(format!("What to try: {}", stopped.advice));
+                ui.label(&stopped.advice);
                 if ui.button("Reset the run").clicked() {
                     asked = Some(Asked::Reset);
                 }
