@@ -419,16 +419,15 @@ impl Simulation {
         }
         let h = t_end - t;
         stepper.attempt(mechanism, t, h, &state.y, &state.k, y_end, k_end);
+        self.accept(t_end, h, evaluations)?;
         if t_end == limit {
             // The next grid begins where this one was cut.
-            state.grid_origin = t_end;
-            state.grid_count = u64::MAX;
+            self.state.grid_origin = t_end;
+            self.state.grid_count = 0;
+        } else {
+            self.state.grid_count += 1;
         }
-        let result = self.accept(t_end, h, evaluations);
-        if result.is_ok() {
-            self.state.grid_count = self.state.grid_count.wrapping_add(1);
-        }
-        result
+        Ok(())
     }
 
     /// A step of a scene whose motion is a function of time alone: predict, close the loops, read the reactions.
