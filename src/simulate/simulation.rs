@@ -764,19 +764,19 @@ impl Simulation {
         waits: bool,
     ) -> Result<Effect, SceneError> {
         let mut running = self.running.clone();
-        let becomes_other = || {
-            self.running
-                .ball_joints
-                .iter()
-                .zip(&next.ball_joints)
-                .any(|(a, b)| (a.contact.clearance == 0.0) != (b.contact.clearance == 0.0))
-        };
+        // What the running scene cannot take may suit the one that waits, say a joint of a longer chain.
+        let waits = waits || change(&mut running).is_err();
         // A joint that turns ideal, or stops being so, changes the equations.
-        if waits || becomes_other() {
+        let turns = |running: &Scene| {
+            let pairs = self.running.ball_joints.iter().zip(&running.ball_joints);
+            pairs
+                .map(|(a, b)| (a.contact.clearance, b.contact.clearance))
+                .any(|(a, b)| (a == 0.0) != (b == 0.0))
+        };
+        if waits || turns(&running) {
             self.scene = next;
             return Ok(Effect::AtReset);
         }
-        change(&mut running)?;
         self.scene = next;
         let before = std::mem::replace(&mut self.running, running);
         self.mechanism.gravity = self.running.gravity;
