@@ -236,17 +236,15 @@ impl Simulation {
     }
 
     fn advance(&mut self, end: f64) -> Result<(), Stopped> {
-        let ramp_end = self.ramp_end();
-        let limit = end.min(ramp_end);
+        // Not at the end of the step before: samples inside it still see the clearance on its way.
+        self.finish_ramps();
+        let limit = end.min(self.ramp_end());
         if self.mechanism.is_kinematic() {
             self.kinematic_step(limit)?;
         } else if self.running.solver.method.is_adaptive() {
             self.adaptive_step(limit)?;
         } else {
             self.fixed_step(limit)?;
-        }
-        if self.state.t >= ramp_end {
-            self.finish_ramps();
         }
         Ok(())
     }
