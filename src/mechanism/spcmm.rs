@@ -147,6 +147,7 @@ impl Trajectory {
         } else {
             0.0
         };
+        let mut worst: Option<Unreachable> = None;
         for n in 0..=SAMPLES {
             let time = period * f64::from(n) / f64::from(SAMPLES);
             let (left, parts) = self.evaluate(time);
@@ -161,15 +162,19 @@ impl Trajectory {
                     square.value
                 };
                 let has = self.p.driven_rod;
-                return Err(Unreachable {
-                    slider: i as u8 + 1,
-                    time,
-                    needs: (has * has - missing).sqrt(),
-                    has,
-                });
+                let needs = (has * has - missing).sqrt();
+                // The farthest reach tells how much there is to change.
+                if worst.is_none_or(|w| needs > w.needs) {
+                    worst = Some(Unreachable {
+                        slider: i as u8 + 1,
+                        time,
+                        needs,
+                        has,
+                    });
+                }
             }
         }
-        Ok(())
+        worst.map_or(Ok(()), Err)
     }
 }
 
