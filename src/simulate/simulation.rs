@@ -291,9 +291,13 @@ impl Simulation {
             if !(state.h_next >= SHORTEST_STEP.max(4.0 * f64::EPSILON * t)) {
                 state.statistics.evaluations += mechanism.evaluations - evaluations;
                 state.h_next = self.running.solver.step;
-                return Err(
-                    self.stopped("the step size that the tolerance asks for fell below 1e-14 s")
+                let advice = format!(
+                    "try a looser solver.tolerance (now {tolerance:e}) or a softer or heavier scene"
                 );
+                return Err(self.stopped(
+                    "the step size that the tolerance asks for fell below 1e-14 s",
+                    advice,
+                ));
             }
         };
         let contact_began = state.contact_began;
@@ -468,7 +472,20 @@ impl Simulation {
         }
         state.statistics.evaluations += mechanism.evaluations - evaluations;
         if let Some(what) = self.objection(open) {
-            return Err(self.stopped(&what));
+            let solver = &self.running.solver;
+            let advice = if solver.method.is_adaptive() {
+                // Its steps are as short as they need to be: the motion itself is beyond the model.
+                format!(
+                    "try slower drives, a stiffer contact, or a tighter solver.tolerance (now {:e})",
+                    solver.tolerance
+                )
+            } else {
+                format!(
+                    "try a smaller solver.step (now {:e} s) or solver.method = dopri5",
+                    solver.step
+                )
+            };
+            return Err(self.stopped(&what, advice));
         }
         let Self {
             mechanism,
@@ -652,20 +669,11 @@ impl Simulation {
         None
     }
 
-    fn stopped(&self, what: &str) -> Stopped {
-        let solver = &self.running.solver;
+    fn stopped(&self, what: &str, advice: String) -> Stopped {
         let advice = if self.mechanism.least_pivot() < 1e-12 {
             "the ideal joints are (nearly) dependent here: keep clear of this pose, or give a joint a clearance".to_owned()
-        } else if solver.method.is_adaptive() {
-            format!(
-                "try a looser solver.tolerance (now {:e}) or a softer or heavier scene",
-                solver.tolerance
-            )
         } else {
-            format!(
-                "try a smaller solver.step (now {:e} s) or solver.method = dopri5",
-                solver.step
-            )
+            advice
         };
         Stopped {
             time: self.state.t,
