@@ -99,8 +99,15 @@ fn a_restored_state_goes_on_with_the_same_bits() {
                 let first = go_on(&mut simulation, 150);
                 simulation.restore(&snapshot).unwrap();
                 assert_eq!(simulation.state_hash(), hash);
-                assert_eq!(format!("{:?}", frame_now(&mut simulation)), format!("{here:?}"));
-                assert_eq!(go_on(&mut simulation, 150), first, "{name}, {method}, {form}");
+                assert_eq!(
+                    format!("{:?}", frame_now(&mut simulation)),
+                    format!("{here:?}")
+                );
+                assert_eq!(
+                    go_on(&mut simulation, 150),
+                    first,
+                    "{name}, {method}, {form}"
+                );
                 // Into one that never saw the run and has other settings.
                 let mut fresh = Simulation::new(&scene(name, &[])).unwrap();
                 fresh.restore(&snapshot).unwrap();

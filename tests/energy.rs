@@ -51,7 +51,10 @@ fn elastic_impacts_keep_the_total_energy_for_a_second() {
         let changes = [changes, &elastic].concat();
         let mut simulation = simulation(name, &changes);
         let (drift, impacts) = drift(&mut simulation, 1.0);
-        println!("{name} {}: {drift:.2e} over {impacts} impacts", elastic[0].0);
+        println!(
+            "{name} {}: {drift:.2e} over {impacts} impacts",
+            elastic[0].0
+        );
         assert!(impacts > 10, "{name}: only {impacts} impacts");
         assert!(drift < 1e-6, "{name} {changes:?}: {drift:e}");
     }
@@ -92,7 +95,9 @@ fn ideal_pendulum_keeps_energy_and_vertical_angular_momentum() {
         energy_error = energy_error.max((frame.kinetic + frame.potential - energy).abs());
         momentum_error = momentum_error.max((momentum(&frame) - vertical).abs());
     }
-    println!("energy {energy_error:.2e} J, vertical angular momentum {momentum_error:.2e} kg m^2/s");
+    println!(
+        "energy {energy_error:.2e} J, vertical angular momentum {momentum_error:.2e} kg m^2/s"
+    );
     // Tolerance 1e-12 per step, a few thousand steps.
     assert!(energy_error < 1e-9 * energy.abs());
     assert!(momentum_error < 1e-9 * vertical.abs());
@@ -134,7 +139,10 @@ fn small_swings_have_the_period_of_the_compound_pendulum() {
     }
     let period = crossings[2] - crossings[0];
     println!("period {period:.9} s, expected {expected:.9} s");
-    assert!((period / expected - 1.0).abs() < 1e-8, "{period} {expected}");
+    assert!(
+        (period / expected - 1.0).abs() < 1e-8,
+        "{period} {expected}"
+    );
 }
 
 /// Gauss-Legendre nodes and weights on 0..1: exact up to degree 5.
@@ -181,11 +189,7 @@ fn power_balance(simulation: &mut Simulation, duration: f64) -> (f64, f64, u64) 
         worst = worst.max((frame.kinetic + frame.potential - start - work).abs());
         most = most.max(work.abs());
     }
-    (
-        worst,
-        most,
-        simulation.statistics().impacts.iter().sum(),
-    )
+    (worst, most, simulation.statistics().impacts.iter().sum())
 }
 
 #[test]
@@ -197,11 +201,19 @@ fn actuators_do_the_work_that_the_energy_gains() {
     // error sets it, some hundred times its tolerance.
     let cases: [(&str, Vec<(&str, &str)>, f64); 7] = [
         ("spcmm", vec![ideal("contact.clearance"), fast], 1e-12),
-        ("spcmm", vec![ideal("contact.clearance"), fast, lagrange], 1e-9),
+        (
+            "spcmm",
+            vec![ideal("contact.clearance"), fast, lagrange],
+            1e-9,
+        ),
         ("spcmm", vec![fast], 1e-8),
         ("spcmm", vec![fast, ideal("joint.S2.clearance")], 1e-8),
         ("spcmm", vec![fast, lagrange], 1e-7),
-        ("slider-crank-driven", vec![ideal("joint.C.clearance")], 1e-12),
+        (
+            "slider-crank-driven",
+            vec![ideal("joint.C.clearance")],
+            1e-12,
+        ),
         ("slider-crank-driven", vec![], 1e-8),
     ];
     for (name, mut changes, bound) in cases {
@@ -221,7 +233,10 @@ fn actuators_do_the_work_that_the_energy_gains() {
         );
         assert_eq!(impacts == 0, all_ideal);
         assert!(work > 1e-3, "{name}: {work}");
-        assert!(worst < bound * work, "{name} {changes:?}: {worst:e} of {work:e}");
+        assert!(
+            worst < bound * work,
+            "{name} {changes:?}: {worst:e} of {work:e}"
+        );
     }
 }
 

@@ -32,7 +32,7 @@ fn still_good(simulation: &mut Simulation, stopped: &Stopped) {
         assert_eq!(again.time, stopped.time);
         assert_eq!(simulation.state_hash(), hash);
         // A step that is cut short by a row of output may succeed where the whole one cannot, but never leaves a bad state.
-        let end = simulation.time() + 0.02;
+        let end = simulation.time() + 0.005;
         assert!(simulation.step_until(end).is_err());
         assert_eq!(simulation.state_hash(), hash);
     }
@@ -55,9 +55,15 @@ fn a_step_far_too_long_for_the_contact_is_stopped_with_advice() {
             println!("{name}, {method}: {stopped}");
             let text = stopped.to_string();
             let scene = simulation.scene();
-            let joints = scene.ball_joints.iter().map(|j| format!("ball joint {}", j.name));
+            let joints = scene
+                .ball_joints
+                .iter()
+                .map(|j| format!("ball joint {}", j.name));
             let bodies = scene.bodies.iter().map(|b| format!("body {}", b.name));
-            assert!(joints.chain(bodies).any(|named| text.contains(&named)), "{text}");
+            assert!(
+                joints.chain(bodies).any(|named| text.contains(&named)),
+                "{text}"
+            );
             assert!(text.contains(&format!("{:.6e} s", stopped.time)), "{text}");
             assert!(stopped.advice.contains("solver.step"), "{text}");
             assert!(stopped.advice.contains("solver.method = dopri5"), "{text}");
@@ -99,11 +105,17 @@ fn ideal_ball_joints_that_do_not_close_are_named() {
     let ideal = parse(&moved, &[("contact.clearance", "0")]);
     let error = start_error(&ideal);
     println!("{error}");
-    assert!(error.contains("ball joint C") && error.contains("5.000e-3 m"), "{error}");
+    assert!(
+        error.contains("ball joint C") && error.contains("5.000e-3 m"),
+        "{error}"
+    );
     // With play it is outside its socket all the same.
     let error = start_error(&parse(&moved, &[]));
     println!("{error}");
-    assert!(error.contains("ball joint C") && error.contains("clearance"), "{error}");
+    assert!(
+        error.contains("ball joint C") && error.contains("clearance"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -114,7 +126,10 @@ fn a_trajectory_that_the_rods_cannot_reach_names_slider_and_time() {
         println!("{error}");
         assert!(error.starts_with("slider "), "{error}");
         assert!(error.contains(": rod too short at t = "), "{error}");
-        assert!(error.contains("needs 0.2") && error.contains("has 0.2000 m"), "{error}");
+        assert!(
+            error.contains("needs 0.2") && error.contains("has 0.2000 m"),
+            "{error}"
+        );
     }
     // A live change of it waits, and a reset that cannot start leaves the run as it is.
     let mut simulation = simulation("spcmm", &[]);
@@ -142,4 +157,21 @@ fn ideal_joints_that_repeat_one_another_are_refused() {
         let one = [changes[0], ("joint.S2.clearance", "0.3 mm"), changes[1]];
         Simulation::new(&parse(&twice, &one)).unwrap();
     }
+}
+
+#[test]
+fn a_drive_beyond_all_measure_stops_the_adaptive_method_too() {
+    let text = built_in_text("slider-crank-driven").unwrap();
+    let wild = text.replace("velocity = \"6 rad/s\"", "velocity = \"300000 rad/s\"");
+    assert_ne!(wild, text);
+    let mut simulation = Simulation::new(&parse(&wild, &[])).unwrap();
+    let stopped = run_to_stop(&mut simulation);
+    println!("{stopped}");
+    let text = stopped.to_string();
+    assert!(
+        text.contains("body crank") || text.contains("ball joint C"),
+        "{text}"
+    );
+    assert!(stopped.advice.contains("slower drives"), "{text}");
+    still_good(&mut simulation, &stopped);
 }

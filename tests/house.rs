@@ -61,13 +61,20 @@ fn code(text: &str) -> String {
     let c: Vec<char> = text.chars().collect();
     let (mut out, mut i) = (String::new(), 0);
     let blank = |out: &mut String, from: usize, to: usize| {
-        out.extend(c[from..to].iter().map(|&c| if c == '\n' { '\n' } else { ' ' }));
+        out.extend(
+            c[from..to]
+                .iter()
+                .map(|&c| if c == '\n' { '\n' } else { ' ' }),
+        );
     };
     while i < c.len() {
         let start = i;
         let word_before = i > 0 && (c[i - 1].is_alphanumeric() || c[i - 1] == '_');
         if c[i..].starts_with(&['/', '/']) {
-            i += c[i..].iter().position(|&c| c == '\n').unwrap_or(c.len() - i);
+            i += c[i..]
+                .iter()
+                .position(|&c| c == '\n')
+                .unwrap_or(c.len() - i);
             blank(&mut out, start, i);
         } else if c[i..].starts_with(&['/', '*']) {
             i += 2;
@@ -179,15 +186,31 @@ fn modules_use_only_lower_floors() {
         let climb = format!("super::{}", "super::".repeat(depth + 1));
         assert!(!code.contains(&climb), "src/{file}: climbs out by {climb}");
     }
-    assert!(arrows > 20, "only {arrows} arrows found: does the search still work?");
+    assert!(
+        arrows > 20,
+        "only {arrows} arrows found: does the search still work?"
+    );
 }
 
 #[test]
 fn physics_knows_no_screen_clock_or_platform_dependent_function() {
     // Crates of the screen, clocks and threads, hash order.
     const FORBIDDEN: [&str; 15] = [
-        "egui", "wgpu", "glam", "eframe", "parry3d", "egui_plot", "web_time", "Instant",
-        "SystemTime", "thread", "HashMap", "HashSet", "mul_add", "f32", "rayon",
+        "egui",
+        "wgpu",
+        "glam",
+        "eframe",
+        "parry3d",
+        "egui_plot",
+        "web_time",
+        "Instant",
+        "SystemTime",
+        "thread",
+        "HashMap",
+        "HashSet",
+        "mul_add",
+        "f32",
+        "rayon",
     ];
     // Elementary functions of std: their bits differ between platforms; `libm` has the same ones everywhere.
     const ELEMENTARY: [&str; 25] = [

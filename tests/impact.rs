@@ -76,7 +76,11 @@ fn restitution_by_quadrature(chi: f64) -> f64 {
             i if i % 2 == 1 => 4.0,
             _ => 2.0,
         };
-        (0..=n).map(|i| weight(i) * f(f64::from(i) * h)).sum::<f64>() * h / 3.0
+        (0..=n)
+            .map(|i| weight(i) * f(f64::from(i) * h))
+            .sum::<f64>()
+            * h
+            / 3.0
     };
     let compression = simpson(1.0, &|u| u / (1.0 + chi * u));
     let (mut low, mut high) = (0.0, 1.0_f64.min(0.999 / chi));
@@ -93,7 +97,13 @@ fn restitution_by_quadrature(chi: f64) -> f64 {
 
 /// Speed after over speed before the first impact of a ball flung along x.
 fn rebound(speed: f64, changes: &[(&str, &str)]) -> (f64, Simulation) {
-    let mut simulation = ball(Vec3::zeros(), Vec3::x() * speed, Vec3::zeros(), 0.0, changes);
+    let mut simulation = ball(
+        Vec3::zeros(),
+        Vec3::x() * speed,
+        Vec3::zeros(),
+        0.0,
+        changes,
+    );
     while simulation.statistics().last_separation[0].is_nan() {
         simulation.step().unwrap();
         assert!(simulation.time() < 1.0);
@@ -123,7 +133,10 @@ fn head_on_impacts_give_the_restitution_of_their_law() {
             let expected = restitution_given(chi);
             if chi > 0.0 {
                 let quadrature = restitution_by_quadrature(chi);
-                assert!((quadrature - expected).abs() < 1e-5, "{name} {ce}: {quadrature}");
+                assert!(
+                    (quadrature - expected).abs() < 1e-5,
+                    "{name} {ce}: {quadrature}"
+                );
             }
             let changes = [("contact.normal_law", name), ("contact.restitution", ce)];
             for speed in [0.02, 0.5] {
@@ -217,7 +230,11 @@ fn friction_opposes_the_slip_with_its_share_of_the_normal_force() {
             let joint = &frame.joints[0];
             let expected = slip * (-0.2 * share * load / speed);
             let off = (joint.friction_force - expected).norm();
-            assert!(off < 1e-8 * load, "{reading} {speed}: {}", joint.friction_force);
+            assert!(
+                off < 1e-8 * load,
+                "{reading} {speed}: {}",
+                joint.friction_force
+            );
             assert!((joint.slip_speed - speed).abs() < 1e-12);
             let state = if speed < 1e-4 {
                 ContactState::Stick

@@ -3,15 +3,15 @@
 mod common;
 
 use common::{run_until, scene, simulation, slope};
-use jointplay::integrate::{
-    DormandPrince, RungeKutta4, SemiImplicitEuler, Stepper, System,
-};
+use jointplay::integrate::{DormandPrince, RungeKutta4, SemiImplicitEuler, Stepper, System};
 use jointplay::mechanism::Mechanism;
 
 /// Largest difference of two states relative to the scales of their components.
 fn distance(a: &[f64], b: &[f64], scale: &[f64]) -> f64 {
     let parts = a.iter().zip(b).zip(scale);
-    parts.map(|((a, b), s)| (a - b).abs() / s).fold(0.0, f64::max)
+    parts
+        .map(|((a, b), s)| (a - b).abs() / s)
+        .fold(0.0, f64::max)
 }
 
 /// State of `mechanism` after `steps` equal steps over `duration`.
@@ -43,11 +43,20 @@ fn slopes_of_the_error_are_the_orders() {
     let mut mechanism = Mechanism::new(&scene).unwrap();
     let mut start = mechanism.start().unwrap();
     let n = start.len();
-    for (rate, i) in start[mechanism.positions()..].iter_mut().zip([0, 0, 0, 6, -9, 5, 20, -15, 10]) {
+    for (rate, i) in start[mechanism.positions()..]
+        .iter_mut()
+        .zip([0, 0, 0, 6, -9, 5, 20, -15, 10])
+    {
         *rate += 0.25 * f64::from(i);
     }
     let scale = mechanism.scale().to_vec();
-    let exact = equal_steps(&mut mechanism, DormandPrince::new(n), &start, DURATION, 4000);
+    let exact = equal_steps(
+        &mut mechanism,
+        DormandPrince::new(n),
+        &start,
+        DURATION,
+        4000,
+    );
     let mut order = |name: &str, steps: [u32; 4], expected: f64, tolerance: f64| {
         let points: Vec<(f64, f64)> = steps
             .iter()
@@ -89,7 +98,12 @@ fn projected(changes: &[(&str, &str)], exact: Option<&[f64]>) -> (f64, Vec<f64>,
 fn projection_keeps_the_order_of_fixed_steps() {
     let (_, exact, _) = projected(&[("solver.tolerance", "1e-13")], None);
     for (method, steps, expected, tolerance) in [
-        ("semi-implicit-euler", [2000.0, 1000.0, 500.0, 250.0], 1.0, 0.1),
+        (
+            "semi-implicit-euler",
+            [2000.0, 1000.0, 500.0, 250.0],
+            1.0,
+            0.1,
+        ),
         ("rk4", [8000.0, 4000.0, 2000.0, 1000.0], 4.0, 0.3),
     ] {
         let points = steps.map(|step| {
