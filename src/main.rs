@@ -1,2 +1,42 @@
 //! Desktop entry.
+
+#[cfg(not(target_arch = "wasm32"))]
+fn main() -> std::process::ExitCode {
+    if std::env::var_os("RUST_LOG").is_some() {
+        env_logger::init();
+    }
+    explain_panics();
+    // Unwinding first lets scratch files be removed.
+    let code = std::panic::catch_unwind(jointplay::cli::main)
+        .unwrap_or(jointplay::cli::Failure::INPUT_OUTPUT);
+    std::process::ExitCode::from(code)
+}
+
+/// The browser has its own entry.
+#[cfg(target_arch = "wasm32")]
 fn main() {}
+
+/// A panic is a mistake in the program: one line that says so, and where, instead of a trace.
+#[cfg(not(target_arch = "wasm32"))]
+fn explain_panics() {
+    use std::io::Write;
+    use std::panic;
+    let trace = panic::take_hook();
+    panic::set_hook(Box::new(move |info| {
+        if std::env::var_os("RUST_BACKTRACE").is_some() {
+            trace(info);
+        }
+        let what = info.payload_as_str().unwrap_or("unknown cause");
+        let place = info
+            .location()
+            .map(|place| format!(" ({}:{})", place.file(), place.line()))
+            .unwrap_or_default();
+        let _ = writeln!(
+            std::io::stderr(),
+            "error: jointplay {} failed inside: {}{place}. This is a mistake in the program; please report this line \
+             and the command that led to it.",
+            jointplay::VERSION,
+            what.replace('\n', " "),
+        );
+    }));
+}

@@ -1,1 +1,126 @@
-//! Command line.
+//! Command line: what is written there, what comes out, and with which exit code.
+
+mod args;
+mod check;
+mod failure;
+mod interrupt;
+pub mod output;
+mod progress;
+mod provenance;
+mod quantity;
+#[cfg(feature = "gui")]
+mod render;
+mod run;
+mod summary;
+
+use std::fmt::Write as _;
+use std::io::{self, Write as _};
+
+use clap::Parser;
+
+use self::args::{Arguments, Command, SceneArguments};
+pub use self::failure::Failure;
+use crate::scene::{BUILT_IN, Scene, reference_page};
+
+/// The scene that opens when none is named.
+pub const DEFAULT_SCENE: &str = "spcmm";
+
+/// Does what the command line says; returns the exit code.
+pub fn main() -> u8 {
+    // Prints help, version and usage errors itself; usage errors leave with code 2.
+    let arguments = Arguments::parse();
+    match dispatch(arguments) {
+        Ok(()) => 0,
+        Err(failure) => {
+            complain(&format!("error: {failure}"));
+            failure.code
+        }
+    }
+}
+
+fn dispatch(arguments: Arguments) -> Result<(), Failure> {
+    match arguments.command {
+        None => view(DEFAULT_SCENE, &[]),
+        Some(Command::View(arguments)) => view(&arguments.scene, &arguments.changes),
+        Some(Command::Scenes) => print(&scenes()?),
+        Some(Command::Check(arguments)) => check::check(&arguments),
+        Some(Command::Run(arguments)) => run::run(&arguments),
+        #[cfg(feature = "gui")]
+        Some(Command::Render(arguments)) => render::render(&arguments),
+        #[cfg(not(feature = "gui"))]
+        Some(Command::Render(_)) => Err(no_graphics()),
+        Some(Command::Parameters) => print(&reference_page()),
+    }
+}
+
+#[cfg(feature = "gui")]
+fn view(scene: &str, changes: &[(String, String)]) -> Result<(), Failure> {
+    use crate::app::{AppOptions, WindowError, run_native};
+    let scene = Scene::load(scene, changes)?;
+    run_native(AppOptions::new(scene)).map_err(|error| {
+        let code = match error {
+            WindowError::Start(_) => Failure::USAGE,
+            WindowError::NoAdapter(_) => Failure::NO_ADAPTER,
+            WindowError::Window(_) => Failure::INPUT_OUTPUT,
+        };
+        // The window system's own words do not say what works instead.
+        let message = if matches!(error, WindowError::Window(_)) && no_display() {
+            "cannot open a window: there is no display; `jointplay render` draws frames without one"
+                .to_owned()
+        } else {
+            error.to_string()
+        };
+        Failure::new(code, message)
+    })
+}
+
+#[cfg(feature = "gui")]
+fn no_display() -> bool {
+    let unset = |name| std::env::var_os(name).is_none_or(|value| value.is_empty());
+    cfg!(target_os = "linux") && unset("DISPLAY") && unset("WAYLAND_DISPLAY")
+}
+
+#[cfg(not(feature = "gui"))]
+fn view(_scene: &str, _changes: &[(String, String)]) -> Result<(), Failure> {
+    Err(no_graphics())
+}
+
+#[cfg(not(feature = "gui"))]
+fn no_graphics() -> Failure {
+    Failure::usage(
+        "this program was built without graphics; build it with the default features to see anything",
+    )
+}
+
+fn scenes() -> Result<String, Failure> {
+    let mut out = String::new();
+    for name in BUILT_IN {
+        // Writing to a String cannot fail.
+        let _ = writeln!(out, "{name:<22}{}", Scene::load(name, &[])?.title);
+    }
+    Ok(out)
+}
+
+fn load(arguments: &SceneArguments) -> Result<Scene, Failure> {
+    Ok(Scene::load(&arguments.scene, &arguments.changes)?)
+}
+
+/// Results go to standard output; a reader that has seen enough (`| head`) is no error.
+fn print(text: &str) -> Result<(), Failure> {
+    let mut out = io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(Failure::io(format!(
+            "cannot write to standard output: {error}"
+        ))),
+        _ => Ok(()),
+    }
+}
+
+fn warn(text: &str) {
+    complain(&format!("warning: {text}"));
+}
+
+/// Standard error may be closed: then there is nobody to tell.
+fn complain(text: &str) {
+    let _ = writeln!(io::stderr(), "{text}");
+}

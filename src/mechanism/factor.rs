@@ -3,43 +3,155 @@
 
 use super::model::NONE;
 
-/// Factors the lower triangle of the row-major n x n matrix `h` in place; `inverse_diagonal` gets 1 / D.
-#[inline]
-pub fn factor(h: &mut [f64], n: usize, parent: &[usize], inverse_diagonal: &mut [f64]) {
-    for k in (0..n).rev() {
-        let inverse = 1.0 / h[k * n + k];
-        inverse_diagonal[k] = inverse;
-        let mut i = parent[k];
-        while i != NONE {
-            let a = h[k * n + i] * inverse;
-            let mut j = i;
-            while j != NONE {
-                h[i * n + j] -= a * h[k * n + j];
-                j = parent[j];
+/// Which coordinates each one couples with.
+#[derive(Clone, Debug)]
+pub struct Pattern {
+    /// Parent coordinate of each; [`NONE`] at a root.
+    pub parent: Vec<usize>,
+    /// All coordinates hang on a free body's six, directly: the shape that is worth fixed-size loops.
+    on_free_body: bool,
+}
+
+impl Pattern {
+    /// From the parent of each coordinate.
+    pub fn new(parent: Vec<usize>) -> Self {
+        let chain = |k: usize| if k == 0 { NONE } else { k - 1 };
+        let on_free_body = parent.len() >= 6
+            && parent
+                .iter()
+                .enumerate()
+                .all(|(k, &p)| p == if k < 6 { chain(k) } else { 5 });
+        Self {
+            parent,
+            on_free_body,
+        }
+    }
+
+    /// Number of coordinates.
+    pub fn len(&self) -> usize {
+        self.parent.len()
+    }
+
+    /// Factors the lower triangle of the row-major matrix `h` in place; `inverse_diagonal` gets 1 / D.
+    #[inline]
+    pub fn factor(&self, h: &mut [f64], inverse_diagonal: &mut [f64]) {
+        let (n, parent) = (self.len(), &self.parent);
+        if self.on_free_body {
+            factor_on_free_body(h, n, inverse_diagonal);
+            return;
+        }
+        for k in (0..n).rev() {
+            let inverse = 1.0 / h[k * n + k];
+            inverse_diagonal[k] = inverse;
+            let mut i = parent[k];
+            while i != NONE {
+                let a = h[k * n + i] * inverse;
+                let mut j = i;
+                while j != NONE {
+                    h[i * n + j] -= a * h[k * n + j];
+                    j = parent[j];
+                }
+                h[k * n + i] = a;
+                i = parent[i];
             }
-            h[k * n + i] = a;
-            i = parent[i];
+        }
+    }
+
+    /// Solves H x = b in place.
+    #[inline]
+    pub fn solve(&self, h: &[f64], inverse_diagonal: &[f64], x: &mut [f64]) {
+        let (n, parent) = (self.len(), &self.parent);
+        if self.on_free_body {
+            solve_on_free_body(h, n, inverse_diagonal, x);
+            return;
+        }
+        for k in (0..n).rev() {
+            let xk = x[k];
+            let mut i = parent[k];
+            while i != NONE {
+                x[i] -= h[k * n + i] * xk;
+                i = parent[i];
+            }
+        }
+        for k in 0..n {
+            let mut xk = x[k] * inverse_diagonal[k];
+            let mut i = parent[k];
+            while i != NONE {
+                xk -= h[k * n + i] * x[i];
+                i = parent[i];
+            }
+            x[k] = xk;
         }
     }
 }
 
-/// Solves H x = b in place.
-#[inline]
-pub fn solve(h: &[f64], n: usize, parent: &[usize], inverse_diagonal: &[f64], x: &mut [f64]) {
-    for k in (0..n).rev() {
-        let xk = x[k];
-        let mut i = parent[k];
-        while i != NONE {
-            x[i] -= h[k * n + i] * xk;
-            i = parent[i];
+/// First six entries of row `k`.
+#[inline(always)]
+fn six(h: &[f64], n: usize, k: usize) -> [f64; 6] {
+    std::array::from_fn(|j| h[k * n..k * n + 6][j])
+}
+
+/// [`Pattern::factor`] where coordinates 6.. hang on the six of a free body: the same operations in fixed-size loops.
+fn factor_on_free_body(h: &mut [f64], n: usize, inverse_diagonal: &mut [f64]) {
+    let mut base: [[f64; 6]; 6] = std::array::from_fn(|i| six(h, n, i));
+    for k in 6..n {
+        let row = six(h, n, k);
+        let inverse = 1.0 / h[k * n + k];
+        inverse_diagonal[k] = inverse;
+        let scaled = row.map(|x| x * inverse);
+        // The upper triangle is updated too: full rows are cheaper than ragged ones, and nobody reads it.
+        for i in 0..6 {
+            for j in 0..6 {
+                base[i][j] -= scaled[i] * row[j];
+            }
+        }
+        h[k * n..k * n + 6].copy_from_slice(&scaled);
+    }
+    for k in (0..6).rev() {
+        let row = base[k];
+        let inverse = 1.0 / row[k];
+        inverse_diagonal[k] = inverse;
+        for i in 0..k {
+            let a = row[i] * inverse;
+            for j in 0..=i {
+                base[i][j] -= a * row[j];
+            }
+            base[k][i] = a;
         }
     }
-    for k in 0..n {
+    for (i, row) in base.iter().enumerate() {
+        h[i * n..i * n + 6].copy_from_slice(row);
+    }
+}
+
+fn solve_on_free_body(h: &[f64], n: usize, inverse_diagonal: &[f64], x: &mut [f64]) {
+    let mut base: [f64; 6] = std::array::from_fn(|i| x[..6][i]);
+    for k in (6..n).rev() {
+        let row = six(h, n, k);
+        for i in 0..6 {
+            base[i] -= row[i] * x[k];
+        }
+    }
+    for k in (0..6).rev() {
+        let row = six(h, n, k);
+        for i in 0..k {
+            base[i] -= row[i] * base[k];
+        }
+    }
+    for k in 0..6 {
+        let row = six(h, n, k);
+        let mut xk = base[k] * inverse_diagonal[k];
+        for i in 0..k {
+            xk -= row[i] * base[i];
+        }
+        base[k] = xk;
+    }
+    x[..6].copy_from_slice(&base);
+    for k in 6..n {
+        let row = six(h, n, k);
         let mut xk = x[k] * inverse_diagonal[k];
-        let mut i = parent[k];
-        while i != NONE {
-            xk -= h[k * n + i] * x[i];
-            i = parent[i];
+        for i in 0..6 {
+            xk -= row[i] * base[i];
         }
         x[k] = xk;
     }
@@ -138,21 +250,41 @@ impl Skyline {
 mod tests {
     use super::*;
 
+    /// A symmetric matrix with the pattern's zeros, diagonally dominant.
+    fn matrix(parent: &[usize]) -> nalgebra::DMatrix<f64> {
+        let n = parent.len();
+        let mut m = nalgebra::DMatrix::zeros(n, n);
+        for k in 0..n {
+            m[(k, k)] = 20.0 + k as f64;
+            let mut i = parent[k];
+            while i != NONE {
+                let value = libm::sin((3 * k + 7 * i) as f64);
+                m[(k, i)] = value;
+                m[(i, k)] = value;
+                i = parent[i];
+            }
+        }
+        m
+    }
+
     #[test]
-    fn branched_tree_solves_like_a_dense_matrix() {
-        // Coordinates 0-1 at the root, 2 and 3 two branches on 1.
-        let parent = [NONE, 0, 1, 1];
-        let dense = nalgebra::Matrix4::new(
-            9., 1., 2., 3., 1., 8., -1., 1., 2., -1., 7., 0., 3., 1., 0., 6.,
-        );
-        let b = nalgebra::Vector4::new(1., -2., 3., 4.);
-        let expected = dense.lu().solve(&b).unwrap();
-        let mut h: Vec<f64> = dense.transpose().as_slice().to_vec();
-        let mut d = [0.0; 4];
-        factor(&mut h, 4, &parent, &mut d);
-        let mut x = b;
-        solve(&h, 4, &parent, &d, x.as_mut_slice());
-        assert!((x - expected).norm() < 1e-14, "{x} {expected}");
+    fn trees_solve_like_dense_matrices() {
+        let branched = vec![NONE, 0, 1, 1];
+        let on_free_body = vec![NONE, 0, 1, 2, 3, 4, 5, 5, 5];
+        let nested = vec![NONE, 0, 1, 2, 3, 4, 5, 6, 5];
+        for parent in [branched, on_free_body, nested] {
+            let n = parent.len();
+            let dense = matrix(&parent);
+            let b = nalgebra::DVector::from_fn(n, |i, _| 1.0 - 0.3 * i as f64);
+            let mut h: Vec<f64> = dense.transpose().as_slice().to_vec();
+            let expected = dense.lu().solve(&b).unwrap();
+            let pattern = Pattern::new(parent);
+            let mut d = vec![0.0; n];
+            pattern.factor(&mut h, &mut d);
+            let mut x = b;
+            pattern.solve(&h, &d, x.as_mut_slice());
+            assert!((x - expected).norm() < 1e-15 * 10.0, "{n}");
+        }
     }
 
     #[test]

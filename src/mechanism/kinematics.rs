@@ -263,6 +263,23 @@ impl Driven {
             let body = &model.bodies[b];
             let parent = &motion[body.parent];
             motion[b] = match body.motion {
+                // A slider on the world: nothing but its line.
+                Motion::Driven {
+                    drive,
+                    revolute: false,
+                } if body.parent == model.world() => {
+                    let q = self.coordinates[drive];
+                    let arm = body.axis * q.value + body.fixed * body.to_centroid;
+                    Kinematics {
+                        rotation: body.fixed,
+                        position: body.from_parent + arm,
+                        velocity: body.axis * q.rate,
+                        acceleration: body.axis * q.acceleration,
+                        axis: body.axis,
+                        arm,
+                        ..Kinematics::rest()
+                    }
+                }
                 Motion::Driven { drive, revolute } => {
                     let q = self.coordinates[drive];
                     follow(body, parent, revolute, q.value, q.rate, q.acceleration)

@@ -1,5 +1,6 @@
 //! A scene compiled for the equations of motion: centroid frames, coordinate numbers, trees, drives.
 
+use super::factor::Pattern;
 use super::jet::Jet;
 use super::spcmm::Trajectory;
 use crate::contact;
@@ -32,6 +33,10 @@ pub struct Body {
     pub origin: Vec3,
     /// Whether its motion depends on time alone.
     pub driven_only: bool,
+    /// Whether another body that does not hangs on it.
+    pub carries: bool,
+    /// Inertia is diagonal in body axes.
+    pub diagonal: bool,
 }
 
 /// How a body moves against its parent.
@@ -67,8 +72,8 @@ pub struct TreeBlock {
     pub v: usize,
     /// Number of velocity coordinates.
     pub n: usize,
-    /// Parent coordinate of each coordinate within the block; `NONE` at the root.
-    pub parent: Vec<usize>,
+    /// Which of its coordinates couple.
+    pub pattern: Pattern,
     /// The one free body of this block, where it is a lone one: its mass matrix is block diagonal.
     pub lone: Option<BodyIndex>,
 }
@@ -199,7 +204,12 @@ impl Model {
                 sine,
                 origin: -body.centre,
                 driven_only: root[index] == usize::MAX,
+                carries: false,
+                diagonal: inertia == Mat3::from_diagonal(&inertia.diagonal()),
             });
+            if parent != world && root[index] != usize::MAX {
+                bodies[parent].carries = true;
+            }
         }
 
         let mut model = Self {
@@ -325,7 +335,7 @@ impl Model {
             self.blocks.push(TreeBlock {
                 v: first,
                 n: parent_coordinate.len(),
-                parent: parent_coordinate,
+                pattern: Pattern::new(parent_coordinate),
                 lone,
             });
         }

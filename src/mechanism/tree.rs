@@ -4,7 +4,6 @@
 //! in world axes with each body's own centroid as reference. Allocates nothing after `new`.
 
 use super::contacts::Contacts;
-use super::factor;
 use super::kinematics::{self, Driven, Kinematics, Wrench};
 use super::model::{Model, Motion};
 use crate::scene::{Mat3, Vec3};
@@ -17,6 +16,36 @@ struct Composite {
     inertia: Mat3,
     force: Vec3,
     torque: Vec3,
+}
+
+impl Composite {
+    const EMPTY: Self = Self {
+        mass: 0.0,
+        moment: Vec3::new(0.0, 0.0, 0.0),
+        inertia: Mat3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+        force: Vec3::new(0.0, 0.0, 0.0),
+        torque: Vec3::new(0.0, 0.0, 0.0),
+    };
+
+    /// Adds one about the same centroid.
+    #[inline]
+    fn add(&mut self, other: &Self) {
+        self.mass += other.mass;
+        self.moment += other.moment;
+        self.inertia += other.inertia;
+        self.force += other.force;
+        self.torque += other.torque;
+    }
+
+    /// Adds one whose centroid lies `d` from this one's.
+    #[inline]
+    fn add_shifted(&mut self, c: &Self, d: &Vec3) {
+        self.mass += c.mass;
+        self.moment += c.moment + d * c.mass;
+        add_shifted_inertia(&mut self.inertia, &c.inertia, c.mass, &c.moment, d);
+        self.force += c.force;
+        self.torque += c.torque + d.cross(&c.force);
+    }
 }
 
 /// Equations of motion in tree coordinates.
@@ -33,9 +62,6 @@ pub struct Tree {
     mass: Vec<f64>,
     mass_offset: Vec<usize>,
     inverse_diagonal: Vec<f64>,
-    /// World inertia of each dynamic body.
-    inertia: Vec<Mat3>,
-    diagonal: Vec<bool>,
 }
 
 impl Tree {
@@ -52,28 +78,15 @@ impl Tree {
                 block.n * block.n
             };
         }
-        let empty = Composite {
-            mass: 0.0,
-            moment: Vec3::zeros(),
-            inertia: Mat3::zeros(),
-            force: Vec3::zeros(),
-            torque: Vec3::zeros(),
-        };
         Self {
             motion: vec![Kinematics::rest(); n + 1],
             wrench: vec![Wrench::zero(); n + 1],
             driven: Driven::new(model),
-            composite: vec![empty; n],
+            composite: vec![Composite::EMPTY; n],
             dynamic: (0..n).filter(|&b| !model.bodies[b].driven_only).collect(),
             mass: vec![0.0; total],
             mass_offset,
             inverse_diagonal: vec![0.0; model.nv],
-            inertia: vec![Mat3::zeros(); n],
-            diagonal: model
-                .bodies
-                .iter()
-                .map(|b| b.inertia == Mat3::from_diagonal(&b.inertia.diagonal()))
-                .collect(),
         }
     }
 
@@ -126,23 +139,9 @@ impl Tree {
     /// Mass matrices, factored, and generalised forces (loads, gravity, bias) into `out`.
     #[inline]
     pub fn assemble(&mut self, model: &Model, gravity: &Vec3, out: &mut [f64]) {
-        for &b in &self.dynamic {
-            let body = &model.bodies[b];
-            let m = &self.motion[b];
-            let inertia = world_inertia(&m.rotation, &body.inertia, self.diagonal[b]);
-            self.inertia[b] = inertia;
-            let w = m.angular_velocity;
-            let load = &self.wrench[b];
-            self.composite[b] = Composite {
-                mass: body.mass,
-                moment: Vec3::zeros(),
-                inertia,
-                force: load.force + (gravity - m.acceleration) * body.mass,
-                torque: load.torque - inertia * m.angular_acceleration - w.cross(&(inertia * w)),
-            };
-        }
         let Self {
             motion,
+            wrench,
             composite,
             mass,
             mass_offset,
@@ -150,8 +149,22 @@ impl Tree {
         } = self;
         for &b in self.dynamic.iter().rev() {
             let body = &model.bodies[b];
-            let c = composite[b];
             let m = &motion[b];
+            let inertia = world_inertia(&m.rotation, &body.inertia, body.diagonal);
+            let w = m.angular_velocity;
+            let load = &wrench[b];
+            let mut c = Composite {
+                mass: body.mass,
+                moment: Vec3::zeros(),
+                inertia,
+                force: load.force + (gravity - m.acceleration) * body.mass,
+                torque: load.torque - inertia * m.angular_acceleration - w.cross(&(inertia * w)),
+            };
+            if body.carries {
+                // Everything that hangs on this body has been added up by now.
+                c.add(&composite[b]);
+                composite[b] = Composite::EMPTY;
+            }
             let block_index = model.block_of[b];
             let block = &model.blocks[block_index];
             let n = block.n;
@@ -181,39 +194,21 @@ impl Tree {
                     out[v..v + 3].copy_from_slice(c.force.as_slice());
                     out[v + 3..v + 6].copy_from_slice(c.torque.as_slice());
                     if block.lone.is_none() {
-                        let h = &mut mass[mass_offset[block_index]..][..n * n];
-                        let k = c.moment;
-                        for i in 0..3 {
-                            for j in 0..=i {
-                                h[i * n + j] = if i == j { c.mass } else { 0.0 };
-                                h[(3 + i) * n + 3 + j] = c.inertia[(i, j)];
-                            }
-                        }
-                        // Angular rows, linear columns: the matrix [k]x of the first moment.
-                        let lower = [[0.0, -k.z, k.y], [k.z, 0.0, -k.x], [-k.y, k.x, 0.0]];
-                        for i in 0..3 {
-                            h[(3 + i) * n..(3 + i) * n + 3].copy_from_slice(&lower[i]);
-                        }
+                        fill_free(&mut mass[mass_offset[block_index]..][..n * n], n, &c);
                     }
                 }
                 Motion::Fixed | Motion::Driven { .. } => {}
             }
             let parent = body.parent;
-            if parent < model.bodies.len() && !model.bodies[parent].driven_only {
-                let d = m.position - motion[parent].position;
-                let p = &mut composite[parent];
-                p.mass += c.mass;
-                p.moment += c.moment + d * c.mass;
-                add_shifted_inertia(&mut p.inertia, &c.inertia, c.mass, &c.moment, &d);
-                p.force += c.force;
-                p.torque += c.torque + d.cross(&c.force);
+            if parent < model.bodies.len() && model.bodies[parent].carries {
+                composite[parent].add_shifted(&c, &(m.position - motion[parent].position));
             }
         }
         for (index, block) in model.blocks.iter().enumerate() {
             if block.lone.is_none() {
                 let h = &mut self.mass[self.mass_offset[index]..][..block.n * block.n];
                 let d = &mut self.inverse_diagonal[block.v..][..block.n];
-                factor::factor(h, block.n, &block.parent, d);
+                block.pattern.factor(h, d);
             }
         }
     }
@@ -233,13 +228,9 @@ impl Tree {
             x[3..6].copy_from_slice(alpha.as_slice());
         } else {
             let h = &self.mass[self.mass_offset[index]..][..block.n * block.n];
-            factor::solve(
-                h,
-                block.n,
-                &block.parent,
-                &self.inverse_diagonal[block.v..][..block.n],
-                x,
-            );
+            block
+                .pattern
+                .solve(h, &self.inverse_diagonal[block.v..][..block.n], x);
         }
     }
 
@@ -376,6 +367,22 @@ fn add_shifted_inertia(sum: &mut Mat3, inertia: &Mat3, mass: f64, k: &Vec3, d: &
     sum.m31 += ixz;
     sum.m23 += iyz;
     sum.m32 += iyz;
+}
+
+/// Rows of a free body: [m 1, .; [k]x, I] with k the first moment.
+#[inline]
+fn fill_free(h: &mut [f64], n: usize, c: &Composite) {
+    let k = c.moment;
+    for i in 0..3 {
+        for j in 0..=i {
+            h[i * n + j] = if i == j { c.mass } else { 0.0 };
+            h[(3 + i) * n + 3 + j] = c.inertia[(i, j)];
+        }
+    }
+    let lower = [[0.0, -k.z, k.y], [k.z, 0.0, -k.x], [-k.y, k.x, 0.0]];
+    for i in 0..3 {
+        h[(3 + i) * n..(3 + i) * n + 3].copy_from_slice(&lower[i]);
+    }
 }
 
 /// Couples coordinate `row` (momentum, angular momentum about body `b`'s centroid for unit rate) with its ancestors.

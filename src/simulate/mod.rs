@@ -1,14 +1,20 @@
 //! A running simulation: state, stepping, live changes, recorded channels, divergence guard.
 
 mod angles;
+mod channels;
 mod frame;
+mod history;
+mod pace;
 mod peaks;
 mod report;
 mod simulation;
 mod stepper;
 
 pub use angles::angles_of;
+pub use channels::*;
 pub use frame::*;
+pub use history::History;
+pub use pace::{LARGEST_BUDGET, LONGEST_FRAME, Pacer, SCALE_RANGE};
 pub use simulation::{CLEARANCE_SPEED, Simulation};
 
 use crate::mechanism::MechanismError;

@@ -1,0 +1,405 @@
+//! Controls of the scene's parameters, made from the one table: the three that matter first, one joint's own
+//! below, the rest folded by group.
+
+use std::collections::HashMap;
+
+use eframe::egui::{self, ComboBox, DragValue, RichText, Slider, SliderClamping, TextEdit, Ui};
+
+use super::icons::{Icon, icon_button};
+use super::player::Player;
+use super::value;
+use crate::scene::{
+    Kind, Parameter, SceneError, Scope, Value, format_quantity_digits, from_display, to_display,
+};
+use crate::simulate::Effect;
+
+/// Parameters that stand first.
+const FIRST: [&str; 3] = [
+    "contact.clearance",
+    "contact.friction",
+    "contact.restitution",
+];
+
+/// State of the controls that is not the simulation's: half-typed values and what was wrong with them.
+#[derive(Default)]
+pub struct Controls {
+    drafts: HashMap<String, Draft>,
+    joint: usize,
+}
+
+#[derive(Default)]
+struct Draft {
+    text: String,
+    error: Option<String>,
+}
+
+impl Controls {
+    /// Forgets half-typed values, as for a new scene.
+    pub fn clear(&mut self) {
+        self.drafts.clear();
+        self.joint = 0;
+    }
+
+    /// All controls, one under the other.
+    pub fn ui(&mut self, ui: &mut Ui, player: &mut Player) {
+        let table = player.wanted().parameters();
+        ui.label(RichText::new(&player.scene().title).small().weak())
+            .on_hover_text(&player.scene().description);
+        ui.add_space(2.0);
+        for key in FIRST {
+            if let Some(parameter) = table.iter().find(|p| p.key == key) {
+                self.control(ui, player, parameter, key);
+                ui.add_space(4.0);
+            }
+        }
+        ui.separator();
+        self.one_joint(ui, player, &table);
+        let mut groups: Vec<&'static str> = Vec::new();
+        for parameter in &table {
+            if !groups.contains(&parameter.group) {
+                groups.push(parameter.group);
+            }
+        }
+        for group in groups {
+            let rest = || {
+                table
+                    .iter()
+                    .filter(|p| p.group == group && !FIRST.contains(&p.key))
+            };
+            if rest().next().is_none() {
+                continue;
+            }
+            ui.collapsing(RichText::new(group).strong(), |ui| {
+                for parameter in rest() {
+                    self.control(ui, player, parameter, parameter.key);
+                }
+            });
+        }
+    }
+
+    /// Contact parameters of one ball joint, which beat the scene's.
+    fn one_joint(&mut self, ui: &mut Ui, player: &mut Player, table: &[&'static Parameter]) {
+        let names: Vec<String> = player
+            .wanted()
+            .ball_joints
+            .iter()
+            .map(|j| j.name.clone())
+            .collect();
+        if names.is_empty() {
+            return;
+        }
+        self.joint = self.joint.min(names.len() - 1);
+        let header = ui.collapsing(RichText::new("One joint").strong(), |ui| {
+            ui.horizontal(|ui| {
+                ui.label("Joint");
+                ComboBox::from_id_salt("one joint")
+                    .selected_text(&names[self.joint])
+                    .show_ui(ui, |ui| {
+                        for (index, name) in names.iter().enumerate() {
+                            ui.selectable_value(&mut self.joint, index, name);
+                        }
+                    })
+                    .response
+                    .accessible_name("Joint");
+            });
+            let joint = &names[self.joint];
+            for parameter in table.iter().filter(|p| p.scope == Scope::Contact) {
+                let last = parameter.key.rsplit('.').next().unwrap_or(parameter.key);
+                self.control(ui, player, parameter, &format!("joint.{joint}.{last}"));
+            }
+        });
+        header.header_response.on_hover_text(
+            "Values of one ball joint only; they beat the values of the whole scene.",
+        );
+    }
+
+    /// One parameter under `key`, which may be a joint's own.
+    fn control(
+        &mut self,
+        ui: &mut Ui,
+        player: &mut Player,
+        parameter: &'static Parameter,
+        key: &str,
+    ) {
+        // A key that the scene lost (a shorter chain) has no control.
+        let Ok(now) = player.wanted().get(key) else {
+            return;
+        };
+        let name = match key
+            .strip_prefix("joint.")
+            .and_then(|rest| rest.rsplit_once('.'))
+        {
+            Some((joint, _)) => format!("{} of {joint}", parameter.label),
+            None => parameter.label.to_owned(),
+        };
+        ui.push_id(key, |ui| match &parameter.kind {
+            Kind::Number { .. } => self.number(ui, player, parameter, key, &name, &now),
+            Kind::Choice(words) => self.choice(ui, player, parameter, key, &name, &now, words),
+            Kind::Count { min, max } => {
+                self.count(ui, player, parameter, key, &name, &now, (*min, *max))
+            }
+        });
+        if let Some(error) = self.drafts.get(key).and_then(|draft| draft.error.as_ref()) {
+            ui.label(
+                RichText::new(error)
+                    .small()
+                    .color(ui.visuals().error_fg_color),
+            );
+        }
+        if player.is_waiting(key) {
+            ui.label(
+                RichText::new("Applies at the next reset")
+                    .small()
+                    .color(ui.visuals().warn_fg_color),
+            );
+        }
+        if let Some(warning) = player.warning(key) {
+            ui.label(
+                RichText::new(warning)
+                    .small()
+                    .color(ui.visuals().warn_fg_color),
+            );
+        }
+    }
+
+    fn number(
+        &mut self,
+        ui: &mut Ui,
+        player: &mut Player,
+        parameter: &'static Parameter,
+        key: &str,
+        name: &str,
+        now: &Value,
+    ) {
+        let Kind::Number {
+            display,
+            slider,
+            logarithmic,
+            ..
+        } = parameter.kind
+        else {
+            return;
+        };
+        let Value::Number(si) = *now else {
+            return;
+        };
+        self.heading(ui, parameter, key, name, |this, ui| {
+            this.default_button(ui, player, parameter, key, name, now);
+            this.entry(ui, player, parameter, key, name, now);
+        });
+        let mut shown = to_display(si, display);
+        let (least, greatest) = (to_display(slider.0, display), to_display(slider.1, display));
+        ui.spacing_mut().slider_width = ui.available_width().max(40.0);
+        let response = ui
+            .add(
+                Slider::new(&mut shown, least..=greatest)
+                    .logarithmic(logarithmic)
+                    .clamping(SliderClamping::Never)
+                    .show_value(false),
+            )
+            .on_hover_ui(|ui| tooltip(ui, parameter, key));
+        let changed = response.changed();
+        response.accessible_name(name);
+        if changed {
+            self.set(
+                player,
+                key,
+                &format_quantity_digits(from_display(shown, display), display, 4),
+            );
+        }
+    }
+
+    fn choice(
+        &mut self,
+        ui: &mut Ui,
+        player: &mut Player,
+        parameter: &'static Parameter,
+        key: &str,
+        name: &str,
+        now: &Value,
+        words: &[&'static str],
+    ) {
+        self.heading(ui, parameter, key, name, |this, ui| {
+            this.default_button(ui, player, parameter, key, name, now);
+            let mut chosen = None;
+            ComboBox::from_id_salt("choice")
+                .width(ui.available_width().min(150.0))
+                .selected_text(value::shown(now, &parameter.kind))
+                .show_ui(ui, |ui| {
+                    for word in words {
+                        if ui
+                            .selectable_label(*now == Value::Choice(word), *word)
+                            .clicked()
+                        {
+                            chosen = Some(*word);
+                        }
+                    }
+                })
+                .response
+                .on_hover_ui(|ui| tooltip(ui, parameter, key))
+                .accessible_name(name);
+            if let Some(word) = chosen {
+                this.set(player, key, word);
+            }
+        });
+    }
+
+    fn count(
+        &mut self,
+        ui: &mut Ui,
+        player: &mut Player,
+        parameter: &'static Parameter,
+        key: &str,
+        name: &str,
+        now: &Value,
+        (min, max): (u64, u64),
+    ) {
+        let Value::Count(mut count) = *now else {
+            return;
+        };
+        self.heading(ui, parameter, key, name, |this, ui| {
+            this.default_button(ui, player, parameter, key, name, now);
+            let response = ui
+                .add(
+                    DragValue::new(&mut count)
+                        .range(min..=max)
+                        .update_while_editing(false),
+                )
+                .on_hover_ui(|ui| tooltip(ui, parameter, key));
+            let changed = response.changed();
+            response.accessible_name(name);
+            if changed {
+                this.set(player, key, &count.to_string());
+            }
+        });
+    }
+
+    /// Name on the left, whatever `rest` adds from the right.
+    fn heading(
+        &mut self,
+        ui: &mut Ui,
+        parameter: &'static Parameter,
+        key: &str,
+        name: &str,
+        rest: impl FnOnce(&mut Self, &mut Ui),
+    ) {
+        ui.horizontal(|ui| {
+            let text = if FIRST.contains(&key) {
+                RichText::new(name).strong()
+            } else {
+                RichText::new(name)
+            };
+            ui.label(text).on_hover_ui(|ui| tooltip(ui, parameter, key));
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                rest(self, ui)
+            });
+        });
+    }
+
+    /// Typed entry; what cannot be read stays to be mended.
+    fn entry(
+        &mut self,
+        ui: &mut Ui,
+        player: &mut Player,
+        parameter: &'static Parameter,
+        key: &str,
+        name: &str,
+        now: &Value,
+    ) {
+        let shown = value::shown(now, &parameter.kind);
+        let mut text = self
+            .drafts
+            .get(key)
+            .map_or_else(|| shown.clone(), |draft| draft.text.clone());
+        let response = ui.add(
+            TextEdit::singleline(&mut text)
+                .desired_width(84.0)
+                .align(egui::Align2::RIGHT_CENTER)
+                .background_color(ui.visuals().faint_bg_color)
+                .margin(egui::Margin::symmetric(6, 3)),
+        );
+        if response.changed() {
+            self.drafts.insert(
+                key.to_owned(),
+                Draft {
+                    text: text.clone(),
+                    error: None,
+                },
+            );
+        }
+        if response.lost_focus() {
+            if ui.input(|i| i.key_pressed(egui::Key::Escape)) {
+                self.drafts.remove(key);
+            } else if text != shown {
+                self.set(player, key, &value::completed(&text, &parameter.kind));
+                if let Some(draft) = self.drafts.get_mut(key) {
+                    draft.text = text;
+                }
+            }
+        }
+        response
+            .on_hover_ui(|ui| tooltip(ui, parameter, key))
+            .accessible_name(name);
+    }
+
+    fn default_button(
+        &mut self,
+        ui: &mut Ui,
+        player: &mut Player,
+        parameter: &'static Parameter,
+        key: &str,
+        name: &str,
+        now: &Value,
+    ) {
+        let size = 22.0;
+        // A place kept free where there is nothing to undo: rows stay aligned.
+        let Some(original) = player.original(key).filter(|original| original != now) else {
+            ui.allocate_space(egui::Vec2::splat(size));
+            return;
+        };
+        let help = format!("Back to {}", value::shown(&original, &parameter.kind));
+        let label = format!("Reset {name}");
+        if icon_button(ui, Icon::Undo, &label, &help, size, false).clicked() {
+            let done = player.set_original(key);
+            self.settle(key, "", done);
+        }
+    }
+
+    fn set(&mut self, player: &mut Player, key: &str, text: &str) {
+        let done = player.set(key, text);
+        self.settle(key, text, done);
+    }
+
+    /// A value that was taken leaves no draft; one that was not stays with the reason.
+    fn settle(&mut self, key: &str, text: &str, done: Result<Effect, SceneError>) {
+        match done {
+            Ok(Effect::Now | Effect::AtReset) => {
+                self.drafts.remove(key);
+            }
+            Err(error) => {
+                let reason = match &error.value {
+                    Some(value) => format!("{value}: {}", error.message),
+                    None => error.message,
+                };
+                let draft = Draft {
+                    text: text.to_owned(),
+                    error: Some(reason),
+                };
+                self.drafts.insert(key.to_owned(), draft);
+            }
+        }
+    }
+}
+
+fn tooltip(ui: &mut Ui, parameter: &Parameter, key: &str) {
+    ui.strong(parameter.label);
+    ui.label(parameter.help);
+    if !parameter.equation.is_empty() {
+        ui.label(RichText::new(format!("Enters {}", parameter.equation)).small());
+    }
+    ui.label(RichText::new(format!("Range {}", value::range(&parameter.kind))).small());
+    ui.label(RichText::new(format!("Key {key}")).small().weak());
+    if parameter.at_reset {
+        ui.label(RichText::new("Applies at the next reset").small());
+    }
+}

@@ -1,0 +1,132 @@
+//! The list of keys, the about box and the field that opens a file.
+
+use eframe::egui::{self, Id, Modal, RichText, TextEdit, Ui};
+
+use super::keys::{BINDINGS, POINTER};
+use super::player::Player;
+
+/// Which dialog is open.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Dialog {
+    /// List of keys.
+    Help,
+    /// Version and state.
+    About,
+    /// Opens a file: the path as typed so far and what was wrong with it.
+    Open {
+        /// Path or name.
+        path: String,
+        /// Why it could not be opened.
+        error: Option<String>,
+    },
+}
+
+/// What a dialog asks for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Answer {
+    /// It wants to be closed.
+    Close,
+    /// Open this scene.
+    Open(String),
+}
+
+/// Shows `dialog`.
+pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player) -> Option<Answer> {
+    let mut answer = None;
+    let widest = (ctx.content_rect().width() - 48.0).min(520.0);
+    let frame = egui::Frame::window(&ctx.global_style());
+    let modal = Modal::new(Id::unique("dialog"))
+        .frame(frame)
+        .show(ctx, |ui| {
+            ui.set_width(widest);
+            let title = match dialog {
+                Dialog::Help => "Keys",
+                Dialog::About => "About Jointplay",
+                Dialog::Open { .. } => "Open a scene file",
+            };
+            ui.heading(title);
+            ui.add_space(6.0);
+            match dialog {
+                Dialog::Help => help(ui),
+                Dialog::About => about(ui, player),
+                Dialog::Open { path, error } => answer = open(ui, path, error.as_deref()),
+            }
+            ui.add_space(8.0);
+            if ui.button("Close").clicked() {
+                answer = Some(Answer::Close);
+            }
+        });
+    if modal.should_close() {
+        answer = Some(Answer::Close);
+    }
+    answer
+}
+
+fn help(ui: &mut Ui) {
+    ui.spacing_mut().interact_size.y = 18.0;
+    let rows = BINDINGS
+        .iter()
+        .filter(|b| !b.written.is_empty())
+        .map(|b| (b.written, b.help))
+        .chain(POINTER);
+    egui::ScrollArea::vertical()
+        .max_height(ui.ctx().content_rect().height() * 0.7)
+        .show(ui, |ui| {
+            egui::Grid::new("keys")
+                .num_columns(2)
+                .spacing([18.0, 5.0])
+                .striped(true)
+                .show(ui, |ui| {
+                    for (key, help) in rows {
+                        ui.label(RichText::new(key).strong());
+                        ui.label(help);
+                        ui.end_row();
+                    }
+                });
+        });
+}
+
+fn about(ui: &mut Ui, player: &Player) {
+    ui.label(format!("Version {}", crate::VERSION));
+    ui.label("A 3D laboratory that shows what play in a ball joint does to a machine.");
+    ui.add_space(6.0);
+    let scene = player.scene();
+    ui.label(RichText::new(&scene.title).strong());
+    ui.label(&scene.description);
+    ui.add_space(6.0);
+    ui.horizontal_wrapped(|ui| {
+        ui.label("State hash");
+        ui.monospace(format!("{:016x}", player.simulation().state_hash()));
+    })
+    .response
+    .on_hover_text(
+        "Names the whole state at the latest step: equal hashes are equal states, bit for bit",
+    );
+    if !scene.changes.is_empty() {
+        ui.label("Changed parameters");
+        for (key, value) in &scene.changes {
+            ui.monospace(format!("{key} = {value}"));
+        }
+    }
+}
+
+fn open(ui: &mut Ui, path: &mut String, error: Option<&str>) -> Option<Answer> {
+    ui.label("Path of a scene file (.toml), or the name of a built-in scene. A file can also be dropped on the window.");
+    let field = ui.add(
+        TextEdit::singleline(path)
+            .desired_width(f32::INFINITY)
+            .hint_text("scene.toml"),
+    );
+    let entered = field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
+    if !entered && ui.memory(|memory| memory.focused().is_none()) {
+        field.request_focus();
+    }
+    field.accessible_name("Path");
+    if let Some(error) = error {
+        ui.label(RichText::new(error).color(ui.visuals().error_fg_color));
+    }
+    let clicked = ui
+        .add_enabled(!path.trim().is_empty(), egui::Button::new("Open"))
+        .clicked();
+    ((clicked || entered) && !path.trim().is_empty()).then(|| Answer::Open(path.trim().to_owned()))
+}

@@ -1,0 +1,163 @@
+//! The keyboard: one table for what a key does and for the overlay that lists them.
+
+use eframe::egui::{self, Key};
+
+/// What a key asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Action {
+    PlayPause,
+    Step,
+    Reset,
+    Slower,
+    Faster,
+    Fit,
+    /// Point of view, by index.
+    Preset(usize),
+    /// Close-up of a ball joint, by index.
+    CloseUp(usize),
+    Magnify,
+    Arrows,
+    Panel,
+    Plots,
+    Theme,
+    Help,
+    Close,
+}
+
+/// Key, how it is written in the overlay (empty: with the line above), what it does.
+pub struct Binding {
+    /// Key.
+    pub key: Key,
+    /// What it asks for.
+    pub action: Action,
+    /// How the overlay writes the key; empty where the line above names it already.
+    pub written: &'static str,
+    /// What the overlay says.
+    pub help: &'static str,
+}
+
+const fn bind(key: Key, action: Action, written: &'static str, help: &'static str) -> Binding {
+    Binding {
+        key,
+        action,
+        written,
+        help,
+    }
+}
+
+/// All keys.
+pub const BINDINGS: [Binding; 27] = [
+    bind(Key::Space, Action::PlayPause, "Space", "Play or pause"),
+    bind(
+        Key::ArrowRight,
+        Action::Step,
+        "Right arrow",
+        "One step of the solver",
+    ),
+    bind(Key::R, Action::Reset, "R", "Reset to t = 0"),
+    bind(Key::ArrowUp, Action::Faster, "Up arrow, +", "Faster"),
+    bind(Key::Plus, Action::Faster, "", ""),
+    bind(Key::Equals, Action::Faster, "", ""),
+    bind(Key::ArrowDown, Action::Slower, "Down arrow, -", "Slower"),
+    bind(Key::Minus, Action::Slower, "", ""),
+    bind(Key::F, Action::Fit, "F", "Show everything"),
+    bind(Key::Num1, Action::Preset(0), "1", "Isometric view"),
+    bind(Key::Num2, Action::Preset(1), "2", "Front view"),
+    bind(Key::Num3, Action::Preset(2), "3", "Side view"),
+    bind(Key::Num4, Action::Preset(3), "4", "Top view"),
+    bind(
+        Key::Num5,
+        Action::CloseUp(0),
+        "5, 6, 7, 8, 9",
+        "Close-up of the first, second, … ball joint",
+    ),
+    bind(Key::Num6, Action::CloseUp(1), "", ""),
+    bind(Key::Num7, Action::CloseUp(2), "", ""),
+    bind(Key::Num8, Action::CloseUp(3), "", ""),
+    bind(Key::Num9, Action::CloseUp(4), "", ""),
+    bind(
+        Key::M,
+        Action::Magnify,
+        "M",
+        "Next magnification of the play",
+    ),
+    bind(Key::A, Action::Arrows, "A", "Force arrows on or off"),
+    bind(Key::C, Action::Panel, "C", "Controls shown or hidden"),
+    bind(Key::P, Action::Plots, "P", "Plots shown or hidden"),
+    bind(Key::T, Action::Theme, "T", "Light or dark"),
+    bind(Key::Questionmark, Action::Help, "?", "This list"),
+    bind(Key::Slash, Action::Help, "", ""),
+    bind(Key::F1, Action::Help, "", ""),
+    bind(Key::Escape, Action::Close, "Esc", "Close"),
+];
+
+/// Mouse and touch, for the overlay.
+pub const POINTER: [(&str, &str); 6] = [
+    ("Drag", "Turn the view"),
+    ("Right or middle drag, shift-drag", "Shift the view"),
+    ("Wheel, pinch", "Come nearer to what is under the cursor"),
+    ("Hover", "What is known about a part"),
+    ("Double-click", "Follow a body or joint; the ground lets go"),
+    ("Drop a file", "Open a scene"),
+];
+
+/// Actions of the keys pressed since the last frame. A field that is being typed in keeps all keys; a control
+/// that has the focus keeps space and arrows.
+pub fn pressed(ctx: &egui::Context) -> Vec<Action> {
+    if ctx.text_edit_focused() {
+        return Vec::new();
+    }
+    let focused = ctx.memory(|memory| memory.focused().is_some());
+    let held_back = |key: Key| {
+        matches!(
+            key,
+            Key::Space | Key::ArrowUp | Key::ArrowDown | Key::ArrowLeft | Key::ArrowRight
+        ) && focused
+    };
+    ctx.input(|input| {
+        input
+            .events
+            .iter()
+            .filter_map(|event| match event {
+                egui::Event::Key {
+                    key,
+                    pressed: true,
+                    repeat,
+                    modifiers,
+                    ..
+                } if !modifiers.command && !modifiers.alt => {
+                    let binding = BINDINGS
+                        .iter()
+                        .find(|b| b.key == *key && !held_back(*key))?;
+                    // Held down, only these go on.
+                    let repeats = matches!(
+                        binding.action,
+                        Action::Step | Action::Faster | Action::Slower
+                    );
+                    (!repeat || repeats).then_some(binding.action)
+                }
+                _ => None,
+            })
+            .collect()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_key_does_two_things_and_every_action_is_listed() {
+        for (i, a) in BINDINGS.iter().enumerate() {
+            for b in &BINDINGS[i + 1..] {
+                assert_ne!(a.key, b.key, "{}", a.help);
+            }
+            let listed = BINDINGS.iter().any(|b| {
+                !b.written.is_empty()
+                    && std::mem::discriminant(&b.action) == std::mem::discriminant(&a.action)
+            });
+            assert!(listed, "{:?} is missing from the overlay", a.action);
+        }
+    }
+}

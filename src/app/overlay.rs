@@ -1,0 +1,176 @@
+//! What the interface paints over a picture: labels, the legend of the arrows, the time. Used by the viewport and
+//! by headless frames.
+
+use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, pos2, vec2};
+
+use super::value;
+use super::viewport::lower_right;
+use crate::scene::{Scene, format_quantity_digits};
+use crate::simulate::{ContactState, Frame};
+use crate::view::{Colour, DrawList, LabelKind, Legend, Palette, Scaling, Theme};
+
+/// Distance of overlays from the edge, points.
+const MARGIN: f32 = 14.0;
+
+fn colour(colour: Colour) -> Color32 {
+    let [r, g, b, a] = colour.to_rgba8();
+    Color32::from_rgba_unmultiplied(r, g, b, a)
+}
+
+/// Text with a halo in the colour of the ground, readable over anything.
+fn text(
+    painter: &Painter,
+    at: Pos2,
+    anchor: Align2,
+    text: &str,
+    size: f32,
+    ink: Color32,
+    halo: Color32,
+) -> Rect {
+    let font = FontId::proportional(size);
+    let halo = halo.gamma_multiply(0.75);
+    for (dx, dy) in [(-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0)] {
+        painter.text(at + vec2(dx, dy), anchor, text, font.clone(), halo);
+    }
+    painter.text(at, anchor, text, font, ink)
+}
+
+/// Names of joints and axes at their places.
+pub fn labels(painter: &Painter, rect: Rect, scale: f32, list: &DrawList) {
+    let halo = colour(list.background.bottom);
+    for label in &list.labels {
+        let at = rect.min + vec2(label.pixel.x, label.pixel.y) / scale;
+        if let LabelKind::Joint(_) = label.kind {
+            // On a plate of its own: it often lies over a dark part.
+            let font = FontId::proportional(13.0);
+            let words = painter.layout_no_wrap(label.text.to_string(), font, colour(label.colour));
+            let place = Align2::LEFT_BOTTOM.anchor_size(at + vec2(10.0, -8.0), words.size());
+            painter.rect_filled(place.expand2(vec2(4.0, 1.0)), 4.0, halo.gamma_multiply(0.8));
+            painter.galley(place.min, words, colour(label.colour));
+            continue;
+        }
+        let ink = colour(label.colour);
+        text(
+            painter,
+            at,
+            Align2::CENTER_CENTER,
+            &label.text,
+            12.0,
+            ink,
+            halo,
+        );
+    }
+}
+
+/// Simulated time in the upper left corner, with notes below it, on a plate of their own.
+pub fn time(painter: &Painter, rect: Rect, time: f64, notes: &[String], theme: Theme) {
+    let palette = Palette::of(theme);
+    let ink = colour(palette.text);
+    let line =
+        |words: String, size: f32| painter.layout_no_wrap(words, FontId::proportional(size), ink);
+    let mut lines = vec![line(format!("t = {}", value::time(time)), 18.0)];
+    let notes = notes.iter().filter(|note| !note.is_empty());
+    lines.extend(notes.map(|note| line(note.clone(), 13.0)));
+    let width = lines.iter().map(|l| l.size().x).fold(0.0, f32::max);
+    let height: f32 = lines.iter().map(|l| l.size().y + 1.0).sum();
+    let corner = rect.min + vec2(MARGIN, MARGIN);
+    let plate = Rect::from_min_size(corner, vec2(width, height)).expand2(vec2(8.0, 4.0));
+    painter.rect_filled(plate, 6.0, colour(palette.sky).gamma_multiply(0.75));
+    let mut at = corner;
+    for line in lines {
+        let step = line.size().y + 1.0;
+        painter.galley(at, line, ink);
+        at.y += step;
+    }
+}
+
+/// One line per ball joint: its forces as the step reported them.
+pub fn force_notes(scene: &Scene, frame: &Frame) -> Vec<String> {
+    let newtons = |force: &crate::scene::Vec3| format_quantity_digits(force.norm(), "N", 4);
+    scene
+        .ball_joints
+        .iter()
+        .zip(&frame.joints)
+        .map(|(joint, report)| match report.state {
+            ContactState::Free => format!("{}  free", joint.name),
+            ContactState::Ideal => {
+                format!("{}  reaction {}", joint.name, newtons(&report.normal_force))
+            }
+            ContactState::Stick | ContactState::Slip => format!(
+                "{}  normal {}, friction {}",
+                joint.name,
+                newtons(&report.normal_force),
+                newtons(&report.friction_force)
+            ),
+        })
+        .collect()
+}
+
+/// How to read the arrows, in the lower right corner.
+pub fn legend(painter: &Painter, rect: Rect, scale: f32, legend: &Legend, theme: Theme) {
+    let palette = Palette::of(theme);
+    let (ink, halo) = (colour(palette.text), colour(palette.sky));
+    let full = legend.pixels / scale;
+    let longest = rect.width() * 0.4;
+    // Seen from near, the reference arrow may be wider than the view: show the part that fits.
+    let shown = full.min(longest);
+    // Room for half a number beyond the last mark.
+    let corner = lower_right(rect, MARGIN) - vec2(12.0, 0.0);
+    let axis = corner.y - 18.0;
+    let left = corner.x - shown;
+    painter.line_segment(
+        [pos2(left, axis), pos2(corner.x, axis)],
+        Stroke::new(1.5, ink),
+    );
+    let mut free_from = f32::NEG_INFINITY;
+    for tick in legend
+        .ticks
+        .iter()
+        .filter(|tick| tick.fraction * full <= shown + 0.5)
+    {
+        let x = left + tick.fraction * full;
+        painter.line_segment(
+            [pos2(x, axis - 4.0), pos2(x, axis + 4.0)],
+            Stroke::new(1.5, ink),
+        );
+        let words = format_quantity_digits(f64::from(tick.force), "", 3);
+        // Left out where it would touch the mark before it.
+        if x - 12.0 >= free_from {
+            let placed = text(
+                painter,
+                pos2(x, axis + 5.0),
+                Align2::CENTER_TOP,
+                &words,
+                11.0,
+                ink,
+                halo,
+            );
+            free_from = placed.max.x + 4.0;
+        }
+    }
+    let mut at = pos2(corner.x + 12.0, axis - 8.0);
+    let mut title = match legend.scaling {
+        Scaling::Linear => "Force on the ball, N".to_owned(),
+        Scaling::Logarithmic => "Force on the ball, N (logarithmic)".to_owned(),
+    };
+    if legend.clipped {
+        title.push_str(", longer ones cut");
+    }
+    at.y = text(painter, at, Align2::RIGHT_BOTTOM, &title, 12.0, ink, halo)
+        .min
+        .y
+        - 2.0;
+    for (name, hue) in [("friction", legend.friction), ("normal", legend.normal)] {
+        let Some(hue) = hue else {
+            continue;
+        };
+        let placed = text(painter, at, Align2::RIGHT_BOTTOM, name, 12.0, ink, halo);
+        let y = placed.center().y;
+        painter.arrow(
+            pos2(placed.min.x - 30.0, y),
+            vec2(24.0, 0.0),
+            Stroke::new(2.5, colour(hue)),
+        );
+        at.y = placed.min.y - 1.0;
+    }
+}

@@ -1,0 +1,193 @@
+//! Transport: play, step, reset, time scale, and how fast time really passes.
+
+use eframe::egui::{self, ComboBox, RichText, Slider, Ui};
+
+use super::icons::{Icon, icon_button};
+use super::player::Player;
+use super::value;
+use crate::simulate::SCALE_RANGE;
+
+/// Time scales that a list offers.
+pub const SCALES: [f64; 8] = [1.0, 0.5, 0.1, 0.05, 0.02, 0.01, 1e-3, 1e-4];
+
+/// Size of the button that plays and pauses, points.
+const PLAY: f32 = 40.0;
+
+/// What the user asked the transport for; the caller does it, since a reset touches more than the player.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Asked {
+    /// Back to t = 0.
+    Reset,
+}
+
+/// The next scale of [`SCALES`] faster or slower than the present one.
+pub fn next_scale(scale: f64, faster: bool) -> f64 {
+    if faster {
+        SCALES
+            .iter()
+            .rev()
+            .copied()
+            .find(|&s| s > scale * 1.0001)
+            .unwrap_or(SCALES[0])
+    } else {
+        SCALES
+            .iter()
+            .copied()
+            .find(|&s| s < scale * 0.9999)
+            .unwrap_or(SCALES[SCALES.len() - 1])
+    }
+}
+
+/// The bar: one row, or two where it is narrow.
+pub fn ui(ui: &mut Ui, player: &mut Player) -> Option<Asked> {
+    let mut asked = None;
+    let narrow = ui.available_width() < 620.0;
+    let row = egui::Layout::left_to_right(egui::Align::Center);
+    let size = egui::vec2(ui.available_width(), PLAY);
+    ui.allocate_ui_with_layout(size, row, |ui| {
+        let help = if player.has_waiting() {
+            "Back to t = 0; applies the changes that wait for it (key R)"
+        } else {
+            "Back to t = 0 (key R)"
+        };
+        if icon_button(ui, Icon::Restart, "Reset", help, 30.0, false).clicked() {
+            asked = Some(Asked::Reset);
+        }
+        let (icon, name, help) = if player.is_playing() {
+            (Icon::Pause, "Pause", "Stand still (space)")
+        } else {
+            (Icon::Play, "Play", "Let time pass (space)")
+        };
+        let runs = player.stopped().is_none();
+        ui.add_enabled_ui(runs, |ui| {
+            if icon_button(ui, icon, name, help, PLAY, true).clicked() {
+                player.set_playing(!player.is_playing());
+            }
+            if icon_button(
+                ui,
+                Icon::Step,
+                "Step",
+                "One step of the solver (right arrow)",
+                30.0,
+                false,
+            )
+            .clicked()
+            {
+                player.single_step();
+            }
+        });
+        ui.add_space(6.0);
+        ui.label(
+            RichText::new(value::time(player.pacer.shown()))
+                .monospace()
+                .strong(),
+        )
+        .on_hover_text("Simulated time");
+        if !narrow {
+            ui.add_space(6.0);
+            speed(ui, player, narrow);
+        }
+    });
+    if narrow {
+        ui.horizontal(|ui| speed(ui, player, narrow));
+    }
+    asked
+}
+
+fn speed(ui: &mut Ui, player: &mut Player, narrow: bool) {
+    let mut scale = player.pacer.scale();
+    ui.label("Time scale").on_hover_text(
+        "Simulated against real time: 1:50 shows a fiftieth of a second in a second (keys + and -)",
+    );
+    ui.spacing_mut().slider_width = if narrow { 90.0 } else { 150.0 };
+    let response = ui
+        .add(
+            Slider::new(&mut scale, SCALE_RANGE.0..=SCALE_RANGE.1)
+                .logarithmic(true)
+                .show_value(false),
+        )
+        .on_hover_text("1:1 is real time, 1:10 000 the slowest motion");
+    if response.changed() {
+        player.pacer.set_scale(scale);
+    }
+    response.accessible_name("Time scale");
+    ComboBox::from_id_salt("time scale")
+        .width(78.0)
+        .selected_text(value::time_scale(player.pacer.scale()))
+        .show_ui(ui, |ui| {
+            for preset in SCALES {
+                let chosen = (player.pacer.scale() / preset - 1.0).abs() < 1e-3;
+                if ui
+                    .selectable_label(chosen, value::time_scale(preset))
+                    .clicked()
+                {
+                    player.pacer.set_scale(preset);
+                }
+            }
+        })
+        .response
+        .on_hover_text("Simulated against real time")
+        .accessible_name("Time scale preset");
+    reached(ui, player);
+}
+
+/// What the machine makes of it.
+fn reached(ui: &mut Ui, player: &Player) {
+    if !player.is_playing() {
+        return;
+    }
+    let Some(reached) = player.pacer.reached_scale() else {
+        return;
+    };
+    let words = format!("reached {}", value::time_scale(reached));
+    if reached < 0.97 * player.pacer.scale() {
+        ui.label(RichText::new(words).color(ui.visuals().warn_fg_color)).on_hover_text(
+            "This machine cannot follow the time scale that was asked for: the simulation runs slower, and skips \
+             nothing. A larger step or the preview preset of the solver helps.",
+        );
+    } else {
+        ui.label(RichText::new(words).weak())
+            .on_hover_text("Simulated against real time, as measured");
+    }
+}
+
+/// Banner of a run that the divergence guard stopped.
+pub fn banner(ui: &mut Ui, player: &Player) -> Option<Asked> {
+    let stopped = player.stopped()?;
+    let mut asked = None;
+    let colour = ui.visuals().error_fg_color;
+    egui::Frame::new()
+        .fill(ui.visuals().window_fill)
+        .stroke(egui::Stroke::new(1.0, colour))
+        .corner_radius(6.0)
+        .inner_margin(10.0)
+        .show(ui, |ui| {
+            ui.horizontal_wrapped(|ui| {
+                ui.label(
+                    RichText::new(format!("Stopped at {}", value::time(stopped.time)))
+                        .strong()
+                        .color(colour),
+                );
+                ui.label(&stopped.what);
+                ui.label(&stopped.advice);
+                if ui.button("Reset the run").clicked() {
+                    asked = Some(Asked::Reset);
+                }
+            });
+        });
+    asked
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_scale_keys_walk_the_list_both_ways_and_stop_at_its_ends() {
+        assert_eq!(next_scale(0.02, true), 0.05);
+        assert_eq!(next_scale(0.02, false), 0.01);
+        assert_eq!(next_scale(0.03, true), 0.05);
+        assert_eq!(next_scale(1.0, true), 1.0);
+        assert_eq!(next_scale(1e-4, false), 1e-4);
+    }
+}

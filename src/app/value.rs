@@ -1,0 +1,120 @@
+//! Parameter values as text: the same words and units that files and the command line take.
+
+use crate::scene::{Kind, Value, format_quantity, format_quantity_digits, to_display};
+
+/// `value` for a person: display unit, six digits.
+pub fn shown(value: &Value, kind: &Kind) -> String {
+    match (value, kind) {
+        (Value::Number(si), Kind::Number { display, .. }) => format_quantity(*si, display),
+        (Value::Number(si), _) => format_quantity(*si, ""),
+        (Value::Count(count), _) => count.to_string(),
+        (Value::Choice(word), _) => (*word).to_owned(),
+        (Value::Unset, _) => "not set".to_owned(),
+    }
+}
+
+/// What a user typed, with the display unit added to a bare number.
+pub fn completed(typed: &str, kind: &Kind) -> String {
+    let typed = typed.trim();
+    match kind {
+        Kind::Number { display, .. } if !display.is_empty() && typed.parse::<f64>().is_ok() => {
+            format!("{typed} {display}")
+        }
+        _ => typed.to_owned(),
+    }
+}
+
+/// Range of a kind, for a tooltip.
+pub fn range(kind: &Kind) -> String {
+    match kind {
+        Kind::Number {
+            min, max, display, ..
+        } => {
+            format!(
+                "{} to {}",
+                format_quantity(to_display(*min, display), ""),
+                format_quantity(*max, display)
+            )
+        }
+        Kind::Count { min, max } => format!("{min} to {max}"),
+        Kind::Choice(words) => words.join(", "),
+    }
+}
+
+/// A bare number with at most `digits` significant digits.
+pub fn number(value: f64, digits: usize) -> String {
+    format_quantity_digits(value, "", digits)
+}
+
+/// A time with the unit that suits its size.
+pub fn time(seconds: f64) -> String {
+    let size = seconds.abs();
+    if size == 0.0 || size >= 1.0 {
+        format!("{seconds:.4} s")
+    } else if size >= 1e-3 {
+        format!("{:.4} ms", seconds * 1e3)
+    } else {
+        format!("{:.3} µs", seconds * 1e6)
+    }
+}
+
+/// A time scale as people say it: `1:50`.
+pub fn time_scale(scale: f64) -> String {
+    if scale <= 0.0 || !scale.is_finite() {
+        return "1:∞".to_owned();
+    }
+    let slower = 1.0 / scale;
+    if slower < 9.95 {
+        format!("1:{}", format_quantity((slower * 10.0).round() / 10.0, ""))
+    } else {
+        format!("1:{}", grouped(slower.round() as u64))
+    }
+}
+
+/// A count with a thin space between thousands.
+fn grouped(count: u64) -> String {
+    if count < 10_000 {
+        count.to_string()
+    } else {
+        format!("{}\u{202f}{:03}", count / 1000, count % 1000)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Dimension;
+
+    const LENGTH: Kind = Kind::Number {
+        dimension: Dimension::Length,
+        min: 0.0,
+        max: 2e-3,
+        display: "mm",
+        slider: (0.0, 1e-3),
+        logarithmic: false,
+    };
+
+    #[test]
+    fn a_bare_number_takes_the_unit_on_show() {
+        assert_eq!(completed(" 0.5 ", &LENGTH), "0.5 mm");
+        assert_eq!(completed("500 um", &LENGTH), "500 um");
+        assert_eq!(completed("half", &LENGTH), "half");
+    }
+
+    #[test]
+    fn values_read_as_people_write_them() {
+        assert_eq!(shown(&Value::Number(3e-4), &LENGTH), "0.3 mm");
+        assert_eq!(range(&LENGTH), "0 to 2 mm");
+    }
+
+    #[test]
+    fn times_and_scales_suit_their_size() {
+        assert_eq!(time(0.0), "0.0000 s");
+        assert_eq!(time(7.85e-3), "7.8500 ms");
+        assert_eq!(time(12.5e-6), "12.500 µs");
+        assert_eq!(time_scale(1.0), "1:1");
+        assert_eq!(time_scale(0.4), "1:2.5");
+        assert_eq!(time_scale(0.02), "1:50");
+        assert_eq!(time_scale(1e-4), "1:10\u{202f}000");
+    }
+}

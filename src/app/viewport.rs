@@ -1,0 +1,455 @@
+//! The 3D viewport: camera by mouse, picking, and what the interface paints over the picture.
+
+use std::sync::Arc;
+
+use eframe::egui::{
+    self, PointerButton, Pos2, Rect, RichText, Role, Sense, Slider, Ui, WidgetInfo, pos2, vec2,
+};
+use glam::{Vec2, Vec3};
+
+use super::player::Player;
+use super::{framing, overlay};
+use crate::render;
+use crate::scene::format_quantity_digits;
+use crate::simulate::ContactState;
+use crate::view::{
+    ArrowMemory, Camera, DrawList, Picked, Preset, Scaling, SceneView, Shot, Theme, ViewOptions,
+    to_f32,
+};
+
+/// Points of the probe's trail that are kept.
+const TRAIL: usize = 1500;
+
+/// A shot of what the player shows. A macro, since the list that it is drawn to is borrowed beside it.
+macro_rules! shot {
+    ($self:ident, $player:ident, $camera:expr, $size:ident, $scale:ident) => {
+        Shot {
+            scene: $player.scene(),
+            frame: $player.frame(),
+            arrows: &$self.arrows,
+            options: &$self.options,
+            camera: $camera,
+            trail: &$self.trail,
+            size: $size,
+            pixels_per_point: $scale,
+        }
+    };
+}
+
+/// Camera, view options and everything that is remembered between two pictures of one scene.
+pub struct Viewport {
+    /// What to draw and how.
+    pub options: ViewOptions,
+    view: SceneView,
+    camera: Camera,
+    /// Where the camera is going; `None` once it is there.
+    goal: Option<Camera>,
+    fit_pending: bool,
+    arrows: ArrowMemory,
+    list: Arc<DrawList>,
+    trail: Vec<Vec3>,
+    followed: Option<Picked>,
+    time: f64,
+}
+
+impl Viewport {
+    /// A viewport that shows all of the player's scene.
+    pub fn new(player: &Player, options: ViewOptions) -> Self {
+        let view = SceneView::new(player.scene(), player.frame());
+        Self {
+            camera: view.camera(),
+            goal: None,
+            fit_pending: true,
+            view,
+            options,
+            arrows: ArrowMemory::new(),
+            list: Arc::new(DrawList::default()),
+            trail: Vec::new(),
+            followed: None,
+            time: player.pacer.shown(),
+        }
+    }
+
+    /// Shows another scene, or the same one after a reset that changed its shapes; the choices stay.
+    pub fn show_scene(&mut self, player: &Player) {
+        *self = Self::new(player, self.options.clone());
+    }
+
+    /// After a reset: the same shapes at t = 0.
+    pub fn restart(&mut self, player: &Player) {
+        self.view = SceneView::new(player.scene(), player.frame());
+        self.arrows.clear();
+        self.trail.clear();
+        self.followed = None;
+        self.time = player.pacer.shown();
+    }
+
+    /// Takes what happened since the last frame, `dt` seconds ago: held forces, flashes, trail, moving camera.
+    /// Returns whether something still moves by itself.
+    pub fn advance(&mut self, player: &Player, dt: f32) -> bool {
+        // Paused, the arrows stand: what is on show is one instant.
+        let shown = player.pacer.shown();
+        if shown != self.time || player.is_playing() {
+            self.time = shown;
+            self.arrows
+                .update(player.frame(), player.peaks(), dt, &self.options.arrows);
+            self.extend_trail(player);
+        } else if self.arrows.joints().is_empty() {
+            self.arrows
+                .update(player.frame(), player.peaks(), 0.0, &self.options.arrows);
+        }
+        if let Some(picked) = self.followed {
+            self.camera.follow(self.view.anchor(player.frame(), picked));
+        }
+        let Some(goal) = self.goal else {
+            return false;
+        };
+        let rate = 1.0 - (-dt * 14.0).exp();
+        self.camera = self.camera.towards(&goal, rate);
+        let near = (self.camera.target - goal.target).length() < 1e-3 * goal.distance
+            && (self.camera.distance - goal.distance).abs() < 1e-3 * goal.distance
+            && (self.camera.yaw - goal.yaw).abs() < 1e-3
+            && (self.camera.pitch - goal.pitch).abs() < 1e-3;
+        if near {
+            self.camera = goal;
+            self.goal = None;
+        }
+        true
+    }
+
+    /// Turns to a named point of view and shows everything.
+    pub fn preset(&mut self, preset: Preset) {
+        self.follow(None);
+        let mut goal = self.goal.unwrap_or(self.camera);
+        goal.preset(preset);
+        self.goal = Some(goal);
+        self.fit_pending = true;
+    }
+
+    /// Shows everything from where the camera looks.
+    pub fn fit(&mut self) {
+        self.follow(None);
+        self.fit_pending = true;
+    }
+
+    /// Looks into ball joint `joint`.
+    pub fn close_up(&mut self, player: &Player, joint: usize) {
+        if joint < player.frame().joints.len() {
+            let mut goal = self.camera;
+            let scene = player.scene();
+            self.view
+                .close_up(&mut goal, joint, scene, player.frame(), &self.options);
+            self.goal = Some(goal);
+            self.fit_pending = false;
+            self.follow(None);
+        }
+    }
+
+    /// Keeps a body or joint where it is on the screen; `None` lets go.
+    pub fn follow(&mut self, picked: Option<Picked>) {
+        self.followed = picked;
+        self.camera.follow(None);
+    }
+
+    /// The next factor of a short list for the magnification of the play.
+    pub fn next_magnification(&mut self) {
+        const STEPS: [f32; 6] = [1.0, 5.0, 10.0, 20.0, 50.0, 100.0];
+        let next = STEPS
+            .iter()
+            .find(|&&step| step > self.options.magnification * 1.001);
+        self.options.magnification = *next.unwrap_or(&STEPS[0]);
+    }
+
+    /// The picture with its overlays, over all of `ui`.
+    pub fn ui(&mut self, ui: &mut Ui, player: &Player) {
+        let (rect, response) = ui.allocate_exact_size(
+            ui.available_size().max(vec2(16.0, 16.0)),
+            Sense::click_and_drag(),
+        );
+        response.widget_info(|| WidgetInfo::labeled(Role::Image, true, "3D view"));
+        let scale = ui.ctx().pixels_per_point();
+        let size = [pixels(rect.width() * scale), pixels(rect.height() * scale)];
+        self.options.theme = if ui.visuals().dark_mode {
+            Theme::Dark
+        } else {
+            Theme::Light
+        };
+
+        if self.fit_pending {
+            self.fit_pending = false;
+            // The first picture of a scene starts where it should be.
+            let first = self.list.size == [0, 0];
+            let goal = self.framed(player, self.goal.unwrap_or(self.camera), size, scale);
+            if first {
+                self.camera = goal;
+            } else {
+                self.goal = Some(goal);
+                ui.ctx().request_repaint();
+            }
+        }
+        self.drag(ui, &response, rect, size, scale);
+        let shot = shot!(self, player, &self.camera, size, scale);
+        let hovered = response
+            .hover_pos()
+            .filter(|_| !response.dragged())
+            .map(|pos| (pos - rect.min) * scale)
+            .and_then(|pixel| self.view.pick(&shot, Vec2::new(pixel.x, pixel.y)));
+        // egui has dropped the clone of the frame before: nothing is copied.
+        self.view.build(&shot, Arc::make_mut(&mut self.list));
+        if response.double_clicked() {
+            self.follow(hovered.map(|hit| hit.what));
+        }
+        let painter = ui.painter_at(rect);
+        painter.add(render::Viewport::shape(rect, self.list.clone()));
+        overlay::labels(&painter, rect, scale, &self.list);
+        if let Some(legend) = &self.list.legend {
+            overlay::legend(&painter, rect, scale, legend, self.options.theme);
+        }
+        let mut notes = vec![self.list.magnification_text.clone()];
+        if let Some(name) = self.followed.and_then(|picked| name_of(player, picked)) {
+            notes.push(format!("following {name}"));
+        }
+        overlay::time(
+            &painter,
+            rect,
+            player.pacer.shown(),
+            &notes,
+            self.options.theme,
+        );
+        if let Some(hit) = hovered {
+            response.on_hover_ui_at_pointer(|ui| describe(ui, player, hit.what));
+        }
+    }
+
+    /// `camera` moved so that everything drawn fills the picture.
+    fn framed(
+        &mut self,
+        player: &Player,
+        mut camera: Camera,
+        size: [u32; 2],
+        scale: f32,
+    ) -> Camera {
+        camera.fit(self.view.bounds(), size[0] as f32 / size[1] as f32);
+        let shot = shot!(self, player, &camera, size, scale);
+        self.view.build(&shot, Arc::make_mut(&mut self.list));
+        framing::frame(&mut camera, &self.list, size);
+        camera
+    }
+
+    fn drag(&mut self, ui: &Ui, response: &egui::Response, rect: Rect, size: [u32; 2], scale: f32) {
+        let shift = ui.input(|i| i.modifiers.shift);
+        let delta = response.drag_delta() * scale;
+        let delta = Vec2::new(delta.x, delta.y);
+        let pans = response.dragged_by(PointerButton::Secondary)
+            || response.dragged_by(PointerButton::Middle)
+            || (shift && response.dragged_by(PointerButton::Primary));
+        if pans {
+            self.goal = None;
+            self.camera.pan(delta, size);
+        } else if response.dragged_by(PointerButton::Primary) {
+            self.goal = None;
+            self.camera.orbit(delta);
+        }
+        if let Some(pos) = response.hover_pos() {
+            let (scroll, pinch) = ui.input(|i| (i.smooth_scroll_delta().y, i.zoom_delta()));
+            let factor = (scroll * 0.004).exp() * pinch;
+            if factor != 1.0 {
+                self.goal = None;
+                let cursor = (pos - rect.min) * scale;
+                self.camera
+                    .zoom(factor, Vec2::new(cursor.x, cursor.y), size);
+            }
+        }
+    }
+
+    /// Buttons for points of view, each added in turn; `backwards` where the layout runs from right to left.
+    pub fn camera_buttons(&mut self, ui: &mut Ui, backwards: bool) {
+        let mut buttons: Vec<Option<Preset>> =
+            Preset::ALL.into_iter().map(Some).chain([None]).collect();
+        if backwards {
+            buttons.reverse();
+        }
+        for button in buttons {
+            match button {
+                Some(preset) => {
+                    let key = Preset::ALL
+                        .iter()
+                        .position(|p| *p == preset)
+                        .map_or(0, |i| i + 1);
+                    let help = format!("Look from here (key {key})");
+                    if ui.button(preset.label()).on_hover_text(help).clicked() {
+                        self.preset(preset);
+                    }
+                }
+                None => {
+                    if ui
+                        .button("Fit")
+                        .on_hover_text("Show everything (key F)")
+                        .clicked()
+                    {
+                        self.fit();
+                    }
+                }
+            }
+        }
+    }
+
+    /// Choices about the picture.
+    pub fn options_ui(&mut self, ui: &mut Ui) {
+        let options = &mut self.options;
+        ui.label("Magnification of the play").on_hover_text(
+            "Draws eccentricity and clearance larger than they are, together, so that the ball never leaves its \
+             socket. The motion of the machine stays as it is. Key M.",
+        );
+        ui.add(
+            Slider::new(&mut options.magnification, 1.0..=100.0)
+                .logarithmic(true)
+                .prefix("×")
+                .max_decimals(1),
+        )
+        .accessible_name("Magnification of the play");
+        ui.add_space(4.0);
+        ui.label("Force arrows");
+        ui.horizontal(|ui| {
+            ui.checkbox(&mut options.arrows.normal, "Normal")
+                .on_hover_text("Normal force on each ball, N");
+            ui.checkbox(&mut options.arrows.friction, "Friction")
+                .on_hover_text("Friction force on each ball, N");
+        });
+        ui.horizontal(|ui| {
+            ui.radio_value(&mut options.arrows.scaling, Scaling::Linear, "Linear")
+                .on_hover_text("Length in proportion to the force");
+            ui.radio_value(
+                &mut options.arrows.scaling,
+                Scaling::Logarithmic,
+                "Logarithmic",
+            )
+            .on_hover_text("Length by the logarithm of the force, over three decades");
+        });
+        let mut automatic = options.arrows.reference.is_none();
+        if ui
+            .checkbox(&mut automatic, "Automatic scale")
+            .on_hover_text("The scale follows the largest force; off, it stays")
+            .changed()
+        {
+            options.arrows.reference = if automatic {
+                None
+            } else {
+                Some(self.arrows.reference(&options.arrows))
+            };
+        }
+        if let Some(reference) = &mut options.arrows.reference {
+            ui.add(
+                Slider::new(reference, 0.1..=10_000.0)
+                    .logarithmic(true)
+                    .suffix(" N")
+                    .max_decimals(1),
+            )
+            .on_hover_text("Force of the longest arrow in the legend")
+            .accessible_name("Force of the reference arrow");
+        }
+        ui.add_space(4.0);
+        ui.label("Show");
+        ui.checkbox(&mut options.flash, "Flash joints that are hit")
+            .on_hover_text("A joint lights up when its ball strikes, brighter for a harder blow");
+        ui.checkbox(&mut options.joint_names, "Joint names")
+            .on_hover_text("Names beside the ball joints");
+        ui.checkbox(&mut options.sockets, "Sockets")
+            .on_hover_text("The cut-open sockets; without them the balls stand free");
+        ui.checkbox(&mut options.floor, "Floor grid")
+            .on_hover_text("The floor with its grid and the shadows on it");
+        ui.checkbox(&mut options.triad, "Axes and gravity")
+            .on_hover_text("World axes X, Y, Z and the direction of gravity g");
+        ui.checkbox(&mut options.trail, "Trail of the probe tip")
+            .on_hover_text("Where the tip of the probe was");
+        if self.followed.is_some()
+            && ui
+                .button("Stop following")
+                .on_hover_text("Let the view go (double-click on the ground)")
+                .clicked()
+        {
+            self.follow(None);
+        }
+    }
+
+    fn extend_trail(&mut self, player: &Player) {
+        let output = &player.scene().output;
+        let (Some(probe), Some(body)) = (output.probe, player.frame().bodies.get(output.body))
+        else {
+            return;
+        };
+        if self.trail.len() == TRAIL {
+            // Half at once: moving the whole trail for every point would cost more than it shows.
+            self.trail.drain(..TRAIL / 2);
+        }
+        self.trail
+            .push(to_f32(&(body.position + body.rotation * probe)));
+    }
+}
+
+fn pixels(length: f32) -> u32 {
+    (length.round() as u32).max(1)
+}
+
+fn name_of(player: &Player, picked: Picked) -> Option<&str> {
+    let scene = player.scene();
+    match picked {
+        Picked::Body(index) => scene.bodies.get(index).map(|body| body.name.as_str()),
+        Picked::Joint(index) => scene
+            .ball_joints
+            .get(index)
+            .map(|joint| joint.name.as_str()),
+        Picked::Fixed(_) => None,
+    }
+}
+
+/// What is known about the thing under the cursor.
+fn describe(ui: &mut Ui, player: &Player, picked: Picked) {
+    // A tooltip is as wide as its longest line, not as the first.
+    ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Extend);
+    let row = |ui: &mut Ui, name: &str, si: f64, unit: &str| {
+        ui.label(format!("{name}  {}", format_quantity_digits(si, unit, 4)));
+    };
+    let frame = player.frame();
+    let Some(name) = name_of(player, picked) else {
+        ui.label("Part of the frame: it does not move");
+        return;
+    };
+    ui.strong(name);
+    match picked {
+        Picked::Body(index) => {
+            if let (Some(body), Some(motion)) =
+                (player.scene().bodies.get(index), frame.bodies.get(index))
+            {
+                row(ui, "Mass", body.mass, "kg");
+                row(ui, "Speed", motion.velocity.norm(), "m/s");
+                row(ui, "Angular speed", motion.angular_velocity.norm(), "rad/s");
+                row(ui, "Acceleration", motion.acceleration.norm(), "m/s^2");
+            }
+        }
+        Picked::Joint(index) => {
+            if let Some(joint) = frame.joints.get(index) {
+                ui.label(match joint.state {
+                    ContactState::Free => "The ball touches nothing",
+                    ContactState::Stick => "In contact, sticking",
+                    ContactState::Slip => "In contact, sliding",
+                    ContactState::Ideal => "Ideal joint: no clearance",
+                });
+                row(ui, "Normal force", joint.normal_force.norm(), "N");
+                row(ui, "Friction force", joint.friction_force.norm(), "N");
+                if joint.state != ContactState::Ideal {
+                    row(ui, "Eccentricity", joint.eccentricity.norm(), "mm");
+                    row(ui, "Clearance", joint.clearance, "mm");
+                    row(ui, "Penetration", joint.penetration.max(0.0), "um");
+                }
+            }
+        }
+        Picked::Fixed(_) => {}
+    }
+    ui.label(RichText::new("Double-click to follow").small().weak());
+}
+
+/// Middle of the lower edge, for what hangs on it.
+pub(super) fn lower_right(rect: Rect, margin: f32) -> Pos2 {
+    pos2(rect.max.x - margin, rect.max.y - margin)
+}

@@ -1,0 +1,323 @@
+//! `check`: what a scene contains, what will be computed and what will not, and what to be careful about.
+
+use std::fmt::Write;
+
+use super::args::SceneArguments;
+use super::output::significant;
+use super::{Failure, load, print, provenance};
+use crate::contact::{FrictionLaw, NormalLaw};
+use crate::mechanism::{Mechanism, Summary};
+use crate::scene::{BallJoint, JointKind, Scene};
+use crate::simulate::{Frame, Simulation};
+
+/// Smallest clearance for which a contact patch is small against the ball, m (Hertz's assumption).
+const LEAST_HERTZ_CLEARANCE: f64 = 0.01e-3;
+
+/// Restitution below which the Lankarani-Nikravesh law rebounds clearly higher than asked.
+const LEAST_LANKARANI_RESTITUTION: f64 = 0.8;
+
+/// Does what `check` asks.
+///
+/// # Errors
+/// Anything wrong with the scene, a start that does not close included.
+pub fn check(arguments: &SceneArguments) -> Result<(), Failure> {
+    let scene = load(arguments)?;
+    // Starting it finds what reading it cannot: joints that do not close, rods that do not reach.
+    let mut simulation = Simulation::new(&scene)?;
+    let mut start = Frame::default();
+    simulation.sample(0.0, &mut start);
+    let contents = Mechanism::new(&scene)
+        .map_err(|error| Failure::usage(error.to_string()))?
+        .summary();
+    print(&report(&scene, &contents, &start)?)
+}
+
+fn is_ideal(joint: &BallJoint) -> bool {
+    joint.contact.clearance == 0.0
+}
+
+fn report(scene: &Scene, contents: &Summary, start: &Frame) -> Result<String, Failure> {
+    let mut out = String::new();
+    // Writing to a String cannot fail.
+    let _ = writeln!(out, "{}: {}", scene.name, scene.title);
+    for (key, value) in &scene.changes {
+        let _ = writeln!(out, "  changed: {key} = {value}");
+    }
+    let mut line = |label: &str, value: &str| {
+        let _ = writeln!(out, "{label:<22}{value}");
+    };
+    line(
+        "Bodies",
+        &format!(
+            "{} moving: {}",
+            scene.bodies.len(),
+            names(scene.bodies.iter().map(|body| &body.name))
+        ),
+    );
+    line("Joints", &tree_joints(scene));
+    line(
+        "Ball joints",
+        &format!(
+            "{} with clearance, {} ideal",
+            contents.contacts, contents.ideal_joints
+        ),
+    );
+    for (joint, report) in scene.ball_joints.iter().zip(&start.joints) {
+        line(
+            &format!("  {}", joint.name),
+            &ball_joint(scene, joint, report.normal_force.norm())?,
+        );
+    }
+    line("Degrees of freedom", &freedoms(contents));
+    line("Constraint rows", &contents.constraint_rows.to_string());
+    line(
+        "Equations",
+        &format!(
+            "{} formulation: {} velocity coordinates, {} constraint rows",
+            provenance::choice(scene, "formulation")?,
+            contents.velocity_coordinates,
+            contents.constraint_rows
+        ),
+    );
+    line("Method", &method(scene)?);
+    let (computed, left_out) = work(scene, contents);
+    computed.iter().for_each(|item| line("Computed", item));
+    left_out.iter().for_each(|item| line("Not computed", item));
+    warnings(scene)
+        .iter()
+        .chain(&near_singular(scene))
+        .for_each(|warning| line("Warning", warning));
+    Ok(out)
+}
+
+fn names<'a>(names: impl Iterator<Item = &'a String>) -> String {
+    names.map(String::as_str).collect::<Vec<_>>().join(", ")
+}
+
+fn tree_joints(scene: &Scene) -> String {
+    let kinds = [
+        (JointKind::Prismatic, "prismatic"),
+        (JointKind::Revolute, "revolute"),
+        (JointKind::Free, "free"),
+        (JointKind::Fixed, "fixed"),
+    ];
+    let mut parts = Vec::new();
+    for (kind, word) in kinds {
+        for driven in [true, false] {
+            let alike = || {
+                scene
+                    .joints
+                    .iter()
+                    .filter(|j| j.kind == kind && j.drive.is_some() == driven)
+            };
+            let count = alike().count();
+            if count > 0 {
+                let word = if driven {
+                    format!("driven {word}")
+                } else {
+                    word.to_owned()
+                };
+                parts.push(format!(
+                    "{count} {word} ({})",
+                    names(alike().map(|joint| &joint.name))
+                ));
+            }
+        }
+    }
+    parts.join(", ")
+}
+
+fn ball_joint(scene: &Scene, joint: &BallJoint, force: f64) -> Result<String, Failure> {
+    let contact = &joint.contact;
+    if is_ideal(joint) {
+        return Ok(format!(
+            "ideal; reaction at the start {} N",
+            significant(force, 6)
+        ));
+    }
+    let key = |key: &str| format!("joint.{}.{key}", joint.name);
+    let friction = match provenance::choice(scene, &key("friction_law"))? {
+        "none" => "no friction".to_owned(),
+        law => format!(
+            "friction {} ({law}, {})",
+            contact.friction,
+            provenance::choice(scene, &key("friction_velocity"))?
+        ),
+    };
+    Ok(format!(
+        "clearance {} mm, ball radius {} mm, {}, restitution {}, {friction}",
+        significant(contact.clearance * 1e3, 6),
+        significant(contact.ball_radius * 1e3, 6),
+        provenance::choice(scene, &key("normal_law"))?,
+        contact.restitution,
+    ))
+}
+
+fn freedoms(contents: &Summary) -> String {
+    let (free, rows) = (contents.degrees_of_freedom, contents.constraint_rows);
+    if rows == 0 {
+        return free.to_string();
+    }
+    format!(
+        "{free} ({} velocity coordinates less {rows} constraint rows)",
+        contents.velocity_coordinates
+    )
+}
+
+fn method(scene: &Scene) -> Result<String, Failure> {
+    let word = provenance::choice(scene, "solver.method")?;
+    let step = significant(scene.solver.step * 1e6, 6);
+    Ok(if scene.solver.method.is_adaptive() {
+        format!(
+            "{word}, relative tolerance {}, first step {step} us",
+            significant(scene.solver.tolerance, 3)
+        )
+    } else {
+        format!("{word}, step {step} us")
+    })
+}
+
+/// What the run will compute, and what it has no need to.
+fn work(scene: &Scene, contents: &Summary) -> (Vec<String>, Vec<String>) {
+    let with = |ideal| {
+        names(
+            scene
+                .ball_joints
+                .iter()
+                .filter(move |j| is_ideal(j) == ideal)
+                .map(|j| &j.name),
+        )
+    };
+    let (mut computed, mut left_out) = (Vec::new(), Vec::new());
+    let mut sort = |needed: bool, yes: String, no: &str| {
+        if needed {
+            computed.push(yes)
+        } else {
+            left_out.push(no.to_owned())
+        }
+    };
+    sort(
+        contents.solves_differential_equation,
+        format!(
+            "differential equations of {} degrees of freedom",
+            contents.degrees_of_freedom
+        ),
+        "differential equations: nothing is free, the drives prescribe the motion",
+    );
+    sort(
+        contents.contacts > 0,
+        format!("contact forces at {}", with(false)),
+        "contact forces: no ball joint has clearance",
+    );
+    let rubs = |joint: &&BallJoint| {
+        !is_ideal(joint)
+            && joint.contact.friction > 0.0
+            && joint.contact.friction_law != FrictionLaw::None
+    };
+    let rubbing = || {
+        scene
+            .ball_joints
+            .iter()
+            .filter(rubs)
+            .map(|joint| &joint.name)
+    };
+    sort(
+        rubbing().next().is_some(),
+        format!("friction at {}", names(rubbing())),
+        "friction: no contact has any",
+    );
+    sort(
+        contents.ideal_joints > 0,
+        format!("reactions of the ideal joints at {}", with(true)),
+        "reactions of ideal joints: every ball joint has clearance",
+    );
+    sort(
+        contents.drives > 0,
+        format!(
+            "actuator forces at {}",
+            names(
+                scene
+                    .joints
+                    .iter()
+                    .filter(|j| j.drive.is_some())
+                    .map(|j| &j.name)
+            )
+        ),
+        "actuator forces: nothing is driven",
+    );
+    (computed, left_out)
+}
+
+/// What a user of this scene should know about the reach of its models.
+pub fn warnings(scene: &Scene) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let contacts = || scene.ball_joints.iter().filter(|joint| !is_ideal(joint));
+    let steep = contacts().filter(|joint| {
+        joint.contact.normal_law == NormalLaw::LankaraniNikravesh
+            && joint.contact.restitution < LEAST_LANKARANI_RESTITUTION
+    });
+    let steep = names(steep.map(|joint| &joint.name));
+    if !steep.is_empty() {
+        warnings.push(format!(
+            "{steep}: the lankarani-nikravesh law is right only for a restitution near 1 and rebounds higher than \
+             asked below {LEAST_LANKARANI_RESTITUTION}; flores or gonthier suit low values"
+        ));
+    }
+    let tight = names(
+        contacts()
+            .filter(|joint| joint.contact.clearance <= LEAST_HERTZ_CLEARANCE)
+            .map(|joint| &joint.name),
+    );
+    if !tight.is_empty() {
+        warnings.push(format!(
+            "{tight}: Hertz contact assumes a contact patch that is small against the ball, which does not hold for \
+             a clearance of {} mm and below",
+            significant(LEAST_HERTZ_CLEARANCE * 1e3, 3)
+        ));
+    }
+    warnings
+}
+
+/// Instants of the drive's period at which the ideal mechanism is looked at.
+const INSTANTS: u32 = 400;
+
+/// Reactions above this many times the weight of all bodies mean that the mechanism is about to lose its stiffness.
+const MOST_WEIGHTS: f64 = 5.0;
+
+/// Rods that reach do not make a good mechanism yet: near a singular pose the reactions of the ideal joints explode.
+fn near_singular(scene: &Scene) -> Option<String> {
+    let mut rigid = scene.clone();
+    let drive = rigid.spcmm.as_mut()?;
+    // Slow, so that weight alone makes the reactions: the poses are the same.
+    drive.frequency = drive.frequency.min(0.5);
+    let period = 1.0 / drive.frequency;
+    for joint in &mut rigid.ball_joints {
+        joint.contact.clearance = 0.0;
+    }
+    let limit = MOST_WEIGHTS * 9.81 * rigid.bodies.iter().map(|body| body.mass).sum::<f64>();
+    let mut simulation = Simulation::new(&rigid).ok()?;
+    let mut frame = Frame::default();
+    let (mut largest, mut when) = (0.0, 0.0);
+    for k in 0..=INSTANTS {
+        let time = period * f64::from(k) / f64::from(INSTANTS);
+        if simulation.advance_to(time).is_err() {
+            let time = simulation.time();
+            return Some(format!(
+                "the ideal mechanism has a singular pose near t = {time:.3} s"
+            ));
+        }
+        simulation.sample(time, &mut frame);
+        for joint in &frame.joints {
+            if joint.normal_force.norm() > largest {
+                (largest, when) = (joint.normal_force.norm(), time);
+            }
+        }
+    }
+    (largest > limit).then(|| {
+        format!(
+            "the mechanism comes near a singular pose: with ideal joints and a slow drive a reaction reaches {} N at \
+             t = {when:.3} s, more than {MOST_WEIGHTS} times the weight of all bodies",
+            significant(largest, 4)
+        )
+    })
+}

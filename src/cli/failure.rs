@@ -1,0 +1,62 @@
+//! Why a command ended early, and the exit code that says so to a script.
+
+use crate::scene::SceneError;
+use crate::simulate::StartError;
+
+/// A message for a person and a code for a script.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{message}")]
+pub struct Failure {
+    /// Exit code of the process.
+    pub code: u8,
+    /// One or two lines for standard error.
+    pub message: String,
+}
+
+impl Failure {
+    /// Something could not be read or written.
+    pub const INPUT_OUTPUT: u8 = 1;
+    /// Bad input or usage.
+    pub const USAGE: u8 = 2;
+    /// No graphics adapter.
+    pub const NO_ADAPTER: u8 = 3;
+    /// The divergence guard stopped the run.
+    pub const DIVERGED: u8 = 4;
+    /// Ctrl-C.
+    pub const INTERRUPTED: u8 = 130;
+
+    /// A failure with the given code.
+    pub fn new(code: u8, message: impl Into<String>) -> Self {
+        Self {
+            code,
+            message: message.into(),
+        }
+    }
+
+    /// Something could not be read or written.
+    pub fn io(message: impl Into<String>) -> Self {
+        Self::new(Self::INPUT_OUTPUT, message)
+    }
+
+    /// Bad input or usage.
+    pub fn usage(message: impl Into<String>) -> Self {
+        Self::new(Self::USAGE, message)
+    }
+}
+
+impl From<SceneError> for Failure {
+    fn from(error: SceneError) -> Self {
+        let code = if error.unreadable {
+            Self::INPUT_OUTPUT
+        } else {
+            Self::USAGE
+        };
+        Self::new(code, error.to_string())
+    }
+}
+
+impl From<StartError> for Failure {
+    fn from(error: StartError) -> Self {
+        Self::usage(error.to_string())
+    }
+}

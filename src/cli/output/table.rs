@@ -1,0 +1,189 @@
+//! The rows of a run: which columns a scene has, and one row for each sampled instant. SI units, world axes.
+
+use crate::scene::{JointKind, Scene};
+use crate::simulate::{ContactState, Frame};
+
+/// Rows of one run, row after row.
+#[derive(Clone, Debug)]
+pub struct Table {
+    names: Vec<String>,
+    values: Vec<f64>,
+    probe: bool,
+}
+
+/// A value that is not a number and so is not written.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{column} is {value} at t = {time:.6e} s")]
+pub struct NotFinite {
+    /// Column.
+    pub column: String,
+    /// Value.
+    pub value: f64,
+    /// Time of the row, s.
+    pub time: f64,
+}
+
+const POSE: [&str; 10] = [
+    "t_s",
+    "x_m",
+    "y_m",
+    "z_m",
+    "alpha_rad",
+    "beta_rad",
+    "gamma_rad",
+    "vx_m_s",
+    "vy_m_s",
+    "vz_m_s",
+];
+const POSE_RATES: [&str; 6] = [
+    "ax_m_s2",
+    "ay_m_s2",
+    "az_m_s2",
+    "alpha_rate_rad_s",
+    "beta_rate_rad_s",
+    "gamma_rate_rad_s",
+];
+const JOINT: [&str; 12] = [
+    "ex_m",
+    "ey_m",
+    "ez_m",
+    "penetration_m",
+    "penetration_rate_m_s",
+    "force_x_N",
+    "force_y_N",
+    "force_z_N",
+    "friction_x_N",
+    "friction_y_N",
+    "friction_z_N",
+    "state",
+];
+const ENERGY: [&str; 3] = ["kinetic_J", "potential_J", "elastic_J"];
+const POSE_ANGLE_ACCELERATIONS: [&str; 3] = [
+    "alpha_accel_rad_s2",
+    "beta_accel_rad_s2",
+    "gamma_accel_rad_s2",
+];
+const PROBE: [&str; 3] = ["probe_error_x_m", "probe_error_y_m", "probe_error_z_m"];
+
+impl Table {
+    /// An empty table with the columns of `scene`; `first` tells whether it has a probe error.
+    pub fn new(scene: &Scene, first: &Frame) -> Self {
+        let joints = || scene.ball_joints.iter().map(|joint| joint.name.as_str());
+        let fixed = |list: &[&str]| list.iter().map(ToString::to_string).collect::<Vec<_>>();
+        let mut names = fixed(&POSE);
+        names.extend(joints().map(|joint| format!("{joint}_eccentricity_m")));
+        names.extend(joints().map(|joint| format!("{joint}_normal_N")));
+        names.extend(fixed(&POSE_RATES));
+        for joint in joints() {
+            names.extend(JOINT.iter().map(|quantity| format!("{joint}_{quantity}")));
+        }
+        for joint in scene.joints.iter().filter(|joint| joint.drive.is_some()) {
+            let unit = if joint.kind == JointKind::Revolute {
+                "Nm"
+            } else {
+                "N"
+            };
+            names.push(format!("{}_actuator_{unit}", joint.name));
+        }
+        names.extend(fixed(&ENERGY));
+        names.extend(fixed(&POSE_ANGLE_ACCELERATIONS));
+        let probe = first.probe_error.is_some();
+        if probe {
+            names.extend(fixed(&PROBE));
+        }
+        Self {
+            names,
+            values: Vec::new(),
+            probe,
+        }
+    }
+
+    /// Column names, in order.
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.values.len() / self.names.len()
+    }
+
+    /// Whether there is no row yet.
+    pub fn is_empty(&self) -> bool {
+        self.values.is_empty()
+    }
+
+    /// Rows in order, each as long as [`Self::names`].
+    pub fn rows(&self) -> impl Iterator<Item = &[f64]> {
+        self.values.chunks_exact(self.names.len())
+    }
+
+    /// Values of one column, in order of time.
+    pub fn column(&self, column: usize) -> impl Iterator<Item = f64> + '_ {
+        self.rows().map(move |row| row[column])
+    }
+
+    /// Appends the row of `frame`.
+    ///
+    /// # Errors
+    /// A value that is not finite; the table is then unchanged.
+    pub fn push(&mut self, frame: &Frame) -> Result<(), NotFinite> {
+        let start = self.values.len();
+        self.append(frame);
+        debug_assert_eq!(
+            self.values.len() - start,
+            self.names.len(),
+            "one value for each column"
+        );
+        if let Some(column) = self.values[start..]
+            .iter()
+            .position(|value| !value.is_finite())
+        {
+            let value = self.values[start + column];
+            self.values.truncate(start);
+            return Err(NotFinite {
+                column: self.names[column].clone(),
+                value,
+                time: frame.time,
+            });
+        }
+        Ok(())
+    }
+
+    /// In the order of the names made in [`Self::new`].
+    fn append(&mut self, frame: &Frame) {
+        let values = &mut self.values;
+        let pose = &frame.pose;
+        values.push(frame.time);
+        values.extend(pose.position.iter());
+        values.extend(pose.angles.iter());
+        values.extend(pose.velocity.iter());
+        values.extend(frame.joints.iter().map(|joint| joint.eccentricity.norm()));
+        values.extend(frame.joints.iter().map(|joint| joint.normal_force.norm()));
+        values.extend(pose.acceleration.iter());
+        values.extend(pose.angle_rates.iter());
+        for joint in &frame.joints {
+            values.extend(joint.eccentricity.iter());
+            values.extend([joint.penetration, joint.penetration_rate]);
+            values.extend((joint.normal_force + joint.friction_force).iter());
+            values.extend(joint.friction_force.iter());
+            values.push(state_code(joint.state));
+        }
+        values.extend(&frame.actuators);
+        values.extend([frame.kinetic, frame.potential, frame.elastic]);
+        values.extend(pose.angle_accelerations.iter());
+        if self.probe {
+            values.extend(frame.probe_error.unwrap_or_default().iter());
+        }
+    }
+}
+
+/// Number that stands for a contact state in the `…_state` columns.
+fn state_code(state: ContactState) -> f64 {
+    match state {
+        ContactState::Free => 0.0,
+        ContactState::Stick => 1.0,
+        ContactState::Slip => 2.0,
+        ContactState::Ideal => 3.0,
+    }
+}

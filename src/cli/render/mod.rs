@@ -1,0 +1,172 @@
+//! `render`: frames without a window, drawn by the same code as those in it.
+
+mod options;
+mod studio;
+
+use std::fs;
+
+use serde_json::{Map, Value as Json, json};
+
+use self::studio::{ApplicationStudio, SceneStudio, Studio};
+use super::args::RenderArguments;
+use super::output::{Folder, MANIFEST};
+use super::summary::{Status, hash_text};
+use super::{Failure, interrupt, load, print, progress, provenance, quantity, warn};
+
+/// Frame names have five digits.
+const MOST_FRAMES: f64 = 100_000.0;
+
+/// When to draw, and how much viewing time passes between two pictures.
+#[derive(Clone, Debug, PartialEq)]
+struct Times {
+    /// Instants, s, in the order of the frame numbers.
+    instants: Vec<f64>,
+    /// Viewing time from one frame of a film to the next, s; `None` for single pictures.
+    frame_time: Option<f64>,
+}
+
+impl Times {
+    fn new(arguments: &RenderArguments) -> Result<Self, Failure> {
+        let (Some(duration), Some(fps)) = (&arguments.duration, arguments.fps) else {
+            let instants = arguments
+                .at
+                .iter()
+                .map(|at| quantity::duration("--at", at))
+                .collect::<Result<_, _>>()?;
+            return Ok(Self {
+                instants,
+                frame_time: None,
+            });
+        };
+        let duration = quantity::duration("--duration", duration)?;
+        options::positive("--fps", fps, 10_000.0)?;
+        options::positive("--slow", arguments.slow, 1e9)?;
+        let rate = fps * arguments.slow;
+        // Both ends count; a whole number of frames is one however the product rounds.
+        let last = (duration * rate * (1.0 + 1e-9)).floor();
+        if last >= MOST_FRAMES {
+            return Err(Failure::usage(format!(
+                "{} frames are more than the limit of {MOST_FRAMES}; choose a lower --fps, a lower --slow or a shorter \
+                 --duration",
+                last + 1.0
+            )));
+        }
+        Ok(Self {
+            instants: (0..=last as u64)
+                .map(|k| (k as f64 / rate).min(duration))
+                .collect(),
+            frame_time: Some(1.0 / fps),
+        })
+    }
+
+    /// Frame numbers in order of time: the simulation only goes forward.
+    fn in_order(&self) -> Vec<usize> {
+        let mut order: Vec<usize> = (0..self.instants.len()).collect();
+        order.sort_by(|&a, &b| self.instants[a].total_cmp(&self.instants[b]));
+        order
+    }
+}
+
+/// Does what `render` asks.
+///
+/// # Errors
+/// Bad input, no adapter, the divergence guard, Ctrl-C, the file system.
+pub fn render(arguments: &RenderArguments) -> Result<(), Failure> {
+    let times = Times::new(arguments)?;
+    let view = options::view_options(arguments)?;
+    let scene = load(&arguments.scene)?;
+    let mut studio: Box<dyn Studio> = if arguments.ui {
+        Box::new(ApplicationStudio::new(&scene, view, arguments)?)
+    } else {
+        Box::new(SceneStudio::new(&scene, view, arguments)?)
+    };
+    let folder = Folder::claim(&arguments.out, arguments.force)?;
+    if !arguments.quiet {
+        super::check::warnings(&scene)
+            .iter()
+            .for_each(|warning| warn(warning));
+    }
+
+    let meta = provenance::meta(&scene)?;
+    interrupt::listen();
+    let bar = progress::bar(!arguments.quiet, times.instants.len() as u64);
+    let labels = labels(&meta);
+    let labels: Vec<(&str, &str)> = labels
+        .iter()
+        .map(|(key, text)| (*key, text.as_str()))
+        .collect();
+    let mut frames = vec![Json::Null; times.instants.len()];
+    let mut status = Status::Done;
+    let mut failure = None;
+    for (done, number) in times.in_order().into_iter().enumerate() {
+        let instant = times.instants[number];
+        if let Err(stop) = studio.go_to(instant) {
+            status = if stop.code == Failure::INTERRUPTED {
+                Status::Interrupted
+            } else {
+                Status::Diverged
+            };
+            failure = Some(stop);
+            break;
+        }
+        let png = studio
+            .draw(instant, times.frame_time)?
+            .png(&labels)
+            .map_err(|error| Failure::io(error.to_string()))?;
+        let file = format!("frame_{number:05}.png");
+        let path = folder.scratch().join(&file);
+        fs::write(&path, png).map_err(|error| {
+            Failure::io(format!(
+                "cannot write {file} for {}: {error}",
+                arguments.out.display()
+            ))
+        })?;
+        frames[number] = json!({
+            "file": file,
+            "time_s": instant,
+            "state_time_s": studio.simulation().time(),
+            "state_hash": hash_text(studio.simulation().state_hash()),
+        });
+        bar.set_position(done as u64 + 1);
+    }
+    bar.finish_and_clear();
+
+    frames.retain(|frame| !frame.is_null());
+    let count = frames.len();
+    let mut manifest = meta;
+    manifest.insert("parameters".into(), provenance::parameters(&scene)?);
+    manifest.insert("status".into(), json!(status.word()));
+    manifest.insert("size".into(), json!([arguments.size.0, arguments.size.1]));
+    manifest.insert("adapter".into(), json!(studio.adapter()));
+    manifest.insert("frames".into(), Json::Array(frames));
+    fs::write(
+        folder.scratch().join(MANIFEST),
+        format!("{:#}\n", Json::Object(manifest)),
+    )
+    .map_err(|error| {
+        Failure::io(format!(
+            "cannot write {MANIFEST} for {}: {error}",
+            arguments.out.display()
+        ))
+    })?;
+    folder.finish()?;
+    print(&format!(
+        "{count} frames and {MANIFEST} in {}\n",
+        arguments.out.display()
+    ))?;
+    failure.map_or(Ok(()), Err)
+}
+
+/// What made a picture, as texts inside it: a frame that has lost its manifest still tells.
+fn labels(meta: &Map<String, Json>) -> Vec<(&'static str, String)> {
+    // PNG texts are Latin-1.
+    let latin = |text: String| {
+        text.chars()
+            .map(|c| if u32::from(c) < 256 { c } else { '?' })
+            .collect()
+    };
+    vec![
+        ("Software", format!("jointplay {}", crate::VERSION)),
+        ("Description", latin(Json::Object(meta.clone()).to_string())),
+    ]
+}

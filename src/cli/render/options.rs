@@ -1,0 +1,115 @@
+//! Options of a picture: point of view, arrows, colours.
+
+use crate::cli::args::{
+    ArrowChoice, ArrowScale, CameraView, Hideable, RenderArguments, ThemeChoice,
+};
+use crate::cli::{Failure, quantity};
+use crate::scene::Scene;
+use crate::simulate::Frame;
+use crate::view::{ArrowOptions, Camera, Preset, Scaling, SceneView, Theme, ViewOptions};
+
+/// Point of view that `arguments` ask for, at the frame of t = 0.
+///
+/// # Errors
+/// Usage.
+pub fn camera(
+    arguments: &RenderArguments,
+    scene: &Scene,
+    view: &SceneView,
+    frame: &Frame,
+    options: &ViewOptions,
+) -> Result<Camera, Failure> {
+    positive("--zoom", f64::from(arguments.zoom), 1e3)?;
+    let mut camera = view.camera();
+    camera.preset(match arguments.camera {
+        CameraView::Isometric => Preset::Isometric,
+        CameraView::Front => Preset::Front,
+        CameraView::Side => Preset::Side,
+        CameraView::Top => Preset::Top,
+    });
+    if let Some(yaw) = &arguments.yaw {
+        camera.yaw = quantity::angle("--yaw", yaw)? as f32;
+    }
+    if let Some(pitch) = &arguments.pitch {
+        camera.pitch = (quantity::angle("--pitch", pitch)? as f32).clamp(-1.55, 1.55);
+    }
+    match &arguments.close_up {
+        Some(name) => {
+            let joint = scene
+                .ball_joints
+                .iter()
+                .position(|joint| joint.name == *name)
+                .ok_or_else(|| {
+                    let names: Vec<&str> = scene
+                        .ball_joints
+                        .iter()
+                        .map(|joint| joint.name.as_str())
+                        .collect();
+                    Failure::usage(format!(
+                        "--close-up {name}: no such ball joint; there are {}",
+                        names.join(", ")
+                    ))
+                })?;
+            view.close_up(&mut camera, joint, scene, frame, options);
+        }
+        None => camera.fit(
+            view.bounds(),
+            arguments.size.0 as f32 / arguments.size.1 as f32,
+        ),
+    }
+    camera.distance /= arguments.zoom;
+    Ok(camera)
+}
+
+/// Choices about the picture that `arguments` ask for.
+///
+/// # Errors
+/// Usage.
+pub fn view_options(arguments: &RenderArguments) -> Result<ViewOptions, Failure> {
+    let magnification = arguments.magnification.unwrap_or(1.0);
+    if !(1.0..=100.0).contains(&magnification) {
+        return Err(Failure::usage(format!(
+            "--magnification {magnification}: allowed 1 to 100"
+        )));
+    }
+    let shown = |thing| !arguments.hide.contains(&thing);
+    Ok(ViewOptions {
+        theme: match arguments.theme {
+            ThemeChoice::Light => Theme::Light,
+            ThemeChoice::Dark => Theme::Dark,
+        },
+        magnification,
+        arrows: ArrowOptions {
+            normal: matches!(arguments.arrows, ArrowChoice::Both | ArrowChoice::Normal),
+            friction: matches!(arguments.arrows, ArrowChoice::Both | ArrowChoice::Friction),
+            scaling: match arguments.arrow_scale {
+                ArrowScale::Linear => Scaling::Linear,
+                ArrowScale::Logarithmic => Scaling::Logarithmic,
+            },
+            reference: match &arguments.arrow_reference {
+                Some(force) => Some(quantity::force("--arrow-reference", force)? as f32),
+                None => None,
+            },
+            ..ArrowOptions::default()
+        },
+        flash: shown(Hideable::Flash),
+        floor: shown(Hideable::Floor),
+        triad: shown(Hideable::Triad),
+        joint_names: shown(Hideable::Names),
+        sockets: shown(Hideable::Sockets),
+        trail: shown(Hideable::Trail),
+    })
+}
+
+/// Refuses what is not in 0 < `value` <= `most`.
+///
+/// # Errors
+/// Usage.
+pub fn positive(option: &str, value: f64, most: f64) -> Result<(), Failure> {
+    if value > 0.0 && value <= most {
+        return Ok(());
+    }
+    Err(Failure::usage(format!(
+        "{option} {value}: must be greater than 0 and at most {most}"
+    )))
+}

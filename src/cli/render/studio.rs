@@ -1,0 +1,269 @@
+//! What takes the pictures: the scene alone, or the whole application.
+
+use std::sync::Arc;
+
+use super::options;
+use crate::app::{App, AppOptions, Headless, Overlay, force_notes};
+use crate::cli::args::{RenderArguments, ThemeChoice};
+use crate::cli::{Failure, interrupt};
+use crate::render::{Image, NoAdapter, Offscreen, RenderError};
+use crate::scene::{Scene, Vec3};
+use crate::simulate::{Frame, Peak, Simulation};
+use crate::view::{ArrowMemory, Camera, DrawList, SceneView, Shot, ViewOptions, to_f32};
+
+/// A simulation and what draws it.
+pub trait Studio {
+    /// Steps until `instant` lies in the latest step; a frame never shortens a step.
+    ///
+    /// # Errors
+    /// The divergence guard, Ctrl-C.
+    fn go_to(&mut self, instant: f64) -> Result<(), Failure>;
+
+    /// Draws `instant`, which lies in the latest step; in a film, `frame_time` seconds of viewing time after the frame
+    /// before and with what happened since.
+    ///
+    /// # Errors
+    /// A failing graphics adapter.
+    fn draw(&mut self, instant: f64, frame_time: Option<f64>) -> Result<Image, Failure>;
+
+    /// The simulation.
+    fn simulation(&self) -> &Simulation;
+
+    /// Name of the graphics adapter.
+    fn adapter(&self) -> String;
+}
+
+/// What the picture is drawn on.
+enum Screen {
+    /// The scene and nothing else.
+    Plain(Box<Offscreen>),
+    /// The scene with text over it.
+    Written(Box<Headless>),
+}
+
+/// The scene alone, with text over it where asked.
+pub struct SceneStudio {
+    simulation: Simulation,
+    frame: Frame,
+    peaks: Vec<Peak>,
+    /// Body and point of the probe tip.
+    probe: Option<(usize, Vec3)>,
+    trail: Vec<glam::Vec3>,
+    screen: Screen,
+    overlay: bool,
+    view: SceneView,
+    camera: Camera,
+    options: ViewOptions,
+    arrows: ArrowMemory,
+    list: Arc<DrawList>,
+    size: [u32; 2],
+}
+
+impl SceneStudio {
+    /// Sets everything up at t = 0.
+    ///
+    /// # Errors
+    /// A scene that cannot start, bad options, no adapter.
+    pub fn new(
+        scene: &Scene,
+        options: ViewOptions,
+        arguments: &RenderArguments,
+    ) -> Result<Self, Failure> {
+        let mut simulation = Simulation::new(scene)?;
+        let mut frame = Frame::default();
+        simulation.sample(0.0, &mut frame);
+        let view = SceneView::new(scene, &frame);
+        let camera = options::camera(arguments, scene, &view, &frame, &options)?;
+        let size = [arguments.size.0, arguments.size.1];
+        // Magnified play is never shown without saying so.
+        let screen = if arguments.overlay || options.magnification != 1.0 {
+            Screen::Written(Box::new(
+                Headless::new().map_err(|error| no_adapter(&error))?,
+            ))
+        } else {
+            let offscreen = Offscreen::new().map_err(|error| no_adapter(&error))?;
+            offscreen.check_size(size).map_err(|error| failed(&error))?;
+            Screen::Plain(Box::new(offscreen))
+        };
+        Ok(Self {
+            simulation,
+            frame,
+            peaks: Vec::new(),
+            probe: scene.output.probe.map(|tip| (scene.output.body, tip)),
+            trail: Vec::new(),
+            screen,
+            overlay: arguments.overlay,
+            view,
+            camera,
+            options,
+            arrows: ArrowMemory::new(),
+            list: Arc::default(),
+            size,
+        })
+    }
+}
+
+impl Studio for SceneStudio {
+    fn go_to(&mut self, instant: f64) -> Result<(), Failure> {
+        while self.simulation.time() < instant {
+            if interrupt::asked() {
+                return Err(interrupted(self.simulation.time()));
+            }
+            self.simulation
+                .step()
+                .map_err(|stopped| Failure::new(Failure::DIVERGED, stopped.to_string()))?;
+        }
+        Ok(())
+    }
+
+    fn draw(&mut self, instant: f64, frame_time: Option<f64>) -> Result<Image, Failure> {
+        self.simulation.sample(instant, &mut self.frame);
+        self.simulation.take_peaks(&mut self.peaks);
+        match frame_time {
+            Some(frame_time) => {
+                let options = &self.options.arrows;
+                self.arrows
+                    .update(&self.frame, &self.peaks, frame_time as f32, options);
+                if let Some((body, tip)) = self.probe {
+                    let motion = &self.frame.bodies[body];
+                    self.trail
+                        .push(to_f32(&(motion.position + motion.rotation * tip)));
+                }
+            }
+            None => {
+                // A single picture shows the forces of its own instant.
+                self.arrows.clear();
+                self.arrows
+                    .update(&self.frame, &[], 0.0, &self.options.arrows);
+            }
+        }
+        let shot = Shot {
+            scene: self.simulation.scene(),
+            frame: &self.frame,
+            arrows: &self.arrows,
+            options: &self.options,
+            camera: &self.camera,
+            trail: &self.trail,
+            size: self.size,
+            pixels_per_point: 1.0,
+        };
+        self.view.build(&shot, Arc::make_mut(&mut self.list));
+        match &mut self.screen {
+            Screen::Plain(offscreen) => offscreen.render(&self.list),
+            Screen::Written(headless) => {
+                let mut overlay = Overlay {
+                    time: Some(instant),
+                    ..Overlay::default()
+                };
+                if self.overlay {
+                    overlay.notes = force_notes(self.simulation.scene(), &self.frame);
+                    overlay.legend = true;
+                    overlay.labels = true;
+                }
+                headless.picture(&self.list, &overlay, self.options.theme, 1.0)
+            }
+        }
+        .map_err(|error| failed(&error))
+    }
+
+    fn simulation(&self) -> &Simulation {
+        &self.simulation
+    }
+
+    fn adapter(&self) -> String {
+        match &self.screen {
+            Screen::Plain(offscreen) => offscreen.adapter(),
+            Screen::Written(headless) => headless.adapter(),
+        }
+    }
+}
+
+/// The whole application with its panels.
+pub struct ApplicationStudio {
+    headless: Headless,
+    app: App,
+    size: [u32; 2],
+}
+
+/// Longest time that the application runs between two looks for Ctrl-C, s.
+const SLICE: f64 = 0.01;
+
+impl ApplicationStudio {
+    /// Sets everything up at t = 0.
+    ///
+    /// # Errors
+    /// A scene that cannot start, no adapter.
+    pub fn new(
+        scene: &Scene,
+        options: ViewOptions,
+        arguments: &RenderArguments,
+    ) -> Result<Self, Failure> {
+        let headless = Headless::new().map_err(|error| no_adapter(&error))?;
+        let mut start = AppOptions::new(scene.clone());
+        start.playing = false;
+        start.view = ViewOptions {
+            magnification: arguments.magnification.unwrap_or(start.view.magnification),
+            ..options
+        };
+        start.theme = match arguments.theme {
+            ThemeChoice::Light => eframe::egui::ThemePreference::Light,
+            ThemeChoice::Dark => eframe::egui::ThemePreference::Dark,
+        };
+        let app = headless.app(start)?;
+        Ok(Self {
+            headless,
+            app,
+            size: [arguments.size.0, arguments.size.1],
+        })
+    }
+}
+
+impl Studio for ApplicationStudio {
+    fn go_to(&mut self, instant: f64) -> Result<(), Failure> {
+        while self.simulation().time() < instant {
+            if interrupt::asked() {
+                return Err(interrupted(self.simulation().time()));
+            }
+            let next = (self.simulation().time() + SLICE).min(instant);
+            let player = self.app.player_mut();
+            player.run_to(next);
+            if let Some(stopped) = player.stopped() {
+                return Err(Failure::new(Failure::DIVERGED, stopped.to_string()));
+            }
+        }
+        Ok(())
+    }
+
+    fn draw(&mut self, instant: f64, _frame_time: Option<f64>) -> Result<Image, Failure> {
+        self.app.player_mut().run_to(instant);
+        self.headless
+            .app_frame(&mut self.app, self.size, 1.0)
+            .map_err(|error| failed(&error))
+    }
+
+    fn simulation(&self) -> &Simulation {
+        self.app.player().simulation()
+    }
+
+    fn adapter(&self) -> String {
+        self.headless.adapter()
+    }
+}
+
+fn no_adapter(error: &NoAdapter) -> Failure {
+    Failure::new(Failure::NO_ADAPTER, error.to_string())
+}
+
+fn failed(error: &RenderError) -> Failure {
+    match error {
+        RenderError::Size { .. } => Failure::usage(error.to_string()),
+        RenderError::Device(_) => Failure::io(error.to_string()),
+    }
+}
+
+fn interrupted(time: f64) -> Failure {
+    Failure::new(
+        Failure::INTERRUPTED,
+        format!("interrupted at t = {time:.6e} s"),
+    )
+}

@@ -1,0 +1,249 @@
+//! `run`: simulate without a window and write rows at equal intervals.
+
+use std::time::{Duration, Instant};
+
+use indicatif::ProgressBar;
+use serde_json::{Value as Json, json};
+
+use super::args::{RunArguments, SummaryForm};
+use super::output::{RowsFile, Table, check_size};
+use super::summary::{self, Status};
+use super::{Failure, interrupt, load, print, progress, quantity, warn};
+use crate::simulate::{Frame, Simulation};
+
+/// Steps between two looks at the clock, the progress bar and Ctrl-C.
+const STEPS_BETWEEN_LOOKS: u32 = 256;
+
+/// Instants k x `every`, k = 0..=`last`, of a run of `duration`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Times {
+    every: f64,
+    last: u64,
+    duration: f64,
+}
+
+impl Times {
+    /// # Errors
+    /// An interval that is not positive.
+    fn new(duration: f64, every: f64) -> Result<Self, Failure> {
+        if every <= 0.0 {
+            return Err(Failure::usage(
+                "--every 0: the interval between rows must be greater than 0",
+            ));
+        }
+        // 20 ms by 0.1 ms is 200 intervals, however the two round.
+        let intervals = duration / every;
+        let whole = intervals.round();
+        let last = if (intervals - whole).abs() <= 1e-9 * whole {
+            whole
+        } else {
+            intervals.floor()
+        };
+        Ok(Self {
+            every,
+            last: last as u64,
+            duration,
+        })
+    }
+
+    /// Time of row `k`, s.
+    fn at(&self, k: u64) -> f64 {
+        (k as f64 * self.every).min(self.duration)
+    }
+
+    /// Whether the last row lies at the end of the run.
+    fn reach_the_end(&self) -> bool {
+        self.duration - self.at(self.last) <= 1e-9 * self.duration
+    }
+}
+
+/// How stepping ended, and the message for a person if it was not at the end.
+struct End {
+    status: Status,
+    failure: Option<Failure>,
+}
+
+/// Does what `run` asks.
+///
+/// # Errors
+/// Any: bad input before it starts; the divergence guard, Ctrl-C and the file system afterwards.
+pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
+    let duration = quantity::duration("--duration", &arguments.duration)?;
+    let times = match &arguments.every {
+        Some(every) => Some(Times::new(duration, quantity::duration("--every", every)?)?),
+        None => None,
+    };
+    let file = match &arguments.out {
+        Some(path) => Some(RowsFile::claim(path, arguments.force)?),
+        None => None,
+    };
+    let scene = load(&arguments.scene)?;
+    let mut simulation = Simulation::new(&scene)?;
+    let mut frame = Frame::default();
+    simulation.sample(0.0, &mut frame);
+    let mut table = Table::new(&scene, &frame);
+    if let Some(times) = &times {
+        check_size(times.last.saturating_add(1), table.names().len())?;
+    }
+    if !arguments.quiet {
+        if times.is_some_and(|times| !times.reach_the_end()) {
+            warn("the duration is no whole number of intervals: the last row lies before the end");
+        }
+        super::check::warnings(&scene)
+            .iter()
+            .for_each(|warning| warn(warning));
+    }
+
+    interrupt::listen();
+    let progress = progress::bar(!arguments.quiet, position(duration));
+    let mut stopwatch = Duration::ZERO;
+    let end = simulate(
+        &mut simulation,
+        duration,
+        times,
+        &mut table,
+        &mut frame,
+        &mut stopwatch,
+        &progress,
+    );
+    progress.finish_and_clear();
+    let wall = stopwatch.as_secs_f64();
+
+    let mut facts = summary::json(&simulation, end.status, wall)?;
+    facts.insert("rows".into(), json!(table.len()));
+    let mut written = None;
+    if let (Some(file), Some(times)) = (file, times) {
+        let path = file.path().to_owned();
+        let mut meta = facts.clone();
+        // Files of the same run are the same, byte for byte: the machine's speed stays out of them.
+        meta.shift_remove("wall_s");
+        meta.shift_remove("ratio");
+        meta.insert("duration_s".into(), json!(duration));
+        meta.insert("every_s".into(), json!(times.every));
+        meta.insert(
+            "contact_states".into(),
+            json!({"0": "free", "1": "stick", "2": "slip", "3": "ideal"}),
+        );
+        file.write(&table, &Json::Object(meta))?;
+        facts.insert("out".into(), json!(path.display().to_string()));
+        written = Some((path, table.len()));
+    }
+    match arguments.summary {
+        SummaryForm::Text => {
+            let written = written.as_ref().map(|(path, rows)| (path.as_path(), *rows));
+            print(&summary::text(&simulation, end.status, wall, written)?)?;
+        }
+        SummaryForm::Json => print(&format!("{:#}\n", Json::Object(facts)))?,
+    }
+    end.failure.map_or(Ok(()), Err)
+}
+
+/// Steps to `duration` and fills `table`; `stopwatch` runs while the simulation steps and at no other time.
+fn simulate(
+    simulation: &mut Simulation,
+    duration: f64,
+    times: Option<Times>,
+    table: &mut Table,
+    frame: &mut Frame,
+    stopwatch: &mut Duration,
+    progress: &ProgressBar,
+) -> End {
+    let mut next = 0;
+    loop {
+        // Rows that lie in the step just taken (at first: the row at 0).
+        if let Some(times) = times {
+            while next <= times.last && times.at(next) <= simulation.time() {
+                simulation.sample(times.at(next), frame);
+                if let Err(error) = table.push(frame) {
+                    return End {
+                        status: Status::Diverged,
+                        failure: Some(Failure::new(
+                            Failure::DIVERGED,
+                            format!(
+                                "stopped: {error}; try a smaller solver.step or solver.tolerance"
+                            ),
+                        )),
+                    };
+                }
+                next += 1;
+            }
+        }
+        if simulation.time() >= duration {
+            return End {
+                status: Status::Done,
+                failure: None,
+            };
+        }
+        progress.set_position(position(simulation.time()));
+        if interrupt::asked() {
+            return End {
+                status: Status::Interrupted,
+                failure: Some(Failure::new(
+                    Failure::INTERRUPTED,
+                    format!(
+                        "interrupted at t = {:.6e} s of {duration:.6e} s",
+                        simulation.time()
+                    ),
+                )),
+            };
+        }
+        let row = times
+            .filter(|times| next <= times.last)
+            .map_or(duration, |times| times.at(next));
+        let started = Instant::now();
+        let outcome = step_some(simulation, row, duration);
+        *stopwatch += started.elapsed();
+        if let Err(stopped) = outcome {
+            return End {
+                status: Status::Diverged,
+                failure: Some(Failure::new(Failure::DIVERGED, stopped.to_string())),
+            };
+        }
+    }
+}
+
+/// Steps until `row` is reached, the run ends, or it is time to look at the clock. A row never shortens a step.
+fn step_some(
+    simulation: &mut Simulation,
+    row: f64,
+    duration: f64,
+) -> Result<(), crate::simulate::Stopped> {
+    for _ in 0..STEPS_BETWEEN_LOOKS {
+        if simulation.time() >= row {
+            break;
+        }
+        simulation.step_until(duration)?;
+    }
+    Ok(())
+}
+
+/// Nanoseconds: the bar counts in whole numbers.
+fn position(time: f64) -> u64 {
+    (time * 1e9) as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_lie_at_whole_multiples_and_both_ends_count() {
+        for (duration, every, rows) in [
+            (0.02, 0.1e-3, 201),
+            (0.0, 1e-3, 1),
+            (0.3, 0.1, 4),
+            (1.0, 0.3, 4),
+            (0.7, 0.1, 8),
+            (3.0, 1e-5, 300_001),
+            (1e-3, 1.0, 1),
+        ] {
+            let times = Times::new(duration, every).unwrap();
+            assert_eq!(times.last + 1, rows, "{duration} by {every}");
+            assert!(times.at(times.last) <= duration, "{duration} by {every}");
+        }
+        assert!(Times::new(0.7, 0.1).unwrap().reach_the_end());
+        assert!(Times::new(0.0, 0.1).unwrap().reach_the_end());
+        assert!(!Times::new(1.0, 0.3).unwrap().reach_the_end());
+        assert!(Times::new(1.0, 0.0).is_err());
+    }
+}

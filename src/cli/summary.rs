@@ -1,0 +1,148 @@
+//! What a run did, for a person or for a script.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use serde_json::{Map, Value as Json, json};
+
+use super::output::significant;
+use super::{Failure, provenance};
+use crate::simulate::Simulation;
+
+/// How a run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Status {
+    /// It reached its duration.
+    Done,
+    /// Ctrl-C.
+    Interrupted,
+    /// The divergence guard stopped it.
+    Diverged,
+}
+
+impl Status {
+    /// The word in summaries and files.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Done => "done",
+            Self::Interrupted => "interrupted",
+            Self::Diverged => "diverged",
+        }
+    }
+}
+
+/// The summary as JSON: what made the run, then what it did.
+///
+/// # Errors
+/// As [`provenance::meta`].
+pub fn json(
+    simulation: &Simulation,
+    status: Status,
+    wall: f64,
+) -> Result<Map<String, Json>, Failure> {
+    let scene = simulation.scene();
+    let statistics = simulation.statistics();
+    let time = simulation.time();
+    let by_joint = |value: &dyn Fn(usize) -> Json| -> Json {
+        let entries = scene.ball_joints.iter().enumerate();
+        Json::Object(
+            entries
+                .map(|(i, joint)| (joint.name.clone(), value(i)))
+                .collect(),
+        )
+    };
+    let mut summary = provenance::meta(scene)?;
+    let own = json!({
+        "status": status.word(),
+        "time_s": time,
+        "steps": statistics.steps,
+        "evaluations": statistics.evaluations,
+        "rejected": statistics.rejected,
+        "impacts": by_joint(&|i| json!(statistics.impacts[i])),
+        "peak_normal_N": by_joint(&|i| json!(statistics.peak_normal[i])),
+        "peak_time_s": by_joint(&|i| json!(statistics.peak_time[i])),
+        "constraint_drift_m": statistics.constraint_drift,
+        "wall_s": wall,
+        "ratio": ratio(time, wall),
+        "state_hash": hash_text(simulation.state_hash()),
+    });
+    if let Json::Object(own) = own {
+        summary.extend(own);
+    }
+    Ok(summary)
+}
+
+/// The summary as text.
+///
+/// # Errors
+/// As [`provenance::meta`].
+pub fn text(
+    simulation: &Simulation,
+    status: Status,
+    wall: f64,
+    written: Option<(&Path, usize)>,
+) -> Result<String, Failure> {
+    let scene = simulation.scene();
+    let statistics = simulation.statistics();
+    let time = simulation.time();
+    let mut out = String::new();
+    let mut line = |label: &str, value: String| {
+        // Writing to a String cannot fail.
+        let _ = writeln!(out, "{label:<18}{value}");
+    };
+    line("Scene", scene.name.clone());
+    for (key, value) in &scene.changes {
+        line("  changed", format!("{key} = {value}"));
+    }
+    line("Status", status.word().to_owned());
+    line("Simulated time", format!("{} s", significant(time, 9)));
+    let method = provenance::choice(scene, "solver.method")?;
+    let formulation = provenance::choice(scene, "formulation")?;
+    line("Method", format!("{method}, {formulation} formulation"));
+    line(
+        "Steps",
+        format!(
+            "{} ({} rejected), {} evaluations",
+            statistics.steps, statistics.rejected, statistics.evaluations
+        ),
+    );
+    for (i, joint) in scene.ball_joints.iter().enumerate() {
+        let peak = format!(
+            "peak {} N at {} s",
+            significant(statistics.peak_normal[i], 6),
+            significant(statistics.peak_time[i], 6)
+        );
+        let story = if joint.contact.clearance == 0.0 {
+            format!("ideal, {peak}")
+        } else {
+            format!("{} impacts, {peak}", statistics.impacts[i])
+        };
+        line(&format!("Joint {}", joint.name), story);
+    }
+    line(
+        "Wall time",
+        match ratio(time, wall) {
+            Some(ratio) => format!(
+                "{wall:.3} s of stepping, {} times real time",
+                significant(ratio, 3)
+            ),
+            None => format!("{wall:.3} s of stepping"),
+        },
+    );
+    line("State hash", hash_text(simulation.state_hash()));
+    if let Some((path, rows)) = written {
+        line("Written", format!("{rows} rows to {}", path.display()));
+    }
+    line("Version", format!("jointplay {}", crate::VERSION));
+    Ok(out)
+}
+
+/// Simulated seconds in a second; `None` where no time was spent.
+fn ratio(time: f64, wall: f64) -> Option<f64> {
+    (wall > 0.0).then(|| time / wall)
+}
+
+/// A hash as outputs write it: 16 hexadecimal digits (JSON numbers do not hold 64 bits).
+pub fn hash_text(hash: u64) -> String {
+    format!("{hash:016x}")
+}

@@ -1,0 +1,220 @@
+//! Which quantities of a simulation are recorded for the plots, in which order, and how they are read from a frame.
+
+use super::Frame;
+use crate::scene::{Scene, Vec3};
+
+/// Ball joints that are recorded; in a longer chain the rest would cost more memory than they tell.
+pub const RECORDED_JOINTS: usize = 12;
+
+/// A physical quantity that a plot shows; its channels share one axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[allow(missing_docs)]
+pub enum Quantity {
+    NormalForce,
+    FrictionForce,
+    Eccentricity,
+    Penetration,
+    Position,
+    Angles,
+    Velocity,
+    AngleRates,
+    Acceleration,
+    AngleAccelerations,
+    ActuatorForce,
+    Energy,
+    ProbeError,
+}
+
+impl Quantity {
+    /// All of them, in the order in which a list shows them.
+    pub const ALL: [Self; 13] = [
+        Self::NormalForce,
+        Self::FrictionForce,
+        Self::Eccentricity,
+        Self::Penetration,
+        Self::Position,
+        Self::Angles,
+        Self::Velocity,
+        Self::AngleRates,
+        Self::Acceleration,
+        Self::AngleAccelerations,
+        Self::ActuatorForce,
+        Self::Energy,
+        Self::ProbeError,
+    ];
+
+    /// Sentence-case name.
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::NormalForce => "Normal force",
+            Self::FrictionForce => "Friction force",
+            Self::Eccentricity => "Eccentricity",
+            Self::Penetration => "Penetration",
+            Self::Position => "Position",
+            Self::Angles => "Angles",
+            Self::Velocity => "Velocity",
+            Self::AngleRates => "Angle rates",
+            Self::Acceleration => "Acceleration",
+            Self::AngleAccelerations => "Angle accelerations",
+            Self::ActuatorForce => "Actuator force",
+            Self::Energy => "Energy",
+            Self::ProbeError => "Probe error",
+        }
+    }
+
+    /// Unit on the axis, and SI units in one of it.
+    pub fn unit(self) -> (&'static str, f64) {
+        match self {
+            Self::NormalForce | Self::FrictionForce | Self::ActuatorForce => ("N", 1.0),
+            Self::Eccentricity | Self::Position | Self::ProbeError => ("mm", 1e-3),
+            Self::Penetration => ("µm", 1e-6),
+            Self::Angles => ("mrad", 1e-3),
+            Self::Velocity => ("m/s", 1.0),
+            Self::AngleRates => ("rad/s", 1.0),
+            Self::Acceleration => ("m/s²", 1.0),
+            Self::AngleAccelerations => ("rad/s²", 1.0),
+            Self::Energy => ("mJ", 1e-3),
+        }
+    }
+
+    /// What it is, in a sentence.
+    pub fn help(self) -> &'static str {
+        match self {
+            Self::NormalForce => {
+                "Size of the normal force on each ball; of the whole reaction where a joint is ideal."
+            }
+            Self::FrictionForce => "Size of the friction force on each ball.",
+            Self::Eccentricity => {
+                "Distance of each ball's centre from its socket's centre. Contact begins at the clearance."
+            }
+            Self::Penetration => {
+                "How deep each ball presses into its socket; below zero there is a gap."
+            }
+            Self::Position => "Origin of the output body in world axes.",
+            Self::Angles => "Angles α, β, γ of the output body.",
+            Self::Velocity => "Velocity of the output body's origin.",
+            Self::AngleRates => "Rates of the angles α, β, γ.",
+            Self::Acceleration => "Acceleration of the output body's origin.",
+            Self::AngleAccelerations => "Second derivatives of the angles α, β, γ.",
+            Self::ActuatorForce => "Force (or torque, in N m) that each drive must bring up.",
+            Self::Energy => "Kinetic, potential and elastic energy of the whole mechanism.",
+            Self::ProbeError => "Probe tip minus the tip of the ideal mechanism at the same time.",
+        }
+    }
+}
+
+/// One recorded series.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Channel {
+    /// What it measures.
+    pub quantity: Quantity,
+    /// Which one of them: a joint's name, an axis, a kind of energy.
+    pub member: String,
+}
+
+/// The channels of one scene, in the order in which [`Channels::read`] writes them.
+#[derive(Clone, Debug, Default)]
+pub struct Channels {
+    list: Vec<Channel>,
+    joints: usize,
+    drives: usize,
+    probe: bool,
+}
+
+impl Channels {
+    /// The channels that `scene` has.
+    pub fn of(scene: &Scene) -> Self {
+        let joints = scene.ball_joints.len().min(RECORDED_JOINTS);
+        let driven = || scene.joints.iter().filter(|joint| joint.drive.is_some());
+        let mut list = Vec::new();
+        let mut add = |quantity, member: &str| {
+            list.push(Channel {
+                quantity,
+                member: member.to_owned(),
+            });
+        };
+        for joint in scene.ball_joints.iter().take(joints) {
+            for quantity in &Quantity::ALL[..4] {
+                add(*quantity, &joint.name);
+            }
+        }
+        for (quantity, members) in [
+            (Quantity::Position, ["x", "y", "z"]),
+            (Quantity::Angles, ["α", "β", "γ"]),
+            (Quantity::Velocity, ["x", "y", "z"]),
+            (Quantity::AngleRates, ["α", "β", "γ"]),
+            (Quantity::Acceleration, ["x", "y", "z"]),
+            (Quantity::AngleAccelerations, ["α", "β", "γ"]),
+            (Quantity::Energy, ["kinetic", "potential", "elastic"]),
+        ] {
+            for member in members {
+                add(quantity, member);
+            }
+        }
+        for joint in driven() {
+            add(Quantity::ActuatorForce, &joint.name);
+        }
+        let probe = scene.spcmm.is_some() && scene.output.probe.is_some();
+        if probe {
+            for member in ["x", "y", "z"] {
+                add(Quantity::ProbeError, member);
+            }
+        }
+        Self {
+            list,
+            joints,
+            drives: driven().count(),
+            probe,
+        }
+    }
+
+    /// The channels in order.
+    pub fn list(&self) -> &[Channel] {
+        &self.list
+    }
+
+    /// Number of channels.
+    pub fn len(&self) -> usize {
+        self.list.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.list.is_empty()
+    }
+
+    /// Index of the normal force of ball joint `joint`, if it is recorded.
+    pub fn normal_force(&self, joint: usize) -> Option<usize> {
+        (joint < self.joints).then_some(4 * joint)
+    }
+
+    /// Reads every channel from `frame` into `out`, SI units.
+    pub fn read(&self, frame: &Frame, out: &mut Vec<f64>) {
+        out.clear();
+        for report in frame.joints.iter().take(self.joints) {
+            out.extend([
+                report.normal_force.norm(),
+                report.friction_force.norm(),
+                report.eccentricity.norm(),
+                report.penetration,
+            ]);
+        }
+        let pose = &frame.pose;
+        for vector in [
+            pose.position,
+            pose.angles,
+            pose.velocity,
+            pose.angle_rates,
+            pose.acceleration,
+            pose.angle_accelerations,
+            Vec3::new(frame.kinetic, frame.potential, frame.elastic),
+        ] {
+            out.extend(vector.iter());
+        }
+        out.extend(frame.actuators.iter().take(self.drives));
+        if self.probe {
+            out.extend(frame.probe_error.unwrap_or_else(Vec3::zeros).iter());
+        }
+        debug_assert_eq!(out.len(), self.list.len());
+    }
+}

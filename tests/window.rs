@@ -1,0 +1,583 @@
+//! The window, driven by role and label as a person with a screen reader would.
+#![cfg(feature = "gui")]
+
+use eframe::egui::{self, Key, Modifiers, accesskit::Role};
+use egui_kittest::{
+    Harness, SnapshotResults,
+    kittest::{NodeT as _, Queryable as _},
+};
+use jointplay::app::{App, AppOptions};
+use jointplay::scene::Scene;
+
+/// The wide window on `scene` at t = 0, paused.
+fn window(scene: &str) -> Harness<'static, App> {
+    sized(scene, [1280.0, 800.0], egui::Theme::Light)
+}
+
+fn sized(scene: &str, size: [f32; 2], theme: egui::Theme) -> Harness<'static, App> {
+    let mut options = AppOptions::new(Scene::load(scene, &[]).expect("a built-in scene"));
+    options.playing = false;
+    options.theme = theme.into();
+    let mut harness = Harness::builder()
+        .with_size(size)
+        .with_theme(theme)
+        .with_step_dt(1.0 / 60.0)
+        .with_max_steps(60)
+        .wgpu()
+        .build_eframe(move |cc| App::new(cc, options).expect("the scene starts"));
+    harness.run();
+    harness
+}
+
+fn time(harness: &Harness<'_, App>) -> f64 {
+    harness.state().player().simulation().time()
+}
+
+fn shown(harness: &Harness<'_, App>) -> f64 {
+    harness.state().player().pacer.shown()
+}
+
+fn clearance(harness: &Harness<'_, App>) -> f64 {
+    harness
+        .state()
+        .player()
+        .simulation()
+        .scene()
+        .contact
+        .clearance
+}
+
+/// Largest normal force since the reset, N.
+fn hardest(harness: &Harness<'_, App>) -> f64 {
+    let statistics = harness.state().player().simulation().statistics();
+    statistics.peak_normal.iter().copied().fold(0.0, f64::max)
+}
+
+fn click(harness: &mut Harness<'_, App>, label: &str) {
+    harness.get_by_role_and_label(Role::Button, label).click();
+    harness.step();
+    harness.step();
+}
+
+/// Replaces what stands in a text field and presses Enter.
+fn type_into(harness: &mut Harness<'_, App>, label: &str, text: &str) {
+    harness
+        .get_by_role_and_label(Role::TextInput, label)
+        .focus();
+    harness.step();
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::A);
+    harness.step();
+    harness
+        .get_by_role_and_label(Role::TextInput, label)
+        .type_text(text);
+    harness.step();
+    harness.key_press(Key::Enter);
+    harness.step();
+    harness.step();
+}
+
+#[test]
+fn the_clearance_slider_changes_when_the_balls_hit() {
+    // A free fall through 0.3 mm takes 7.8 ms, through 0.5 mm 10.1 ms.
+    let mut harness = window("spcmm");
+    harness.state_mut().player_mut().run_to(9.0e-3);
+    assert!(
+        hardest(&harness) > 100.0,
+        "at 0.3 mm all three joints have been hit by 9 ms"
+    );
+
+    let slider = harness.get_by_role_and_label(Role::Slider, "Clearance");
+    assert!(
+        (slider
+            .accesskit_node()
+            .numeric_value()
+            .expect("a slider has a value")
+            - 0.3)
+            .abs()
+            < 1e-9
+    );
+    slider.set_value_accesskit(0.5);
+    harness.run();
+    assert!((clearance(&harness) - 0.5e-3).abs() < 1e-12);
+
+    click(&mut harness, "Reset");
+    assert_eq!(time(&harness), 0.0);
+    harness.state_mut().player_mut().run_to(9.0e-3);
+    assert!(
+        hardest(&harness) < 1.0,
+        "at 0.5 mm nothing has been hit by 9 ms"
+    );
+    harness.state_mut().player_mut().run_to(12.0e-3);
+    assert!(hardest(&harness) > 100.0);
+}
+
+#[test]
+fn a_live_change_of_clearance_reaches_the_running_joints() {
+    let mut harness = window("spcmm");
+    harness
+        .get_by_role_and_label(Role::Slider, "Clearance")
+        .set_value_accesskit(0.6);
+    harness.run();
+    harness.state_mut().player_mut().run_to(0.1);
+    for joint in &harness.state().player().frame().joints {
+        assert!(
+            (joint.clearance - 0.6e-3).abs() < 1e-9,
+            "{}",
+            joint.clearance
+        );
+    }
+}
+
+#[test]
+fn a_drag_on_the_friction_slider_moves_friction() {
+    let mut harness = window("spcmm");
+    let before = harness
+        .state()
+        .player()
+        .simulation()
+        .scene()
+        .contact
+        .friction;
+    let track = harness
+        .get_by_role_and_label(Role::Slider, "Friction coefficient")
+        .rect();
+    harness.drag_at(track.left_center() + egui::vec2(12.0, 0.0));
+    harness.step();
+    harness.hover_at(track.right_center() - egui::vec2(4.0, 0.0));
+    harness.step();
+    harness.drop_at(track.right_center() - egui::vec2(4.0, 0.0));
+    harness.run();
+    let after = harness
+        .state()
+        .player()
+        .simulation()
+        .scene()
+        .contact
+        .friction;
+    assert!(after > before, "{before} to {after}");
+}
+
+#[test]
+fn a_typed_value_takes_any_unit_and_a_bad_one_stays_to_be_mended() {
+    let mut harness = window("spcmm");
+    type_into(&mut harness, "Clearance", "500 um");
+    assert!((clearance(&harness) - 0.5e-3).abs() < 1e-12);
+    type_into(&mut harness, "Clearance", "0.4");
+    assert!(
+        (clearance(&harness) - 0.4e-3).abs() < 1e-12,
+        "a bare number takes the unit on show"
+    );
+
+    type_into(&mut harness, "Clearance", "0.4 kg");
+    assert!(
+        (clearance(&harness) - 0.4e-3).abs() < 1e-12,
+        "the running value stays"
+    );
+    let field = harness.get_by_role_and_label(Role::TextInput, "Clearance");
+    assert_eq!(
+        field.value().as_deref(),
+        Some("0.4 kg"),
+        "what was typed is not lost"
+    );
+    harness.get_by_label_contains("wrong unit");
+
+    type_into(&mut harness, "Clearance", "0.2 mm");
+    assert!((clearance(&harness) - 0.2e-3).abs() < 1e-12);
+    assert!(
+        harness.query_by_label_contains("wrong unit").is_none(),
+        "mended, the complaint goes"
+    );
+
+    click(&mut harness, "Reset Clearance");
+    assert!(
+        (clearance(&harness) - 0.3e-3).abs() < 1e-12,
+        "back to the scene's own value"
+    );
+}
+
+#[test]
+fn play_pause_and_the_space_bar() {
+    let mut harness = window("spcmm");
+    assert_eq!(time(&harness), 0.0);
+    click(&mut harness, "Play");
+    harness.run_steps(20);
+    assert!(harness.state().player().is_playing());
+    let playing = shown(&harness);
+    assert!(playing > 0.0);
+
+    click(&mut harness, "Pause");
+    let paused = shown(&harness);
+    harness.run_steps(10);
+    assert_eq!(shown(&harness), paused, "paused, time stands still");
+
+    harness.key_press(Key::Space);
+    harness.step();
+    assert!(harness.state().player().is_playing());
+    harness.key_press(Key::Space);
+    harness.step();
+    assert!(!harness.state().player().is_playing());
+}
+
+#[test]
+fn a_single_step_is_one_step_of_the_solver() {
+    let mut harness = window("spcmm");
+    for expected in 1..=3 {
+        click(&mut harness, "Step");
+        assert_eq!(
+            harness.state().player().simulation().statistics().steps,
+            expected
+        );
+        assert_eq!(shown(&harness), time(&harness));
+    }
+    harness.key_press(Key::ArrowRight);
+    harness.step();
+    assert_eq!(harness.state().player().simulation().statistics().steps, 4);
+}
+
+#[test]
+fn reset_goes_back_to_the_same_bits() {
+    let mut harness = window("spcmm");
+    let start = harness.state().player().simulation().state_hash();
+    harness.state_mut().player_mut().run_to(10.0e-3);
+    assert_ne!(harness.state().player().simulation().state_hash(), start);
+    harness.key_press(Key::R);
+    harness.run();
+    assert_eq!(harness.state().player().simulation().state_hash(), start);
+    assert_eq!(shown(&harness), 0.0);
+}
+
+#[test]
+fn the_time_scale_sets_how_fast_simulated_time_passes() {
+    let mut harness = window("spcmm");
+    harness
+        .get_by_role_and_label(Role::Slider, "Time scale")
+        .set_value_accesskit(1e-3);
+    harness.step();
+    click(&mut harness, "Play");
+    let before = shown(&harness);
+    harness.run_steps(30);
+    let passed = shown(&harness) - before;
+    assert!((passed - 30.0 / 60.0 * 1e-3).abs() < 1e-9, "{passed}");
+
+    harness.key_press(Key::Minus);
+    harness.step();
+    assert!((harness.state().player().pacer.scale() - 1e-4).abs() < 1e-12);
+    harness.key_press(Key::ArrowUp);
+    harness.step();
+    assert!((harness.state().player().pacer.scale() - 1e-3).abs() < 1e-12);
+}
+
+#[test]
+fn slow_motion_moves_in_every_frame_within_one_step() {
+    let mut harness = window("spcmm");
+    harness.state_mut().player_mut().run_to(7.85e-3);
+    harness.state_mut().player_mut().pacer.set_scale(1e-4);
+    harness.state_mut().player_mut().set_playing(true);
+    let mut last = harness.state().player().frame().pose.position;
+    let mut distinct = 0;
+    for _ in 0..30 {
+        harness.step();
+        let now = harness.state().player().frame().pose.position;
+        distinct += usize::from(now != last);
+        last = now;
+    }
+    assert!(distinct >= 29, "{distinct} of 30 frames moved");
+}
+
+#[test]
+fn the_question_mark_lists_the_keys_and_escape_closes() {
+    let mut harness = window("pendulum");
+    harness.key_press(Key::Questionmark);
+    harness.run();
+    harness.get_by_label("Play or pause");
+    // Under the list the machine is out of reach.
+    harness.key_press(Key::Space);
+    harness.step();
+    assert!(!harness.state().player().is_playing());
+    harness.key_press(Key::Escape);
+    harness.run();
+    assert!(harness.query_by_label("Play or pause").is_none());
+}
+
+#[test]
+fn another_scene_opens_and_a_bad_one_leaves_the_running_one() {
+    let mut harness = window("spcmm");
+    harness
+        .get_by_role_and_label(Role::ComboBox, "Scene")
+        .click();
+    harness.run();
+    harness.get_by_label("pendulum").click();
+    harness.run();
+    assert_eq!(
+        harness.state().player().simulation().scene().name,
+        "pendulum"
+    );
+
+    click(&mut harness, "Open…");
+    type_into(&mut harness, "Path", "missing/scene.toml");
+    harness.run();
+    harness.get_by_label_contains("missing/scene.toml");
+    assert_eq!(
+        harness.state().player().simulation().scene().name,
+        "pendulum"
+    );
+}
+
+#[test]
+fn a_value_that_waits_for_the_reset_says_so() {
+    let mut harness = window("spcmm");
+    let frequency = |harness: &Harness<'_, App>| {
+        harness
+            .state()
+            .player()
+            .simulation()
+            .scene()
+            .spcmm
+            .expect("the paper's scene")
+            .frequency
+    };
+    harness.state_mut().player_mut().run_to(1e-3);
+    harness
+        .state_mut()
+        .player_mut()
+        .set("spcmm.frequency", "0.4 Hz")
+        .expect("in range");
+    let group = Scene::load("spcmm", &[])
+        .expect("built in")
+        .parameters()
+        .iter()
+        .find(|p| p.key == "spcmm.frequency")
+        .expect("in the table")
+        .group;
+    harness.get_by_label(group).click();
+    harness.run();
+    harness.get_by_label("Applies at the next reset");
+    click(&mut harness, "Reset");
+    assert!(
+        harness
+            .query_by_label("Applies at the next reset")
+            .is_none()
+    );
+    assert!((frequency(&harness) - 0.4).abs() < 1e-12);
+}
+
+#[test]
+fn low_restitution_with_the_papers_law_is_commented_on() {
+    let mut harness = window("spcmm");
+    assert!(
+        harness
+            .query_by_label_contains("right only near 1")
+            .is_none()
+    );
+    harness
+        .get_by_role_and_label(Role::Slider, "Restitution")
+        .set_value_accesskit(0.3);
+    harness.run();
+    harness.get_by_label_contains("right only near 1");
+}
+
+#[test]
+fn the_divergence_guard_says_what_happened_and_a_reset_helps() {
+    let mut harness = window("spcmm");
+    let player = harness.state_mut().player_mut();
+    player.set("solver.method", "rk4").expect("a method");
+    player.set("solver.step", "1 ms").expect("in range");
+    player.run_to(0.5);
+    assert!(
+        player.stopped().is_some(),
+        "steps ten times longer than an impact cannot hold"
+    );
+    harness.run();
+    harness.get_by_label_contains("Stopped at");
+    harness
+        .state_mut()
+        .player_mut()
+        .set("solver.step", "10 us")
+        .expect("in range");
+    click(&mut harness, "Reset the run");
+    harness.run();
+    assert!(harness.query_by_label_contains("Stopped at").is_none());
+    harness.state_mut().player_mut().run_to(9e-3);
+    assert!(harness.state().player().stopped().is_none());
+}
+
+#[test]
+fn a_narrow_window_keeps_the_controls_within_reach() {
+    let mut harness = sized("spcmm", [420.0, 800.0], egui::Theme::Light);
+    for label in ["Play", "Step", "Reset"] {
+        let rect = harness.get_by_role_and_label(Role::Button, label).rect();
+        assert!(
+            rect.right() <= 420.0 && rect.bottom() <= 800.0,
+            "{label}: {rect:?}"
+        );
+    }
+    let rect = harness
+        .get_by_role_and_label(Role::Slider, "Clearance")
+        .rect();
+    assert!(rect.right() <= 420.0 && rect.bottom() <= 800.0, "{rect:?}");
+    harness
+        .get_by_role_and_label(Role::Slider, "Clearance")
+        .set_value_accesskit(0.7);
+    harness.run();
+    assert!((clearance(&harness) - 0.7e-3).abs() < 1e-12);
+}
+
+#[test]
+fn keys_leave_a_field_alone_that_is_being_typed_in() {
+    let mut harness = window("spcmm");
+    harness
+        .get_by_role_and_label(Role::TextInput, "Clearance")
+        .focus();
+    harness.step();
+    harness.key_press(Key::Space);
+    harness.key_press(Key::R);
+    harness.step();
+    assert!(!harness.state().player().is_playing());
+}
+
+#[test]
+fn every_control_has_a_name() {
+    let mut harness = window("spcmm");
+    // All groups of parameters open.
+    for group in ["One joint", "Contact", "Gravity", "Solver"] {
+        if let Some(header) = harness.query_by_label(group) {
+            header.click();
+            harness.run();
+        }
+    }
+    let nameless: Vec<Role> = harness
+        .root()
+        .children_recursive()
+        .filter(|node| {
+            let node = node.accesskit_node();
+            matches!(
+                node.role(),
+                Role::Button
+                    | Role::Slider
+                    | Role::TextInput
+                    | Role::ComboBox
+                    | Role::CheckBox
+                    | Role::SpinButton
+            ) && node.label().is_none_or(|label| label.trim().is_empty())
+        })
+        .map(|node| node.accesskit_node().role())
+        .collect();
+    assert!(nameless.is_empty(), "{nameless:?}");
+}
+
+#[test]
+fn pictures() {
+    let mut results = SnapshotResults::new();
+    for (name, size, theme) in [
+        ("wide_light", [1280.0, 800.0], egui::Theme::Light),
+        ("wide_dark", [1280.0, 800.0], egui::Theme::Dark),
+        ("narrow_light", [420.0, 800.0], egui::Theme::Light),
+    ] {
+        let mut harness = sized("spcmm", size, theme);
+        harness.state_mut().player_mut().run_to(7.85e-3);
+        harness.run();
+        harness.snapshot(name);
+        results.extend_harness(&mut harness);
+    }
+}
+
+#[test]
+#[ignore = "writes pictures to look at, to $JOINTPLAY_LOOK"]
+fn look() {
+    let Ok(folder) = std::env::var("JOINTPLAY_LOOK") else {
+        return;
+    };
+    let save = |harness: &mut Harness<'_, App>, name: &str| {
+        harness
+            .render()
+            .expect("drawn")
+            .save(format!("{folder}/{name}.png"))
+            .expect("written");
+    };
+    let mut h = sized("spcmm", [1280.0, 800.0], egui::Theme::Light);
+    h.state_mut().player_mut().set_playing(true);
+    h.run_steps(100);
+    h.state_mut().player_mut().set_playing(false);
+    h.run();
+    save(&mut h, "played");
+    h.key_press(Key::Num5);
+    h.run();
+    save(&mut h, "closeup");
+    h.key_press(Key::Questionmark);
+    h.run();
+    save(&mut h, "keys");
+    h.key_press(Key::Escape);
+    h.run();
+    for group in ["Contact", "Solver", "One joint"] {
+        h.get_by_label(group).click();
+        h.run();
+    }
+    type_into(&mut h, "Clearance", "0.4 kg");
+    h.get_by_role_and_label(Role::Slider, "Restitution")
+        .set_value_accesskit(0.3);
+    h.state_mut()
+        .player_mut()
+        .set("spcmm.frequency", "0.4 Hz")
+        .expect("ok");
+    h.run();
+    save(&mut h, "groups");
+    let mut h = sized("spcmm", [1280.0, 800.0], egui::Theme::Dark);
+    h.state_mut().player_mut().pacer.set_scale(1.0);
+    h.state_mut().player_mut().set_playing(true);
+    h.run_steps(60);
+    h.get_by_label("View options").click();
+    h.run_steps(5);
+    save(&mut h, "playing");
+    let player = h.state_mut().player_mut();
+    player.set("solver.method", "rk4").expect("a method");
+    player.set("solver.step", "1 ms").expect("in range");
+    player.run_to(2.5);
+    h.run();
+    save(&mut h, "stopped");
+    let mut h = sized("slider-crank", [420.0, 800.0], egui::Theme::Dark);
+    h.state_mut().player_mut().run_to(0.05);
+    h.get_by_label("Choose plots").scroll_to_me();
+    h.run();
+    save(&mut h, "narrow_dark");
+}
+
+#[test]
+fn hovering_names_a_part_and_a_double_click_follows_it() {
+    let mut harness = window("spcmm");
+    // The middle of the platform, in the isometric view that the window starts with.
+    let view = harness.get_by_label("3D view").rect();
+    let platform = view.lerp_inside(egui::vec2(0.37, 0.74));
+    harness.hover_at(platform);
+    harness.run_steps(60);
+    harness.get_by_label("Double-click to follow");
+    harness.get_by_label_contains("Angular speed");
+
+    for _ in 0..2 {
+        harness.drag_at(platform);
+        harness.drop_at(platform);
+        harness.step();
+    }
+    harness.remove_cursor();
+    harness.run();
+    harness.get_by_label("View options").click();
+    harness.run();
+    harness.get_by_label("Stop following").click();
+    harness.run();
+    assert!(harness.query_by_label("Stop following").is_none());
+}
+
+#[test]
+fn the_chosen_plots_are_shown_with_their_units() {
+    let mut harness = window("spcmm");
+    harness.get_by_label("Normal force, N");
+    assert!(harness.query_by_label("Energy, mJ").is_none());
+    harness.get_by_label("Choose plots").click();
+    harness.run();
+    harness
+        .get_by_role_and_label(Role::CheckBox, "Energy, mJ")
+        .click();
+    harness.run();
+    harness.key_press(Key::Escape);
+    harness.run();
+    harness.get_by_role_and_label(Role::Label, "Energy, mJ");
+}
