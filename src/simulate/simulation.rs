@@ -23,6 +23,9 @@ const ABSURD_SPEED: f64 = 1e6;
 /// Loops that are open by more than this after projection have come apart, m.
 const OPEN_LOOP: f64 = 1e-7;
 
+/// Advice where closed loops cannot stay closed.
+const DEPENDENT: &str = "the ideal joints are (nearly) dependent here: keep clear of this pose, or give a joint a clearance";
+
 /// A scene in motion.
 ///
 /// The same scene and the same calls give the same bits.
@@ -473,7 +476,9 @@ impl Simulation {
         state.statistics.evaluations += mechanism.evaluations - evaluations;
         if let Some(what) = self.objection(open) {
             let solver = &self.running.solver;
-            let advice = if solver.method.is_adaptive() {
+            let advice = if open.is_nan() || open > OPEN_LOOP {
+                DEPENDENT.to_owned()
+            } else if solver.method.is_adaptive() {
                 // Its steps are as short as they need to be: the motion itself is beyond the model.
                 format!(
                     "try slower drives, a stiffer contact, or a tighter solver.tolerance (now {:e})",
@@ -671,7 +676,7 @@ impl Simulation {
 
     fn stopped(&self, what: &str, advice: String) -> Stopped {
         let advice = if self.mechanism.least_pivot() < 1e-12 {
-            "the ideal joints are (nearly) dependent here: keep clear of this pose, or give a joint a clearance".to_owned()
+            DEPENDENT.to_owned()
         } else {
             advice
         };
