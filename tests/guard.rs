@@ -175,3 +175,18 @@ fn a_drive_beyond_all_measure_stops_the_adaptive_method_too() {
     assert!(stopped.advice.contains("slower drives"), "{text}");
     still_good(&mut simulation, &stopped);
 }
+
+#[test]
+fn loops_that_pass_a_singular_pose_say_so() {
+    // Inside the range of slider planes in which the Jacobian changes its sign.
+    let changes = [("contact.clearance", "0"), ("spcmm.slider_plane", "165 mm")];
+    let mut simulation = simulation("spcmm", &changes);
+    let stopped = run_to_stop(&mut simulation);
+    println!("{stopped}");
+    assert!(stopped.what.contains("loops"), "{stopped}");
+    assert!(stopped.advice.contains("clearance"), "{stopped}");
+    assert!((stopped.time - 0.074).abs() < 2e-3);
+    let hash = simulation.state_hash();
+    assert!(simulation.step().is_err());
+    assert_eq!(simulation.state_hash(), hash);
+}

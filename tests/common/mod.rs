@@ -12,23 +12,26 @@ pub const SCENES: [&str; 5] = jointplay::scene::BUILT_IN;
 /// Words of `solver.method`.
 pub const METHODS: [&str; 3] = ["semi-implicit-euler", "rk4", "dopri5"];
 
-fn owned(changes: &[(&str, &str)]) -> Vec<(String, String)> {
+/// Keys and values as a user writes them.
+pub type Changes<'a> = [(&'a str, &'a str)];
+
+fn owned(changes: &Changes) -> Vec<(String, String)> {
     let own = |(key, value): &(&str, &str)| ((*key).to_owned(), (*value).to_owned());
     changes.iter().map(own).collect()
 }
 
 /// A built-in scene with changes.
-pub fn scene(name: &str, changes: &[(&str, &str)]) -> Scene {
+pub fn scene(name: &str, changes: &Changes) -> Scene {
     Scene::load(name, &owned(changes)).unwrap()
 }
 
 /// A scene from its text with changes.
-pub fn parse(text: &str, changes: &[(&str, &str)]) -> Scene {
+pub fn parse(text: &str, changes: &Changes) -> Scene {
     Scene::parse(text, None, &owned(changes)).unwrap()
 }
 
 /// A running built-in scene.
-pub fn simulation(name: &str, changes: &[(&str, &str)]) -> Simulation {
+pub fn simulation(name: &str, changes: &Changes) -> Simulation {
     Simulation::new(&scene(name, changes)).unwrap()
 }
 
