@@ -139,7 +139,7 @@ impl Trajectory {
     /// Looks along one whole period for a rod that is too short.
     ///
     /// # Errors
-    /// The first rod and instant found.
+    /// The rod that falls shortest, where it does.
     pub fn check(&self) -> Result<(), Unreachable> {
         const SAMPLES: u32 = 4000;
         let period = if self.p.frequency > 0.0 {
@@ -147,6 +147,7 @@ impl Trajectory {
         } else {
             0.0
         };
+        let has = self.p.driven_rod;
         let mut worst: Option<Unreachable> = None;
         for n in 0..=SAMPLES {
             let time = period * f64::from(n) / f64::from(SAMPLES);
@@ -161,12 +162,11 @@ impl Trajectory {
                 } else {
                     square.value
                 };
-                let has = self.p.driven_rod;
                 let needs = (has * has - missing).sqrt();
-                // The farthest reach tells how much there is to change.
                 if worst.is_none_or(|w| needs > w.needs) {
+                    let slider = i as u8 + 1;
                     worst = Some(Unreachable {
-                        slider: i as u8 + 1,
+                        slider,
                         time,
                         needs,
                         has,
