@@ -32,6 +32,9 @@ const ABSURD_SPEED: f64 = 1e6;
 /// Loops that are open by more than this after projection have come apart, m.
 const OPEN_LOOP: f64 = 1e-7;
 
+/// Advice where closed loops cannot stay closed.
+const DEPENDENT: &str = "the ideal joints are (nearly) dependent here: keep clear of this pose, or give a joint a clearance";
+
 /// A scene in motion.
 ///
 /// The same scene and the same calls give the same bits.
@@ -255,17 +258,15 @@ impl Simulation {
     }
 
     fn advance(&mut self, end: f64) -> Result<(), Stopped> {
-        let ramp_end = self.ramp_end();
-        let limit = end.min(ramp_end);
+        // Not at the end of the step before: samples inside it still see the clearance on its way.
+        self.finish_ramps();
+        let limit = end.min(self.ramp_end());
         if self.mechanism.is_kinematic() {
             self.kinematic_step(limit)?;
         } else if self.running.solver.method.is_adaptive() {
             self.adaptive_step(limit)?;
         } else {
             self.fixed_step(limit)?;
-        }
-        if self.state.t >= ramp_end {
-            self.finish_ramps();
         }
         Ok(())
     }
@@ -313,9 +314,13 @@ impl Simulation {
             if !(state.h_next >= SHORTEST_STEP.max(4.0 * f64::EPSILON * t)) {
                 state.statistics.evaluations += mechanism.evaluations - evaluations;
                 state.h_next = self.running.solver.step;
-                return Err(
-                    self.stopped("the step size that the tolerance asks for fell below 1e-14 s")
+                let advice = format!(
+                    "try a looser solver.tolerance (now {tolerance:e}) or a softer or heavier scene"
                 );
+                return Err(self.stopped(
+                    "the step size that the tolerance asks for fell below 1e-14 s",
+                    advice,
+                ));
             }
         };
         let contact_began = state.contact_began;
@@ -488,16 +493,15 @@ impl Simulation {
         }
         let h = t_end - t;
         stepper.attempt(mechanism, t, h, &state.y, &state.k, y_end, k_end);
+        self.accept(t_end, h, evaluations)?;
         if t_end == limit {
             // The next grid begins where this one was cut.
-            state.grid_origin = t_end;
-            state.grid_count = u64::MAX;
+            self.state.grid_origin = t_end;
+            self.state.grid_count = 0;
+        } else {
+            self.state.grid_count += 1;
         }
-        let result = self.accept(t_end, h, evaluations);
-        if result.is_ok() {
-            self.state.grid_count = self.state.grid_count.wrapping_add(1);
-        }
-        result
+        Ok(())
     }
 
     /// A step of a scene whose motion is a function of time alone: predict, close the loops, read the reactions.
@@ -540,7 +544,22 @@ impl Simulation {
         }
         state.statistics.evaluations += mechanism.evaluations - evaluations;
         if let Some(what) = self.objection(open) {
-            return Err(self.stopped(&what));
+            let solver = &self.running.solver;
+            let advice = if open.is_nan() || open > OPEN_LOOP {
+                DEPENDENT.to_owned()
+            } else if solver.method.is_adaptive() {
+                // Its steps are as short as they need to be: the motion itself is beyond the model.
+                format!(
+                    "try slower drives, a stiffer contact, or a tighter solver.tolerance (now {:e})",
+                    solver.tolerance
+                )
+            } else {
+                format!(
+                    "try a smaller solver.step (now {:e} s) or solver.method = dopri5",
+                    solver.step
+                )
+            };
+            return Err(self.stopped(&what, advice));
         }
         let Self {
             mechanism,
@@ -723,20 +742,11 @@ impl Simulation {
         None
     }
 
-    fn stopped(&self, what: &str) -> Stopped {
-        let solver = &self.running.solver;
+    fn stopped(&self, what: &str, advice: String) -> Stopped {
         let advice = if self.mechanism.least_pivot() < 1e-12 {
-            "the ideal joints are (nearly) dependent here: keep clear of this pose, or give a joint a clearance".to_owned()
-        } else if solver.method.is_adaptive() {
-            format!(
-                "try a looser solver.tolerance (now {:e}) or a softer or heavier scene",
-                solver.tolerance
-            )
+            DEPENDENT.to_owned()
         } else {
-            format!(
-                "try a smaller solver.step (now {:e} s) or solver.method = dopri5",
-                solver.step
-            )
+            advice
         };
         Stopped {
             time: self.state.t,
@@ -833,19 +843,19 @@ impl Simulation {
         waits: bool,
     ) -> Result<Effect, SceneError> {
         let mut running = self.running.clone();
-        let becomes_other = || {
-            self.running
-                .ball_joints
-                .iter()
-                .zip(&next.ball_joints)
-                .any(|(a, b)| (a.contact.clearance == 0.0) != (b.contact.clearance == 0.0))
-        };
+        // What the running scene cannot take may suit the one that waits, say a joint of a longer chain.
+        let waits = waits || change(&mut running).is_err();
         // A joint that turns ideal, or stops being so, changes the equations.
-        if waits || becomes_other() {
+        let turns = |running: &Scene| {
+            let pairs = self.running.ball_joints.iter().zip(&running.ball_joints);
+            pairs
+                .map(|(a, b)| (a.contact.clearance, b.contact.clearance))
+                .any(|(a, b)| (a == 0.0) != (b == 0.0))
+        };
+        if waits || turns(&running) {
             self.scene = next;
             return Ok(Effect::AtReset);
         }
-        change(&mut running)?;
         self.scene = next;
         let before = std::mem::replace(&mut self.running, running);
         self.mechanism.gravity = self.running.gravity;
