@@ -104,9 +104,39 @@ impl SceneView {
         options: &ViewOptions,
         size: [u32; 2],
     ) {
+        camera.fit_balls(&self.extents(scene, frame, options), size, [0.0; 2]);
+    }
+
+    /// The same beside or below a `plate` of text, width and height in pixels, in the upper left corner: whichever shows
+    /// the scene larger.
+    pub fn fit_around(
+        &self,
+        camera: &mut Camera,
+        scene: &Scene,
+        frame: &Frame,
+        options: &ViewOptions,
+        size: [u32; 2],
+        plate: [f32; 2],
+    ) {
+        let extents = self.extents(scene, frame, options);
+        let mut below = *camera;
+        camera.fit_balls(&extents, size, [plate[0], 0.0]);
+        below.fit_balls(&extents, size, [0.0, plate[1]]);
+        if below.distance < camera.distance {
+            *camera = below;
+        }
+    }
+
+    fn extents(&self, scene: &Scene, frame: &Frame, options: &ViewOptions) -> Vec<(Vec3, f32)> {
         let m = drawn::magnification(scene, frame, options.magnification);
         let joints = drawn::joints(scene, frame, m);
-        camera.fit_balls(&extents(&self.parts, frame, &joints), size);
+        let mut extents = extents(&self.parts, frame, &joints);
+        if options.arrows.normal || options.arrows.friction {
+            // Half a reference length around each joint: arrows lean any way, and most are shorter.
+            let arrow = ARROW_LENGTH * self.bounds.radius;
+            extents.extend(joints.iter().map(|joint| (joint.socket_centre, arrow)));
+        }
+        extents
     }
 
     /// Turns `camera` to a close-up of ball joint `joint`, looking into its opening.
