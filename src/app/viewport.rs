@@ -405,6 +405,8 @@ fn name_of(player: &Player, picked: Picked) -> Option<&str> {
 
 /// What is known about the thing under the cursor.
 fn describe(ui: &mut Ui, player: &Player, picked: Picked) {
+    // A tooltip is as wide as its longest line, not as the first.
+    ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Extend);
     let row = |ui: &mut Ui, name: &str, si: f64, unit: &str| {
         ui.label(format!("{name}  {}", format_quantity_digits(si, unit, 4)));
     };

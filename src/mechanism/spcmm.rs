@@ -139,7 +139,7 @@ impl Trajectory {
     /// Looks along one whole period for a rod that is too short.
     ///
     /// # Errors
-    /// The first rod and instant found.
+    /// The rod that falls shortest, where it does.
     pub fn check(&self) -> Result<(), Unreachable> {
         const SAMPLES: u32 = 4000;
         let period = if self.p.frequency > 0.0 {
@@ -147,6 +147,8 @@ impl Trajectory {
         } else {
             0.0
         };
+        let has = self.p.driven_rod;
+        let mut worst: Option<Unreachable> = None;
         for n in 0..=SAMPLES {
             let time = period * f64::from(n) / f64::from(SAMPLES);
             let (left, parts) = self.evaluate(time);
@@ -160,16 +162,19 @@ impl Trajectory {
                 } else {
                     square.value
                 };
-                let has = self.p.driven_rod;
-                return Err(Unreachable {
-                    slider: i as u8 + 1,
-                    time,
-                    needs: (has * has - missing).sqrt(),
-                    has,
-                });
+                let needs = (has * has - missing).sqrt();
+                if worst.is_none_or(|w| needs > w.needs) {
+                    let slider = i as u8 + 1;
+                    worst = Some(Unreachable {
+                        slider,
+                        time,
+                        needs,
+                        has,
+                    });
+                }
             }
         }
-        Ok(())
+        worst.map_or(Ok(()), Err)
     }
 }
 

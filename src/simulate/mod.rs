@@ -91,7 +91,7 @@ pub struct Snapshot {
 
 impl Snapshot {
     /// The scene it belongs to, as it ran.
-    pub fn scene(&self) -> &Scene {
+    pub fn running_scene(&self) -> &Scene {
         &self.running
     }
 }

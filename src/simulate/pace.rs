@@ -2,7 +2,7 @@
 //! measures and tells.
 
 /// Longest frame that is caught up with, s: after a hitch or a hidden window the simulation goes on, it does not race.
-pub const LONGEST_FRAME: f64 = 0.1;
+pub const LONGEST_FRAME: f64 = 0.25;
 
 /// Most stepping per frame, s: what is left of a 60 Hz frame after drawing.
 pub const LARGEST_BUDGET: f64 = 0.012;

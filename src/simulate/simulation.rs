@@ -640,9 +640,8 @@ impl Simulation {
         }
         for (m, body) in self.mechanism.motion().iter().zip(&self.running.bodies) {
             let (v, w) = (m.velocity.norm(), m.angular_velocity.norm());
-            if !(v <= ABSURD_SPEED && w <= ABSURD_SPEED)
-                || !m.position.iter().all(|x| x.is_finite())
-            {
+            let sane = v <= ABSURD_SPEED && w <= ABSURD_SPEED;
+            if !(sane && m.position.iter().all(|x| x.is_finite())) {
                 return Some(format!(
                     "body {}: speed {v:.3e} m/s, angular speed {w:.3e} rad/s",
                     body.name
