@@ -104,11 +104,11 @@ impl SceneView {
         options: &ViewOptions,
         size: [u32; 2],
     ) {
-        camera.fit_balls(&self.extents(scene, frame, options), size, [0.0; 2]);
+        camera.fit_balls(&self.extents(scene, frame, options), size, [0.0; 3]);
     }
 
-    /// The same beside or below a `plate` of text, width and height in pixels, in the upper left corner: whichever shows
-    /// the scene larger.
+    /// The same with room for text: beside a `plate`, width and height in pixels, in the upper left corner and above the
+    /// legend in the lower right, or below the plate; whichever shows the scene larger.
     pub fn fit_around(
         &self,
         camera: &mut Camera,
@@ -118,10 +118,11 @@ impl SceneView {
         size: [u32; 2],
         plate: [f32; 2],
     ) {
+        const LEGEND: f32 = 60.0;
         let extents = self.extents(scene, frame, options);
         let mut below = *camera;
-        camera.fit_balls(&extents, size, [plate[0], 0.0]);
-        below.fit_balls(&extents, size, [0.0, plate[1]]);
+        camera.fit_balls(&extents, size, [plate[0], 0.0, LEGEND]);
+        below.fit_balls(&extents, size, [0.0, plate[1], 0.0]);
         if below.distance < camera.distance {
             *camera = below;
         }

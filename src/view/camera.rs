@@ -95,16 +95,24 @@ impl Camera {
     }
 
     /// Moves so that the balls (centre, radius) just fill a picture of `size`, with a small margin; the direction stays.
-    /// `reserved` pixels at the left and at the top are kept free.
-    pub(super) fn fit_balls(&mut self, balls: &[(Vec3, f32)], size: [u32; 2], reserved: [f32; 2]) {
+    /// `reserved` pixels at the left, the top and the bottom are kept free.
+    pub(super) fn fit_balls(
+        &mut self,
+        balls: &[(Vec3, f32)],
+        size: [u32; 2],
+        [left, top, bottom]: [f32; 3],
+    ) {
         const MARGIN: f32 = 1.16;
         let axes = self.axes();
         let [width, height] = size.map(|n| n.max(1) as f32);
         // Slope of one pixel. No more is kept free than leaves most of the picture.
         let pixel = 2.0 * (self.field_of_view / 2.0).tan() / height;
-        let free_of = |edge: f32, reserved: f32| {
-            let reserved = reserved.clamp(0.0, 0.6 * edge);
-            let (middle, half) = (reserved / 2.0, (edge - reserved) / 2.0 / MARGIN);
+        let free_of = |edge: f32, low: f32, high: f32| {
+            let keep = (0.6 * edge / (low + high).max(1e-3)).min(1.0);
+            let (middle, half) = (
+                keep * (low - high) / 2.0,
+                (edge - keep * (low + high)) / 2.0 / MARGIN,
+            );
             (pixel * (half - middle), pixel * (half + middle))
         };
         // Along one screen axis, up to slopes `low` and `high`: a ball at (x, depth z towards the eye) is inside both
@@ -121,11 +129,8 @@ impl Camera {
             let midway = move |d: f32| (above - below + d * (low - high)) / 2.0;
             (midway, (above + below) / (low + high))
         };
-        // The left is the low side of the first axis, the top the high side of the second.
-        let (left, right) = free_of(width, reserved[0]);
-        let (top, bottom) = free_of(height, reserved[1]);
-        let (x, from_x) = span(axes.0, (left, right));
-        let (y, from_y) = span(axes.1, (bottom, top));
+        let (x, from_x) = span(axes.0, free_of(width, left, 0.0));
+        let (y, from_y) = span(axes.1, free_of(height, bottom, top));
         let eye_depth = from_x.max(from_y);
         let depths = || balls.iter().map(|(p, _)| p.dot(axes.2));
         let middle = (depths().fold(f32::INFINITY, f32::min)
@@ -375,15 +380,15 @@ mod tests {
             (Vec3::new(0.0, -0.4, 0.2), 0.0),
         ];
         for (size, reserved) in [
-            ([1280, 720], [0.0, 0.0]),
-            ([300, 900], [0.0, 0.0]),
-            ([640, 400], [250.0, 0.0]),
-            ([640, 400], [0.0, 180.0]),
+            ([1280, 720], [0.0; 3]),
+            ([300, 900], [0.0; 3]),
+            ([640, 400], [250.0, 0.0, 60.0]),
+            ([640, 400], [0.0, 180.0, 0.0]),
         ] {
             let mut camera = camera(SignedAxis::MinusZ);
             camera.fit_balls(&balls, size, reserved);
             let [w, h] = size.map(|n| n as f32);
-            let (free_w, free_h) = (w - reserved[0], h - reserved[1]);
+            let (free_w, free_h) = (w - reserved[0], h - reserved[1] - reserved[2]);
             let mut least = f32::INFINITY;
             for (centre, radius) in balls {
                 // Points of each ball, seen from all sides.
@@ -396,7 +401,7 @@ mod tests {
                         .min((p.x - reserved[0]) / free_w)
                         .min((w - p.x) / free_w)
                         .min((p.y - reserved[1]) / free_h)
-                        .min((h - p.y) / free_h);
+                        .min((h - reserved[2] - p.y) / free_h);
                 }
             }
             // The margin of 16 % leaves 0.5 (1 - 1/1.16) = 6.9 % at the tightest edge.
