@@ -132,11 +132,10 @@ impl SceneView {
         let m = drawn::magnification(scene, frame, options.magnification);
         let joints = drawn::joints(scene, frame, m);
         let mut extents = extents(&self.parts, frame, &joints);
-        if options.arrows.normal || options.arrows.friction {
-            // Half a reference length around each joint: arrows lean any way, and most are shorter.
-            let arrow = ARROW_LENGTH * self.bounds.radius;
-            extents.extend(joints.iter().map(|joint| (joint.socket_centre, arrow)));
-        }
+        // Half a reference length of arrows around each joint: they lean any way, and most are shorter. Drawn or not, so
+        // that pictures with and without them compare.
+        let arrow = ARROW_LENGTH * self.bounds.radius;
+        extents.extend(joints.iter().map(|joint| (joint.socket_centre, arrow)));
         extents
     }
 
