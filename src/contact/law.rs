@@ -148,6 +148,16 @@ impl Coefficients {
             self.friction * (slip_speed - self.slip_low) / (self.slip_high - self.slip_low)
         }
     }
+
+    /// Derivative of [`Self::friction_ratio`] by the sliding speed, s/m.
+    #[inline]
+    pub fn friction_slope(&self, slip_speed: f64) -> f64 {
+        if slip_speed <= self.slip_low || slip_speed >= self.slip_high {
+            0.0
+        } else {
+            self.friction / (self.slip_high - self.slip_low)
+        }
+    }
 }
 
 #[cfg(test)]

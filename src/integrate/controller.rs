@@ -35,14 +35,4 @@ impl Controller {
         }
         (0.9 * libm::pow(error, -1.0 / self.exponent)).clamp(0.1, 0.9)
     }
-
-    /// The remembered error, for a snapshot.
-    pub fn memory(&self) -> f64 {
-        self.previous
-    }
-
-    /// Restores the remembered error.
-    pub fn set_memory(&mut self, previous: f64) {
-        self.previous = previous;
-    }
 }

@@ -78,6 +78,22 @@ impl DormandPrince {
             raw_k_end: zeros(),
         }
     }
+
+    /// h |lambda| of the step just attempted, from the two evaluations at its end: beyond about 3.25 the step is held
+    /// by stability and not by accuracy (Hairer & Wanner II, IV.2, eq. (2.8)).
+    pub fn stiffness(&self, h: f64, y_end: &[f64], k_end: &[f64]) -> f64 {
+        let (mut rate, mut distance) = (0.0, 0.0);
+        for i in 0..y_end.len() {
+            let (dk, dy) = (k_end[i] - self.k6[i], y_end[i] - self.stage[i]);
+            rate += dk * dk;
+            distance += dy * dy;
+        }
+        if distance > 0.0 {
+            h * (rate / distance).sqrt()
+        } else {
+            0.0
+        }
+    }
 }
 
 impl Stepper for DormandPrince {
@@ -153,10 +169,6 @@ impl Stepper for DormandPrince {
             }
         }
         error
-    }
-
-    fn ends_with_derivative(&self) -> bool {
-        true
     }
 
     fn interpolate(

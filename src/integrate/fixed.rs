@@ -39,10 +39,6 @@ impl Stepper for SemiImplicitEuler {
         0.0
     }
 
-    fn ends_with_derivative(&self) -> bool {
-        false
-    }
-
     fn interpolate(
         &self,
         theta: f64,
@@ -107,10 +103,6 @@ impl Stepper for RungeKutta4 {
             y_end[i] = y[i] + h / 6.0 * (k[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
         }
         0.0
-    }
-
-    fn ends_with_derivative(&self) -> bool {
-        false
     }
 
     fn interpolate(

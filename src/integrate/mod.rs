@@ -7,11 +7,13 @@ mod controller;
 mod dormand_prince;
 mod fixed;
 mod root;
+mod rosenbrock;
 
 pub use controller::Controller;
 pub use dormand_prince::DormandPrince;
 pub use fixed::{RungeKutta4, SemiImplicitEuler};
 pub use root::find_root;
+pub use rosenbrock::Rosenbrock;
 
 /// Time-stepping method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,12 +24,16 @@ pub enum Method {
     RungeKutta4,
     /// Dormand-Prince 5(4), adaptive.
     DormandPrince5,
+    /// ROS34PW2, linearly implicit, order 3, adaptive.
+    Rosenbrock,
+    /// Dormand-Prince while accuracy sets the step, ROS34PW2 once stability does.
+    Automatic,
 }
 
 impl Method {
     /// Whether the step size is controlled by an error estimate.
     pub fn is_adaptive(self) -> bool {
-        matches!(self, Self::DormandPrince5)
+        !matches!(self, Self::SemiImplicitEuler | Self::RungeKutta4)
     }
 }
 
@@ -45,11 +51,24 @@ pub trait System {
     fn scale(&self) -> &[f64];
 }
 
+/// A system that a linearly implicit method can solve: it knows an approximation of its Jacobian J = df/dy, good in
+/// what is stiff.
+pub trait StiffSystem: System {
+    /// Takes J and df/dt at (t, y) and keeps them.
+    fn linearise(&mut self, t: f64, y: &[f64]);
+    /// Prepares to solve with `shift` I - J.
+    fn factor_shifted(&mut self, shift: f64);
+    /// Solves (`shift` I - J) x = b in place.
+    fn solve_shifted(&mut self, b: &mut [f64]);
+    /// df/dt where J was taken.
+    fn time_derivative(&self) -> &[f64];
+}
+
 /// One-step method.
 pub trait Stepper {
     /// Tries a step of size `h` from (`t`, `y`), where `k` = f(t, y), into `y_end`.
     ///
-    /// On return `k_end` is f(t + h, y_end) if [`Self::ends_with_derivative`]. Returns the error estimate relative to
+    /// On return an adaptive method has left f(t + h, y_end) in `k_end`. Returns the error estimate relative to
     /// the system's scales (largest component; 0 for a fixed-step method), not yet divided by the tolerance.
     fn attempt<S: System>(
         &mut self,
@@ -61,9 +80,6 @@ pub trait Stepper {
         y_end: &mut [f64],
         k_end: &mut [f64],
     ) -> f64;
-
-    /// Whether `attempt` leaves f(t + h, y_end) in `k_end`.
-    fn ends_with_derivative(&self) -> bool;
 
     /// State at `t + theta h` of the latest attempt, 0 <= theta <= 1, given its ends.
     fn interpolate(

@@ -25,6 +25,7 @@ pub struct Constraints {
     matrix: Skyline,
     /// Multipliers of the latest solve: force on the ball, N, three per joint.
     multipliers: Vec<f64>,
+    scratch: Vec<f64>,
     step: Vec<f64>,
     /// Smallest pivot ratio of the latest factorisation.
     pub least_pivot: f64,
@@ -84,6 +85,7 @@ impl Constraints {
             weighted: vec![0.0; total],
             matrix: Skyline::new(rows),
             multipliers: vec![0.0; 3 * joints.len()],
+            scratch: vec![0.0; 3 * joints.len()],
             step: vec![0.0; model.nv],
             least_pivot: f64::INFINITY,
         }
@@ -120,7 +122,7 @@ impl Constraints {
                     &tree.motion,
                     anchor.body,
                     &point,
-                    |column, velocity| {
+                    |column, velocity, _| {
                         for i in 0..3 {
                             rows[i * side.n + column] += sign * velocity[i];
                         }
@@ -196,6 +198,19 @@ impl Constraints {
         }
         self.matrix.solve(&mut self.multipliers);
         self.add_weighted(model, &self.multipliers, vdot);
+    }
+
+    /// Takes from the accelerations `vdot` what would open the joints: the linear part of [`Self::correct`], with its
+    /// matrices.
+    pub fn restrain(&mut self, model: &Model, vdot: &mut [f64]) {
+        for k in 0..self.joints.len() {
+            let residual = self.apply(model, k, vdot);
+            for i in 0..3 {
+                self.scratch[3 * k + i] = -residual[i];
+            }
+        }
+        self.matrix.solve(&mut self.scratch);
+        self.add_weighted(model, &self.scratch, vdot);
     }
 
     /// Projects positions, then velocities, onto the constraints in the metric of the mass matrix.

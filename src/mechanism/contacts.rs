@@ -90,6 +90,8 @@ pub struct Contacts {
     pub evaluations: u64,
     any_ramp: bool,
     any_contact: bool,
+    /// Of the latest evaluation, s.
+    time: f64,
 }
 
 impl Contacts {
@@ -117,6 +119,7 @@ impl Contacts {
             switching: Switching::Located,
             evaluations: 0,
             any_ramp: false,
+            time: 0.0,
         }
     }
 
@@ -194,8 +197,13 @@ impl Contacts {
         }
     }
 
+    /// Rate of the clearance of joint `i` at the latest evaluation, m/s.
+    pub fn clearance_rate(&self, i: usize) -> f64 {
+        self.clearance_rate_at(i, self.time)
+    }
+
     #[inline]
-    fn clearance_rate(&self, i: usize, t: f64) -> f64 {
+    fn clearance_rate_at(&self, i: usize, t: f64) -> f64 {
         if self.any_ramp {
             self.ramps[i].map_or(0.0, |r| r.at(t).1)
         } else {
@@ -209,6 +217,7 @@ impl Contacts {
             return;
         }
         self.update_ramps(t);
+        self.time = t;
         self.evaluations += 1;
         for i in 0..self.joints.len() {
             let Joint {
@@ -307,7 +316,7 @@ impl Contacts {
     /// Completes normal, penetration and rate of every gap from the eccentricities of the latest evaluation.
     pub fn finish(&mut self, t: f64) {
         for i in 0..self.joints.len() {
-            let clearance_rate = self.clearance_rate(i, t);
+            let clearance_rate = self.clearance_rate_at(i, t);
             let ideal = self.joints[i].joint.ideal.is_some();
             let clearance = self.joints[i].clearance;
             let gap = &mut self.gaps[i];

@@ -353,6 +353,46 @@ impl Lagrange {
         }
     }
 
+    /// Accelerations that generalised forces `x` cause under the constraints of the latest evaluation, in place.
+    pub fn mobilise(&mut self, model: &Model, x: &mut [f64]) {
+        for (b, body) in model.bodies.iter().enumerate() {
+            let torque = Vec3::new(x[6 * b + 3], x[6 * b + 4], x[6 * b + 5]);
+            let alpha = self.inverse_inertia[b] * torque;
+            for i in 0..3 {
+                x[6 * b + i] /= body.mass;
+                x[6 * b + 3 + i] = alpha[i];
+            }
+        }
+        let part = |x: &[f64], b: usize, at: usize| {
+            Vec3::new(x[6 * b + at], x[6 * b + at + 1], x[6 * b + at + 2])
+        };
+        for (i, row) in self.rows.iter().enumerate() {
+            let group = &self.groups[self.group_of[i]];
+            let mut sum = 0.0;
+            for (b, j) in [(group.child, &row.child), (group.parent, &row.parent)] {
+                if b < model.bodies.len() {
+                    sum += j[0].dot(&part(x, b, 0)) + j[1].dot(&part(x, b, 3));
+                }
+            }
+            self.residual[i] = -sum;
+        }
+        self.matrix.solve(&mut self.residual);
+        for (i, row) in self.rows.iter().enumerate() {
+            let group = &self.groups[self.group_of[i]];
+            let lambda = self.residual[i];
+            for (b, j) in [(group.child, &row.child), (group.parent, &row.parent)] {
+                if b < model.bodies.len() {
+                    let linear = j[0] * (lambda / model.bodies[b].mass);
+                    let angular = self.inverse_inertia[b] * j[1] * lambda;
+                    for k in 0..3 {
+                        x[6 * b + k] += linear[k];
+                        x[6 * b + 3 + k] += angular[k];
+                    }
+                }
+            }
+        }
+    }
+
     /// J_i M^-1 J_j^T.
     #[inline]
     fn mobility(&self, model: &Model, i: usize, j: usize) -> f64 {

@@ -11,6 +11,7 @@ mod kinematics;
 mod lagrange;
 mod model;
 mod spcmm;
+mod stiff;
 mod summary;
 mod tree;
 
@@ -20,7 +21,7 @@ pub use kinematics::{Kinematics, Wrench};
 pub use spcmm::{Ideal, Trajectory, Unreachable};
 pub use summary::Summary;
 
-use crate::integrate::System;
+use crate::integrate::{StiffSystem, System};
 use crate::scene::{Formulation, Scene, StartRule, Vec3};
 use constraints::Constraints;
 use lagrange::Lagrange;
@@ -78,6 +79,8 @@ pub struct Mechanism {
     /// World gravity, m/s^2.
     pub gravity: Vec3,
     joint_names: Vec<String>,
+    /// Linearisation; made when a linearly implicit method first asks.
+    stiff: Option<Box<stiff::Stiff>>,
     /// Evaluations of the equations of motion so far.
     pub evaluations: u64,
 }
@@ -107,6 +110,7 @@ impl Mechanism {
             contacts,
             gravity: scene.gravity,
             joint_names: scene.ball_joints.iter().map(|j| j.name.clone()).collect(),
+            stiff: None,
             evaluations: 0,
         })
     }
@@ -480,5 +484,105 @@ impl System for Mechanism {
             Form::Tree { .. } => &self.model.scale,
             Form::Lagrange(lagrange) => lagrange.scale(),
         }
+    }
+}
+
+/// Step in time of the difference that gives df/dt, s: short against any contact, long against rounding.
+const TIME_DIFFERENCE: f64 = 1e-8;
+
+impl StiffSystem for Mechanism {
+    fn linearise(&mut self, t: f64, y: &[f64]) {
+        let (dimension, positions) = (self.dimension(), self.positions());
+        let mut stiff = self
+            .stiff
+            .take()
+            .unwrap_or_else(|| Box::new(stiff::Stiff::new(dimension - positions, dimension)));
+        let mut now = std::mem::take(&mut stiff.derivative);
+        // Prescribed motion is the only explicit time in f.
+        let moves = self.drives() > 0 || self.contacts.ramps().iter().any(Option::is_some);
+        if moves {
+            self.derivative(t + TIME_DIFFERENCE, y, &mut stiff.time_derivative);
+        }
+        self.derivative(t, y, &mut now);
+        if moves {
+            for (later, now) in stiff.time_derivative.iter_mut().zip(&now) {
+                *later = (*later - now) / TIME_DIFFERENCE;
+            }
+        } else {
+            stiff.time_derivative.fill(0.0);
+        }
+        stiff.derivative = now;
+        let Self {
+            model,
+            form,
+            contacts,
+            ..
+        } = self;
+        match form {
+            Form::Tree { tree, constraints } => {
+                let motion = &tree.motion;
+                stiff.gather(model, contacts, motion, y, |body, point, visit| {
+                    if body < model.bodies.len() && !model.bodies[body].driven_only {
+                        let first = model.blocks[model.block_of[body]].v;
+                        tree::visit_columns(model, motion, body, point, |c, v, w| {
+                            visit(first + c, v, w)
+                        });
+                    }
+                });
+                stiff.mobilise(|x| {
+                    tree.solve(model, x);
+                    if let Some(constraints) = constraints {
+                        constraints.restrain(model, x);
+                    }
+                });
+            }
+            Form::Lagrange(lagrange) => {
+                let motion = &lagrange.motion;
+                stiff.gather(model, contacts, motion, y, |body, point, mut visit| {
+                    if body < model.bodies.len() {
+                        tree::visit_free(6 * body, &(point - motion[body].position), &mut visit);
+                    }
+                });
+                stiff.mobilise(|x| lagrange.mobilise(model, x));
+            }
+        }
+        self.stiff = Some(stiff);
+    }
+
+    fn factor_shifted(&mut self, shift: f64) {
+        if let Some(stiff) = &mut self.stiff {
+            stiff.factor(shift);
+        }
+    }
+
+    fn solve_shifted(&mut self, b: &mut [f64]) {
+        let positions = self.positions();
+        let Self {
+            model, form, stiff, ..
+        } = self;
+        let Some(stiff) = stiff else { return };
+        match form {
+            Form::Tree { .. } => stiff.solve(
+                positions,
+                b,
+                |y, rate, out| stiff::tree_velocities(model, y, rate, out),
+                |y, out| Tree::position_rate(model, y, out),
+            ),
+            Form::Lagrange(_) => {
+                let n = model.bodies.len();
+                stiff.solve(
+                    positions,
+                    b,
+                    |y, rate, out| stiff::body_velocities(n, y, rate, out),
+                    |y, out| Lagrange::position_rate(n, y, out),
+                );
+            }
+        }
+    }
+
+    fn time_derivative(&self) -> &[f64] {
+        self.stiff
+            .as_ref()
+            .map_or(&[], |stiff| &stiff.time_derivative)
     }
 }

@@ -422,15 +422,15 @@ fn fill_row(
     }
 }
 
-/// Column-wise walk over the coordinates that move body `b`: calls `visit(coordinate within block, point velocity per
-/// unit rate)` for a point at `point` (world).
+/// Column-wise walk over the coordinates that move body `b`: calls `visit(coordinate within block, point velocity,
+/// angular velocity)`, both per unit rate, for a point at `point` (world).
 #[inline]
 pub fn visit_columns(
     model: &Model,
     motion: &[Kinematics],
     b: usize,
     point: &Vec3,
-    mut visit: impl FnMut(usize, Vec3),
+    mut visit: impl FnMut(usize, Vec3, Vec3),
 ) {
     let mut at = b;
     while at < model.bodies.len() && !model.bodies[at].driven_only {
@@ -439,21 +439,24 @@ pub fn visit_columns(
         match model.bodies[at].motion {
             Motion::Revolute { v, .. } => {
                 let joint = m.position - m.arm;
-                visit(v - first, m.axis.cross(&(point - joint)));
+                visit(v - first, m.axis.cross(&(point - joint)), m.axis);
             }
-            Motion::Prismatic { v, .. } => visit(v - first, m.axis),
-            Motion::Free { v, .. } => {
-                let d = point - m.position;
-                let v = v - first;
-                visit(v, Vec3::x());
-                visit(v + 1, Vec3::y());
-                visit(v + 2, Vec3::z());
-                visit(v + 3, Vec3::new(0.0, -d.z, d.y));
-                visit(v + 4, Vec3::new(d.z, 0.0, -d.x));
-                visit(v + 5, Vec3::new(-d.y, d.x, 0.0));
-            }
+            Motion::Prismatic { v, .. } => visit(v - first, m.axis, Vec3::zeros()),
+            Motion::Free { v, .. } => visit_free(v - first, &(point - m.position), &mut visit),
             Motion::Fixed | Motion::Driven { .. } => {}
         }
         at = model.bodies[at].parent;
     }
+}
+
+/// The six columns of a free body for a point `d` from its centroid.
+#[inline]
+pub fn visit_free(v: usize, d: &Vec3, visit: &mut impl FnMut(usize, Vec3, Vec3)) {
+    let zero = Vec3::zeros();
+    visit(v, Vec3::x(), zero);
+    visit(v + 1, Vec3::y(), zero);
+    visit(v + 2, Vec3::z(), zero);
+    visit(v + 3, Vec3::new(0.0, -d.z, d.y), Vec3::x());
+    visit(v + 4, Vec3::new(d.z, 0.0, -d.x), Vec3::y());
+    visit(v + 5, Vec3::new(-d.y, d.x, 0.0), Vec3::z());
 }

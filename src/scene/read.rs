@@ -4,7 +4,7 @@ use super::document::{Document, Node, Section};
 use super::read_bodies::{read_body, read_shape};
 use super::read_joints::{BallJointText, JointText, read_ball_joint, read_joint, sort_forest};
 use super::*;
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::path::Path;
 use toml::de::DeTable;
 
@@ -38,7 +38,7 @@ const SPCMM_DIMENSIONS: [&str; 5] = [
 ];
 
 /// Where a value of a parameter stands in the file.
-type Places<'d> = HashMap<String, Node<'d>>;
+type Places<'d> = BTreeMap<String, Node<'d>>;
 
 impl Scene {
     /// A scene from TOML text; `file` is the name that errors give.
@@ -207,7 +207,7 @@ fn keys_with<'a>(section: &str, more: &[&'a str]) -> Vec<&'a str> {
 /// Every parameter from the file, or its default; returns where each stands.
 fn read_parameters<'d>(top: &Section<'d>, scene: &mut Scene) -> Result<Places<'d>, SceneError> {
     let mut places = Places::new();
-    let mut sections: HashMap<&str, Section<'d>> = HashMap::new();
+    let mut sections: BTreeMap<&str, Section<'d>> = BTreeMap::new();
     for (name, more) in [
         ("gravity", &[][..]),
         ("contact", &[]),
@@ -246,7 +246,7 @@ fn read_parameters<'d>(top: &Section<'d>, scene: &mut Scene) -> Result<Places<'d
     Ok(places)
 }
 
-fn default_of(parameter: &Parameter, sections: &HashMap<&str, Section<'_>>) -> Value {
+fn default_of(parameter: &Parameter, sections: &BTreeMap<&str, Section<'_>>) -> Value {
     // Half a gravity vector would be a surprise: a section that names one component has 0 for the others.
     if parameter.key.starts_with("gravity.") && sections.contains_key("gravity") {
         Value::Number(0.0)
@@ -305,7 +305,7 @@ fn read_mechanism<'d>(
         joints.push(joint);
     }
     (scene.bodies, scene.joints) = sort_forest(bodies, joints, &body_sections)?;
-    let by_name: HashMap<String, usize> = scene
+    let by_name: BTreeMap<String, usize> = scene
         .bodies
         .iter()
         .enumerate()
@@ -393,7 +393,7 @@ pub(super) fn no_body<'a>(wanted: &str, names: impl Iterator<Item = &'a str> + C
 /// Names seen so far, with their lines: no two may be equal.
 #[derive(Default)]
 struct Names {
-    lines: HashMap<String, u32>,
+    lines: BTreeMap<String, u32>,
 }
 
 impl Names {

@@ -5,7 +5,7 @@ use super::document::{Node, Section};
 use super::read::no_body;
 use super::table::contact_part;
 use super::*;
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 
 const KINDS: [&str; 4] = ["fixed", "prismatic", "revolute", "free"];
@@ -22,7 +22,7 @@ pub(super) struct JointText<'d> {
 pub(super) struct BallJointText<'d> {
     pub joint: BallJoint,
     pub section: Section<'d>,
-    pub places: HashMap<String, Node<'d>>,
+    pub places: BTreeMap<String, Node<'d>>,
 }
 
 /// One `[[joint]]`; `bodies` are the names in file order.
@@ -438,7 +438,7 @@ pub(super) fn sort_forest(
 pub(super) fn read_ball_joint<'d>(
     node: &Node<'d>,
     scene: &Scene,
-    bodies: &HashMap<String, usize>,
+    bodies: &BTreeMap<String, usize>,
 ) -> Result<BallJointText<'d>, SceneError> {
     let parts: Vec<&'static str> = table().iter().filter_map(contact_part).collect();
     let known: Vec<&str> = ["name", "socket", "ball", "opening"]
@@ -481,7 +481,7 @@ pub(super) fn read_ball_joint<'d>(
         .map_or(Ok(scene.view.down.unit()), |node| node.direction())?;
     let mut contact = scene.contact;
     let mut overrides = Vec::new();
-    let mut places = HashMap::new();
+    let mut places = BTreeMap::new();
     for part in parts {
         if let Some(node) = section.get(part) {
             set_contact_value(

@@ -19,7 +19,13 @@ pub(super) const NORMAL_LAWS: [&str; 5] = [
 ];
 pub(super) const FRICTION_LAWS: [&str; 2] = ["modified-coulomb", "none"];
 pub(super) const FORMULATIONS: [&str; 2] = ["tree", "lagrange"];
-pub(super) const METHODS: [&str; 3] = ["semi-implicit-euler", "rk4", "dopri5"];
+pub(super) const METHODS: [&str; 5] = [
+    "semi-implicit-euler",
+    "rk4",
+    "dopri5",
+    "rosenbrock",
+    "automatic",
+];
 pub(super) const PRESETS: [&str; 4] = ["preview", "real-time", "accurate", "reference"];
 pub(super) const AXES: [&str; 6] = ["+x", "-x", "+y", "-y", "+z", "-z"];
 
@@ -342,7 +348,9 @@ static TABLE: [Parameter; 26] = [
         Value::Choice("dopri5"),
         Scope::Every,
         "Time stepper. semi-implicit-euler (order 1) and rk4 (order 4) keep a fixed step; dopri5 (Dormand-Prince, \
-         order 5) chooses its steps by the tolerance and finds the instants at which contacts begin and end.",
+         order 5) chooses its steps by the tolerance and finds the instants at which contacts begin and end; \
+         rosenbrock (ROS34PW2, linearly implicit, order 3) does so too and is not held back by stiff, settled \
+         contacts; automatic changes between these two.",
         "Solves paper eqs. (55), (58) in time",
     ),
     row(

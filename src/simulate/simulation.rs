@@ -3,7 +3,7 @@
 use super::peaks::{Approach, Course};
 use super::stepper::AnyStepper;
 use super::{Effect, Frame, Peak, Snapshot, StartError, Statistics, Stopped, report};
-use crate::integrate::{Controller, Stepper, System, find_root, hermite};
+use crate::integrate::{Controller, Method, System, find_root, hermite};
 use crate::mechanism::{Mechanism, Memory, Ramp, Switching};
 use crate::scene::{Scene, SceneError};
 
@@ -18,10 +18,22 @@ const SHORTEST_STEP: f64 = 1e-14;
 const KINEMATIC_STEP: f64 = 2e-3;
 /// First step after a contact begins, before one is known to work, s: a tenth of a usual impact.
 const FIRST_CONTACT_STEP: f64 = 1e-5;
+/// h |lambda| beyond which an explicit step is held by stability.
+const HELD_BY_STABILITY: f64 = 3.0;
+/// Steps in a row that must be held by stability before the linearly implicit method takes over.
+const HELD_STEPS: i32 = 8;
+/// Steps in a row that must stay short before the explicit method gets its turn back, and for how many steps then.
+const SHORT_STEPS: i32 = 12;
+const EXPLICIT_TURN: i32 = 150;
+/// More velocity coordinates than this make a dense factorisation dearer than many explicit steps.
+const LARGEST_IMPLICIT: usize = 96;
 /// Speed beyond which a state is absurd, m/s and rad/s.
 const ABSURD_SPEED: f64 = 1e6;
 /// Loops that are open by more than this after projection have come apart, m.
 const OPEN_LOOP: f64 = 1e-7;
+
+/// Advice where closed loops cannot stay closed.
+const DEPENDENT: &str = "the ideal joints are (nearly) dependent here: keep clear of this pose, or give a joint a clearance";
 
 /// A scene in motion.
 ///
@@ -69,6 +81,12 @@ pub(super) struct State {
     h_contact: f64,
     /// A contact began at the latest event.
     contact_began: bool,
+    /// Of the automatic pair the linearly implicit method steps.
+    implicit: bool,
+    /// Steps in a row that spoke for the other method of the pair; negative: it has to wait.
+    votes: i32,
+    /// Explicit step at the latest change to the implicit method.
+    h_explicit: f64,
     controller: Controller,
     /// Fixed steps are counted from here, so that times do not accumulate rounding.
     grid_origin: f64,
@@ -108,7 +126,10 @@ impl Simulation {
                 h_next: scene.solver.step.min(LONGEST_STEP),
                 h_contact: FIRST_CONTACT_STEP,
                 contact_began: false,
-                controller: Controller::new(4),
+                implicit: scene.solver.method == Method::Rosenbrock,
+                votes: 0,
+                h_explicit: 0.0,
+                controller: controller_of(scene.solver.method == Method::Rosenbrock),
                 grid_origin: 0.0,
                 grid_count: 0,
                 statistics: Statistics {
@@ -166,6 +187,7 @@ impl Simulation {
         mechanism.evaluations = evaluations;
         mechanism.contacts.finish(state.t);
         store_gaps(mechanism, &mut state.gaps);
+        self.stepper.invalidate();
         state.t0 = state.t;
         state.y0.copy_from_slice(&state.y);
         state.k0.copy_from_slice(&state.k);
@@ -236,17 +258,15 @@ impl Simulation {
     }
 
     fn advance(&mut self, end: f64) -> Result<(), Stopped> {
-        let ramp_end = self.ramp_end();
-        let limit = end.min(ramp_end);
+        // Not at the end of the step before: samples inside it still see the clearance on its way.
+        self.finish_ramps();
+        let limit = end.min(self.ramp_end());
         if self.mechanism.is_kinematic() {
             self.kinematic_step(limit)?;
         } else if self.running.solver.method.is_adaptive() {
             self.adaptive_step(limit)?;
         } else {
             self.fixed_step(limit)?;
-        }
-        if self.state.t >= ramp_end {
-            self.finish_ramps();
         }
         Ok(())
     }
@@ -262,6 +282,7 @@ impl Simulation {
             ..
         } = self;
         let tolerance = self.running.solver.tolerance;
+        stepper.choose(state.implicit);
         let evaluations = mechanism.evaluations;
         mechanism
             .contacts
@@ -293,12 +314,17 @@ impl Simulation {
             if !(state.h_next >= SHORTEST_STEP.max(4.0 * f64::EPSILON * t)) {
                 state.statistics.evaluations += mechanism.evaluations - evaluations;
                 state.h_next = self.running.solver.step;
-                return Err(
-                    self.stopped("the step size that the tolerance asks for fell below 1e-14 s")
+                let advice = format!(
+                    "try a looser solver.tolerance (now {tolerance:e}) or a softer or heavier scene"
                 );
+                return Err(self.stopped(
+                    "the step size that the tolerance asks for fell below 1e-14 s",
+                    advice,
+                ));
             }
         };
         let contact_began = state.contact_began;
+        let stiffness = stepper.stiffness(h, y_end, k_end);
         if let Some(factor) = factor {
             state.h_next = h * factor;
         }
@@ -323,7 +349,55 @@ impl Simulation {
         } else if contact_began {
             self.state.h_contact = h.max(1e-9);
         }
-        self.accept(t_end, h, evaluations)
+        self.accept(t_end, h, evaluations)?;
+        if self.running.solver.method == Method::Automatic {
+            self.vote(h, stiffness);
+        }
+        Ok(())
+    }
+
+    /// Which method of the automatic pair takes the next step.
+    fn vote(&mut self, h: f64, stiffness: f64) {
+        let state = &mut self.state;
+        // An impact is short and not stiff: the explicit method resolves it at less cost.
+        if state.contact_began {
+            if state.implicit {
+                state.implicit = false;
+                state.controller = controller_of(false);
+            }
+            state.votes = 0;
+            return;
+        }
+        if state.votes < 0 {
+            state.votes += 1;
+            return;
+        }
+        if state.implicit {
+            state.votes = if h < 4.0 * state.h_explicit {
+                state.votes + 1
+            } else {
+                0
+            };
+            if state.votes >= SHORT_STEPS {
+                state.implicit = false;
+                state.controller = controller_of(false);
+                state.h_next = state.h_explicit;
+                state.votes = -EXPLICIT_TURN;
+            }
+        } else {
+            state.votes = if stiffness > HELD_BY_STABILITY {
+                state.votes + 1
+            } else {
+                (state.votes - 1).max(0)
+            };
+            let velocities = state.y.len() - self.mechanism.positions();
+            if state.votes >= HELD_STEPS && velocities <= LARGEST_IMPLICIT {
+                state.implicit = true;
+                state.controller = controller_of(true);
+                state.h_explicit = h;
+                state.votes = 0;
+            }
+        }
     }
 
     /// Fraction of the step just attempted at which the first contact starts or ends, if one does.
@@ -419,16 +493,15 @@ impl Simulation {
         }
         let h = t_end - t;
         stepper.attempt(mechanism, t, h, &state.y, &state.k, y_end, k_end);
+        self.accept(t_end, h, evaluations)?;
         if t_end == limit {
             // The next grid begins where this one was cut.
-            state.grid_origin = t_end;
-            state.grid_count = u64::MAX;
+            self.state.grid_origin = t_end;
+            self.state.grid_count = 0;
+        } else {
+            self.state.grid_count += 1;
         }
-        let result = self.accept(t_end, h, evaluations);
-        if result.is_ok() {
-            self.state.grid_count = self.state.grid_count.wrapping_add(1);
-        }
-        result
+        Ok(())
     }
 
     /// A step of a scene whose motion is a function of time alone: predict, close the loops, read the reactions.
@@ -471,7 +544,22 @@ impl Simulation {
         }
         state.statistics.evaluations += mechanism.evaluations - evaluations;
         if let Some(what) = self.objection(open) {
-            return Err(self.stopped(&what));
+            let solver = &self.running.solver;
+            let advice = if open.is_nan() || open > OPEN_LOOP {
+                DEPENDENT.to_owned()
+            } else if solver.method.is_adaptive() {
+                // Its steps are as short as they need to be: the motion itself is beyond the model.
+                format!(
+                    "try slower drives, a stiffer contact, or a tighter solver.tolerance (now {:e})",
+                    solver.tolerance
+                )
+            } else {
+                format!(
+                    "try a smaller solver.step (now {:e} s) or solver.method = dopri5",
+                    solver.step
+                )
+            };
+            return Err(self.stopped(&what, advice));
         }
         let Self {
             mechanism,
@@ -654,20 +742,11 @@ impl Simulation {
         None
     }
 
-    fn stopped(&self, what: &str) -> Stopped {
-        let solver = &self.running.solver;
+    fn stopped(&self, what: &str, advice: String) -> Stopped {
         let advice = if self.mechanism.least_pivot() < 1e-12 {
-            "the ideal joints are (nearly) dependent here: keep clear of this pose, or give a joint a clearance".to_owned()
-        } else if solver.method.is_adaptive() {
-            format!(
-                "try a looser solver.tolerance (now {:e}) or a softer or heavier scene",
-                solver.tolerance
-            )
+            DEPENDENT.to_owned()
         } else {
-            format!(
-                "try a smaller solver.step (now {:e} s) or solver.method = dopri5",
-                solver.step
-            )
+            advice
         };
         Stopped {
             time: self.state.t,
@@ -764,19 +843,19 @@ impl Simulation {
         waits: bool,
     ) -> Result<Effect, SceneError> {
         let mut running = self.running.clone();
-        let becomes_other = || {
-            self.running
-                .ball_joints
-                .iter()
-                .zip(&next.ball_joints)
-                .any(|(a, b)| (a.contact.clearance == 0.0) != (b.contact.clearance == 0.0))
-        };
+        // What the running scene cannot take may suit the one that waits, say a joint of a longer chain.
+        let waits = waits || change(&mut running).is_err();
         // A joint that turns ideal, or stops being so, changes the equations.
-        if waits || becomes_other() {
+        let turns = |running: &Scene| {
+            let pairs = self.running.ball_joints.iter().zip(&running.ball_joints);
+            pairs
+                .map(|(a, b)| (a.contact.clearance, b.contact.clearance))
+                .any(|(a, b)| (a == 0.0) != (b == 0.0))
+        };
+        if waits || turns(&running) {
             self.scene = next;
             return Ok(Effect::AtReset);
         }
-        change(&mut running)?;
         self.scene = next;
         let before = std::mem::replace(&mut self.running, running);
         self.mechanism.gravity = self.running.gravity;
@@ -790,6 +869,9 @@ impl Simulation {
             let solver = &self.running.solver;
             if solver.method != before.solver.method {
                 self.stepper = AnyStepper::new(solver.method, self.state.y.len());
+                self.state.implicit = solver.method == Method::Rosenbrock;
+                self.state.controller = controller_of(self.state.implicit);
+                self.state.votes = 0;
                 self.mechanism.contacts.switching = switching_of(&self.running);
             }
             self.state.h_next = self.state.h_next.min(solver.step);
@@ -942,6 +1024,11 @@ impl Simulation {
     pub fn contact_memory(&self, j: usize) -> Memory {
         self.state.memory[j]
     }
+}
+
+/// Step-size control of the linearly implicit method (embedded order 2) or of the explicit one (embedded order 4).
+fn controller_of(implicit: bool) -> Controller {
+    Controller::new(if implicit { 2 } else { 4 })
 }
 
 fn switching_of(scene: &Scene) -> Switching {

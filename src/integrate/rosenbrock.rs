@@ -1,0 +1,297 @@
+//! ROS34PW2, a linearly implicit method for stiff systems: four stages, order 3 for any approximation of the Jacobian
+//! (a W-method), stiffly accurate, L-stable, embedded order 2
+//! (Rang & Angermann, *New Rosenbrock W-methods of order 3 for PDAEs of index 1*, BIT 45 (2005) 761-787).
+//!
+//! Written in the variables U = Gamma K, which need no product with the Jacobian
+//! (Hairer & Wanner, *Solving Ordinary Differential Equations II*, 2nd ed., IV.7, eq. (7.25)).
+
+use super::{StiffSystem, hermite};
+
+const STAGES: usize = 4;
+const GAMMA: f64 = 0.435_866_521_508_459;
+const ALPHA_IJ: [[f64; STAGES]; STAGES] = [
+    [0.0; 4],
+    [0.871_733_043_016_918, 0.0, 0.0, 0.0],
+    [0.844_570_600_153_694_2, -0.112_990_642_364_841_85, 0.0, 0.0],
+    [0.0, 0.0, 1.0, 0.0],
+];
+const GAMMA_IJ: [[f64; STAGES]; STAGES] = [
+    [GAMMA, 0.0, 0.0, 0.0],
+    [-0.871_733_043_016_918, GAMMA, 0.0, 0.0],
+    [
+        -0.903_380_570_130_440_8,
+        0.054_180_672_388_095_326,
+        GAMMA,
+        0.0,
+    ],
+    [
+        0.242_123_807_060_953_46,
+        -1.223_250_583_904_514_7,
+        0.545_260_255_335_102_1,
+        GAMMA,
+    ],
+];
+const WEIGHTS: [f64; STAGES] = [
+    0.242_123_807_060_953_46,
+    -1.223_250_583_904_514_7,
+    1.545_260_255_335_102,
+    GAMMA,
+];
+const EMBEDDED: [f64; STAGES] = [
+    0.378_109_031_458_193_7,
+    -0.096_042_292_212_423_18,
+    0.5,
+    0.217_932_607_542_295,
+];
+
+/// Coefficients in the variables U.
+struct Table {
+    a: [[f64; STAGES]; STAGES],
+    c: [[f64; STAGES]; STAGES],
+    weights: [f64; STAGES],
+    error: [f64; STAGES],
+    /// Abscissae and the weights of the time derivative.
+    alpha: [f64; STAGES],
+    gamma: [f64; STAGES],
+}
+
+impl Table {
+    /// A = alpha Gamma^-1, C = diag(1 / gamma) - Gamma^-1, m = b Gamma^-1.
+    fn new() -> Self {
+        let mut inverse = [[0.0; STAGES]; STAGES];
+        for j in 0..STAGES {
+            for i in j..STAGES {
+                let mut sum = if i == j { 1.0 } else { 0.0 };
+                for k in j..i {
+                    sum -= GAMMA_IJ[i][k] * inverse[k][j];
+                }
+                inverse[i][j] = sum / GAMMA;
+            }
+        }
+        let times_inverse = |row: &[f64; STAGES]| {
+            std::array::from_fn(|j| (0..STAGES).map(|k| row[k] * inverse[k][j]).sum::<f64>())
+        };
+        let difference: [f64; STAGES] = std::array::from_fn(|i| WEIGHTS[i] - EMBEDDED[i]);
+        Self {
+            a: std::array::from_fn(|i| times_inverse(&ALPHA_IJ[i])),
+            c: std::array::from_fn(|i| {
+                std::array::from_fn(|j| if i == j { 0.0 } else { -inverse[i][j] })
+            }),
+            weights: times_inverse(&WEIGHTS),
+            error: times_inverse(&difference),
+            alpha: std::array::from_fn(|i| ALPHA_IJ[i].iter().sum()),
+            gamma: std::array::from_fn(|i| GAMMA_IJ[i].iter().sum()),
+        }
+    }
+}
+
+/// ROS34PW2.
+pub struct Rosenbrock {
+    table: Table,
+    u: [Vec<f64>; STAGES],
+    stage: Vec<f64>,
+    rate: Vec<f64>,
+    /// Where the Jacobian was taken last; a rejected step keeps it.
+    linearised_at: f64,
+}
+
+impl Rosenbrock {
+    /// For `dimension` components.
+    pub fn new(dimension: usize) -> Self {
+        Self {
+            table: Table::new(),
+            u: std::array::from_fn(|_| vec![0.0; dimension]),
+            stage: vec![0.0; dimension],
+            rate: vec![0.0; dimension],
+            linearised_at: f64::NAN,
+        }
+    }
+
+    /// Forgets the Jacobian: the state was changed by something else than a step.
+    pub fn invalidate(&mut self) {
+        self.linearised_at = f64::NAN;
+    }
+
+    /// As [`super::Stepper::attempt`].
+    pub fn attempt<S: StiffSystem>(
+        &mut self,
+        system: &mut S,
+        t: f64,
+        h: f64,
+        y: &[f64],
+        k: &[f64],
+        y_end: &mut [f64],
+        k_end: &mut [f64],
+    ) -> f64 {
+        let n = y.len();
+        if self.linearised_at != t {
+            system.linearise(t, y);
+            self.linearised_at = t;
+        }
+        system.factor_shifted(1.0 / (GAMMA * h));
+        let Self {
+            table,
+            u,
+            stage,
+            rate,
+            ..
+        } = self;
+        for i in 0..STAGES {
+            let (done, rest) = u.split_at_mut(i);
+            let target = &mut rest[0];
+            if i == 0 {
+                target.copy_from_slice(k);
+            } else {
+                stage.copy_from_slice(y);
+                for (j, uj) in done.iter().enumerate() {
+                    let a = table.a[i][j];
+                    for m in 0..n {
+                        stage[m] += a * uj[m];
+                    }
+                }
+                system.derivative(t + table.alpha[i] * h, stage, rate);
+                target.copy_from_slice(rate);
+                for (j, uj) in done.iter().enumerate() {
+                    let c = table.c[i][j] / h;
+                    for m in 0..n {
+                        target[m] += c * uj[m];
+                    }
+                }
+            }
+            let g = table.gamma[i] * h;
+            for (x, f) in target.iter_mut().zip(system.time_derivative()) {
+                *x += g * f;
+            }
+            system.solve_shifted(target);
+        }
+        let mut error = 0.0;
+        let scale = system.scale();
+        for m in 0..n {
+            let (mut sum, mut e) = (y[m], 0.0);
+            for i in 0..STAGES {
+                sum += table.weights[i] * u[i][m];
+                e += table.error[i] * u[i][m];
+            }
+            y_end[m] = sum;
+            let e: f64 = e.abs() / scale[m];
+            // `max` would drop a NaN.
+            if e > error || e.is_nan() {
+                error = e;
+            }
+        }
+        system.derivative(t + h, y_end, k_end);
+        error
+    }
+
+    /// State at `t + theta h`: the cubic through both ends, of the method's own order.
+    pub fn interpolate(
+        &self,
+        theta: f64,
+        h: f64,
+        y: &[f64],
+        k: &[f64],
+        y_end: &[f64],
+        k_end: &[f64],
+        out: &mut [f64],
+    ) {
+        hermite(theta, h, y, k, y_end, k_end, out);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::integrate::System;
+
+    /// Prothero & Robinson (1974) with a second, mildly nonlinear component: y0' = -L (y0 - sin t) + cos t,
+    /// y1' = -y1^2 + t; `exact` uses the true Jacobian, else a crude one.
+    struct Problem {
+        stiffness: f64,
+        exact: bool,
+        j: [f64; 2],
+        shift: f64,
+        ft: [f64; 2],
+    }
+
+    impl System for Problem {
+        fn dimension(&self) -> usize {
+            2
+        }
+        fn positions(&self) -> usize {
+            0
+        }
+        fn derivative(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
+            let (s, c) = libm::sincos(t);
+            dy[0] = -self.stiffness * (y[0] - s) + c;
+            dy[1] = -y[1] * y[1] + t;
+        }
+        fn position_rate(&mut self, _t: f64, _y: &[f64], _dy: &mut [f64]) {}
+        fn scale(&self) -> &[f64] {
+            &[1.0, 1.0]
+        }
+    }
+
+    impl StiffSystem for Problem {
+        fn linearise(&mut self, t: f64, y: &[f64]) {
+            let (s, c) = libm::sincos(t);
+            if self.exact {
+                self.j = [-self.stiffness, -2.0 * y[1]];
+                self.ft = [self.stiffness * c - s, 1.0];
+            } else {
+                self.j = [-0.9 * self.stiffness, 0.0];
+                self.ft = [0.0, 0.0];
+            }
+        }
+        fn factor_shifted(&mut self, shift: f64) {
+            self.shift = shift;
+        }
+        fn solve_shifted(&mut self, b: &mut [f64]) {
+            b[0] /= self.shift - self.j[0];
+            b[1] /= self.shift - self.j[1];
+        }
+        fn time_derivative(&self) -> &[f64] {
+            &self.ft
+        }
+    }
+
+    fn end_error(stiffness: f64, exact: bool, steps: u32) -> f64 {
+        let end = |steps: u32| {
+            let mut problem = Problem {
+                stiffness,
+                exact,
+                j: [0.0; 2],
+                shift: 0.0,
+                ft: [0.0; 2],
+            };
+            let mut method = Rosenbrock::new(2);
+            let (mut y, mut k, mut y1, mut k1) = ([0.0, 0.5], [0.0; 2], [0.0; 2], [0.0; 2]);
+            let h = 1.0 / f64::from(steps);
+            for n in 0..steps {
+                let t = f64::from(n) * h;
+                problem.derivative(t, &y, &mut k);
+                method.attempt(&mut problem, t, h, &y, &k, &mut y1, &mut k1);
+                y = y1;
+            }
+            y
+        };
+        let (got, fine) = (end(steps), end(4096));
+        (got[0] - libm::sin(1.0))
+            .abs()
+            .max((got[1] - fine[1]).abs())
+    }
+
+    #[test]
+    fn order_is_three_with_an_exact_and_with_a_crude_jacobian() {
+        for exact in [true, false] {
+            let order = libm::log2(end_error(2.0, exact, 20) / end_error(2.0, exact, 40));
+            assert!((order - 3.0).abs() < 0.3, "exact {exact}: {order}");
+        }
+    }
+
+    #[test]
+    fn a_very_stiff_component_is_followed_at_large_steps() {
+        // L h = 5e8: an explicit method would need half a billion steps.
+        let error = end_error(1e10, true, 20);
+        assert!(error < 1e-4, "{error:e}");
+    }
+}

@@ -1,0 +1,112 @@
+//! Nothing is allocated in the stepping loop.
+#![allow(
+    unsafe_code,
+    reason = "a global allocator that counts can only be written with it"
+)]
+
+mod common;
+
+use common::{METHODS, SCENES, simulation};
+use jointplay::simulate::Frame;
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+thread_local! {
+    /// Allocations of this thread: tests run side by side.
+    static COUNT: Cell<u64> = const { Cell::new(0) };
+}
+
+struct Counting;
+
+fn count() {
+    // A thread that is ending has no counter any more, and none of its allocations matter.
+    let _ = COUNT.try_with(|count| count.set(count.get() + 1));
+}
+
+// SAFETY: every call is handed on unchanged to the system's allocator.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        count();
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        count();
+        unsafe { System.alloc_zeroed(layout) }
+    }
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        count();
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// Allocations that `work` makes.
+fn allocations(work: impl FnOnce()) -> u64 {
+    let before = COUNT.get();
+    work();
+    COUNT.get() - before
+}
+
+#[test]
+fn the_counter_counts() {
+    assert_eq!(allocations(|| drop(std::hint::black_box(vec![1.0; 8]))), 1);
+    let mut grown = vec![1.0];
+    assert!(allocations(|| grown.extend(std::hint::black_box([2.0; 9]))) > 0);
+}
+
+#[test]
+fn steps_samples_and_peaks_allocate_nothing() {
+    for name in SCENES {
+        for method in METHODS {
+            for form in ["tree", "lagrange"] {
+                for clearance in ["as given", "0"] {
+                    let mut changes = vec![
+                        ("solver.method", method),
+                        ("solver.tolerance", "1e-5"),
+                        ("formulation", form),
+                    ];
+                    if clearance == "0" {
+                        changes.push(("contact.clearance", "0"));
+                    }
+                    let mut simulation = simulation(name, &changes);
+                    let (mut frame, mut peaks) = (Frame::default(), Vec::new());
+                    simulation.sample(0.0, &mut frame);
+                    simulation.take_peaks(&mut peaks);
+                    let end = if form == "tree" { 0.02 } else { 0.0125 };
+                    let found = allocations(|| {
+                        while simulation.time() < end {
+                            simulation.step().unwrap();
+                            let (from, to) = (simulation.step_start(), simulation.time());
+                            simulation.sample(0.5 * (from + to), &mut frame);
+                            simulation.sample(to, &mut frame);
+                            simulation.take_peaks(&mut peaks);
+                            std::hint::black_box(simulation.state_hash());
+                        }
+                        simulation.step_until(end + 1e-6).unwrap();
+                    });
+                    let case = format!("{name}, {method}, {form}, clearance {clearance}");
+                    assert_eq!(found, 0, "{case}");
+                    let impacts: u64 = simulation.statistics().impacts.iter().sum();
+                    assert_eq!(impacts == 0, clearance == "0", "{case}: {impacts}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_clearance_on_its_way_allocates_nothing() {
+    for method in METHODS {
+        let mut simulation = simulation("pendulum", &[("solver.method", method)]);
+        simulation.advance_to(0.03).unwrap();
+        simulation.set("contact.clearance", "0.25 mm").unwrap();
+        simulation.set("contact.friction", "0.2").unwrap();
+        let found = allocations(|| simulation.advance_to(0.06).unwrap());
+        assert_eq!(found, 0, "{method}");
+    }
+}

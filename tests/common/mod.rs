@@ -1,0 +1,64 @@
+//! What several test files need.
+#![allow(
+    dead_code,
+    reason = "each test file is a crate of its own and uses some of this"
+)]
+
+use jointplay::scene::Scene;
+use jointplay::simulate::{Frame, Simulation};
+
+/// Built-in scenes.
+pub const SCENES: [&str; 5] = jointplay::scene::BUILT_IN;
+/// Words of `solver.method`.
+pub const METHODS: [&str; 3] = ["semi-implicit-euler", "rk4", "dopri5"];
+
+/// Keys and values as a user writes them.
+pub type Changes<'a> = [(&'a str, &'a str)];
+
+fn owned(changes: &Changes) -> Vec<(String, String)> {
+    let own = |(key, value): &(&str, &str)| ((*key).to_owned(), (*value).to_owned());
+    changes.iter().map(own).collect()
+}
+
+/// A built-in scene with changes.
+pub fn scene(name: &str, changes: &Changes) -> Scene {
+    Scene::load(name, &owned(changes)).unwrap()
+}
+
+/// A scene from its text with changes.
+pub fn parse(text: &str, changes: &Changes) -> Scene {
+    Scene::parse(text, None, &owned(changes)).unwrap()
+}
+
+/// A running built-in scene.
+pub fn simulation(name: &str, changes: &Changes) -> Simulation {
+    Simulation::new(&scene(name, changes)).unwrap()
+}
+
+/// Steps exactly to `end`, the last step cut.
+pub fn run_until(simulation: &mut Simulation, end: f64) {
+    while simulation.time() < end {
+        simulation.step_until(end).unwrap();
+    }
+}
+
+/// Everything at the latest state.
+pub fn frame_now(simulation: &mut Simulation) -> Frame {
+    let mut frame = Frame::default();
+    simulation.sample(simulation.time(), &mut frame);
+    frame
+}
+
+/// Slope of ln(y) against ln(x) by least squares.
+pub fn slope(points: &[(f64, f64)]) -> f64 {
+    let n = points.len() as f64;
+    let logs = points.iter().map(|&(x, y)| (x.ln(), y.ln()));
+    let (mut sx, mut sy, mut sxx, mut sxy) = (0.0, 0.0, 0.0, 0.0);
+    for (x, y) in logs {
+        sx += x;
+        sy += y;
+        sxx += x * x;
+        sxy += x * y;
+    }
+    (n * sxy - sx * sy) / (n * sxx - sx * sx)
+}
