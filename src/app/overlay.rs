@@ -84,7 +84,7 @@ pub fn time(painter: &Painter, rect: Rect, time: f64, notes: &[String], theme: T
     }
 }
 
-/// About the width and height that [`time`] takes with a note for each of so many joints, whatever they come to say; points.
+/// About the width and height that the time takes with a note for each of so many joints, whatever they come to say; points.
 pub fn plate(joints: usize) -> [f32; 2] {
     const LONGEST: f32 = 230.0;
     const LINE: f32 = 16.0;
