@@ -31,7 +31,7 @@ impl Controller {
     /// Factor for the next try after a rejected one.
     pub fn after_reject(&self, error: f64) -> f64 {
         if !error.is_finite() {
-            return 0.1;
+            return 0.25;
         }
         (0.9 * libm::pow(error, -1.0 / self.exponent)).clamp(0.1, 0.9)
     }

@@ -79,6 +79,24 @@ impl DormandPrince {
         }
     }
 
+    /// State at `t + theta h` of the latest attempt, 0 <= theta <= 1, from its start and the derivative there.
+    pub fn interpolate(&self, theta: f64, h: f64, y: &[f64], k: &[f64], out: &mut [f64]) {
+        let s = 1.0 - theta;
+        for i in 0..out.len() {
+            let d = self.raw_end[i] - y[i];
+            let b = h * k[i] - d;
+            let c = d - h * self.raw_k_end[i] - b;
+            let e = h
+                * (D[0] * k[i]
+                    + D[1] * self.k3[i]
+                    + D[2] * self.k4[i]
+                    + D[3] * self.k5[i]
+                    + D[4] * self.k6[i]
+                    + D[5] * self.raw_k_end[i]);
+            out[i] = y[i] + theta * (d + s * (b + theta * (c + s * e)));
+        }
+    }
+
     /// h |lambda| of the step just attempted, from the two evaluations at its end: beyond about 3.25 the step is held
     /// by stability and not by accuracy (Hairer & Wanner II, IV.2, eq. (2.8)).
     pub fn stiffness(&self, h: f64, y_end: &[f64], k_end: &[f64]) -> f64 {
@@ -169,31 +187,5 @@ impl Stepper for DormandPrince {
             }
         }
         error
-    }
-
-    fn interpolate(
-        &self,
-        theta: f64,
-        h: f64,
-        y: &[f64],
-        k: &[f64],
-        _y_end: &[f64],
-        _k_end: &[f64],
-        out: &mut [f64],
-    ) {
-        let s = 1.0 - theta;
-        for i in 0..out.len() {
-            let d = self.raw_end[i] - y[i];
-            let b = h * k[i] - d;
-            let c = d - h * self.raw_k_end[i] - b;
-            let e = h
-                * (D[0] * k[i]
-                    + D[1] * self.k3[i]
-                    + D[2] * self.k4[i]
-                    + D[3] * self.k5[i]
-                    + D[4] * self.k6[i]
-                    + D[5] * self.raw_k_end[i]);
-            out[i] = y[i] + theta * (d + s * (b + theta * (c + s * e)));
-        }
     }
 }

@@ -1,6 +1,6 @@
 //! Fixed-step methods.
 
-use super::{Stepper, System, hermite};
+use super::{Stepper, System};
 
 /// v1 = v + h a(t, q, v), q1 = q + h q_dot(q, v1): order 1, keeps the energy of oscillations bounded.
 pub struct SemiImplicitEuler {
@@ -37,19 +37,6 @@ impl Stepper for SemiImplicitEuler {
             y_end[i] += h * self.rate[i];
         }
         0.0
-    }
-
-    fn interpolate(
-        &self,
-        theta: f64,
-        h: f64,
-        y: &[f64],
-        k: &[f64],
-        y_end: &[f64],
-        k_end: &[f64],
-        out: &mut [f64],
-    ) {
-        hermite(theta, h, y, k, y_end, k_end, out);
     }
 }
 
@@ -103,18 +90,5 @@ impl Stepper for RungeKutta4 {
             y_end[i] = y[i] + h / 6.0 * (k[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
         }
         0.0
-    }
-
-    fn interpolate(
-        &self,
-        theta: f64,
-        h: f64,
-        y: &[f64],
-        k: &[f64],
-        y_end: &[f64],
-        k_end: &[f64],
-        out: &mut [f64],
-    ) {
-        hermite(theta, h, y, k, y_end, k_end, out);
     }
 }

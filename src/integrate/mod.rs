@@ -6,12 +6,14 @@
 mod controller;
 mod dormand_prince;
 mod fixed;
+mod radau;
 mod root;
 mod rosenbrock;
 
 pub use controller::Controller;
 pub use dormand_prince::DormandPrince;
 pub use fixed::{RungeKutta4, SemiImplicitEuler};
+pub use radau::Radau;
 pub use root::find_root;
 pub use rosenbrock::Rosenbrock;
 
@@ -26,7 +28,9 @@ pub enum Method {
     DormandPrince5,
     /// ROS34PW2, linearly implicit, order 3, adaptive.
     Rosenbrock,
-    /// Dormand-Prince while accuracy sets the step, ROS34PW2 once stability does.
+    /// Radau IIA(5), implicit, order 5, adaptive.
+    Radau5,
+    /// Dormand-Prince while accuracy sets the step, Radau IIA(5) once stability does.
     Automatic,
 }
 
@@ -60,6 +64,10 @@ pub trait StiffSystem: System {
     fn factor_shifted(&mut self, shift: f64);
     /// Solves (`shift` I - J) x = b in place.
     fn solve_shifted(&mut self, b: &mut [f64]);
+    /// Prepares to solve with (`real` + i `imaginary`) I - J.
+    fn factor_shifted_pair(&mut self, real: f64, imaginary: f64);
+    /// Solves that in place for `b_real` + i `b_imaginary`.
+    fn solve_shifted_pair(&mut self, b_real: &mut [f64], b_imaginary: &mut [f64]);
     /// df/dt where J was taken.
     fn time_derivative(&self) -> &[f64];
 }
@@ -80,18 +88,6 @@ pub trait Stepper {
         y_end: &mut [f64],
         k_end: &mut [f64],
     ) -> f64;
-
-    /// State at `t + theta h` of the latest attempt, 0 <= theta <= 1, given its ends.
-    fn interpolate(
-        &self,
-        theta: f64,
-        h: f64,
-        y: &[f64],
-        k: &[f64],
-        y_end: &[f64],
-        k_end: &[f64],
-        out: &mut [f64],
-    );
 }
 
 /// Cubic Hermite interpolation between two states with their derivatives; error O(h^4).
@@ -175,7 +171,7 @@ mod tests {
         let mut stepper = DormandPrince::new(2);
         Oscillator.derivative(0.0, &y, &mut k);
         stepper.attempt(&mut Oscillator, 0.0, h, &y, &k, &mut y1, &mut k1);
-        stepper.interpolate(0.37, h, &y, &k, &y1, &k1, &mut out);
+        stepper.interpolate(0.37, h, &y, &k, &mut out);
         (out[0] - libm::cos(0.37 * h))
             .abs()
             .max((out[1] + libm::sin(0.37 * h)).abs())

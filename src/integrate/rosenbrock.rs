@@ -5,7 +5,7 @@
 //! Written in the variables U = Gamma K, which need no product with the Jacobian
 //! (Hairer & Wanner, *Solving Ordinary Differential Equations II*, 2nd ed., IV.7, eq. (7.25)).
 
-use super::{StiffSystem, hermite};
+use super::StiffSystem;
 
 const STAGES: usize = 4;
 const GAMMA: f64 = 0.435_866_521_508_459;
@@ -182,20 +182,6 @@ impl Rosenbrock {
         system.derivative(t + h, y_end, k_end);
         error
     }
-
-    /// State at `t + theta h`: the cubic through both ends, of the method's own order.
-    pub fn interpolate(
-        &self,
-        theta: f64,
-        h: f64,
-        y: &[f64],
-        k: &[f64],
-        y_end: &[f64],
-        k_end: &[f64],
-        out: &mut [f64],
-    ) {
-        hermite(theta, h, y, k, y_end, k_end, out);
-    }
 }
 
 #[cfg(test)]
@@ -249,6 +235,8 @@ mod tests {
             b[0] /= self.shift - self.j[0];
             b[1] /= self.shift - self.j[1];
         }
+        fn factor_shifted_pair(&mut self, _real: f64, _imaginary: f64) {}
+        fn solve_shifted_pair(&mut self, _b_real: &mut [f64], _b_imaginary: &mut [f64]) {}
         fn time_derivative(&self) -> &[f64] {
             &self.ft
         }

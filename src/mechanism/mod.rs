@@ -487,30 +487,24 @@ impl System for Mechanism {
     }
 }
 
-/// Step in time of the difference that gives df/dt, s: short against any contact, long against rounding.
-const TIME_DIFFERENCE: f64 = 1e-8;
-
 impl StiffSystem for Mechanism {
     fn linearise(&mut self, t: f64, y: &[f64]) {
         let (dimension, positions) = (self.dimension(), self.positions());
-        let mut stiff = self
-            .stiff
-            .take()
-            .unwrap_or_else(|| Box::new(stiff::Stiff::new(dimension - positions, dimension)));
+        let mut stiff = self.stiff.take().unwrap_or_else(|| {
+            let joints = self.contacts.len();
+            Box::new(stiff::Stiff::new(dimension - positions, dimension, joints))
+        });
+        // Prescribed motion is what moves contacts by time alone; bodies that are states stand still in that sense.
+        if let Form::Tree { tree, .. } = &mut self.form {
+            let mut at_rest = std::mem::take(&mut stiff.derivative);
+            at_rest[..positions].copy_from_slice(&y[..positions]);
+            at_rest[positions..].fill(0.0);
+            tree.forward(&self.model, t, &at_rest);
+            stiff.observe_drift(&self.model, &tree.motion);
+            stiff.derivative = at_rest;
+        }
         let mut now = std::mem::take(&mut stiff.derivative);
-        // Prescribed motion is the only explicit time in f.
-        let moves = self.drives() > 0 || self.contacts.ramps().iter().any(Option::is_some);
-        if moves {
-            self.derivative(t + TIME_DIFFERENCE, y, &mut stiff.time_derivative);
-        }
         self.derivative(t, y, &mut now);
-        if moves {
-            for (later, now) in stiff.time_derivative.iter_mut().zip(&now) {
-                *later = (*later - now) / TIME_DIFFERENCE;
-            }
-        } else {
-            stiff.time_derivative.fill(0.0);
-        }
         stiff.derivative = now;
         let Self {
             model,
@@ -556,26 +550,31 @@ impl StiffSystem for Mechanism {
     }
 
     fn solve_shifted(&mut self, b: &mut [f64]) {
-        let positions = self.positions();
         let Self {
             model, form, stiff, ..
         } = self;
         let Some(stiff) = stiff else { return };
         match form {
-            Form::Tree { .. } => stiff.solve(
-                positions,
-                b,
-                |y, rate, out| stiff::tree_velocities(model, y, rate, out),
-                |y, out| Tree::position_rate(model, y, out),
-            ),
+            Form::Tree { .. } => stiff.solve(b, &stiff::TreeMap(model)),
+            Form::Lagrange(_) => stiff.solve(b, &stiff::BodyMap(model.bodies.len())),
+        }
+    }
+
+    fn factor_shifted_pair(&mut self, real: f64, imaginary: f64) {
+        if let Some(stiff) = &mut self.stiff {
+            stiff.factor_pair(nalgebra::Complex::new(real, imaginary));
+        }
+    }
+
+    fn solve_shifted_pair(&mut self, b_real: &mut [f64], b_imaginary: &mut [f64]) {
+        let Self {
+            model, form, stiff, ..
+        } = self;
+        let Some(stiff) = stiff else { return };
+        match form {
+            Form::Tree { .. } => stiff.solve_pair(b_real, b_imaginary, &stiff::TreeMap(model)),
             Form::Lagrange(_) => {
-                let n = model.bodies.len();
-                stiff.solve(
-                    positions,
-                    b,
-                    |y, rate, out| stiff::body_velocities(n, y, rate, out),
-                    |y, out| Lagrange::position_rate(n, y, out),
-                );
+                stiff.solve_pair(b_real, b_imaginary, &stiff::BodyMap(model.bodies.len()));
             }
         }
     }

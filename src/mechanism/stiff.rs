@@ -7,8 +7,11 @@
 
 use super::contacts::Contacts;
 use super::kinematics::Kinematics;
+use super::lagrange::Lagrange;
 use super::model::{BallJoint, Model, Motion};
+use super::tree::Tree;
 use crate::scene::{Mat3, Vec3};
+use nalgebra::{Complex, ComplexField};
 
 /// Derivatives of one contact's force on the ball, and of its normal.
 struct Stiffness {
@@ -20,6 +23,8 @@ struct Stiffness {
     by_slip: Mat3,
     /// dn/de, 1/m.
     normal: Mat3,
+    /// Change of the force per second by a clearance under way, N/s.
+    by_clearance: Vec3,
     force: Vec3,
     n: Vec3,
 }
@@ -36,45 +41,63 @@ struct Column {
     turn: Vec3,
 }
 
+/// Partial time derivatives of a contact's motion at fixed coordinates.
+#[derive(Clone, Copy, Default)]
+struct Drift {
+    eccentricity: Vec3,
+    rate: Vec3,
+}
+
 /// The linearisation and its factors.
 pub struct Stiff {
     n: usize,
     /// M^-1 K and M^-1 D, column-major n x n.
     by_position: Vec<f64>,
     by_velocity: Vec<f64>,
-    lu: Vec<f64>,
-    pivots: Vec<usize>,
+    lu: Lu<f64>,
+    lu_pair: Lu<Complex<f64>>,
     columns: Vec<Column>,
-    /// df/dt, positions and velocities.
+    /// df/dt, positions and velocities: the stiff part, from the same matrices as J, because the two nearly cancel.
     pub time_derivative: Vec<f64>,
     /// Scratch for the derivative at the point of linearisation.
     pub derivative: Vec<f64>,
+    /// How each contact moves with time alone: rates of the eccentricity, of its rate, and of the sliding velocity.
+    drift: Vec<Drift>,
     /// Positions at which the linearisation was taken.
     y: Vec<f64>,
     shift: f64,
+    shift_pair: Complex<f64>,
     scratch: Vec<f64>,
+    scratch_im: Vec<f64>,
     rate: Vec<f64>,
+    rate_im: Vec<f64>,
+    pair: Vec<Complex<f64>>,
     /// No contact carries a force: J is taken as zero but for q' = T v.
     empty: bool,
 }
 
 impl Stiff {
-    /// For `velocities` velocity coordinates in a state of `dimension`.
-    pub fn new(velocities: usize, dimension: usize) -> Self {
+    /// For `velocities` velocity coordinates in a state of `dimension`, with `joints` ball joints.
+    pub fn new(velocities: usize, dimension: usize, joints: usize) -> Self {
         let n = velocities;
         Self {
             n,
             by_position: vec![0.0; n * n],
             by_velocity: vec![0.0; n * n],
-            lu: vec![0.0; n * n],
-            pivots: vec![0; n],
+            lu: Lu::new(n),
+            lu_pair: Lu::new(n),
             columns: Vec::with_capacity(n),
             time_derivative: vec![0.0; dimension],
+            drift: vec![Drift::default(); joints],
             derivative: vec![0.0; dimension],
             y: vec![0.0; dimension],
             shift: 1.0,
+            shift_pair: Complex::new(1.0, 1.0),
             scratch: vec![0.0; n],
+            scratch_im: vec![0.0; n],
             rate: vec![0.0; dimension - n],
+            rate_im: vec![0.0; dimension - n],
+            pair: vec![Complex::new(0.0, 0.0); n],
             empty: true,
         }
     }
@@ -92,6 +115,7 @@ impl Stiff {
         self.y.copy_from_slice(y);
         self.by_position.fill(0.0);
         self.by_velocity.fill(0.0);
+        self.time_derivative.fill(0.0);
         self.empty = true;
         for (j, joint) in model.joints.iter().enumerate() {
             let Some(stiffness) = linearise_contact(contacts, motion, joint, j) else {
@@ -100,6 +124,33 @@ impl Stiff {
             self.empty = false;
             self.collect(contacts, motion, joint, j, &stiffness.n, &visit);
             self.add(&stiffness, contacts.coefficients(j).surface);
+            self.add_drift(&stiffness, j);
+        }
+    }
+
+    /// Takes how the contacts move with time alone from a motion with all coordinates at rest.
+    pub fn observe_drift(&mut self, model: &Model, motion: &[Kinematics]) {
+        for (j, joint) in model.joints.iter().enumerate() {
+            let (ball, socket) = (&motion[joint.ball.body], &motion[joint.socket.body]);
+            let arm_ball = ball.rotation * joint.ball.offset;
+            let arm_socket = socket.rotation * joint.socket.offset;
+            self.drift[j] = Drift {
+                eccentricity: ball.point_velocity(&arm_ball) - socket.point_velocity(&arm_socket),
+                rate: ball.point_acceleration(&arm_ball) - socket.point_acceleration(&arm_socket),
+            };
+        }
+    }
+
+    /// dQ_k/dt of one contact. The sliding of driven bodies' surfaces by their turning is not stiff and left out.
+    fn add_drift(&mut self, s: &Stiffness, j: usize) {
+        let drift = self.drift[j];
+        let force = s.by_displacement * drift.eccentricity + (s.by_rate + s.by_slip) * drift.rate
+            - s.by_clearance;
+        let lever = (s.normal * drift.eccentricity).cross(&s.force);
+        let positions = self.time_derivative.len() - self.n;
+        for k in &self.columns {
+            self.time_derivative[positions + k.coordinate] +=
+                k.surface.dot(&force) + k.turn.dot(&lever);
         }
     }
 
@@ -176,27 +227,142 @@ impl Stiff {
         for column in self.by_velocity.chunks_exact_mut(self.n) {
             mobilise(column);
         }
+        let positions = self.time_derivative.len() - self.n;
+        mobilise(&mut self.time_derivative[positions..]);
     }
 
-    /// Factors s I - M^-1 D - M^-1 K / s by elimination with row exchanges.
+    /// Prepares to solve with a real shift s: factors s I - M^-1 D - M^-1 K / s.
     pub fn factor(&mut self, shift: f64) {
         self.shift = shift;
-        if self.empty {
-            return;
+        if !self.empty {
+            let Self {
+                by_position,
+                by_velocity,
+                lu,
+                ..
+            } = self;
+            lu.factor(|i, j, n| {
+                let entry = -by_velocity[j * n + i] - by_position[j * n + i] / shift;
+                if i == j { shift + entry } else { entry }
+            });
         }
+    }
+
+    /// Prepares to solve with a complex shift.
+    pub fn factor_pair(&mut self, shift: Complex<f64>) {
+        self.shift_pair = shift;
+        if !self.empty {
+            let Self {
+                by_position,
+                by_velocity,
+                lu_pair,
+                ..
+            } = self;
+            let inverse = shift.inv();
+            lu_pair.factor(|i, j, n| {
+                let entry = -inverse * by_position[j * n + i] - by_velocity[j * n + i];
+                if i == j { shift + entry } else { entry }
+            });
+        }
+    }
+
+    /// Solves (s I - J) x = b in place; `map` goes between position rates and velocities.
+    pub fn solve(&mut self, b: &mut [f64], map: &impl Map) {
+        let positions = b.len() - self.n;
+        let (b_q, b_v) = b.split_at_mut(positions);
+        let s = self.shift;
+        if self.empty {
+            b_v.iter_mut().for_each(|x| *x /= s);
+        } else {
+            map.velocities(&self.y, b_q, &mut self.scratch);
+            for (column, x) in self.by_position.chunks_exact(self.n).zip(&self.scratch) {
+                let x = x / s;
+                for (b, a) in b_v.iter_mut().zip(column) {
+                    *b += a * x;
+                }
+            }
+            self.lu.solve(b_v);
+        }
+        self.y[positions..].copy_from_slice(b_v);
+        map.rates(&self.y, &mut self.rate);
+        for (x, r) in b_q.iter_mut().zip(&self.rate) {
+            *x = (*x + r) / s;
+        }
+    }
+
+    /// As [`Self::solve`] with the complex shift, for `re` + i `im`.
+    pub fn solve_pair(&mut self, re: &mut [f64], im: &mut [f64], map: &impl Map) {
+        let (n, positions) = (self.n, re.len() - self.n);
+        let inverse = self.shift_pair.inv();
+        let (re_q, re_v) = re.split_at_mut(positions);
+        let (im_q, im_v) = im.split_at_mut(positions);
+        for i in 0..n {
+            self.pair[i] = Complex::new(re_v[i], im_v[i]);
+        }
+        if self.empty {
+            self.pair.iter_mut().for_each(|x| *x *= inverse);
+        } else {
+            map.velocities(&self.y, re_q, &mut self.scratch);
+            map.velocities(&self.y, im_q, &mut self.scratch_im);
+            for (j, column) in self.by_position.chunks_exact(n).enumerate() {
+                let x = inverse * Complex::new(self.scratch[j], self.scratch_im[j]);
+                for (b, a) in self.pair.iter_mut().zip(column) {
+                    *b += x * *a;
+                }
+            }
+            self.lu_pair.solve(&mut self.pair);
+        }
+        for i in 0..n {
+            (re_v[i], im_v[i]) = (self.pair[i].re, self.pair[i].im);
+        }
+        self.y[positions..].copy_from_slice(re_v);
+        map.rates(&self.y, &mut self.rate);
+        self.y[positions..].copy_from_slice(im_v);
+        map.rates(&self.y, &mut self.rate_im);
+        for i in 0..positions {
+            let x = inverse * Complex::new(re_q[i] + self.rate[i], im_q[i] + self.rate_im[i]);
+            (re_q[i], im_q[i]) = (x.re, x.im);
+        }
+    }
+}
+
+/// The two directions between position rates and velocities, at the positions in `y`.
+pub trait Map {
+    /// T^+: velocities from position rates.
+    fn velocities(&self, y: &[f64], rate: &[f64], out: &mut [f64]);
+    /// T: position rates from the velocities in `y`.
+    fn rates(&self, y: &[f64], out: &mut [f64]);
+}
+
+/// Dense elimination with row exchanges, for real and complex numbers.
+struct Lu<X> {
+    n: usize,
+    rows: Vec<X>,
+    pivots: Vec<usize>,
+}
+
+impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
+    fn new(n: usize) -> Self {
+        Self {
+            n,
+            rows: vec![X::zero(); n * n],
+            pivots: vec![0; n],
+        }
+    }
+
+    /// Factors the matrix with these entries (row, column, n).
+    fn factor(&mut self, entry: impl Fn(usize, usize, usize) -> X) {
         let n = self.n;
-        let a = &mut self.lu;
-        // Row-major for the elimination.
+        let a = &mut self.rows;
         for i in 0..n {
             for j in 0..n {
-                a[i * n + j] = -self.by_velocity[j * n + i] - self.by_position[j * n + i] / shift;
+                a[i * n + j] = entry(i, j, n);
             }
-            a[i * n + i] += shift;
         }
         for k in 0..n {
             let mut best = k;
             for i in k + 1..n {
-                if a[i * n + k].abs() > a[best * n + k].abs() {
+                if a[i * n + k].norm1() > a[best * n + k].norm1() {
                     best = i;
                 }
             }
@@ -208,65 +374,36 @@ impl Stiff {
             }
             let (top, bottom) = a.split_at_mut((k + 1) * n);
             let pivot_row = &top[k * n..];
-            let inverse = 1.0 / pivot_row[k];
+            let inverse = X::one() / pivot_row[k];
             for row in bottom.chunks_exact_mut(n) {
                 let factor = row[k] * inverse;
                 row[k] = factor;
-                if factor != 0.0 {
-                    for j in k + 1..n {
-                        row[j] -= factor * pivot_row[j];
-                    }
+                for j in k + 1..n {
+                    row[j] -= factor * pivot_row[j];
                 }
             }
         }
     }
 
-    /// Solves (s I - J) x = b in place; `positions` splits `b`.
-    pub fn solve(
-        &mut self,
-        positions: usize,
-        b: &mut [f64],
-        to_velocity_space: impl Fn(&[f64], &[f64], &mut [f64]),
-        position_rate: impl Fn(&[f64], &mut [f64]),
-    ) {
+    fn solve(&self, b: &mut [X]) {
         let n = self.n;
-        let (b_q, b_v) = b.split_at_mut(positions);
-        if !self.empty {
-            to_velocity_space(&self.y, b_q, &mut self.scratch);
-            for (j, x) in self.scratch.iter().enumerate() {
-                let x = x / self.shift;
-                let column = &self.by_position[j * n..(j + 1) * n];
-                for i in 0..n {
-                    b_v[i] += column[i] * x;
-                }
-            }
-            for k in 0..n {
-                b_v.swap(k, self.pivots[k]);
-            }
-            for i in 1..n {
-                let row = &self.lu[i * n..i * n + i];
-                let dot: f64 = row.iter().zip(&*b_v).map(|(a, x)| a * x).sum();
-                b_v[i] -= dot;
-            }
-            for i in (0..n).rev() {
-                let row = &self.lu[i * n..(i + 1) * n];
-                let dot: f64 = row[i + 1..]
-                    .iter()
-                    .zip(&b_v[i + 1..])
-                    .map(|(a, x)| a * x)
-                    .sum();
-                b_v[i] = (b_v[i] - dot) / row[i];
-            }
-        } else {
-            for x in b_v.iter_mut() {
-                *x /= self.shift;
-            }
+        for k in 0..n {
+            b.swap(k, self.pivots[k]);
         }
-        // T is linear in v at the positions of the linearisation.
-        self.y[positions..].copy_from_slice(b_v);
-        position_rate(&self.y, &mut self.rate);
-        for (x, r) in b_q.iter_mut().zip(&self.rate) {
-            *x = (*x + r) / self.shift;
+        for i in 1..n {
+            let mut x = b[i];
+            for (a, x_j) in self.rows[i * n..i * n + i].iter().zip(&*b) {
+                x -= *a * *x_j;
+            }
+            b[i] = x;
+        }
+        for i in (0..n).rev() {
+            let row = &self.rows[i * n..(i + 1) * n];
+            let mut x = b[i];
+            for (a, x_j) in row[i + 1..].iter().zip(&b[i + 1..]) {
+                x -= *a * *x_j;
+            }
+            b[i] = x / row[i];
         }
     }
 }
@@ -337,31 +474,49 @@ fn linearise_contact(
         by_rate: along * (n * by_rate).transpose(),
         by_slip,
         normal,
+        by_clearance: along * (by_penetration * contacts.clearance_rate(j)),
         force: n * -force_n + gap.friction,
         n,
     })
 }
 
-/// T^+ of the tree coordinates: rates of positions to velocities.
-pub fn tree_velocities(model: &Model, y: &[f64], rate: &[f64], out: &mut [f64]) {
-    for body in &model.bodies {
-        match body.motion {
-            Motion::Free { q, v } => {
-                out[v..v + 3].copy_from_slice(&rate[q..q + 3]);
-                out[v + 3..v + 6].copy_from_slice(&spin_of(&y[q + 3..q + 7], &rate[q + 3..q + 7]));
+/// [`Map`] of the tree coordinates.
+pub struct TreeMap<'a>(pub &'a Model);
+
+impl Map for TreeMap<'_> {
+    fn velocities(&self, y: &[f64], rate: &[f64], out: &mut [f64]) {
+        for body in &self.0.bodies {
+            match body.motion {
+                Motion::Free { q, v } => {
+                    out[v..v + 3].copy_from_slice(&rate[q..q + 3]);
+                    out[v + 3..v + 6]
+                        .copy_from_slice(&spin_of(&y[q + 3..q + 7], &rate[q + 3..q + 7]));
+                }
+                Motion::Revolute { q, v } | Motion::Prismatic { q, v } => out[v] = rate[q],
+                Motion::Fixed | Motion::Driven { .. } => {}
             }
-            Motion::Revolute { q, v } | Motion::Prismatic { q, v } => out[v] = rate[q],
-            Motion::Fixed | Motion::Driven { .. } => {}
         }
+    }
+
+    fn rates(&self, y: &[f64], out: &mut [f64]) {
+        Tree::position_rate(self.0, y, out);
     }
 }
 
-/// T^+ of body coordinates.
-pub fn body_velocities(bodies: usize, y: &[f64], rate: &[f64], out: &mut [f64]) {
-    for b in 0..bodies {
-        out[6 * b..6 * b + 3].copy_from_slice(&rate[7 * b..7 * b + 3]);
-        let spin = spin_of(&y[7 * b + 3..7 * b + 7], &rate[7 * b + 3..7 * b + 7]);
-        out[6 * b + 3..6 * b + 6].copy_from_slice(&spin);
+/// [`Map`] of body coordinates, for this many bodies.
+pub struct BodyMap(pub usize);
+
+impl Map for BodyMap {
+    fn velocities(&self, y: &[f64], rate: &[f64], out: &mut [f64]) {
+        for b in 0..self.0 {
+            out[6 * b..6 * b + 3].copy_from_slice(&rate[7 * b..7 * b + 3]);
+            let spin = spin_of(&y[7 * b + 3..7 * b + 7], &rate[7 * b + 3..7 * b + 7]);
+            out[6 * b + 3..6 * b + 6].copy_from_slice(&spin);
+        }
+    }
+
+    fn rates(&self, y: &[f64], out: &mut [f64]) {
+        Lagrange::position_rate(self.0, y, out);
     }
 }
 
@@ -373,4 +528,107 @@ fn spin_of(q: &[f64], d: &[f64]) -> [f64; 3] {
         2.0 * (-d[0] * y + d[1] * z + d[2] * w - d[3] * x),
         2.0 * (-d[0] * z - d[1] * y + d[2] * x + d[3] * w),
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::integrate::{StiffSystem, System};
+    use crate::mechanism::{Mechanism, Memory};
+    use crate::scene::Scene;
+
+    /// The default scene with its platform lowered until every ball rests 0.2 um deep in its wall and creeps along it.
+    fn resting(changes: &[(&str, &str)]) -> (Mechanism, Vec<f64>) {
+        let changes: Vec<(String, String)> = changes
+            .iter()
+            .map(|(k, v)| ((*k).to_owned(), (*v).to_owned()))
+            .collect();
+        let scene = Scene::load("spcmm", &changes).unwrap();
+        let mut mechanism = Mechanism::new(&scene).unwrap();
+        let mut y = mechanism.start().unwrap();
+        y[0] += 0.3e-3 + 2e-7;
+        let v = mechanism.positions();
+        // At the start every ball moves with its socket.
+        for (i, slip) in [2e-7, 3e-5, -4e-5].iter().enumerate() {
+            y[v + i] += slip;
+        }
+        for memory in mechanism.contacts.memory_mut() {
+            *memory = Memory {
+                active: true,
+                approach_speed: 1e-3,
+                floored: true,
+            };
+        }
+        (mechanism, y)
+    }
+
+    #[test]
+    fn jacobian_is_that_of_central_differences_in_everything_stiff() {
+        for surface in ["centres", "surface"] {
+            let (mut m, y) = resting(&[("contact.friction_velocity", surface)]);
+            let (t, nq) = (0.0, m.positions());
+            m.linearise(t, &y);
+            let stiff = m.stiff.take().unwrap();
+            let n = stiff.n;
+            let (mut plus, mut minus) = (vec![0.0; y.len()], vec![0.0; y.len()]);
+            // Rounding of the differences and what a W-method may leave out stay below 1e-3 of the stiffest entry.
+            let compare =
+                |name: &str, got: &[f64], plus: &[f64], minus: &[f64], scale: f64, width: f64| {
+                    for k in 0..n {
+                        let want = (plus[nq + k] - minus[nq + k]) / (2.0 * width);
+                        assert!(
+                            (got[k] - want).abs() < 1e-3 * scale,
+                            "{surface} {name}[{k}]: {:e} against {want:e}",
+                            got[k]
+                        );
+                    }
+                };
+            let largest = |x: &[f64]| x.iter().map(|x| x.abs()).fold(0.0, f64::max);
+            let (stiffest, dampest) = (largest(&stiff.by_position), largest(&stiff.by_velocity));
+            assert!(stiffest > 1e7 && dampest > 1e3, "{stiffest:e} {dampest:e}");
+            for l in 0..n {
+                let mut moved = |sign: f64, out: &mut [f64]| {
+                    let mut z = y.clone();
+                    let mut step = vec![0.0; n];
+                    step[l] = sign * 1e-10;
+                    crate::mechanism::Tree::displace(&m.model, &mut z, &step);
+                    m.derivative(t, &z, out);
+                };
+                moved(1.0, &mut plus);
+                moved(-1.0, &mut minus);
+                compare(
+                    &format!("K{l}"),
+                    &stiff.by_position[l * n..][..n],
+                    &plus,
+                    &minus,
+                    stiffest,
+                    1e-10,
+                );
+                let mut faster = |sign: f64, out: &mut [f64]| {
+                    let mut z = y.clone();
+                    z[nq + l] += sign * 1e-8;
+                    m.derivative(t, &z, out);
+                };
+                faster(1.0, &mut plus);
+                faster(-1.0, &mut minus);
+                compare(
+                    &format!("D{l}"),
+                    &stiff.by_velocity[l * n..][..n],
+                    &plus,
+                    &minus,
+                    dampest,
+                    1e-8,
+                );
+            }
+            m.derivative(t + 1e-9, &y, &mut plus);
+            m.derivative(t - 1e-9, &y, &mut minus);
+            compare(
+                "ft",
+                &stiff.time_derivative[nq..],
+                &plus,
+                &minus,
+                1e-2 * stiffest,
+                1e-9,
+            );
+        }
+    }
 }

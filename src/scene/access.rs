@@ -16,11 +16,12 @@ const NORMALS: [NormalLaw; 5] = [
 ];
 const FRICTIONS: [FrictionLaw; 2] = [FrictionLaw::ModifiedCoulomb, FrictionLaw::None];
 const FORMS: [Formulation; 2] = [Formulation::Tree, Formulation::Lagrange];
-const METHODS: [Method; 5] = [
+const METHODS: [Method; 6] = [
     Method::SemiImplicitEuler,
     Method::RungeKutta4,
     Method::DormandPrince5,
     Method::Rosenbrock,
+    Method::Radau5,
     Method::Automatic,
 ];
 const PRESETS: [Preset; 4] = [

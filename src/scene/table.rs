@@ -19,11 +19,12 @@ pub(super) const NORMAL_LAWS: [&str; 5] = [
 ];
 pub(super) const FRICTION_LAWS: [&str; 2] = ["modified-coulomb", "none"];
 pub(super) const FORMULATIONS: [&str; 2] = ["tree", "lagrange"];
-pub(super) const METHODS: [&str; 5] = [
+pub(super) const METHODS: [&str; 6] = [
     "semi-implicit-euler",
     "rk4",
     "dopri5",
     "rosenbrock",
+    "radau5",
     "automatic",
 ];
 pub(super) const PRESETS: [&str; 4] = ["preview", "real-time", "accurate", "reference"];
@@ -349,8 +350,9 @@ static TABLE: [Parameter; 26] = [
         Scope::Every,
         "Time stepper. semi-implicit-euler (order 1) and rk4 (order 4) keep a fixed step; dopri5 (Dormand-Prince, \
          order 5) chooses its steps by the tolerance and finds the instants at which contacts begin and end; \
-         rosenbrock (ROS34PW2, linearly implicit, order 3) does so too and is not held back by stiff, settled \
-         contacts; automatic changes between these two.",
+         rosenbrock (ROS34PW2, linearly implicit, order 3) does so too and takes longer steps where contacts \
+         have settled; radau5 (Radau IIA, implicit, order 5) takes the longest there; automatic changes between \
+         dopri5 and radau5.",
         "Solves paper eqs. (55), (58) in time",
     ),
     row(

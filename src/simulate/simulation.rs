@@ -20,11 +20,16 @@ const KINEMATIC_STEP: f64 = 2e-3;
 const FIRST_CONTACT_STEP: f64 = 1e-5;
 /// h |lambda| beyond which an explicit step is held by stability.
 const HELD_BY_STABILITY: f64 = 3.0;
-/// Steps in a row that must be held by stability before the linearly implicit method takes over.
-const HELD_STEPS: i32 = 8;
-/// Steps in a row that must stay short before the explicit method gets its turn back, and for how many steps then.
-const SHORT_STEPS: i32 = 12;
-const EXPLICIT_TURN: i32 = 150;
+/// Steps that must be held by stability, or taken since the latest contact began, before the implicit method is tried.
+const HELD_STEPS: u32 = 8;
+const SETTLED_STEPS: u32 = 60;
+/// Over so many implicit steps the progress per evaluation must be this many times the explicit method's; else the
+/// explicit one has its turn for so many steps.
+const TRIAL_STEPS: u32 = 12;
+const WORTH_IT: f64 = 2.0;
+const EXPLICIT_TURN: u32 = 200;
+/// Evaluations of one explicit step.
+const EXPLICIT_EVALUATIONS: f64 = 6.0;
 /// More velocity coordinates than this make a dense factorisation dearer than many explicit steps.
 const LARGEST_IMPLICIT: usize = 96;
 /// Speed beyond which a state is absurd, m/s and rad/s.
@@ -83,15 +88,29 @@ pub(super) struct State {
     contact_began: bool,
     /// Of the automatic pair the linearly implicit method steps.
     implicit: bool,
-    /// Steps in a row that spoke for the other method of the pair; negative: it has to wait.
-    votes: i32,
-    /// Explicit step at the latest change to the implicit method.
-    h_explicit: f64,
+    /// What the automatic pair's choice goes by.
+    choice: Choice,
     controller: Controller,
     /// Fixed steps are counted from here, so that times do not accumulate rounding.
     grid_origin: f64,
     grid_count: u64,
     statistics: Statistics,
+}
+
+/// Memory of the automatic pair.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Choice {
+    /// Explicit steps since the latest contact began, and how many of them were held by stability.
+    since_contact: u32,
+    held: u32,
+    /// Explicit steps before the implicit method may be tried again.
+    wait: u32,
+    /// Explicit step at the latest change to the implicit method, s.
+    h_explicit: f64,
+    /// Time and evaluations of the implicit steps on trial.
+    progress: f64,
+    cost: u64,
+    steps: u32,
 }
 
 impl Simulation {
@@ -126,10 +145,9 @@ impl Simulation {
                 h_next: scene.solver.step.min(LONGEST_STEP),
                 h_contact: FIRST_CONTACT_STEP,
                 contact_began: false,
-                implicit: scene.solver.method == Method::Rosenbrock,
-                votes: 0,
-                h_explicit: 0.0,
-                controller: controller_of(scene.solver.method == Method::Rosenbrock),
+                implicit: false,
+                choice: Choice::default(),
+                controller: controller_of(scene.solver.method, false),
                 grid_origin: 0.0,
                 grid_count: 0,
                 statistics: Statistics {
@@ -273,6 +291,76 @@ impl Simulation {
 
     /// A step whose size follows the error estimate, cut at the first contact start or end inside it.
     fn adaptive_step(&mut self, limit: f64) -> Result<(), Stopped> {
+        let before = self.mechanism.evaluations;
+        let contacts = self.mechanism.contacts.memory_mut();
+        contacts.copy_from_slice(&self.state.memory);
+        self.stepper.choose(self.state.implicit);
+        let (t_end, h) = loop {
+            if let Some(step) = self.attempt_adaptive(limit) {
+                break step;
+            }
+            self.state.statistics.rejected += 1;
+            let shortest = SHORTEST_STEP.max(4.0 * f64::EPSILON * self.state.t);
+            if !(self.state.h_next >= shortest) {
+                self.state.statistics.evaluations += self.mechanism.evaluations - before;
+                self.state.h_next = self.running.solver.step;
+                let what = "the step size that the tolerance asks for fell below 1e-14 s";
+                let tolerance = self.running.solver.tolerance;
+                let advice = format!(
+                    "try a looser solver.tolerance (now {tolerance:e}) or a softer or heavier scene"
+                );
+                return Err(self.stopped(what, advice));
+            }
+        };
+        let stiffness = self.stepper.stiffness(h, &self.y_end, &self.k_end);
+        let evaluations = self.mechanism.evaluations - before;
+        self.accept(t_end, h, before)?;
+        if self.running.solver.method == Method::Automatic {
+            self.vote(h, stiffness, evaluations);
+        }
+        Ok(())
+    }
+
+    /// One try of a step with its event; `None` where it has to be repeated with the smaller `h_next` that it left.
+    fn attempt_adaptive(&mut self, limit: f64) -> Option<(f64, f64)> {
+        let t = self.state.t;
+        let tolerance = self.running.solver.tolerance;
+        let mut h = self.state.h_next.min(LONGEST_STEP);
+        let mut t_end = t + h;
+        let cut = t_end >= limit - 1e-6 * h;
+        if cut {
+            t_end = limit;
+            h = limit - t;
+        }
+        let error = self.attempt(h) / tolerance;
+        let state = &mut self.state;
+        if !(error <= 1.0) {
+            state.h_next = h * state.controller.after_reject(error);
+            return None;
+        }
+        let next = h * state.controller.after_accept(error);
+        // A step cut short says nothing against the longer one.
+        state.h_next = if cut { state.h_next.max(next) } else { next };
+        let contact_began = std::mem::take(&mut state.contact_began);
+        self.finish_gaps(t_end);
+        if let Some(theta) = self.first_event(h) {
+            // The step is taken again, shorter, so that its end carries the method's error and not the interpolant's.
+            t_end = t + theta * h;
+            h *= theta;
+            if !self.attempt(h).is_finite() {
+                self.state.h_next = 0.5 * h;
+                self.state.contact_began = contact_began;
+                return None;
+            }
+            self.finish_gaps(t_end);
+        } else if contact_began {
+            self.state.h_contact = h.max(1e-9);
+        }
+        Some((t_end, h))
+    }
+
+    /// Tries a step of size `h` from the current state; returns the error against the scales.
+    fn attempt(&mut self, h: f64) -> f64 {
         let Self {
             mechanism,
             stepper,
@@ -282,121 +370,65 @@ impl Simulation {
             ..
         } = self;
         let tolerance = self.running.solver.tolerance;
-        stepper.choose(state.implicit);
-        let evaluations = mechanism.evaluations;
-        mechanism
-            .contacts
-            .memory_mut()
-            .copy_from_slice(&state.memory);
-        let t = state.t;
-        let (mut h, mut t_end);
-        let factor = loop {
-            h = state.h_next.min(LONGEST_STEP);
-            t_end = t + h;
-            let cut = t_end >= limit - 1e-6 * h;
-            if cut {
-                t_end = limit;
-                h = limit - t;
-            }
-            let error =
-                stepper.attempt(mechanism, t, h, &state.y, &state.k, y_end, k_end) / tolerance;
-            if error <= 1.0 {
-                let factor = state.controller.after_accept(error);
-                if cut {
-                    // A step cut short says nothing against the longer one.
-                    state.h_next = state.h_next.max(h * factor);
-                    break None;
-                }
-                break Some(factor);
-            }
-            state.statistics.rejected += 1;
-            state.h_next = h * state.controller.after_reject(error);
-            if !(state.h_next >= SHORTEST_STEP.max(4.0 * f64::EPSILON * t)) {
-                state.statistics.evaluations += mechanism.evaluations - evaluations;
-                state.h_next = self.running.solver.step;
-                let advice = format!(
-                    "try a looser solver.tolerance (now {tolerance:e}) or a softer or heavier scene"
-                );
-                return Err(self.stopped(
-                    "the step size that the tolerance asks for fell below 1e-14 s",
-                    advice,
-                ));
-            }
-        };
-        let contact_began = state.contact_began;
-        let stiffness = stepper.stiffness(h, y_end, k_end);
-        if let Some(factor) = factor {
-            state.h_next = h * factor;
-        }
-        state.contact_began = false;
-        mechanism.contacts.finish(t_end);
-        store_gaps(mechanism, &mut self.gaps_end);
-        if let Some(theta) = self.first_event(h) {
-            // The step is taken again, shorter, so that its end carries the method's error and not the interpolant's.
-            t_end = t + theta * h;
-            h *= theta;
-            let Self {
-                mechanism,
-                stepper,
-                state,
-                y_end,
-                k_end,
-                ..
-            } = self;
-            stepper.attempt(mechanism, t, h, &state.y, &state.k, y_end, k_end);
-            mechanism.contacts.finish(t_end);
-            store_gaps(mechanism, &mut self.gaps_end);
-        } else if contact_began {
-            self.state.h_contact = h.max(1e-9);
-        }
-        self.accept(t_end, h, evaluations)?;
-        if self.running.solver.method == Method::Automatic {
-            self.vote(h, stiffness);
-        }
-        Ok(())
+        stepper.attempt(
+            mechanism, state.t, h, &state.y, &state.k, y_end, k_end, tolerance,
+        )
     }
 
-    /// Which method of the automatic pair takes the next step.
-    fn vote(&mut self, h: f64, stiffness: f64) {
+    fn finish_gaps(&mut self, t_end: f64) {
+        self.mechanism.contacts.finish(t_end);
+        store_gaps(&self.mechanism, &mut self.gaps_end);
+    }
+
+    /// Which method of the automatic pair takes the next step, after one of size `h` that took so many evaluations.
+    fn vote(&mut self, h: f64, stiffness: f64, evaluations: u64) {
         let state = &mut self.state;
-        // An impact is short and not stiff: the explicit method resolves it at less cost.
+        let choice = &mut state.choice;
         if state.contact_began {
-            if state.implicit {
+            choice.since_contact = 0;
+            choice.held = 0;
+            // An impact is short and not stiff: the explicit method resolves it at less cost.
+            if state.implicit && state.memory.iter().any(|m| m.active && !m.floored) {
                 state.implicit = false;
-                state.controller = controller_of(false);
+                state.controller = controller_of(Method::Automatic, false);
             }
-            state.votes = 0;
-            return;
-        }
-        if state.votes < 0 {
-            state.votes += 1;
             return;
         }
         if state.implicit {
-            state.votes = if h < 4.0 * state.h_explicit {
-                state.votes + 1
-            } else {
-                0
-            };
-            if state.votes >= SHORT_STEPS {
-                state.implicit = false;
-                state.controller = controller_of(false);
-                state.h_next = state.h_explicit;
-                state.votes = -EXPLICIT_TURN;
+            choice.progress += h;
+            choice.cost += evaluations;
+            choice.steps += 1;
+            if choice.steps >= TRIAL_STEPS {
+                let explicit = choice.h_explicit / EXPLICIT_EVALUATIONS;
+                if choice.progress < WORTH_IT * explicit * choice.cost as f64 {
+                    state.implicit = false;
+                    state.controller = controller_of(Method::Automatic, false);
+                    state.h_next = choice.h_explicit;
+                    choice.wait = EXPLICIT_TURN;
+                }
+                (choice.progress, choice.cost, choice.steps) = (0.0, 0, 0);
             }
+            return;
+        }
+        choice.since_contact += 1;
+        choice.held = if stiffness > HELD_BY_STABILITY {
+            choice.held + 1
         } else {
-            state.votes = if stiffness > HELD_BY_STABILITY {
-                state.votes + 1
-            } else {
-                (state.votes - 1).max(0)
+            choice.held.saturating_sub(1)
+        };
+        if choice.wait > 0 {
+            choice.wait -= 1;
+            return;
+        }
+        let settled = choice.held >= HELD_STEPS || choice.since_contact >= SETTLED_STEPS;
+        let velocities = state.y.len() - self.mechanism.positions();
+        if settled && velocities <= LARGEST_IMPLICIT && state.memory.iter().any(|m| m.active) {
+            state.implicit = true;
+            state.controller = controller_of(Method::Automatic, true);
+            *choice = Choice {
+                h_explicit: h,
+                ..Choice::default()
             };
-            let velocities = state.y.len() - self.mechanism.positions();
-            if state.votes >= HELD_STEPS && velocities <= LARGEST_IMPLICIT {
-                state.implicit = true;
-                state.controller = controller_of(true);
-                state.h_explicit = h;
-                state.votes = 0;
-            }
         }
     }
 
@@ -492,7 +524,8 @@ impl Simulation {
             t_end = limit;
         }
         let h = t_end - t;
-        stepper.attempt(mechanism, t, h, &state.y, &state.k, y_end, k_end);
+        let tolerance = self.running.solver.tolerance;
+        stepper.attempt(mechanism, t, h, &state.y, &state.k, y_end, k_end, tolerance);
         self.accept(t_end, h, evaluations)?;
         if t_end == limit {
             // The next grid begins where this one was cut.
@@ -869,9 +902,9 @@ impl Simulation {
             let solver = &self.running.solver;
             if solver.method != before.solver.method {
                 self.stepper = AnyStepper::new(solver.method, self.state.y.len());
-                self.state.implicit = solver.method == Method::Rosenbrock;
-                self.state.controller = controller_of(self.state.implicit);
-                self.state.votes = 0;
+                self.state.implicit = false;
+                self.state.controller = controller_of(solver.method, false);
+                self.state.choice = Choice::default();
                 self.mechanism.contacts.switching = switching_of(&self.running);
             }
             self.state.h_next = self.state.h_next.min(solver.step);
@@ -1026,9 +1059,13 @@ impl Simulation {
     }
 }
 
-/// Step-size control of the linearly implicit method (embedded order 2) or of the explicit one (embedded order 4).
-fn controller_of(implicit: bool) -> Controller {
-    Controller::new(if implicit { 2 } else { 4 })
+/// Step-size control for the order of the method's error estimate.
+fn controller_of(method: Method, implicit: bool) -> Controller {
+    Controller::new(match (method, implicit) {
+        (Method::Rosenbrock, _) => 2,
+        (Method::Radau5, _) | (Method::Automatic, true) => 3,
+        _ => 4,
+    })
 }
 
 fn switching_of(scene: &Scene) -> Switching {

@@ -1,7 +1,8 @@
 //! The stepping methods behind one name, so that a method can change while the simulation runs.
 
 use crate::integrate::{
-    DormandPrince, Method, Rosenbrock, RungeKutta4, SemiImplicitEuler, Stepper, StiffSystem,
+    DormandPrince, Method, Radau, Rosenbrock, RungeKutta4, SemiImplicitEuler, Stepper, StiffSystem,
+    hermite,
 };
 
 pub(super) enum AnyStepper {
@@ -9,37 +10,13 @@ pub(super) enum AnyStepper {
     RungeKutta4(RungeKutta4),
     DormandPrince(DormandPrince),
     Rosenbrock(Box<Rosenbrock>),
+    Radau(Box<Radau>),
     /// The explicit one steps while `implicit` is false.
     Pair {
         explicit: DormandPrince,
-        stiff: Box<Rosenbrock>,
+        stiff: Box<Radau>,
         implicit: bool,
     },
-}
-
-/// Calls the stepper in charge.
-macro_rules! each {
-    ($self:expr, $s:ident => $call:expr) => {
-        match $self {
-            AnyStepper::SemiImplicitEuler($s) => $call,
-            AnyStepper::RungeKutta4($s) => $call,
-            AnyStepper::DormandPrince($s) => $call,
-            AnyStepper::Rosenbrock($s) => $call,
-            AnyStepper::Pair {
-                explicit,
-                stiff,
-                implicit,
-            } => {
-                if *implicit {
-                    let $s = stiff;
-                    $call
-                } else {
-                    let $s = explicit;
-                    $call
-                }
-            }
-        }
-    };
 }
 
 impl AnyStepper {
@@ -49,9 +26,10 @@ impl AnyStepper {
             Method::RungeKutta4 => Self::RungeKutta4(RungeKutta4::new(dimension)),
             Method::DormandPrince5 => Self::DormandPrince(DormandPrince::new(dimension)),
             Method::Rosenbrock => Self::Rosenbrock(Box::new(Rosenbrock::new(dimension))),
+            Method::Radau5 => Self::Radau(Box::new(Radau::new(dimension))),
             Method::Automatic => Self::Pair {
                 explicit: DormandPrince::new(dimension),
-                stiff: Box::new(Rosenbrock::new(dimension)),
+                stiff: Box::new(Radau::new(dimension)),
                 implicit: false,
             },
         }
@@ -67,7 +45,8 @@ impl AnyStepper {
     /// Forgets what was computed at a state that is no longer the current one.
     pub(super) fn invalidate(&mut self) {
         match self {
-            Self::Rosenbrock(stiff) | Self::Pair { stiff, .. } => stiff.invalidate(),
+            Self::Rosenbrock(stiff) => stiff.invalidate(),
+            Self::Radau(stiff) | Self::Pair { stiff, .. } => stiff.invalidate(),
             _ => {}
         }
     }
@@ -93,8 +72,22 @@ impl AnyStepper {
         k: &[f64],
         y_end: &mut [f64],
         k_end: &mut [f64],
+        tolerance: f64,
     ) -> f64 {
-        each!(self, s => s.attempt(system, t, h, y, k, y_end, k_end))
+        match self {
+            Self::SemiImplicitEuler(s) => s.attempt(system, t, h, y, k, y_end, k_end),
+            Self::RungeKutta4(s) => s.attempt(system, t, h, y, k, y_end, k_end),
+            Self::DormandPrince(s)
+            | Self::Pair {
+                explicit: s,
+                implicit: false,
+                ..
+            } => s.attempt(system, t, h, y, k, y_end, k_end),
+            Self::Rosenbrock(s) => s.attempt(system, t, h, y, k, y_end, k_end),
+            Self::Radau(s) | Self::Pair { stiff: s, .. } => {
+                s.attempt(system, t, h, y, k, y_end, k_end, tolerance)
+            }
+        }
     }
 
     /// Whether `attempt` leaves the derivative at the end.
@@ -112,6 +105,17 @@ impl AnyStepper {
         k_end: &[f64],
         out: &mut [f64],
     ) {
-        each!(self, s => s.interpolate(theta, h, y, k, y_end, k_end, out));
+        match self {
+            Self::SemiImplicitEuler(_) | Self::RungeKutta4(_) | Self::Rosenbrock(_) => {
+                hermite(theta, h, y, k, y_end, k_end, out);
+            }
+            Self::DormandPrince(s)
+            | Self::Pair {
+                explicit: s,
+                implicit: false,
+                ..
+            } => s.interpolate(theta, h, y, k, out),
+            Self::Radau(s) | Self::Pair { stiff: s, .. } => s.interpolate(theta, y, out),
+        }
     }
 }

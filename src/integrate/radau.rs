@@ -1,0 +1,434 @@
+//! Radau IIA with three stages: implicit, order 5, stiffly accurate, L-stable, stage order 3
+//! (Hairer & Wanner, *Solving Ordinary Differential Equations II*, 2nd ed., IV.8; coefficients of Table IV.5.6).
+//!
+//! Unlike a linearly implicit method it iterates: a stiff contact on a curved path leaves a linearised step off the
+//! contact by (h v)^2 / (2 L), which is more than a settled penetration at steps of a millisecond.
+
+use super::StiffSystem;
+
+const SQRT6: f64 = 2.449_489_742_783_178;
+const C: [f64; 3] = [(4.0 - SQRT6) / 10.0, (4.0 + SQRT6) / 10.0, 1.0];
+/// Weights of the stages in the embedded error estimate.
+const ERROR: [f64; 3] = [
+    -(13.0 + 7.0 * SQRT6) / 3.0,
+    (-13.0 + 7.0 * SQRT6) / 3.0,
+    -1.0 / 3.0,
+];
+/// Eigenvalues of the inverse of the coefficient matrix: one real, one complex pair.
+const REAL: f64 = 3.637_834_252_744_496;
+const PAIR: (f64, f64) = (2.681_082_873_627_752, 3.050_430_199_247_411);
+/// Transformation to those eigenvalues, and its inverse.
+const T: [[f64; 3]; 3] = [
+    [
+        0.091_232_394_870_892_94,
+        -0.141_255_295_020_954_2,
+        -0.030_029_194_105_147_424,
+    ],
+    [
+        0.241_717_932_707_107_02,
+        0.204_129_352_293_799_93,
+        0.382_942_112_757_261_94,
+    ],
+    [0.966_048_182_615_092_9, 1.0, 0.0],
+];
+const T_INVERSE: [[f64; 3]; 3] = [
+    [
+        4.325_579_890_063_155,
+        0.339_199_251_815_809_87,
+        0.541_770_539_935_874_9,
+    ],
+    [
+        -4.178_718_591_551_905,
+        -0.327_682_820_761_062_4,
+        0.476_623_554_500_550_45,
+    ],
+    [
+        -0.502_872_634_945_786_9,
+        2.571_926_949_855_605_4,
+        -0.596_039_204_828_224_9,
+    ],
+];
+const MOST_ITERATIONS: u32 = 7;
+
+/// Radau IIA(5).
+pub struct Radau {
+    /// Stage increments Z and their transforms W.
+    z: [Vec<f64>; 3],
+    w: [Vec<f64>; 3],
+    f: [Vec<f64>; 3],
+    stage: Vec<f64>,
+    error: Vec<f64>,
+    linearised_at: f64,
+    /// Step whose polynomial starts the next iteration; 0 where there is none.
+    h_previous: f64,
+    t_previous: f64,
+    previous: [Vec<f64>; 3],
+    /// Iterations of the latest attempt.
+    pub iterations: u32,
+    /// The latest attempt's convergence was slow: a longer step would not pay.
+    pub slow: bool,
+}
+
+impl Radau {
+    /// For `dimension` components.
+    pub fn new(dimension: usize) -> Self {
+        let triple = || std::array::from_fn(|_| vec![0.0; dimension]);
+        Self {
+            z: triple(),
+            w: triple(),
+            f: triple(),
+            stage: vec![0.0; dimension],
+            error: vec![0.0; dimension],
+            linearised_at: f64::NAN,
+            h_previous: 0.0,
+            t_previous: f64::NAN,
+            previous: triple(),
+            iterations: 0,
+            slow: false,
+        }
+    }
+
+    /// Forgets the Jacobian and the previous step: the state was changed by something else than a step.
+    pub fn invalidate(&mut self) {
+        self.linearised_at = f64::NAN;
+        self.h_previous = 0.0;
+    }
+
+    /// As [`super::Stepper::attempt`]; `tolerance` sets how far the iteration goes. Infinite where it fails.
+    pub fn attempt<S: StiffSystem>(
+        &mut self,
+        system: &mut S,
+        t: f64,
+        h: f64,
+        y: &[f64],
+        k: &[f64],
+        y_end: &mut [f64],
+        k_end: &mut [f64],
+        tolerance: f64,
+    ) -> f64 {
+        let n = y.len();
+        if self.linearised_at != t {
+            system.linearise(t, y);
+            self.linearised_at = t;
+        }
+        system.factor_shifted(REAL / h);
+        system.factor_shifted_pair(PAIR.0 / h, PAIR.1 / h);
+        self.begin(t, h, n);
+        if !self.iterate(system, t, h, y, tolerance) {
+            return f64::INFINITY;
+        }
+        for i in 0..n {
+            y_end[i] = y[i] + self.z[2][i];
+        }
+        let error = self.estimate(system, t, h, y, k, tolerance);
+        system.derivative(t + h, y_end, k_end);
+        self.remember(t, h);
+        error
+    }
+
+    /// First guess of the stages: the previous step's polynomial, continued.
+    fn begin(&mut self, t: f64, h: f64, n: usize) {
+        if self.h_previous == 0.0 || (self.t_previous - t).abs() > 1e-9 * h {
+            for j in 0..3 {
+                self.z[j].fill(0.0);
+                self.w[j].fill(0.0);
+            }
+            return;
+        }
+        let ratio = h / self.h_previous;
+        for i in 0..n {
+            let z = std::array::from_fn(|j| self.previous[j][i]);
+            let start = polynomial(&z, 0.0);
+            for j in 0..3 {
+                // The polynomial is in s = (time - step's end) / h_previous and gives increments from its own start.
+                self.z[j][i] = polynomial(&z, C[j] * ratio) - start;
+            }
+            for j in 0..3 {
+                self.w[j][i] = (0..3).map(|m| T_INVERSE[j][m] * self.z[m][i]).sum();
+            }
+        }
+    }
+
+    /// Simplified Newton iteration on the transformed stages. Returns whether it converged.
+    fn iterate<S: StiffSystem>(
+        &mut self,
+        system: &mut S,
+        t: f64,
+        h: f64,
+        y: &[f64],
+        tolerance: f64,
+    ) -> bool {
+        let n = y.len();
+        // The iteration's own error stays well below the step's.
+        let target = (10.0 * f64::EPSILON / tolerance).max(tolerance.sqrt().min(0.01));
+        let (real, alpha, beta) = (REAL / h, PAIR.0 / h, PAIR.1 / h);
+        let mut before = 0.0;
+        self.slow = false;
+        for iteration in 0..MOST_ITERATIONS {
+            self.iterations = iteration + 1;
+            for j in 0..3 {
+                for i in 0..n {
+                    self.stage[i] = y[i] + self.z[j][i];
+                }
+                system.derivative(t + C[j] * h, &self.stage, &mut self.f[j]);
+            }
+            for i in 0..n {
+                let f = [self.f[0][i], self.f[1][i], self.f[2][i]];
+                let a: [f64; 3] = std::array::from_fn(|j| {
+                    T_INVERSE[j][0] * f[0] + T_INVERSE[j][1] * f[1] + T_INVERSE[j][2] * f[2]
+                });
+                let (w1, w2, w3) = (self.w[0][i], self.w[1][i], self.w[2][i]);
+                self.f[0][i] = a[0] - real * w1;
+                self.f[1][i] = a[1] - alpha * w2 + beta * w3;
+                self.f[2][i] = a[2] - alpha * w3 - beta * w2;
+            }
+            let [f1, f2, f3] = &mut self.f;
+            system.solve_shifted(f1);
+            system.solve_shifted_pair(f2, f3);
+            let scale = system.scale();
+            let mut size: f64 = 0.0;
+            for i in 0..n {
+                let mut largest: f64 = 0.0;
+                for j in 0..3 {
+                    self.w[j][i] += self.f[j][i];
+                    largest = largest.max(self.f[j][i].abs());
+                }
+                let w = [self.w[0][i], self.w[1][i], self.w[2][i]];
+                for j in 0..3 {
+                    self.z[j][i] = T[j][0] * w[0] + T[j][1] * w[1] + T[j][2] * w[2];
+                }
+                let relative = largest / (tolerance * scale[i]);
+                if relative > size || relative.is_nan() {
+                    size = relative;
+                }
+            }
+            if !size.is_finite() {
+                return false;
+            }
+            if iteration == 0 {
+                if size <= target * 1e-3 {
+                    return true;
+                }
+            } else {
+                let theta = size / before;
+                // Rounding keeps the last corrections from shrinking further.
+                if size <= 0.1 * target {
+                    return true;
+                }
+                if theta >= 0.99 {
+                    return false;
+                }
+                self.slow = theta > 0.3;
+                let left = theta / (1.0 - theta) * size;
+                if left <= target {
+                    return true;
+                }
+                let remaining = (MOST_ITERATIONS - 1 - iteration) as i32;
+                if left * theta.powi(remaining) > target {
+                    return false;
+                }
+            }
+            before = size;
+        }
+        false
+    }
+
+    /// Embedded error estimate of order 3, filtered through the real factor so that stiff components do not inflate it.
+    fn estimate<S: StiffSystem>(
+        &mut self,
+        system: &mut S,
+        t: f64,
+        h: f64,
+        y: &[f64],
+        k: &[f64],
+        tolerance: f64,
+    ) -> f64 {
+        let n = y.len();
+        let weighted = |z: &[Vec<f64>; 3], i: usize| {
+            (ERROR[0] * z[0][i] + ERROR[1] * z[1][i] + ERROR[2] * z[2][i]) / h
+        };
+        for i in 0..n {
+            self.error[i] = weighted(&self.z, i) + k[i];
+        }
+        system.solve_shifted(&mut self.error);
+        let mut error = largest(&self.error, system.scale());
+        if error > tolerance {
+            for i in 0..n {
+                self.stage[i] = y[i] + self.error[i];
+            }
+            let (stage, rate) = (&self.stage, &mut self.error);
+            system.derivative(t, stage, rate);
+            for i in 0..n {
+                self.error[i] += weighted(&self.z, i);
+            }
+            system.solve_shifted(&mut self.error);
+            error = largest(&self.error, system.scale());
+        }
+        error
+    }
+
+    fn remember(&mut self, t: f64, h: f64) {
+        for j in 0..3 {
+            self.previous[j].copy_from_slice(&self.z[j]);
+        }
+        self.h_previous = h;
+        self.t_previous = t + h;
+    }
+
+    /// State at `t + theta h`: the collocation polynomial.
+    pub fn interpolate(&self, theta: f64, y: &[f64], out: &mut [f64]) {
+        for (i, out) in out.iter_mut().enumerate() {
+            let z = std::array::from_fn(|j| self.previous[j][i]);
+            *out = y[i] + polynomial(&z, theta - 1.0);
+        }
+    }
+}
+
+/// Largest component against its scale; NaN if any is.
+fn largest(x: &[f64], scale: &[f64]) -> f64 {
+    let mut size: f64 = 0.0;
+    for (x, s) in x.iter().zip(scale) {
+        let e = x.abs() / s;
+        if e > size || e.is_nan() {
+            size = e;
+        }
+    }
+    size
+}
+
+/// Increment from the step's start at s = (time - step's end) / h: the cubic through 0 and the three stages.
+fn polynomial(z: &[f64; 3], s: f64) -> f64 {
+    let (c1, c2) = (C[0], C[1]);
+    let (c1m1, c2m1) = (c1 - 1.0, c2 - 1.0);
+    let a1 = (z[1] - z[2]) / c2m1;
+    let slope = (z[0] - z[1]) / (c1 - c2);
+    let a3 = (slope - z[0] / c1) / c2;
+    let a2 = (slope - a1) / c1m1;
+    let a3 = a2 - a3;
+    z[2] + s * (a1 + (s - c2m1) * (a2 + (s - c1m1) * a3))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::integrate::System;
+    use nalgebra::{Complex, Matrix2, Vector2};
+
+    /// Van der Pol's oscillator in Lienard's form is stiff for a small `epsilon`; here also with a forcing in time.
+    struct VanDerPol {
+        epsilon: f64,
+        j: Matrix2<f64>,
+        real: Matrix2<f64>,
+        pair: Matrix2<Complex<f64>>,
+    }
+
+    impl VanDerPol {
+        fn new(epsilon: f64) -> Self {
+            Self {
+                epsilon,
+                j: Matrix2::zeros(),
+                real: Matrix2::zeros(),
+                pair: Matrix2::zeros(),
+            }
+        }
+    }
+
+    impl System for VanDerPol {
+        fn dimension(&self) -> usize {
+            2
+        }
+        fn positions(&self) -> usize {
+            0
+        }
+        fn derivative(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
+            dy[0] = y[1];
+            dy[1] = ((1.0 - y[0] * y[0]) * y[1] - y[0] + libm::sin(t)) / self.epsilon;
+        }
+        fn position_rate(&mut self, _t: f64, _y: &[f64], _dy: &mut [f64]) {}
+        fn scale(&self) -> &[f64] {
+            &[1.0, 1.0]
+        }
+    }
+
+    impl StiffSystem for VanDerPol {
+        fn linearise(&mut self, _t: f64, y: &[f64]) {
+            self.j = Matrix2::new(
+                0.0,
+                1.0,
+                (-2.0 * y[0] * y[1] - 1.0) / self.epsilon,
+                (1.0 - y[0] * y[0]) / self.epsilon,
+            );
+        }
+        fn factor_shifted(&mut self, shift: f64) {
+            self.real = (Matrix2::identity() * shift - self.j)
+                .try_inverse()
+                .unwrap();
+        }
+        fn solve_shifted(&mut self, b: &mut [f64]) {
+            let x = self.real * Vector2::new(b[0], b[1]);
+            b.copy_from_slice(x.as_slice());
+        }
+        fn factor_shifted_pair(&mut self, real: f64, imaginary: f64) {
+            let shift = Matrix2::identity() * Complex::new(real, imaginary);
+            self.pair = (shift - self.j.map(|x| Complex::new(x, 0.0)))
+                .try_inverse()
+                .unwrap();
+        }
+        fn solve_shifted_pair(&mut self, re: &mut [f64], im: &mut [f64]) {
+            let x =
+                self.pair * Vector2::new(Complex::new(re[0], im[0]), Complex::new(re[1], im[1]));
+            for i in 0..2 {
+                (re[i], im[i]) = (x[i].re, x[i].im);
+            }
+        }
+        fn time_derivative(&self) -> &[f64] {
+            &[]
+        }
+    }
+
+    fn end(epsilon: f64, steps: u32) -> [f64; 2] {
+        let mut system = VanDerPol::new(epsilon);
+        let mut method = Radau::new(2);
+        let (mut y, mut k, mut y1, mut k1) = ([1.5, -1.0], [0.0; 2], [0.0; 2], [0.0; 2]);
+        let h = 0.5 / f64::from(steps);
+        for n in 0..steps {
+            let t = f64::from(n) * h;
+            system.derivative(t, &y, &mut k);
+            let error = method.attempt(&mut system, t, h, &y, &k, &mut y1, &mut k1, 1e-13);
+            assert!(error.is_finite(), "the iteration failed at {t}");
+            y = y1;
+        }
+        y
+    }
+
+    #[test]
+    fn order_is_five_on_a_smooth_problem() {
+        let fine = end(1.0, 512);
+        let error = |steps: u32| {
+            let y = end(1.0, steps);
+            (y[0] - fine[0]).abs().max((y[1] - fine[1]).abs())
+        };
+        let order = libm::log2(error(4) / error(8));
+        assert!((order - 5.0).abs() < 0.4, "{order}");
+    }
+
+    #[test]
+    fn transformation_and_its_inverse_belong_together() {
+        for i in 0..3 {
+            for j in 0..3 {
+                let product: f64 = (0..3).map(|k| T[i][k] * T_INVERSE[k][j]).sum();
+                let unit = if i == j { 1.0 } else { 0.0 };
+                assert!((product - unit).abs() < 2e-15, "{i} {j}: {product}");
+            }
+        }
+    }
+
+    #[test]
+    fn polynomial_passes_through_its_stages() {
+        let z = [0.3, -0.7, 1.1];
+        assert!(polynomial(&z, -1.0).abs() < 1e-15);
+        for j in 0..3 {
+            assert!((polynomial(&z, C[j] - 1.0) - z[j]).abs() < 1e-14);
+        }
+    }
+}
