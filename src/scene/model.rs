@@ -74,7 +74,7 @@ pub struct Source {
     pub text: String,
 }
 
-/// Equations of motion (`physics.md` section 3).
+/// Form of the equations of motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Formulation {
     /// Spanning forest coordinates.

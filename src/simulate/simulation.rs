@@ -176,7 +176,7 @@ impl Simulation {
         Ok(simulation)
     }
 
-    /// Contacts that exist at the start take the floor as their approach speed (`physics.md` section 2).
+    /// Contacts that exist at the start take the floor as their approach speed: nothing tells how they began.
     fn begin_contacts_at_start(&mut self) {
         self.mechanism.measure(self.state.t, &self.state.y);
         for j in 0..self.state.memory.len() {
