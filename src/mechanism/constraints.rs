@@ -27,6 +27,10 @@ pub struct Constraints {
     multipliers: Vec<f64>,
     scratch: Vec<f64>,
     step: Vec<f64>,
+    square: Vec<f64>,
+    /// Instant and positions of the latest factorisation.
+    time: f64,
+    positions: Vec<f64>,
     /// Smallest pivot ratio of the latest factorisation.
     pub least_pivot: f64,
 }
@@ -87,8 +91,37 @@ impl Constraints {
             multipliers: vec![0.0; 3 * joints.len()],
             scratch: vec![0.0; 3 * joints.len()],
             step: vec![0.0; model.nv],
+            square: if 3 * joints.len() == model.nv {
+                vec![0.0; model.nv * model.nv]
+            } else {
+                Vec::new()
+            },
+            time: f64::NAN,
+            positions: vec![f64::NAN; model.nq],
             least_pivot: f64::INFINITY,
         }
+    }
+
+    /// Whether the determinant of the Jacobian of the latest factorisation is positive, where it is square: its sign
+    /// changes where the loops pass a singular pose.
+    pub fn is_right_handed(&mut self, model: &Model) -> bool {
+        let n = model.nv;
+        let a = &mut self.square;
+        a.resize(n * n, 0.0);
+        a.fill(0.0);
+        for (k, sides) in self.sides.iter().enumerate() {
+            for side in sides {
+                let first = model.blocks[side.block].v;
+                for i in 0..3 {
+                    let row = &self.jacobian[side.offset + i * side.n..][..side.n];
+                    let at = (3 * k + i) * n + first;
+                    for (a, j) in a[at..].iter_mut().zip(row) {
+                        *a += j;
+                    }
+                }
+            }
+        }
+        super::factor::is_determinant_positive(a, n)
     }
 
     /// Number of rows.
@@ -101,8 +134,14 @@ impl Constraints {
         Vec3::from_column_slice(&self.multipliers[3 * k..3 * k + 3])
     }
 
-    /// Jacobians and J M^-1 J^T, factored, for a tree that has been moved forward and assembled.
-    fn factor(&mut self, model: &Model, tree: &Tree) {
+    /// Jacobians and J M^-1 J^T, factored, for a tree that has been moved forward and assembled at (t, q); nothing to do
+    /// where they are those of the latest call.
+    fn factor(&mut self, model: &Model, tree: &Tree, t: f64, q: &[f64]) {
+        if self.is_factored(t, q) {
+            return;
+        }
+        self.time = t;
+        self.positions.copy_from_slice(q);
         self.jacobian.fill(0.0);
         for (k, &j) in self.joints.iter().enumerate() {
             let joint = &model.joints[j];
@@ -153,6 +192,10 @@ impl Constraints {
         self.least_pivot = self.matrix.factor();
     }
 
+    fn is_factored(&self, t: f64, q: &[f64]) -> bool {
+        self.time == t && self.positions == q
+    }
+
     /// x = J v for the rows of joint `k`.
     fn apply(&self, model: &Model, k: usize, v: &[f64]) -> Vec3 {
         let mut sum = Vec3::zeros();
@@ -183,8 +226,8 @@ impl Constraints {
 
     /// Corrects the unconstrained accelerations `vdot` so that the joints stay closed, and keeps the multipliers.
     /// The tree must have been moved forward (bias accelerations) and assembled at the same state.
-    pub fn correct(&mut self, model: &Model, tree: &Tree, vdot: &mut [f64]) {
-        self.factor(model, tree);
+    pub fn correct(&mut self, model: &Model, tree: &Tree, t: f64, q: &[f64], vdot: &mut [f64]) {
+        self.factor(model, tree, t, q);
         for k in 0..self.joints.len() {
             let bias = relative(
                 &model.joints[self.joints[k]],
@@ -234,8 +277,11 @@ impl Constraints {
                 error = largest;
                 break;
             }
+            // Once close, the matrix of the iteration before is as good as a new one.
+            if error.is_infinite() || !(largest < 1e-4 * error && largest < 1e-9) {
+                self.prepare(model, tree, t, &y[..model.nq], &gravity);
+            }
             error = largest;
-            self.prepare(model, tree, &gravity);
             self.matrix.solve(&mut self.multipliers);
             let mut step = std::mem::take(&mut self.step);
             step.fill(0.0);
@@ -243,7 +289,7 @@ impl Constraints {
             Tree::displace(model, y, &step);
             self.step = step;
         }
-        self.prepare(model, tree, &gravity);
+        self.prepare(model, tree, t, &y[..model.nq], &gravity);
         for (k, &j) in self.joints.iter().enumerate() {
             let rate = relative(&model.joints[j], &tree.motion, Kinematics::point_velocity);
             for i in 0..3 {
@@ -261,11 +307,14 @@ impl Constraints {
         error
     }
 
-    fn prepare(&mut self, model: &Model, tree: &mut Tree, gravity: &Vec3) {
+    fn prepare(&mut self, model: &Model, tree: &mut Tree, t: f64, q: &[f64], gravity: &Vec3) {
+        if self.is_factored(t, q) {
+            return;
+        }
         let mut scratch = std::mem::take(&mut self.step);
         tree.assemble(model, gravity, &mut scratch);
         self.step = scratch;
-        self.factor(model, tree);
+        self.factor(model, tree, t, q);
     }
 }
 

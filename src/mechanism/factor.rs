@@ -157,6 +157,38 @@ fn solve_on_free_body(h: &[f64], n: usize, inverse_diagonal: &[f64], x: &mut [f6
     }
 }
 
+/// Whether the determinant of a row-major n x n matrix is positive, by elimination in place with row exchanges.
+pub fn is_determinant_positive(a: &mut [f64], n: usize) -> bool {
+    let mut positive = true;
+    for k in 0..n {
+        let mut best = k;
+        for i in k + 1..n {
+            if a[i * n + k].abs() > a[best * n + k].abs() {
+                best = i;
+            }
+        }
+        if best != k {
+            positive = !positive;
+            for j in k..n {
+                a.swap(k * n + j, best * n + j);
+            }
+        }
+        let (top, bottom) = a.split_at_mut((k + 1) * n);
+        let pivot = &top[k * n..];
+        positive ^= pivot[k] < 0.0;
+        let inverse = 1.0 / pivot[k];
+        for row in bottom.chunks_exact_mut(n) {
+            let factor = row[k] * inverse;
+            if factor != 0.0 {
+                for j in k + 1..n {
+                    row[j] -= factor * pivot[j];
+                }
+            }
+        }
+    }
+    positive
+}
+
 /// Cholesky factorisation of a symmetric positive definite matrix stored by its row envelope.
 ///
 /// Row i holds columns `first[i]..=i`; nothing outside the envelope fills in, so that a chain costs linear time.
@@ -284,6 +316,19 @@ mod tests {
             let mut x = b;
             pattern.solve(&h, &d, x.as_mut_slice());
             assert!((x - expected).norm() < 1e-15 * 10.0, "{n}");
+        }
+    }
+
+    #[test]
+    fn sign_of_the_determinant() {
+        let dense = matrix(&[NONE, 0, 1, 1]);
+        for sign in [1.0, -1.0] {
+            let mut a = dense.clone();
+            a.row_mut(2).scale_mut(sign);
+            a.swap_rows(0, 3);
+            let expected = a.determinant() > 0.0;
+            let mut rows: Vec<f64> = a.transpose().as_slice().to_vec();
+            assert_eq!(is_determinant_positive(&mut rows, 4), expected);
         }
     }
 

@@ -47,7 +47,7 @@ pub enum MechanismError {
     /// A ball that starts deeper in its socket wall than a contact can mean.
     #[error(
         "ball joint {joint}: ball and socket centres are {distance:.3e} m apart at the start, \
-         more than the clearance {clearance:.3e} m plus a tenth of the ball radius"
+         deeper in the wall than the clearance {clearance:.3e} m and a hundredth of the ball radius allow"
     )]
     OutsideSocket {
         /// Name of the joint.
@@ -57,6 +57,11 @@ pub enum MechanismError {
         /// c, m.
         clearance: f64,
     },
+    /// The loops closed at the start, but not where the drives' closed form has them.
+    #[error(
+        "the loops close on another branch than the drives ask for: start poses are too far off"
+    )]
+    OtherBranch,
     /// Too many coordinates for a method that solves with a dense matrix.
     #[error(
         "this scene has {velocities} velocity coordinates; the implicit methods take at most {most}: \
@@ -137,6 +142,8 @@ impl Mechanism {
         let mut y = model.start_state.clone();
         if let Some(trajectory) = &model.trajectory {
             place_output_body(model, trajectory, &mut y);
+            tree.forward(model, T, &y);
+            turn_hinges(model, &tree.motion, &mut y);
         }
         let all: Vec<usize> = match model.start {
             StartRule::Ideal => (0..model.joints.len()).collect(),
@@ -163,7 +170,7 @@ impl Mechanism {
                         distance: d,
                     });
                 }
-            } else if d > clearance + 0.1 * coefficients.ball_radius {
+            } else if d > clearance + 0.01 * coefficients.ball_radius {
                 return Err(MechanismError::OutsideSocket {
                     joint: self.joint_names[j].clone(),
                     distance: d,
@@ -219,6 +226,48 @@ impl Mechanism {
             }
             Form::Lagrange(_) => false,
         }
+    }
+
+    /// Longest step of a scene that is a function of time alone, s: a fiftieth of its shortest period.
+    pub fn kinematic_step(&self) -> f64 {
+        self.model.shortest_period() / 50.0
+    }
+
+    /// For a scene that is a function of time alone, on which side of a singular pose its loops are.
+    pub fn is_right_handed(&mut self) -> bool {
+        if !self.is_kinematic() {
+            return true;
+        }
+        match &mut self.form {
+            Form::Tree {
+                constraints: Some(constraints),
+                ..
+            } => constraints.is_right_handed(&self.model),
+            _ => true,
+        }
+    }
+
+    /// For a scene that is a function of time alone and knows its motion in closed form: how far its output body is from
+    /// that motion at the latest evaluation, m. 0 elsewhere.
+    pub fn distance_from_ideal(&self) -> f64 {
+        let Some(ideal) = self.ideal().filter(|_| self.is_kinematic()) else {
+            return 0.0;
+        };
+        let body = &self.model.bodies[self.model.output_body];
+        let m = &self.motion()[self.model.output_body];
+        let origin = m.position + m.rotation * body.origin;
+        (origin - Vec3::from_fn(|i, _| ideal.position[i].value)).norm()
+    }
+
+    /// Predicts the state of a scene that is a function of time alone a step `h` on: second order in positions.
+    pub fn predict(&self, h: f64, y: &[f64], k: &[f64], step: &mut [f64], out: &mut [f64]) {
+        let nq = self.model.nq;
+        out.copy_from_slice(y);
+        for i in 0..self.model.nv {
+            step[i] = h * (y[nq + i] + 0.5 * h * k[nq + i]);
+            out[nq + i] += h * k[nq + i];
+        }
+        Tree::displace(&self.model, out, step);
     }
 
     /// After a step: orientations back to unit length, loops closed again. Returns the closure error left, m.
@@ -420,6 +469,26 @@ fn place_output_body(model: &Model, trajectory: &Trajectory, y: &mut [f64]) {
     }
 }
 
+/// Turns every hinged body that carries a ball until the ball comes closest to its socket, so that loops close on the
+/// branch that the closed form means.
+fn turn_hinges(model: &Model, motion: &[Kinematics], y: &mut [f64]) {
+    for joint in &model.joints {
+        let motion_of = |b: usize| model.bodies.get(b).map(|body| body.motion);
+        let Some(Motion::Revolute { q, .. }) = motion_of(joint.ball.body) else {
+            continue;
+        };
+        let body = &motion[joint.ball.body];
+        let hinge = body.position - body.arm;
+        let centre = |a: &model::Anchor| {
+            motion[a.body].position + motion[a.body].rotation * a.offset - hinge
+        };
+        let (ball, socket, axis) = (centre(&joint.ball), centre(&joint.socket), body.axis);
+        let sine = axis.dot(&ball.cross(&socket));
+        let cosine = ball.dot(&socket) - axis.dot(&ball) * axis.dot(&socket);
+        y[q] += libm::atan2(sine, cosine);
+    }
+}
+
 /// Forces that the drives must give for the true accelerations in `tree.motion` under the loads in `tree.wrench`.
 fn inverse_dynamics(model: &Model, tree: &mut Tree, gravity: &Vec3, out: &mut [f64]) {
     for (b, body) in model.bodies.iter().enumerate() {
@@ -483,7 +552,7 @@ impl System for Mechanism {
                 tree.assemble(model, gravity, dv);
                 tree.solve(model, dv);
                 if let Some(constraints) = constraints {
-                    constraints.correct(model, tree, dv);
+                    constraints.correct(model, tree, t, &y[..model.nq], dv);
                 }
             }
             Form::Lagrange(lagrange) => {

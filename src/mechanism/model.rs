@@ -352,6 +352,25 @@ impl Model {
         self.bodies.len()
     }
 
+    /// Shortest period of a drive, s; infinite where nothing is driven periodically.
+    pub fn shortest_period(&self) -> f64 {
+        self.drives
+            .iter()
+            .zip(&self.revolute_drives)
+            .map(|(drive, &revolute)| match drive.law {
+                Drive::Spcmm { .. } => self
+                    .trajectory
+                    .as_ref()
+                    .map_or(f64::INFINITY, Trajectory::period),
+                Drive::Harmonic { frequency, .. } => 1.0 / frequency,
+                Drive::Constant { velocity, .. } if revolute => {
+                    std::f64::consts::TAU / velocity.abs()
+                }
+                Drive::Constant { .. } => f64::INFINITY,
+            })
+            .fold(f64::INFINITY, f64::min)
+    }
+
     /// Driven coordinate `drive` at `t`.
     pub fn drive(&self, drive: usize, t: f64, ideal: Option<&super::spcmm::Ideal>) -> Jet {
         match self.drives[drive].law {

@@ -57,6 +57,9 @@ pub struct Statistics {
     pub rejected: u64,
     /// Contacts begun, per ball joint.
     pub impacts: Vec<u64>,
+    /// Contacts that began slower than the scene's `impact_speed_floor` or existed at the start, per ball joint: they
+    /// rebound higher than asked.
+    pub floored: Vec<u64>,
     /// Largest continuous-time normal force (reaction of an ideal joint), per ball joint, N.
     pub peak_normal: Vec<f64>,
     /// When it occurred, per ball joint, s.
@@ -74,6 +77,7 @@ impl PartialEq for Statistics {
         (self.steps, self.evaluations, self.rejected)
             == (other.steps, other.evaluations, other.rejected)
             && self.impacts == other.impacts
+            && self.floored == other.floored
             && bits(&self.peak_normal) == bits(&other.peak_normal)
             && bits(&self.peak_time) == bits(&other.peak_time)
             && bits(&self.last_separation) == bits(&other.last_separation)

@@ -7,6 +7,35 @@ use crate::contact::Coefficients;
 pub(super) struct Approach {
     pub penetration: f64,
     pub rate: f64,
+    /// |de/dt|, m/s.
+    pub speed: f64,
+}
+
+/// A quantity at the latest two instants.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Recent {
+    /// (time, value), the older first; a value of 0 stands for none yet.
+    before: [(f64, f64); 2],
+}
+
+impl Recent {
+    /// Takes the value at a new instant; returns the largest since the one before, by the parabola through three.
+    pub(super) fn rise(&mut self, time: f64, value: f64) -> f64 {
+        let [(t0, f0), (t1, f1)] = self.before;
+        self.before = [(t1, f1), (time, value)];
+        if f0 <= 0.0 || !(f1 >= f0 && f1 >= value) || t1 <= t0 || time <= t1 {
+            return value;
+        }
+        let (a, b) = (t1 - t0, time - t1);
+        let (left, right) = ((f1 - f0) / a, (value - f1) / b);
+        let curvature = (right - left) / (a + b);
+        if curvature >= 0.0 {
+            return f1;
+        }
+        // Slope at t1 of that parabola, then its vertex.
+        let slope = left + curvature * a;
+        f1 - slope * slope / (4.0 * curvature)
+    }
 }
 
 /// Cubic Hermite polynomial of the penetration over one step.
@@ -35,21 +64,6 @@ impl Course {
             (m0 + s * (2.0 * a + 3.0 * b * s)) / self.h,
             (2.0 * a + 6.0 * b * s) / (self.h * self.h),
         )
-    }
-
-    /// Where the penetration has an extremum inside the step (rates of opposite sign at its ends).
-    pub(super) fn extremum(&self) -> f64 {
-        let (mut low, mut high) = (0.0, 1.0);
-        let rising = self.start.rate > 0.0;
-        for _ in 0..40 {
-            let middle = 0.5 * (low + high);
-            if (self.at(middle).1 > 0.0) == rising {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        0.5 * (low + high)
     }
 
     /// Where the penetration passes zero, given that it changes sign over the step.
@@ -112,6 +126,14 @@ mod tests {
     use crate::contact::Parameters;
 
     #[test]
+    fn a_parabola_between_samples_has_its_vertex_found() {
+        let f = |t: f64| 7.0 - 3.0 * (t - 0.42) * (t - 0.42);
+        let mut recent = Recent::default();
+        let peak = [0.1, 0.35, 0.7].map(|t| recent.rise(t, f(t)))[2];
+        assert!((peak - 7.0).abs() < 1e-14, "{peak}");
+    }
+
+    #[test]
     fn finds_the_peak_of_an_impact_between_coarse_samples() {
         // penetration = a sin(pi t / T): undamped peak at T / 2.
         let c = Coefficients {
@@ -124,6 +146,7 @@ mod tests {
             Approach {
                 penetration: a * s,
                 rate: a * std::f64::consts::PI / t_end * k,
+                speed: 0.0,
             }
         };
         let (start, end) = (0.43e-4, 0.53e-4);

@@ -1,6 +1,6 @@
 //! A scene in motion: stepping, events, live changes, snapshots. Depends on no clock.
 
-use super::peaks::{Approach, Course};
+use super::peaks::{Approach, Course, Recent};
 use super::stepper::AnyStepper;
 use super::{Effect, Frame, Peak, Snapshot, StartError, Statistics, Stopped, report};
 use crate::integrate::{Controller, Method, System, find_root, hermite};
@@ -14,8 +14,10 @@ pub const CLEARANCE_SPEED: f64 = 2e-3;
 const LONGEST_STEP: f64 = 10e-3;
 /// Shortest step of an adaptive method, s.
 const SHORTEST_STEP: f64 = 1e-14;
-/// Step of a scene that is a function of time alone, s: nothing accumulates, so it only spaces the peaks that are seen.
-const KINEMATIC_STEP: f64 = 2e-3;
+/// Further than this from its closed form, an ideal motion is on another branch of it, m.
+const OTHER_BRANCH: f64 = 1e-6;
+/// How close a scene that is a function of time alone comes to a pose that it cannot pass, s.
+const SHORTEST_KINEMATIC_STEP: f64 = 1e-5;
 /// First step after a contact begins, before one is known to work, s: a tenth of a usual impact.
 const FIRST_CONTACT_STEP: f64 = 1e-5;
 /// h |lambda| beyond which an explicit step is held by stability.
@@ -60,6 +62,10 @@ pub struct Simulation {
     scratch_y: Vec<f64>,
     scratch_k: Vec<f64>,
     gaps_end: Vec<Approach>,
+    /// On which side of singular poses a scene that is a function of time alone started.
+    right_handed: bool,
+    /// Joint whose contact starts or ends at the end of the step being taken.
+    located: Option<usize>,
     scratch_memory: Vec<Memory>,
 }
 
@@ -82,6 +88,8 @@ pub(super) struct State {
     ramps: Vec<Option<Ramp>>,
     /// Clearances in force.
     clearances: Vec<f64>,
+    /// Reactions of the ideal joints at the latest two instants, for their peaks between steps.
+    reactions: Vec<Recent>,
     /// Next step of an adaptive method.
     h_next: f64,
     /// Step that worked after the latest contact began.
@@ -145,6 +153,7 @@ impl Simulation {
                 clearances: (0..joints)
                     .map(|j| mechanism.contacts.clearance(j))
                     .collect(),
+                reactions: vec![Recent::default(); joints],
                 h_next: scene.solver.step.min(LONGEST_STEP),
                 h_contact: FIRST_CONTACT_STEP,
                 contact_began: false,
@@ -155,6 +164,7 @@ impl Simulation {
                 grid_count: 0,
                 statistics: Statistics {
                     impacts: vec![0; joints],
+                    floored: vec![0; joints],
                     peak_normal: vec![0.0; joints],
                     peak_time: vec![0.0; joints],
                     last_separation: vec![f64::NAN; joints],
@@ -167,12 +177,19 @@ impl Simulation {
             scratch_y: vec![0.0; n],
             scratch_k: vec![0.0; n],
             gaps_end: vec![Approach::default(); joints],
+            right_handed: true,
+            located: None,
             scratch_memory: vec![Memory::default(); joints],
             mechanism,
         };
         simulation.mechanism.contacts.switching = switching_of(scene);
         simulation.begin_contacts_at_start();
         simulation.refresh();
+        simulation.right_handed = simulation.mechanism.is_right_handed();
+        if simulation.mechanism.distance_from_ideal() > OTHER_BRANCH {
+            return Err(MechanismError::OtherBranch.into());
+        }
+        simulation.track_peaks(0.0);
         Ok(simulation)
     }
 
@@ -190,6 +207,7 @@ impl Simulation {
                     floored: true,
                 };
                 self.state.statistics.impacts[j] += 1;
+                self.state.statistics.floored[j] += 1;
             }
         }
     }
@@ -435,64 +453,104 @@ impl Simulation {
         }
     }
 
-    /// Fraction of the step just attempted at which the first contact starts or ends, if one does.
+    /// Fraction of the step just attempted at which the first contact starts or ends, if one does; that joint is put
+    /// down in `located`.
     fn first_event(&mut self, h: f64) -> Option<f64> {
         let mut first: Option<f64> = None;
+        self.located = None;
         for j in 0..self.gaps_end.len() {
             if !self.mechanism.contacts.has_clearance(j) {
                 continue;
             }
-            let (start, end) = (self.state.gaps[j], self.gaps_end[j]);
-            let course = Course::new(start, end, h);
-            // Positive where the contact is in the other state than its memory says.
-            let sign = if self.state.memory[j].active {
-                -1.0
-            } else {
-                1.0
+            let Some(theta) = self.event_of(j, h) else {
+                continue;
             };
-            let (from, to) = (sign * start.penetration, sign * end.penetration);
-            let (from_rate, to_rate) = (sign * start.rate, sign * end.rate);
-            let bracket = if to > 0.0 {
-                if from < 0.0 {
-                    Some((0.0, from, 1.0, to))
-                } else if from_rate < 0.0 && to_rate > 0.0 {
-                    // Switched at the start of this step, went the right way and came back.
-                    let theta = course.extremum();
-                    let value = sign * self.penetration_at(j, theta, h);
-                    (value < 0.0).then_some((theta, value, 1.0, to))
-                } else {
-                    None
-                }
-            } else if from < 0.0 && from_rate > 0.0 && to_rate < 0.0 {
-                // Grazes between two steps.
-                let theta = course.extremum();
-                let value = if sign * course.at(theta).0 > 0.0 {
-                    sign * self.penetration_at(j, theta, h)
-                } else {
-                    -1.0
-                };
-                (value > 0.0).then_some((0.0, from, theta, value))
-            } else {
-                None
-            };
-            let theta = match bracket {
-                Some((a, fa, b, fb)) => {
-                    let width = (1e-15 / h).max(1e-12);
-                    find_root(a, fa, b, fb, width, 1e-16, |theta| {
-                        sign * self.penetration_at(j, theta, h)
-                    })
-                }
-                // Wrong all along: switch as soon as a step allows it.
-                None if to > 0.0 => 1.0,
-                None => continue,
-            };
-            first = Some(first.map_or(theta, |f: f64| f.min(theta)));
+            if first.is_none_or(|earliest| theta < earliest) {
+                first = Some(theta);
+                self.located = Some(j);
+            }
         }
-        first.filter(|&theta| theta < 1.0)
+        first
     }
 
-    /// Penetration of joint `j` on the interpolant of the attempted step.
-    fn penetration_at(&mut self, j: usize, theta: f64, h: f64) -> f64 {
+    /// Where joint `j` leaves the state that its memory says, as a fraction of the step just attempted.
+    fn event_of(&mut self, j: usize, h: f64) -> Option<f64> {
+        let (start, end) = (self.state.gaps[j], self.gaps_end[j]);
+        // Positive where the contact is in the other state than its memory says.
+        let sign = if self.state.memory[j].active {
+            -1.0
+        } else {
+            1.0
+        };
+        // A ball may cross its play several times in one long step: look at pieces that are short against the play.
+        let travel = h * start.speed.max(end.speed);
+        let clearance = self.mechanism.contacts.clearance(j);
+        let pieces = (4.0 * travel / clearance).ceil().clamp(1.0, 64.0);
+        let mut left = (0.0, sign * start.penetration, sign * start.rate);
+        for n in 1..=pieces as u32 {
+            let right = if f64::from(n) == pieces {
+                (1.0, sign * end.penetration, sign * end.rate)
+            } else {
+                self.signed_gap(j, f64::from(n) / pieces, h, sign)
+            };
+            if let Some((a, b)) = self.crossing_within(j, h, sign, left, right) {
+                let width = (1e-15 / h).max(1e-12);
+                return Some(find_root(a.0, a.1, b.0, b.1, width, 1e-16, |theta| {
+                    self.signed_gap(j, theta, h, sign).1
+                }));
+            }
+            left = right;
+        }
+        // In the wrong state all along: it switches at the end of the step.
+        None
+    }
+
+    /// Two points of a piece of the step between which the signed gap turns positive; each is (theta, gap, rate).
+    fn crossing_within(
+        &mut self,
+        j: usize,
+        h: f64,
+        sign: f64,
+        left: (f64, f64, f64),
+        right: (f64, f64, f64),
+    ) -> Option<((f64, f64, f64), (f64, f64, f64))> {
+        if left.1 < 0.0 && right.1 > 0.0 {
+            return Some((left, right));
+        }
+        // An extremum inside: a touch that both ends miss, or a way out and back.
+        let (mut a, mut b) = (left, right);
+        let turns = if right.1 > 0.0 {
+            a.2 < 0.0 && b.2 > 0.0
+        } else {
+            a.2 > 0.0 && b.2 < 0.0
+        };
+        if !turns {
+            return None;
+        }
+        for _ in 0..40 {
+            // Neither tangent reaches zero: nothing to find.
+            let reach = (a.1 + a.2 * (b.0 - a.0) * h).min(b.1 - b.2 * (b.0 - a.0) * h);
+            if right.1 <= 0.0 && reach < 0.0 {
+                return None;
+            }
+            let middle = self.signed_gap(j, 0.5 * (a.0 + b.0), h, sign);
+            if right.1 > 0.0 && middle.1 < 0.0 {
+                return Some((middle, right));
+            }
+            if right.1 <= 0.0 && middle.1 > 0.0 && left.1 < 0.0 {
+                return Some((left, middle));
+            }
+            if (middle.2 > 0.0) == (a.2 > 0.0) {
+                a = middle;
+            } else {
+                b = middle;
+            }
+        }
+        None
+    }
+
+    /// (theta, penetration, its rate) of joint `j` on the interpolant of the attempted step, times `sign`.
+    fn signed_gap(&mut self, j: usize, theta: f64, h: f64, sign: f64) -> (f64, f64, f64) {
         let Self {
             mechanism,
             stepper,
@@ -504,7 +562,8 @@ impl Simulation {
         } = self;
         stepper.interpolate(theta, h, &state.y, &state.k, y_end, k_end, scratch_y);
         mechanism.measure(state.t + theta * h, scratch_y);
-        mechanism.contacts.gaps()[j].penetration
+        let gap = &mechanism.contacts.gaps()[j];
+        (theta, sign * gap.penetration, sign * gap.rate)
     }
 
     fn fixed_step(&mut self, limit: f64) -> Result<(), Stopped> {
@@ -540,25 +599,34 @@ impl Simulation {
         Ok(())
     }
 
-    /// A step of a scene whose motion is a function of time alone: predict, close the loops, read the reactions.
+    /// A step of a scene whose motion is a function of time alone: predict, close the loops, read the reactions. Where
+    /// that fails it comes closer in shorter steps, so that the last good state is next to the bad one.
     fn kinematic_step(&mut self, limit: f64) -> Result<(), Stopped> {
-        let Self {
-            mechanism,
-            state,
-            y_end,
-            ..
-        } = self;
-        let evaluations = mechanism.evaluations;
-        let t = state.t;
-        let mut t_end = t + KINEMATIC_STEP;
-        if t_end >= limit - 1e-6 * KINEMATIC_STEP {
-            t_end = limit;
+        let t = self.state.t;
+        let mut step = self.mechanism.kinematic_step().min(LONGEST_STEP);
+        loop {
+            let Self {
+                mechanism,
+                state,
+                y_end,
+                scratch_k,
+                ..
+            } = self;
+            let evaluations = mechanism.evaluations;
+            let t_end = if t + step >= limit - 1e-6 * step {
+                limit
+            } else {
+                t + step
+            };
+            mechanism.predict(t_end - t, &state.y, &state.k, scratch_k, y_end);
+            match self.accept(t_end, t_end - t, evaluations) {
+                Err(_) if step > SHORTEST_KINEMATIC_STEP => {
+                    self.state.statistics.rejected += 1;
+                    step *= 0.25;
+                }
+                result => return result,
+            }
         }
-        let h = t_end - t;
-        for i in 0..y_end.len() {
-            y_end[i] = state.y[i] + h * state.k[i];
-        }
-        self.accept(t_end, h, evaluations)
     }
 
     /// Makes the attempted step count: projection, guard, contact memory, peaks.
@@ -579,9 +647,17 @@ impl Simulation {
             store_gaps(mechanism, gaps_end);
         }
         state.statistics.evaluations += mechanism.evaluations - evaluations;
-        if let Some(what) = self.objection(open) {
+        // The loops may close again behind the pose, on another branch.
+        let passed = mechanism.is_right_handed() != self.right_handed
+            || mechanism.distance_from_ideal() > OTHER_BRANCH;
+        let objection = if passed {
+            Some("the loops through the ideal ball joints pass a singular pose".to_owned())
+        } else {
+            self.objection(open)
+        };
+        if let Some(what) = objection {
             let solver = &self.running.solver;
-            let advice = if open.is_nan() || open > OPEN_LOOP {
+            let advice = if passed || open.is_nan() || open > OPEN_LOOP {
                 DEPENDENT.to_owned()
             } else if solver.method.is_adaptive() {
                 // Its steps are as short as they need to be: the motion itself is beyond the model.
@@ -619,8 +695,9 @@ impl Simulation {
             .statistics
             .constraint_drift
             .max(mechanism.constraint_drift());
+        let switched = self.switch_contacts(h);
         self.track_peaks(h);
-        if self.switch_contacts(h) && self.mechanism.contacts.switching == Switching::Immediate {
+        if switched && self.mechanism.contacts.switching == Switching::Immediate {
             // The force now divides by the approach speed just found.
             let Self {
                 mechanism, state, ..
@@ -637,6 +714,7 @@ impl Simulation {
 
     /// Starts and ends contacts whose penetration changed sign over the step just accepted.
     fn switch_contacts(&mut self, h: f64) -> bool {
+        let located = self.located.take();
         let Self {
             mechanism,
             state,
@@ -649,9 +727,12 @@ impl Simulation {
                 continue;
             }
             let (start, end) = (state.gaps0[j], state.gaps[j]);
-            let touching = end.penetration > 0.0
-                // Located a hair before the wall.
-                || (!state.memory[j].active && end.penetration > -1e-15 && end.rate > 0.0);
+            // A located switch ends within rounding of the wall, on either side.
+            let touching = if located == Some(j) {
+                !state.memory[j].active
+            } else {
+                end.penetration > 0.0
+            };
             if touching == state.memory[j].active {
                 continue;
             }
@@ -670,6 +751,7 @@ impl Simulation {
                     floored: rate < floor,
                 };
                 state.statistics.impacts[j] += 1;
+                state.statistics.floored[j] += u64::from(rate < floor);
                 peaks[j].impacts += 1;
                 peaks[j].approach_speed = peaks[j].approach_speed.max(rate);
                 state.contact_began = true;
@@ -693,7 +775,7 @@ impl Simulation {
         for j in 0..state.gaps.len() {
             if !mechanism.contacts.has_clearance(j) {
                 if let Some(reaction) = mechanism.reaction(j) {
-                    let force = reaction.norm();
+                    let force = state.reactions[j].rise(state.t, reaction.norm());
                     if force > state.statistics.peak_normal[j] {
                         state.statistics.peak_normal[j] = force;
                         state.statistics.peak_time[j] = state.t;
@@ -713,6 +795,8 @@ impl Simulation {
             let coefficients = mechanism.contacts.coefficients(j);
             let approach = if state.memory0[j].active {
                 state.memory0[j].approach_speed
+            } else if state.memory[j].active {
+                state.memory[j].approach_speed
             } else {
                 start.rate.max(end.rate).max(coefficients.speed_floor)
             };
@@ -1115,6 +1199,7 @@ fn store_gaps(mechanism: &Mechanism, out: &mut [Approach]) {
         *out = Approach {
             penetration: gap.penetration,
             rate: gap.rate,
+            speed: gap.eccentricity_rate.norm(),
         };
     }
 }
