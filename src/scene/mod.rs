@@ -11,7 +11,7 @@
 //! |---|---|
 //! | top | `name`, `title`, `description`, `start` (`"as-given"` or `"ideal"`, see [`StartRule`]), `formulation` |
 //! | `[gravity]`, `[contact]`, `[solver]` | the rows of the parameter [`table`] |
-//! | `[view]` | `down`; `floor`: where the floor lies along `down` |
+//! | `[view]` | `down`; `floor`: where the floor lies along `down`; `yaw` and `pitch` of the isometric view |
 //! | `[output]` | `body` whose pose is reported (the last one if left out); `probe`: a point in its frame |
 //! | `[spcmm]` | rows of the table; `mean_x`, `gamma`, `hinge_radius`, `driving_rod`, `driven_rod` |
 //! | `[chain]` | `links`; `hang`: the fixed socket; `rotation` of every link; `[chain.link]`: `ball`, `socket`, `opening`, and a body's keys |

@@ -48,6 +48,7 @@ pub struct Camera {
     pub field_of_view: f32,
     up: Vec3,
     right: Vec3,
+    isometric: (f32, f32),
     followed: Option<Vec3>,
 }
 
@@ -69,11 +70,19 @@ impl Camera {
             field_of_view: 0.6,
             up: -down,
             right,
+            isometric: (0.6, 0.32),
             followed: None,
         };
         camera.preset(Preset::Isometric);
         camera.fit(bounds, 16.0 / 9.0);
         camera
+    }
+
+    /// Isometric view at another yaw and pitch, rad, than the usual.
+    pub fn with_isometric(mut self, yaw: f32, pitch: f32) -> Self {
+        self.isometric = (yaw, pitch.clamp(-STEEPEST, STEEPEST));
+        self.preset(Preset::Isometric);
+        self
     }
 
     /// Turns to a named point of view; target and distance stay.
@@ -82,7 +91,7 @@ impl Camera {
             Preset::Front => (0.0, 0.0),
             Preset::Side => (STEEPEST, 0.0),
             Preset::Top => (0.0, STEEPEST),
-            Preset::Isometric => (0.6, 0.32),
+            Preset::Isometric => self.isometric,
         };
     }
 

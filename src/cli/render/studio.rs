@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::options;
 use crate::app::{App, AppOptions, Headless, Overlay, force_notes};
 use crate::cli::args::{RenderArguments, ThemeChoice};
-use crate::cli::{Failure, interrupt};
+use crate::cli::{Failure, interrupt, start};
 use crate::render::{Image, NoAdapter, Offscreen, RenderError};
 use crate::scene::{Scene, Vec3};
 use crate::simulate::{Frame, Peak, Simulation};
@@ -69,7 +69,7 @@ impl SceneStudio {
         options: ViewOptions,
         arguments: &RenderArguments,
     ) -> Result<Self, Failure> {
-        let mut simulation = Simulation::new(scene)?;
+        let mut simulation = start(scene)?;
         let mut frame = Frame::default();
         simulation.sample(0.0, &mut frame);
         let view = SceneView::new(scene, &frame);
@@ -199,17 +199,17 @@ impl ApplicationStudio {
         arguments: &RenderArguments,
     ) -> Result<Self, Failure> {
         let headless = Headless::new().map_err(|error| no_adapter(&error))?;
-        let mut start = AppOptions::new(scene.clone());
-        start.playing = false;
-        start.view = ViewOptions {
-            magnification: arguments.magnification.unwrap_or(start.view.magnification),
+        let mut begin = AppOptions::new(scene.clone());
+        begin.playing = false;
+        begin.view = ViewOptions {
+            magnification: arguments.magnification.unwrap_or(begin.view.magnification),
             ..options
         };
-        start.theme = match arguments.theme {
+        begin.theme = match arguments.theme {
             ThemeChoice::Light => eframe::egui::ThemePreference::Light,
             ThemeChoice::Dark => eframe::egui::ThemePreference::Dark,
         };
-        let app = headless.app(start)?;
+        let app = headless.app(begin).map_err(|error| error.located(scene))?;
         Ok(Self {
             headless,
             app,
