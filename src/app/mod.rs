@@ -23,7 +23,7 @@ use eframe::egui::{
 use eframe::egui_wgpu;
 
 use crate::render;
-use crate::scene::{BUILT_IN, Scene};
+use crate::scene::{BUILT_IN, Scene, SceneError};
 use crate::simulate::StartError;
 use crate::view::{Preset, ViewOptions};
 
@@ -150,7 +150,7 @@ impl App {
                 self.problem = None;
                 self.viewport.restart(&self.player);
             }
-            Err(error) => self.problem = Some(error.to_string()),
+            Err(error) => self.problem = Some(error.located(self.player.wanted()).to_string()),
         }
     }
 
@@ -162,7 +162,7 @@ impl App {
     }
 
     fn show_scene(&mut self, scene: &Scene) -> Result<(), String> {
-        let mut player = Player::new(scene).map_err(|error| error.to_string())?;
+        let mut player = Player::new(scene).map_err(|error| error.located(scene).to_string())?;
         player.pacer.set_scale(self.player.pacer.scale());
         player.set_playing(self.player.is_playing() || self.player.stopped().is_some());
         self.player = player;
@@ -181,6 +181,7 @@ impl App {
         match action {
             Action::PlayPause => player.set_playing(!player.is_playing()),
             Action::Step => player.single_step(),
+            Action::StepBack => player.step_back(),
             Action::Reset => self.reset(),
             Action::Slower | Action::Faster => {
                 let scale = transport::next_scale(player.pacer.scale(), action == Action::Faster);
@@ -522,7 +523,7 @@ impl eframe::App for App {
 pub enum WindowError {
     /// The scene cannot start.
     #[error(transparent)]
-    Start(#[from] StartError),
+    Start(#[from] SceneError),
     /// No graphics adapter.
     #[error(transparent)]
     NoAdapter(#[from] render::NoAdapter),
@@ -546,7 +547,7 @@ pub fn run_native(options: AppOptions) -> Result<(), WindowError> {
         ..Default::default()
     };
     // The scene's own error must come out typed, not as the window's.
-    Player::new(&options.scene)?;
+    Player::new(&options.scene).map_err(|error| error.located(&options.scene))?;
     let create: eframe::AppCreator<'_> = Box::new(|cc| Ok(Box::new(App::new(cc, options)?)));
     eframe::run_native("Jointplay", native, create).map_err(|error| match error {
         eframe::Error::Wgpu(egui_wgpu::WgpuError::RequestAdapterError(_)) => {
