@@ -26,6 +26,9 @@ pub trait Studio {
     /// A failing graphics adapter.
     fn draw(&mut self, instant: f64, frame_time: Option<f64>) -> Result<Image, Failure>;
 
+    /// Gives the reference arrow a force, N, that all frames share.
+    fn fix_arrow_scale(&mut self, reference: f32);
+
     /// The simulation.
     fn simulation(&self) -> &Simulation;
 
@@ -166,6 +169,10 @@ impl Studio for SceneStudio {
         .map_err(|error| failed(&error))
     }
 
+    fn fix_arrow_scale(&mut self, reference: f32) {
+        self.options.arrows.reference = Some(reference);
+    }
+
     fn simulation(&self) -> &Simulation {
         &self.simulation
     }
@@ -240,6 +247,9 @@ impl Studio for ApplicationStudio {
             .app_frame(&mut self.app, self.size, 1.0)
             .map_err(|error| failed(&error))
     }
+
+    // The window's scale follows its own forces.
+    fn fix_arrow_scale(&mut self, _reference: f32) {}
 
     fn simulation(&self) -> &Simulation {
         self.app.player().simulation()
