@@ -172,6 +172,21 @@ impl Camera {
         self.target += (right * off_centre.x - up * off_centre.y) * shrink;
     }
 
+    /// Comes nearer by `factor` to a point of the scene, which stays where it is on the screen. The target takes its
+    /// depth, so that coming nearer never leads past it.
+    pub fn zoom_about(&mut self, factor: f32, point: Vec3, size: [u32; 2]) {
+        let (eye, back) = (self.eye(), self.axes().2);
+        let depth = (eye - point).dot(back);
+        if !(depth > 1e-4) {
+            return;
+        }
+        self.target = eye - back * depth;
+        self.distance = depth;
+        if let Some(pixel) = self.project(point, size) {
+            self.zoom(factor, pixel, size);
+        }
+    }
+
     /// Moves with a followed point: call each frame with its place, or `None` to stay.
     pub fn follow(&mut self, point: Option<Vec3>) {
         if let (Some(now), Some(before)) = (point, self.followed) {
@@ -348,6 +363,19 @@ mod tests {
         camera.pan(Vec2::new(100.0, -40.0), SIZE);
         let now = camera.project(point, SIZE).expect("before the eye");
         assert!(now.distance(Vec2::new(740.0, 320.0)) < 0.05, "{now}");
+    }
+
+    #[test]
+    fn coming_nearer_to_a_point_keeps_it_in_its_place_and_in_front() {
+        let mut camera = camera(SignedAxis::PlusX);
+        let point = Vec3::new(0.3, 0.05, -0.2);
+        let before = camera.project(point, SIZE).expect("before the eye");
+        for _ in 0..100 {
+            camera.zoom_about(1.3, point, SIZE);
+        }
+        let after = camera.project(point, SIZE).expect("before the eye");
+        assert!(before.distance(after) < 1.0, "{before} {after}");
+        assert!(camera.eye().distance(point) < 1e-3);
     }
 
     #[test]
