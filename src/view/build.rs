@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::{Mat3, Quat, Vec2, Vec3};
+use glam::{Mat3, Quat, Vec2, Vec3, Vec4};
 
 use super::arrows::ArrowMemory;
 use super::drawn::{self, BarKind, DrawnJoint, Part, Solid};
@@ -289,6 +289,10 @@ impl SceneView {
                 .map(|n| n as f32 * camera.metres_per_pixel(shot.size) / 2.0);
             camera.target - right * (width - 62.0 * scale) - up * (height - 62.0 * scale)
         };
+        // Perspective would stretch it out there: sheared so that it looks as it does in the middle.
+        let back = camera.axes().2;
+        let lean = (corner - camera.target) / camera.distance;
+        let sheared = |point: Vec3| point - lean * (point - corner).dot(back);
         for (i, axis) in Vec3::AXES.into_iter().enumerate() {
             let colour = palette.axes[i];
             push_arrow(
@@ -302,7 +306,7 @@ impl SceneView {
                 out,
                 &self.axis_names[i],
                 LabelKind::Axis,
-                corner + axis * (47.0 * scale),
+                sheared(corner + axis * (47.0 * scale)),
                 colour,
             );
         }
@@ -321,9 +325,16 @@ impl SceneView {
                 out,
                 &self.axis_names[3],
                 LabelKind::Gravity,
-                anchor,
+                sheared(anchor),
                 palette.gravity,
             );
+        }
+        for instance in out.overlay.by_mesh.iter_mut().flatten() {
+            let rows = instance.world_from_mesh.map(Vec4::from);
+            // Depth over the corner of the mesh's axes and origin.
+            let depth =
+                rows[0] * back.x + rows[1] * back.y + rows[2] * back.z - Vec4::W * corner.dot(back);
+            instance.world_from_mesh = [0, 1, 2].map(|i| (rows[i] - lean[i] * depth).to_array());
         }
     }
 }
