@@ -159,6 +159,7 @@ impl Headless {
                 overlay::labels(&painter, rect, scale, list);
             }
             if overlay.legend
+                && overlay::has_room(rect)
                 && let Some(legend) = &list.legend
             {
                 overlay::legend(&painter, rect, scale, legend, theme);
