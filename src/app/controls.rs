@@ -196,18 +196,10 @@ impl Controls {
         let Value::Number(si) = *now else {
             return;
         };
-        self.heading(
-            ui,
-            player,
-            128.0,
-            parameter,
-            key,
-            name,
-            |this, ui, player| {
-                this.default_button(ui, player, parameter, key, name, now);
-                this.entry(ui, player, parameter, key, name, now);
-            },
-        );
+        self.heading(ui, player, 114.0, parameter, key, |this, ui, player| {
+            this.default_button(ui, player, parameter, key, name, now);
+            this.entry(ui, player, parameter, key, name, now);
+        });
         let mut shown = to_display(si, display);
         let (least, greatest) = (to_display(slider.0, display), to_display(slider.1, display));
         ui.spacing_mut().slider_width = ui.available_width().max(40.0);
@@ -239,39 +231,31 @@ impl Controls {
         now: &Value,
         words: &[&'static str],
     ) {
-        self.heading(
-            ui,
-            player,
-            190.0,
-            parameter,
-            key,
-            name,
-            |this, ui, player| {
-                this.default_button(ui, player, parameter, key, name, now);
-                let mut chosen = None;
-                let width = ui.available_width().min(170.0);
-                let response = ComboBox::from_id_salt("choice")
-                    .width(width)
-                    .truncate()
-                    .selected_text(value::shown(now, &parameter.kind))
-                    .show_ui(ui, |ui| {
-                        for word in words {
-                            if ui
-                                .selectable_label(*now == Value::Choice(word), *word)
-                                .clicked()
-                            {
-                                chosen = Some(*word);
-                            }
+        self.heading(ui, player, 190.0, parameter, key, |this, ui, player| {
+            this.default_button(ui, player, parameter, key, name, now);
+            let mut chosen = None;
+            let width = ui.available_width().min(170.0);
+            let response = ComboBox::from_id_salt("choice")
+                .width(width)
+                .truncate()
+                .selected_text(value::shown(now, &parameter.kind))
+                .show_ui(ui, |ui| {
+                    for word in words {
+                        if ui
+                            .selectable_label(*now == Value::Choice(word), *word)
+                            .clicked()
+                        {
+                            chosen = Some(*word);
                         }
-                    })
-                    .response;
-                tooltip(ui, &response, player, parameter, key);
-                response.accessible_name(name);
-                if let Some(word) = chosen {
-                    this.set(player, key, word);
-                }
-            },
-        );
+                    }
+                })
+                .response;
+            tooltip(ui, &response, player, parameter, key);
+            response.accessible_name(name);
+            if let Some(word) = chosen {
+                this.set(player, key, word);
+            }
+        });
     }
 
     fn count(
@@ -287,28 +271,20 @@ impl Controls {
         let Value::Count(mut count) = *now else {
             return;
         };
-        self.heading(
-            ui,
-            player,
-            100.0,
-            parameter,
-            key,
-            name,
-            |this, ui, player| {
-                this.default_button(ui, player, parameter, key, name, now);
-                let response = ui.add(
-                    DragValue::new(&mut count)
-                        .range(min..=max)
-                        .update_while_editing(false),
-                );
-                tooltip(ui, &response, player, parameter, key);
-                let changed = response.changed();
-                response.accessible_name(name);
-                if changed {
-                    this.set(player, key, &count.to_string());
-                }
-            },
-        );
+        self.heading(ui, player, 100.0, parameter, key, |this, ui, player| {
+            this.default_button(ui, player, parameter, key, name, now);
+            let response = ui.add(
+                DragValue::new(&mut count)
+                    .range(min..=max)
+                    .update_while_editing(false),
+            );
+            tooltip(ui, &response, player, parameter, key);
+            let changed = response.changed();
+            response.accessible_name(name);
+            if changed {
+                this.set(player, key, &count.to_string());
+            }
+        });
     }
 
     /// Name on the left, whatever `rest` adds from the right; in a line below where `room` points are not left for it.
@@ -319,11 +295,11 @@ impl Controls {
         room: f32,
         parameter: &'static Parameter,
         key: &str,
-        name: &str,
         rest: impl FnOnce(&mut Self, &mut Ui, &mut Player),
     ) {
         let font = egui::TextStyle::Body.resolve(ui.style());
         let colour = ui.visuals().text_color();
+        let name = parameter.label;
         let words = ui.painter().layout_no_wrap(name.to_owned(), font, colour);
         let below = words.size().x + ui.spacing().item_spacing.x + room > ui.available_width();
         let backwards = egui::Layout::right_to_left(egui::Align::Center);

@@ -82,6 +82,7 @@ pub struct App {
     problem: Option<String>,
     show_controls: bool,
     show_plots: bool,
+    hint_dismissed: bool,
 }
 
 impl App {
@@ -118,6 +119,7 @@ impl App {
             problem: None,
             show_controls: true,
             show_plots: true,
+            hint_dismissed: false,
             player,
         })
     }
@@ -356,9 +358,35 @@ impl App {
                 });
             }
         });
+        self.settled_hint(ui, inner);
         let middle = egui::UiBuilder::new().max_rect(inner.shrink2(egui::vec2(0.0, 44.0)));
         ui.scope_builder(middle, |ui| transport::banner(ui, &self.player))
             .inner
+    }
+
+    /// What to do when nothing happens any more, in the middle of the lower edge.
+    fn settled_hint(&mut self, ui: &mut Ui, area: egui::Rect) {
+        let player = &self.player;
+        if self.hint_dismissed || !player.is_playing() || !player.has_settled() {
+            return;
+        }
+        let size = egui::vec2(186.0, 26.0);
+        let place = egui::Align2::CENTER_BOTTOM.align_size_within_rect(size, area);
+        let row = egui::UiBuilder::new()
+            .max_rect(place)
+            .layout(egui::Layout::left_to_right(egui::Align::Center));
+        let fill = ui.visuals().window_fill.gamma_multiply(0.8);
+        ui.painter().rect_filled(place, 6.0, fill);
+        ui.scope_builder(row, |ui| {
+            ui.add_space(8.0);
+            ui.label(RichText::new("Settled: R restarts").weak())
+                .on_hover_text("No ball has struck its socket for 0.2 s of simulated time");
+            let close = ui
+                .add(egui::Button::new("×").frame(false))
+                .on_hover_text("Do not show this again")
+                .accessible_name("Dismiss the hint");
+            self.hint_dismissed |= close.clicked();
+        });
     }
 
     fn header(&mut self, ui: &mut Ui, narrow: bool) {
@@ -404,10 +432,14 @@ impl App {
                 {
                     self.dialog = Some(Dialog::Help);
                 }
-                if ui.button("About").clicked() {
+                // What does not fit is left out rather than laid over the rest; a key stands for the theme.
+                let room = ui.available_width();
+                if room > 80.0 && ui.button("About").clicked() {
                     self.dialog = Some(Dialog::About);
                 }
-                theme_box(ui);
+                if room > 200.0 {
+                    theme_box(ui);
+                }
             });
         });
     }

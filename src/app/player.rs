@@ -29,12 +29,17 @@ pub struct Player {
     history: History,
     recorded: Frame,
     values: Vec<f64>,
+    /// When a ball last struck, s; `None` before the first time.
+    last_impact: Option<f64>,
     /// States before the latest single steps, oldest first.
     past: VecDeque<Snapshot>,
 }
 
 /// Keys of the solver that win over its preset.
 const SOLVER_KEYS: [&str; 3] = ["solver.method", "solver.step", "solver.tolerance"];
+
+/// Simulated time without an impact after which the motion counts as settled, s.
+const SETTLED: f64 = 0.2;
 
 /// Single steps that can be taken back.
 const PAST: usize = 64;
@@ -68,6 +73,7 @@ impl Player {
             channels,
             recorded: Frame::default(),
             values: Vec::new(),
+            last_impact: None,
             past: VecDeque::new(),
             simulation,
         };
@@ -133,6 +139,12 @@ impl Player {
     /// Why the divergence guard stopped the run.
     pub fn stopped(&self) -> Option<&Stopped> {
         self.stopped.as_ref()
+    }
+
+    /// Whether the balls have struck and now lie in their sockets: no impact for a while.
+    pub fn has_settled(&self) -> bool {
+        self.last_impact
+            .is_some_and(|last| self.simulation.time() - last > SETTLED)
     }
 
     /// Moves on by one frame that comes `dt` seconds after the last, and refreshes what is on show.
@@ -326,6 +338,7 @@ impl Player {
     fn start_record(&mut self) {
         self.history.clear();
         self.past.clear();
+        self.last_impact = None;
         self.show_latest();
         self.record();
         self.simulation.take_peaks(&mut self.peaks);
@@ -333,6 +346,9 @@ impl Player {
 
     fn take_peaks(&mut self) {
         self.simulation.take_peaks(&mut self.peaks);
+        if self.peaks.iter().any(|peak| peak.impacts > 0) {
+            self.last_impact = Some(self.simulation.time());
+        }
         for (joint, peak) in self.peaks.iter().enumerate() {
             if let Some(channel) = self.channels.normal_force(joint)
                 && peak.normal > 0.0
