@@ -389,7 +389,7 @@ fn two_hundred_changes_in_half_a_second_leave_a_sane_state() {
         ("contact.youngs_modulus", &["20 GPa", "206 GPa", "400 GPa"]),
         ("gravity.x", &["-9.81 m/s^2", "0", "9.81 m/s^2", "20 m/s^2"]),
         ("gravity.y", &["-9.81 m/s^2", "0", "9.81 m/s^2"]),
-        ("solver.method", &["rk4", "dopri5"]),
+        ("solver.method", &["rk4", "dopri5", "radau5", "automatic"]),
         ("solver.tolerance", &["1e-4", "1e-6", "1e-8"]),
     ];
     let run = |seed: u64| {

@@ -15,7 +15,7 @@ fn simulation(name: &str, changes: &[(&str, &str)]) -> Simulation {
     Simulation::new(&scene(name, changes)).unwrap()
 }
 
-/// Rows of `shared/reference`-style files: 16 columns.
+/// Rows of a file in `tests/reference/`: 16 columns.
 fn reference(file: &str) -> Vec<[f64; 16]> {
     let path = format!("{}/tests/reference/{file}", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(path).unwrap();
@@ -101,7 +101,7 @@ fn ideal_reactions_are_the_anchors() {
 #[test]
 fn first_impacts_have_the_anchors_speeds_and_peaks() {
     let mut simulation = simulation("spcmm", &[("solver.tolerance", "1e-9")]);
-    // (joint, start, approach speed, peak): `physics.md` section 5.
+    // (joint, start, s; approach speed, m/s; peak, N): anchors of the contract.
     let expected = [
         (0, 7.801422908e-3, 0.07690900, 621.35),
         (1, 7.807677416e-3, 0.07687389, 560.67),

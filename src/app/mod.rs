@@ -32,7 +32,7 @@ use dialogs::{Answer, Dialog};
 #[cfg(not(target_arch = "wasm32"))]
 pub use headless::{Headless, HeadlessError, Overlay, UiFrame};
 use keys::Action;
-pub use overlay::force_notes;
+pub use overlay::{force_notes, plate};
 pub use player::Player;
 pub use plots::{Plots, Window};
 use viewport::Viewport;

@@ -107,6 +107,17 @@ pub fn time(painter: &Painter, rect: Rect, time: f64, notes: &[String], theme: T
     }
 }
 
+/// About the width and height that the time takes with a note for each of so many joints, whatever they come to say; points.
+pub fn plate(joints: usize) -> [f32; 2] {
+    const LONGEST: f32 = 230.0;
+    const LINE: f32 = 16.0;
+    // Time and magnification come first.
+    [
+        MARGIN + LONGEST + 8.0,
+        MARGIN + 38.0 + LINE * joints as f32 + 8.0,
+    ]
+}
+
 /// One line per ball joint: its forces as the step reported them.
 pub fn force_notes(scene: &Scene, frame: &Frame) -> Vec<String> {
     let newtons = |force: &crate::scene::Vec3| format_quantity_digits(force.norm(), "N", 4);

@@ -13,7 +13,7 @@ mod rosenbrock;
 pub use controller::Controller;
 pub use dormand_prince::DormandPrince;
 pub use fixed::{RungeKutta4, SemiImplicitEuler};
-pub use radau::Radau;
+pub use radau::{Polynomial, Radau};
 pub use root::find_root;
 pub use rosenbrock::Rosenbrock;
 
@@ -35,6 +35,11 @@ pub enum Method {
 }
 
 impl Method {
+    /// Whether every step of it solves with the Jacobian.
+    pub fn is_implicit(self) -> bool {
+        matches!(self, Self::Rosenbrock | Self::Radau5)
+    }
+
     /// Whether the step size is controlled by an error estimate.
     pub fn is_adaptive(self) -> bool {
         !matches!(self, Self::SemiImplicitEuler | Self::RungeKutta4)

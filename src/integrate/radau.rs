@@ -25,11 +25,11 @@ const T: [[f64; 3]; 3] = [
         -0.030_029_194_105_147_424,
     ],
     [
-        0.241_717_932_707_107_02,
+        0.241_717_932_707_107,
         0.204_129_352_293_799_93,
-        0.382_942_112_757_261_94,
+        0.382_942_112_757_261_9,
     ],
-    [0.966_048_182_615_092_9, 1.0, 0.0],
+    [0.966_048_182_615_093, 1.0, 0.0],
 ];
 const T_INVERSE: [[f64; 3]; 3] = [
     [
@@ -44,11 +44,23 @@ const T_INVERSE: [[f64; 3]; 3] = [
     ],
     [
         -0.502_872_634_945_786_9,
-        2.571_926_949_855_605_4,
+        2.571_926_949_855_605,
         -0.596_039_204_828_224_9,
     ],
 ];
 const MOST_ITERATIONS: u32 = 7;
+
+/// The latest step's collocation polynomial: it interpolates that step and starts the iteration of the next, so it is
+/// part of what a snapshot needs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Polynomial {
+    /// Step size, s; 0 where there is none.
+    h: f64,
+    /// End of the step, s.
+    end: f64,
+    /// Increments of the three stages.
+    z: [Vec<f64>; 3],
+}
 
 /// Radau IIA(5).
 pub struct Radau {
@@ -59,10 +71,7 @@ pub struct Radau {
     stage: Vec<f64>,
     error: Vec<f64>,
     linearised_at: f64,
-    /// Step whose polynomial starts the next iteration; 0 where there is none.
-    h_previous: f64,
-    t_previous: f64,
-    previous: [Vec<f64>; 3],
+    previous: Polynomial,
     /// Iterations of the latest attempt.
     pub iterations: u32,
     /// The latest attempt's convergence was slow: a longer step would not pay.
@@ -80,9 +89,11 @@ impl Radau {
             stage: vec![0.0; dimension],
             error: vec![0.0; dimension],
             linearised_at: f64::NAN,
-            h_previous: 0.0,
-            t_previous: f64::NAN,
-            previous: triple(),
+            previous: Polynomial {
+                h: 0.0,
+                end: 0.0,
+                z: triple(),
+            },
             iterations: 0,
             slow: false,
         }
@@ -91,7 +102,17 @@ impl Radau {
     /// Forgets the Jacobian and the previous step: the state was changed by something else than a step.
     pub fn invalidate(&mut self) {
         self.linearised_at = f64::NAN;
-        self.h_previous = 0.0;
+        self.previous.h = 0.0;
+    }
+
+    /// What a resumed run needs to give the same bits.
+    pub fn polynomial(&self) -> &Polynomial {
+        &self.previous
+    }
+
+    /// Takes it back, after [`Self::invalidate`].
+    pub fn set_polynomial(&mut self, polynomial: &Polynomial) {
+        self.previous.clone_from(polynomial);
     }
 
     /// As [`super::Stepper::attempt`]; `tolerance` sets how far the iteration goes. Infinite where it fails.
@@ -128,16 +149,16 @@ impl Radau {
 
     /// First guess of the stages: the previous step's polynomial, continued.
     fn begin(&mut self, t: f64, h: f64, n: usize) {
-        if self.h_previous == 0.0 || (self.t_previous - t).abs() > 1e-9 * h {
+        if self.previous.h == 0.0 || (self.previous.end - t).abs() > 1e-9 * h {
             for j in 0..3 {
                 self.z[j].fill(0.0);
                 self.w[j].fill(0.0);
             }
             return;
         }
-        let ratio = h / self.h_previous;
+        let ratio = h / self.previous.h;
         for i in 0..n {
-            let z = std::array::from_fn(|j| self.previous[j][i]);
+            let z = std::array::from_fn(|j| self.previous.z[j][i]);
             let start = polynomial(&z, 0.0);
             for j in 0..3 {
                 // The polynomial is in s = (time - step's end) / h_previous and gives increments from its own start.
@@ -269,16 +290,16 @@ impl Radau {
 
     fn remember(&mut self, t: f64, h: f64) {
         for j in 0..3 {
-            self.previous[j].copy_from_slice(&self.z[j]);
+            self.previous.z[j].copy_from_slice(&self.z[j]);
         }
-        self.h_previous = h;
-        self.t_previous = t + h;
+        self.previous.h = h;
+        self.previous.end = t + h;
     }
 
     /// State at `t + theta h`: the collocation polynomial.
     pub fn interpolate(&self, theta: f64, y: &[f64], out: &mut [f64]) {
         for (i, out) in out.iter_mut().enumerate() {
-            let z = std::array::from_fn(|j| self.previous[j][i]);
+            let z = std::array::from_fn(|j| self.previous.z[j][i]);
             *out = y[i] + polynomial(&z, theta - 1.0);
         }
     }

@@ -57,6 +57,17 @@ pub enum MechanismError {
         /// c, m.
         clearance: f64,
     },
+    /// Too many coordinates for a method that solves with a dense matrix.
+    #[error(
+        "this scene has {velocities} velocity coordinates; the implicit methods take at most {most}: \
+         choose solver.method = automatic or dopri5"
+    )]
+    TooLarge {
+        /// Velocity coordinates.
+        velocities: usize,
+        /// Most that are taken.
+        most: usize,
+    },
     /// Ideal joints whose rows depend on one another.
     #[error("the ideal ball joints over-constrain the mechanism: give one of them a clearance")]
     Redundant,
@@ -79,7 +90,7 @@ pub struct Mechanism {
     /// World gravity, m/s^2.
     pub gravity: Vec3,
     joint_names: Vec<String>,
-    /// Linearisation; made when a linearly implicit method first asks.
+    /// Linearisation; made where an implicit method is chosen.
     stiff: Option<Box<stiff::Stiff>>,
     /// Evaluations of the equations of motion so far.
     pub evaluations: u64,
@@ -372,6 +383,19 @@ impl Mechanism {
         self.model.bodies[b].origin
     }
 
+    /// Allocates what [`StiffSystem::linearise`] needs, so that no step does.
+    pub fn prepare_linearisation(&mut self) {
+        if self.stiff.is_none() {
+            let (dimension, positions) = (self.dimension(), self.positions());
+            let joints = self.contacts.len();
+            self.stiff = Some(Box::new(stiff::Stiff::new(
+                dimension - positions,
+                dimension,
+                joints,
+            )));
+        }
+    }
+
     /// What the scene contains, what will be computed and what not.
     pub fn summary(&self) -> Summary {
         Summary::new(self)
@@ -489,11 +513,11 @@ impl System for Mechanism {
 
 impl StiffSystem for Mechanism {
     fn linearise(&mut self, t: f64, y: &[f64]) {
-        let (dimension, positions) = (self.dimension(), self.positions());
-        let mut stiff = self.stiff.take().unwrap_or_else(|| {
-            let joints = self.contacts.len();
-            Box::new(stiff::Stiff::new(dimension - positions, dimension, joints))
-        });
+        let positions = self.positions();
+        self.prepare_linearisation();
+        let Some(mut stiff) = self.stiff.take() else {
+            return;
+        };
         // Prescribed motion is what moves contacts by time alone; bodies that are states stand still in that sense.
         if let Form::Tree { tree, .. } = &mut self.form {
             let mut at_rest = std::mem::take(&mut stiff.derivative);

@@ -79,7 +79,7 @@ pub struct Source {
     pub places: BTreeMap<String, (u32, u32)>,
 }
 
-/// Equations of motion (`physics.md` section 3).
+/// Form of the equations of motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Formulation {
     /// Spanning forest coordinates.

@@ -7,7 +7,7 @@ use crate::scene::{Mat3, Vec3};
 /// Closer than this to beta = +-pi/2 (in cos beta), alpha is 0 and gamma takes the rest.
 const NEAR_SINGULAR: f64 = 1e-9;
 
-/// (alpha, beta, gamma) of a rotation, rad (`physics.md` section 7).
+/// (alpha, beta, gamma) of a rotation, rad.
 pub fn angles_of(r: &Mat3) -> Vec3 {
     let beta = libm::asin((-r.m12).clamp(-1.0, 1.0));
     if libm::cos(beta) < NEAR_SINGULAR {

@@ -42,7 +42,7 @@ pub struct BodyMotion {
     pub angular_acceleration: Vec3,
 }
 
-/// Pose of the output body with its angles (`physics.md` section 7: R = Rx(alpha) Rz(beta) Ry(gamma)).
+/// Pose of the output body with its angles, R = Rx(alpha) Rz(beta) Ry(gamma).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pose {
     /// Origin, m.

@@ -114,6 +114,7 @@ pub struct Snapshot {
     scene: Scene,
     running: Scene,
     state: simulation::State,
+    polynomial: Option<crate::integrate::Polynomial>,
 }
 
 impl Snapshot {

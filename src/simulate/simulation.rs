@@ -4,7 +4,7 @@ use super::peaks::{Approach, Course};
 use super::stepper::AnyStepper;
 use super::{Effect, Frame, Peak, Snapshot, StartError, Statistics, Stopped, report};
 use crate::integrate::{Controller, Method, System, find_root, hermite};
-use crate::mechanism::{Mechanism, Memory, Ramp, Switching};
+use crate::mechanism::{Mechanism, MechanismError, Memory, Ramp, Switching};
 use crate::scene::{Scene, SceneError};
 
 /// Speed at which the clearance closes when a jump would put a ball inside its socket wall, m/s: an impact at this speed
@@ -30,6 +30,8 @@ const WORTH_IT: f64 = 2.0;
 const EXPLICIT_TURN: u32 = 200;
 /// Evaluations of one explicit step.
 const EXPLICIT_EVALUATIONS: f64 = 6.0;
+/// More velocity coordinates than this are refused by the implicit methods, whose matrices are dense.
+const LARGEST_DENSE: usize = 1024;
 /// More velocity coordinates than this make a dense factorisation dearer than many explicit steps.
 const LARGEST_IMPLICIT: usize = 96;
 /// Speed beyond which a state is absurd, m/s and rad/s.
@@ -122,6 +124,7 @@ impl Simulation {
         let mut mechanism = Mechanism::new(scene)?;
         let y = mechanism.start()?;
         let n = y.len();
+        prepare_implicit(&mut mechanism, scene.solver.method)?;
         let joints = mechanism.contacts.len();
         let mut simulation = Self {
             scene: scene.clone(),
@@ -173,7 +176,7 @@ impl Simulation {
         Ok(simulation)
     }
 
-    /// Contacts that exist at the start take the floor as their approach speed (`physics.md` section 2).
+    /// Contacts that exist at the start take the floor as their approach speed: nothing tells how they began.
     fn begin_contacts_at_start(&mut self) {
         self.mechanism.measure(self.state.t, &self.state.y);
         for j in 0..self.state.memory.len() {
@@ -889,6 +892,15 @@ impl Simulation {
             self.scene = next;
             return Ok(Effect::AtReset);
         }
+        if running.solver.method != self.running.solver.method {
+            prepare_implicit(&mut self.mechanism, running.solver.method).map_err(|error| {
+                SceneError {
+                    key: Some("solver.method".to_owned()),
+                    message: error.to_string(),
+                    ..SceneError::default()
+                }
+            })?;
+        }
         self.scene = next;
         let before = std::mem::replace(&mut self.running, running);
         self.mechanism.gravity = self.running.gravity;
@@ -993,6 +1005,7 @@ impl Simulation {
             scene: self.scene.clone(),
             running: self.running.clone(),
             state: self.state.clone(),
+            polynomial: self.stepper.polynomial().cloned(),
         }
     }
 
@@ -1021,6 +1034,9 @@ impl Simulation {
         state.k0.copy_from_slice(&state.k);
         state.gaps0.copy_from_slice(&state.gaps);
         state.memory0.copy_from_slice(&state.memory);
+        if let Some(polynomial) = &snapshot.polynomial {
+            fresh.stepper.set_polynomial(polynomial);
+        }
         *self = fresh;
         Ok(())
     }
@@ -1066,6 +1082,24 @@ fn controller_of(method: Method, implicit: bool) -> Controller {
         (Method::Radau5, _) | (Method::Automatic, true) => 3,
         _ => 4,
     })
+}
+
+/// Allocates what an implicit method needs.
+fn prepare_implicit(mechanism: &mut Mechanism, method: Method) -> Result<(), MechanismError> {
+    let velocities = mechanism.dimension() - mechanism.positions();
+    if mechanism.is_kinematic() {
+        return Ok(());
+    }
+    if method.is_implicit() && velocities > LARGEST_DENSE {
+        return Err(MechanismError::TooLarge {
+            velocities,
+            most: LARGEST_DENSE,
+        });
+    }
+    if method.is_implicit() || (method == Method::Automatic && velocities <= LARGEST_IMPLICIT) {
+        mechanism.prepare_linearisation();
+    }
+    Ok(())
 }
 
 fn switching_of(scene: &Scene) -> Switching {

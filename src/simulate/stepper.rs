@@ -1,8 +1,8 @@
 //! The stepping methods behind one name, so that a method can change while the simulation runs.
 
 use crate::integrate::{
-    DormandPrince, Method, Radau, Rosenbrock, RungeKutta4, SemiImplicitEuler, Stepper, StiffSystem,
-    hermite,
+    DormandPrince, Method, Polynomial, Radau, Rosenbrock, RungeKutta4, SemiImplicitEuler, Stepper,
+    StiffSystem, hermite,
 };
 
 pub(super) enum AnyStepper {
@@ -48,6 +48,21 @@ impl AnyStepper {
             Self::Rosenbrock(stiff) => stiff.invalidate(),
             Self::Radau(stiff) | Self::Pair { stiff, .. } => stiff.invalidate(),
             _ => {}
+        }
+    }
+
+    /// The implicit method's latest polynomial, for a snapshot.
+    pub(super) fn polynomial(&self) -> Option<&Polynomial> {
+        match self {
+            Self::Radau(stiff) | Self::Pair { stiff, .. } => Some(stiff.polynomial()),
+            _ => None,
+        }
+    }
+
+    /// Takes it back.
+    pub(super) fn set_polynomial(&mut self, polynomial: &Polynomial) {
+        if let Self::Radau(stiff) | Self::Pair { stiff, .. } = self {
+            stiff.set_polynomial(polynomial);
         }
     }
 

@@ -112,9 +112,39 @@ impl SceneView {
         options: &ViewOptions,
         size: [u32; 2],
     ) {
+        camera.fit_balls(&self.extents(scene, frame, options), size, [0.0; 3]);
+    }
+
+    /// The same with room for text: beside a `plate`, width and height in pixels, in the upper left corner and above the
+    /// legend in the lower right, or below the plate; whichever shows the scene larger.
+    pub fn fit_around(
+        &self,
+        camera: &mut Camera,
+        scene: &Scene,
+        frame: &Frame,
+        options: &ViewOptions,
+        size: [u32; 2],
+        plate: [f32; 2],
+    ) {
+        const LEGEND: f32 = 60.0;
+        let extents = self.extents(scene, frame, options);
+        let mut below = *camera;
+        camera.fit_balls(&extents, size, [plate[0], 0.0, LEGEND]);
+        below.fit_balls(&extents, size, [0.0, plate[1], 0.0]);
+        if below.distance < camera.distance {
+            *camera = below;
+        }
+    }
+
+    fn extents(&self, scene: &Scene, frame: &Frame, options: &ViewOptions) -> Vec<(Vec3, f32)> {
         let m = drawn::magnification(scene, frame, options.magnification);
         let joints = drawn::joints(scene, frame, m);
-        camera.fit_balls(&extents(&self.parts, frame, &joints), size);
+        let mut extents = extents(&self.parts, frame, &joints);
+        // Half a reference length of arrows around each joint: they lean any way, and most are shorter. Drawn or not, so
+        // that pictures with and without them compare.
+        let arrow = ARROW_LENGTH * self.bounds.radius;
+        extents.extend(joints.iter().map(|joint| (joint.socket_centre, arrow)));
+        extents
     }
 
     /// Turns `camera` to a close-up of ball joint `joint`, looking into its opening.

@@ -104,29 +104,48 @@ impl Camera {
     }
 
     /// Moves so that the balls (centre, radius) just fill a picture of `size`, with a small margin; the direction stays.
-    pub(super) fn fit_balls(&mut self, balls: &[(Vec3, f32)], size: [u32; 2]) {
+    /// `reserved` pixels at the left, the top and the bottom are kept free.
+    pub(super) fn fit_balls(
+        &mut self,
+        balls: &[(Vec3, f32)],
+        size: [u32; 2],
+        [left, top, bottom]: [f32; 3],
+    ) {
         const MARGIN: f32 = 1.16;
         let axes = self.axes();
-        let tan_y = (self.field_of_view / 2.0).tan() / MARGIN;
-        let tan_x = tan_y * size[0].max(1) as f32 / size[1].max(1) as f32;
-        // Along one screen axis, at slope `tan`: a ball at (x, depth z towards the eye) is inside both edges where
-        // |x - x0| + r sqrt(1 + tan^2) <= (d - z) tan. The two tightest edges give x0 and d.
-        let span = |axis: Vec3, tan: f32| {
-            let reach = |sign: f32| {
+        let [width, height] = size.map(|n| n.max(1) as f32);
+        // Slope of one pixel. No more is kept free than leaves most of the picture.
+        let pixel = 2.0 * (self.field_of_view / 2.0).tan() / height;
+        let free_of = |edge: f32, low: f32, high: f32| {
+            let keep = (0.6 * edge / (low + high).max(1e-3)).min(1.0);
+            let (middle, half) = (
+                keep * (low - high) / 2.0,
+                (edge - keep * (low + high)) / 2.0 / MARGIN,
+            );
+            (pixel * (half - middle), pixel * (half + middle))
+        };
+        // Along one screen axis, up to slopes `low` and `high`: a ball at (x, depth z towards the eye) is inside both
+        // edges where x - x0 + r sqrt(1 + high^2) <= (d - z) high, and likewise below. The two tightest edges give d, and
+        // the x0 that lies midway for any greater d.
+        let span = |axis: Vec3, (low, high): (f32, f32)| {
+            let reach = |sign: f32, slope: f32| {
                 let edge = |&(p, r): &(Vec3, f32)| {
-                    sign * p.dot(axis) + r * (1.0 + tan * tan).sqrt() + p.dot(axes.2) * tan
+                    sign * p.dot(axis) + r * (1.0 + slope * slope).sqrt() + p.dot(axes.2) * slope
                 };
                 balls.iter().map(edge).fold(f32::NEG_INFINITY, f32::max)
             };
-            let (high, low) = (reach(1.0), reach(-1.0));
-            ((high - low) / 2.0, (high + low) / (2.0 * tan))
+            let (above, below) = (reach(1.0, high), reach(-1.0, low));
+            let midway = move |d: f32| (above - below + d * (low - high)) / 2.0;
+            (midway, (above + below) / (low + high))
         };
-        let ((x, from_x), (y, from_y)) = (span(axes.0, tan_x), span(axes.1, tan_y));
+        let (x, from_x) = span(axes.0, free_of(width, left, 0.0));
+        let (y, from_y) = span(axes.1, free_of(height, bottom, top));
         let eye_depth = from_x.max(from_y);
         let depths = || balls.iter().map(|(p, _)| p.dot(axes.2));
         let middle = (depths().fold(f32::INFINITY, f32::min)
             + depths().fold(f32::NEG_INFINITY, f32::max))
             / 2.0;
+        let (x, y) = (x(eye_depth), y(eye_depth));
         if eye_depth - middle > 0.0 && x.is_finite() && y.is_finite() {
             self.target = axes.0 * x + axes.1 * y + axes.2 * middle;
             self.distance = (eye_depth - middle).max(1e-4);
@@ -397,9 +416,16 @@ mod tests {
             (Vec3::new(-0.3, 0.2, 0.1), 0.1),
             (Vec3::new(0.0, -0.4, 0.2), 0.0),
         ];
-        for size in [[1280, 720], [300, 900]] {
+        for (size, reserved) in [
+            ([1280, 720], [0.0; 3]),
+            ([300, 900], [0.0; 3]),
+            ([640, 400], [250.0, 0.0, 60.0]),
+            ([640, 400], [0.0, 180.0, 0.0]),
+        ] {
             let mut camera = camera(SignedAxis::MinusZ);
-            camera.fit_balls(&balls, size);
+            camera.fit_balls(&balls, size, reserved);
+            let [w, h] = size.map(|n| n as f32);
+            let (free_w, free_h) = (w - reserved[0], h - reserved[1] - reserved[2]);
             let mut least = f32::INFINITY;
             for (centre, radius) in balls {
                 // Points of each ball, seen from all sides.
@@ -408,16 +434,18 @@ mod tests {
                     let on =
                         centre + radius * Vec3::new(a.cos() * b.sin(), a.sin() * b.sin(), b.cos());
                     let p = camera.project(on, size).expect("before the eye");
-                    let [w, h] = size.map(|n| n as f32);
                     least = least
-                        .min(p.x / w)
-                        .min(1.0 - p.x / w)
-                        .min(p.y / h)
-                        .min(1.0 - p.y / h);
+                        .min((p.x - reserved[0]) / free_w)
+                        .min((w - p.x) / free_w)
+                        .min((p.y - reserved[1]) / free_h)
+                        .min((h - reserved[2] - p.y) / free_h);
                 }
             }
             // The margin of 16 % leaves 0.5 (1 - 1/1.16) = 6.9 % at the tightest edge.
-            assert!((0.06..0.08).contains(&least), "{size:?}: {least}");
+            assert!(
+                (0.06..0.08).contains(&least),
+                "{size:?} {reserved:?}: {least}"
+            );
         }
     }
 }

@@ -145,7 +145,7 @@ pub(crate) fn pendulum() -> (Scene, Frame) {
     (scene, frame)
 }
 
-/// The paper's mechanism as it stands at t = 0 (`physics.md` sections 1 and 5), balls pressed against their sockets.
+/// The paper's mechanism as it stands at t = 0, balls pressed against their sockets.
 pub(crate) fn three_legs() -> (Scene, Frame) {
     let x = |x: f64| Vec3::new(x, 0.0, 0.0);
     let f = [0.136_493_548, 0.240_922_773_5, 0.186_472_405_6];

@@ -10,7 +10,14 @@ use jointplay::simulate::{Frame, Simulation};
 /// Built-in scenes.
 pub const SCENES: [&str; 5] = jointplay::scene::BUILT_IN;
 /// Words of `solver.method`.
-pub const METHODS: [&str; 3] = ["semi-implicit-euler", "rk4", "dopri5"];
+pub const METHODS: [&str; 6] = [
+    "semi-implicit-euler",
+    "rk4",
+    "dopri5",
+    "rosenbrock",
+    "radau5",
+    "automatic",
+];
 
 /// Keys and values as a user writes them.
 pub type Changes<'a> = [(&'a str, &'a str)];

@@ -1,5 +1,6 @@
 //! Options of a picture: point of view, arrows, colours.
 
+use crate::app::plate;
 use crate::cli::args::{
     ArrowChoice, ArrowScale, CameraView, Hideable, RenderArguments, ThemeChoice,
 };
@@ -52,10 +53,15 @@ pub fn camera(
                 })?;
             view.close_up(&mut camera, joint, scene, frame, options);
         }
-        None => camera.fit(
-            view.bounds(),
-            arguments.size.0 as f32 / arguments.size.1 as f32,
-        ),
+        None => {
+            let size = [arguments.size.0, arguments.size.1];
+            if arguments.overlay {
+                let plate = plate(scene.ball_joints.len());
+                view.fit_around(&mut camera, scene, frame, options, size, plate);
+            } else {
+                view.fit(&mut camera, scene, frame, options, size);
+            }
+        }
     }
     camera.distance /= arguments.zoom;
     Ok(camera)
