@@ -542,11 +542,47 @@ fn look() {
 }
 
 #[test]
+fn a_settled_run_says_how_to_start_again_until_told_not_to() {
+    let mut harness = window("spcmm");
+    let player = harness.state_mut().player_mut();
+    player.pacer.set_scale(1.0);
+    player.run_to(0.06);
+    player.set_playing(true);
+    harness.step();
+    assert!(harness.query_by_label("Settled: R restarts").is_none());
+    harness.run_steps(60);
+    assert!(time(&harness) > 0.5);
+    harness.get_by_label("Settled: R restarts");
+    click_once(&mut harness, "Dismiss the hint");
+    harness.run_steps(3);
+    assert!(harness.query_by_label("Settled: R restarts").is_none());
+}
+
+fn click_once(harness: &mut Harness<'_, App>, label: &str) {
+    harness.get_by_label(label).click();
+    harness.step();
+}
+
+#[test]
+fn the_left_arrow_takes_a_single_step_back() {
+    let mut harness = window("spcmm");
+    harness.state_mut().player_mut().set_playing(false);
+    harness.run();
+    let start = time(&harness);
+    harness.key_press(Key::ArrowRight);
+    harness.run();
+    assert!(time(&harness) > start);
+    harness.key_press(Key::ArrowLeft);
+    harness.run();
+    assert_eq!(time(&harness), start);
+}
+
+#[test]
 fn hovering_names_a_part_and_a_double_click_follows_it() {
     let mut harness = window("spcmm");
     // The middle of the platform, in the isometric view that the window starts with.
     let view = harness.get_by_label("3D view").rect();
-    let platform = view.lerp_inside(egui::vec2(0.37, 0.74));
+    let platform = view.lerp_inside(egui::vec2(0.571, 0.722));
     harness.hover_at(platform);
     harness.run_steps(60);
     harness.get_by_label("Double-click to follow");

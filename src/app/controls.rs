@@ -3,13 +3,17 @@
 
 use std::collections::HashMap;
 
-use eframe::egui::{self, ComboBox, DragValue, RichText, Slider, SliderClamping, TextEdit, Ui};
+use eframe::egui::{
+    self, ComboBox, DragValue, Rect, RectAlign, Response, RichText, Slider, SliderClamping,
+    TextEdit, Tooltip, Ui,
+};
 
 use super::icons::{Icon, icon_button};
 use super::player::Player;
 use super::value;
 use crate::scene::{
-    Kind, Parameter, SceneError, Scope, Value, format_quantity_digits, from_display, to_display,
+    Kind, Parameter, SceneError, Scope, Value, format_quantity, format_quantity_digits,
+    from_display, to_display,
 };
 use crate::simulate::Effect;
 
@@ -146,6 +150,15 @@ impl Controls {
                     .color(ui.visuals().error_fg_color),
             );
         }
+        let beats = player.beats_preset();
+        if key == "solver.preset" && !beats.is_empty() {
+            let names: Vec<&str> = beats.iter().filter_map(|k| k.split('.').nth(1)).collect();
+            let words = format!(
+                "The scene's file gives {}: it wins over a preset",
+                names.join(", ")
+            );
+            ui.label(RichText::new(words).small().weak());
+        }
         if player.is_waiting(key) {
             ui.label(
                 RichText::new("Applies at the next reset")
@@ -183,21 +196,20 @@ impl Controls {
         let Value::Number(si) = *now else {
             return;
         };
-        self.heading(ui, parameter, key, name, |this, ui| {
+        self.heading(ui, player, 114.0, parameter, key, |this, ui, player| {
             this.default_button(ui, player, parameter, key, name, now);
             this.entry(ui, player, parameter, key, name, now);
         });
         let mut shown = to_display(si, display);
         let (least, greatest) = (to_display(slider.0, display), to_display(slider.1, display));
         ui.spacing_mut().slider_width = ui.available_width().max(40.0);
-        let response = ui
-            .add(
-                Slider::new(&mut shown, least..=greatest)
-                    .logarithmic(logarithmic)
-                    .clamping(SliderClamping::Never)
-                    .show_value(false),
-            )
-            .on_hover_ui(|ui| tooltip(ui, parameter, key));
+        let response = ui.add(
+            Slider::new(&mut shown, least..=greatest)
+                .logarithmic(logarithmic)
+                .clamping(SliderClamping::Never)
+                .show_value(false),
+        );
+        tooltip(ui, &response, player, parameter, key);
         let changed = response.changed();
         response.accessible_name(name);
         if changed {
@@ -219,11 +231,13 @@ impl Controls {
         now: &Value,
         words: &[&'static str],
     ) {
-        self.heading(ui, parameter, key, name, |this, ui| {
+        self.heading(ui, player, 190.0, parameter, key, |this, ui, player| {
             this.default_button(ui, player, parameter, key, name, now);
             let mut chosen = None;
-            ComboBox::from_id_salt("choice")
-                .width(ui.available_width().min(150.0))
+            let width = ui.available_width().min(170.0);
+            let response = ComboBox::from_id_salt("choice")
+                .width(width)
+                .truncate()
                 .selected_text(value::shown(now, &parameter.kind))
                 .show_ui(ui, |ui| {
                     for word in words {
@@ -235,9 +249,9 @@ impl Controls {
                         }
                     }
                 })
-                .response
-                .on_hover_ui(|ui| tooltip(ui, parameter, key))
-                .accessible_name(name);
+                .response;
+            tooltip(ui, &response, player, parameter, key);
+            response.accessible_name(name);
             if let Some(word) = chosen {
                 this.set(player, key, word);
             }
@@ -257,15 +271,14 @@ impl Controls {
         let Value::Count(mut count) = *now else {
             return;
         };
-        self.heading(ui, parameter, key, name, |this, ui| {
+        self.heading(ui, player, 100.0, parameter, key, |this, ui, player| {
             this.default_button(ui, player, parameter, key, name, now);
-            let response = ui
-                .add(
-                    DragValue::new(&mut count)
-                        .range(min..=max)
-                        .update_while_editing(false),
-                )
-                .on_hover_ui(|ui| tooltip(ui, parameter, key));
+            let response = ui.add(
+                DragValue::new(&mut count)
+                    .range(min..=max)
+                    .update_while_editing(false),
+            );
+            tooltip(ui, &response, player, parameter, key);
             let changed = response.changed();
             response.accessible_name(name);
             if changed {
@@ -274,26 +287,39 @@ impl Controls {
         });
     }
 
-    /// Name on the left, whatever `rest` adds from the right.
+    /// Name on the left, whatever `rest` adds from the right; in a line below where `room` points are not left for it.
     fn heading(
         &mut self,
         ui: &mut Ui,
+        player: &mut Player,
+        room: f32,
         parameter: &'static Parameter,
         key: &str,
-        name: &str,
-        rest: impl FnOnce(&mut Self, &mut Ui),
+        rest: impl FnOnce(&mut Self, &mut Ui, &mut Player),
     ) {
+        let font = egui::TextStyle::Body.resolve(ui.style());
+        let colour = ui.visuals().text_color();
+        let name = parameter.label;
+        let words = ui.painter().layout_no_wrap(name.to_owned(), font, colour);
+        let below = words.size().x + ui.spacing().item_spacing.x + room > ui.available_width();
+        let backwards = egui::Layout::right_to_left(egui::Align::Center);
+        let mut rest = Some(rest);
         ui.horizontal(|ui| {
             let text = if FIRST.contains(&key) {
                 RichText::new(name).strong()
             } else {
                 RichText::new(name)
             };
-            ui.label(text).on_hover_ui(|ui| tooltip(ui, parameter, key));
-            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                rest(self, ui)
-            });
+            let label = ui.label(text);
+            tooltip(ui, &label, player, parameter, key);
+            if !below && let Some(rest) = rest.take() {
+                ui.with_layout(backwards, |ui| rest(self, ui, player));
+            }
         });
+        if let Some(rest) = rest {
+            let size = egui::vec2(ui.available_width(), ui.spacing().interact_size.y);
+            ui.allocate_ui_with_layout(size, backwards, |ui| rest(self, ui, player));
+        }
     }
 
     /// Typed entry; what cannot be read stays to be mended.
@@ -337,9 +363,8 @@ impl Controls {
                 }
             }
         }
-        response
-            .on_hover_ui(|ui| tooltip(ui, parameter, key))
-            .accessible_name(name);
+        tooltip(ui, &response, player, parameter, key);
+        response.accessible_name(name);
     }
 
     fn default_button(
@@ -391,15 +416,33 @@ impl Controls {
     }
 }
 
-fn tooltip(ui: &mut Ui, parameter: &Parameter, key: &str) {
-    ui.strong(parameter.label);
-    ui.label(parameter.help);
-    if !parameter.equation.is_empty() {
-        ui.label(RichText::new(format!("Enters {}", parameter.equation)).small());
-    }
-    ui.label(RichText::new(format!("Range {}", value::range(&parameter.kind))).small());
-    ui.label(RichText::new(format!("Key {key}")).small().weak());
-    if parameter.at_reset {
-        ui.label(RichText::new("Applies at the next reset").small());
-    }
+/// What a control is about, beside its panel: the control in use stays in sight.
+fn tooltip(ui: &Ui, response: &Response, player: &Player, parameter: &Parameter, key: &str) {
+    let row = Rect::from_x_y_ranges(ui.clip_rect().x_range(), response.rect.y_range());
+    let mut tooltip = Tooltip::for_enabled(response);
+    tooltip.popup = tooltip.popup.anchor(row).align(RectAlign::RIGHT_START);
+    tooltip.show(|ui| {
+        ui.strong(parameter.label);
+        ui.label(parameter.help);
+        let equation = match parameter.equation.strip_prefix("Paper") {
+            Some(rest) => format!("Enters paper{rest}"),
+            None => parameter.equation.to_owned(),
+        };
+        if !equation.is_empty() {
+            ui.label(RichText::new(equation).small());
+        }
+        let mut range = parameter.range();
+        if parameter.key == "contact.clearance"
+            && let Ok(Value::Number(radius)) = player
+                .wanted()
+                .get(&key.replace("clearance", "ball_radius"))
+        {
+            range = format!("{range} ({})", format_quantity(radius, "mm"));
+        }
+        ui.label(RichText::new(format!("Range {range}")).small());
+        ui.label(RichText::new(format!("Key {key}")).small().weak());
+        if parameter.at_reset {
+            ui.label(RichText::new("Applies at the next reset").small());
+        }
+    });
 }

@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use super::{App, AppOptions, overlay, theme};
 use crate::render::{self, Image, NoAdapter, RenderError, wgpu};
+use crate::scene::SceneError;
 use crate::simulate::StartError;
 use crate::view::{DrawList, Theme};
 
@@ -20,7 +21,7 @@ pub enum HeadlessError {
     NoAdapter(#[from] NoAdapter),
     /// The scene cannot start.
     #[error(transparent)]
-    Start(#[from] StartError),
+    Start(#[from] SceneError),
     /// The picture cannot be drawn.
     #[error(transparent)]
     Render(#[from] RenderError),
@@ -101,7 +102,9 @@ impl Headless {
     /// A scene that cannot start, a size that cannot be drawn.
     pub fn ui_frame(&mut self, frame: &UiFrame) -> Result<Image, HeadlessError> {
         self.ctx = egui::Context::default();
-        let mut app = self.app(frame.options.clone())?;
+        let mut app = self
+            .app(frame.options.clone())
+            .map_err(|error| error.located(&frame.options.scene))?;
         app.player_mut().run_to(frame.at);
         self.app_frame(&mut app, frame.size, frame.scale)
             .map_err(Into::into)
@@ -156,6 +159,7 @@ impl Headless {
                 overlay::labels(&painter, rect, scale, list);
             }
             if overlay.legend
+                && overlay::has_room(rect)
                 && let Some(legend) = &list.legend
             {
                 overlay::legend(&painter, rect, scale, legend, theme);

@@ -8,6 +8,7 @@ use eframe::egui::{self, Key};
 pub enum Action {
     PlayPause,
     Step,
+    StepBack,
     Reset,
     Slower,
     Faster,
@@ -47,13 +48,19 @@ const fn bind(key: Key, action: Action, written: &'static str, help: &'static st
 }
 
 /// All keys.
-pub const BINDINGS: [Binding; 27] = [
+pub const BINDINGS: [Binding; 28] = [
     bind(Key::Space, Action::PlayPause, "Space", "Play or pause"),
     bind(
         Key::ArrowRight,
         Action::Step,
         "Right arrow",
         "One step of the solver",
+    ),
+    bind(
+        Key::ArrowLeft,
+        Action::StepBack,
+        "Left arrow",
+        "Take such a step back (the last 64)",
     ),
     bind(Key::R, Action::Reset, "R", "Reset to t = 0"),
     bind(Key::ArrowUp, Action::Faster, "Up arrow, +", "Faster"),
@@ -133,7 +140,7 @@ pub fn pressed(ctx: &egui::Context) -> Vec<Action> {
                     // Held down, only these go on.
                     let repeats = matches!(
                         binding.action,
-                        Action::Step | Action::Faster | Action::Slower
+                        Action::Step | Action::StepBack | Action::Faster | Action::Slower
                     );
                     (!repeat || repeats).then_some(binding.action)
                 }

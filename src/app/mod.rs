@@ -23,7 +23,7 @@ use eframe::egui::{
 use eframe::egui_wgpu;
 
 use crate::render;
-use crate::scene::{BUILT_IN, Scene};
+use crate::scene::{BUILT_IN, Scene, SceneError};
 use crate::simulate::StartError;
 use crate::view::{Preset, ViewOptions};
 
@@ -82,6 +82,7 @@ pub struct App {
     problem: Option<String>,
     show_controls: bool,
     show_plots: bool,
+    hint_dismissed: bool,
 }
 
 impl App {
@@ -118,6 +119,7 @@ impl App {
             problem: None,
             show_controls: true,
             show_plots: true,
+            hint_dismissed: false,
             player,
         })
     }
@@ -150,7 +152,7 @@ impl App {
                 self.problem = None;
                 self.viewport.restart(&self.player);
             }
-            Err(error) => self.problem = Some(error.to_string()),
+            Err(error) => self.problem = Some(error.located(self.player.wanted()).to_string()),
         }
     }
 
@@ -162,7 +164,7 @@ impl App {
     }
 
     fn show_scene(&mut self, scene: &Scene) -> Result<(), String> {
-        let mut player = Player::new(scene).map_err(|error| error.to_string())?;
+        let mut player = Player::new(scene).map_err(|error| error.located(scene).to_string())?;
         player.pacer.set_scale(self.player.pacer.scale());
         player.set_playing(self.player.is_playing() || self.player.stopped().is_some());
         self.player = player;
@@ -181,6 +183,7 @@ impl App {
         match action {
             Action::PlayPause => player.set_playing(!player.is_playing()),
             Action::Step => player.single_step(),
+            Action::StepBack => player.step_back(),
             Action::Reset => self.reset(),
             Action::Slower | Action::Faster => {
                 let scale = transport::next_scale(player.pacer.scale(), action == Action::Faster);
@@ -355,9 +358,35 @@ impl App {
                 });
             }
         });
+        self.settled_hint(ui, inner);
         let middle = egui::UiBuilder::new().max_rect(inner.shrink2(egui::vec2(0.0, 44.0)));
         ui.scope_builder(middle, |ui| transport::banner(ui, &self.player))
             .inner
+    }
+
+    /// What to do when nothing happens any more, in the middle of the lower edge.
+    fn settled_hint(&mut self, ui: &mut Ui, area: egui::Rect) {
+        let player = &self.player;
+        if self.hint_dismissed || !player.is_playing() || !player.has_settled() {
+            return;
+        }
+        let size = egui::vec2(186.0, 26.0);
+        let place = egui::Align2::CENTER_BOTTOM.align_size_within_rect(size, area);
+        let row = egui::UiBuilder::new()
+            .max_rect(place)
+            .layout(egui::Layout::left_to_right(egui::Align::Center));
+        let fill = ui.visuals().window_fill.gamma_multiply(0.8);
+        ui.painter().rect_filled(place, 6.0, fill);
+        ui.scope_builder(row, |ui| {
+            ui.add_space(8.0);
+            ui.label(RichText::new("Settled: R restarts").weak())
+                .on_hover_text("No ball has struck its socket for 0.2 s of simulated time");
+            let close = ui
+                .add(egui::Button::new("×").frame(false))
+                .on_hover_text("Do not show this again")
+                .accessible_name("Dismiss the hint");
+            self.hint_dismissed |= close.clicked();
+        });
     }
 
     fn header(&mut self, ui: &mut Ui, narrow: bool) {
@@ -403,10 +432,14 @@ impl App {
                 {
                     self.dialog = Some(Dialog::Help);
                 }
-                if ui.button("About").clicked() {
+                // What does not fit is left out rather than laid over the rest; a key stands for the theme.
+                let room = ui.available_width();
+                if room > 80.0 && ui.button("About").clicked() {
                     self.dialog = Some(Dialog::About);
                 }
-                theme_box(ui);
+                if room > 200.0 {
+                    theme_box(ui);
+                }
             });
         });
     }
@@ -522,7 +555,7 @@ impl eframe::App for App {
 pub enum WindowError {
     /// The scene cannot start.
     #[error(transparent)]
-    Start(#[from] StartError),
+    Start(#[from] SceneError),
     /// No graphics adapter.
     #[error(transparent)]
     NoAdapter(#[from] render::NoAdapter),
@@ -546,7 +579,7 @@ pub fn run_native(options: AppOptions) -> Result<(), WindowError> {
         ..Default::default()
     };
     // The scene's own error must come out typed, not as the window's.
-    Player::new(&options.scene)?;
+    Player::new(&options.scene).map_err(|error| error.located(&options.scene))?;
     let create: eframe::AppCreator<'_> = Box::new(|cc| Ok(Box::new(App::new(cc, options)?)));
     eframe::run_native("Jointplay", native, create).map_err(|error| match error {
         eframe::Error::Wgpu(egui_wgpu::WgpuError::RequestAdapterError(_)) => {

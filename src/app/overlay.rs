@@ -35,8 +35,19 @@ fn text(
     painter.text(at, anchor, text, font, ink)
 }
 
+/// Least edge of a picture that has room for more than the time, points.
+const SMALL: f32 = 200.0;
+
+/// Whether a picture is large enough for a legend, names and forces.
+pub fn has_room(rect: Rect) -> bool {
+    rect.size().min_elem() >= SMALL
+}
+
 /// Names of joints and axes at their places.
 pub fn labels(painter: &Painter, rect: Rect, scale: f32, list: &DrawList) {
+    if !has_room(rect) {
+        return;
+    }
     let halo = colour(list.background.bottom);
     for label in &list.labels {
         let at = rect.min + vec2(label.pixel.x, label.pixel.y) / scale;
@@ -68,12 +79,24 @@ pub fn time(painter: &Painter, rect: Rect, time: f64, notes: &[String], theme: T
     let ink = colour(palette.text);
     let line =
         |words: String, size: f32| painter.layout_no_wrap(words, FontId::proportional(size), ink);
-    let mut lines = vec![line(format!("t = {}", value::time(time)), 18.0)];
-    let notes = notes.iter().filter(|note| !note.is_empty());
-    lines.extend(notes.map(|note| line(note.clone(), 13.0)));
+    let large = has_room(rect);
+    let (size, small_size, margin) = if large {
+        (18.0, 13.0, MARGIN)
+    } else {
+        (11.0, 10.0, 6.0)
+    };
+    let mut lines = vec![line(format!("t = {}", value::time(time)), size)];
+    // The first note says how much the play is magnified: never left out for want of room alone.
+    let notes =
+        notes
+            .iter()
+            .filter(|note| !note.is_empty())
+            .take(if large { usize::MAX } else { 1 });
+    lines.extend(notes.map(|note| line(note.clone(), small_size)));
+    lines.retain(|line| line.size().x + 2.0 * margin <= rect.width());
     let width = lines.iter().map(|l| l.size().x).fold(0.0, f32::max);
     let height: f32 = lines.iter().map(|l| l.size().y + 1.0).sum();
-    let corner = rect.min + vec2(MARGIN, MARGIN);
+    let corner = rect.min + vec2(margin, margin);
     let plate = Rect::from_min_size(corner, vec2(width, height)).expand2(vec2(8.0, 4.0));
     painter.rect_filled(plate, 6.0, colour(palette.sky).gamma_multiply(0.75));
     let mut at = corner;

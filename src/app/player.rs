@@ -1,10 +1,12 @@
 //! A running scene with its transport: playing, pacing, recording, peaks and what went wrong. No egui here.
 
+use std::collections::VecDeque;
+
 use web_time::Instant;
 
 use crate::scene::{Scene, SceneError, Value};
 use crate::simulate::{
-    Channels, Effect, Frame, History, Pacer, Peak, Simulation, StartError, Stopped,
+    Channels, Effect, Frame, History, Pacer, Peak, Simulation, Snapshot, StartError, Stopped,
 };
 
 /// Narrowest bin of the record, s: shorter than any step that resolves an impact.
@@ -27,7 +29,20 @@ pub struct Player {
     history: History,
     recorded: Frame,
     values: Vec<f64>,
+    /// When a ball last struck, s; `None` before the first time.
+    last_impact: Option<f64>,
+    /// States before the latest single steps, oldest first.
+    past: VecDeque<Snapshot>,
 }
+
+/// Keys of the solver that win over its preset.
+const SOLVER_KEYS: [&str; 3] = ["solver.method", "solver.step", "solver.tolerance"];
+
+/// Simulated time without an impact after which the motion counts as settled, s.
+const SETTLED: f64 = 0.2;
+
+/// Single steps that can be taken back.
+const PAST: usize = 64;
 
 /// Seconds of viewing that the automatic window of the plots shows.
 const VIEWING: f64 = 5.0;
@@ -58,6 +73,8 @@ impl Player {
             channels,
             recorded: Frame::default(),
             values: Vec::new(),
+            last_impact: None,
+            past: VecDeque::new(),
             simulation,
         };
         player.start_record();
@@ -113,6 +130,7 @@ impl Player {
     pub fn set_playing(&mut self, playing: bool) {
         self.playing = playing && self.stopped.is_none();
         if self.playing {
+            self.past.clear();
             // The average of the reached speed starts anew.
             self.pacer.jump(self.pacer.shown());
         }
@@ -121,6 +139,12 @@ impl Player {
     /// Why the divergence guard stopped the run.
     pub fn stopped(&self) -> Option<&Stopped> {
         self.stopped.as_ref()
+    }
+
+    /// Whether the balls have struck and now lie in their sockets: no impact for a while.
+    pub fn has_settled(&self) -> bool {
+        self.last_impact
+            .is_some_and(|last| self.simulation.time() - last > SETTLED)
     }
 
     /// Moves on by one frame that comes `dt` seconds after the last, and refreshes what is on show.
@@ -147,13 +171,31 @@ impl Player {
         if self.stopped.is_some() {
             return;
         }
+        if self.past.len() == PAST {
+            self.past.pop_front();
+        }
+        self.past.push_back(self.simulation.snapshot());
         self.step();
         self.show_latest();
+    }
+
+    /// Takes the latest single step back; nothing where there is none.
+    pub fn step_back(&mut self) {
+        let Some(snapshot) = self.past.pop_back() else {
+            return;
+        };
+        self.playing = false;
+        // A scene that has run once starts again.
+        if self.simulation.restore(&snapshot).is_ok() {
+            self.stopped = None;
+            self.show_latest();
+        }
     }
 
     /// Pauses and runs on until `time`, s, whatever it takes: the start of a headless frame.
     pub fn run_to(&mut self, time: f64) {
         self.playing = false;
+        self.past.clear();
         while self.simulation.time() < time && self.stopped.is_none() {
             self.step();
         }
@@ -186,8 +228,21 @@ impl Player {
     /// As [`Simulation::set`]; nothing has changed then.
     pub fn set(&mut self, key: &str, value: &str) -> Result<Effect, SceneError> {
         let effect = self.simulation.set(key, value)?;
-        self.warnings = self.wanted().warnings();
+        if key == "solver.preset" {
+            // Chosen here, a preset is to have effect: it replaces what was set by name before.
+            for by_name in SOLVER_KEYS {
+                self.simulation.set_value(by_name, &Value::Unset)?;
+            }
+        }
+        self.after_change();
         Ok(effect)
+    }
+
+    /// Keys that the scene's file gives by name and that therefore win over any preset.
+    pub fn beats_preset(&self) -> Vec<&'static str> {
+        let places = &self.original.source.places;
+        let given = |key: &&str| places.contains_key(*key);
+        SOLVER_KEYS.into_iter().filter(given).collect()
     }
 
     /// Gives a parameter the value that the scene's file has.
@@ -197,8 +252,19 @@ impl Player {
     pub fn set_original(&mut self, key: &str) -> Result<Effect, SceneError> {
         let value = self.original.get(key)?;
         let effect = self.simulation.set_value(key, &value)?;
-        self.warnings = self.wanted().warnings();
+        self.after_change();
         Ok(effect)
+    }
+
+    fn after_change(&mut self) {
+        self.warnings = self.wanted().warnings();
+        self.past.clear();
+        // What was recorded before steps were taken back belongs to another future.
+        let recorded = self.history.span().map_or(0.0, |(_, end)| end);
+        if recorded > self.simulation.time() {
+            self.history.clear();
+            self.record();
+        }
     }
 
     /// Whether `key` was changed and waits for a reset.
@@ -271,6 +337,8 @@ impl Player {
 
     fn start_record(&mut self) {
         self.history.clear();
+        self.past.clear();
+        self.last_impact = None;
         self.show_latest();
         self.record();
         self.simulation.take_peaks(&mut self.peaks);
@@ -278,6 +346,9 @@ impl Player {
 
     fn take_peaks(&mut self) {
         self.simulation.take_peaks(&mut self.peaks);
+        if self.peaks.iter().any(|peak| peak.impacts > 0) {
+            self.last_impact = Some(self.simulation.time());
+        }
         for (joint, peak) in self.peaks.iter().enumerate() {
             if let Some(channel) = self.channels.normal_force(joint)
                 && peak.normal > 0.0
@@ -352,6 +423,44 @@ mod tests {
         assert!(player.channels().len() < before);
         player.run_to(0.01);
         assert!(!recorded(&player, Quantity::NormalForce, 0.01).is_empty());
+    }
+
+    #[test]
+    fn single_steps_are_taken_back_bit_by_bit() {
+        let mut player = player("spcmm");
+        player.run_to(8e-3);
+        player.step_back();
+        let mut hashes = Vec::new();
+        for _ in 0..80 {
+            hashes.push(player.simulation().state_hash());
+            player.single_step();
+        }
+        let end = player.simulation().state_hash();
+        for hash in hashes.iter().rev().take(PAST) {
+            player.step_back();
+            assert_eq!(player.simulation().state_hash(), *hash);
+        }
+        player.step_back();
+        assert_eq!(player.simulation().state_hash(), hashes[80 - PAST]);
+        for _ in 0..PAST {
+            player.single_step();
+        }
+        assert_eq!(player.simulation().state_hash(), end);
+        player.set("contact.friction", "0.3").expect("in range");
+        player.step_back();
+        assert_eq!(player.simulation().state_hash(), end);
+    }
+
+    #[test]
+    fn a_preset_chosen_here_replaces_what_was_set_by_name() {
+        let mut player = player("spcmm");
+        player.set("solver.tolerance", "1e-9").expect("in range");
+        player.set("solver.preset", "accurate").expect("a preset");
+        assert_eq!(player.wanted().solver.tolerance, 1e-7);
+        assert_eq!(player.scene().solver.tolerance, 1e-7);
+        player.set("solver.tolerance", "1e-9").expect("in range");
+        assert_eq!(player.scene().solver.tolerance, 1e-9);
+        assert!(player.beats_preset().is_empty());
     }
 
     #[test]

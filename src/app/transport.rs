@@ -67,7 +67,7 @@ pub fn ui(ui: &mut Ui, player: &mut Player) -> Option<Asked> {
                 ui,
                 Icon::Step,
                 "Step",
-                "One step of the solver (right arrow)",
+                "One step of the solver (right arrow; left arrow takes it back)",
                 30.0,
                 false,
             )

@@ -1,6 +1,6 @@
 //! Parameter values as text: the same words and units that files and the command line take.
 
-use crate::scene::{Kind, Value, format_quantity, format_quantity_digits, to_display};
+use crate::scene::{Kind, Value, format_quantity, format_quantity_digits};
 
 /// `value` for a person: display unit, six digits.
 pub fn shown(value: &Value, kind: &Kind) -> String {
@@ -21,23 +21,6 @@ pub fn completed(typed: &str, kind: &Kind) -> String {
             format!("{typed} {display}")
         }
         _ => typed.to_owned(),
-    }
-}
-
-/// Range of a kind, for a tooltip.
-pub fn range(kind: &Kind) -> String {
-    match kind {
-        Kind::Number {
-            min, max, display, ..
-        } => {
-            format!(
-                "{} to {}",
-                format_quantity(to_display(*min, display), ""),
-                format_quantity(*max, display)
-            )
-        }
-        Kind::Count { min, max } => format!("{min} to {max}"),
-        Kind::Choice(words) => words.join(", "),
     }
 }
 
@@ -104,7 +87,6 @@ mod tests {
     #[test]
     fn values_read_as_people_write_them() {
         assert_eq!(shown(&Value::Number(3e-4), &LENGTH), "0.3 mm");
-        assert_eq!(range(&LENGTH), "0 to 2 mm");
     }
 
     #[test]

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use eframe::egui::{
-    self, PointerButton, Pos2, Rect, RichText, Role, Sense, Slider, Ui, WidgetInfo, pos2, vec2,
+    self, PointerButton, Pos2, Rect, RectAlign, RichText, Role, Sense, Slider, Tooltip, Ui,
+    WidgetInfo, pos2, vec2,
 };
 use glam::{Vec2, Vec3};
 
@@ -19,6 +20,9 @@ use crate::view::{
 
 /// Points of the probe's trail that are kept.
 const TRAIL: usize = 1500;
+
+/// Farthest that the wheel goes away, in radii of the machine.
+const FARTHEST: f32 = 30.0;
 
 /// A shot of what the player shows. A macro, since the list that it is drawn to is borrowed beside it.
 macro_rules! shot {
@@ -187,7 +191,7 @@ impl Viewport {
                 ui.ctx().request_repaint();
             }
         }
-        self.drag(ui, &response, rect, size, scale);
+        self.drag(ui, &response, player, rect, size, scale);
         let shot = shot!(self, player, &self.camera, size, scale);
         let hovered = response
             .hover_pos()
@@ -202,7 +206,9 @@ impl Viewport {
         let painter = ui.painter_at(rect);
         painter.add(render::Viewport::shape(rect, self.list.clone()));
         overlay::labels(&painter, rect, scale, &self.list);
-        if let Some(legend) = &self.list.legend {
+        if let Some(legend) = &self.list.legend
+            && overlay::has_room(rect)
+        {
             overlay::legend(&painter, rect, scale, legend, self.options.theme);
         }
         let mut notes = vec![self.list.magnification_text.clone()];
@@ -217,7 +223,18 @@ impl Viewport {
             self.options.theme,
         );
         if let Some(hit) = hovered {
-            response.on_hover_ui_at_pointer(|ui| describe(ui, player, hit.what));
+            // Away from the nearer edge: the transport below stays free.
+            let low = response
+                .hover_pos()
+                .is_some_and(|pos| pos.y > rect.center().y);
+            let align = if low {
+                RectAlign::TOP_START
+            } else {
+                RectAlign::BOTTOM_START
+            };
+            let mut card = Tooltip::for_enabled(&response).at_pointer().gap(12.0);
+            card.popup = card.popup.align(align);
+            card.show(|ui| describe(ui, player, hit.what));
         }
     }
 
@@ -236,7 +253,15 @@ impl Viewport {
         camera
     }
 
-    fn drag(&mut self, ui: &Ui, response: &egui::Response, rect: Rect, size: [u32; 2], scale: f32) {
+    fn drag(
+        &mut self,
+        ui: &Ui,
+        response: &egui::Response,
+        player: &Player,
+        rect: Rect,
+        size: [u32; 2],
+        scale: f32,
+    ) {
         let shift = ui.input(|i| i.modifiers.shift);
         let delta = response.drag_delta() * scale;
         let delta = Vec2::new(delta.x, delta.y);
@@ -256,8 +281,20 @@ impl Viewport {
             if factor != 1.0 {
                 self.goal = None;
                 let cursor = (pos - rect.min) * scale;
-                self.camera
-                    .zoom(factor, Vec2::new(cursor.x, cursor.y), size);
+                let shot = shot!(self, player, &self.camera, size, scale);
+                let hit = self.view.pick(&shot, Vec2::new(cursor.x, cursor.y));
+                let bounds = self.view.bounds();
+                // Over the ground the whole machine stays in place, and neither end of the way loses it.
+                let point = hit.map_or(bounds.centre, |hit| hit.point);
+                let from = self.camera.eye().distance(bounds.centre);
+                let lost = match hit {
+                    _ if factor < 1.0 => from > FARTHEST * bounds.radius,
+                    Some(_) => false,
+                    None => from < bounds.radius,
+                };
+                if !lost {
+                    self.camera.zoom_about(factor, point, size);
+                }
             }
         }
     }

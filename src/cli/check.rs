@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::args::SceneArguments;
 use super::output::significant;
-use super::{Failure, load, print, provenance};
+use super::{Failure, load, print, provenance, start};
 use crate::contact::{FrictionLaw, NormalLaw};
 use crate::mechanism::{Mechanism, Summary};
 use crate::scene::{BallJoint, JointKind, Scene};
@@ -23,13 +23,13 @@ const LEAST_LANKARANI_RESTITUTION: f64 = 0.8;
 pub fn check(arguments: &SceneArguments) -> Result<(), Failure> {
     let scene = load(arguments)?;
     // Starting it finds what reading it cannot: joints that do not close, rods that do not reach.
-    let mut simulation = Simulation::new(&scene)?;
-    let mut start = Frame::default();
-    simulation.sample(0.0, &mut start);
+    let mut simulation = start(&scene)?;
+    let mut frame = Frame::default();
+    simulation.sample(0.0, &mut frame);
     let contents = Mechanism::new(&scene)
         .map_err(|error| Failure::usage(error.to_string()))?
         .summary();
-    print(&report(&scene, &contents, &start)?)
+    print(&report(&scene, &contents, &frame)?)
 }
 
 fn is_ideal(joint: &BallJoint) -> bool {

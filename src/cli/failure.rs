@@ -1,7 +1,6 @@
 //! Why a command ended early, and the exit code that says so to a script.
 
 use crate::scene::SceneError;
-use crate::simulate::StartError;
 
 /// A message for a person and a code for a script.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -52,11 +51,5 @@ impl From<SceneError> for Failure {
             Self::USAGE
         };
         Self::new(code, error.to_string())
-    }
-}
-
-impl From<StartError> for Failure {
-    fn from(error: StartError) -> Self {
-        Self::usage(error.to_string())
     }
 }

@@ -21,6 +21,7 @@ use clap::Parser;
 use self::args::{Arguments, Command, SceneArguments};
 pub use self::failure::Failure;
 use crate::scene::{BUILT_IN, Scene, reference_page};
+use crate::simulate::Simulation;
 
 /// The scene that opens when none is named.
 pub const DEFAULT_SCENE: &str = "spcmm";
@@ -103,6 +104,11 @@ fn scenes() -> Result<String, Failure> {
 
 fn load(arguments: &SceneArguments) -> Result<Scene, Failure> {
     Ok(Scene::load(&arguments.scene, &arguments.changes)?)
+}
+
+/// Starts a scene; an error names the line of its file and the change that it is about.
+fn start(scene: &Scene) -> Result<Simulation, Failure> {
+    Simulation::new(scene).map_err(|error| error.located(scene).into())
 }
 
 /// Results go to standard output; a reader that has seen enough (`| head`) is no error.

@@ -8,7 +8,7 @@ use serde_json::{Value as Json, json};
 use super::args::{RunArguments, SummaryForm};
 use super::output::{RowsFile, Table, check_size};
 use super::summary::{self, Status};
-use super::{Failure, interrupt, load, print, progress, quantity, warn};
+use super::{Failure, interrupt, load, print, progress, quantity, start, warn};
 use crate::simulate::{Frame, Simulation};
 
 /// Steps between two looks at the clock, the progress bar and Ctrl-C.
@@ -78,7 +78,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         None => None,
     };
     let scene = load(&arguments.scene)?;
-    let mut simulation = Simulation::new(&scene)?;
+    let mut simulation = start(&scene)?;
     let mut frame = Frame::default();
     simulation.sample(0.0, &mut frame);
     let mut table = Table::new(&scene, &frame);

@@ -114,8 +114,10 @@ pub fn text(
         );
         let story = if joint.contact.clearance == 0.0 {
             format!("ideal, {peak}")
+        } else if statistics.peak_normal[i] == 0.0 {
+            "no contact".to_owned()
         } else {
-            format!("{} impacts, {peak}", statistics.impacts[i])
+            format!("{}, {peak}", count(statistics.impacts[i], "impact"))
         };
         line(&format!("Joint {}", joint.name), story);
     }
@@ -131,10 +133,19 @@ pub fn text(
     );
     line("State hash", hash_text(simulation.state_hash()));
     if let Some((path, rows)) = written {
-        line("Written", format!("{rows} rows to {}", path.display()));
+        line(
+            "Written",
+            format!("{} to {}", count(rows as u64, "row"), path.display()),
+        );
     }
     line("Version", format!("jointplay {}", crate::VERSION));
     Ok(out)
+}
+
+/// A number of things: `1 row`, `2 rows`.
+pub fn count(number: u64, what: &str) -> String {
+    let plural = if number == 1 { "" } else { "s" };
+    format!("{number} {what}{plural}")
 }
 
 /// Simulated seconds in a second; `None` where no time was spent.

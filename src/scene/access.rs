@@ -1,6 +1,7 @@
 //! Parameters of a scene by key: reading and changing.
 
 use super::error::nearest;
+use super::read::{SPCMM_DIMENSIONS, VIEW_SETTINGS};
 use super::table::{self, contact_part, find};
 use super::*;
 use crate::contact::{self, FrictionLaw, FrictionVelocity, NormalLaw};
@@ -119,6 +120,19 @@ struct Resolved {
     joint: Option<usize>,
 }
 
+/// Whether a key has its place in a scene file although it is no parameter.
+fn file_only(key: &str) -> bool {
+    let (section, rest) = key.split_once('.').unwrap_or((key, ""));
+    match section {
+        "spcmm" => SPCMM_DIMENSIONS.contains(&rest),
+        "view" => VIEW_SETTINGS.contains(&rest),
+        "chain" => ["hang", "rotation"].contains(&rest) || rest.starts_with("link."),
+        "output" => ["body", "probe"].contains(&rest),
+        "name" | "title" | "description" | "start" => rest.is_empty(),
+        _ => false,
+    }
+}
+
 impl Scene {
     /// Whether a row's keys exist in this scene.
     fn has(&self, parameter: &Parameter) -> bool {
@@ -158,6 +172,11 @@ impl Scene {
                         ),
                     ))
                 }
+                None if file_only(key) => Err(SceneError::about(
+                    key,
+                    None,
+                    "only in the scene file: it cannot be changed from outside it",
+                )),
                 None => {
                     // Keys without their section are a common slip: compare both forms.
                     let here = self.parameters();
@@ -386,14 +405,26 @@ impl Scene {
         }
     }
 
+    /// What the scene's text does not give by name follows the preset.
     fn apply_preset(&mut self, preset: Preset) {
         let (method, step, tolerance) = preset.point();
-        self.solver = Solver {
-            preset: Some(preset),
-            method,
-            step,
-            tolerance,
-        };
+        let free = |key: &str| !self.source.places.contains_key(key);
+        let (method_free, step_free, tolerance_free) = (
+            free("solver.method"),
+            free("solver.step"),
+            free("solver.tolerance"),
+        );
+        let solver = &mut self.solver;
+        solver.preset = Some(preset);
+        if method_free {
+            solver.method = method;
+        }
+        if step_free {
+            solver.step = step;
+        }
+        if tolerance_free {
+            solver.tolerance = tolerance;
+        }
     }
 
     /// Solver settings that were changed by name win over a preset, whichever came first.

@@ -1,6 +1,7 @@
 //! What must hold between the parameters of a scene, and what is allowed but doubtful.
 
 use super::access::contact_value;
+use super::error::line_text;
 use super::*;
 use crate::contact::{self, FrictionLaw, NormalLaw};
 
@@ -63,6 +64,28 @@ impl Scene {
             ));
         }
         warnings
+    }
+
+    /// An error found when the scene starts, about what `title` names (see [`Source::places`]): it points to that
+    /// line of the file, and names the latest change whose key is among `keys` or, where they end in a dot, below one.
+    pub fn start_error(&self, title: &str, keys: &[String], message: String) -> SceneError {
+        let concerns = |changed: &str| {
+            keys.iter()
+                .any(|key| changed == key || (key.ends_with('.') && changed.starts_with(key)))
+        };
+        let change = self.changes.iter().rfind(|(changed, _)| concerns(changed));
+        let place = self.source.places.get(title).copied();
+        let mut error = match change {
+            Some((key, value)) => SceneError::about(key, Some(value), message),
+            None => SceneError::about(title, None, message),
+        };
+        error.file.clone_from(&self.source.file);
+        // Of a built-in scene there is no file to look into: a change that explains the error is enough.
+        if self.source.file.is_some() || change.is_none() {
+            error.position = place;
+            error.line_text = place.and_then(|(line, _)| line_text(&self.source.text, line));
+        }
+        error
     }
 
     /// Ball joints with equal contact parameters, named together.

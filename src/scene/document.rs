@@ -1,6 +1,6 @@
 //! TOML with places: every value knows its key and its line and column, so that every error can name them.
 
-use super::error::{line_and_column, nearest};
+use super::error::{line_and_column, line_text, nearest};
 use super::units::{QuantityError, parse_quantity};
 use super::{Dimension, SceneError, Vec3, find};
 use std::ops::Range;
@@ -43,21 +43,20 @@ impl<'d> Document<'d> {
         value: Option<&str>,
         message: impl Into<String>,
     ) -> SceneError {
-        let start = self.text.floor_char_boundary(span.start);
-        let before = &self.text[..start];
-        let line_start = before.rfind('\n').map_or(0, |at| at + 1);
-        let line_text = self.text[line_start..].lines().next().unwrap_or("");
+        let (line, column) = self.place(&span);
         let mut error = SceneError::about(key, value, message);
         if key.is_empty() {
             error.key = None;
         }
         error.file = self.file.map(str::to_owned);
-        error.position = Some(line_and_column(before));
-        // A line too long for a terminal, or one with control characters in it, helps nobody.
-        if line_text.len() <= 160 && !line_text.chars().any(|c| c.is_control() && c != '\t') {
-            error.line_text = Some(line_text.replace('\t', " ").into());
-        }
+        error.position = Some((line, column));
+        error.line_text = line_text(self.text, line);
         error
+    }
+
+    /// Line and column of a place in the text.
+    fn place(&self, span: &Range<usize>) -> (u32, u32) {
+        line_and_column(&self.text[..self.text.floor_char_boundary(span.start)])
     }
 
     /// The text of a value, cut to what fits in a line.
@@ -129,6 +128,11 @@ impl<'d> Section<'d> {
         })
     }
 
+    /// Line and column of this table.
+    pub fn place(&self) -> (u32, u32) {
+        self.document.place(&self.span)
+    }
+
     /// An error about this table as a whole, or about a key that it lacks.
     pub fn error(&self, name: &str, message: impl Into<String>) -> SceneError {
         let key = if name.is_empty() {
@@ -148,6 +152,11 @@ impl<'d> Section<'d> {
 }
 
 impl<'d> Node<'d> {
+    /// Line and column of this value.
+    pub fn place(&self) -> (u32, u32) {
+        self.document.place(&self.value.span())
+    }
+
     /// An error about this value.
     pub fn error(&self, message: impl Into<String>) -> SceneError {
         let span = self.value.span();

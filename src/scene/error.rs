@@ -76,6 +76,16 @@ pub(super) fn line_and_column(before: &str) -> (u32, u32) {
     )
 }
 
+/// Line number `line`, from 1, of a text; `None` for one too long for a terminal, or with control characters in it.
+pub(super) fn line_text(text: &str, line: u32) -> Option<Box<str>> {
+    let line = text
+        .lines()
+        .nth(line.saturating_sub(1) as usize)
+        .unwrap_or("");
+    let fit = line.len() <= 160 && !line.chars().any(|c| c.is_control() && c != '\t');
+    fit.then(|| line.replace('\t', " ").into())
+}
+
 /// The nearest of `names` to `wrong`, in brackets; "" if none is near.
 pub(super) fn nearest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> String {
     let wrong_lower = wrong.to_lowercase();

@@ -1,5 +1,7 @@
 //! What a scene is, typed and in SI units. `read.rs` makes one from a file, `parameters.rs` changes one by key.
 
+use std::collections::BTreeMap;
+
 use crate::contact;
 use crate::integrate::Method;
 
@@ -72,6 +74,9 @@ pub struct Source {
     pub file: Option<String>,
     /// The TOML text.
     pub text: String,
+    /// Line and column, from 1, of what errors after reading point to: each parameter that the text gives, by key;
+    /// `spcmm`, its section; `joint.<name>`, each ball joint (a chain's: its section).
+    pub places: BTreeMap<String, (u32, u32)>,
 }
 
 /// Form of the equations of motion.
@@ -184,6 +189,8 @@ pub struct ViewSettings {
     pub down: SignedAxis,
     /// Where the floor grid lies: coordinate along `down`, m; `None` lets the view choose.
     pub floor: Option<f64>,
+    /// Turn about the vertical and height angle of the isometric view, rad, where the usual one hides something.
+    pub isometric: Option<(f64, f64)>,
 }
 
 /// What the pose columns report.

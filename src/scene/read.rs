@@ -29,13 +29,16 @@ const TOP: [&str; 16] = [
 ];
 
 /// Keys of `[spcmm]` that are no parameters: the file's bodies are built to these dimensions.
-const SPCMM_DIMENSIONS: [&str; 5] = [
+pub(super) const SPCMM_DIMENSIONS: [&str; 5] = [
     "mean_x",
     "gamma",
     "hinge_radius",
     "driving_rod",
     "driven_rod",
 ];
+
+/// Keys of `[view]` that are no parameters.
+pub(super) const VIEW_SETTINGS: [&str; 3] = ["floor", "yaw", "pitch"];
 
 /// Where a value of a parameter stands in the file.
 type Places<'d> = BTreeMap<String, Node<'d>>;
@@ -71,6 +74,14 @@ impl Scene {
         let top = Section::new(document, String::new(), parsed.get_ref(), 0..0, &TOP)?;
         let mut scene = read_settings(&top)?;
         let mut places = read_parameters(&top, &mut scene)?;
+        scene.source.places = places
+            .iter()
+            .map(|(key, node)| (key.clone(), node.place()))
+            .chain(
+                top.get("spcmm")
+                    .map(|node| ("spcmm".to_owned(), node.place())),
+            )
+            .collect();
         // These two decide what the bodies are, so they come before them.
         for (key, value) in changes
             .iter()
@@ -150,16 +161,25 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
             })
         }
     };
-    let floor = match top.get("view") {
-        None => None,
-        Some(view) => {
-            let section = view.section(&keys_with("view", &["floor"]))?;
+    let (mut floor, mut isometric) = (None, None);
+    if let Some(view) = top.get("view") {
+        let section = view.section(&keys_with("view", &VIEW_SETTINGS))?;
+        let get = |name: &str, dimension| {
             section
-                .get("floor")
-                .map(|node| node.quantity(Dimension::Length))
-                .transpose()?
-        }
-    };
+                .get(name)
+                .map(|node| node.quantity(dimension))
+                .transpose()
+        };
+        floor = get("floor", Dimension::Length)?;
+        isometric = match (
+            get("yaw", Dimension::Angle)?,
+            get("pitch", Dimension::Angle)?,
+        ) {
+            (Some(yaw), Some(pitch)) => Some((yaw, pitch)),
+            (None, None) => None,
+            _ => return Err(section.error("", "yaw and pitch belong together: give both or none")),
+        };
+    }
     Ok(Scene {
         title: text("title")?.unwrap_or(&name).to_owned(),
         description: text("description")?.unwrap_or("").trim().to_owned(),
@@ -178,6 +198,7 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
         view: ViewSettings {
             down: SignedAxis::MinusZ,
             floor,
+            isometric,
         },
         output: Output {
             body: 0,
@@ -191,6 +212,7 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
         source: Source {
             file: document.file.map(str::to_owned),
             text: document.text.to_owned(),
+            places: BTreeMap::new(),
         },
         changes: Vec::new(),
     })
@@ -214,7 +236,7 @@ fn read_parameters<'d>(top: &Section<'d>, scene: &mut Scene) -> Result<Places<'d
         ("solver", &[]),
         ("spcmm", &SPCMM_DIMENSIONS),
         ("chain", &["hang", "rotation", "link"]),
-        ("view", &["floor"]),
+        ("view", &VIEW_SETTINGS),
     ] {
         if let Some(node) = top.get(name) {
             sections.insert(name, node.section(&keys_with(name, more))?);
@@ -318,6 +340,8 @@ fn read_mechanism<'d>(
             places: own,
         } = read_ball_joint(&node, scene, &by_name)?;
         joint_names.add(&section, "joint", &joint.name)?;
+        let title = format!("joint.{}", joint.name);
+        scene.source.places.insert(title, section.place());
         scene.ball_joints.push(joint);
         places.extend(own);
     }
@@ -327,6 +351,10 @@ fn read_mechanism<'d>(
     }
     if let Some(node) = top.get("chain") {
         super::chain::expand(&node, scene)?;
+        for joint in &scene.ball_joints {
+            let title = format!("joint.{}", joint.name);
+            scene.source.places.entry(title).or_insert(node.place());
+        }
     }
     if scene.bodies.is_empty() {
         return Err(top.document.error(

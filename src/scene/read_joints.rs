@@ -215,20 +215,28 @@ fn read_drive(
         }
         1 => {
             let section = node.section(&["law", "position", "velocity"])?;
+            let like = match kind {
+                JointKind::Revolute => "\"6 rad/s\"",
+                _ => "\"10 mm/s\"",
+            };
             Drive::Constant {
                 position: section
                     .get("position")
                     .map_or(Ok(0.0), |node| node.quantity(place))?,
-                velocity: section.require("velocity", "\"6 rad/s\"")?.quantity(rate)?,
+                velocity: section.require("velocity", like)?.quantity(rate)?,
             }
         }
         _ => {
             let section = node.section(&["law", "mean", "amplitude", "frequency", "phase"])?;
+            let like = match kind {
+                JointKind::Revolute => "\"10 deg\"",
+                _ => "\"10 mm\"",
+            };
             Drive::Harmonic {
                 mean: section
                     .get("mean")
                     .map_or(Ok(0.0), |node| node.quantity(place))?,
-                amplitude: section.require("amplitude", "\"10 mm\"")?.quantity(place)?,
+                amplitude: section.require("amplitude", like)?.quantity(place)?,
                 frequency: section
                     .require("frequency", "\"1 Hz\"")?
                     .quantity(Dimension::Frequency)?,

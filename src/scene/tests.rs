@@ -214,12 +214,35 @@ fn explicit_solver_settings_beat_a_preset_in_either_order() {
         Scene::parse(&file, None, &[]).unwrap().solver.tolerance,
         1e-5
     );
-    // A preset that is asked for later replaces all that the file says.
-    let ask = [("solver.preset".to_owned(), "accurate".to_owned())];
-    assert_eq!(
-        Scene::parse(&file, None, &ask).unwrap().solver.tolerance,
-        1e-7
-    );
+    // Nor does one that is asked for later replace what the file says by name.
+    let ask = [("solver.preset".to_owned(), "preview".to_owned())];
+    let solver = Scene::parse(&file, None, &ask).unwrap().solver;
+    assert_eq!(solver.tolerance, 1e-5);
+    assert_eq!(solver.method, crate::integrate::Method::RungeKutta4);
+}
+
+#[test]
+fn a_key_of_the_file_alone_says_so() {
+    for key in ["spcmm.gamma", "view.floor", "output.body", "start"] {
+        let error = Scene::load("spcmm", &[(key.to_owned(), "1".to_owned())]).unwrap_err();
+        assert!(
+            error.message.starts_with("only in the scene file"),
+            "{error}"
+        );
+    }
+}
+
+#[test]
+fn a_drive_is_asked_for_in_the_unit_of_its_joint() {
+    for (kind, like) in [("revolute", "10 deg"), ("prismatic", "10 mm")] {
+        let text = format!(
+            "[[body]]\nname = \"rod\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n\
+             [[joint]]\nname = \"P\"\nkind = \"{kind}\"\nchild = \"rod\"\naxis = [0, 0, 1]\n\
+             drive = {{ law = \"harmonic\", frequency = \"1 Hz\" }}"
+        );
+        let error = Scene::parse(&text, None, &[]).unwrap_err();
+        assert!(error.message.contains(&format!("\"{like}\"")), "{error}");
+    }
 }
 
 #[test]

@@ -18,12 +18,39 @@ pub use pace::{LARGEST_BUDGET, LONGEST_FRAME, Pacer, SCALE_RANGE};
 pub use simulation::{CLEARANCE_SPEED, Simulation};
 
 use crate::mechanism::MechanismError;
-use crate::scene::Scene;
+use crate::scene::{BallJoint, Scene, SceneError};
 
 /// Why a simulation could not start.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{0}")]
 pub struct StartError(#[from] pub MechanismError);
+
+impl StartError {
+    /// The same with the line of `scene`'s file and the change that it is about.
+    pub fn located(&self, scene: &Scene) -> SceneError {
+        let one = |joint: &str, parts: &[&str]| {
+            let mut keys = vec!["spcmm.".to_owned(), "formulation".to_owned()];
+            for part in parts {
+                keys.push(format!("contact.{part}"));
+                keys.push(format!("joint.{joint}.{part}"));
+            }
+            (format!("joint.{joint}"), keys)
+        };
+        let (title, keys) = match &self.0 {
+            MechanismError::Unreachable(_) => ("spcmm".to_owned(), vec!["spcmm.".to_owned()]),
+            MechanismError::Open { joint, .. } => one(joint, &["clearance"]),
+            MechanismError::OutsideSocket { joint, .. } => {
+                one(joint, &["clearance", "ball_radius"])
+            }
+            MechanismError::Redundant => {
+                let ideal = |joint: &&BallJoint| joint.contact.clearance == 0.0;
+                let last = scene.ball_joints.iter().rfind(ideal);
+                one(last.map_or("", |joint| &joint.name), &["clearance"])
+            }
+        };
+        scene.start_error(&title, &keys, self.to_string())
+    }
+}
 
 /// Why a simulation stopped: the divergence guard. The state is the last good one.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -98,5 +125,41 @@ impl Snapshot {
     /// The scene it belongs to, as it ran.
     pub fn running_scene(&self) -> &Scene {
         &self.running
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::built_in_text;
+
+    fn start_error(text: &str, changes: &[(&str, &str)]) -> SceneError {
+        let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
+        let changes: Vec<(String, String)> = changes.iter().map(own).collect();
+        let scene = Scene::parse(text, Some("mine.toml"), &changes).expect("reads");
+        let error = Simulation::new(&scene).err().expect("cannot start");
+        error.located(&scene)
+    }
+
+    #[test]
+    fn a_start_error_points_to_its_line_and_names_the_change() {
+        let text = built_in_text("spcmm").expect("built in");
+        let line_of = |text: &str, what: &str| {
+            let at = text.lines().position(|line| line == what);
+            at.map(|at| at as u32 + 1)
+        };
+        let far = text.replace("amplitude_x = \"25 mm\"", "amplitude_x = \"200 mm\"");
+        let error = start_error(&far, &[]);
+        assert_eq!(error.position.map(|p| p.0), line_of(text, "[spcmm]"));
+        assert_eq!(error.line_text.as_deref(), Some("[spcmm]"));
+        let error = start_error(text, &[("spcmm.amplitude_x", "200 mm")]);
+        assert_eq!(error.key.as_deref(), Some("spcmm.amplitude_x"));
+        assert!(error.to_string().starts_with("mine.toml:"), "{error}");
+
+        let text = built_in_text("slider-crank").expect("built in");
+        let open = text.replace("at = \"0 0 80 mm\"", "at = \"0 0 380 mm\"");
+        let error = start_error(&open, &[]);
+        assert_eq!(error.position.map(|p| p.0), line_of(text, "[[ball_joint]]"));
+        assert!(error.to_string().contains("ball joint B"), "{error}");
     }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::{Mat3, Quat, Vec2, Vec3};
+use glam::{Mat3, Quat, Vec2, Vec3, Vec4};
 
 use super::arrows::ArrowMemory;
 use super::drawn::{self, BarKind, DrawnJoint, Part, Solid};
@@ -22,6 +22,7 @@ pub struct SceneView {
     axis_names: [Arc<str>; 4],
     bounds: Bounds,
     down: SignedAxis,
+    isometric: Option<(f64, f64)>,
     /// Coordinate of the floor along `down`, m.
     floor: f32,
 }
@@ -49,6 +50,8 @@ pub struct Shot<'a> {
 
 /// Reference length of arrows, in heights of the picture.
 const ARROW_LENGTH: f32 = 0.22;
+/// Least edge of a picture that has room for the triad, points.
+const SMALLEST_WITH_TRIAD: f32 = 200.0;
 /// Longest arrow, in reference lengths.
 const LONGEST_ARROW: f32 = 2.5;
 
@@ -81,6 +84,7 @@ impl SceneView {
             axis_names: ["X", "Y", "Z", "g"].map(Arc::from),
             bounds,
             down: scene.view.down,
+            isometric: scene.view.isometric,
             floor,
         }
     }
@@ -92,7 +96,11 @@ impl SceneView {
 
     /// Isometric camera that shows the whole scene.
     pub fn camera(&self) -> Camera {
-        Camera::new(self.down, self.bounds)
+        let camera = Camera::new(self.down, self.bounds);
+        match self.isometric {
+            Some((yaw, pitch)) => camera.with_isometric(yaw as f32, pitch as f32),
+            None => camera,
+        }
     }
 
     /// Moves `camera` so that everything drawn in `frame` fills a picture of `size`; the direction stays.
@@ -298,6 +306,11 @@ impl SceneView {
     /// Axes and gravity in the lower left corner, of constant size on the screen.
     fn push_triad(&self, shot: &Shot<'_>, palette: &Palette, out: &mut DrawList) {
         let camera = shot.camera;
+        let points = shot.size.map(|n| n as f32 / shot.pixels_per_point);
+        // In a small picture it would lie over the machine.
+        if points[0].min(points[1]) < SMALLEST_WITH_TRIAD {
+            return;
+        }
         let scale = shot.pixels_per_point * camera.metres_per_pixel(shot.size);
         let (right, up, _) = camera.axes();
         let corner = {
@@ -306,6 +319,10 @@ impl SceneView {
                 .map(|n| n as f32 * camera.metres_per_pixel(shot.size) / 2.0);
             camera.target - right * (width - 62.0 * scale) - up * (height - 62.0 * scale)
         };
+        // Perspective would stretch it out there: sheared so that it looks as it does in the middle.
+        let back = camera.axes().2;
+        let lean = (corner - camera.target) / camera.distance;
+        let sheared = |point: Vec3| point - lean * (point - corner).dot(back);
         for (i, axis) in Vec3::AXES.into_iter().enumerate() {
             let colour = palette.axes[i];
             push_arrow(
@@ -319,7 +336,7 @@ impl SceneView {
                 out,
                 &self.axis_names[i],
                 LabelKind::Axis,
-                corner + axis * (47.0 * scale),
+                sheared(corner + axis * (47.0 * scale)),
                 colour,
             );
         }
@@ -338,9 +355,16 @@ impl SceneView {
                 out,
                 &self.axis_names[3],
                 LabelKind::Gravity,
-                anchor,
+                sheared(anchor),
                 palette.gravity,
             );
+        }
+        for instance in out.overlay.by_mesh.iter_mut().flatten() {
+            let rows = instance.world_from_mesh.map(Vec4::from);
+            // Depth over the corner of the mesh's axes and origin.
+            let depth =
+                rows[0] * back.x + rows[1] * back.y + rows[2] * back.z - Vec4::W * corner.dot(back);
+            instance.world_from_mesh = [0, 1, 2].map(|i| (rows[i] - lean[i] * depth).to_array());
         }
     }
 }
@@ -469,27 +493,31 @@ fn push_solid(layer: &mut Layer, solid: &Solid<'_>, material: Material) {
     }
 }
 
-/// Shaft and head; a short arrow is all head.
+/// Length of an arrow that is as thick as it may be, in radii of its shaft; a shorter one is thinner in proportion.
+const STOUTEST: f32 = 10.0;
+/// Least length of a force arrow, in radii of the thickest shaft: what an eye still takes for a direction.
+const LEAST_ARROW: f32 = 7.0;
+/// Force of the shortest arrow that is drawn, in reference forces: less is no arrow.
+const LEAST_FORCE: f32 = 1e-3;
+
+/// Shaft and head, at most as thick as `radius` says.
 fn push_arrow(layer: &mut Layer, tail: Vec3, along: Vec3, radius: f32, colour: Colour) {
     let length = along.length();
     if length.is_nan() || length < 0.2 * radius {
         return;
     }
+    let radius = radius.min(length / STOUTEST);
     let material = Material {
         colour,
         roughness: 0.55,
         metal: 0.0,
     };
-    let head = (5.5 * radius).min(length);
+    let head = 5.5 * radius;
     let neck = along * ((length - head) / length);
-    // Where there is no room for a shaft the head shrinks in all directions, so that length still tells the force.
-    let head_radius = 2.3 * radius * (head / (5.5 * radius));
-    if length > head {
-        layer.push(Mesh::Cylinder, bar(tail, neck, radius, material));
-    }
+    layer.push(Mesh::Cylinder, bar(tail, neck, radius, material));
     layer.push(
         Mesh::Cone,
-        bar(tail + neck, along - neck, head_radius, material),
+        bar(tail + neck, along - neck, 2.3 * radius, material),
     );
 }
 
@@ -523,7 +551,12 @@ fn push_arrows(shot: &Shot<'_>, joints: &[DrawnJoint], palette: &Palette, out: &
         for (_, force, colour) in shown.into_iter().filter(|(shown, ..)| *shown) {
             let (length, clipped) = arrow_length(force.length(), reference, options.scaling);
             any_clipped |= clipped;
-            let along = force.normalize_or_zero() * (length * reference_length);
+            if force.length() < LEAST_FORCE * reference {
+                continue;
+            }
+            // A small force still shows where it points.
+            let length = (length * reference_length).max(LEAST_ARROW * radius);
+            let along = force.normalize_or_zero() * length;
             push_arrow(&mut out.arrows, contact, along, radius, colour);
         }
     }

@@ -48,6 +48,7 @@ pub struct Camera {
     pub field_of_view: f32,
     up: Vec3,
     right: Vec3,
+    isometric: (f32, f32),
     followed: Option<Vec3>,
 }
 
@@ -69,11 +70,19 @@ impl Camera {
             field_of_view: 0.6,
             up: -down,
             right,
+            isometric: (0.6, 0.32),
             followed: None,
         };
         camera.preset(Preset::Isometric);
         camera.fit(bounds, 16.0 / 9.0);
         camera
+    }
+
+    /// Isometric view at another yaw and pitch, rad, than the usual.
+    pub fn with_isometric(mut self, yaw: f32, pitch: f32) -> Self {
+        self.isometric = (yaw, pitch.clamp(-STEEPEST, STEEPEST));
+        self.preset(Preset::Isometric);
+        self
     }
 
     /// Turns to a named point of view; target and distance stay.
@@ -82,7 +91,7 @@ impl Camera {
             Preset::Front => (0.0, 0.0),
             Preset::Side => (STEEPEST, 0.0),
             Preset::Top => (0.0, STEEPEST),
-            Preset::Isometric => (0.6, 0.32),
+            Preset::Isometric => self.isometric,
         };
     }
 
@@ -180,6 +189,21 @@ impl Camera {
         let off_centre = cursor - Vec2::new(size[0] as f32, size[1] as f32) / 2.0;
         let (right, up, _) = self.axes();
         self.target += (right * off_centre.x - up * off_centre.y) * shrink;
+    }
+
+    /// Comes nearer by `factor` to a point of the scene, which stays where it is on the screen. The target takes its
+    /// depth, so that coming nearer never leads past it.
+    pub fn zoom_about(&mut self, factor: f32, point: Vec3, size: [u32; 2]) {
+        let (eye, back) = (self.eye(), self.axes().2);
+        let depth = (eye - point).dot(back);
+        if !(depth > 1e-4) {
+            return;
+        }
+        self.target = eye - back * depth;
+        self.distance = depth;
+        if let Some(pixel) = self.project(point, size) {
+            self.zoom(factor, pixel, size);
+        }
     }
 
     /// Moves with a followed point: call each frame with its place, or `None` to stay.
@@ -358,6 +382,19 @@ mod tests {
         camera.pan(Vec2::new(100.0, -40.0), SIZE);
         let now = camera.project(point, SIZE).expect("before the eye");
         assert!(now.distance(Vec2::new(740.0, 320.0)) < 0.05, "{now}");
+    }
+
+    #[test]
+    fn coming_nearer_to_a_point_keeps_it_in_its_place_and_in_front() {
+        let mut camera = camera(SignedAxis::PlusX);
+        let point = Vec3::new(0.3, 0.05, -0.2);
+        let before = camera.project(point, SIZE).expect("before the eye");
+        for _ in 0..100 {
+            camera.zoom_about(1.3, point, SIZE);
+        }
+        let after = camera.project(point, SIZE).expect("before the eye");
+        assert!(before.distance(after) < 1.0, "{before} {after}");
+        assert!(camera.eye().distance(point) < 1e-3);
     }
 
     #[test]

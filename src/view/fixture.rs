@@ -38,7 +38,11 @@ fn scene(
     Scene {
         name: name.to_owned(),
         gravity: down.unit() * 9.81,
-        view: ViewSettings { down, floor: None },
+        view: ViewSettings {
+            down,
+            floor: None,
+            isometric: None,
+        },
         output: Output {
             body: 0,
             probe: None,

@@ -67,13 +67,15 @@ impl RowsFile {
     /// Unknown ending (usage), existing file without `force`, unwritable folder (input/output).
     pub fn claim(path: &Path, force: bool) -> Result<Self, Failure> {
         let format = Format::of(path)?;
+        // The name that the user gave first: an error is to name that one.
+        let rows = Target::claim(path, force)?;
         let beside = match format {
             Format::Csv => Some(Target::claim(&Self::meta_path(path), force)?),
             Format::Json | Format::Npz => None,
         };
         Ok(Self {
             format,
-            rows: Target::claim(path, force)?,
+            rows,
             beside,
         })
     }

@@ -10,8 +10,11 @@ use serde_json::{Map, Value as Json, json};
 use self::studio::{ApplicationStudio, SceneStudio, Studio};
 use super::args::RenderArguments;
 use super::output::{Folder, MANIFEST};
-use super::summary::{Status, hash_text};
-use super::{Failure, interrupt, load, print, progress, provenance, quantity, warn};
+use super::summary::{Status, count as count_of, hash_text};
+use super::{Failure, interrupt, load, print, progress, provenance, quantity, start, warn};
+use crate::scene::Scene;
+use crate::simulate::{Frame, Peak};
+use crate::view::{ArrowMemory, ViewOptions};
 
 /// Frame names have five digits.
 const MOST_FRAMES: f64 = 100_000.0;
@@ -76,9 +79,9 @@ pub fn render(arguments: &RenderArguments) -> Result<(), Failure> {
     let view = options::view_options(arguments)?;
     let scene = load(&arguments.scene)?;
     let mut studio: Box<dyn Studio> = if arguments.ui {
-        Box::new(ApplicationStudio::new(&scene, view, arguments)?)
+        Box::new(ApplicationStudio::new(&scene, view.clone(), arguments)?)
     } else {
-        Box::new(SceneStudio::new(&scene, view, arguments)?)
+        Box::new(SceneStudio::new(&scene, view.clone(), arguments)?)
     };
     let folder = Folder::claim(&arguments.out, arguments.force)?;
     if !arguments.quiet {
@@ -90,6 +93,9 @@ pub fn render(arguments: &RenderArguments) -> Result<(), Failure> {
     let meta = provenance::meta(&scene)?;
     interrupt::listen();
     let bar = progress::bar(!arguments.quiet, times.instants.len() as u64);
+    if let Some(reference) = common_reference(&scene, &times, &view, arguments)? {
+        studio.fix_arrow_scale(reference);
+    }
     let labels = labels(&meta);
     let labels: Vec<(&str, &str)> = labels
         .iter()
@@ -132,7 +138,7 @@ pub fn render(arguments: &RenderArguments) -> Result<(), Failure> {
     bar.finish_and_clear();
 
     frames.retain(|frame| !frame.is_null());
-    let count = frames.len();
+    let written = count_of(frames.len() as u64, "frame");
     let mut manifest = meta;
     manifest.insert("parameters".into(), provenance::parameters(&scene)?);
     manifest.insert("status".into(), json!(status.word()));
@@ -151,10 +157,47 @@ pub fn render(arguments: &RenderArguments) -> Result<(), Failure> {
     })?;
     folder.finish()?;
     print(&format!(
-        "{count} frames and {MANIFEST} in {}\n",
+        "{} and {MANIFEST} in {}\n",
+        written,
         arguments.out.display()
     ))?;
     failure.map_or(Ok(()), Err)
+}
+
+/// The automatic force of the reference arrow, N, from all frames together, so that their arrows compare; `None` where
+/// there is nothing to agree on. It runs the simulation once before.
+fn common_reference(
+    scene: &Scene,
+    times: &Times,
+    view: &ViewOptions,
+    arguments: &RenderArguments,
+) -> Result<Option<f32>, Failure> {
+    let arrows = &view.arrows;
+    let drawn = arrows.normal || arrows.friction;
+    if arguments.ui || !drawn || arrows.reference.is_some() || times.instants.len() < 2 {
+        return Ok(None);
+    }
+    let mut simulation = start(scene)?;
+    let (mut frame, mut peaks, mut memory) = (Frame::default(), Vec::new(), ArrowMemory::new());
+    for number in times.in_order() {
+        let instant = times.instants[number];
+        while simulation.time() < instant {
+            // The frames themselves say why they end early.
+            if interrupt::asked() || simulation.step().is_err() {
+                return Ok(Some(memory.reference(arrows)));
+            }
+        }
+        simulation.sample(instant, &mut frame);
+        simulation.take_peaks(&mut peaks);
+        let since: &[Peak] = if times.frame_time.is_some() {
+            &peaks
+        } else {
+            &[]
+        };
+        // No viewing time passes: what was large stays.
+        memory.update(&frame, since, 0.0, arrows);
+    }
+    Ok(Some(memory.reference(arrows)))
 }
 
 /// What made a picture, as texts inside it: a frame that has lost its manifest still tells.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::options;
 use crate::app::{App, AppOptions, Headless, Overlay, force_notes};
 use crate::cli::args::{RenderArguments, ThemeChoice};
-use crate::cli::{Failure, interrupt};
+use crate::cli::{Failure, interrupt, start};
 use crate::render::{Image, NoAdapter, Offscreen, RenderError};
 use crate::scene::{Scene, Vec3};
 use crate::simulate::{Frame, Peak, Simulation};
@@ -25,6 +25,9 @@ pub trait Studio {
     /// # Errors
     /// A failing graphics adapter.
     fn draw(&mut self, instant: f64, frame_time: Option<f64>) -> Result<Image, Failure>;
+
+    /// Gives the reference arrow a force, N, that all frames share.
+    fn fix_arrow_scale(&mut self, reference: f32);
 
     /// The simulation.
     fn simulation(&self) -> &Simulation;
@@ -69,7 +72,7 @@ impl SceneStudio {
         options: ViewOptions,
         arguments: &RenderArguments,
     ) -> Result<Self, Failure> {
-        let mut simulation = Simulation::new(scene)?;
+        let mut simulation = start(scene)?;
         let mut frame = Frame::default();
         simulation.sample(0.0, &mut frame);
         let view = SceneView::new(scene, &frame);
@@ -166,6 +169,10 @@ impl Studio for SceneStudio {
         .map_err(|error| failed(&error))
     }
 
+    fn fix_arrow_scale(&mut self, reference: f32) {
+        self.options.arrows.reference = Some(reference);
+    }
+
     fn simulation(&self) -> &Simulation {
         &self.simulation
     }
@@ -199,17 +206,17 @@ impl ApplicationStudio {
         arguments: &RenderArguments,
     ) -> Result<Self, Failure> {
         let headless = Headless::new().map_err(|error| no_adapter(&error))?;
-        let mut start = AppOptions::new(scene.clone());
-        start.playing = false;
-        start.view = ViewOptions {
-            magnification: arguments.magnification.unwrap_or(start.view.magnification),
+        let mut begin = AppOptions::new(scene.clone());
+        begin.playing = false;
+        begin.view = ViewOptions {
+            magnification: arguments.magnification.unwrap_or(begin.view.magnification),
             ..options
         };
-        start.theme = match arguments.theme {
+        begin.theme = match arguments.theme {
             ThemeChoice::Light => eframe::egui::ThemePreference::Light,
             ThemeChoice::Dark => eframe::egui::ThemePreference::Dark,
         };
-        let app = headless.app(start)?;
+        let app = headless.app(begin).map_err(|error| error.located(scene))?;
         Ok(Self {
             headless,
             app,
@@ -240,6 +247,9 @@ impl Studio for ApplicationStudio {
             .app_frame(&mut self.app, self.size, 1.0)
             .map_err(|error| failed(&error))
     }
+
+    // The window's scale follows its own forces.
+    fn fix_arrow_scale(&mut self, _reference: f32) {}
 
     fn simulation(&self) -> &Simulation {
         self.app.player().simulation()
