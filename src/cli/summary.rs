@@ -59,6 +59,7 @@ pub fn json(
         "evaluations": statistics.evaluations,
         "rejected": statistics.rejected,
         "impacts": by_joint(&|i| json!(statistics.impacts[i])),
+        "floored": by_joint(&|i| json!(statistics.floored[i])),
         "peak_normal_N": by_joint(&|i| json!(statistics.peak_normal[i])),
         "peak_time_s": by_joint(&|i| json!(statistics.peak_time[i])),
         "constraint_drift_m": statistics.constraint_drift,
@@ -117,7 +118,12 @@ pub fn text(
         } else if statistics.peak_normal[i] == 0.0 {
             "no contact".to_owned()
         } else {
-            format!("{}, {peak}", count(statistics.impacts[i], "impact"))
+            let impacts = count(statistics.impacts[i], "impact");
+            match statistics.floored[i] {
+                0 => format!("{impacts}, {peak}"),
+                // The damping term divides by the floor there: they rebound higher than asked.
+                slow => format!("{impacts} ({slow} slower than impact_speed_floor), {peak}"),
+            }
         };
         line(&format!("Joint {}", joint.name), story);
     }
