@@ -37,7 +37,13 @@ impl StartError {
             (format!("joint.{joint}"), keys)
         };
         let (title, keys) = match &self.0 {
-            MechanismError::Unreachable(_) => ("spcmm".to_owned(), vec!["spcmm.".to_owned()]),
+            MechanismError::Unreachable(_) | MechanismError::OtherBranch => {
+                ("spcmm".to_owned(), vec!["spcmm.".to_owned()])
+            }
+            MechanismError::TooLarge { .. } => (
+                "solver".to_owned(),
+                vec!["solver.method".to_owned(), "chain.links".to_owned()],
+            ),
             MechanismError::Open { joint, .. } => one(joint, &["clearance"]),
             MechanismError::OutsideSocket { joint, .. } => {
                 one(joint, &["clearance", "ball_radius"])
