@@ -48,6 +48,10 @@ impl StartError {
             MechanismError::OutsideSocket { joint, .. } => {
                 one(joint, &["clearance", "ball_radius"])
             }
+            MechanismError::TooLarge { .. } => {
+                let keys = ["solver.method", "chain.links", "formulation"];
+                (keys[0].to_owned(), keys.map(str::to_owned).to_vec())
+            }
             MechanismError::Redundant => {
                 let ideal = |joint: &&BallJoint| joint.contact.clearance == 0.0;
                 let last = scene.ball_joints.iter().rfind(ideal);
