@@ -9,6 +9,9 @@ use jointplay::scene::Scene;
 use jointplay::simulate::Simulation;
 use std::hint::black_box;
 
+/// Keys with their values.
+type Changes = [(&'static str, &'static str)];
+
 fn load(name: &str, changes: &[(&str, &str)]) -> Scene {
     let changes: Vec<_> = changes
         .iter()
@@ -90,47 +93,43 @@ fn real_time(c: &mut Criterion) {
 
 /// Simulated spans with the methods that are meant for them, beside Runge-Kutta 4 at 10 us over the same span.
 fn spans(c: &mut Criterion) {
-    let span = |c: &mut Criterion,
-                name: &str,
-                changes: &[(&str, &str)],
-                from: f64,
-                to: f64,
-                rk4_to: f64| {
-        let mut group = c.benchmark_group(name);
-        group.sample_size(10);
-        let methods: [(&str, &[(&str, &str)], f64); 2] = [
-            (
-                "automatic at 1e-5",
-                &[("solver.method", "automatic"), ("solver.tolerance", "1e-5")],
-                to,
-            ),
-            (
-                "rk4 at 10 us, a tenth of the span",
-                &[("solver.method", "rk4"), ("solver.step", "10 us")],
-                rk4_to,
-            ),
-        ];
-        for (label, method, end) in methods {
-            let all: Vec<(&str, &str)> = changes.iter().chain(method).copied().collect();
-            let scene = load("spcmm", &all);
-            let mut simulation = Simulation::new(&scene).expect("a built-in scene starts");
-            simulation.advance_to(from).expect("a built-in scene runs");
-            let start = simulation.snapshot();
-            group.bench_function(label, |b| {
-                b.iter_batched(
-                    || {
-                        let mut simulation =
-                            Simulation::new(&scene).expect("a built-in scene starts");
-                        simulation.restore(&start).expect("its own snapshot");
-                        simulation
-                    },
-                    |mut simulation| simulation.advance_to(end).expect("a built-in scene runs"),
-                    criterion::BatchSize::LargeInput,
-                );
-            });
-        }
-        group.finish();
-    };
+    let span =
+        |c: &mut Criterion, name: &str, changes: &Changes, from: f64, to: f64, rk4_to: f64| {
+            let mut group = c.benchmark_group(name);
+            group.sample_size(10);
+            let methods: [(&str, &Changes, f64); 2] = [
+                (
+                    "automatic at 1e-5",
+                    &[("solver.method", "automatic"), ("solver.tolerance", "1e-5")],
+                    to,
+                ),
+                (
+                    "rk4 at 10 us, a tenth of the span",
+                    &[("solver.method", "rk4"), ("solver.step", "10 us")],
+                    rk4_to,
+                ),
+            ];
+            for (label, method, end) in methods {
+                let all: Vec<(&str, &str)> = changes.iter().chain(method).copied().collect();
+                let scene = load("spcmm", &all);
+                let mut simulation = Simulation::new(&scene).expect("a built-in scene starts");
+                simulation.advance_to(from).expect("a built-in scene runs");
+                let start = simulation.snapshot();
+                group.bench_function(label, |b| {
+                    b.iter_batched(
+                        || {
+                            let mut simulation =
+                                Simulation::new(&scene).expect("a built-in scene starts");
+                            simulation.restore(&start).expect("its own snapshot");
+                            simulation
+                        },
+                        |mut simulation| simulation.advance_to(end).expect("a built-in scene runs"),
+                        criterion::BatchSize::LargeInput,
+                    );
+                });
+            }
+            group.finish();
+        };
     span(c, "first second, impacts included", &[], 0.0, 1.0, 0.1);
     span(c, "settled, 1 s to 4 s", &[], 1.0, 4.0, 1.3);
     span(

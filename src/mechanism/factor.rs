@@ -1,7 +1,8 @@
 //! Sparse factorisation of a tree's mass matrix, H = L^T D L: fill-in free because every coordinate couples only with
 //! its ancestors (Featherstone, *Rigid Body Dynamics Algorithms*, 2008, section 6.5).
 
-use super::model::NONE;
+/// No parent coordinate.
+pub const NONE: usize = usize::MAX;
 
 /// Which coordinates each one couples with.
 #[derive(Clone, Debug)]

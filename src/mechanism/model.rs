@@ -1,6 +1,6 @@
 //! A scene compiled for the equations of motion: centroid frames, coordinate numbers, trees, drives.
 
-use super::factor::Pattern;
+use super::factor::{NONE, Pattern};
 use super::jet::Jet;
 use super::spcmm::Trajectory;
 use crate::contact;
@@ -77,9 +77,6 @@ pub struct TreeBlock {
     /// The one free body of this block, where it is a lone one: its mass matrix is block diagonal.
     pub lone: Option<BodyIndex>,
 }
-
-/// No parent coordinate.
-pub const NONE: usize = usize::MAX;
 
 /// A point fixed to a body.
 #[derive(Clone, Copy, Debug)]

@@ -40,10 +40,6 @@ impl StartError {
             MechanismError::Unreachable(_) | MechanismError::OtherBranch => {
                 ("spcmm".to_owned(), vec!["spcmm.".to_owned()])
             }
-            MechanismError::TooLarge { .. } => (
-                "solver".to_owned(),
-                vec!["solver.method".to_owned(), "chain.links".to_owned()],
-            ),
             MechanismError::Open { joint, .. } => one(joint, &["clearance"]),
             MechanismError::OutsideSocket { joint, .. } => {
                 one(joint, &["clearance", "ball_radius"])

@@ -1,41 +1,30 @@
 //! A scene in motion: stepping, events, live changes, snapshots. Depends on no clock.
 
-use super::peaks::{Approach, Course, Recent};
+mod adaptive;
+mod automatic;
+mod contacts;
+mod live;
+mod snapshot;
+
+use super::peaks::{Approach, Recent};
 use super::stepper::AnyStepper;
-use super::{Effect, Frame, Peak, Snapshot, StartError, Statistics, Stopped, report};
-use crate::integrate::{Controller, Method, System, find_root, hermite};
+use super::{Frame, Peak, StartError, Statistics, Stopped, report};
+use crate::integrate::{Controller, System, hermite};
 use crate::mechanism::{Mechanism, MechanismError, Memory, Ramp, Switching};
-use crate::scene::{Scene, SceneError};
+use crate::scene::Scene;
+use automatic::{Choice, controller_of, prepare_implicit};
 
 /// Speed at which the clearance closes when a jump would put a ball inside its socket wall, m/s: an impact at this speed
 /// is of the order of the settled forces.
 pub const CLEARANCE_SPEED: f64 = 2e-3;
 /// Longest step of an adaptive method, s.
 const LONGEST_STEP: f64 = 10e-3;
-/// Shortest step of an adaptive method, s.
-const SHORTEST_STEP: f64 = 1e-14;
 /// Further than this from its closed form, an ideal motion is on another branch of it, m.
 const OTHER_BRANCH: f64 = 1e-6;
 /// How close a scene that is a function of time alone comes to a pose that it cannot pass, s.
 const SHORTEST_KINEMATIC_STEP: f64 = 1e-5;
 /// First step after a contact begins, before one is known to work, s: a tenth of a usual impact.
 const FIRST_CONTACT_STEP: f64 = 1e-5;
-/// h |lambda| beyond which an explicit step is held by stability.
-const HELD_BY_STABILITY: f64 = 3.0;
-/// Steps that must be held by stability, or taken since the latest contact began, before the implicit method is tried.
-const HELD_STEPS: u32 = 8;
-const SETTLED_STEPS: u32 = 60;
-/// Over so many implicit steps the progress per evaluation must be this many times the explicit method's; else the
-/// explicit one has its turn for so many steps.
-const TRIAL_STEPS: u32 = 12;
-const WORTH_IT: f64 = 2.0;
-const EXPLICIT_TURN: u32 = 200;
-/// Evaluations of one explicit step.
-const EXPLICIT_EVALUATIONS: f64 = 6.0;
-/// More velocity coordinates than this are refused by the implicit methods, whose matrices are dense.
-const LARGEST_DENSE: usize = 1024;
-/// More velocity coordinates than this make a dense factorisation dearer than many explicit steps.
-const LARGEST_IMPLICIT: usize = 96;
 /// Speed beyond which a state is absurd, m/s and rad/s.
 const ABSURD_SPEED: f64 = 1e6;
 /// Loops that are open by more than this after projection have come apart, m.
@@ -105,22 +94,6 @@ pub(super) struct State {
     grid_origin: f64,
     grid_count: u64,
     statistics: Statistics,
-}
-
-/// Memory of the automatic pair.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Choice {
-    /// Explicit steps since the latest contact began, and how many of them were held by stability.
-    since_contact: u32,
-    held: u32,
-    /// Explicit steps before the implicit method may be tried again.
-    wait: u32,
-    /// Explicit step at the latest change to the implicit method, s.
-    h_explicit: f64,
-    /// Time and evaluations of the implicit steps on trial.
-    progress: f64,
-    cost: u64,
-    steps: u32,
 }
 
 impl Simulation {
@@ -310,262 +283,6 @@ impl Simulation {
         Ok(())
     }
 
-    /// A step whose size follows the error estimate, cut at the first contact start or end inside it.
-    fn adaptive_step(&mut self, limit: f64) -> Result<(), Stopped> {
-        let before = self.mechanism.evaluations;
-        let contacts = self.mechanism.contacts.memory_mut();
-        contacts.copy_from_slice(&self.state.memory);
-        self.stepper.choose(self.state.implicit);
-        let (t_end, h) = loop {
-            if let Some(step) = self.attempt_adaptive(limit) {
-                break step;
-            }
-            self.state.statistics.rejected += 1;
-            let shortest = SHORTEST_STEP.max(4.0 * f64::EPSILON * self.state.t);
-            if !(self.state.h_next >= shortest) {
-                self.state.statistics.evaluations += self.mechanism.evaluations - before;
-                self.state.h_next = self.running.solver.step;
-                let what = "the step size that the tolerance asks for fell below 1e-14 s";
-                let tolerance = self.running.solver.tolerance;
-                let advice = format!(
-                    "try a looser solver.tolerance (now {tolerance:e}) or a softer or heavier scene"
-                );
-                return Err(self.stopped(what, advice));
-            }
-        };
-        let stiffness = self.stepper.stiffness(h, &self.y_end, &self.k_end);
-        let evaluations = self.mechanism.evaluations - before;
-        self.accept(t_end, h, before)?;
-        if self.running.solver.method == Method::Automatic {
-            self.vote(h, stiffness, evaluations);
-        }
-        Ok(())
-    }
-
-    /// One try of a step with its event; `None` where it has to be repeated with the smaller `h_next` that it left.
-    fn attempt_adaptive(&mut self, limit: f64) -> Option<(f64, f64)> {
-        let t = self.state.t;
-        let tolerance = self.running.solver.tolerance;
-        let mut h = self.state.h_next.min(LONGEST_STEP);
-        let mut t_end = t + h;
-        let cut = t_end >= limit - 1e-6 * h;
-        if cut {
-            t_end = limit;
-            h = limit - t;
-        }
-        let error = self.attempt(h) / tolerance;
-        let state = &mut self.state;
-        if !(error <= 1.0) {
-            state.h_next = h * state.controller.after_reject(error);
-            return None;
-        }
-        let next = h * state.controller.after_accept(error);
-        // A step cut short says nothing against the longer one.
-        state.h_next = if cut { state.h_next.max(next) } else { next };
-        let contact_began = std::mem::take(&mut state.contact_began);
-        self.finish_gaps(t_end);
-        if let Some(theta) = self.first_event(h) {
-            // The step is taken again, shorter, so that its end carries the method's error and not the interpolant's.
-            t_end = t + theta * h;
-            h *= theta;
-            if !self.attempt(h).is_finite() {
-                self.state.h_next = 0.5 * h;
-                self.state.contact_began = contact_began;
-                return None;
-            }
-            self.finish_gaps(t_end);
-        } else if contact_began {
-            self.state.h_contact = h.max(1e-9);
-        }
-        Some((t_end, h))
-    }
-
-    /// Tries a step of size `h` from the current state; returns the error against the scales.
-    fn attempt(&mut self, h: f64) -> f64 {
-        let Self {
-            mechanism,
-            stepper,
-            state,
-            y_end,
-            k_end,
-            ..
-        } = self;
-        let tolerance = self.running.solver.tolerance;
-        stepper.attempt(
-            mechanism, state.t, h, &state.y, &state.k, y_end, k_end, tolerance,
-        )
-    }
-
-    fn finish_gaps(&mut self, t_end: f64) {
-        self.mechanism.contacts.finish(t_end);
-        store_gaps(&self.mechanism, &mut self.gaps_end);
-    }
-
-    /// Which method of the automatic pair takes the next step, after one of size `h` that took so many evaluations.
-    fn vote(&mut self, h: f64, stiffness: f64, evaluations: u64) {
-        let state = &mut self.state;
-        let choice = &mut state.choice;
-        if state.contact_began {
-            choice.since_contact = 0;
-            choice.held = 0;
-            // An impact is short and not stiff: the explicit method resolves it at less cost.
-            if state.implicit && state.memory.iter().any(|m| m.active && !m.floored) {
-                state.implicit = false;
-                state.controller = controller_of(Method::Automatic, false);
-            }
-            return;
-        }
-        if state.implicit {
-            choice.progress += h;
-            choice.cost += evaluations;
-            choice.steps += 1;
-            if choice.steps >= TRIAL_STEPS {
-                let explicit = choice.h_explicit / EXPLICIT_EVALUATIONS;
-                if choice.progress < WORTH_IT * explicit * choice.cost as f64 {
-                    state.implicit = false;
-                    state.controller = controller_of(Method::Automatic, false);
-                    state.h_next = choice.h_explicit;
-                    choice.wait = EXPLICIT_TURN;
-                }
-                (choice.progress, choice.cost, choice.steps) = (0.0, 0, 0);
-            }
-            return;
-        }
-        choice.since_contact += 1;
-        choice.held = if stiffness > HELD_BY_STABILITY {
-            choice.held + 1
-        } else {
-            choice.held.saturating_sub(1)
-        };
-        if choice.wait > 0 {
-            choice.wait -= 1;
-            return;
-        }
-        let settled = choice.held >= HELD_STEPS || choice.since_contact >= SETTLED_STEPS;
-        let velocities = state.y.len() - self.mechanism.positions();
-        if settled && velocities <= LARGEST_IMPLICIT && state.memory.iter().any(|m| m.active) {
-            state.implicit = true;
-            state.controller = controller_of(Method::Automatic, true);
-            *choice = Choice {
-                h_explicit: h,
-                ..Choice::default()
-            };
-        }
-    }
-
-    /// Fraction of the step just attempted at which the first contact starts or ends, if one does; that joint is put
-    /// down in `located`.
-    fn first_event(&mut self, h: f64) -> Option<f64> {
-        let mut first: Option<f64> = None;
-        self.located = None;
-        for j in 0..self.gaps_end.len() {
-            if !self.mechanism.contacts.has_clearance(j) {
-                continue;
-            }
-            let Some(theta) = self.event_of(j, h) else {
-                continue;
-            };
-            if first.is_none_or(|earliest| theta < earliest) {
-                first = Some(theta);
-                self.located = Some(j);
-            }
-        }
-        first
-    }
-
-    /// Where joint `j` leaves the state that its memory says, as a fraction of the step just attempted.
-    fn event_of(&mut self, j: usize, h: f64) -> Option<f64> {
-        let (start, end) = (self.state.gaps[j], self.gaps_end[j]);
-        // Positive where the contact is in the other state than its memory says.
-        let sign = if self.state.memory[j].active {
-            -1.0
-        } else {
-            1.0
-        };
-        // A ball may cross its play several times in one long step: look at pieces that are short against the play.
-        let travel = h * start.speed.max(end.speed);
-        let clearance = self.mechanism.contacts.clearance(j);
-        let pieces = (4.0 * travel / clearance).ceil().clamp(1.0, 64.0);
-        let mut left = (0.0, sign * start.penetration, sign * start.rate);
-        for n in 1..=pieces as u32 {
-            let right = if f64::from(n) == pieces {
-                (1.0, sign * end.penetration, sign * end.rate)
-            } else {
-                self.signed_gap(j, f64::from(n) / pieces, h, sign)
-            };
-            if let Some((a, b)) = self.crossing_within(j, h, sign, left, right) {
-                let width = (1e-15 / h).max(1e-12);
-                return Some(find_root(a.0, a.1, b.0, b.1, width, 1e-16, |theta| {
-                    self.signed_gap(j, theta, h, sign).1
-                }));
-            }
-            left = right;
-        }
-        // In the wrong state all along: it switches at the end of the step.
-        None
-    }
-
-    /// Two points of a piece of the step between which the signed gap turns positive; each is (theta, gap, rate).
-    fn crossing_within(
-        &mut self,
-        j: usize,
-        h: f64,
-        sign: f64,
-        left: (f64, f64, f64),
-        right: (f64, f64, f64),
-    ) -> Option<((f64, f64, f64), (f64, f64, f64))> {
-        if left.1 < 0.0 && right.1 > 0.0 {
-            return Some((left, right));
-        }
-        // An extremum inside: a touch that both ends miss, or a way out and back.
-        let (mut a, mut b) = (left, right);
-        let turns = if right.1 > 0.0 {
-            a.2 < 0.0 && b.2 > 0.0
-        } else {
-            a.2 > 0.0 && b.2 < 0.0
-        };
-        if !turns {
-            return None;
-        }
-        for _ in 0..40 {
-            // Neither tangent reaches zero: nothing to find.
-            let reach = (a.1 + a.2 * (b.0 - a.0) * h).min(b.1 - b.2 * (b.0 - a.0) * h);
-            if right.1 <= 0.0 && reach < 0.0 {
-                return None;
-            }
-            let middle = self.signed_gap(j, 0.5 * (a.0 + b.0), h, sign);
-            if right.1 > 0.0 && middle.1 < 0.0 {
-                return Some((middle, right));
-            }
-            if right.1 <= 0.0 && middle.1 > 0.0 && left.1 < 0.0 {
-                return Some((left, middle));
-            }
-            if (middle.2 > 0.0) == (a.2 > 0.0) {
-                a = middle;
-            } else {
-                b = middle;
-            }
-        }
-        None
-    }
-
-    /// (theta, penetration, its rate) of joint `j` on the interpolant of the attempted step, times `sign`.
-    fn signed_gap(&mut self, j: usize, theta: f64, h: f64, sign: f64) -> (f64, f64, f64) {
-        let Self {
-            mechanism,
-            stepper,
-            state,
-            y_end,
-            k_end,
-            scratch_y,
-            ..
-        } = self;
-        stepper.interpolate(theta, h, &state.y, &state.k, y_end, k_end, scratch_y);
-        mechanism.measure(state.t + theta * h, scratch_y);
-        let gap = &mechanism.contacts.gaps()[j];
-        (theta, sign * gap.penetration, sign * gap.rate)
-    }
-
     fn fixed_step(&mut self, limit: f64) -> Result<(), Stopped> {
         let Self {
             mechanism,
@@ -712,120 +429,6 @@ impl Simulation {
         Ok(())
     }
 
-    /// Starts and ends contacts whose penetration changed sign over the step just accepted.
-    fn switch_contacts(&mut self, h: f64) -> bool {
-        let located = self.located.take();
-        let Self {
-            mechanism,
-            state,
-            peaks,
-            ..
-        } = self;
-        let mut switched = false;
-        for j in 0..state.gaps.len() {
-            if !mechanism.contacts.has_clearance(j) {
-                continue;
-            }
-            let (start, end) = (state.gaps0[j], state.gaps[j]);
-            // A located switch ends within rounding of the wall, on either side.
-            let touching = if located == Some(j) {
-                !state.memory[j].active
-            } else {
-                end.penetration > 0.0
-            };
-            if touching == state.memory[j].active {
-                continue;
-            }
-            switched = true;
-            if touching {
-                let rate = if start.penetration < 0.0 && end.penetration > 0.0 {
-                    let course = Course::new(start, end, h);
-                    course.at(course.crossing()).1
-                } else {
-                    end.rate
-                };
-                let floor = mechanism.contacts.coefficients(j).speed_floor;
-                state.memory[j] = Memory {
-                    active: true,
-                    approach_speed: rate.max(floor),
-                    floored: rate < floor,
-                };
-                state.statistics.impacts[j] += 1;
-                state.statistics.floored[j] += u64::from(rate < floor);
-                peaks[j].impacts += 1;
-                peaks[j].approach_speed = peaks[j].approach_speed.max(rate);
-                state.contact_began = true;
-                state.h_next = state.h_next.min(state.h_contact);
-            } else {
-                state.memory[j] = Memory::default();
-                state.statistics.last_separation[j] = state.t;
-            }
-        }
-        switched
-    }
-
-    /// Largest forces of the step just accepted, in continuous time.
-    fn track_peaks(&mut self, h: f64) {
-        let Self {
-            mechanism,
-            state,
-            peaks,
-            ..
-        } = self;
-        for j in 0..state.gaps.len() {
-            if !mechanism.contacts.has_clearance(j) {
-                if let Some(reaction) = mechanism.reaction(j) {
-                    let force = state.reactions[j].rise(state.t, reaction.norm());
-                    if force > state.statistics.peak_normal[j] {
-                        state.statistics.peak_normal[j] = force;
-                        state.statistics.peak_time[j] = state.t;
-                    }
-                    if force > peaks[j].normal {
-                        peaks[j].normal = force;
-                        peaks[j].time = state.t;
-                        peaks[j].normal_force = reaction;
-                    }
-                }
-                continue;
-            }
-            let (start, end) = (state.gaps0[j], state.gaps[j]);
-            if start.penetration <= 0.0 && end.penetration <= 0.0 {
-                continue;
-            }
-            let coefficients = mechanism.contacts.coefficients(j);
-            let approach = if state.memory0[j].active {
-                state.memory0[j].approach_speed
-            } else if state.memory[j].active {
-                state.memory[j].approach_speed
-            } else {
-                start.rate.max(end.rate).max(coefficients.speed_floor)
-            };
-            let (force, theta) = Course::new(start, end, h).strongest(coefficients, approach);
-            let time = state.t0 + theta * h;
-            if force > state.statistics.peak_normal[j] {
-                state.statistics.peak_normal[j] = force;
-                state.statistics.peak_time[j] = time;
-            }
-            if force > peaks[j].normal {
-                let gap = &mechanism.contacts.gaps()[j];
-                let n = if gap.eccentricity.norm() > 0.0 {
-                    gap.eccentricity.normalize()
-                } else {
-                    gap.eccentricity
-                };
-                peaks[j].normal = force;
-                peaks[j].time = time;
-                peaks[j].normal_force = n * -force;
-                // Friction follows the normal force within a step: its ratio at the step's end serves for the peak.
-                peaks[j].friction_force = if gap.normal_force > 0.0 {
-                    gap.friction * (force / gap.normal_force)
-                } else {
-                    gap.friction
-                };
-            }
-        }
-    }
-
     /// What is wrong with the step just attempted, if anything.
     fn objection(&self, open: f64) -> Option<String> {
         if !(open <= OPEN_LOOP) {
@@ -928,152 +531,6 @@ impl Simulation {
         self.peaks.fill(Peak::default());
     }
 
-    /// Changes a parameter (`contact.clearance`, `joint.S1.friction`, …) to a value as a user writes it.
-    ///
-    /// # Errors
-    /// Unknown key, bad unit, out of range: the running simulation is unchanged.
-    pub fn set(&mut self, key: &str, value: &str) -> Result<Effect, SceneError> {
-        let mut next = self.scene.clone();
-        let waits = next.set(key, value)?.at_reset;
-        self.adopt(next, |running| running.set(key, value).map(|_| ()), waits)
-    }
-
-    /// As [`Self::set`], with a value in SI units.
-    ///
-    /// # Errors
-    /// As [`Self::set`].
-    pub fn set_value(
-        &mut self,
-        key: &str,
-        value: &crate::scene::Value,
-    ) -> Result<Effect, SceneError> {
-        let mut next = self.scene.clone();
-        let waits = next.set_value(key, value)?.at_reset;
-        self.adopt(
-            next,
-            |running| running.set_value(key, value).map(|_| ()),
-            waits,
-        )
-    }
-
-    fn adopt(
-        &mut self,
-        next: Scene,
-        change: impl FnOnce(&mut Scene) -> Result<(), SceneError>,
-        waits: bool,
-    ) -> Result<Effect, SceneError> {
-        let mut running = self.running.clone();
-        // What the running scene cannot take may suit the one that waits, say a joint of a longer chain.
-        let waits = waits || change(&mut running).is_err();
-        // A joint that turns ideal, or stops being so, changes the equations.
-        let turns = |running: &Scene| {
-            let pairs = self.running.ball_joints.iter().zip(&running.ball_joints);
-            pairs
-                .map(|(a, b)| (a.contact.clearance, b.contact.clearance))
-                .any(|(a, b)| (a == 0.0) != (b == 0.0))
-        };
-        if waits || turns(&running) {
-            self.scene = next;
-            return Ok(Effect::AtReset);
-        }
-        if running.solver.method != self.running.solver.method {
-            prepare_implicit(&mut self.mechanism, running.solver.method).map_err(|error| {
-                SceneError {
-                    key: Some("solver.method".to_owned()),
-                    message: error.to_string(),
-                    ..SceneError::default()
-                }
-            })?;
-        }
-        self.scene = next;
-        let before = std::mem::replace(&mut self.running, running);
-        self.mechanism.gravity = self.running.gravity;
-        for j in 0..self.running.ball_joints.len() {
-            let contact = self.running.ball_joints[j].contact;
-            if contact != before.ball_joints[j].contact {
-                self.change_contact(j, &contact);
-            }
-        }
-        if self.running.solver != before.solver {
-            let solver = &self.running.solver;
-            if solver.method != before.solver.method {
-                self.stepper = AnyStepper::new(solver.method, self.state.y.len());
-                self.state.implicit = false;
-                self.state.controller = controller_of(solver.method, false);
-                self.state.choice = Choice::default();
-                self.mechanism.contacts.switching = switching_of(&self.running);
-            }
-            self.state.h_next = self.state.h_next.min(solver.step);
-        }
-        self.refresh();
-        Ok(Effect::Now)
-    }
-
-    /// New contact parameters at this instant; a clearance that would put the ball inside the wall starts to move.
-    fn change_contact(&mut self, j: usize, contact: &crate::contact::Parameters) {
-        if contact.clearance == 0.0 {
-            return;
-        }
-        let Self {
-            mechanism, state, ..
-        } = self;
-        mechanism.measure(state.t, &state.y);
-        let now = mechanism.contacts.clearance(j);
-        let gap = mechanism.contacts.gaps()[j];
-        let distance = gap.penetration + now;
-        let clearance = if contact.clearance < now && distance > contact.clearance {
-            let ramp = Ramp {
-                start: state.t,
-                from: now,
-                rate: -CLEARANCE_SPEED,
-                to: contact.clearance,
-            };
-            state.ramps[j] = Some(ramp);
-            now
-        } else {
-            state.ramps[j] = None;
-            contact.clearance
-        };
-        mechanism.contacts.set_ramp(j, state.ramps[j]);
-        mechanism.contacts.set_parameters(j, contact, clearance);
-        state.clearances[j] = clearance;
-        if state.memory[j].active && distance <= clearance {
-            state.memory[j] = Memory::default();
-        }
-    }
-
-    /// When the first clearance under way arrives, s.
-    fn ramp_end(&self) -> f64 {
-        let end = |r: &Ramp| r.start + (r.to - r.from) / r.rate;
-        self.state
-            .ramps
-            .iter()
-            .flatten()
-            .map(end)
-            .fold(f64::INFINITY, f64::min)
-    }
-
-    fn finish_ramps(&mut self) {
-        let t = self.state.t;
-        let mut finished = false;
-        for j in 0..self.state.ramps.len() {
-            let Some(ramp) = self.state.ramps[j] else {
-                continue;
-            };
-            if t >= ramp.start + (ramp.to - ramp.from) / ramp.rate {
-                self.state.ramps[j] = None;
-                self.state.clearances[j] = ramp.to;
-                self.mechanism.contacts.set_ramp(j, None);
-                let contact = self.running.ball_joints[j].contact;
-                self.mechanism.contacts.set_parameters(j, &contact, ramp.to);
-                finished = true;
-            }
-        }
-        if finished {
-            self.refresh();
-        }
-    }
-
     /// Back to t = 0 with the parameters as they are now, those that wait for a reset included.
     ///
     /// # Errors
@@ -1081,71 +538,6 @@ impl Simulation {
     pub fn reset(&mut self) -> Result<(), StartError> {
         *self = Self::new(&self.scene)?;
         Ok(())
-    }
-
-    /// The whole state.
-    pub fn snapshot(&self) -> Snapshot {
-        Snapshot {
-            scene: self.scene.clone(),
-            running: self.running.clone(),
-            state: self.state.clone(),
-            polynomial: self.stepper.polynomial().cloned(),
-        }
-    }
-
-    /// Goes back to a state that this simulation, or another of the same scene, was in. Resuming gives the same bits.
-    ///
-    /// # Errors
-    /// A snapshot of a scene whose equations cannot be set up.
-    pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), StartError> {
-        let mut fresh = Self::new(&snapshot.running)?;
-        fresh.scene = snapshot.scene.clone();
-        fresh.state = snapshot.state.clone();
-        for j in 0..fresh.state.ramps.len() {
-            fresh.mechanism.contacts.set_ramp(j, fresh.state.ramps[j]);
-            let contact = fresh.running.ball_joints[j].contact;
-            if contact.clearance > 0.0 {
-                fresh
-                    .mechanism
-                    .contacts
-                    .set_parameters(j, &contact, fresh.state.clearances[j]);
-            }
-        }
-        // The interpolant of the step before is not part of a state.
-        let state = &mut fresh.state;
-        state.t0 = state.t;
-        state.y0.copy_from_slice(&state.y);
-        state.k0.copy_from_slice(&state.k);
-        state.gaps0.copy_from_slice(&state.gaps);
-        state.memory0.copy_from_slice(&state.memory);
-        if let Some(polynomial) = &snapshot.polynomial {
-            fresh.stepper.set_polynomial(polynomial);
-        }
-        *self = fresh;
-        Ok(())
-    }
-
-    /// FNV-1a, 64 bit, over the whole state: little-endian bits of time, coordinates, velocities, then for each ball
-    /// joint whether it is in contact, its approach speed, and its clearance in force.
-    pub fn state_hash(&self) -> u64 {
-        let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-        let mut add = |bits: u64| {
-            for byte in bits.to_le_bytes() {
-                hash = (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
-            }
-        };
-        let state = &self.state;
-        add(state.t.to_bits());
-        for y in &state.y {
-            add(y.to_bits());
-        }
-        for (j, m) in state.memory.iter().enumerate() {
-            add(u64::from(m.active));
-            add(m.approach_speed.to_bits());
-            let clearance = state.ramps[j].map_or(state.clearances[j], |r| r.at(state.t).0);
-            add(clearance.to_bits());
-        }
-        hash
     }
 
     /// Coordinates, then velocities, as the formulation orders them.
@@ -1157,33 +549,6 @@ impl Simulation {
     pub fn contact_memory(&self, j: usize) -> Memory {
         self.state.memory[j]
     }
-}
-
-/// Step-size control for the order of the method's error estimate.
-fn controller_of(method: Method, implicit: bool) -> Controller {
-    Controller::new(match (method, implicit) {
-        (Method::Rosenbrock, _) => 2,
-        (Method::Radau5, _) | (Method::Automatic, true) => 3,
-        _ => 4,
-    })
-}
-
-/// Allocates what an implicit method needs.
-fn prepare_implicit(mechanism: &mut Mechanism, method: Method) -> Result<(), MechanismError> {
-    let velocities = mechanism.dimension() - mechanism.positions();
-    if mechanism.is_kinematic() {
-        return Ok(());
-    }
-    if method.is_implicit() && velocities > LARGEST_DENSE {
-        return Err(MechanismError::TooLarge {
-            velocities,
-            most: LARGEST_DENSE,
-        });
-    }
-    if method.is_implicit() || (method == Method::Automatic && velocities <= LARGEST_IMPLICIT) {
-        mechanism.prepare_linearisation();
-    }
-    Ok(())
 }
 
 fn switching_of(scene: &Scene) -> Switching {

@@ -1,0 +1,235 @@
+//! Steps whose size follows the error estimate, cut at the first contact start or end inside them.
+
+use super::{LONGEST_STEP, Simulation, store_gaps};
+use crate::integrate::{Method, find_root};
+use crate::simulate::Stopped;
+use crate::simulate::peaks::Approach;
+
+/// Shortest step of an adaptive method, s.
+const SHORTEST_STEP: f64 = 1e-14;
+
+/// A gap at one instant of a step, positive where the contact is in the other state than its memory says.
+#[derive(Clone, Copy)]
+struct SignedGap {
+    /// Fraction of the step.
+    theta: f64,
+    /// m.
+    gap: f64,
+    /// m/s.
+    rate: f64,
+}
+
+impl Simulation {
+    /// A step whose size follows the error estimate, cut at the first contact start or end inside it.
+    pub(super) fn adaptive_step(&mut self, limit: f64) -> Result<(), Stopped> {
+        let before = self.mechanism.evaluations;
+        let contacts = self.mechanism.contacts.memory_mut();
+        contacts.copy_from_slice(&self.state.memory);
+        self.stepper.choose(self.state.implicit);
+        let (t_end, h) = loop {
+            if let Some(step) = self.attempt_adaptive(limit) {
+                break step;
+            }
+            self.state.statistics.rejected += 1;
+            let shortest = SHORTEST_STEP.max(4.0 * f64::EPSILON * self.state.t);
+            if !(self.state.h_next >= shortest) {
+                self.state.statistics.evaluations += self.mechanism.evaluations - before;
+                self.state.h_next = self.running.solver.step;
+                let what = "the step size that the tolerance asks for fell below 1e-14 s";
+                let tolerance = self.running.solver.tolerance;
+                let advice = format!(
+                    "try a looser solver.tolerance (now {tolerance:e}) or a softer or heavier scene"
+                );
+                return Err(self.stopped(what, advice));
+            }
+        };
+        let stiffness = self.stepper.stiffness(h, &self.y_end, &self.k_end);
+        let evaluations = self.mechanism.evaluations - before;
+        self.accept(t_end, h, before)?;
+        if self.running.solver.method == Method::Automatic {
+            self.vote(h, stiffness, evaluations);
+        }
+        Ok(())
+    }
+
+    /// One try of a step with its event; `None` where it has to be repeated with the smaller `h_next` that it left.
+    fn attempt_adaptive(&mut self, limit: f64) -> Option<(f64, f64)> {
+        let t = self.state.t;
+        let tolerance = self.running.solver.tolerance;
+        let mut h = self.state.h_next.min(LONGEST_STEP);
+        let mut t_end = t + h;
+        let cut = t_end >= limit - 1e-6 * h;
+        if cut {
+            t_end = limit;
+            h = limit - t;
+        }
+        let error = self.attempt(h) / tolerance;
+        let state = &mut self.state;
+        if !(error <= 1.0) {
+            state.h_next = h * state.controller.after_reject(error);
+            return None;
+        }
+        let next = h * state.controller.after_accept(error);
+        // A step cut short says nothing against the longer one.
+        state.h_next = if cut { state.h_next.max(next) } else { next };
+        let contact_began = std::mem::take(&mut state.contact_began);
+        self.finish_gaps(t_end);
+        if let Some(theta) = self.first_event(h) {
+            // The step is taken again, shorter, so that its end carries the method's error and not the interpolant's.
+            t_end = t + theta * h;
+            h *= theta;
+            if !self.attempt(h).is_finite() {
+                self.state.h_next = 0.5 * h;
+                self.state.contact_began = contact_began;
+                return None;
+            }
+            self.finish_gaps(t_end);
+        } else if contact_began {
+            self.state.h_contact = h.max(1e-9);
+        }
+        Some((t_end, h))
+    }
+
+    /// Tries a step of size `h` from the current state; returns the error against the scales.
+    fn attempt(&mut self, h: f64) -> f64 {
+        let Self {
+            mechanism,
+            stepper,
+            state,
+            y_end,
+            k_end,
+            ..
+        } = self;
+        let tolerance = self.running.solver.tolerance;
+        stepper.attempt(
+            mechanism, state.t, h, &state.y, &state.k, y_end, k_end, tolerance,
+        )
+    }
+
+    fn finish_gaps(&mut self, t_end: f64) {
+        self.mechanism.contacts.finish(t_end);
+        store_gaps(&self.mechanism, &mut self.gaps_end);
+    }
+
+    /// Fraction of the step just attempted at which the first contact starts or ends, if one does; that joint is put
+    /// down in `located`.
+    fn first_event(&mut self, h: f64) -> Option<f64> {
+        let mut first: Option<f64> = None;
+        self.located = None;
+        for j in 0..self.gaps_end.len() {
+            if !self.mechanism.contacts.has_clearance(j) {
+                continue;
+            }
+            let Some(theta) = self.event_of(j, h) else {
+                continue;
+            };
+            if first.is_none_or(|earliest| theta < earliest) {
+                first = Some(theta);
+                self.located = Some(j);
+            }
+        }
+        first
+    }
+
+    /// Where joint `j` leaves the state that its memory says, as a fraction of the step just attempted.
+    fn event_of(&mut self, j: usize, h: f64) -> Option<f64> {
+        let (start, end) = (self.state.gaps[j], self.gaps_end[j]);
+        // Positive where the contact is in the other state than its memory says.
+        let sign = if self.state.memory[j].active {
+            -1.0
+        } else {
+            1.0
+        };
+        // A ball may cross its play several times in one long step: look at pieces that are short against the play.
+        let travel = h * start.speed.max(end.speed);
+        let clearance = self.mechanism.contacts.clearance(j);
+        let pieces = (4.0 * travel / clearance).ceil().clamp(1.0, 64.0);
+        let signed = |theta: f64, at: Approach| SignedGap {
+            theta,
+            gap: sign * at.penetration,
+            rate: sign * at.rate,
+        };
+        let mut left = signed(0.0, start);
+        for n in 1..=pieces as u32 {
+            let right = if f64::from(n) == pieces {
+                signed(1.0, end)
+            } else {
+                self.signed_gap(j, f64::from(n) / pieces, h, sign)
+            };
+            if let Some((a, b)) = self.crossing_within(j, h, sign, left, right) {
+                let width = (1e-15 / h).max(1e-12);
+                let gap = |theta: f64| self.signed_gap(j, theta, h, sign).gap;
+                return Some(find_root(a.theta, a.gap, b.theta, b.gap, width, 1e-16, gap));
+            }
+            left = right;
+        }
+        // In the wrong state all along: it switches at the end of the step.
+        None
+    }
+
+    /// Two points of a piece of the step between which the signed gap turns positive.
+    fn crossing_within(
+        &mut self,
+        j: usize,
+        h: f64,
+        sign: f64,
+        left: SignedGap,
+        right: SignedGap,
+    ) -> Option<(SignedGap, SignedGap)> {
+        if left.gap < 0.0 && right.gap > 0.0 {
+            return Some((left, right));
+        }
+        // An extremum inside: a touch that both ends miss, or a way out and back.
+        let (mut a, mut b) = (left, right);
+        let turns = if right.gap > 0.0 {
+            a.rate < 0.0 && b.rate > 0.0
+        } else {
+            a.rate > 0.0 && b.rate < 0.0
+        };
+        if !turns {
+            return None;
+        }
+        for _ in 0..40 {
+            // Neither tangent reaches zero: nothing to find.
+            let reach = (a.gap + a.rate * (b.theta - a.theta) * h)
+                .min(b.gap - b.rate * (b.theta - a.theta) * h);
+            if right.gap <= 0.0 && reach < 0.0 {
+                return None;
+            }
+            let middle = self.signed_gap(j, 0.5 * (a.theta + b.theta), h, sign);
+            if right.gap > 0.0 && middle.gap < 0.0 {
+                return Some((middle, right));
+            }
+            if right.gap <= 0.0 && middle.gap > 0.0 && left.gap < 0.0 {
+                return Some((left, middle));
+            }
+            if (middle.rate > 0.0) == (a.rate > 0.0) {
+                a = middle;
+            } else {
+                b = middle;
+            }
+        }
+        None
+    }
+
+    /// Gap of joint `j` on the interpolant of the attempted step, times `sign`.
+    fn signed_gap(&mut self, j: usize, theta: f64, h: f64, sign: f64) -> SignedGap {
+        let Self {
+            mechanism,
+            stepper,
+            state,
+            y_end,
+            k_end,
+            scratch_y,
+            ..
+        } = self;
+        stepper.interpolate(theta, h, &state.y, &state.k, y_end, k_end, scratch_y);
+        mechanism.measure(state.t + theta * h, scratch_y);
+        let gap = &mechanism.contacts.gaps()[j];
+        SignedGap {
+            theta,
+            gap: sign * gap.penetration,
+            rate: sign * gap.rate,
+        }
+    }
+}

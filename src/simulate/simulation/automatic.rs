@@ -1,0 +1,122 @@
+//! Which method of the automatic pair steps: the explicit one through impacts, the implicit one once contacts settled.
+
+use super::Simulation;
+use crate::integrate::{Controller, Method, System};
+use crate::mechanism::{Mechanism, MechanismError};
+
+/// h |lambda| beyond which an explicit step is held by stability.
+const HELD_BY_STABILITY: f64 = 3.0;
+/// Steps that must be held by stability, or taken since the latest contact began, before the implicit method is tried.
+const HELD_STEPS: u32 = 8;
+const SETTLED_STEPS: u32 = 60;
+/// Over so many implicit steps the progress per evaluation must be this many times the explicit method's; else the
+/// explicit one has its turn for so many steps.
+const TRIAL_STEPS: u32 = 12;
+const WORTH_IT: f64 = 2.0;
+const EXPLICIT_TURN: u32 = 200;
+/// Evaluations of one explicit step.
+const EXPLICIT_EVALUATIONS: f64 = 6.0;
+/// More velocity coordinates than this are refused by the implicit methods, whose matrices are dense.
+const LARGEST_DENSE: usize = 1024;
+/// More velocity coordinates than this make a dense factorisation dearer than many explicit steps.
+const LARGEST_IMPLICIT: usize = 96;
+
+/// Memory of the automatic pair.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Choice {
+    /// Explicit steps since the latest contact began, and how many of them were held by stability.
+    pub(super) since_contact: u32,
+    pub(super) held: u32,
+    /// Explicit steps before the implicit method may be tried again.
+    pub(super) wait: u32,
+    /// Explicit step at the latest change to the implicit method, s.
+    pub(super) h_explicit: f64,
+    /// Time and evaluations of the implicit steps on trial.
+    pub(super) progress: f64,
+    pub(super) cost: u64,
+    pub(super) steps: u32,
+}
+
+impl Simulation {
+    /// Which method of the automatic pair takes the next step, after one of size `h` that took so many evaluations.
+    pub(super) fn vote(&mut self, h: f64, stiffness: f64, evaluations: u64) {
+        let state = &mut self.state;
+        let choice = &mut state.choice;
+        if state.contact_began {
+            choice.since_contact = 0;
+            choice.held = 0;
+            // An impact is short and not stiff: the explicit method resolves it at less cost.
+            if state.implicit && state.memory.iter().any(|m| m.active && !m.floored) {
+                state.implicit = false;
+                state.controller = controller_of(Method::Automatic, false);
+            }
+            return;
+        }
+        if state.implicit {
+            choice.progress += h;
+            choice.cost += evaluations;
+            choice.steps += 1;
+            if choice.steps >= TRIAL_STEPS {
+                let explicit = choice.h_explicit / EXPLICIT_EVALUATIONS;
+                if choice.progress < WORTH_IT * explicit * choice.cost as f64 {
+                    state.implicit = false;
+                    state.controller = controller_of(Method::Automatic, false);
+                    state.h_next = choice.h_explicit;
+                    choice.wait = EXPLICIT_TURN;
+                }
+                (choice.progress, choice.cost, choice.steps) = (0.0, 0, 0);
+            }
+            return;
+        }
+        choice.since_contact += 1;
+        choice.held = if stiffness > HELD_BY_STABILITY {
+            choice.held + 1
+        } else {
+            choice.held.saturating_sub(1)
+        };
+        if choice.wait > 0 {
+            choice.wait -= 1;
+            return;
+        }
+        let settled = choice.held >= HELD_STEPS || choice.since_contact >= SETTLED_STEPS;
+        let velocities = state.y.len() - self.mechanism.positions();
+        if settled && velocities <= LARGEST_IMPLICIT && state.memory.iter().any(|m| m.active) {
+            state.implicit = true;
+            state.controller = controller_of(Method::Automatic, true);
+            *choice = Choice {
+                h_explicit: h,
+                ..Choice::default()
+            };
+        }
+    }
+}
+
+/// Step-size control for the order of the method's error estimate.
+pub(super) fn controller_of(method: Method, implicit: bool) -> Controller {
+    Controller::new(match (method, implicit) {
+        (Method::Rosenbrock, _) => 2,
+        (Method::Radau5, _) | (Method::Automatic, true) => 3,
+        _ => 4,
+    })
+}
+
+/// Allocates what an implicit method needs.
+pub(super) fn prepare_implicit(
+    mechanism: &mut Mechanism,
+    method: Method,
+) -> Result<(), MechanismError> {
+    let velocities = mechanism.dimension() - mechanism.positions();
+    if mechanism.is_kinematic() {
+        return Ok(());
+    }
+    if method.is_implicit() && velocities > LARGEST_DENSE {
+        return Err(MechanismError::TooLarge {
+            velocities,
+            most: LARGEST_DENSE,
+        });
+    }
+    if method.is_implicit() || (method == Method::Automatic && velocities <= LARGEST_IMPLICIT) {
+        mechanism.prepare_linearisation();
+    }
+    Ok(())
+}

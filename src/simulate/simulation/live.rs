@@ -1,0 +1,156 @@
+//! Parameters changed while the simulation runs.
+
+use super::automatic::{Choice, controller_of, prepare_implicit};
+use super::{CLEARANCE_SPEED, Simulation, switching_of};
+use crate::mechanism::{Memory, Ramp};
+use crate::scene::{Scene, SceneError};
+use crate::simulate::Effect;
+use crate::simulate::stepper::AnyStepper;
+
+impl Simulation {
+    /// Changes a parameter (`contact.clearance`, `joint.S1.friction`, …) to a value as a user writes it.
+    ///
+    /// # Errors
+    /// Unknown key, bad unit, out of range: the running simulation is unchanged.
+    pub fn set(&mut self, key: &str, value: &str) -> Result<Effect, SceneError> {
+        let mut next = self.scene.clone();
+        let waits = next.set(key, value)?.at_reset;
+        self.adopt(next, |running| running.set(key, value).map(|_| ()), waits)
+    }
+
+    /// As [`Self::set`], with a value in SI units.
+    ///
+    /// # Errors
+    /// As [`Self::set`].
+    pub fn set_value(
+        &mut self,
+        key: &str,
+        value: &crate::scene::Value,
+    ) -> Result<Effect, SceneError> {
+        let mut next = self.scene.clone();
+        let waits = next.set_value(key, value)?.at_reset;
+        self.adopt(
+            next,
+            |running| running.set_value(key, value).map(|_| ()),
+            waits,
+        )
+    }
+
+    fn adopt(
+        &mut self,
+        next: Scene,
+        change: impl FnOnce(&mut Scene) -> Result<(), SceneError>,
+        waits: bool,
+    ) -> Result<Effect, SceneError> {
+        let mut running = self.running.clone();
+        // What the running scene cannot take may suit the one that waits, say a joint of a longer chain.
+        let waits = waits || change(&mut running).is_err();
+        // A joint that turns ideal, or stops being so, changes the equations.
+        let turns = |running: &Scene| {
+            let pairs = self.running.ball_joints.iter().zip(&running.ball_joints);
+            pairs
+                .map(|(a, b)| (a.contact.clearance, b.contact.clearance))
+                .any(|(a, b)| (a == 0.0) != (b == 0.0))
+        };
+        if waits || turns(&running) {
+            self.scene = next;
+            return Ok(Effect::AtReset);
+        }
+        if running.solver.method != self.running.solver.method {
+            prepare_implicit(&mut self.mechanism, running.solver.method).map_err(|error| {
+                SceneError {
+                    key: Some("solver.method".to_owned()),
+                    message: error.to_string(),
+                    ..SceneError::default()
+                }
+            })?;
+        }
+        self.scene = next;
+        let before = std::mem::replace(&mut self.running, running);
+        self.mechanism.gravity = self.running.gravity;
+        for j in 0..self.running.ball_joints.len() {
+            let contact = self.running.ball_joints[j].contact;
+            if contact != before.ball_joints[j].contact {
+                self.change_contact(j, &contact);
+            }
+        }
+        if self.running.solver != before.solver {
+            let solver = &self.running.solver;
+            if solver.method != before.solver.method {
+                self.stepper = AnyStepper::new(solver.method, self.state.y.len());
+                self.state.implicit = false;
+                self.state.controller = controller_of(solver.method, false);
+                self.state.choice = Choice::default();
+                self.mechanism.contacts.switching = switching_of(&self.running);
+            }
+            self.state.h_next = self.state.h_next.min(solver.step);
+        }
+        self.refresh();
+        Ok(Effect::Now)
+    }
+
+    /// New contact parameters at this instant; a clearance that would put the ball inside the wall starts to move.
+    fn change_contact(&mut self, j: usize, contact: &crate::contact::Parameters) {
+        if contact.clearance == 0.0 {
+            return;
+        }
+        let Self {
+            mechanism, state, ..
+        } = self;
+        mechanism.measure(state.t, &state.y);
+        let now = mechanism.contacts.clearance(j);
+        let gap = mechanism.contacts.gaps()[j];
+        let distance = gap.penetration + now;
+        let clearance = if contact.clearance < now && distance > contact.clearance {
+            let ramp = Ramp {
+                start: state.t,
+                from: now,
+                rate: -CLEARANCE_SPEED,
+                to: contact.clearance,
+            };
+            state.ramps[j] = Some(ramp);
+            now
+        } else {
+            state.ramps[j] = None;
+            contact.clearance
+        };
+        mechanism.contacts.set_ramp(j, state.ramps[j]);
+        mechanism.contacts.set_parameters(j, contact, clearance);
+        state.clearances[j] = clearance;
+        if state.memory[j].active && distance <= clearance {
+            state.memory[j] = Memory::default();
+        }
+    }
+
+    /// When the first clearance under way arrives, s.
+    pub(super) fn ramp_end(&self) -> f64 {
+        let end = |r: &Ramp| r.start + (r.to - r.from) / r.rate;
+        self.state
+            .ramps
+            .iter()
+            .flatten()
+            .map(end)
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    pub(super) fn finish_ramps(&mut self) {
+        let t = self.state.t;
+        let mut finished = false;
+        for j in 0..self.state.ramps.len() {
+            let Some(ramp) = self.state.ramps[j] else {
+                continue;
+            };
+            if t >= ramp.start + (ramp.to - ramp.from) / ramp.rate {
+                self.state.ramps[j] = None;
+                self.state.clearances[j] = ramp.to;
+                self.mechanism.contacts.set_ramp(j, None);
+                let contact = self.running.ball_joints[j].contact;
+                self.mechanism.contacts.set_parameters(j, &contact, ramp.to);
+                finished = true;
+            }
+        }
+        if finished {
+            self.refresh();
+        }
+    }
+}
