@@ -64,11 +64,15 @@ fn positions_follow_the_reference_trajectories() {
             ],
         ),
     ];
-    for (file, changes) in cases {
-        let (early, late) = compare(file, changes);
-        println!("{file}: {early:.2e} m to 12 ms, {late:.2e} m to 20 ms");
-        assert!(early < 1e-7, "{file}: {early:e} m up to 12 ms");
-        assert!(late < 1e-6, "{file}: {late:e} m up to 20 ms");
+    for method in ["dopri5", "automatic", "radau5"] {
+        for (file, changes) in cases {
+            let mut changes = changes.to_vec();
+            changes.push(("solver.method", method));
+            let (early, late) = compare(file, &changes);
+            println!("{method}, {file}: {early:.2e} m to 12 ms, {late:.2e} m to 20 ms");
+            assert!(early < 1e-7, "{method}, {file}: {early:e} m up to 12 ms");
+            assert!(late < 1e-6, "{method}, {file}: {late:e} m up to 20 ms");
+        }
     }
 }
 

@@ -22,7 +22,10 @@ fn mean_forces(simulation: &mut Simulation, from: f64, to: f64) -> Vec<f64> {
 
 #[test]
 fn settled_forces_are_those_of_a_converged_explicit_run() {
-    let mut explicit = simulation("spcmm", &[("solver.tolerance", "1e-7")]);
+    let mut explicit = simulation(
+        "spcmm",
+        &[("solver.method", "dopri5"), ("solver.tolerance", "1e-7")],
+    );
     let expected = mean_forces(&mut explicit, 1.0, 1.5);
     let explicit_steps = explicit.statistics().steps;
     for (method, tolerance) in [

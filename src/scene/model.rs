@@ -118,9 +118,9 @@ impl Preset {
     /// Method, step (s) and tolerance of the preset.
     pub fn point(self) -> (Method, f64, f64) {
         match self {
-            Self::Preview => (Method::RungeKutta4, 20e-6, 1e-4),
-            Self::RealTime => (Method::DormandPrince5, 10e-6, 1e-4),
-            Self::Accurate => (Method::DormandPrince5, 10e-6, 1e-7),
+            Self::Preview => (Method::Automatic, 10e-6, 1e-3),
+            Self::RealTime => (Method::Automatic, 10e-6, 1e-4),
+            Self::Accurate => (Method::Automatic, 10e-6, 1e-6),
             Self::Reference => (Method::DormandPrince5, 10e-6, 1e-11),
         }
     }

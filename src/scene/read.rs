@@ -189,7 +189,7 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
         formulation: Formulation::Tree,
         solver: Solver {
             preset: None,
-            method: crate::integrate::Method::DormandPrince5,
+            method: crate::integrate::Method::Automatic,
             step: 0.0,
             tolerance: 0.0,
         },

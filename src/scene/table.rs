@@ -346,7 +346,7 @@ static TABLE: [Parameter; 26] = [
         "Method",
         "Solver",
         Kind::Choice(&METHODS),
-        Value::Choice("dopri5"),
+        Value::Choice("automatic"),
         Scope::Every,
         "Time stepper. semi-implicit-euler (order 1) and rk4 (order 4) keep a fixed step; dopri5 (Dormand-Prince, \
          order 5) chooses its steps by the tolerance and finds the instants at which contacts begin and end; \
@@ -384,8 +384,8 @@ static TABLE: [Parameter; 26] = [
         Kind::Choice(&PRESETS),
         Value::Unset,
         Scope::Every,
-        "Method, step and tolerance by name: preview (rk4, 20 us), real-time (dopri5, 1e-4), accurate (dopri5, 1e-7), \
-         reference (dopri5, 1e-11). A method, step or tolerance that is set as well wins over the preset.",
+        "Method, step and tolerance by name: preview (automatic, 1e-3), real-time (automatic, 1e-4), \
+         accurate (automatic, 1e-6), reference (dopri5, 1e-11). A method, step or tolerance that is set as well wins over the preset.",
         "Solves paper eqs. (55), (58) in time",
     ),
     row(
