@@ -636,6 +636,17 @@ fn scenes_are_listed_and_each_says_what_it_contains() {
 }
 
 #[test]
+fn a_scene_whose_sliders_rest_can_be_checked() {
+    // A drive without a period has no period to look through: this once never came back.
+    let here = folder();
+    for changes in ["", " --set formulation=lagrange"] {
+        let line = format!("check spcmm --set spcmm.frequency=0{changes}");
+        let checked = jointplay(here.path(), &line).expect(0);
+        assert!(!checked.stdout.contains("singular"), "{}", checked.stdout);
+    }
+}
+
+#[test]
 fn a_file_works_wherever_a_name_does() {
     let folder = folder();
     let source = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("assets/scenes/pendulum.toml");

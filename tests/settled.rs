@@ -60,7 +60,7 @@ fn peaks_of_the_first_six_impacts_are_right_with_the_automatic_pair() {
         "spcmm",
         &[("solver.method", "automatic"), ("solver.tolerance", "1e-5")],
     );
-    // `physics.md` section 5, in the order in which they begin.
+    // Continuous-time peaks of the reference solution, N, in the order in which they begin.
     let expected = [
         (0, 621.35),
         (1, 560.67),

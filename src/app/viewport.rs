@@ -486,7 +486,7 @@ fn describe(ui: &mut Ui, player: &Player, picked: Picked) {
     ui.label(RichText::new("Double-click to follow").small().weak());
 }
 
-/// Middle of the lower edge, for what hangs on it.
+/// Lower right corner, `margin` points away from both edges.
 pub(super) fn lower_right(rect: Rect, margin: f32) -> Pos2 {
     pos2(rect.max.x - margin, rect.max.y - margin)
 }

@@ -7,7 +7,7 @@ use super::output::significant;
 use super::{Failure, load, print, provenance, start};
 use crate::contact::{FrictionLaw, NormalLaw};
 use crate::mechanism::{Mechanism, Summary};
-use crate::scene::{BallJoint, JointKind, Scene};
+use crate::scene::{BallJoint, Formulation, JointKind, Scene};
 use crate::simulate::{Frame, Simulation};
 
 /// Smallest clearance for which a contact patch is small against the ball, m (Hertz's assumption).
@@ -281,16 +281,22 @@ pub fn warnings(scene: &Scene) -> Vec<String> {
 /// Instants of the drive's period at which the ideal mechanism is looked at.
 const INSTANTS: u32 = 400;
 
+/// Drive frequency at which it is looked at, Hz: the paper's.
+const SLOW: f64 = 0.5;
+
 /// Reactions above this many times the weight of all bodies mean that the mechanism is about to lose its stiffness.
 const MOST_WEIGHTS: f64 = 5.0;
 
 /// Rods that reach do not make a good mechanism yet: near a singular pose the reactions of the ideal joints explode.
 fn near_singular(scene: &Scene) -> Option<String> {
     let mut rigid = scene.clone();
+    rigid.formulation = Formulation::Tree;
     let drive = rigid.spcmm.as_mut()?;
+    // Sliders that rest have one pose.
+    let instants = if drive.frequency > 0.0 { INSTANTS } else { 0 };
     // Slow, so that weight alone makes the reactions: the poses are the same.
-    drive.frequency = drive.frequency.min(0.5);
-    let period = 1.0 / drive.frequency;
+    drive.frequency = SLOW;
+    let period = 1.0 / SLOW;
     for joint in &mut rigid.ball_joints {
         joint.contact.clearance = 0.0;
     }
@@ -298,7 +304,7 @@ fn near_singular(scene: &Scene) -> Option<String> {
     let mut simulation = Simulation::new(&rigid).ok()?;
     let mut frame = Frame::default();
     let (mut largest, mut when) = (0.0, 0.0);
-    for k in 0..=INSTANTS {
+    for k in 0..=instants {
         let time = period * f64::from(k) / f64::from(INSTANTS);
         if simulation.advance_to(time).is_err() {
             let time = simulation.time();

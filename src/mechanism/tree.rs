@@ -369,7 +369,7 @@ fn add_shifted_inertia(sum: &mut Mat3, inertia: &Mat3, mass: f64, k: &Vec3, d: &
     sum.m32 += iyz;
 }
 
-/// Rows of a free body: [m 1, .; [k]x, I] with k the first moment.
+/// Rows of a free body: `[m 1, .; [k]x, I]` with k the first moment.
 #[inline]
 fn fill_free(h: &mut [f64], n: usize, c: &Composite) {
     let k = c.moment;

@@ -85,7 +85,7 @@ pub(super) struct State {
     h_contact: f64,
     /// A contact began at the latest event.
     contact_began: bool,
-    /// Of the automatic pair the linearly implicit method steps.
+    /// Of the automatic pair the implicit method steps.
     implicit: bool,
     /// What the automatic pair's choice goes by.
     choice: Choice,
@@ -200,6 +200,8 @@ impl Simulation {
         mechanism.contacts.finish(state.t);
         store_gaps(mechanism, &mut state.gaps);
         self.stepper.invalidate();
+        // Forces jump here: a parabola through both sides would have a peak that never was.
+        state.reactions.fill(Recent::default());
         state.t0 = state.t;
         state.y0.copy_from_slice(&state.y);
         state.k0.copy_from_slice(&state.k);

@@ -35,7 +35,7 @@ impl AnyStepper {
         }
     }
 
-    /// Puts the linearly implicit method of a pair in charge, or the explicit one.
+    /// Puts the implicit method of a pair in charge, or the explicit one.
     pub(super) fn choose(&mut self, use_implicit: bool) {
         if let Self::Pair { implicit, .. } = self {
             *implicit = use_implicit;
