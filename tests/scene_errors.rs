@@ -727,3 +727,29 @@ fn a_damaged_file_never_panics_and_its_error_has_a_place() {
         }
     }
 }
+
+#[test]
+fn a_drive_that_swings_backwards_in_time_is_refused() {
+    // A negative period once let a driven scene step backwards for ever.
+    let drive = |frequency: &str| {
+        let text = GOOD.replace("kind = \"free\"", "kind = \"prismatic\"\naxis = [1, 0, 0]");
+        text.replace(
+            "start = { position = [0, 0, \"-100 mm\"] }",
+            &format!("drive = {{ law = \"harmonic\", amplitude = \"1 mm\", frequency = \"{frequency}\" }}"),
+        )
+    };
+    assert!(parse(&drive("1 Hz")).is_ok());
+    for bad in ["-1 Hz", "0 Hz", "20 kHz"] {
+        let error = parse(&drive(bad)).unwrap_err();
+        holds(
+            bad,
+            &error,
+            &[
+                "my.toml:16:",
+                "joint.free.drive.frequency",
+                bad,
+                "above 0 up to 10000 Hz",
+            ],
+        );
+    }
+}

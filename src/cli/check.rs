@@ -4,17 +4,12 @@ use std::fmt::Write;
 
 use super::args::SceneArguments;
 use super::output::significant;
+use super::summary::count;
 use super::{Failure, load, print, provenance, start};
-use crate::contact::{FrictionLaw, NormalLaw};
+use crate::contact::FrictionLaw;
 use crate::mechanism::{Mechanism, Summary};
 use crate::scene::{BallJoint, Formulation, JointKind, Scene};
 use crate::simulate::{Frame, Simulation};
-
-/// Smallest clearance for which a contact patch is small against the ball, m (Hertz's assumption).
-const LEAST_HERTZ_CLEARANCE: f64 = 0.01e-3;
-
-/// Restitution below which the Lankarani-Nikravesh law rebounds clearly higher than asked.
-const LEAST_LANKARANI_RESTITUTION: f64 = 0.8;
 
 /// Does what `check` asks.
 ///
@@ -83,7 +78,8 @@ fn report(scene: &Scene, contents: &Summary, start: &Frame) -> Result<String, Fa
     let (computed, left_out) = work(scene, contents);
     computed.iter().for_each(|item| line("Computed", item));
     left_out.iter().for_each(|item| line("Not computed", item));
-    warnings(scene)
+    scene
+        .warnings()
         .iter()
         .chain(&near_singular(scene))
         .for_each(|warning| line("Warning", warning));
@@ -199,8 +195,8 @@ fn work(scene: &Scene, contents: &Summary) -> (Vec<String>, Vec<String>) {
     sort(
         contents.solves_differential_equation,
         format!(
-            "differential equations of {} degrees of freedom",
-            contents.degrees_of_freedom
+            "differential equations of {} of freedom",
+            count(contents.degrees_of_freedom as u64, "degree")
         ),
         "differential equations: nothing is free, the drives prescribe the motion",
     );
@@ -229,7 +225,7 @@ fn work(scene: &Scene, contents: &Summary) -> (Vec<String>, Vec<String>) {
     sort(
         contents.ideal_joints > 0,
         format!("reactions of the ideal joints at {}", with(true)),
-        "reactions of ideal joints: every ball joint has clearance",
+        "reactions of ideal joints: no ball joint is ideal",
     );
     sort(
         contents.drives > 0,
@@ -246,36 +242,6 @@ fn work(scene: &Scene, contents: &Summary) -> (Vec<String>, Vec<String>) {
         "actuator forces: nothing is driven",
     );
     (computed, left_out)
-}
-
-/// What a user of this scene should know about the reach of its models.
-pub fn warnings(scene: &Scene) -> Vec<String> {
-    let mut warnings = Vec::new();
-    let contacts = || scene.ball_joints.iter().filter(|joint| !is_ideal(joint));
-    let steep = contacts().filter(|joint| {
-        joint.contact.normal_law == NormalLaw::LankaraniNikravesh
-            && joint.contact.restitution < LEAST_LANKARANI_RESTITUTION
-    });
-    let steep = names(steep.map(|joint| &joint.name));
-    if !steep.is_empty() {
-        warnings.push(format!(
-            "{steep}: the lankarani-nikravesh law is right only for a restitution near 1 and rebounds higher than \
-             asked below {LEAST_LANKARANI_RESTITUTION}; flores or gonthier suit low values"
-        ));
-    }
-    let tight = names(
-        contacts()
-            .filter(|joint| joint.contact.clearance <= LEAST_HERTZ_CLEARANCE)
-            .map(|joint| &joint.name),
-    );
-    if !tight.is_empty() {
-        warnings.push(format!(
-            "{tight}: Hertz contact assumes a contact patch that is small against the ball, which does not hold for \
-             a clearance of {} mm and below",
-            significant(LEAST_HERTZ_CLEARANCE * 1e3, 3)
-        ));
-    }
-    warnings
 }
 
 /// Instants of the drive's period at which the ideal mechanism is looked at.

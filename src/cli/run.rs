@@ -89,9 +89,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         if times.is_some_and(|times| !times.reach_the_end()) {
             warn("the duration is no whole number of intervals: the last row lies before the end");
         }
-        super::check::warnings(&scene)
-            .iter()
-            .for_each(|warning| warn(warning));
+        scene.warnings().iter().for_each(|warning| warn(warning));
     }
 
     interrupt::listen();

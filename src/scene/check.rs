@@ -38,7 +38,7 @@ impl Scene {
             if contact.clearance > 0.0 && contact.clearance <= 1e-5 {
                 warnings.push(format!(
                     "{joints}: clearance {} is so small that the contact patch is no longer small against the ball \
-                     (radius {}), which the contact law assumes.",
+                     (radius {}), which Hertz's theory assumes.",
                     format_quantity(contact.clearance, "mm"),
                     format_quantity(contact.ball_radius, "mm")
                 ));

@@ -10,6 +10,9 @@ use std::f64::consts::TAU;
 
 const KINDS: [&str; 4] = ["fixed", "prismatic", "revolute", "free"];
 
+/// Highest frequency of a harmonic drive, Hz.
+const FASTEST_DRIVE: f64 = 1e4;
+
 /// A tree joint whose bodies are still places in the file.
 pub(super) struct JointText<'d> {
     pub name: String,
@@ -237,9 +240,11 @@ fn read_drive(
                     .get("mean")
                     .map_or(Ok(0.0), |node| node.quantity(place))?,
                 amplitude: section.require("amplitude", like)?.quantity(place)?,
-                frequency: section
-                    .require("frequency", "\"1 Hz\"")?
-                    .quantity(Dimension::Frequency)?,
+                frequency: section.require("frequency", "\"1 Hz\"")?.positive(
+                    Dimension::Frequency,
+                    FASTEST_DRIVE,
+                    "Hz",
+                )?,
                 phase: section
                     .get("phase")
                     .map_or(Ok(0.0), |node| node.quantity(Dimension::Angle))?,

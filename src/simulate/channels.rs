@@ -1,7 +1,7 @@
 //! Which quantities of a simulation are recorded for the plots, in which order, and how they are read from a frame.
 
 use super::Frame;
-use crate::scene::{Scene, Vec3};
+use crate::scene::{JointKind, Scene, Vec3};
 
 /// Ball joints that are recorded; in a longer chain the rest would cost more memory than they tell.
 pub const RECORDED_JOINTS: usize = 12;
@@ -21,13 +21,14 @@ pub enum Quantity {
     Acceleration,
     AngleAccelerations,
     ActuatorForce,
+    ActuatorTorque,
     Energy,
     ProbeError,
 }
 
 impl Quantity {
     /// All of them, in the order in which a list shows them.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::NormalForce,
         Self::FrictionForce,
         Self::Eccentricity,
@@ -39,6 +40,7 @@ impl Quantity {
         Self::Acceleration,
         Self::AngleAccelerations,
         Self::ActuatorForce,
+        Self::ActuatorTorque,
         Self::Energy,
         Self::ProbeError,
     ];
@@ -57,6 +59,7 @@ impl Quantity {
             Self::Acceleration => "Acceleration",
             Self::AngleAccelerations => "Angle accelerations",
             Self::ActuatorForce => "Actuator force",
+            Self::ActuatorTorque => "Actuator torque",
             Self::Energy => "Energy",
             Self::ProbeError => "Probe error",
         }
@@ -66,6 +69,7 @@ impl Quantity {
     pub fn unit(self) -> (&'static str, f64) {
         match self {
             Self::NormalForce | Self::FrictionForce | Self::ActuatorForce => ("N", 1.0),
+            Self::ActuatorTorque => ("N m", 1.0),
             Self::Eccentricity | Self::Position | Self::ProbeError => ("mm", 1e-3),
             Self::Penetration => ("µm", 1e-6),
             Self::Angles => ("mrad", 1e-3),
@@ -96,7 +100,8 @@ impl Quantity {
             Self::AngleRates => "Rates of the angles α, β, γ.",
             Self::Acceleration => "Acceleration of the output body's origin.",
             Self::AngleAccelerations => "Second derivatives of the angles α, β, γ.",
-            Self::ActuatorForce => "Force (or torque, in N m) that each drive must bring up.",
+            Self::ActuatorForce => "Force that each driven slide needs, positive along its axis.",
+            Self::ActuatorTorque => "Torque that each driven hinge needs, positive about its axis.",
             Self::Energy => "Kinetic, potential and elastic energy of the whole mechanism.",
             Self::ProbeError => "Probe tip minus the tip of the ideal mechanism at the same time.",
         }
@@ -152,7 +157,11 @@ impl Channels {
             }
         }
         for joint in driven() {
-            add(Quantity::ActuatorForce, &joint.name);
+            let quantity = match joint.kind {
+                JointKind::Revolute => Quantity::ActuatorTorque,
+                _ => Quantity::ActuatorForce,
+            };
+            add(quantity, &joint.name);
         }
         let probe = scene.spcmm.is_some() && scene.output.probe.is_some();
         if probe {

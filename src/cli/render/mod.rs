@@ -85,9 +85,7 @@ pub fn render(arguments: &RenderArguments) -> Result<(), Failure> {
     };
     let folder = Folder::claim(&arguments.out, arguments.force)?;
     if !arguments.quiet {
-        super::check::warnings(&scene)
-            .iter()
-            .for_each(|warning| warn(warning));
+        scene.warnings().iter().for_each(|warning| warn(warning));
     }
 
     let meta = provenance::meta(&scene)?;
