@@ -4,7 +4,6 @@
 
 mod controls;
 mod dialogs;
-mod framing;
 #[cfg(not(target_arch = "wasm32"))]
 mod headless;
 mod icons;

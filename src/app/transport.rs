@@ -143,7 +143,7 @@ fn reached(ui: &mut Ui, player: &Player) {
     if reached < 0.97 * player.pacer.scale() {
         ui.label(RichText::new(words).color(ui.visuals().warn_fg_color)).on_hover_text(
             "This machine cannot follow the time scale that was asked for: the simulation runs slower, and skips \
-             nothing. A larger step or the preview preset of the solver helps.",
+             nothing. A looser tolerance or the preview preset of the solver helps.",
         );
     } else {
         ui.label(RichText::new(words).weak())

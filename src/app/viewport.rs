@@ -8,8 +8,8 @@ use eframe::egui::{
 };
 use glam::{Vec2, Vec3};
 
+use super::overlay;
 use super::player::Player;
-use super::{framing, overlay};
 use crate::render;
 use crate::scene::format_quantity_digits;
 use crate::simulate::ContactState;
@@ -183,7 +183,14 @@ impl Viewport {
             self.fit_pending = false;
             // The first picture of a scene starts where it should be.
             let first = self.list.size == [0, 0];
-            let goal = self.framed(player, self.goal.unwrap_or(self.camera), size, scale);
+            let mut goal = self.goal.unwrap_or(self.camera);
+            self.view.fit(
+                &mut goal,
+                player.scene(),
+                player.frame(),
+                &self.options,
+                size,
+            );
             if first {
                 self.camera = goal;
             } else {
@@ -236,21 +243,6 @@ impl Viewport {
             card.popup = card.popup.align(align);
             card.show(|ui| describe(ui, player, hit.what));
         }
-    }
-
-    /// `camera` moved so that everything drawn fills the picture.
-    fn framed(
-        &mut self,
-        player: &Player,
-        mut camera: Camera,
-        size: [u32; 2],
-        scale: f32,
-    ) -> Camera {
-        camera.fit(self.view.bounds(), size[0] as f32 / size[1] as f32);
-        let shot = shot!(self, player, &camera, size, scale);
-        self.view.build(&shot, Arc::make_mut(&mut self.list));
-        framing::frame(&mut camera, &self.list, size);
-        camera
     }
 
     fn drag(
