@@ -140,7 +140,9 @@ impl Mechanism {
         let model = &self.model;
         let mut tree = Tree::new(model);
         let mut y = model.start_state.clone();
-        if let Some(trajectory) = &model.trajectory {
+        if model.start == StartRule::Ideal
+            && let Some(trajectory) = &model.trajectory
+        {
             place_output_body(model, trajectory, &mut y);
             tree.forward(model, T, &y);
             turn_hinges(model, &tree.motion, &mut y);

@@ -168,4 +168,20 @@ mod tests {
         assert_eq!(error.position.map(|p| p.0), line_of(text, "[[ball_joint]]"));
         assert!(error.to_string().contains("ball joint B"), "{error}");
     }
+
+    #[test]
+    fn values_as_given_are_not_turned_to_the_closed_form() {
+        let text = built_in_text("spcmm").expect("built in");
+        let given = text
+            .replace("start = \"ideal\"", "start = \"as-given\"")
+            .replace("0.4106585548949 rad", "0.4111585548949 rad");
+        let scene = Scene::parse(&given, None, &[]).expect("reads");
+        let mut simulation = Simulation::new(&scene).expect("starts");
+        let mut frame = Frame::default();
+        simulation.sample(0.0, &mut frame);
+        let eccentricities = frame.joints.iter().map(|joint| joint.eccentricity.norm());
+        let most = eccentricities.fold(0.0, f64::max);
+        // Half a milliradian at the end of a rod of 200 mm.
+        assert!((most / 0.1e-3 - 1.0).abs() < 0.01, "{most}");
+    }
 }
