@@ -160,6 +160,22 @@ fn ideal_joints_that_repeat_one_another_are_refused() {
 }
 
 #[test]
+fn a_start_in_a_singular_pose_is_refused() {
+    // The slider plane level with the hinges: the rods cannot hold the platform.
+    for plane in ["175 mm", "174.9999999 mm", "175.000000001 mm"] {
+        for clearance in ["0", "0.3 mm"] {
+            let changes = [
+                ("spcmm.slider_plane", plane),
+                ("contact.clearance", clearance),
+            ];
+            let error = start_error(&scene("spcmm", &changes));
+            assert!(error.contains("singular pose"), "{error}");
+        }
+    }
+    simulation("spcmm", &[("spcmm.slider_plane", "174.99 mm")]);
+}
+
+#[test]
 fn a_drive_beyond_all_measure_stops_the_adaptive_method_too() {
     let text = built_in_text("slider-crank-driven").unwrap();
     let wild = text.replace("velocity = \"6 rad/s\"", "velocity = \"300000 rad/s\"");
