@@ -18,6 +18,14 @@ pub fn settled_penetration(stiffness: f64, force: f64) -> f64 {
     libm::cbrt((force / stiffness) * (force / stiffness))
 }
 
+/// Estimated duration of an impact of a mass `mass` (kg) at `speed` (m/s) on a contact of `stiffness` K and damping factor
+/// `damping`, s: 2.94 delta / v with the deepest penetration of Hertz's theory, shallower where the damping is strong.
+pub fn impact_duration(stiffness: f64, damping: f64, mass: f64, speed: f64) -> f64 {
+    let effective = stiffness * (1.0 + 0.5 * damping);
+    let deepest = libm::pow(1.25 * mass * speed * speed / effective, 0.4);
+    2.94 * deepest / speed
+}
+
 /// Damping factor chi of a law for the restitution asked for.
 ///
 /// - Lankarani & Nikravesh (1990): 3 (1 - ce^2) / 4, derived for ce near 1.
@@ -247,6 +255,20 @@ mod tests {
         assert_eq!(c.friction_ratio(1e-3), 0.15);
         let half = c.friction_ratio(0.5 * (1e-6 + 1e-4));
         assert!((half - 0.075).abs() < 1e-12);
+    }
+
+    #[test]
+    fn an_elastic_impact_lasts_as_long_as_estimated() {
+        // Deepest at half the time: x from m v dv = -K x^1.5 dx.
+        let (stiffness, mass, speed) = (8.84e10, 0.3, 0.077);
+        let estimate = impact_duration(stiffness, 0.0, mass, speed);
+        let (mut x, mut v, mut t, h) = (0.0_f64, speed, 0.0, 1e-9);
+        while x >= 0.0 {
+            v -= h * stiffness * x * x.sqrt() / mass;
+            x += h * v;
+            t += h;
+        }
+        assert!((t / estimate - 1.0).abs() < 2e-3, "{t:e} {estimate:e}");
     }
 
     #[test]

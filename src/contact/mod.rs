@@ -3,7 +3,8 @@
 mod law;
 
 pub use law::{
-    Coefficients, damping_factor, hertz_stiffness, restitution_given, settled_penetration,
+    Coefficients, damping_factor, hertz_stiffness, impact_duration, restitution_given,
+    settled_penetration,
 };
 
 /// Normal-force law of a contact.

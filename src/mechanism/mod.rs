@@ -28,6 +28,9 @@ use lagrange::Lagrange;
 use model::{Model, Motion};
 use tree::Tree;
 
+/// Smallest pivot ratio at which a start still has its velocities to three digits.
+const DEPENDENT_ROWS: f64 = 1e-13;
+
 /// Why a scene's equations cannot be set up.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MechanismError {
@@ -62,6 +65,12 @@ pub enum MechanismError {
         "the loops close on another branch than the drives ask for: start poses are too far off"
     )]
     OtherBranch,
+    /// A start pose in which the ideal joints do not fix the velocities.
+    #[error(
+        "the mechanism starts in a singular pose, in which its drives do not fix its velocities: \
+         move the start of the trajectory away from it"
+    )]
+    Singular,
     /// Too many coordinates for a method that solves with a dense matrix.
     #[error(
         "this scene has {velocities} velocity coordinates; the implicit methods take at most {most}: \
@@ -196,9 +205,11 @@ impl Mechanism {
                     distance,
                 });
             }
-            // The rows of a start that is only assembled need not be independent later.
-            if model.start == StartRule::AsGiven && constraints.least_pivot < 1e-13 {
-                return Err(MechanismError::Redundant);
+            if constraints.least_pivot < DEPENDENT_ROWS {
+                return Err(match model.start {
+                    StartRule::AsGiven => MechanismError::Redundant,
+                    StartRule::Ideal => MechanismError::Singular,
+                });
             }
         }
         Tree::normalise(model, &mut y);

@@ -5,6 +5,9 @@ use super::error::line_text;
 use super::*;
 use crate::contact::{self, FrictionLaw, NormalLaw};
 
+/// Fewer fixed steps than this do not resolve an impact; ten do.
+const LEAST_STEPS: f64 = 5.0;
+
 impl Scene {
     /// What must hold between the contact parameters of one joint.
     pub(super) fn check_contacts(&self) -> Result<(), Fault> {
@@ -53,17 +56,95 @@ impl Scene {
                 ));
             }
         }
-        let rattles = self
+        warnings.extend(self.step_warning());
+        warnings
+    }
+
+    /// That a fixed step is too long for the shortest impact to be expected, with one that is not.
+    fn step_warning(&self) -> Option<String> {
+        if self.solver.method.is_adaptive() {
+            return None;
+        }
+        let clearances = self
             .ball_joints
             .iter()
-            .any(|joint| joint.contact.clearance > 0.0);
-        if rattles && !self.solver.method.is_adaptive() && self.solver.step > 20e-6 {
-            warnings.push(format!(
-                "solver.step {}: an impact lasts about 0.1 ms, which a fixed step above 20 us does not resolve.",
-                format_quantity(self.solver.step, "us")
-            ));
+            .filter(|j| j.contact.clearance > 0.0);
+        let (joint, duration) = clearances
+            .map(|joint| (joint, self.impact_duration(joint)))
+            .min_by(|a, b| (a.1.0 / a.1.1).total_cmp(&(b.1.0 / b.1.1)))?;
+        let (impact, friction) = duration;
+        let duration = impact / friction;
+        if self.solver.step <= duration / LEAST_STEPS {
+            return None;
         }
-        warnings
+        // One, two or five of a decade: at least ten steps in the impact.
+        let most = duration / 10.0;
+        let decade = libm::pow(10.0, libm::floor(libm::log10(most)));
+        let digit = [5.0, 2.0, 1.0].into_iter().find(|d| d * decade <= most);
+        let recommended = digit.unwrap_or(1.0) * decade;
+        let why = if friction > 1.0 {
+            format!(
+                "friction at ball joint {} is estimated to reverse the sliding in",
+                joint.name
+            )
+        } else {
+            format!(
+                "an impact at ball joint {} is estimated to last",
+                joint.name
+            )
+        };
+        Some(format!(
+            "solver.step {}: {why} {}, which a fixed step this long does not resolve; use {} or less, or \
+             solver.method = automatic.",
+            format_quantity(self.solver.step, "us"),
+            format_quantity(libm::round(duration * 1e8) * 1e-8, "us"),
+            format_quantity(recommended, "us")
+        ))
+    }
+
+    /// Estimated duration of the first impact of a joint with clearance, s, whose bodies fall freely through the gap; and
+    /// how many times within it friction could reverse a sliding as fast as the approach, at least 1.
+    fn impact_duration(&self, joint: &BallJoint) -> (f64, f64) {
+        let c = &joint.contact;
+        let coefficients = contact::Coefficients::new(c, c.clearance);
+        // Inverse masses felt at the ball's centre and in sliding: a force there also turns the body.
+        let (mut normal, mut sliding) = (0.0, 0.0);
+        for attachment in [&joint.ball, &joint.socket] {
+            let Some(body) = attachment.body.map(|b| &self.bodies[b]) else {
+                continue;
+            };
+            let driven = self.joints.iter().any(|j| {
+                Some(j.child) == attachment.body
+                    && (j.drive.is_some() || j.kind == JointKind::Fixed)
+            });
+            if driven {
+                continue;
+            }
+            let arm = (attachment.point - body.centre).norm_squared();
+            let moments = body.inertia.symmetric_eigenvalues();
+            let at_centre = 1.0 / body.mass + arm / moments.max();
+            normal += at_centre;
+            let turning = match c.friction_velocity {
+                contact::FrictionVelocity::Surface => c.ball_radius * c.ball_radius / moments.min(),
+                contact::FrictionVelocity::Centres => 0.0,
+            };
+            sliding += at_centre + turning;
+        }
+        if normal == 0.0 {
+            return (f64::INFINITY, 1.0);
+        }
+        let fall = (2.0 * self.gravity.norm() * c.clearance).sqrt();
+        let speed = fall.max(c.impact_speed_floor);
+        let duration = contact::impact_duration(
+            coefficients.stiffness,
+            coefficients.damping,
+            1.0 / normal,
+            speed,
+        );
+        (
+            duration,
+            (coefficients.friction * sliding / normal).max(1.0),
+        )
     }
 
     /// An error found when the scene starts, about what `title` names (see [`Source::places`]): it points to that

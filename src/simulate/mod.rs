@@ -37,9 +37,9 @@ impl StartError {
             (format!("joint.{joint}"), keys)
         };
         let (title, keys) = match &self.0 {
-            MechanismError::Unreachable(_) | MechanismError::OtherBranch => {
-                ("spcmm".to_owned(), vec!["spcmm.".to_owned()])
-            }
+            MechanismError::Unreachable(_)
+            | MechanismError::OtherBranch
+            | MechanismError::Singular => ("spcmm".to_owned(), vec!["spcmm.".to_owned()]),
             MechanismError::Open { joint, .. } => one(joint, &["clearance"]),
             MechanismError::OutsideSocket { joint, .. } => {
                 one(joint, &["clearance", "ball_radius"])

@@ -20,9 +20,11 @@ impl Simulation {
                 continue;
             }
             let (start, end) = (state.gaps0[j], state.gaps[j]);
-            // A located switch ends within rounding of the wall, on either side.
+            // A located switch ends within rounding of the wall, on either side; but the step taken again may show that a
+            // ball that was about to separate turned around before.
+            let turned = state.memory[j].active && end.penetration > 0.0 && end.rate > 0.0;
             let touching = if located == Some(j) {
-                !state.memory[j].active
+                !state.memory[j].active || turned
             } else {
                 end.penetration > 0.0
             };
