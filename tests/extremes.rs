@@ -15,7 +15,7 @@ use jointplay::simulate::{Frame, JointReport, Simulation};
 const DURATION: f64 = 0.03;
 const SETTLED: f64 = 0.5;
 /// Evaluations of the equations after which a run has done enough, and that no single step may take.
-const MOST_EVALUATIONS: u64 = 12_000;
+const MOST_EVALUATIONS: u64 = 16_000;
 const MOST_IN_A_STEP: u64 = 2000;
 /// Wall time of one call beyond which it hangs.
 const HANG: Duration = Duration::from_secs(1);
@@ -445,7 +445,7 @@ fn run(row: &Row, form: &str, method: &str) -> Outcome {
         * if form == "tree" {
             MOST_EVALUATIONS
         } else {
-            MOST_EVALUATIONS / 4
+            MOST_EVALUATIONS / 2
         };
     let mut steps = 0_u64;
     loop {
