@@ -456,8 +456,9 @@ mod tests {
         let mut player = player("spcmm");
         player.set("solver.tolerance", "1e-9").expect("in range");
         player.set("solver.preset", "accurate").expect("a preset");
-        assert_eq!(player.wanted().solver.tolerance, 1e-7);
-        assert_eq!(player.scene().solver.tolerance, 1e-7);
+        let (_, _, tolerance) = crate::scene::Preset::Accurate.point();
+        assert_eq!(player.wanted().solver.tolerance, tolerance);
+        assert_eq!(player.scene().solver.tolerance, tolerance);
         player.set("solver.tolerance", "1e-9").expect("in range");
         assert_eq!(player.scene().solver.tolerance, 1e-9);
         assert!(player.beats_preset().is_empty());

@@ -23,7 +23,10 @@ pub struct Ideal {
 
 /// A trajectory that a rod cannot follow.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("slider {slider}: rod too short at t = {time:.4} s: needs {needs:.4} m, has {has:.4} m")]
+#[error(
+    "slider {slider}: rod too short at t = {time:.4} s: needs {needs:.4} m, has {has:.4} m, {:.1e} m less",
+    needs - has
+)]
 pub struct Unreachable {
     /// 1, 2 or 3.
     pub slider: u8,

@@ -8,6 +8,9 @@ use crate::contact::{self, FrictionLaw, NormalLaw};
 /// Fewer fixed steps than this do not resolve an impact; ten do.
 const LEAST_STEPS: f64 = 5.0;
 
+/// Loosest tolerance at which impacts keep their energy to a few per cent.
+const LOOSEST: f64 = 1e-3;
+
 impl Scene {
     /// What must hold between the contact parameters of one joint.
     pub(super) fn check_contacts(&self) -> Result<(), Fault> {
@@ -57,7 +60,20 @@ impl Scene {
             }
         }
         warnings.extend(self.step_warning());
+        warnings.extend(self.tolerance_warning());
         warnings
+    }
+
+    /// That a tolerance is too loose for impacts.
+    fn tolerance_warning(&self) -> Option<String> {
+        let rattles = self.ball_joints.iter().any(|j| j.contact.clearance > 0.0);
+        let loose = self.solver.method.is_adaptive() && self.solver.tolerance > LOOSEST;
+        (rattles && loose).then(|| {
+            format!(
+                "solver.tolerance {:e}: impacts may gain or lose much of their energy; use {LOOSEST:e} or less.",
+                self.solver.tolerance
+            )
+        })
     }
 
     /// That a fixed step is too long for the shortest impact to be expected, with one that is not.
