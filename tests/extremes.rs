@@ -5,7 +5,7 @@ mod common;
 use std::fmt::Write;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use common::{METHODS, frame_now};
 use jointplay::scene::{BallJoint, JointStart, Scene, Vec3};
@@ -17,9 +17,8 @@ const SETTLED: f64 = 0.5;
 /// Evaluations of the equations after which a run has done enough, and that no single step may take.
 const MOST_EVALUATIONS: u64 = 16_000;
 const MOST_IN_A_STEP: u64 = 2000;
-/// Wall time of one call beyond which it hangs.
-const HANG: Duration = Duration::from_secs(1);
-const DEAD: Duration = Duration::from_secs(20);
+/// Without a result for so long a call hangs; work is counted in evaluations, so that a busy machine fails nothing.
+const DEAD: Duration = Duration::from_secs(60);
 /// Penetration over ball radius beyond which a ball has left its socket.
 const OUT_OF_SOCKET: f64 = 0.1;
 /// Energy that a passive scene may gain, of that exchanged: a method of order 1 with ten steps in an impact, and the others.
@@ -450,12 +449,7 @@ fn run(row: &Row, form: &str, method: &str) -> Outcome {
     let mut steps = 0_u64;
     loop {
         let before = simulation.statistics().evaluations;
-        let clock = Instant::now();
         let result = simulation.step_until(row.duration);
-        let took = clock.elapsed();
-        if took > HANG {
-            return Outcome::Wrong(format!("a step took {took:.1?}"));
-        }
         if let Err(stopped) = result {
             let hash = simulation.state_hash();
             frame = frame_now(&mut simulation);
