@@ -24,8 +24,8 @@ pub struct Ideal {
 /// A trajectory that a rod cannot follow.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
-    "slider {slider}: rod too short at t = {time:.4} s: needs {needs:.4} m, has {has:.4} m, {:.1e} m less",
-    needs - has
+    "slider {slider}: rod too short at t = {time:.4} s: needs {needs:.digits$} m, has {has:.digits$} m",
+    digits = self.digits()
 )]
 pub struct Unreachable {
     /// 1, 2 or 3.
@@ -36,6 +36,14 @@ pub struct Unreachable {
     pub needs: f64,
     /// L2, m.
     pub has: f64,
+}
+
+impl Unreachable {
+    /// Decimals that tell the two lengths apart, four at least.
+    fn digits(&self) -> usize {
+        let missing = libm::log10((self.needs - self.has).max(1e-12));
+        (1.0 - missing.floor()).clamp(4.0, 12.0) as usize
+    }
 }
 
 /// What depends on the parameters alone.
@@ -264,6 +272,15 @@ mod tests {
         };
         let error = Trajectory::new(&p).check().unwrap_err();
         assert_eq!(error.slider, 1);
+        let near = Unreachable {
+            needs: 0.200_000_3,
+            ..error
+        };
+        assert!(
+            near.to_string()
+                .ends_with("needs 0.20000030 m, has 0.20000000 m"),
+            "{near}"
+        );
         assert!(error.needs > 0.2, "{error}");
     }
 }
