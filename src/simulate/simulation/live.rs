@@ -86,6 +86,7 @@ impl Simulation {
             self.state.h_next = self.state.h_next.min(solver.step);
         }
         self.refresh();
+        self.book_change();
         Ok(Effect::Now)
     }
 
@@ -151,6 +152,7 @@ impl Simulation {
         }
         if finished {
             self.refresh();
+            self.book_change();
         }
     }
 }
