@@ -203,7 +203,7 @@ fn the_residual_is_the_error_of_the_integration() {
 fn live_changes_are_booked() {
     for method in ["automatic", "rk4"] {
         let mut simulation = simulation("spcmm", &[("solver.method", method)]);
-        let bound = if method == "rk4" { 1e-3 } else { PROMISE };
+        let bound = PROMISE;
         simulation.advance_to(0.4).unwrap();
         // Settled: the balls stand against their walls, which close now.
         simulation.set("contact.clearance", "0.29 mm").unwrap();

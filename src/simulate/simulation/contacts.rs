@@ -50,10 +50,10 @@ impl Simulation {
                 let floor = coefficients.speed_floor;
                 let time = state.t0 + theta * h;
                 let asked = running.ball_joints[j].contact.restitution;
-                let touching = state.memory.iter().any(|m| m.active);
+                let among_others = state.memory.iter().any(|m| m.active);
                 state
                     .impacts
-                    .begin(j, time, rate, asked, coefficients, touching);
+                    .begin(j, time, rate, asked, coefficients, among_others);
                 // A located one begins where the step ends.
                 if mechanism.contacts.switching == Switching::Immediate {
                     state.impacts.follow(j, &course, coefficients);
