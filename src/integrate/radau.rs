@@ -79,6 +79,9 @@ pub struct Radau {
 }
 
 impl Radau {
+    /// Its instants within a step; the third is the end. The polynomial through a quantity there has the step's own order.
+    pub const INTERIOR: [f64; 2] = [C[0], C[1]];
+
     /// For `dimension` components.
     pub fn new(dimension: usize) -> Self {
         let triple = || std::array::from_fn(|_| vec![0.0; dimension]);

@@ -10,6 +10,7 @@ mod jet;
 mod kinematics;
 mod lagrange;
 mod model;
+mod power;
 mod spcmm;
 mod stiff;
 mod summary;
@@ -18,6 +19,7 @@ mod tree;
 pub use contacts::{Contacts, Gap, Memory, Ramp, Switching};
 pub use jet::Jet;
 pub use kinematics::{Kinematics, Wrench};
+pub use power::Powers;
 pub use spcmm::{Ideal, Trajectory, Unreachable};
 pub use summary::Summary;
 
@@ -106,6 +108,9 @@ pub struct Mechanism {
     joint_names: Vec<String>,
     /// Linearisation; made where an implicit method is chosen.
     stiff: Option<Box<stiff::Stiff>>,
+    sources: power::Sources,
+    /// Instant at which motion and forces are those of the latest evaluation, s; NaN where something was measured since.
+    evaluated: f64,
     /// Evaluations of the equations of motion so far.
     pub evaluations: u64,
 }
@@ -130,6 +135,8 @@ impl Mechanism {
             Formulation::Lagrange => Form::Lagrange(Box::new(Lagrange::new(scene, &model))),
         };
         Ok(Self {
+            sources: power::Sources::new(&model, matches!(form, Form::Tree { .. })),
+            evaluated: f64::NAN,
             model,
             form,
             contacts,
@@ -285,6 +292,7 @@ impl Mechanism {
 
     /// After a step: orientations back to unit length, loops closed again. Returns the closure error left, m.
     pub fn project(&mut self, t: f64, y: &mut [f64]) -> f64 {
+        self.evaluated = f64::NAN;
         let Self { model, form, .. } = self;
         match form {
             Form::Tree { tree, constraints } => {
@@ -302,6 +310,7 @@ impl Mechanism {
 
     /// Poses, velocities and gaps at (t, y), without forces.
     pub fn measure(&mut self, t: f64, y: &[f64]) {
+        self.evaluated = f64::NAN;
         let Self {
             model,
             form,
@@ -324,6 +333,7 @@ impl Mechanism {
     /// reactions and actuator forces.
     pub fn evaluate_fully(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
         self.derivative(t, y, dy);
+        self.evaluated = f64::NAN;
         let nq = self.positions();
         let Self {
             model,
@@ -411,20 +421,18 @@ impl Mechanism {
                 }
             }
             Form::Tree { tree, constraints } => {
-                let mut load = |anchor: &model::Anchor, force: Vec3| {
-                    let arm = tree.motion[anchor.body].rotation * anchor.offset;
-                    let w = &mut tree.wrench[anchor.body];
-                    w.force += force;
-                    w.torque += arm.cross(&force);
-                };
                 if let Some(constraints) = constraints {
-                    for (k, &j) in model.ideal_joints.iter().enumerate() {
-                        let force = constraints.reaction(k);
-                        load(&model.joints[j].ball, force);
-                        load(&model.joints[j].socket, -force);
-                    }
+                    load_reactions(model, tree, constraints);
                 }
-                inverse_dynamics(model, tree, gravity, out);
+                let Tree { motion, wrench, .. } = &mut **tree;
+                power::inverse_dynamics(
+                    model,
+                    motion,
+                    wrench,
+                    gravity,
+                    |_| true,
+                    |drive, force| out[drive] = force,
+                );
             }
         }
     }
@@ -502,33 +510,18 @@ fn turn_hinges(model: &Model, motion: &[Kinematics], y: &mut [f64]) {
     }
 }
 
-/// Forces that the drives must give for the true accelerations in `tree.motion` under the loads in `tree.wrench`.
-fn inverse_dynamics(model: &Model, tree: &mut Tree, gravity: &Vec3, out: &mut [f64]) {
-    for (b, body) in model.bodies.iter().enumerate() {
-        let m = &tree.motion[b];
-        let w = m.rotation.tr_mul(&m.angular_velocity);
-        let alpha = m.rotation.tr_mul(&m.angular_acceleration);
-        let torque = m.rotation * (body.inertia * alpha + w.cross(&(body.inertia * w)));
-        let load = &mut tree.wrench[b];
-        load.force = (m.acceleration - gravity) * body.mass - load.force;
-        load.torque = torque - load.torque;
-    }
-    for (b, body) in model.bodies.iter().enumerate().rev() {
-        let m = &tree.motion[b];
-        let needed = tree.wrench[b];
-        if let Motion::Driven { drive, revolute } = body.motion {
-            out[drive] = if revolute {
-                m.axis.dot(&(needed.torque + m.arm.cross(&needed.force)))
-            } else {
-                m.axis.dot(&needed.force)
-            };
-        }
-        if body.parent < model.bodies.len() {
-            let d = m.position - tree.motion[body.parent].position;
-            let parent = &mut tree.wrench[body.parent];
-            parent.force += needed.force;
-            parent.torque += needed.torque + d.cross(&needed.force);
-        }
+/// Adds the reactions of the ideal joints to the loads on the bodies.
+fn load_reactions(model: &Model, tree: &mut Tree, constraints: &Constraints) {
+    let mut load = |anchor: &model::Anchor, force: Vec3| {
+        let arm = tree.motion[anchor.body].rotation * anchor.offset;
+        let w = &mut tree.wrench[anchor.body];
+        w.force += force;
+        w.torque += arm.cross(&force);
+    };
+    for (k, &j) in model.ideal_joints.iter().enumerate() {
+        let force = constraints.reaction(k);
+        load(&model.joints[j].ball, force);
+        load(&model.joints[j].socket, -force);
     }
 }
 
@@ -549,6 +542,7 @@ impl System for Mechanism {
 
     fn derivative(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
         self.evaluations += 1;
+        self.evaluated = t;
         let Self {
             model,
             form,

@@ -250,6 +250,9 @@ impl Scene {
                 Some(preset) => word(&table::PRESETS, &PRESETS, preset),
                 None => Value::Unset,
             },
+            "solver.energy_ledger" => {
+                word(&table::SWITCHES, &[true, false], &self.solver.energy_ledger)
+            }
             "view.down" => word(&table::AXES, &AXES, &self.view.down),
             other => unreachable!("{other} has no field"),
         })
@@ -400,6 +403,9 @@ impl Scene {
             ("solver.step", _) => self.solver.step = number(value),
             ("solver.tolerance", _) => self.solver.tolerance = number(value),
             ("solver.preset", _) => self.apply_preset(item(&table::PRESETS, &PRESETS, value)),
+            ("solver.energy_ledger", _) => {
+                self.solver.energy_ledger = item(&table::SWITCHES, &[true, false], value);
+            }
             ("view.down", _) => self.view.down = item(&table::AXES, &AXES, value),
             _ => unreachable!("{key} has no field here"),
         }

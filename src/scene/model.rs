@@ -112,6 +112,8 @@ pub struct Solver {
     pub step: f64,
     /// Relative tolerance of an adaptive method.
     pub tolerance: f64,
+    /// Whether the energy ledger is kept.
+    pub energy_ledger: bool,
 }
 
 impl Preset {

@@ -192,6 +192,7 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
             method: crate::integrate::Method::Automatic,
             step: 0.0,
             tolerance: 0.0,
+            energy_ledger: true,
         },
         spcmm,
         chain: top.get("chain").map(|_| Chain { links: 0 }),

@@ -28,6 +28,7 @@ pub(super) const METHODS: [&str; 6] = [
     "automatic",
 ];
 pub(super) const PRESETS: [&str; 4] = ["preview", "real-time", "accurate", "reference"];
+pub(super) const SWITCHES: [&str; 2] = ["on", "off"];
 pub(super) const AXES: [&str; 6] = ["+x", "-x", "+y", "-y", "+z", "-z"];
 
 /// A row that takes effect at once; the functions below change that where it is otherwise.
@@ -152,7 +153,7 @@ const fn gravity(
     )
 }
 
-static TABLE: [Parameter; 26] = [
+static TABLE: [Parameter; 27] = [
     contact(
         "contact.clearance",
         "Clearance",
@@ -388,6 +389,17 @@ static TABLE: [Parameter; 26] = [
          accurate (automatic, 1e-6), reference (dopri5, 1e-11). A method, step or tolerance that is set as well wins over the preset.",
         "Solves paper eqs. (55), (58) in time",
     ),
+    at_reset(row(
+        "solver.energy_ledger",
+        "Energy ledger",
+        "Solver",
+        Kind::Choice(&SWITCHES),
+        Value::Choice("on"),
+        Scope::Every,
+        "Keeps count of where the energy comes from and where it goes: drives, gravity, contacts, losses, and the \
+         residual, which is the error of the integration. It changes no step; without it a run is a little faster.",
+        "Integrals of force times velocity; power of friction from (20) at the points of (24)",
+    )),
     row(
         "view.down",
         "Down on screen",

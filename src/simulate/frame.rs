@@ -1,5 +1,6 @@
 //! One instant of a simulation as plain data: what the outputs write and the view draws.
 
+use super::Ledger;
 use crate::scene::{Mat3, Vec3};
 
 /// Everything that is reported about one instant. SI units, world axes.
@@ -23,6 +24,8 @@ pub struct Frame {
     pub elastic: f64,
     /// Probe tip minus the tip of the ideal mechanism at the same time, m; `None` where the scene has no such reference.
     pub probe_error: Option<Vec3>,
+    /// Energy moved since the start; `None` where `solver.energy_ledger` is off.
+    pub ledger: Option<Ledger>,
 }
 
 /// Motion of a body's frame.

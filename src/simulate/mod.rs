@@ -4,6 +4,8 @@ mod angles;
 mod channels;
 mod frame;
 mod history;
+mod impacts;
+mod ledger;
 mod pace;
 mod peaks;
 mod report;
@@ -14,6 +16,8 @@ pub use angles::angles_of;
 pub use channels::*;
 pub use frame::*;
 pub use history::History;
+pub use impacts::Impact;
+pub use ledger::Ledger;
 pub use pace::{LARGEST_BUDGET, LONGEST_FRAME, Pacer, SCALE_RANGE};
 pub use simulation::{CLEARANCE_SPEED, Simulation};
 

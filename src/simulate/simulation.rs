@@ -3,10 +3,13 @@
 mod adaptive;
 mod automatic;
 mod contacts;
+mod energy;
 mod guard;
 mod live;
 mod snapshot;
 
+use super::impacts::{Impact, Impacts};
+use super::ledger::Account;
 use super::peaks::{Approach, Recent};
 use super::stepper::AnyStepper;
 use super::{Frame, Peak, StartError, Statistics, Stopped, report};
@@ -92,6 +95,8 @@ pub(super) struct State {
     /// Fixed steps are counted from here, so that times do not accumulate rounding.
     grid_origin: f64,
     grid_count: u64,
+    account: Account,
+    impacts: Impacts,
     statistics: Statistics,
 }
 
@@ -134,6 +139,8 @@ impl Simulation {
                 controller: controller_of(scene.solver.method, false),
                 grid_origin: 0.0,
                 grid_count: 0,
+                account: Account::default(),
+                impacts: Impacts::new(joints),
                 statistics: Statistics {
                     impacts: vec![0; joints],
                     floored: vec![0; joints],
@@ -162,6 +169,7 @@ impl Simulation {
             return Err(MechanismError::OtherBranch.into());
         }
         simulation.track_peaks(0.0);
+        simulation.open_account();
         Ok(simulation)
     }
 
@@ -415,6 +423,7 @@ impl Simulation {
             .max(mechanism.constraint_drift());
         let switched = self.switch_contacts(h);
         self.track_peaks(h);
+        self.book_step(h, switched);
         if switched && self.mechanism.contacts.switching == Switching::Immediate {
             // The force now divides by the approach speed just found.
             let Self {
@@ -446,9 +455,17 @@ impl Simulation {
     /// Everything at `time`, interpolated within the latest step; forces come from the interpolated state.
     /// Allocates only while `out` is too small.
     pub fn sample(&mut self, time: f64, out: &mut Frame) {
+        let h = self.state.t - self.state.t0;
+        let time = time.clamp(self.state.t0, self.state.t);
+        let inside = h > 0.0 && time < self.state.t;
+        if inside {
+            let theta = (time - self.state.t0) / h;
+            self.interpolate(theta, h);
+        } else {
+            self.scratch_y.copy_from_slice(&self.state.y);
+        }
         let Self {
             mechanism,
-            stepper,
             state,
             scratch_y,
             scratch_k,
@@ -456,23 +473,8 @@ impl Simulation {
             ..
         } = self;
         let counts = (mechanism.evaluations, mechanism.contacts.evaluations);
-        let h = state.t - state.t0;
-        let time = time.clamp(state.t0, state.t);
-        let inside = h > 0.0 && time < state.t;
         if inside {
-            let theta = (time - state.t0) / h;
-            if mechanism.is_kinematic() {
-                hermite(
-                    theta, h, &state.y0, &state.k0, &state.y, &state.k, scratch_y,
-                );
-            } else {
-                stepper.interpolate(
-                    theta, h, &state.y0, &state.k0, &state.y, &state.k, scratch_y,
-                );
-            }
             mechanism.project(time, scratch_y);
-        } else {
-            scratch_y.copy_from_slice(&state.y);
         }
         let memory = if inside {
             &state.memory0
@@ -487,6 +489,24 @@ impl Simulation {
         mechanism.evaluate_fully(time, scratch_y, scratch_k);
         report::fill(mechanism, &self.running, time, out);
         (mechanism.evaluations, mechanism.contacts.evaluations) = counts;
+        out.ledger = self.ledger_of(out);
+    }
+
+    /// State at the part `theta` of the latest step, of size `h`, into the scratch state, as the method interpolates it.
+    fn interpolate(&mut self, theta: f64, h: f64) {
+        let Self {
+            mechanism,
+            stepper,
+            state,
+            scratch_y,
+            ..
+        } = self;
+        let (y0, k0, y, k) = (&state.y0, &state.k0, &state.y, &state.k);
+        if mechanism.is_kinematic() {
+            hermite(theta, h, y0, k0, y, k, scratch_y);
+        } else {
+            stepper.interpolate(theta, h, y0, k0, y, k, scratch_y);
+        }
     }
 
     /// Peaks per ball joint since the last call, written to `out` in joint order, and forgotten here.
@@ -494,6 +514,17 @@ impl Simulation {
         out.clear();
         out.extend_from_slice(&self.peaks);
         self.peaks.fill(Peak::default());
+    }
+
+    /// The latest finished impacts, at most 64, the oldest first.
+    pub fn impacts(&self) -> impl ExactSizeIterator<Item = &Impact> + DoubleEndedIterator {
+        self.state.impacts.latest()
+    }
+
+    /// Appends to `out` the impacts that finished since the last call. None is lost if it is called after every step;
+    /// otherwise only the latest 64 (more where there are more ball joints) are sure to be there.
+    pub fn take_impacts(&mut self, out: &mut Vec<Impact>) {
+        self.state.impacts.hand_out(out);
     }
 
     /// Back to t = 0 with the parameters as they are now, those that wait for a reset included.

@@ -105,6 +105,15 @@ impl AnyStepper {
         }
     }
 
+    /// Where within a step an integral over it reads what it integrates: the middle, to go with both ends, or a
+    /// collocation method's own instants, between which its polynomial leaves stiff contacts.
+    pub(super) fn interior(&self) -> &'static [f64] {
+        match self {
+            Self::Radau(_) | Self::Pair { implicit: true, .. } => &Radau::INTERIOR,
+            _ => &[0.5],
+        }
+    }
+
     /// Whether `attempt` leaves the derivative at the end.
     pub(super) fn ends_with_derivative(&self) -> bool {
         !matches!(self, Self::SemiImplicitEuler(_) | Self::RungeKutta4(_))

@@ -86,6 +86,7 @@ impl Simulation {
             self.state.h_next = self.state.h_next.min(solver.step);
         }
         self.refresh();
+        self.book_change();
         Ok(Effect::Now)
     }
 
@@ -120,6 +121,7 @@ impl Simulation {
         if state.memory[j].active && distance <= clearance {
             state.memory[j] = Memory::default();
         }
+        state.impacts.change(j, state.memory[j].active);
     }
 
     /// When the first clearance under way arrives, s.
@@ -151,6 +153,7 @@ impl Simulation {
         }
         if finished {
             self.refresh();
+            self.book_change();
         }
     }
 }

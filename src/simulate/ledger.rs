@@ -1,0 +1,339 @@
+//! Where the energy came from and where it went: works by quadrature of powers, against the change of the energies.
+
+use crate::mechanism::Powers;
+
+/// Energy moved since the start, J. Each work comes from the forces that do it, none from the energies, so that what does
+/// not add up is the error of the integration: [`Self::residual`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Ledger {
+    /// Given by the drives: actuator force times rate.
+    pub drive_work: f64,
+    /// Given by gravity, minus the change of its potential.
+    pub gravity_work: f64,
+    /// Change of the kinetic energy of all bodies.
+    pub kinetic_change: f64,
+    /// Change of the elastic energy in the contacts.
+    pub elastic_change: f64,
+    /// Taken by the damping part of the normal forces, the cut at 0 included.
+    pub restitution_loss: f64,
+    /// Taken by friction, with the velocities of the two points at which it acts. Where friction reads the centres'
+    /// velocity it may be negative: the force then drives the surfaces.
+    pub friction_loss: f64,
+    /// Given by clearances on their way to a new value.
+    pub clearance_work: f64,
+    /// Put into the contacts by changed parameters: jumps of their elastic energy.
+    pub change_work: f64,
+    /// Energy exchanged: half the sum, over all steps, of the sizes of all terms, for each joule leaves one and arrives at
+    /// another.
+    pub exchanged: f64,
+}
+
+impl Ledger {
+    /// Energy that nothing accounts for, J: positive where it came from nowhere.
+    pub fn residual(&self) -> f64 {
+        let given = self.drive_work + self.gravity_work + self.clearance_work + self.change_work;
+        let taken = self.restitution_loss + self.friction_loss;
+        self.kinetic_change + self.elastic_change - (given - taken)
+    }
+
+    /// Residual over the energy exchanged; 0 where none was.
+    pub fn relative_residual(&self) -> f64 {
+        if self.exchanged > 0.0 {
+            self.residual() / self.exchanged
+        } else {
+            0.0
+        }
+    }
+}
+
+/// Energies at one instant, J.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Energies {
+    pub kinetic: f64,
+    pub gravitational: f64,
+    pub elastic: f64,
+}
+
+/// Most instants that a quadrature uses.
+const NODES: usize = 6;
+/// Weights of six even instants for the interval between the last two: Adams and Moulton's (Hairer, Nørsett & Wanner,
+/// *Solving Ordinary Differential Equations I*, III.1).
+const EVEN: [f64; NODES] = [
+    27.0 / 1440.0,
+    -173.0 / 1440.0,
+    482.0 / 1440.0,
+    -798.0 / 1440.0,
+    1427.0 / 1440.0,
+    475.0 / 1440.0,
+];
+/// Instants that are even to this part of their interval: the weights are then right to as much.
+const EVENLY: f64 = 1e-9;
+
+/// Powers at some instants, and the polynomial through them.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct PowerCourse {
+    times: [f64; NODES],
+    powers: [Powers; NODES],
+    count: usize,
+}
+
+impl PowerCourse {
+    pub(super) fn len(&self) -> usize {
+        self.count
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.count = 0;
+    }
+
+    /// Adds an instant; the oldest makes room.
+    pub(super) fn push(&mut self, time: f64, powers: Powers) {
+        if self.count == NODES {
+            self.times.copy_within(1.., 0);
+            self.powers.copy_within(1.., 0);
+            self.count -= 1;
+        }
+        self.times[self.count] = time;
+        self.powers[self.count] = powers;
+        self.count += 1;
+    }
+
+    /// Adds an instant; those that lie closer than `apart` before the latest are dropped.
+    pub(super) fn push_apart(&mut self, time: f64, powers: Powers, apart: f64) {
+        while let [.., before, latest] = self.times[..self.count]
+            && latest - before < apart
+        {
+            let last = self.count - 1;
+            self.times[last - 1] = latest;
+            self.powers[last - 1] = self.powers[last];
+            self.count = last;
+        }
+        self.push(time, powers);
+    }
+
+    /// The same with its times in steps of size `h` from `from`.
+    pub(super) fn seen_from(&self, from: f64, h: f64) -> Self {
+        let mut seen = *self;
+        for time in &mut seen.times[..self.count] {
+            *time = (*time - from) / h;
+        }
+        seen
+    }
+
+    /// Integral of the polynomial from 0 to `end`.
+    pub(super) fn integral(&self, end: f64) -> Powers {
+        let mut sum = Powers::default();
+        let nodes = &self.times[..self.count];
+        let even = |(i, x): (usize, &f64)| (x - (i as f64 - 4.0)).abs() < EVENLY;
+        if end == 1.0 && nodes.len() == NODES && nodes.iter().enumerate().all(even) {
+            for (weight, powers) in EVEN.iter().zip(&self.powers) {
+                sum.add(*weight, powers);
+            }
+            return sum;
+        }
+        for (i, x) in nodes.iter().enumerate() {
+            // Lagrange's polynomial of this node by its coefficients, lowest first.
+            let mut coefficients = [0.0; NODES + 1];
+            coefficients[0] = 1.0;
+            let others = nodes.iter().enumerate().filter(|&(j, _)| j != i);
+            for (degree, (_, other)) in others.enumerate() {
+                let scale = 1.0 / (x - other);
+                for k in (0..=degree + 1).rev() {
+                    let below = if k > 0 { coefficients[k - 1] } else { 0.0 };
+                    coefficients[k] = (below - other * coefficients[k]) * scale;
+                }
+            }
+            let terms = (0..nodes.len()).rev();
+            let weight = terms.fold(0.0, |sum, k| end * (sum + coefficients[k] / (k + 1) as f64));
+            sum.add(weight, &self.powers[i]);
+        }
+        sum
+    }
+}
+
+/// The ledger of a running simulation, at both ends of the latest step: part of its state.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Account {
+    /// Whether it is kept.
+    pub on: bool,
+    /// Start and end of the latest step.
+    before: (Ledger, Energies),
+    now: (Ledger, Energies),
+    /// Powers over the latest step, which goes from 0 to 1: what its works are integrated from.
+    pub course: PowerCourse,
+    /// Powers at the ends of past steps, by time, where the motion is a function of time alone.
+    pub past: PowerCourse,
+    /// Powers now, where they are known.
+    pub powers: Option<Powers>,
+}
+
+impl Account {
+    /// An account that starts with these energies.
+    pub(super) fn start(on: bool, energies: Energies) -> Self {
+        let entry = (Ledger::default(), energies);
+        Self {
+            on,
+            before: entry,
+            now: entry,
+            ..Self::default()
+        }
+    }
+
+    /// Books a step of size `h` that ends with `energies`, by the powers in `course`.
+    pub(super) fn book(&mut self, h: f64, energies: Energies) {
+        self.before = self.now;
+        self.now = (self.within(1.0, h, energies), energies);
+    }
+
+    /// Books a change of parameters, not of the motion: the energies that go with the new ones.
+    pub(super) fn book_change(&mut self, energies: Energies) {
+        let (ledger, before) = &mut self.now;
+        let jump = energies.elastic - before.elastic;
+        ledger.change_work += jump;
+        ledger.elastic_change += jump;
+        ledger.exchanged += jump.abs();
+        *before = energies;
+        self.before = self.now;
+        self.powers = None;
+        self.course.clear();
+        self.past.clear();
+    }
+
+    /// At the end of the latest step.
+    pub(super) fn ledger(&self) -> &Ledger {
+        &self.now.0
+    }
+
+    /// At the part `theta` of the latest step, of size `h`, where the energies are these.
+    pub(super) fn within(&self, theta: f64, h: f64, energies: Energies) -> Ledger {
+        let (ledger, start) = &self.before;
+        let mut works = Powers::default();
+        works.add(h, &self.course.integral(theta));
+        entered(ledger, start, energies, &works)
+    }
+}
+
+/// `ledger` with what happened since it stood at the energies `start`.
+fn entered(ledger: &Ledger, start: &Energies, end: Energies, works: &Powers) -> Ledger {
+    let gravity = start.gravitational - end.gravitational;
+    let kinetic = end.kinetic - start.kinetic;
+    let elastic = end.elastic - start.elastic;
+    let moved = works.drive.abs()
+        + gravity.abs()
+        + kinetic.abs()
+        + elastic.abs()
+        + works.restitution.abs()
+        + works.friction.abs()
+        + works.clearance.abs();
+    Ledger {
+        drive_work: ledger.drive_work + works.drive,
+        gravity_work: ledger.gravity_work + gravity,
+        kinetic_change: ledger.kinetic_change + kinetic,
+        elastic_change: ledger.elastic_change + elastic,
+        restitution_loss: ledger.restitution_loss + works.restitution,
+        friction_loss: ledger.friction_loss + works.friction,
+        clearance_work: ledger.clearance_work + works.clearance,
+        change_work: ledger.change_work,
+        exchanged: ledger.exchanged + 0.5 * moved,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn drive(power: f64) -> Powers {
+        Powers {
+            drive: power,
+            ..Powers::default()
+        }
+    }
+
+    #[test]
+    fn a_course_integrates_the_polynomial_through_its_instants() {
+        // Of degree 5 through six uneven instants, four of them before the interval.
+        let p = |t: f64| 1.0 + t * (2.0 - t * (3.0 - t * (0.5 + t * (0.25 - t))));
+        let integral =
+            |t: f64| t + t * t - t.powi(3) + 0.125 * t.powi(4) + 0.05 * t.powi(5) - t.powi(6) / 6.0;
+        let mut course = PowerCourse::default();
+        for t in [-9.0, -0.9, -0.5, -0.2, 0.0, 0.299] {
+            course.push_apart(t, drive(p(t)), 1e-2);
+        }
+        course.push_apart(0.3, drive(p(0.3)), 1e-2);
+        course.push_apart(1.0, drive(p(1.0)), 1e-2);
+        assert_eq!(course.len(), NODES, "the oldest is forgotten");
+        let seen = course.seen_from(0.3, 0.7);
+        let expected = [-8.0 / 7.0, -5.0 / 7.0, -3.0 / 7.0, 0.0, 1.0];
+        for (time, expected) in seen.times[1..].iter().zip(expected) {
+            assert!((time - expected).abs() < 1e-15);
+        }
+        for end in [1.0, 0.5, 0.0, -0.5] {
+            let got = 0.7 * seen.integral(end).drive;
+            let expected = integral(0.3 + 0.7 * end) - integral(0.3);
+            assert!((got - expected).abs() < 1e-13, "{got} {expected}");
+        }
+    }
+
+    #[test]
+    fn even_instants_have_the_weights_of_the_polynomial_through_them() {
+        for (i, weight) in EVEN.into_iter().enumerate() {
+            let (mut even, mut uneven) = (PowerCourse::default(), PowerCourse::default());
+            for j in 0..NODES {
+                let (time, power) = (j as f64 - 4.0, if i == j { 1.0 } else { 0.0 });
+                even.push(time, drive(power));
+                // Not even by more than is taken for it.
+                let off = if j == 0 { 1e-8 } else { 0.0 };
+                uneven.push(time + off, drive(power));
+            }
+            assert_eq!(even.integral(1.0).drive, weight);
+            assert!((uneven.integral(1.0).drive - weight).abs() < 1e-7);
+        }
+    }
+
+    #[test]
+    fn simpson_and_radau_are_courses_through_their_own_instants() {
+        let weight = |times: &[f64], which: usize| {
+            let mut course = PowerCourse::default();
+            for (i, &t) in times.iter().enumerate() {
+                course.push(t, drive(if i == which { 1.0 } else { 0.0 }));
+            }
+            course.integral(1.0).drive
+        };
+        for (i, expected) in [1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0].into_iter().enumerate() {
+            assert!((weight(&[0.0, 0.5, 1.0], i) - expected).abs() < 1e-15);
+        }
+        let [c1, c2] = crate::integrate::Radau::INTERIOR;
+        let root = 6.0_f64.sqrt();
+        // Hairer & Wanner II, (IV.5.9).
+        let radau = [(16.0 - root) / 36.0, (16.0 + root) / 36.0, 1.0 / 9.0];
+        for (i, expected) in radau.into_iter().enumerate() {
+            assert!((weight(&[c1, c2, 1.0], i) - expected).abs() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn what_is_not_booked_is_the_residual() {
+        let at = |kinetic: f64, gravitational: f64| Energies {
+            kinetic,
+            gravitational,
+            elastic: 0.0,
+        };
+        let mut account = Account::start(true, at(0.0, 1.0));
+        account.course.push(0.0, drive(2.0));
+        // 2 J by the drive and 1 J by gravity, of which 2.75 J arrive.
+        account.book(1.0, at(2.75, 0.0));
+        let ledger = account.ledger();
+        assert_eq!(ledger.residual(), -0.25);
+        assert_eq!(ledger.exchanged, 0.5 * 5.75);
+        let half = account.within(0.5, 1.0, at(1.5, 0.5));
+        assert_eq!((half.residual(), half.drive_work), (0.0, 1.0));
+        // 4 J of elastic energy from a stiffer contact.
+        account.book_change(Energies {
+            kinetic: 2.75,
+            gravitational: 7.0,
+            elastic: 4.0,
+        });
+        assert_eq!(account.ledger().change_work, 4.0);
+        assert_eq!(account.ledger().residual(), -0.25);
+    }
+}

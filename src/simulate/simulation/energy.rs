@@ -1,0 +1,148 @@
+//! Keeps the energy ledger: powers at a few instants of each accepted step.
+
+use super::{Simulation, State};
+use crate::mechanism::{Mechanism, Powers};
+use crate::simulate::ledger::{Account, Energies};
+use crate::simulate::{Frame, Ledger};
+
+/// Instants at the ends of past steps from which the works of a scene that is a function of time alone are integrated:
+/// its powers are smooth, and its steps short against their periods.
+const PAST_ENDS: usize = 5;
+/// A past step shorter than this part of the one to integrate says nothing about its powers.
+const SHORTEST_PAST: f64 = 0.1;
+/// Where else than at its ends the powers of such a step are read as long as there are too few of them.
+const MIDDLE: [f64; 1] = [0.5];
+
+impl Simulation {
+    /// Energy moved since the start (the last reset); `None` where `solver.energy_ledger` is off.
+    pub fn ledger(&self) -> Option<&Ledger> {
+        let account = &self.state.account;
+        account.on.then(|| account.ledger())
+    }
+
+    /// A new account at the present state, of which everything was just evaluated.
+    pub(super) fn open_account(&mut self) {
+        let Self {
+            mechanism, state, ..
+        } = self;
+        let energies = energies(mechanism, state);
+        state.account = Account::start(self.running.solver.energy_ledger, energies);
+    }
+
+    /// Books what a live change did to the energies; everything was just evaluated.
+    pub(super) fn book_change(&mut self) {
+        let Self {
+            mechanism, state, ..
+        } = self;
+        if state.account.on {
+            let energies = energies(mechanism, state);
+            state.account.book_change(energies);
+        }
+    }
+
+    /// Books the step just accepted, of size `h`. The contact memory in force is still that of the step; `switched` where
+    /// another has been found for its end.
+    pub(super) fn book_step(&mut self, h: f64, switched: bool) {
+        if !self.state.account.on {
+            return;
+        }
+        let Self {
+            mechanism,
+            state,
+            scratch_k,
+            ..
+        } = self;
+        if !mechanism.is_evaluated_at(state.t) {
+            mechanism.measure(state.t, &state.y);
+        }
+        let energies = energies(mechanism, state);
+        if mechanism.has_powers() {
+            scratch_k.copy_from_slice(&state.k);
+            let end = mechanism.powers(state.t, &state.y, scratch_k);
+            self.lay_out_course(h, end);
+            self.state.account.powers = (!switched).then_some(end);
+        }
+        self.state.account.book(h, energies);
+    }
+
+    /// Finds the instants from which the works of the step just accepted are integrated; at its end the powers are `end`.
+    fn lay_out_course(&mut self, h: f64, end: Powers) {
+        let (from, to) = (self.state.t0, self.state.t);
+        let kinematic = self.mechanism.is_kinematic();
+        if kinematic {
+            let past = &mut self.state.account.past;
+            past.push_apart(to, end, SHORTEST_PAST * h);
+            if past.len() > PAST_ENDS {
+                self.state.account.course = past.seen_from(from, h);
+                return;
+            }
+        }
+        let interior = if kinematic {
+            &MIDDLE
+        } else {
+            self.stepper.interior()
+        };
+        self.state.account.course.clear();
+        // A collocation method has its own quadrature, which leaves the start out.
+        if interior.len() == 1 {
+            let start = self.state.account.powers;
+            let start = start.unwrap_or_else(|| self.powers_within(0.0, h));
+            self.state.account.course.push(0.0, start);
+        }
+        for &theta in interior {
+            let powers = self.powers_within(theta, h);
+            self.state.account.course.push(theta, powers);
+        }
+        self.state.account.course.push(1.0, end);
+    }
+
+    /// Powers at the part `theta` of the step just accepted.
+    fn powers_within(&mut self, theta: f64, h: f64) -> Powers {
+        self.interpolate(theta, h);
+        let Self {
+            mechanism,
+            state,
+            scratch_y,
+            scratch_k,
+            ..
+        } = self;
+        mechanism.forget_evaluation();
+        mechanism.powers(state.t0 + theta * h, scratch_y, scratch_k)
+    }
+
+    /// Ledger at the instant of `frame`, within the latest step.
+    pub(super) fn ledger_of(&self, frame: &Frame) -> Option<Ledger> {
+        let State { account, t0, t, .. } = &self.state;
+        if frame.time >= *t {
+            return self.ledger().copied();
+        }
+        let energies = Energies {
+            kinetic: frame.kinetic,
+            gravitational: frame.potential - frame.elastic,
+            elastic: frame.elastic,
+        };
+        let h = t - t0;
+        account
+            .on
+            .then(|| account.within((frame.time - t0) / h, h, energies))
+    }
+}
+
+/// Energies at the latest evaluation, that of the present state.
+fn energies(mechanism: &Mechanism, state: &State) -> Energies {
+    let (kinetic, gravitational) = mechanism.energies();
+    let contacts = &mechanism.contacts;
+    let elastic = (0..contacts.len())
+        .filter(|&j| contacts.has_clearance(j))
+        .map(|j| {
+            contacts
+                .coefficients(j)
+                .elastic_energy(state.gaps[j].penetration)
+        })
+        .sum();
+    Energies {
+        kinetic,
+        gravitational,
+        elastic,
+    }
+}

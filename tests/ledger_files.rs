@@ -1,0 +1,189 @@
+//! The energy ledger and the restitution check as scripts see them.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use serde_json::Value as Json;
+
+fn jointplay(folder: &Path, line: &str) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_jointplay"))
+        .args(line.split_whitespace())
+        .current_dir(folder)
+        .env_remove("DISPLAY")
+        .env_remove("WAYLAND_DISPLAY")
+        .output()
+        .unwrap()
+}
+
+/// Standard output of a run that is done.
+fn done(folder: &Path, line: &str) -> String {
+    let output = jointplay(folder, line);
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{line}: {error}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn json(path: &Path) -> Json {
+    serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
+}
+
+fn column(file: &Json, name: &str) -> Vec<f64> {
+    let values = file["columns"][name].as_array();
+    let values = values.unwrap_or_else(|| panic!("no column {name}"));
+    values.iter().map(|value| value.as_f64().unwrap()).collect()
+}
+
+const LAST_COLUMNS: &str = "drive_work_J,gravity_work_J,restitution_loss_J,friction_loss_J,\
+                            clearance_work_J,energy_residual_J";
+
+#[test]
+fn rows_carry_the_ledger_and_balance() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = "run spcmm --duration 30ms --every 0.1ms";
+    let summary = done(
+        folder.path(),
+        &format!("{run} --out run.json --summary json"),
+    );
+    let summary: Json = serde_json::from_str(&summary).unwrap();
+    let file = json(&folder.path().join("run.json"));
+    let get = |name: &str| column(&file, name);
+    let (kinetic, elastic) = (get("kinetic_J"), get("elastic_J"));
+    let works = LAST_COLUMNS.split(',').map(get).collect::<Vec<_>>();
+    let exchanged = summary["energy_J"]["exchanged"].as_f64().unwrap();
+    for k in 0..kinetic.len() {
+        let change = kinetic[k] - kinetic[0] + elastic[k] - elastic[0];
+        let [drive, gravity, restitution, friction, clearance, residual] =
+            [0, 1, 2, 3, 4, 5].map(|i| works[i][k]);
+        let accounted = drive + gravity + clearance - restitution - friction + residual;
+        assert!((change - accounted).abs() < 1e-12, "row {k}");
+        assert!(residual.abs() < 1e-4 * exchanged, "row {k}: {residual:e}");
+    }
+    let last = kinetic.len() - 1;
+    for (i, key) in [
+        "drive_work",
+        "gravity_work",
+        "restitution_loss",
+        "friction_loss",
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        assert_eq!(
+            summary["energy_J"][key].as_f64().unwrap(),
+            works[i][last],
+            "{key}"
+        );
+        assert!(works[i][last].abs() > 1e-4, "{key}");
+    }
+    let relative = summary["energy_J"]["relative_residual"].as_f64().unwrap();
+    let residual = summary["energy_J"]["residual"].as_f64().unwrap();
+    assert!((relative - residual / exchanged).abs() < 1e-15);
+    let text = done(folder.path(), "run spcmm --duration 10ms");
+    assert!(text.contains("of the energy exchanged"), "{text}");
+
+    // They are the last columns, and without the ledger they are not there; the motion is the same.
+    done(folder.path(), &format!("{run} --out with.csv"));
+    let off = "--set solver.energy_ledger=off";
+    let without = done(
+        folder.path(),
+        &format!("{run} {off} --out without.csv --summary json"),
+    );
+    let without: Json = serde_json::from_str(&without).unwrap();
+    assert_eq!(without["state_hash"], summary["state_hash"]);
+    assert_eq!(without["energy_J"], Json::Null);
+    let header = |name: &str| {
+        let text = fs::read_to_string(folder.path().join(name)).unwrap();
+        text.lines().next().unwrap().to_owned()
+    };
+    assert!(header("with.csv").ends_with(LAST_COLUMNS));
+    assert!(!header("without.csv").contains("work_J"));
+}
+
+#[test]
+fn every_impact_has_its_row() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = "run spcmm --duration 50ms --set contact.clearance=0.2mm";
+    let summary = done(
+        folder.path(),
+        &format!("{run} --impacts hits.json --summary json"),
+    );
+    let summary: Json = serde_json::from_str(&summary).unwrap();
+    let file = json(&folder.path().join("hits.json"));
+    assert_eq!(
+        file["meta"]["ball_joints"],
+        serde_json::json!(["S1", "S2", "S3"])
+    );
+    assert_eq!(file["meta"]["scene"], "spcmm");
+    assert!(
+        file["meta"]["wall_s"].is_null(),
+        "files of one run are the same"
+    );
+    let joint = column(&file, "joint");
+    let (approach, separation) = (
+        column(&file, "approach_m_s"),
+        column(&file, "separation_m_s"),
+    );
+    let (given, asked) = (
+        column(&file, "restitution_given"),
+        column(&file, "restitution_asked"),
+    );
+    let (start, end) = (column(&file, "start_s"), column(&file, "end_s"));
+    let disturbed = column(&file, "disturbed");
+    assert!(joint.len() > 20, "{}", joint.len());
+    for k in 0..joint.len() {
+        assert!((given[k] - separation[k] / approach[k]).abs() < 1e-15);
+        assert!(end[k] > start[k] && asked[k] == 0.9);
+        assert!(k == 0 || end[k] >= end[k - 1]);
+    }
+    for name in ["restitution_law", "floored", "steps", "deepest_m", "peak_N"] {
+        assert_eq!(column(&file, name).len(), joint.len());
+    }
+    // None is lost: all that began have ended, or are under way.
+    for (j, name) in ["S1", "S2", "S3"].into_iter().enumerate() {
+        let of = |k: &usize| joint[*k] == j as f64;
+        let finished = (0..joint.len()).filter(of).count() as u64;
+        let begun = summary["impacts"][name].as_u64().unwrap();
+        assert!(begun - finished <= 1, "{name}: {finished} of {begun}");
+        let entry = &summary["restitution"][name];
+        assert_eq!(entry["finished"], finished);
+        let alone = (0..joint.len())
+            .filter(of)
+            .filter(|&k| disturbed[k] == 0.0)
+            .count();
+        assert!(entry["undisturbed"].as_u64().unwrap() <= alone as u64);
+        assert!(entry["median_excess"].as_f64().unwrap().abs() < 0.2);
+    }
+
+    // As with rows: by the ending, whole, and over nothing that is there.
+    done(folder.path(), &format!("{run} --impacts hits.csv"));
+    let text = fs::read_to_string(folder.path().join("hits.csv")).unwrap();
+    assert_eq!(text.lines().count(), joint.len() + 1);
+    assert!(folder.path().join("hits.csv.meta.json").is_file());
+    done(folder.path(), &format!("{run} --impacts hits.npz"));
+    for (line, code, word) in [
+        ("--impacts hits.csv", 1, "--force"),
+        ("--impacts hits.txt", 2, ".npz"),
+        ("--impacts no/hits.csv", 1, "cannot write"),
+        (
+            "--impacts same.csv --out same.csv --every 1ms",
+            2,
+            "same file",
+        ),
+    ] {
+        let output = jointplay(
+            folder.path(),
+            &format!("run pendulum --duration 1000000s {line}"),
+        );
+        assert_eq!(output.status.code(), Some(code), "{line}");
+        assert!(
+            String::from_utf8_lossy(&output.stderr).contains(word),
+            "{line}"
+        );
+    }
+    done(folder.path(), &format!("{run} --impacts hits.csv --force"));
+    // A run without impacts writes none.
+    done(folder.path(), "run spcmm --duration 1ms --impacts none.csv");
+    let text = fs::read_to_string(folder.path().join("none.csv")).unwrap();
+    assert_eq!(text.lines().count(), 1);
+}
