@@ -3,6 +3,7 @@
 mod adaptive;
 mod automatic;
 mod contacts;
+mod doubts;
 mod guard;
 mod live;
 mod snapshot;
@@ -73,6 +74,8 @@ pub(super) struct State {
     k: Vec<f64>,
     gaps: Vec<Approach>,
     memory: Vec<Memory>,
+    /// Steps since the contact under way began.
+    contact_steps: Vec<u64>,
     ramps: Vec<Option<Ramp>>,
     /// Clearances in force.
     clearances: Vec<f64>,
@@ -121,6 +124,7 @@ impl Simulation {
                 k: vec![0.0; n],
                 gaps: vec![Approach::default(); joints],
                 memory: vec![Memory::default(); joints],
+                contact_steps: vec![0; joints],
                 ramps: vec![None; joints],
                 clearances: (0..joints)
                     .map(|j| mechanism.contacts.clearance(j))
@@ -137,6 +141,7 @@ impl Simulation {
                 statistics: Statistics {
                     impacts: vec![0; joints],
                     floored: vec![0; joints],
+                    coarse: vec![0; joints],
                     peak_normal: vec![0.0; joints],
                     peak_time: vec![0.0; joints],
                     last_separation: vec![f64::NAN; joints],
