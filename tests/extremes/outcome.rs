@@ -1,9 +1,9 @@
 //! One cell of the table: a run, and how it ends.
 
-use jointplay::scene::{BallJoint, Scene, Vec3};
-use jointplay::simulate::{Frame, JointReport, Pacer, Simulation};
+use jointplay::simulate::{Frame, Pacer, Simulation};
 
 use super::common::frame_now;
+use super::common::invariants::{fault, finite};
 use super::rows::Row;
 
 /// What is asked for: simulated seconds a second, in frames of so many seconds, of a machine that does so many evaluations
@@ -15,8 +15,6 @@ const EVALUATIONS_PER_SECOND: f64 = 50_000.0;
 const PATIENCE: f64 = 1.5;
 /// Evaluations that no single step may take.
 const MOST_IN_A_STEP: u64 = 2000;
-/// Penetration over ball radius beyond which a ball has left its socket.
-const OUT_OF_SOCKET: f64 = 0.1;
 /// Energy that a passive scene may gain, of that exchanged: a method of order 1 with ten steps in an impact, and the others.
 const CREATED: [f64; 2] = [0.06, 0.02];
 
@@ -55,91 +53,6 @@ impl Outcome {
             _ => "",
         }
     }
-}
-
-pub fn finite(frame: &Frame) -> bool {
-    let mut all = vec![frame.time, frame.kinetic, frame.potential, frame.elastic];
-    let mut push = |v: &Vec3| all.extend_from_slice(v.as_slice());
-    for b in &frame.bodies {
-        for v in [
-            &b.position,
-            &b.velocity,
-            &b.angular_velocity,
-            &b.acceleration,
-            &b.angular_acceleration,
-        ] {
-            push(v);
-        }
-        (0..3).for_each(|i| push(&b.rotation.column(i).into_owned()));
-    }
-    for j in &frame.joints {
-        for v in [
-            &j.socket_centre,
-            &j.ball_centre,
-            &j.eccentricity,
-            &j.normal_force,
-            &j.friction_force,
-            &j.contact_point,
-        ] {
-            push(v);
-        }
-        push(&Vec3::new(j.penetration, j.penetration_rate, j.slip_speed));
-    }
-    let p = &frame.pose;
-    for v in [
-        &p.position,
-        &p.angles,
-        &p.velocity,
-        &p.angle_rates,
-        &p.acceleration,
-        &p.angle_accelerations,
-    ] {
-        push(v);
-    }
-    frame.probe_error.iter().for_each(&mut push);
-    all.extend_from_slice(&frame.actuators);
-    all.iter().all(|x| x.is_finite())
-}
-
-/// What no frame may show; `None` where all is well.
-pub fn fault(frame: &Frame, scene: &Scene, form: &str) -> Option<String> {
-    if !finite(frame) {
-        return Some(format!("not finite at t = {:e} s", frame.time));
-    }
-    for b in &frame.bodies {
-        let skew = (b.rotation.tr_mul(&b.rotation) - jointplay::scene::Mat3::identity()).amax();
-        if skew > 1e-9 {
-            return Some(format!(
-                "orientation off by {skew:e} at t = {:e} s",
-                frame.time
-            ));
-        }
-    }
-    let pairs = frame.joints.iter().zip(&scene.ball_joints);
-    pairs
-        .filter_map(|(report, joint)| joint_fault(report, joint, form))
-        .next()
-        .map(|what| format!("{what} at t = {:e} s", frame.time))
-}
-
-fn joint_fault(report: &JointReport, joint: &BallJoint, form: &str) -> Option<String> {
-    let radius = joint.contact.ball_radius;
-    if joint.contact.clearance == 0.0 {
-        // The other form only stabilises its constraints.
-        let limit = if form == "tree" { 1e-9 } else { 1e-3 };
-        let open = report.eccentricity.norm();
-        return (open > limit).then(|| format!("{} open by {open:e} m", joint.name));
-    }
-    if report.penetration > OUT_OF_SOCKET * radius {
-        return Some(format!(
-            "{} {:.3} radii inside the wall",
-            joint.name,
-            report.penetration / radius
-        ));
-    }
-    let unheld = report.penetration > 1e-9 && report.penetration_rate > 0.0;
-    (unheld && report.normal_force.norm() == 0.0)
-        .then(|| format!("{} leaves its socket without a force", joint.name))
 }
 
 /// Energy of a run that nothing drives.
