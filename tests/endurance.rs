@@ -182,7 +182,7 @@ struct Long {
     what: &'static str,
     changes: &'static common::Changes<'static>,
     period: f64,
-    /// Largest changes of energy and force with `preview` and with `real-time`; none where contacts do not settle.
+    /// Largest change of energy, and a tenth of that of a force, with `preview` and with `real-time`; none where contacts do not settle.
     limits: [Option<f64>; 2],
 }
 
@@ -269,8 +269,10 @@ fn long_run(of: &Long, preset: usize, duration: f64) -> Drift {
         simulation.advance_to(now).unwrap();
         simulation.sample(now, &mut frame);
         assert!(finite(&frame));
+        // At the step's end: inside it the interpolated state may lie in the wall by as much as the tolerance allows.
+        let end = frame_now(&mut simulation);
         let running = simulation.running_scene();
-        assert_eq!(fault(&frame, running, "tree"), None);
+        assert_eq!(fault(&end, running, "tree"), None);
         kinetic = kinetic.max(frame.kinetic);
         for (joint, of_scene) in frame.joints.iter().zip(&running.ball_joints) {
             if of_scene.contact.clearance == 0.0 {
@@ -316,7 +318,11 @@ fn holds(of: &Long, preset: usize, drift: &Drift) {
     );
     if let Some(limit) = of.limits[preset] {
         assert!(drift.energy < limit, "{what}: energy {:e}", drift.energy);
-        assert!(drift.force < limit, "{what}: force {:e}", drift.force);
+        assert!(
+            drift.force < 10.0 * limit,
+            "{what}: force {:e}",
+            drift.force
+        );
     }
 }
 
