@@ -82,3 +82,39 @@ fn a_reset_forgets_what_the_run_met_and_a_snapshot_keeps_it() {
     simulation.restore(&snapshot).unwrap();
     assert_eq!(simulation.doubts(), kept);
 }
+
+#[test]
+fn the_summary_of_a_run_marks_it() {
+    let run = |form: &str, floor: &str| {
+        let output = std::process::Command::new(env!("CARGO_BIN_EXE_jointplay"))
+            .args([
+                "run",
+                "pendulum",
+                "--duration",
+                "20ms",
+                "--quiet",
+                "--summary",
+                form,
+            ])
+            .args(["--set", floor])
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let (odd, usual) = (
+        "contact.impact_speed_floor=10m/s",
+        "contact.impact_speed_floor=1mm/s",
+    );
+    let json: serde_json::Value = serde_json::from_str(&run("json", odd)).unwrap();
+    assert_eq!(json["doubts"].as_array().unwrap().len(), 1, "{json}");
+    assert_eq!(json["slower_than_asked"], false);
+    let json: serde_json::Value = serde_json::from_str(&run("json", usual)).unwrap();
+    assert!(json["doubts"].as_array().unwrap().is_empty(), "{json}");
+    assert!(
+        run("text", odd).contains("Not trusted       S1: "),
+        "{}",
+        run("text", odd)
+    );
+    assert!(!run("text", usual).contains("Not trusted"));
+}

@@ -388,7 +388,7 @@ fn the_pendulum_is_that_of_other_equations_and_another_solver() {
             let what = format!("{solver:?} and {method}");
             same_contacts(&what, &contacts, &theirs.contacts);
             assert!(contacts.len() > 3, "only {} contacts", contacts.len());
-            let body = common::frame_now(&mut simulation).bodies[0].clone();
+            let body = common::frame_now(&mut simulation).bodies[0];
             let angle = body.rotation[(0, 2)].atan2(body.rotation[(2, 2)]);
             let off = [
                 body.position.x - theirs.y[0],

@@ -68,7 +68,7 @@ fn key(scene: &Scene, parameter: &Parameter, joint: usize) -> String {
     // Twice in three of all.
     let joints = &scene.ball_joints;
     match parameter.key.strip_prefix("contact.") {
-        Some(part) if joint % 3 == 0 => {
+        Some(part) if joint.is_multiple_of(3) => {
             format!("joint.{}.{part}", joints[joint / 3 % joints.len()].name)
         }
         _ => parameter.key.to_owned(),

@@ -131,7 +131,7 @@ pub fn text(
         line(&format!("Joint {}", joint.name), story);
     }
     for doubt in simulation.doubts() {
-        line("Not to be trusted", doubt);
+        line("Not trusted", doubt);
     }
     let ratio = ratio(time, wall);
     let mut speed = format!("{wall:.3} s of stepping");
