@@ -126,6 +126,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     // Files of the same run are the same, byte for byte: the machine's speed stays out of them.
     meta.shift_remove("wall_s");
     meta.shift_remove("ratio");
+    meta.shift_remove("slower_than_asked");
     meta.insert("duration_s".into(), json!(duration));
     if let (Some(file), Some(times)) = (file, times) {
         let path = file.path().to_owned();

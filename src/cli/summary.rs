@@ -8,6 +8,7 @@ use serde_json::{Map, Value as Json, json};
 use super::impacts::Restitution;
 use super::output::significant;
 use super::{Failure, provenance};
+use crate::scene::{Preset, Scene};
 use crate::simulate::{Impact, Ledger, Simulation};
 
 /// How a run ended.
@@ -65,8 +66,10 @@ pub fn json(
         "peak_normal_N": by_joint(&|i| json!(statistics.peak_normal[i])),
         "peak_time_s": by_joint(&|i| json!(statistics.peak_time[i])),
         "constraint_drift_m": statistics.constraint_drift,
+        "doubts": simulation.doubts(),
         "wall_s": wall,
         "ratio": ratio(time, wall),
+        "slower_than_asked": slower_than_asked(scene, ratio(time, wall)),
         "state_hash": hash_text(simulation.state_hash()),
     });
     if let Json::Object(own) = own {
@@ -186,16 +189,18 @@ pub fn text(
             ),
         );
     }
-    line(
-        "Wall time",
-        match ratio(time, wall) {
-            Some(ratio) => format!(
-                "{wall:.3} s of stepping, {} times real time",
-                significant(ratio, 3)
-            ),
-            None => format!("{wall:.3} s of stepping"),
-        },
-    );
+    for doubt in simulation.doubts() {
+        line("Not trusted", doubt);
+    }
+    let ratio = ratio(time, wall);
+    let mut speed = format!("{wall:.3} s of stepping");
+    if let Some(ratio) = ratio {
+        speed += &format!(", {} times real time", significant(ratio, 3));
+    }
+    if slower_than_asked(scene, ratio) {
+        speed += ": slower than the preset real-time asks for";
+    }
+    line("Wall time", speed);
     line("State hash", hash_text(simulation.state_hash()));
     line("Version", format!("jointplay {}", crate::VERSION));
     Ok(out)
@@ -219,7 +224,36 @@ fn ratio(time: f64, wall: f64) -> Option<f64> {
     (wall > 0.0).then(|| time / wall)
 }
 
+/// Whether real time was asked for, by the preset of that name, and not reached.
+fn slower_than_asked(scene: &Scene, ratio: Option<f64>) -> bool {
+    scene.solver.preset == Some(Preset::RealTime) && ratio.is_some_and(|ratio| ratio < 1.0)
+}
+
 /// A hash as outputs write it: 16 hexadecimal digits (JSON numbers do not hold 64 bits).
 pub fn hash_text(hash: u64) -> String {
     format!("{hash:016x}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_preset_real_time_asks_for_real_time() {
+        for (preset, slow) in [("real-time", true), ("accurate", false)] {
+            let change = ("solver.preset".to_owned(), preset.to_owned());
+            let scene = Scene::load("pendulum", &[change]).unwrap();
+            assert_eq!(slower_than_asked(&scene, Some(0.9)), slow, "{preset}");
+            assert!(!slower_than_asked(&scene, Some(1.1)), "{preset}");
+            assert!(!slower_than_asked(&scene, None), "{preset}");
+            let mut simulation = Simulation::new(&scene).unwrap();
+            simulation.advance_to(1e-3).unwrap();
+            for (wall, said) in [(1.0, slow), (1e-9, false)] {
+                let text = text(&simulation, Status::Done, wall, None).unwrap();
+                assert_eq!(text.contains("slower than"), said, "{text}");
+                let facts = json(&simulation, Status::Done, wall, None).unwrap();
+                assert_eq!(facts["slower_than_asked"], said);
+            }
+        }
+    }
 }

@@ -29,26 +29,11 @@ impl Scene {
         Ok(())
     }
 
-    /// Choices that are allowed but may not mean what the user expects, one sentence each.
+    /// Choices that are allowed but may not mean what the user expects, one sentence each: [`Self::doubts`], and what
+    /// makes a run slow.
     pub fn warnings(&self) -> Vec<String> {
-        let mut warnings = Vec::new();
+        let mut warnings = self.doubts();
         for (joints, contact) in self.contact_groups() {
-            let near_one = contact.restitution >= 0.8 || contact.clearance == 0.0;
-            if contact.normal_law == NormalLaw::LankaraniNikravesh && !near_one {
-                warnings.push(format!(
-                    "{joints}: restitution {} with lankarani-nikravesh, which is right only near 1 (asked for 0, it gives \
-                     about 0.66); flores or gonthier suit low restitution.",
-                    contact.restitution
-                ));
-            }
-            if contact.clearance > 0.0 && contact.clearance <= 1e-5 {
-                warnings.push(format!(
-                    "{joints}: clearance {} is so small that the contact patch is no longer small against the ball \
-                     (radius {}), which Hertz's theory assumes.",
-                    format_quantity(contact.clearance, "mm"),
-                    format_quantity(contact.ball_radius, "mm")
-                ));
-            }
             if contact.clearance > 0.0
                 && contact.slip_speed_high < 1e-6
                 && contact.friction_law == FrictionLaw::ModifiedCoulomb
@@ -59,9 +44,43 @@ impl Scene {
                 ));
             }
         }
-        warnings.extend(self.step_warning());
-        warnings.extend(self.tolerance_warning());
         warnings
+    }
+
+    /// Why a result of this scene is not to be trusted, whatever the run meets, one sentence each.
+    pub fn doubts(&self) -> Vec<String> {
+        let mut doubts = Vec::new();
+        for (joints, contact) in self.contact_groups() {
+            let law = match contact.normal_law {
+                NormalLaw::LankaraniNikravesh => Some("lankarani-nikravesh"),
+                NormalLaw::HuntCrossley => Some("hunt-crossley"),
+                NormalLaw::Hertz => Some("hertz"),
+                NormalLaw::Flores | NormalLaw::Gonthier => None,
+            };
+            let near_one = contact.restitution >= 0.8 || contact.clearance == 0.0;
+            if let Some(law) = law
+                && !near_one
+            {
+                let damping = contact::damping_factor(contact.normal_law, 0.0);
+                doubts.push(format!(
+                    "{joints}: restitution {} with {law}, which is right only near 1 (asked for 0, it gives \
+                     about {:.2}); flores or gonthier suit low restitution.",
+                    contact.restitution,
+                    contact::restitution_given(damping)
+                ));
+            }
+            if contact.clearance > 0.0 && contact.clearance <= 1e-5 {
+                doubts.push(format!(
+                    "{joints}: clearance {} is so small that the contact patch is no longer small against the ball \
+                     (radius {}), which Hertz's theory assumes.",
+                    format_quantity(contact.clearance, "mm"),
+                    format_quantity(contact.ball_radius, "mm")
+                ));
+            }
+        }
+        doubts.extend(self.step_warning());
+        doubts.extend(self.tolerance_warning());
+        doubts
     }
 
     /// That a tolerance is too loose for impacts.

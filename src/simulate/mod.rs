@@ -97,6 +97,8 @@ pub struct Statistics {
     /// Contacts that began slower than the scene's `impact_speed_floor` or existed at the start, per ball joint: they
     /// rebound higher than asked.
     pub floored: Vec<u64>,
+    /// Contacts that ended after fewer fixed steps than resolve one, per ball joint; 0 with an adaptive method.
+    pub coarse: Vec<u64>,
     /// Largest continuous-time normal force (reaction of an ideal joint), per ball joint, N.
     pub peak_normal: Vec<f64>,
     /// When it occurred, per ball joint, s.
@@ -115,6 +117,7 @@ impl PartialEq for Statistics {
             == (other.steps, other.evaluations, other.rejected)
             && self.impacts == other.impacts
             && self.floored == other.floored
+            && self.coarse == other.coarse
             && bits(&self.peak_normal) == bits(&other.peak_normal)
             && bits(&self.peak_time) == bits(&other.peak_time)
             && bits(&self.last_separation) == bits(&other.last_separation)

@@ -3,6 +3,7 @@
 mod adaptive;
 mod automatic;
 mod contacts;
+mod doubts;
 mod energy;
 mod guard;
 mod live;
@@ -76,6 +77,8 @@ pub(super) struct State {
     k: Vec<f64>,
     gaps: Vec<Approach>,
     memory: Vec<Memory>,
+    /// Steps since the contact under way began.
+    contact_steps: Vec<u64>,
     ramps: Vec<Option<Ramp>>,
     /// Clearances in force.
     clearances: Vec<f64>,
@@ -126,6 +129,7 @@ impl Simulation {
                 k: vec![0.0; n],
                 gaps: vec![Approach::default(); joints],
                 memory: vec![Memory::default(); joints],
+                contact_steps: vec![0; joints],
                 ramps: vec![None; joints],
                 clearances: (0..joints)
                     .map(|j| mechanism.contacts.clearance(j))
@@ -144,6 +148,7 @@ impl Simulation {
                 statistics: Statistics {
                     impacts: vec![0; joints],
                     floored: vec![0; joints],
+                    coarse: vec![0; joints],
                     peak_normal: vec![0.0; joints],
                     peak_time: vec![0.0; joints],
                     last_separation: vec![f64::NAN; joints],

@@ -4,6 +4,8 @@
     reason = "each test file is a crate of its own and uses some of this"
 )]
 
+pub mod invariants;
+
 use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation};
 

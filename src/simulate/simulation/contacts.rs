@@ -1,6 +1,7 @@
 //! Contact memory and continuous-time peaks of the step just accepted.
 
 use super::Simulation;
+use super::doubts::LEAST_STEPS;
 use crate::mechanism::{Memory, Switching};
 use crate::simulate::peaks::Course;
 
@@ -8,6 +9,7 @@ impl Simulation {
     /// Starts and ends contacts whose penetration changed sign over the step just accepted.
     pub(super) fn switch_contacts(&mut self, h: f64) -> bool {
         let located = self.located.take();
+        let fixed = !self.running.solver.method.is_adaptive();
         let Self {
             mechanism,
             running,
@@ -34,10 +36,12 @@ impl Simulation {
             } else {
                 end.penetration > 0.0
             };
+            state.contact_steps[j] += 1;
             if touching == state.memory[j].active {
                 continue;
             }
             switched = true;
+            let steps = std::mem::replace(&mut state.contact_steps[j], 0);
             if touching {
                 let course = Course::new(start, end, h);
                 let crosses = start.penetration < 0.0 && end.penetration > 0.0;
@@ -79,6 +83,8 @@ impl Simulation {
                     (state.t, end.rate)
                 };
                 state.impacts.end(j, time, rate);
+                let coarse = fixed && steps < LEAST_STEPS;
+                state.statistics.coarse[j] += u64::from(coarse);
                 state.memory[j] = Memory::default();
                 state.statistics.last_separation[j] = state.t;
             }

@@ -1,0 +1,8 @@
+//! Any bytes as a scene file.
+#![no_main]
+
+mod check;
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
+    check::check(bytes);
+});
