@@ -2,7 +2,7 @@
 
 use super::kinematics::{Kinematics, Wrench};
 use super::model::{BallJoint, Model};
-use crate::contact::{Coefficients, Parameters};
+use crate::contact::{Coefficients, Parameters, Slip};
 use crate::scene::{Scene, Vec3};
 
 /// What a contact remembers between steps: part of the state.
@@ -14,6 +14,8 @@ pub struct Memory {
     pub approach_speed: f64,
     /// The floor was used: this contact rebounds higher than asked.
     pub floored: bool,
+    /// Piece of the friction law in force.
+    pub slip: Slip,
 }
 
 /// A clearance on its way to a new value.
@@ -90,6 +92,8 @@ pub struct Contacts {
     pub evaluations: u64,
     any_ramp: bool,
     any_contact: bool,
+    /// A sliding speed was beyond its piece of the friction law since this was last cleared.
+    pub strayed: bool,
     /// Of the latest evaluation, s.
     time: f64,
 }
@@ -119,6 +123,7 @@ impl Contacts {
             switching: Switching::Located,
             evaluations: 0,
             any_ramp: false,
+            strayed: false,
             time: 0.0,
         }
     }
@@ -281,9 +286,12 @@ impl Contacts {
                 let slip = relative - n * n.dot(&relative);
                 let speed = slip.norm();
                 gap.slip_speed = speed;
-                let ratio = coefficients.friction_ratio(speed);
-                if ratio > 0.0 {
-                    let friction = slip * (-ratio * normal_force / speed);
+                if memory.slip != Slip::Whole && coefficients.beyond(memory.slip, speed) > 0.0 {
+                    self.strayed = true;
+                }
+                let per_speed = coefficients.friction_per_speed(memory.slip, speed);
+                if per_speed != 0.0 {
+                    let friction = slip * (-per_speed * normal_force);
                     gap.friction = friction;
                     force += friction;
                 }
@@ -311,6 +319,28 @@ impl Contacts {
                 - (socket.velocity + socket.angular_velocity.cross(&arm_socket));
         }
         self.finish(t);
+    }
+
+    /// Sliding speed of joint `i` in the motion last measured, m/s.
+    pub fn slip_speed(&self, i: usize, motion: &[Kinematics]) -> f64 {
+        let Joint {
+            joint,
+            coefficients,
+            clearance,
+        } = &self.joints[i];
+        let gap = &self.gaps[i];
+        let n = gap.normal;
+        let mut relative = gap.eccentricity_rate;
+        if coefficients.surface {
+            let radius = coefficients.ball_radius;
+            relative += motion[joint.ball.body]
+                .angular_velocity
+                .cross(&(n * radius))
+                - motion[joint.socket.body]
+                    .angular_velocity
+                    .cross(&(n * (radius + clearance)));
+        }
+        (relative - n * n.dot(&relative)).norm()
     }
 
     /// Completes normal, penetration and rate of every gap from the eccentricities of the latest evaluation.

@@ -320,6 +320,11 @@ impl Mechanism {
         }
     }
 
+    /// Sliding speed of ball joint `j` in the motion last measured, m/s.
+    pub fn slip_speed(&self, j: usize) -> f64 {
+        self.contacts.slip_speed(j, self.motion())
+    }
+
     /// Everything at (t, y): derivative into `dy`, true accelerations in [`Self::motion`], gaps of all joints,
     /// reactions and actuator forces.
     pub fn evaluate_fully(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {

@@ -444,9 +444,9 @@ fn linearise_contact(
     let mut along = -n;
     let mut by_slip = Mat3::zeros();
     let mut by_normal = identity * -force_n;
-    if c.friction > 0.0 && gap.slip_speed > 0.0 {
+    if c.friction > 0.0 {
         let speed = gap.slip_speed;
-        let ratio = c.friction_ratio(speed);
+        let per_speed = c.friction_per_speed(memory.slip, speed);
         let radius = c.ball_radius;
         let (ball, socket) = (&motion[joint.ball.body], &motion[joint.socket.body]);
         let mut sliding = gap.eccentricity_rate;
@@ -456,11 +456,14 @@ fn linearise_contact(
                     .angular_velocity
                     .cross(&(n * (radius + contacts.clearance(j))));
         }
-        let t = (sliding - n * n.dot(&sliding)) / speed;
-        along -= t * ratio;
-        let slope = c.friction_slope(speed);
-        let tt = t * t.transpose();
-        by_slip = ((tangent - tt) * (ratio / speed) + tt * slope) * -force_n;
+        let t = if speed > 0.0 {
+            (sliding - n * n.dot(&sliding)) / speed
+        } else {
+            Vec3::zeros()
+        };
+        along -= t * (per_speed * speed);
+        let slope = speed * c.friction_per_speed_slope(memory.slip, speed);
+        by_slip = (tangent * per_speed + t * t.transpose() * slope) * -force_n;
         // The tangent plane turns with n: d(v_t) = -(n . w) dn - n (w . dn).
         by_normal += by_slip * (identity * -n.dot(&sliding));
         by_slip *= tangent;
@@ -532,6 +535,7 @@ fn spin_of(q: &[f64], d: &[f64]) -> [f64; 3] {
 
 #[cfg(test)]
 mod tests {
+    use crate::contact::Slip;
     use crate::integrate::{StiffSystem, System};
     use crate::mechanism::{Mechanism, Memory};
     use crate::scene::Scene;
@@ -556,6 +560,7 @@ mod tests {
                 active: true,
                 approach_speed: 1e-3,
                 floored: true,
+                slip: Slip::Whole,
             };
         }
         (mechanism, y)

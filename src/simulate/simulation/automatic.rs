@@ -49,6 +49,7 @@ impl Simulation {
             if state.implicit && state.memory.iter().any(|m| m.active && !m.floored) {
                 state.implicit = false;
                 state.controller = controller_of(Method::Automatic, false);
+                self.hold_slip(true);
             }
             return;
         }
@@ -65,6 +66,7 @@ impl Simulation {
                     choice.wait = EXPLICIT_TURN;
                 }
                 (choice.progress, choice.cost, choice.steps) = (0.0, 0, 0);
+                self.hold_slip(false);
             }
             return;
         }
@@ -87,6 +89,7 @@ impl Simulation {
                 h_explicit: h,
                 ..Choice::default()
             };
+            self.hold_slip(true);
         }
     }
 }

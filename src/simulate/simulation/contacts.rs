@@ -1,6 +1,7 @@
 //! Contact memory and continuous-time peaks of the step just accepted.
 
 use super::Simulation;
+use crate::contact::Slip;
 use crate::mechanism::Memory;
 use crate::simulate::peaks::Course;
 
@@ -44,6 +45,7 @@ impl Simulation {
                     active: true,
                     approach_speed: rate.max(floor),
                     floored: rate < floor,
+                    slip: Slip::Whole,
                 };
                 state.statistics.impacts[j] += 1;
                 state.statistics.floored[j] += u64::from(rate < floor);
