@@ -147,9 +147,11 @@ impl Radau {
         error
     }
 
-    /// First guess of the stages: the previous step's polynomial, continued.
+    /// First guess of the stages: the previous step's polynomial, continued, or that of a longer attempt from here.
     fn begin(&mut self, t: f64, h: f64, n: usize) {
-        if self.previous.h == 0.0 || (self.previous.end - t).abs() > 1e-9 * h {
+        let again = self.previous.h > 0.0
+            && (self.previous.end - self.previous.h - t).abs() <= 1e-9 * h;
+        if !again && (self.previous.h == 0.0 || (self.previous.end - t).abs() > 1e-9 * h) {
             for j in 0..3 {
                 self.z[j].fill(0.0);
                 self.w[j].fill(0.0);
@@ -159,10 +161,11 @@ impl Radau {
         let ratio = h / self.previous.h;
         for i in 0..n {
             let z = std::array::from_fn(|j| self.previous.z[j][i]);
-            let start = polynomial(&z, 0.0);
+            // The polynomial is in s = (time - step's end) / h_previous and gives increments from its own start.
+            let from = if again { -1.0 } else { 0.0 };
+            let start = polynomial(&z, from);
             for j in 0..3 {
-                // The polynomial is in s = (time - step's end) / h_previous and gives increments from its own start.
-                self.z[j][i] = polynomial(&z, C[j] * ratio) - start;
+                self.z[j][i] = polynomial(&z, from + C[j] * ratio) - start;
             }
             for j in 0..3 {
                 self.w[j][i] = (0..3).map(|m| T_INVERSE[j][m] * self.z[m][i]).sum();
@@ -294,6 +297,19 @@ impl Radau {
         }
         self.previous.h = h;
         self.previous.end = t + h;
+    }
+
+    /// Lets the latest attempt end at `theta` of its length: the same polynomial over the shorter step.
+    pub fn truncate(&mut self, theta: f64) {
+        let n = self.stage.len();
+        for i in 0..n {
+            let z = std::array::from_fn(|j| self.previous.z[j][i]);
+            for j in 0..3 {
+                self.previous.z[j][i] = polynomial(&z, C[j] * theta - 1.0);
+            }
+        }
+        self.previous.end -= (1.0 - theta) * self.previous.h;
+        self.previous.h *= theta;
     }
 
     /// State at `t + theta h`: the collocation polynomial.

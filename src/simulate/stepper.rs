@@ -105,6 +105,13 @@ impl AnyStepper {
         }
     }
 
+    /// Lets the latest attempt end at `theta` of its length, where its interpolant is.
+    pub(super) fn truncate(&mut self, theta: f64) {
+        if let Self::Radau(stiff) | Self::Pair { stiff, .. } = self {
+            stiff.truncate(theta);
+        }
+    }
+
     /// Whether `attempt` leaves the derivative at the end.
     pub(super) fn ends_with_derivative(&self) -> bool {
         !matches!(self, Self::SemiImplicitEuler(_) | Self::RungeKutta4(_))

@@ -95,12 +95,13 @@ impl Simulation {
             return None;
         }
         let corner = corner.filter(|corner| !corner.is_at_start());
-        let cut_at = corner.as_ref().map(|corner| corner.theta).or(event);
-        if let Some(theta) = cut_at {
-            if let Some(corner) = corner {
-                self.located = None;
-                self.corner = Some((corner.joint, corner.next));
-            }
+        if let Some(corner) = corner {
+            self.located = None;
+            self.corner = Some((corner.joint, corner.next));
+            t_end = t + corner.theta * h;
+            self.end_at(corner.theta, t_end, h);
+            h *= corner.theta;
+        } else if let Some(theta) = event {
             // The step is taken again, shorter, so that its end carries the method's error and not the interpolant's.
             t_end = t + theta * h;
             h *= theta;
@@ -132,7 +133,7 @@ impl Simulation {
         )
     }
 
-    fn finish_gaps(&mut self, t_end: f64) {
+    pub(super) fn finish_gaps(&mut self, t_end: f64) {
         self.mechanism.contacts.finish(t_end);
         store_gaps(&self.mechanism, &mut self.gaps_end);
     }

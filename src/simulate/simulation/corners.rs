@@ -3,7 +3,7 @@
 
 use super::Simulation;
 use crate::contact::Slip;
-use crate::integrate::{Method, find_root};
+use crate::integrate::{Method, System, find_root};
 
 /// Parts of a step at whose ends the sliding speed is looked at.
 const PARTS: u32 = 4;
@@ -119,6 +119,25 @@ impl Simulation {
             left = right;
         }
         None
+    }
+
+    /// Lets the step just attempted end at a corner. Unlike a beginning contact it is not taken again: its end would be
+    /// off the corner by the tolerance, which is not small against the ramp, and slide back at once.
+    pub(super) fn end_at(&mut self, theta: f64, t_end: f64, h: f64) {
+        let Self {
+            mechanism,
+            stepper,
+            state,
+            y_end,
+            k_end,
+            scratch_y,
+            ..
+        } = self;
+        stepper.interpolate(theta, h, &state.y, &state.k, y_end, k_end, scratch_y);
+        y_end.copy_from_slice(scratch_y);
+        stepper.truncate(theta);
+        mechanism.derivative(t_end, y_end, k_end);
+        self.finish_gaps(t_end);
     }
 
     /// How far joint `j` slides beyond its piece on the interpolant of the attempted step, and its sliding speed, m/s.
