@@ -54,7 +54,11 @@ impl Coefficients {
             Slip::Creep => 0.0,
             Slip::Ramp => {
                 let low = self.slip_low;
-                let start = if low > 0.0 { low * inverse(speed, low).0 } else { 0.0 };
+                let start = if low > 0.0 {
+                    low * inverse(speed, low).0
+                } else {
+                    0.0
+                };
                 self.friction / (self.slip_high - low) * (1.0 - start)
             }
             Slip::Full => self.friction * inverse(speed, self.slip_high).0,
@@ -66,12 +70,20 @@ impl Coefficients {
         match slip {
             Slip::Whole => {
                 let (ratio, slope) = (self.friction_ratio(speed), self.friction_slope(speed));
-                if speed > 0.0 { (slope - ratio / speed) / speed } else { 0.0 }
+                if speed > 0.0 {
+                    (slope - ratio / speed) / speed
+                } else {
+                    0.0
+                }
             }
             Slip::Creep => 0.0,
             Slip::Ramp => {
                 let low = self.slip_low;
-                let start = if low > 0.0 { low * inverse(speed, low).1 } else { 0.0 };
+                let start = if low > 0.0 {
+                    low * inverse(speed, low).1
+                } else {
+                    0.0
+                };
                 -self.friction / (self.slip_high - low) * start
             }
             Slip::Full => self.friction * inverse(speed, self.slip_high).1,
@@ -144,7 +156,10 @@ mod tests {
 
     #[test]
     fn no_creep_range_leaves_a_ramp_that_is_smooth_through_rest() {
-        let c = Coefficients { slip_low: 0.0, ..coefficients() };
+        let c = Coefficients {
+            slip_low: 0.0,
+            ..coefficients()
+        };
         assert_eq!(c.slip_at(0.0), Slip::Ramp);
         assert!(c.beyond(Slip::Ramp, 0.0) < 0.0);
         assert!(c.friction_per_speed(Slip::Ramp, 0.0).is_finite());

@@ -149,8 +149,8 @@ impl Radau {
 
     /// First guess of the stages: the previous step's polynomial, continued, or that of a longer attempt from here.
     fn begin(&mut self, t: f64, h: f64, n: usize) {
-        let again = self.previous.h > 0.0
-            && (self.previous.end - self.previous.h - t).abs() <= 1e-9 * h;
+        let again =
+            self.previous.h > 0.0 && (self.previous.end - self.previous.h - t).abs() <= 1e-9 * h;
         if !again && (self.previous.h == 0.0 || (self.previous.end - t).abs() > 1e-9 * h) {
             for j in 0..3 {
                 self.z[j].fill(0.0);

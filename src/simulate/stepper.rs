@@ -107,8 +107,16 @@ impl AnyStepper {
 
     /// Lets the latest attempt end at `theta` of its length, where its interpolant is.
     pub(super) fn truncate(&mut self, theta: f64) {
-        if let Self::Radau(stiff) | Self::Pair { stiff, .. } = self {
-            stiff.truncate(theta);
+        match self {
+            Self::DormandPrince(s)
+            | Self::Pair {
+                explicit: s,
+                implicit: false,
+                ..
+            } => s.truncate(theta),
+            Self::Radau(s) | Self::Pair { stiff: s, .. } => s.truncate(theta),
+            // What interpolates between the ends of a step takes the new end as it is.
+            _ => {}
         }
     }
 

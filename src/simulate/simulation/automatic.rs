@@ -49,7 +49,6 @@ impl Simulation {
             if state.implicit && state.memory.iter().any(|m| m.active && !m.floored) {
                 state.implicit = false;
                 state.controller = controller_of(Method::Automatic, false);
-                self.hold_slip(true);
             }
             return;
         }
@@ -66,7 +65,6 @@ impl Simulation {
                     choice.wait = EXPLICIT_TURN;
                 }
                 (choice.progress, choice.cost, choice.steps) = (0.0, 0, 0);
-                self.hold_slip(false);
             }
             return;
         }
@@ -89,7 +87,6 @@ impl Simulation {
                 h_explicit: h,
                 ..Choice::default()
             };
-            self.hold_slip(true);
         }
     }
 }

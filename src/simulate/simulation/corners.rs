@@ -3,7 +3,7 @@
 
 use super::Simulation;
 use crate::contact::Slip;
-use crate::integrate::{Method, System, find_root};
+use crate::integrate::{System, find_root};
 
 /// Parts of a step at whose ends the sliding speed is looked at.
 const PARTS: u32 = 4;
@@ -31,19 +31,10 @@ impl Corner {
 }
 
 impl Simulation {
-    /// Whether the method in charge locates corners. An explicit one gains nothing: it resolves a ramp in short steps anyway.
-    fn locates_corners(&self) -> bool {
-        match self.running.solver.method {
-            Method::Rosenbrock | Method::Radau5 => true,
-            Method::Automatic => self.state.implicit,
-            _ => false,
-        }
-    }
-
     /// Puts every touching joint on the piece of the friction law on which it slides now; those that hold one already keep
     /// it unless `anew`. Where corners are not located, all follow the whole law.
     pub(super) fn hold_slip(&mut self, anew: bool) {
-        let holds = self.locates_corners() && !self.state.chatters;
+        let holds = self.running.solver.method.is_adaptive() && !self.state.chatters;
         let keeps = |slip: Slip| slip != Slip::Whole && !anew;
         if !holds {
             for memory in &mut self.state.memory {
