@@ -92,6 +92,9 @@ pub struct Contacts {
     pub evaluations: u64,
     any_ramp: bool,
     any_contact: bool,
+    /// Forces are those where present rates and bias accelerations carry the contacts within this time, s; 0 elsewhere than in
+    /// [`crate::integrate::ContactSystem::derivative_ahead`].
+    pub ahead: f64,
     /// A sliding speed was beyond its piece of the friction law since this was last cleared.
     pub strayed: bool,
     /// Of the latest evaluation, s.
@@ -123,6 +126,7 @@ impl Contacts {
             switching: Switching::Located,
             evaluations: 0,
             any_ramp: false,
+            ahead: 0.0,
             strayed: false,
             time: 0.0,
         }
@@ -236,9 +240,19 @@ impl Contacts {
             let (ball, socket) = (&motion[joint.ball.body], &motion[joint.socket.body]);
             let arm_ball = ball.rotation * joint.ball.offset;
             let arm_socket = socket.rotation * joint.socket.offset;
-            let e = (ball.position + arm_ball) - (socket.position + arm_socket);
+            let mut centre_velocity = (ball.velocity + ball.angular_velocity.cross(&arm_ball))
+                - (socket.velocity + socket.angular_velocity.cross(&arm_socket));
+            let mut e = (ball.position + arm_ball) - (socket.position + arm_socket);
+            if self.ahead > 0.0 {
+                // What the coordinates' rates do not tell: centripetal and prescribed accelerations.
+                let bias =
+                    ball.point_acceleration(&arm_ball) - socket.point_acceleration(&arm_socket);
+                e += (centre_velocity + bias * (0.5 * self.ahead)) * self.ahead;
+                centre_velocity += bias * self.ahead;
+            }
             let gap = &mut self.gaps[i];
             gap.eccentricity = e;
+            gap.eccentricity_rate = centre_velocity;
             gap.normal_force = 0.0;
             gap.friction = Vec3::zeros();
             gap.slip_speed = 0.0;
@@ -248,9 +262,6 @@ impl Contacts {
                 Switching::Located => memory.active,
                 Switching::Immediate => square > clearance * clearance,
             };
-            let centre_velocity = (ball.velocity + ball.angular_velocity.cross(&arm_ball))
-                - (socket.velocity + socket.angular_velocity.cross(&arm_socket));
-            gap.eccentricity_rate = centre_velocity;
             if !touches || square <= clearance * clearance {
                 continue;
             }

@@ -31,12 +31,13 @@ struct Stiffness {
 
 /// Columns of one contact: how each coordinate moves it.
 #[derive(Clone, Copy)]
-struct Column {
-    coordinate: usize,
+pub struct Column {
+    /// Velocity coordinate.
+    pub coordinate: usize,
     /// Ball centre against socket centre.
-    centre: Vec3,
+    pub centre: Vec3,
     /// Ball's contact point against the socket's.
-    surface: Vec3,
+    pub surface: Vec3,
     /// r omega_ball - R omega_socket.
     turn: Vec3,
 }
@@ -122,7 +123,15 @@ impl Stiff {
                 continue;
             };
             self.empty = false;
-            self.collect(contacts, motion, joint, j, &stiffness.n, &visit);
+            collect_columns(
+                &mut self.columns,
+                contacts,
+                motion,
+                joint,
+                j,
+                &stiffness.n,
+                &visit,
+            );
             self.add(&stiffness, contacts.coefficients(j).surface);
             self.add_drift(&stiffness, j);
         }
@@ -151,47 +160,6 @@ impl Stiff {
         for k in &self.columns {
             self.time_derivative[positions + k.coordinate] +=
                 k.surface.dot(&force) + k.turn.dot(&lever);
-        }
-    }
-
-    fn collect(
-        &mut self,
-        contacts: &Contacts,
-        motion: &[Kinematics],
-        joint: &BallJoint,
-        j: usize,
-        n: &Vec3,
-        visit: &impl Fn(usize, &Vec3, &mut dyn FnMut(usize, Vec3, Vec3)),
-    ) {
-        self.columns.clear();
-        let radius = contacts.coefficients(j).ball_radius;
-        let sides = [
-            (&joint.ball, radius, 1.0),
-            (&joint.socket, radius + contacts.clearance(j), -1.0),
-        ];
-        for (anchor, radius, sign) in sides {
-            let m = &motion[anchor.body];
-            let centre = m.position + m.rotation * anchor.offset;
-            let to_surface = n * radius;
-            let columns = &mut self.columns;
-            visit(anchor.body, &centre, &mut |coordinate, velocity, omega| {
-                let centre = velocity * sign;
-                let surface = (velocity + omega.cross(&to_surface)) * sign;
-                let turn = omega * (radius * sign);
-                // A coordinate above both bodies of the joint moves both.
-                if let Some(column) = columns.iter_mut().find(|c| c.coordinate == coordinate) {
-                    column.centre += centre;
-                    column.surface += surface;
-                    column.turn += turn;
-                } else {
-                    columns.push(Column {
-                        coordinate,
-                        centre,
-                        surface,
-                        turn,
-                    });
-                }
-            });
         }
     }
 
@@ -481,6 +449,47 @@ fn linearise_contact(
         force: n * -force_n + gap.friction,
         n,
     })
+}
+
+/// How each coordinate moves contact `j` with normal `n`, into `columns`.
+pub fn collect_columns(
+    columns: &mut Vec<Column>,
+    contacts: &Contacts,
+    motion: &[Kinematics],
+    joint: &BallJoint,
+    j: usize,
+    n: &Vec3,
+    visit: &impl Fn(usize, &Vec3, &mut dyn FnMut(usize, Vec3, Vec3)),
+) {
+    columns.clear();
+    let radius = contacts.coefficients(j).ball_radius;
+    let sides = [
+        (&joint.ball, radius, 1.0),
+        (&joint.socket, radius + contacts.clearance(j), -1.0),
+    ];
+    for (anchor, radius, sign) in sides {
+        let m = &motion[anchor.body];
+        let centre = m.position + m.rotation * anchor.offset;
+        let to_surface = n * radius;
+        visit(anchor.body, &centre, &mut |coordinate, velocity, omega| {
+            let centre = velocity * sign;
+            let surface = (velocity + omega.cross(&to_surface)) * sign;
+            let turn = omega * (radius * sign);
+            // A coordinate above both bodies of the joint moves both.
+            if let Some(column) = columns.iter_mut().find(|c| c.coordinate == coordinate) {
+                column.centre += centre;
+                column.surface += surface;
+                column.turn += turn;
+            } else {
+                columns.push(Column {
+                    coordinate,
+                    centre,
+                    surface,
+                    turn,
+                });
+            }
+        });
+    }
 }
 
 /// [`Map`] of the tree coordinates.
