@@ -60,6 +60,8 @@ pub struct Polynomial {
     end: f64,
     /// Increments of the three stages.
     z: [Vec<f64>; 3],
+    /// theta / (1 - theta) of the latest iteration that showed its contraction theta.
+    contraction: f64,
 }
 
 /// Radau IIA(5).
@@ -93,6 +95,7 @@ impl Radau {
                 h: 0.0,
                 end: 0.0,
                 z: triple(),
+                contraction: 1.0,
             },
             iterations: 0,
             slow: false,
@@ -103,6 +106,7 @@ impl Radau {
     pub fn invalidate(&mut self) {
         self.linearised_at = f64::NAN;
         self.previous.h = 0.0;
+        self.previous.contraction = 1.0;
     }
 
     /// What a resumed run needs to give the same bits.
@@ -186,6 +190,9 @@ impl Radau {
         // The iteration's own error stays well below the step's.
         let target = (10.0 * f64::EPSILON / tolerance).max(tolerance.sqrt().min(0.01));
         let (real, alpha, beta) = (REAL / h, PAIR.0 / h, PAIR.1 / h);
+        // Where the steps before converged fast, one iteration may do; trust in that wears off (Hairer & Wanner II, IV.8).
+        let trusted = libm::pow(self.previous.contraction.max(f64::EPSILON), 0.8);
+        self.previous.contraction = trusted;
         let mut before = 0.0;
         self.slow = false;
         for iteration in 0..MOST_ITERATIONS {
@@ -230,7 +237,7 @@ impl Radau {
                 return false;
             }
             if iteration == 0 {
-                if size <= target * 1e-3 {
+                if trusted * size <= target {
                     return true;
                 }
             } else {
@@ -243,7 +250,8 @@ impl Radau {
                     return false;
                 }
                 self.slow = theta > 0.3;
-                let left = theta / (1.0 - theta) * size;
+                self.previous.contraction = theta / (1.0 - theta);
+                let left = self.previous.contraction * size;
                 if left <= target {
                     return true;
                 }
