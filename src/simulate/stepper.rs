@@ -118,7 +118,6 @@ impl AnyStepper {
                 ..
             } => s.truncate(theta),
             Self::Radau(s) | Self::Pair { stiff: s, .. } => s.truncate(theta),
-            // What interpolates between the ends of a step takes the new end as it is.
             _ => {}
         }
     }

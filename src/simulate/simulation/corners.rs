@@ -3,7 +3,7 @@
 
 use super::Simulation;
 use crate::contact::Slip;
-use crate::integrate::{System, find_root};
+use crate::integrate::{Method, System, find_root};
 
 /// Parts of a step at whose ends the sliding speed is looked at.
 const PARTS: u32 = 4;
@@ -31,10 +31,17 @@ impl Corner {
 }
 
 impl Simulation {
+    /// Whether the method locates corners. It needs an interpolant of its own: a cubic through both ends of a step longer
+    /// than a contact rings overshoots inside, and a step that ends on it gains energy.
+    fn locates_corners(&self) -> bool {
+        let method = self.running.solver.method;
+        method.is_adaptive() && method != Method::Rosenbrock
+    }
+
     /// Puts every touching joint on the piece of the friction law on which it slides now; those that hold one already keep
     /// it unless `anew`. Where corners are not located, all follow the whole law.
     pub(super) fn hold_slip(&mut self, anew: bool) {
-        let holds = self.running.solver.method.is_adaptive() && !self.state.chatters;
+        let holds = self.locates_corners() && !self.state.chatters;
         let keeps = |slip: Slip| slip != Slip::Whole && !anew;
         if !holds {
             for memory in &mut self.state.memory {
