@@ -213,6 +213,7 @@ impl Equations for Borrowed {
                 active: speed.is_some(),
                 approach_speed: speed.unwrap_or(0.0),
                 floored: false,
+                ..Memory::default()
             };
         }
     }

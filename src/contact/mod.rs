@@ -1,11 +1,13 @@
 //! Contact of a ball in its socket: pure functions of gap, rates and parameters. SI units, f64.
 
 mod law;
+mod slip;
 
 pub use law::{
     Coefficients, damping_factor, hertz_stiffness, impact_duration, restitution_given,
     settled_penetration,
 };
+pub use slip::Slip;
 
 /// Normal-force law of a contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -61,6 +61,8 @@ pub struct DormandPrince {
     /// End state and derivative as the method left them: the caller may project its own copy.
     raw_end: Vec<f64>,
     raw_k_end: Vec<f64>,
+    /// Part of the latest attempt that counts.
+    kept: f64,
 }
 
 impl DormandPrince {
@@ -76,11 +78,18 @@ impl DormandPrince {
             stage: zeros(),
             raw_end: zeros(),
             raw_k_end: zeros(),
+            kept: 1.0,
         }
+    }
+
+    /// Lets the latest attempt end at `theta` of its length: the same interpolant over the shorter step.
+    pub fn truncate(&mut self, theta: f64) {
+        self.kept *= theta;
     }
 
     /// State at `t + theta h` of the latest attempt, 0 <= theta <= 1, from its start and the derivative there.
     pub fn interpolate(&self, theta: f64, h: f64, y: &[f64], k: &[f64], out: &mut [f64]) {
+        let (theta, h) = (theta * self.kept, h / self.kept);
         let s = 1.0 - theta;
         for i in 0..out.len() {
             let d = self.raw_end[i] - y[i];
@@ -97,7 +106,7 @@ impl DormandPrince {
         }
     }
 
-    /// h |lambda| of the step just attempted, from the two evaluations at its end: beyond about 3.25 the step is held
+    /// h |lambda| of the step just attempted, from the two evaluations at its end, 0 where it was truncated: beyond about 3.25 the step is held
     /// by stability and not by accuracy (Hairer & Wanner II, IV.2, eq. (2.8)).
     pub fn stiffness(&self, h: f64, y_end: &[f64], k_end: &[f64]) -> f64 {
         let (mut rate, mut distance) = (0.0, 0.0);
@@ -106,7 +115,7 @@ impl DormandPrince {
             rate += dk * dk;
             distance += dy * dy;
         }
-        if distance > 0.0 {
+        if distance > 0.0 && self.kept == 1.0 {
             h * (rate / distance).sqrt()
         } else {
             0.0
@@ -135,7 +144,9 @@ impl Stepper for DormandPrince {
             stage,
             raw_end,
             raw_k_end,
+            kept,
         } = self;
+        *kept = 1.0;
         for i in 0..n {
             stage[i] = y[i] + h * (A[0][0] * k[i]);
         }

@@ -1,6 +1,6 @@
 //! Fixed-step methods.
 
-use super::{Stepper, System};
+use super::{ContactSystem, Stepper, System};
 
 /// v1 = v + h a(t, q, v), q1 = q + h q_dot(q, v1): order 1, keeps the energy of oscillations bounded.
 pub struct SemiImplicitEuler {
@@ -31,6 +31,43 @@ impl Stepper for SemiImplicitEuler {
         y_end[..positions].copy_from_slice(&y[..positions]);
         for i in positions..y.len() {
             y_end[i] = y[i] + h * k[i];
+        }
+        system.position_rate(t, y_end, &mut self.rate);
+        for i in 0..positions {
+            y_end[i] += h * self.rate[i];
+        }
+        0.0
+    }
+}
+
+/// Implicit-explicit Euler: [`SemiImplicitEuler`] but with the contact forces at the end of the step; order 1, L-stable in the contacts as the
+/// implicit Euler method is, so that steps need not resolve how a settled contact rings.
+pub struct ImexEuler {
+    rate: Vec<f64>,
+}
+
+impl ImexEuler {
+    /// For `dimension` components.
+    pub fn new(dimension: usize) -> Self {
+        Self {
+            rate: vec![0.0; dimension],
+        }
+    }
+
+    /// As [`Stepper::attempt`]; needs no derivative at the start and leaves none at the end.
+    pub fn attempt<S: ContactSystem>(
+        &mut self,
+        system: &mut S,
+        t: f64,
+        h: f64,
+        y: &[f64],
+        y_end: &mut [f64],
+    ) -> f64 {
+        let positions = system.positions();
+        system.derivative_ahead(t, h, y, &mut self.rate);
+        y_end[..positions].copy_from_slice(&y[..positions]);
+        for i in positions..y.len() {
+            y_end[i] = y[i] + h * self.rate[i];
         }
         system.position_rate(t, y_end, &mut self.rate);
         for i in 0..positions {

@@ -12,7 +12,7 @@ mod rosenbrock;
 
 pub use controller::Controller;
 pub use dormand_prince::DormandPrince;
-pub use fixed::{RungeKutta4, SemiImplicitEuler};
+pub use fixed::{ImexEuler, RungeKutta4, SemiImplicitEuler};
 pub use radau::{Polynomial, Radau};
 pub use root::find_root;
 pub use rosenbrock::Rosenbrock;
@@ -22,6 +22,8 @@ pub use rosenbrock::Rosenbrock;
 pub enum Method {
     /// Semi-implicit Euler, order 1, fixed step.
     SemiImplicitEuler,
+    /// Implicit-explicit Euler, implicit in the contacts alone, order 1, fixed step.
+    ImexEuler,
     /// Classical Runge-Kutta, order 4, fixed step.
     RungeKutta4,
     /// Dormand-Prince 5(4), adaptive.
@@ -42,7 +44,10 @@ impl Method {
 
     /// Whether the step size is controlled by an error estimate.
     pub fn is_adaptive(self) -> bool {
-        !matches!(self, Self::SemiImplicitEuler | Self::RungeKutta4)
+        !matches!(
+            self,
+            Self::SemiImplicitEuler | Self::ImexEuler | Self::RungeKutta4
+        )
     }
 }
 
@@ -75,6 +80,13 @@ pub trait StiffSystem: System {
     fn solve_shifted_pair(&mut self, b_real: &mut [f64], b_imaginary: &mut [f64]);
     /// df/dt where J was taken.
     fn time_derivative(&self) -> &[f64];
+}
+
+/// A system whose contacts can be stepped implicitly by themselves.
+pub trait ContactSystem: System {
+    /// f(t, y) into `dy`, but with the contact forces at the end of a step of size `h`: the velocities there
+    /// are those at (t, y) plus `h` times these rates.
+    fn derivative_ahead(&mut self, t: f64, h: f64, y: &[f64], dy: &mut [f64]);
 }
 
 /// One-step method.

@@ -60,6 +60,8 @@ pub struct Polynomial {
     end: f64,
     /// Increments of the three stages.
     z: [Vec<f64>; 3],
+    /// theta / (1 - theta) of the latest iteration that showed its contraction theta.
+    contraction: f64,
 }
 
 /// Radau IIA(5).
@@ -96,6 +98,7 @@ impl Radau {
                 h: 0.0,
                 end: 0.0,
                 z: triple(),
+                contraction: 1.0,
             },
             iterations: 0,
             slow: false,
@@ -106,6 +109,7 @@ impl Radau {
     pub fn invalidate(&mut self) {
         self.linearised_at = f64::NAN;
         self.previous.h = 0.0;
+        self.previous.contraction = 1.0;
     }
 
     /// What a resumed run needs to give the same bits.
@@ -150,9 +154,11 @@ impl Radau {
         error
     }
 
-    /// First guess of the stages: the previous step's polynomial, continued.
+    /// First guess of the stages: the previous step's polynomial, continued, or that of a longer attempt from here.
     fn begin(&mut self, t: f64, h: f64, n: usize) {
-        if self.previous.h == 0.0 || (self.previous.end - t).abs() > 1e-9 * h {
+        let again =
+            self.previous.h > 0.0 && (self.previous.end - self.previous.h - t).abs() <= 1e-9 * h;
+        if !again && (self.previous.h == 0.0 || (self.previous.end - t).abs() > 1e-9 * h) {
             for j in 0..3 {
                 self.z[j].fill(0.0);
                 self.w[j].fill(0.0);
@@ -162,10 +168,11 @@ impl Radau {
         let ratio = h / self.previous.h;
         for i in 0..n {
             let z = std::array::from_fn(|j| self.previous.z[j][i]);
-            let start = polynomial(&z, 0.0);
+            // The polynomial is in s = (time - step's end) / h_previous and gives increments from its own start.
+            let from = if again { -1.0 } else { 0.0 };
+            let start = polynomial(&z, from);
             for j in 0..3 {
-                // The polynomial is in s = (time - step's end) / h_previous and gives increments from its own start.
-                self.z[j][i] = polynomial(&z, C[j] * ratio) - start;
+                self.z[j][i] = polynomial(&z, from + C[j] * ratio) - start;
             }
             for j in 0..3 {
                 self.w[j][i] = (0..3).map(|m| T_INVERSE[j][m] * self.z[m][i]).sum();
@@ -186,6 +193,9 @@ impl Radau {
         // The iteration's own error stays well below the step's.
         let target = (10.0 * f64::EPSILON / tolerance).max(tolerance.sqrt().min(0.01));
         let (real, alpha, beta) = (REAL / h, PAIR.0 / h, PAIR.1 / h);
+        // Where the steps before converged fast, one iteration may do; trust in that wears off (Hairer & Wanner II, IV.8).
+        let trusted = libm::pow(self.previous.contraction.max(f64::EPSILON), 0.8);
+        self.previous.contraction = trusted;
         let mut before = 0.0;
         self.slow = false;
         for iteration in 0..MOST_ITERATIONS {
@@ -230,7 +240,7 @@ impl Radau {
                 return false;
             }
             if iteration == 0 {
-                if size <= target * 1e-3 {
+                if trusted * size <= target {
                     return true;
                 }
             } else {
@@ -243,7 +253,8 @@ impl Radau {
                     return false;
                 }
                 self.slow = theta > 0.3;
-                let left = theta / (1.0 - theta) * size;
+                self.previous.contraction = theta / (1.0 - theta);
+                let left = self.previous.contraction * size;
                 if left <= target {
                     return true;
                 }
@@ -297,6 +308,19 @@ impl Radau {
         }
         self.previous.h = h;
         self.previous.end = t + h;
+    }
+
+    /// Lets the latest attempt end at `theta` of its length: the same polynomial over the shorter step.
+    pub fn truncate(&mut self, theta: f64) {
+        let n = self.stage.len();
+        for i in 0..n {
+            let z = std::array::from_fn(|j| self.previous.z[j][i]);
+            for j in 0..3 {
+                self.previous.z[j][i] = polynomial(&z, C[j] * theta - 1.0);
+            }
+        }
+        self.previous.end -= (1.0 - theta) * self.previous.h;
+        self.previous.h *= theta;
     }
 
     /// State at `t + theta h`: the collocation polynomial.

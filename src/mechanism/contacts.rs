@@ -2,7 +2,7 @@
 
 use super::kinematics::{Kinematics, Wrench};
 use super::model::{BallJoint, Model};
-use crate::contact::{Coefficients, Parameters};
+use crate::contact::{Coefficients, Parameters, Slip};
 use crate::scene::{Scene, Vec3};
 
 /// What a contact remembers between steps: part of the state.
@@ -14,6 +14,8 @@ pub struct Memory {
     pub approach_speed: f64,
     /// The floor was used: this contact rebounds higher than asked.
     pub floored: bool,
+    /// Piece of the friction law in force.
+    pub slip: Slip,
 }
 
 /// A clearance on its way to a new value.
@@ -90,6 +92,11 @@ pub struct Contacts {
     pub evaluations: u64,
     any_ramp: bool,
     any_contact: bool,
+    /// Forces are those where present rates and bias accelerations carry the contacts within this time, s; 0 elsewhere than in
+    /// [`crate::integrate::ContactSystem::derivative_ahead`].
+    pub ahead: f64,
+    /// A sliding speed was beyond its piece of the friction law since this was last cleared.
+    pub strayed: bool,
     /// Of the latest evaluation, s.
     time: f64,
 }
@@ -119,6 +126,8 @@ impl Contacts {
             switching: Switching::Located,
             evaluations: 0,
             any_ramp: false,
+            ahead: 0.0,
+            strayed: false,
             time: 0.0,
         }
     }
@@ -231,9 +240,19 @@ impl Contacts {
             let (ball, socket) = (&motion[joint.ball.body], &motion[joint.socket.body]);
             let arm_ball = ball.rotation * joint.ball.offset;
             let arm_socket = socket.rotation * joint.socket.offset;
-            let e = (ball.position + arm_ball) - (socket.position + arm_socket);
+            let mut centre_velocity = (ball.velocity + ball.angular_velocity.cross(&arm_ball))
+                - (socket.velocity + socket.angular_velocity.cross(&arm_socket));
+            let mut e = (ball.position + arm_ball) - (socket.position + arm_socket);
+            if self.ahead > 0.0 {
+                // What the coordinates' rates do not tell: centripetal and prescribed accelerations.
+                let bias =
+                    ball.point_acceleration(&arm_ball) - socket.point_acceleration(&arm_socket);
+                e += (centre_velocity + bias * (0.5 * self.ahead)) * self.ahead;
+                centre_velocity += bias * self.ahead;
+            }
             let gap = &mut self.gaps[i];
             gap.eccentricity = e;
+            gap.eccentricity_rate = centre_velocity;
             gap.normal_force = 0.0;
             gap.friction = Vec3::zeros();
             gap.slip_speed = 0.0;
@@ -243,9 +262,6 @@ impl Contacts {
                 Switching::Located => memory.active,
                 Switching::Immediate => square > clearance * clearance,
             };
-            let centre_velocity = (ball.velocity + ball.angular_velocity.cross(&arm_ball))
-                - (socket.velocity + socket.angular_velocity.cross(&arm_socket));
-            gap.eccentricity_rate = centre_velocity;
             if !touches || square <= clearance * clearance {
                 continue;
             }
@@ -281,9 +297,12 @@ impl Contacts {
                 let slip = relative - n * n.dot(&relative);
                 let speed = slip.norm();
                 gap.slip_speed = speed;
-                let ratio = coefficients.friction_ratio(speed);
-                if ratio > 0.0 {
-                    let friction = slip * (-ratio * normal_force / speed);
+                if memory.slip != Slip::Whole && coefficients.beyond(memory.slip, speed) > 0.0 {
+                    self.strayed = true;
+                }
+                let per_speed = coefficients.friction_per_speed(memory.slip, speed);
+                if per_speed != 0.0 {
+                    let friction = slip * (-per_speed * normal_force);
                     gap.friction = friction;
                     force += friction;
                 }
@@ -311,6 +330,28 @@ impl Contacts {
                 - (socket.velocity + socket.angular_velocity.cross(&arm_socket));
         }
         self.finish(t);
+    }
+
+    /// Sliding speed of joint `i` in the motion last measured, m/s.
+    pub fn slip_speed(&self, i: usize, motion: &[Kinematics]) -> f64 {
+        let Joint {
+            joint,
+            coefficients,
+            clearance,
+        } = &self.joints[i];
+        let gap = &self.gaps[i];
+        let n = gap.normal;
+        let mut relative = gap.eccentricity_rate;
+        if coefficients.surface {
+            let radius = coefficients.ball_radius;
+            relative += motion[joint.ball.body]
+                .angular_velocity
+                .cross(&(n * radius))
+                - motion[joint.socket.body]
+                    .angular_velocity
+                    .cross(&(n * (radius + clearance)));
+        }
+        (relative - n * n.dot(&relative)).norm()
     }
 
     /// Completes normal, penetration and rate of every gap from the eccentricities of the latest evaluation.

@@ -6,6 +6,7 @@
 mod constraints;
 mod contacts;
 mod factor;
+mod implicit;
 mod jet;
 mod kinematics;
 mod lagrange;
@@ -23,7 +24,7 @@ pub use power::Powers;
 pub use spcmm::{Ideal, Trajectory, Unreachable};
 pub use summary::Summary;
 
-use crate::integrate::{StiffSystem, System};
+use crate::integrate::{ContactSystem, StiffSystem, System};
 use crate::scene::{Formulation, Scene, StartRule, Vec3};
 use constraints::Constraints;
 use lagrange::Lagrange;
@@ -111,6 +112,8 @@ pub struct Mechanism {
     sources: power::Sources,
     /// Instant at which motion and forces are those of the latest evaluation, s; NaN where something was measured since.
     evaluated: f64,
+    /// Made where contacts alone are stepped implicitly.
+    implicit: Option<Box<implicit::ImplicitContacts>>,
     /// Evaluations of the equations of motion so far.
     pub evaluations: u64,
 }
@@ -143,6 +146,7 @@ impl Mechanism {
             gravity: scene.gravity,
             joint_names: scene.ball_joints.iter().map(|j| j.name.clone()).collect(),
             stiff: None,
+            implicit: None,
             evaluations: 0,
         })
     }
@@ -329,6 +333,11 @@ impl Mechanism {
         }
     }
 
+    /// Sliding speed of ball joint `j` in the motion last measured, m/s.
+    pub fn slip_speed(&self, j: usize) -> f64 {
+        self.contacts.slip_speed(j, self.motion())
+    }
+
     /// Everything at (t, y): derivative into `dy`, true accelerations in [`Self::motion`], gaps of all joints,
     /// reactions and actuator forces.
     pub fn evaluate_fully(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
@@ -462,6 +471,25 @@ impl Mechanism {
                 dimension - positions,
                 dimension,
                 joints,
+            )));
+        }
+    }
+
+    /// Allocates what [`ContactSystem`] needs, so that no step does.
+    pub fn prepare_implicit_contacts(&mut self) {
+        if self.implicit.is_none() {
+            let velocities = self.dimension() - self.positions();
+            let blocks = matches!(
+                &self.form,
+                Form::Tree {
+                    constraints: None,
+                    ..
+                }
+            );
+            self.implicit = Some(Box::new(implicit::ImplicitContacts::new(
+                &self.model,
+                velocities,
+                blocks,
             )));
         }
     }
@@ -683,5 +711,62 @@ impl StiffSystem for Mechanism {
         self.stiff
             .as_ref()
             .map_or(&[], |stiff| &stiff.time_derivative)
+    }
+}
+
+impl ContactSystem for Mechanism {
+    fn derivative_ahead(&mut self, t: f64, h: f64, y: &[f64], dy: &mut [f64]) {
+        self.prepare_implicit_contacts();
+        if let Form::Lagrange(lagrange) = &mut self.form {
+            // Every body is free here: its accelerations are none of its bias.
+            for m in &mut lagrange.motion[..self.model.bodies.len()] {
+                m.acceleration = Vec3::zeros();
+                m.angular_acceleration = Vec3::zeros();
+            }
+        }
+        self.contacts.ahead = h;
+        self.derivative(t, y, dy);
+        self.contacts.ahead = 0.0;
+        let Some(mut implicit) = self.implicit.take() else {
+            return;
+        };
+        let dv = &mut dy[self.positions()..];
+        let Self {
+            model,
+            form,
+            contacts,
+            ..
+        } = self;
+        match form {
+            Form::Tree { tree, constraints } => {
+                let motion = &tree.motion;
+                implicit.gather(model, contacts, motion, |body, point, visit| {
+                    if body < model.bodies.len() && !model.bodies[body].driven_only {
+                        let first = model.blocks[model.block_of[body]].v;
+                        tree::visit_columns(model, motion, body, point, |c, v, w| {
+                            visit(first + c, v, w)
+                        });
+                    }
+                });
+                implicit.correct(h, dv, |(first, end), x| {
+                    if let Some(constraints) = constraints {
+                        tree.solve(model, x);
+                        constraints.restrain(model, x);
+                    } else {
+                        tree.solve_within(model, first, end, x);
+                    }
+                });
+            }
+            Form::Lagrange(lagrange) => {
+                let motion = &lagrange.motion;
+                implicit.gather(model, contacts, motion, |body, point, mut visit| {
+                    if body < model.bodies.len() {
+                        tree::visit_free(6 * body, &(point - motion[body].position), &mut visit);
+                    }
+                });
+                implicit.correct(h, dv, |_, x| lagrange.mobilise(model, x));
+            }
+        }
+        self.implicit = Some(implicit);
     }
 }

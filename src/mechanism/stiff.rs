@@ -31,12 +31,13 @@ struct Stiffness {
 
 /// Columns of one contact: how each coordinate moves it.
 #[derive(Clone, Copy)]
-struct Column {
-    coordinate: usize,
+pub struct Column {
+    /// Velocity coordinate.
+    pub coordinate: usize,
     /// Ball centre against socket centre.
-    centre: Vec3,
+    pub centre: Vec3,
     /// Ball's contact point against the socket's.
-    surface: Vec3,
+    pub surface: Vec3,
     /// r omega_ball - R omega_socket.
     turn: Vec3,
 }
@@ -122,7 +123,15 @@ impl Stiff {
                 continue;
             };
             self.empty = false;
-            self.collect(contacts, motion, joint, j, &stiffness.n, &visit);
+            collect_columns(
+                &mut self.columns,
+                contacts,
+                motion,
+                joint,
+                j,
+                &stiffness.n,
+                &visit,
+            );
             self.add(&stiffness, contacts.coefficients(j).surface);
             self.add_drift(&stiffness, j);
         }
@@ -151,47 +160,6 @@ impl Stiff {
         for k in &self.columns {
             self.time_derivative[positions + k.coordinate] +=
                 k.surface.dot(&force) + k.turn.dot(&lever);
-        }
-    }
-
-    fn collect(
-        &mut self,
-        contacts: &Contacts,
-        motion: &[Kinematics],
-        joint: &BallJoint,
-        j: usize,
-        n: &Vec3,
-        visit: &impl Fn(usize, &Vec3, &mut dyn FnMut(usize, Vec3, Vec3)),
-    ) {
-        self.columns.clear();
-        let radius = contacts.coefficients(j).ball_radius;
-        let sides = [
-            (&joint.ball, radius, 1.0),
-            (&joint.socket, radius + contacts.clearance(j), -1.0),
-        ];
-        for (anchor, radius, sign) in sides {
-            let m = &motion[anchor.body];
-            let centre = m.position + m.rotation * anchor.offset;
-            let to_surface = n * radius;
-            let columns = &mut self.columns;
-            visit(anchor.body, &centre, &mut |coordinate, velocity, omega| {
-                let centre = velocity * sign;
-                let surface = (velocity + omega.cross(&to_surface)) * sign;
-                let turn = omega * (radius * sign);
-                // A coordinate above both bodies of the joint moves both.
-                if let Some(column) = columns.iter_mut().find(|c| c.coordinate == coordinate) {
-                    column.centre += centre;
-                    column.surface += surface;
-                    column.turn += turn;
-                } else {
-                    columns.push(Column {
-                        coordinate,
-                        centre,
-                        surface,
-                        turn,
-                    });
-                }
-            });
         }
     }
 
@@ -444,9 +412,9 @@ fn linearise_contact(
     let mut along = -n;
     let mut by_slip = Mat3::zeros();
     let mut by_normal = identity * -force_n;
-    if c.friction > 0.0 && gap.slip_speed > 0.0 {
+    if c.friction > 0.0 {
         let speed = gap.slip_speed;
-        let ratio = c.friction_ratio(speed);
+        let per_speed = c.friction_per_speed(memory.slip, speed);
         let radius = c.ball_radius;
         let (ball, socket) = (&motion[joint.ball.body], &motion[joint.socket.body]);
         let mut sliding = gap.eccentricity_rate;
@@ -456,11 +424,14 @@ fn linearise_contact(
                     .angular_velocity
                     .cross(&(n * (radius + contacts.clearance(j))));
         }
-        let t = (sliding - n * n.dot(&sliding)) / speed;
-        along -= t * ratio;
-        let slope = c.friction_slope(speed);
-        let tt = t * t.transpose();
-        by_slip = ((tangent - tt) * (ratio / speed) + tt * slope) * -force_n;
+        let t = if speed > 0.0 {
+            (sliding - n * n.dot(&sliding)) / speed
+        } else {
+            Vec3::zeros()
+        };
+        along -= t * (per_speed * speed);
+        let slope = speed * c.friction_per_speed_slope(memory.slip, speed);
+        by_slip = (tangent * per_speed + t * t.transpose() * slope) * -force_n;
         // The tangent plane turns with n: d(v_t) = -(n . w) dn - n (w . dn).
         by_normal += by_slip * (identity * -n.dot(&sliding));
         by_slip *= tangent;
@@ -478,6 +449,47 @@ fn linearise_contact(
         force: n * -force_n + gap.friction,
         n,
     })
+}
+
+/// How each coordinate moves contact `j` with normal `n`, into `columns`.
+pub fn collect_columns(
+    columns: &mut Vec<Column>,
+    contacts: &Contacts,
+    motion: &[Kinematics],
+    joint: &BallJoint,
+    j: usize,
+    n: &Vec3,
+    visit: &impl Fn(usize, &Vec3, &mut dyn FnMut(usize, Vec3, Vec3)),
+) {
+    columns.clear();
+    let radius = contacts.coefficients(j).ball_radius;
+    let sides = [
+        (&joint.ball, radius, 1.0),
+        (&joint.socket, radius + contacts.clearance(j), -1.0),
+    ];
+    for (anchor, radius, sign) in sides {
+        let m = &motion[anchor.body];
+        let centre = m.position + m.rotation * anchor.offset;
+        let to_surface = n * radius;
+        visit(anchor.body, &centre, &mut |coordinate, velocity, omega| {
+            let centre = velocity * sign;
+            let surface = (velocity + omega.cross(&to_surface)) * sign;
+            let turn = omega * (radius * sign);
+            // A coordinate above both bodies of the joint moves both.
+            if let Some(column) = columns.iter_mut().find(|c| c.coordinate == coordinate) {
+                column.centre += centre;
+                column.surface += surface;
+                column.turn += turn;
+            } else {
+                columns.push(Column {
+                    coordinate,
+                    centre,
+                    surface,
+                    turn,
+                });
+            }
+        });
+    }
 }
 
 /// [`Map`] of the tree coordinates.
@@ -532,6 +544,7 @@ fn spin_of(q: &[f64], d: &[f64]) -> [f64; 3] {
 
 #[cfg(test)]
 mod tests {
+    use crate::contact::Slip;
     use crate::integrate::{StiffSystem, System};
     use crate::mechanism::{Mechanism, Memory};
     use crate::scene::Scene;
@@ -556,6 +569,7 @@ mod tests {
                 active: true,
                 approach_speed: 1e-3,
                 floored: true,
+                slip: Slip::Whole,
             };
         }
         (mechanism, y)

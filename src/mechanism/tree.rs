@@ -242,6 +242,17 @@ impl Tree {
         }
     }
 
+    /// As [`Self::solve`] for the blocks whose coordinates lie within `first..end`.
+    pub fn solve_within(&self, model: &Model, first: usize, end: usize, x: &mut [f64]) {
+        let from = model.blocks.partition_point(|block| block.v < first);
+        for (index, block) in model.blocks.iter().enumerate().skip(from) {
+            if block.v >= end {
+                break;
+            }
+            self.solve_block(model, index, &mut x[block.v..][..block.n]);
+        }
+    }
+
     /// Replaces the bias accelerations of the bodies by the true ones for coordinate accelerations `vdot`.
     pub fn accelerate(&mut self, model: &Model, y: &[f64], vdot: &[f64]) {
         let vs = &y[model.nq..];

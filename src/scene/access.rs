@@ -17,8 +17,9 @@ const NORMALS: [NormalLaw; 5] = [
 ];
 const FRICTIONS: [FrictionLaw; 2] = [FrictionLaw::ModifiedCoulomb, FrictionLaw::None];
 const FORMS: [Formulation; 2] = [Formulation::Tree, Formulation::Lagrange];
-const METHODS: [Method; 6] = [
+const METHODS: [Method; 7] = [
     Method::SemiImplicitEuler,
+    Method::ImexEuler,
     Method::RungeKutta4,
     Method::DormandPrince5,
     Method::Rosenbrock,

@@ -4,6 +4,7 @@ use super::access::contact_value;
 use super::error::line_text;
 use super::*;
 use crate::contact::{self, FrictionLaw, NormalLaw};
+use crate::integrate::Method;
 
 /// Fewer fixed steps than this do not resolve an impact; ten do.
 const LEAST_STEPS: f64 = 5.0;
@@ -128,8 +129,13 @@ impl Scene {
                 joint.name
             )
         };
+        let stays = if self.solver.method == Method::ImexEuler {
+            " (imex-euler stays stable, but its peak forces and rebounds are too low)"
+        } else {
+            ""
+        };
         Some(format!(
-            "solver.step {}: {why} {}, which a fixed step this long does not resolve; use {} or less, or \
+            "solver.step {}: {why} {}, which a fixed step this long does not resolve{stays}; use {} or less, or \
              solver.method = automatic.",
             format_quantity(self.solver.step, "us"),
             format_quantity(libm::round(duration * 1e8) * 1e-8, "us"),

@@ -19,8 +19,9 @@ pub(super) const NORMAL_LAWS: [&str; 5] = [
 ];
 pub(super) const FRICTION_LAWS: [&str; 2] = ["modified-coulomb", "none"];
 pub(super) const FORMULATIONS: [&str; 2] = ["tree", "lagrange"];
-pub(super) const METHODS: [&str; 6] = [
+pub(super) const METHODS: [&str; 7] = [
     "semi-implicit-euler",
+    "imex-euler",
     "rk4",
     "dopri5",
     "rosenbrock",
@@ -349,7 +350,8 @@ static TABLE: [Parameter; 27] = [
         Kind::Choice(&METHODS),
         Value::Choice("automatic"),
         Scope::Every,
-        "Time stepper. semi-implicit-euler (order 1) and rk4 (order 4) keep a fixed step; dopri5 (Dormand-Prince, \
+        "Time stepper. semi-implicit-euler (order 1), imex-euler (order 1, implicit in the contacts, so \
+         that settled ones stay still at steps that resolve no impact) and rk4 (order 4) keep a fixed step; dopri5 (Dormand-Prince, \
          order 5) chooses its steps by the tolerance and finds the instants at which contacts begin and end; \
          rosenbrock (ROS34PW2, linearly implicit, order 3) does so too and takes longer steps where contacts \
          have settled; radau5 (Radau IIA, implicit, order 5) takes the longest there; automatic changes between \

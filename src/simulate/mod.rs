@@ -92,6 +92,8 @@ pub struct Statistics {
     pub evaluations: u64,
     /// Rejected steps.
     pub rejected: u64,
+    /// Steps that ended at a corner of the friction law.
+    pub corners: u64,
     /// Contacts begun, per ball joint.
     pub impacts: Vec<u64>,
     /// Contacts that began slower than the scene's `impact_speed_floor` or existed at the start, per ball joint: they
@@ -113,8 +115,8 @@ impl PartialEq for Statistics {
     /// Bit by bit, so that "no separation yet" equals itself.
     fn eq(&self, other: &Self) -> bool {
         let bits = |v: &[f64]| v.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
-        (self.steps, self.evaluations, self.rejected)
-            == (other.steps, other.evaluations, other.rejected)
+        let counts = |s: &Self| (s.steps, s.evaluations, s.rejected, s.corners);
+        counts(self) == counts(other)
             && self.impacts == other.impacts
             && self.floored == other.floored
             && self.coarse == other.coarse

@@ -3,6 +3,7 @@
 mod adaptive;
 mod automatic;
 mod contacts;
+mod corners;
 mod doubts;
 mod energy;
 mod guard;
@@ -14,6 +15,7 @@ use super::ledger::Account;
 use super::peaks::{Approach, Recent};
 use super::stepper::AnyStepper;
 use super::{Frame, Peak, StartError, Statistics, Stopped, report};
+use crate::contact::Slip;
 use crate::integrate::{Controller, System, hermite};
 use crate::mechanism::{Mechanism, MechanismError, Memory, Ramp, Switching};
 use crate::scene::Scene;
@@ -58,6 +60,10 @@ pub struct Simulation {
     right_handed: bool,
     /// Joint whose contact starts or ends at the end of the step being taken.
     located: Option<usize>,
+    /// Joint that slides onto another piece of the friction law there.
+    corner: Option<(usize, Slip)>,
+    /// The step being taken was begun again on another piece.
+    turned: bool,
     scratch_memory: Vec<Memory>,
 }
 
@@ -90,6 +96,9 @@ pub(super) struct State {
     h_contact: f64,
     /// A contact began at the latest event.
     contact_began: bool,
+    /// How closely corners of the friction law followed one another, and whether too closely to locate them.
+    chatter: u32,
+    chatters: bool,
     /// Of the automatic pair the implicit method steps.
     implicit: bool,
     /// What the automatic pair's choice goes by.
@@ -138,6 +147,8 @@ impl Simulation {
                 h_next: scene.solver.step.min(LONGEST_STEP),
                 h_contact: FIRST_CONTACT_STEP,
                 contact_began: false,
+                chatter: 0,
+                chatters: false,
                 implicit: false,
                 choice: Choice::default(),
                 controller: controller_of(scene.solver.method, false),
@@ -163,6 +174,8 @@ impl Simulation {
             gaps_end: vec![Approach::default(); joints],
             right_handed: true,
             located: None,
+            corner: None,
+            turned: false,
             scratch_memory: vec![Memory::default(); joints],
             mechanism,
         };
@@ -190,6 +203,7 @@ impl Simulation {
                     active: true,
                     approach_speed,
                     floored: true,
+                    slip: Slip::Whole,
                 };
                 self.state.statistics.impacts[j] += 1;
                 self.state.statistics.floored[j] += 1;
@@ -199,6 +213,7 @@ impl Simulation {
 
     /// Recomputes derivative and gaps of the current state after anything but a step changed it; forgets the step before.
     fn refresh(&mut self) {
+        self.hold_slip(true);
         let Self {
             mechanism, state, ..
         } = self;
@@ -429,6 +444,7 @@ impl Simulation {
         let switched = self.switch_contacts(h);
         self.track_peaks(h);
         self.book_step(h, switched);
+        self.pass_corner();
         if switched && self.mechanism.contacts.switching == Switching::Immediate {
             // The force now divides by the approach speed just found.
             let Self {

@@ -1,12 +1,13 @@
 //! The stepping methods behind one name, so that a method can change while the simulation runs.
 
 use crate::integrate::{
-    DormandPrince, Method, Polynomial, Radau, Rosenbrock, RungeKutta4, SemiImplicitEuler, Stepper,
-    StiffSystem, hermite,
+    ContactSystem, DormandPrince, ImexEuler, Method, Polynomial, Radau, Rosenbrock, RungeKutta4,
+    SemiImplicitEuler, Stepper, StiffSystem, hermite,
 };
 
 pub(super) enum AnyStepper {
     SemiImplicitEuler(SemiImplicitEuler),
+    ImexEuler(ImexEuler),
     RungeKutta4(RungeKutta4),
     DormandPrince(DormandPrince),
     Rosenbrock(Box<Rosenbrock>),
@@ -23,6 +24,7 @@ impl AnyStepper {
     pub(super) fn new(method: Method, dimension: usize) -> Self {
         match method {
             Method::SemiImplicitEuler => Self::SemiImplicitEuler(SemiImplicitEuler::new(dimension)),
+            Method::ImexEuler => Self::ImexEuler(ImexEuler::new(dimension)),
             Method::RungeKutta4 => Self::RungeKutta4(RungeKutta4::new(dimension)),
             Method::DormandPrince5 => Self::DormandPrince(DormandPrince::new(dimension)),
             Method::Rosenbrock => Self::Rosenbrock(Box::new(Rosenbrock::new(dimension))),
@@ -78,7 +80,7 @@ impl AnyStepper {
         }
     }
 
-    pub(super) fn attempt<S: StiffSystem>(
+    pub(super) fn attempt<S: StiffSystem + ContactSystem>(
         &mut self,
         system: &mut S,
         t: f64,
@@ -91,6 +93,7 @@ impl AnyStepper {
     ) -> f64 {
         match self {
             Self::SemiImplicitEuler(s) => s.attempt(system, t, h, y, k, y_end, k_end),
+            Self::ImexEuler(s) => s.attempt(system, t, h, y, y_end),
             Self::RungeKutta4(s) => s.attempt(system, t, h, y, k, y_end, k_end),
             Self::DormandPrince(s)
             | Self::Pair {
@@ -114,9 +117,26 @@ impl AnyStepper {
         }
     }
 
+    /// Lets the latest attempt end at `theta` of its length, where its interpolant is.
+    pub(super) fn truncate(&mut self, theta: f64) {
+        match self {
+            Self::DormandPrince(s)
+            | Self::Pair {
+                explicit: s,
+                implicit: false,
+                ..
+            } => s.truncate(theta),
+            Self::Radau(s) | Self::Pair { stiff: s, .. } => s.truncate(theta),
+            _ => {}
+        }
+    }
+
     /// Whether `attempt` leaves the derivative at the end.
     pub(super) fn ends_with_derivative(&self) -> bool {
-        !matches!(self, Self::SemiImplicitEuler(_) | Self::RungeKutta4(_))
+        !matches!(
+            self,
+            Self::SemiImplicitEuler(_) | Self::ImexEuler(_) | Self::RungeKutta4(_)
+        )
     }
 
     pub(super) fn interpolate(
@@ -130,7 +150,10 @@ impl AnyStepper {
         out: &mut [f64],
     ) {
         match self {
-            Self::SemiImplicitEuler(_) | Self::RungeKutta4(_) | Self::Rosenbrock(_) => {
+            Self::SemiImplicitEuler(_)
+            | Self::ImexEuler(_)
+            | Self::RungeKutta4(_)
+            | Self::Rosenbrock(_) => {
                 hermite(theta, h, y, k, y_end, k_end, out);
             }
             Self::DormandPrince(s)

@@ -12,8 +12,9 @@ use jointplay::simulate::{Frame, Simulation};
 /// Built-in scenes.
 pub const SCENES: [&str; 5] = jointplay::scene::BUILT_IN;
 /// Words of `solver.method`.
-pub const METHODS: [&str; 6] = [
+pub const METHODS: [&str; 7] = [
     "semi-implicit-euler",
+    "imex-euler",
     "rk4",
     "dopri5",
     "rosenbrock",

@@ -26,6 +26,8 @@ impl Simulation {
         let contacts = self.mechanism.contacts.memory_mut();
         contacts.copy_from_slice(&self.state.memory);
         self.stepper.choose(self.state.implicit);
+        self.mechanism.contacts.strayed = false;
+        self.turned = false;
         let (t_end, h) = loop {
             if let Some(step) = self.attempt_adaptive(limit) {
                 break step;
@@ -56,7 +58,8 @@ impl Simulation {
     fn attempt_adaptive(&mut self, limit: f64) -> Option<(f64, f64)> {
         let t = self.state.t;
         let tolerance = self.running.solver.tolerance;
-        let mut h = self.state.h_next.min(LONGEST_STEP);
+        let asked = self.state.h_next;
+        let mut h = asked.min(LONGEST_STEP);
         let mut t_end = t + h;
         let cut = t_end >= limit - 1e-6 * h;
         if cut {
@@ -74,7 +77,31 @@ impl Simulation {
         state.h_next = if cut { state.h_next.max(next) } else { next };
         let contact_began = std::mem::take(&mut state.contact_began);
         self.finish_gaps(t_end);
-        if let Some(theta) = self.first_event(h) {
+        let event = self.first_event(h);
+        let corner = self.first_corner(h);
+        self.corner = None;
+        let corner = corner.filter(|corner| event.is_none_or(|theta| corner.theta < theta));
+        if let Some(corner) = &corner
+            && corner.is_at_start()
+            && !self.turned
+        {
+            // One more try on the other piece; it may well lead back here, and then this one is as good.
+            self.turned = true;
+            self.state.memory[corner.joint].slip = corner.next;
+            self.mechanism.contacts.memory_mut()[corner.joint].slip = corner.next;
+            self.stepper.invalidate();
+            self.state.h_next = asked;
+            self.state.contact_began = contact_began;
+            return None;
+        }
+        let corner = corner.filter(|corner| !corner.is_at_start());
+        if let Some(corner) = corner {
+            self.located = None;
+            self.corner = Some((corner.joint, corner.next));
+            t_end = t + corner.theta * h;
+            self.end_at(corner.theta, t_end, h);
+            h *= corner.theta;
+        } else if let Some(theta) = event {
             // The step is taken again, shorter, so that its end carries the method's error and not the interpolant's.
             t_end = t + theta * h;
             h *= theta;
@@ -106,7 +133,7 @@ impl Simulation {
         )
     }
 
-    fn finish_gaps(&mut self, t_end: f64) {
+    pub(super) fn finish_gaps(&mut self, t_end: f64) {
         self.mechanism.contacts.finish(t_end);
         store_gaps(&self.mechanism, &mut self.gaps_end);
     }

@@ -109,6 +109,9 @@ pub(super) fn prepare_implicit(
     if mechanism.is_kinematic() {
         return Ok(());
     }
+    if method == Method::ImexEuler {
+        mechanism.prepare_implicit_contacts();
+    }
     if method.is_implicit() && velocities > LARGEST_DENSE {
         return Err(MechanismError::TooLarge {
             velocities,

@@ -2,6 +2,7 @@
 
 use super::Simulation;
 use super::doubts::LEAST_STEPS;
+use crate::contact::Slip;
 use crate::mechanism::{Memory, Switching};
 use crate::simulate::peaks::Course;
 
@@ -66,6 +67,7 @@ impl Simulation {
                     active: true,
                     approach_speed: rate.max(floor),
                     floored: rate < floor,
+                    slip: Slip::Whole,
                 };
                 state.statistics.impacts[j] += 1;
                 state.statistics.floored[j] += u64::from(rate < floor);

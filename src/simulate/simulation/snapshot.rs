@@ -47,7 +47,8 @@ impl Simulation {
     }
 
     /// FNV-1a, 64 bit, over the whole state: little-endian bits of time, coordinates, velocities, then for each ball
-    /// joint whether it is in contact, its approach speed, and its clearance in force.
+    /// joint whether it is in contact, its approach speed, and its clearance in force. The piece of
+    /// the friction law in force is not in it: like the step size it belongs to the stepper.
     pub fn state_hash(&self) -> u64 {
         let mut hash = 0xcbf2_9ce4_8422_2325_u64;
         let mut add = |bits: u64| {

@@ -1,0 +1,167 @@
+//! Pieces of the friction law between its corners, each continued smoothly beyond them.
+//!
+//! A step that crosses a corner has no more than order 1 there. A stepper that locates corners holds one piece over a
+//! whole step, finds where the sliding speed leaves it, and goes on from there with the next.
+
+use super::Coefficients;
+
+/// Piece of the friction law (21) that is in force.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Slip {
+    /// The law as it stands, corners included: for steppers that do not locate them.
+    #[default]
+    Whole,
+    /// Below v_a: no friction.
+    Creep,
+    /// Between v_a and v_theta: friction rises with the speed.
+    Ramp,
+    /// Above v_theta: full friction.
+    Full,
+}
+
+impl Coefficients {
+    /// The piece that a sliding speed (m/s) lies on.
+    pub fn slip_at(&self, speed: f64) -> Slip {
+        if speed >= self.slip_high {
+            Slip::Full
+        } else if speed > self.slip_low || self.slip_low == 0.0 {
+            Slip::Ramp
+        } else {
+            Slip::Creep
+        }
+    }
+
+    /// How far a sliding speed is beyond the corners of `slip`, m/s: negative inside.
+    pub fn beyond(&self, slip: Slip, speed: f64) -> f64 {
+        match slip {
+            Slip::Whole => f64::NEG_INFINITY,
+            Slip::Creep => speed - self.slip_low,
+            // Without a creep range the ramp is smooth through rest.
+            Slip::Ramp if self.slip_low == 0.0 => speed - self.slip_high,
+            Slip::Ramp => (speed - self.slip_high).max(self.slip_low - speed),
+            Slip::Full => self.slip_high - speed,
+        }
+    }
+
+    /// Friction force over normal force and sliding velocity, s/m, of a piece continued beyond its corners: twice
+    /// continuously differentiable even through rest.
+    pub fn friction_per_speed(&self, slip: Slip, speed: f64) -> f64 {
+        match slip {
+            Slip::Whole => {
+                let ratio = self.friction_ratio(speed);
+                if ratio > 0.0 { ratio / speed } else { 0.0 }
+            }
+            Slip::Creep => 0.0,
+            Slip::Ramp => {
+                let low = self.slip_low;
+                let start = if low > 0.0 {
+                    low * inverse(speed, low).0
+                } else {
+                    0.0
+                };
+                self.friction / (self.slip_high - low) * (1.0 - start)
+            }
+            Slip::Full => self.friction * inverse(speed, self.slip_high).0,
+        }
+    }
+
+    /// Derivative of [`Self::friction_per_speed`] by the sliding speed, s^2/m^2.
+    pub fn friction_per_speed_slope(&self, slip: Slip, speed: f64) -> f64 {
+        match slip {
+            Slip::Whole => {
+                let (ratio, slope) = (self.friction_ratio(speed), self.friction_slope(speed));
+                if speed > 0.0 {
+                    (slope - ratio / speed) / speed
+                } else {
+                    0.0
+                }
+            }
+            Slip::Creep => 0.0,
+            Slip::Ramp => {
+                let low = self.slip_low;
+                let start = if low > 0.0 {
+                    low * inverse(speed, low).1
+                } else {
+                    0.0
+                };
+                -self.friction / (self.slip_high - low) * start
+            }
+            Slip::Full => self.friction * inverse(speed, self.slip_high).1,
+        }
+    }
+}
+
+/// 1 / speed and its derivative; below half the `corner` the polynomial in the speed's square that joins it with two
+/// continuous derivatives.
+fn inverse(speed: f64, corner: f64) -> (f64, f64) {
+    let join = 0.5 * corner;
+    if speed >= join {
+        return (1.0 / speed, -1.0 / (speed * speed));
+    }
+    let x = speed / join;
+    let u = x * x;
+    (
+        (1.875 - 1.25 * u + 0.375 * u * u) / join,
+        (-2.5 + 1.5 * u) * x / (join * join),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::Parameters;
+
+    fn coefficients() -> Coefficients {
+        Coefficients::new(&Parameters::default(), 3e-4)
+    }
+
+    #[test]
+    fn pieces_are_the_law_between_their_corners_and_meet_there() {
+        let c = coefficients();
+        for speed in [1e-7, 1e-6, 2e-6, 5e-5, 9.99e-5, 1e-4, 3e-4, 1.0] {
+            let slip = c.slip_at(speed);
+            let got = c.friction_per_speed(slip, speed) * speed;
+            let want = c.friction_ratio(speed);
+            assert!((got - want).abs() < 1e-15, "{speed}: {got} {want}");
+            assert!(c.beyond(slip, speed) <= 0.0, "{speed}");
+        }
+        for (below, above, corner) in [
+            (Slip::Creep, Slip::Ramp, c.slip_low),
+            (Slip::Ramp, Slip::Full, c.slip_high),
+        ] {
+            let force = |slip| c.friction_per_speed(slip, corner) * corner;
+            assert!((force(below) - force(above)).abs() < 1e-15);
+            assert!(c.beyond(below, 1.01 * corner) > 0.0 && c.beyond(above, 0.99 * corner) > 0.0);
+        }
+    }
+
+    #[test]
+    fn continued_pieces_are_smooth_and_their_slopes_are_right() {
+        let c = coefficients();
+        for slip in [Slip::Ramp, Slip::Full] {
+            for n in 1..400 {
+                let speed = f64::from(n) * 0.5e-6;
+                let d = 1e-4 * speed;
+                let difference = (c.friction_per_speed(slip, speed + d)
+                    - c.friction_per_speed(slip, speed - d))
+                    / (2.0 * d);
+                let slope = c.friction_per_speed_slope(slip, speed);
+                assert!(
+                    (slope - difference).abs() <= 1e-3 * slope.abs() + 1.0,
+                    "{slip:?} {speed}: {slope} {difference}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn no_creep_range_leaves_a_ramp_that_is_smooth_through_rest() {
+        let c = Coefficients {
+            slip_low: 0.0,
+            ..coefficients()
+        };
+        assert_eq!(c.slip_at(0.0), Slip::Ramp);
+        assert!(c.beyond(Slip::Ramp, 0.0) < 0.0);
+        assert!(c.friction_per_speed(Slip::Ramp, 0.0).is_finite());
+    }
+}
