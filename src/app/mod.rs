@@ -2,6 +2,7 @@
 //!
 //! `logic` moves the state (keys, stepping, recording), `ui` shows it.
 
+mod accuracy;
 mod controls;
 mod dialogs;
 #[cfg(not(target_arch = "wasm32"))]
