@@ -73,10 +73,13 @@ pub struct RunArguments {
     /// File to write; its ending chooses the format: .csv, .json or .npz.
     #[arg(long, value_name = "FILE", requires = "every")]
     pub out: Option<PathBuf>,
+    /// File for one row per finished impact, with the restitution that it really gave: .csv, .json or .npz.
+    #[arg(long, value_name = "FILE")]
+    pub impacts: Option<PathBuf>,
     /// Form of the summary on standard output.
     #[arg(long, value_enum, value_name = "FORM", default_value = "text")]
     pub summary: SummaryForm,
-    /// Replace an existing file.
+    /// Replace existing files.
     #[arg(long)]
     pub force: bool,
     /// No progress bar and no warnings.

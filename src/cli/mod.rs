@@ -3,6 +3,7 @@
 mod args;
 mod check;
 mod failure;
+mod impacts;
 mod interrupt;
 pub mod output;
 mod progress;

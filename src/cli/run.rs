@@ -6,6 +6,7 @@ use indicatif::ProgressBar;
 use serde_json::{Value as Json, json};
 
 use super::args::{RunArguments, SummaryForm};
+use super::impacts::ImpactsFile;
 use super::output::{RowsFile, Table, check_size};
 use super::summary::{self, Status};
 use super::{Failure, interrupt, load, print, progress, quantity, start, warn};
@@ -77,6 +78,15 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         Some(path) => Some(RowsFile::claim(path, arguments.force)?),
         None => None,
     };
+    let mut impacts = match &arguments.impacts {
+        Some(path) if arguments.out.as_ref() == Some(path) => {
+            return Err(Failure::usage(
+                "--impacts and --out name the same file: give each its own",
+            ));
+        }
+        Some(path) => Some(ImpactsFile::claim(path, arguments.force)?),
+        None => None,
+    };
     let scene = load(&arguments.scene)?;
     let mut simulation = start(&scene)?;
     let mut frame = Frame::default();
@@ -100,6 +110,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         duration,
         times,
         &mut table,
+        impacts.as_mut(),
         &mut frame,
         &mut stopwatch,
         &progress,
@@ -107,16 +118,18 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     progress.finish_and_clear();
     let wall = stopwatch.as_secs_f64();
 
-    let mut facts = summary::json(&simulation, end.status, wall)?;
+    let found = impacts.as_ref().map(ImpactsFile::impacts);
+    let mut facts = summary::json(&simulation, end.status, wall, found)?;
+    let mut text = summary::text(&simulation, end.status, wall, found)?;
     facts.insert("rows".into(), json!(table.len()));
-    let mut written = None;
+    let mut meta = facts.clone();
+    // Files of the same run are the same, byte for byte: the machine's speed stays out of them.
+    meta.shift_remove("wall_s");
+    meta.shift_remove("ratio");
+    meta.insert("duration_s".into(), json!(duration));
     if let (Some(file), Some(times)) = (file, times) {
         let path = file.path().to_owned();
-        let mut meta = facts.clone();
-        // Files of the same run are the same, byte for byte: the machine's speed stays out of them.
-        meta.shift_remove("wall_s");
-        meta.shift_remove("ratio");
-        meta.insert("duration_s".into(), json!(duration));
+        let mut meta = meta.clone();
         meta.insert("every_s".into(), json!(times.every));
         meta.insert(
             "contact_states".into(),
@@ -124,13 +137,15 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         );
         file.write(&table, &Json::Object(meta))?;
         facts.insert("out".into(), json!(path.display().to_string()));
-        written = Some((path, table.len()));
+        summary::written(&mut text, table.len(), "row", &path);
+    }
+    if let (Some(impacts), Some(path)) = (impacts, &arguments.impacts) {
+        let rows = impacts.write(&scene, meta)?;
+        facts.insert("impacts_out".into(), json!(path.display().to_string()));
+        summary::written(&mut text, rows, "impact", path);
     }
     match arguments.summary {
-        SummaryForm::Text => {
-            let written = written.as_ref().map(|(path, rows)| (path.as_path(), *rows));
-            print(&summary::text(&simulation, end.status, wall, written)?)?;
-        }
+        SummaryForm::Text => print(&text)?,
         SummaryForm::Json => print(&format!("{:#}\n", Json::Object(facts)))?,
     }
     end.failure.map_or(Ok(()), Err)
@@ -142,6 +157,7 @@ fn simulate(
     duration: f64,
     times: Option<Times>,
     table: &mut Table,
+    mut impacts: Option<&mut ImpactsFile>,
     frame: &mut Frame,
     stopwatch: &mut Duration,
     progress: &ProgressBar,
@@ -189,7 +205,7 @@ fn simulate(
             .filter(|times| next <= times.last)
             .map_or(duration, |times| times.at(next));
         let started = Instant::now();
-        let outcome = step_some(simulation, row, duration);
+        let outcome = step_some(simulation, row, duration, impacts.as_deref_mut());
         *stopwatch += started.elapsed();
         if let Err(stopped) = outcome {
             return End {
@@ -205,12 +221,16 @@ fn step_some(
     simulation: &mut Simulation,
     row: f64,
     duration: f64,
+    mut impacts: Option<&mut ImpactsFile>,
 ) -> Result<(), crate::simulate::Stopped> {
     for _ in 0..STEPS_BETWEEN_LOOKS {
         if simulation.time() >= row {
             break;
         }
         simulation.step_until(duration)?;
+        if let Some(impacts) = &mut impacts {
+            impacts.collect(simulation);
+        }
     }
     Ok(())
 }

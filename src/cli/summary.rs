@@ -5,9 +5,10 @@ use std::path::Path;
 
 use serde_json::{Map, Value as Json, json};
 
+use super::impacts::Restitution;
 use super::output::significant;
 use super::{Failure, provenance};
-use crate::simulate::Simulation;
+use crate::simulate::{Impact, Ledger, Simulation};
 
 /// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,7 +32,7 @@ impl Status {
     }
 }
 
-/// The summary as JSON: what made the run, then what it did.
+/// The summary as JSON: what made the run, then what it did; `impacts` where all of them were collected.
 ///
 /// # Errors
 /// As [`provenance::meta`].
@@ -39,6 +40,7 @@ pub fn json(
     simulation: &Simulation,
     status: Status,
     wall: f64,
+    impacts: Option<&[Impact]>,
 ) -> Result<Map<String, Json>, Failure> {
     let scene = simulation.scene();
     let statistics = simulation.statistics();
@@ -70,10 +72,34 @@ pub fn json(
     if let Json::Object(own) = own {
         summary.extend(own);
     }
+    if let Some(ledger) = simulation.ledger() {
+        summary.insert("energy_J".into(), energy(ledger));
+    }
+    if let Some(impacts) = impacts {
+        let entry = |i: usize| Restitution::of(impacts, i).json();
+        summary.insert("restitution".into(), by_joint(&entry));
+    }
     Ok(summary)
 }
 
-/// The summary as text.
+/// The ledger as JSON, J; `relative_residual` is the residual over the energy exchanged.
+fn energy(ledger: &Ledger) -> Json {
+    json!({
+        "drive_work": ledger.drive_work,
+        "gravity_work": ledger.gravity_work,
+        "kinetic_change": ledger.kinetic_change,
+        "elastic_change": ledger.elastic_change,
+        "restitution_loss": ledger.restitution_loss,
+        "friction_loss": ledger.friction_loss,
+        "clearance_work": ledger.clearance_work,
+        "change_work": ledger.change_work,
+        "exchanged": ledger.exchanged,
+        "residual": ledger.residual(),
+        "relative_residual": ledger.relative_residual(),
+    })
+}
+
+/// The summary as text; `impacts` where all of them were collected.
 ///
 /// # Errors
 /// As [`provenance::meta`].
@@ -81,7 +107,7 @@ pub fn text(
     simulation: &Simulation,
     status: Status,
     wall: f64,
-    written: Option<(&Path, usize)>,
+    impacts: Option<&[Impact]>,
 ) -> Result<String, Failure> {
     let scene = simulation.scene();
     let statistics = simulation.statistics();
@@ -126,6 +152,39 @@ pub fn text(
             }
         };
         line(&format!("Joint {}", joint.name), story);
+        let check = impacts.map(|impacts| Restitution::of(impacts, i));
+        if let Some(check) = check.filter(|check| check.impacts > 0) {
+            let undisturbed = count(check.undisturbed as u64, "undisturbed impact");
+            let story = match check.median_excess {
+                Some(excess) => format!(
+                    "{} more than asked for, median of {undisturbed}",
+                    significant(excess, 3)
+                ),
+                None => undisturbed,
+            };
+            line("  restitution", story);
+        }
+    }
+    if let Some(ledger) = simulation.ledger() {
+        let joules = |value: f64| significant(value, 4);
+        line(
+            "Energy",
+            format!(
+                "drives {} J, gravity {} J, lost by restitution {} J, by friction {} J",
+                joules(ledger.drive_work),
+                joules(ledger.gravity_work),
+                joules(ledger.restitution_loss),
+                joules(ledger.friction_loss)
+            ),
+        );
+        line(
+            "  residual",
+            format!(
+                "{} J, {} of the energy exchanged",
+                joules(ledger.residual()),
+                significant(ledger.relative_residual(), 2)
+            ),
+        );
     }
     line(
         "Wall time",
@@ -138,14 +197,15 @@ pub fn text(
         },
     );
     line("State hash", hash_text(simulation.state_hash()));
-    if let Some((path, rows)) = written {
-        line(
-            "Written",
-            format!("{} to {}", count(rows as u64, "row"), path.display()),
-        );
-    }
     line("Version", format!("jointplay {}", crate::VERSION));
     Ok(out)
+}
+
+/// Adds to a summary that a file was written.
+pub fn written(text: &mut String, rows: usize, what: &str, path: &Path) {
+    let rows = count(rows as u64, what);
+    // Writing to a String cannot fail.
+    let _ = writeln!(text, "{:<18}{rows} to {}", "Written", path.display());
 }
 
 /// A number of things: `1 row`, `2 rows`.

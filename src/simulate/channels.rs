@@ -23,12 +23,13 @@ pub enum Quantity {
     ActuatorForce,
     ActuatorTorque,
     Energy,
+    EnergyBalance,
     ProbeError,
 }
 
 impl Quantity {
     /// All of them, in the order in which a list shows them.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::NormalForce,
         Self::FrictionForce,
         Self::Eccentricity,
@@ -42,7 +43,22 @@ impl Quantity {
         Self::ActuatorForce,
         Self::ActuatorTorque,
         Self::Energy,
+        Self::EnergyBalance,
         Self::ProbeError,
+    ];
+
+    /// Members of [`Self::EnergyBalance`]: kinetic and elastic change equal the works given by drives, gravity, clearance
+    /// and changes, less the losses by restitution and friction, plus the residual.
+    pub const BALANCE: [&str; 9] = [
+        "drives",
+        "gravity",
+        "clearance",
+        "changes",
+        "restitution",
+        "friction",
+        "kinetic",
+        "elastic",
+        "residual",
     ];
 
     /// Sentence-case name.
@@ -61,6 +77,7 @@ impl Quantity {
             Self::ActuatorForce => "Actuator force",
             Self::ActuatorTorque => "Actuator torque",
             Self::Energy => "Energy",
+            Self::EnergyBalance => "Energy balance",
             Self::ProbeError => "Probe error",
         }
     }
@@ -77,7 +94,7 @@ impl Quantity {
             Self::AngleRates => ("rad/s", 1.0),
             Self::Acceleration => ("m/s²", 1.0),
             Self::AngleAccelerations => ("rad/s²", 1.0),
-            Self::Energy => ("mJ", 1e-3),
+            Self::Energy | Self::EnergyBalance => ("mJ", 1e-3),
         }
     }
 
@@ -103,6 +120,11 @@ impl Quantity {
             Self::ActuatorForce => "Force that each driven slide needs, positive along its axis.",
             Self::ActuatorTorque => "Torque that each driven hinge needs, positive about its axis.",
             Self::Energy => "Kinetic, potential and elastic energy of the whole mechanism.",
+            Self::EnergyBalance => {
+                "Since the start: work of drives, gravity, moving clearances and changed parameters, loss by restitution \
+                 and friction, change of kinetic and elastic energy, and the residual, which is the error of the \
+                 integration."
+            }
             Self::ProbeError => "Probe tip minus the tip of the ideal mechanism at the same time.",
         }
     }
@@ -124,6 +146,7 @@ pub struct Channels {
     joints: usize,
     drives: usize,
     probe: bool,
+    balance: bool,
 }
 
 impl Channels {
@@ -163,6 +186,12 @@ impl Channels {
             };
             add(quantity, &joint.name);
         }
+        let balance = scene.solver.energy_ledger;
+        if balance {
+            for member in Quantity::BALANCE {
+                add(Quantity::EnergyBalance, member);
+            }
+        }
         let probe = scene.spcmm.is_some() && scene.output.probe.is_some();
         if probe {
             for member in ["x", "y", "z"] {
@@ -174,6 +203,7 @@ impl Channels {
             joints,
             drives: driven().count(),
             probe,
+            balance,
         }
     }
 
@@ -221,6 +251,20 @@ impl Channels {
             out.extend(vector.iter());
         }
         out.extend(frame.actuators.iter().take(self.drives));
+        if self.balance {
+            let ledger = frame.ledger.unwrap_or_default();
+            out.extend([
+                ledger.drive_work,
+                ledger.gravity_work,
+                ledger.clearance_work,
+                ledger.change_work,
+                ledger.restitution_loss,
+                ledger.friction_loss,
+                ledger.kinetic_change,
+                ledger.elastic_change,
+                ledger.residual(),
+            ]);
+        }
         if self.probe {
             out.extend(frame.probe_error.unwrap_or_else(Vec3::zeros).iter());
         }

@@ -81,6 +81,24 @@ impl Course {
         high
     }
 
+    /// Deepest penetration over the step, m.
+    pub(super) fn deepest(&self) -> f64 {
+        let ends = self.start.penetration.max(self.end.penetration);
+        if !(self.start.rate > 0.0 && self.end.rate < 0.0) {
+            return ends;
+        }
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..30 {
+            let middle = 0.5 * (low + high);
+            if self.at(middle).1 > 0.0 {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        self.at(0.5 * (low + high)).0.max(ends)
+    }
+
     /// Largest normal force over the step and where: (N, theta).
     pub(super) fn strongest(&self, c: &Coefficients, approach_speed: f64) -> (f64, f64) {
         let force = |theta: f64| {

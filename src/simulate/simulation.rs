@@ -8,6 +8,7 @@ mod guard;
 mod live;
 mod snapshot;
 
+use super::impacts::{Impact, Impacts};
 use super::ledger::Account;
 use super::peaks::{Approach, Recent};
 use super::stepper::AnyStepper;
@@ -95,6 +96,7 @@ pub(super) struct State {
     grid_origin: f64,
     grid_count: u64,
     account: Account,
+    impacts: Impacts,
     statistics: Statistics,
 }
 
@@ -138,6 +140,7 @@ impl Simulation {
                 grid_origin: 0.0,
                 grid_count: 0,
                 account: Account::default(),
+                impacts: Impacts::new(joints),
                 statistics: Statistics {
                     impacts: vec![0; joints],
                     floored: vec![0; joints],
@@ -511,6 +514,17 @@ impl Simulation {
         out.clear();
         out.extend_from_slice(&self.peaks);
         self.peaks.fill(Peak::default());
+    }
+
+    /// The latest finished impacts, at most 64, the oldest first.
+    pub fn impacts(&self) -> impl ExactSizeIterator<Item = &Impact> + DoubleEndedIterator {
+        self.state.impacts.latest()
+    }
+
+    /// Appends to `out` the impacts that finished since the last call. None is lost if it is called after every step;
+    /// otherwise only the latest 64 (more where there are more ball joints) are sure to be there.
+    pub fn take_impacts(&mut self, out: &mut Vec<Impact>) {
+        self.state.impacts.hand_out(out);
     }
 
     /// Back to t = 0 with the parameters as they are now, those that wait for a reset included.

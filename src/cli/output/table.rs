@@ -9,6 +9,7 @@ pub struct Table {
     names: Vec<String>,
     values: Vec<f64>,
     probe: bool,
+    ledger: bool,
 }
 
 /// A value that is not a number and so is not written.
@@ -63,10 +64,18 @@ const POSE_ANGLE_ACCELERATIONS: [&str; 3] = [
     "beta_accel_rad_s2",
     "gamma_accel_rad_s2",
 ];
+const LEDGER: [&str; 6] = [
+    "drive_work_J",
+    "gravity_work_J",
+    "restitution_loss_J",
+    "friction_loss_J",
+    "clearance_work_J",
+    "energy_residual_J",
+];
 const PROBE: [&str; 3] = ["probe_error_x_m", "probe_error_y_m", "probe_error_z_m"];
 
 impl Table {
-    /// An empty table with the columns of `scene`; `first` tells whether it has a probe error.
+    /// An empty table with the columns of `scene`; `first` tells whether it has a probe error and a ledger.
     pub fn new(scene: &Scene, first: &Frame) -> Self {
         let joints = || scene.ball_joints.iter().map(|joint| joint.name.as_str());
         let fixed = |list: &[&str]| list.iter().map(ToString::to_string).collect::<Vec<_>>();
@@ -91,10 +100,25 @@ impl Table {
         if probe {
             names.extend(fixed(&PROBE));
         }
+        let ledger = first.ledger.is_some();
+        if ledger {
+            names.extend(fixed(&LEDGER));
+        }
         Self {
             names,
             values: Vec::new(),
             probe,
+            ledger,
+        }
+    }
+
+    /// A table of other rows than those of a run.
+    pub fn of_rows<const N: usize>(names: [&str; N], rows: impl Iterator<Item = [f64; N]>) -> Self {
+        Self {
+            names: names.map(str::to_owned).to_vec(),
+            values: rows.flatten().collect(),
+            probe: false,
+            ledger: false,
         }
     }
 
@@ -174,6 +198,17 @@ impl Table {
         values.extend(pose.angle_accelerations.iter());
         if self.probe {
             values.extend(frame.probe_error.unwrap_or_default().iter());
+        }
+        if self.ledger {
+            let ledger = frame.ledger.unwrap_or_default();
+            values.extend([
+                ledger.drive_work,
+                ledger.gravity_work,
+                ledger.restitution_loss,
+                ledger.friction_loss,
+                ledger.clearance_work,
+                ledger.residual(),
+            ]);
         }
     }
 }

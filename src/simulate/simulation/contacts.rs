@@ -1,7 +1,7 @@
 //! Contact memory and continuous-time peaks of the step just accepted.
 
 use super::Simulation;
-use crate::mechanism::Memory;
+use crate::mechanism::{Memory, Switching};
 use crate::simulate::peaks::Course;
 
 impl Simulation {
@@ -10,6 +10,7 @@ impl Simulation {
         let located = self.located.take();
         let Self {
             mechanism,
+            running,
             state,
             peaks,
             ..
@@ -20,6 +21,11 @@ impl Simulation {
                 continue;
             }
             let (start, end) = (state.gaps0[j], state.gaps[j]);
+            let coefficients = mechanism.contacts.coefficients(j);
+            if state.memory[j].active {
+                let course = Course::new(start, end, h);
+                state.impacts.follow(j, &course, coefficients);
+            }
             // A located switch ends within rounding of the wall, on either side; but the step taken again may show that a
             // ball that was about to separate turned around before.
             let turned = state.memory[j].active && end.penetration > 0.0 && end.rate > 0.0;
@@ -33,13 +39,25 @@ impl Simulation {
             }
             switched = true;
             if touching {
-                let rate = if start.penetration < 0.0 && end.penetration > 0.0 {
-                    let course = Course::new(start, end, h);
-                    course.at(course.crossing()).1
+                let course = Course::new(start, end, h);
+                let crosses = start.penetration < 0.0 && end.penetration > 0.0;
+                let theta = if crosses { course.crossing() } else { 1.0 };
+                let rate = if crosses {
+                    course.at(theta).1
                 } else {
                     end.rate
                 };
-                let floor = mechanism.contacts.coefficients(j).speed_floor;
+                let floor = coefficients.speed_floor;
+                let time = state.t0 + theta * h;
+                let asked = running.ball_joints[j].contact.restitution;
+                let touching = state.memory.iter().any(|m| m.active);
+                state
+                    .impacts
+                    .begin(j, time, rate, asked, coefficients, touching);
+                // A located one begins where the step ends.
+                if mechanism.contacts.switching == Switching::Immediate {
+                    state.impacts.follow(j, &course, coefficients);
+                }
                 state.memory[j] = Memory {
                     active: true,
                     approach_speed: rate.max(floor),
@@ -52,6 +70,15 @@ impl Simulation {
                 state.contact_began = true;
                 state.h_next = state.h_next.min(state.h_contact);
             } else {
+                let crosses = start.penetration > 0.0 && end.penetration < 0.0;
+                let (time, rate) = if crosses && located != Some(j) {
+                    let course = Course::new(start, end, h);
+                    let theta = course.crossing();
+                    (state.t0 + theta * h, course.at(theta).1)
+                } else {
+                    (state.t, end.rate)
+                };
+                state.impacts.end(j, time, rate);
                 state.memory[j] = Memory::default();
                 state.statistics.last_separation[j] = state.t;
             }

@@ -121,6 +121,7 @@ impl Simulation {
         if state.memory[j].active && distance <= clearance {
             state.memory[j] = Memory::default();
         }
+        state.impacts.change(j, state.memory[j].active);
     }
 
     /// When the first clearance under way arrives, s.

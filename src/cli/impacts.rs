@@ -1,0 +1,155 @@
+//! `run --impacts`: one row for each finished impact, and what they come to.
+
+use std::path::Path;
+
+use serde_json::{Map, Value as Json, json};
+
+use super::Failure;
+use super::output::{RowsFile, Table};
+use crate::scene::Scene;
+use crate::simulate::{Impact, Simulation};
+
+const COLUMNS: [&str; 13] = [
+    "joint",
+    "start_s",
+    "end_s",
+    "approach_m_s",
+    "separation_m_s",
+    "restitution_asked",
+    "restitution_law",
+    "restitution_given",
+    "floored",
+    "disturbed",
+    "steps",
+    "deepest_m",
+    "peak_N",
+];
+
+/// Collects the impacts of a run for a file.
+pub struct ImpactsFile {
+    file: RowsFile,
+    impacts: Vec<Impact>,
+}
+
+impl ImpactsFile {
+    /// Checks that `path` can be written.
+    ///
+    /// # Errors
+    /// As [`RowsFile::claim`].
+    pub fn claim(path: &Path, force: bool) -> Result<Self, Failure> {
+        Ok(Self {
+            file: RowsFile::claim(path, force)?,
+            impacts: Vec::new(),
+        })
+    }
+
+    /// Takes what finished since the last call; to be called after every step.
+    pub fn collect(&mut self, simulation: &mut Simulation) {
+        simulation.take_impacts(&mut self.impacts);
+    }
+
+    /// All so far, in the order in which they finished.
+    pub fn impacts(&self) -> &[Impact] {
+        &self.impacts
+    }
+
+    /// Writes them with `meta`, which says what made them. Returns the number of rows.
+    ///
+    /// # Errors
+    /// As [`RowsFile::write`].
+    pub fn write(self, scene: &Scene, mut meta: Map<String, Json>) -> Result<usize, Failure> {
+        let names: Vec<&str> = scene.ball_joints.iter().map(|j| j.name.as_str()).collect();
+        meta.insert("rows".into(), json!(self.impacts.len()));
+        // Numbers in the column `joint`, from 0.
+        meta.insert("ball_joints".into(), json!(names));
+        let flag = |is: bool| f64::from(u8::from(is));
+        let rows = self.impacts.iter().map(|impact| {
+            [
+                impact.joint as f64,
+                impact.start,
+                impact.end,
+                impact.approach_speed,
+                impact.separation_speed,
+                impact.asked,
+                impact.law,
+                impact.given(),
+                flag(impact.floored),
+                flag(impact.disturbed),
+                impact.steps as f64,
+                impact.deepest,
+                impact.peak,
+            ]
+        });
+        let table = Table::of_rows(COLUMNS, rows);
+        self.file.write(&table, &Json::Object(meta))?;
+        Ok(self.impacts.len())
+    }
+}
+
+/// What the impacts of one ball joint come to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Restitution {
+    /// Impacts, and how many of them nothing disturbed that were no slower than the floor.
+    pub impacts: usize,
+    /// See `impacts`.
+    pub undisturbed: usize,
+    /// Median of restitution given less restitution asked for over the undisturbed ones; `None` without any.
+    pub median_excess: Option<f64>,
+}
+
+impl Restitution {
+    /// Of ball joint `joint`.
+    pub fn of(impacts: &[Impact], joint: usize) -> Self {
+        let own = || impacts.iter().filter(|impact| impact.joint == joint);
+        let clean = own().filter(|impact| !impact.disturbed && !impact.floored);
+        let mut excess: Vec<f64> = clean.map(|impact| impact.given() - impact.asked).collect();
+        excess.sort_by(f64::total_cmp);
+        let n = excess.len();
+        Self {
+            impacts: own().count(),
+            undisturbed: n,
+            median_excess: (n > 0).then(|| 0.5 * (excess[(n - 1) / 2] + excess[n / 2])),
+        }
+    }
+
+    /// As an entry of the summary.
+    pub fn json(&self) -> Json {
+        json!({
+            "finished": self.impacts,
+            "undisturbed": self.undisturbed,
+            "median_excess": self.median_excess,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_median_leaves_disturbed_and_slow_impacts_out() {
+        let impact = |joint, given: f64, floored, disturbed| Impact {
+            joint,
+            approach_speed: 0.1,
+            separation_speed: 0.1 * given,
+            asked: 0.5,
+            floored,
+            disturbed,
+            ..Impact::default()
+        };
+        let all = [
+            impact(0, 0.4, false, false),
+            impact(0, 0.6, false, false),
+            impact(0, 0.7, false, false),
+            impact(0, 0.9, true, false),
+            impact(0, 0.1, false, true),
+            impact(1, 0.2, false, true),
+        ];
+        let first = Restitution::of(&all, 0);
+        assert_eq!((first.impacts, first.undisturbed), (5, 3));
+        assert!((first.median_excess.unwrap() - 0.1).abs() < 1e-12);
+        let even = Restitution::of(&all[..2], 0);
+        assert!(even.median_excess.unwrap().abs() < 1e-12);
+        assert_eq!(Restitution::of(&all, 1).median_excess, None);
+    }
+}

@@ -1,0 +1,156 @@
+//! The restitution check: for each impact what was asked for, what its law gives, and what it really gave.
+
+use super::peaks::Course;
+use crate::contact::{Coefficients, restitution_given};
+
+/// Latest impacts that are kept.
+const KEPT: usize = 64;
+
+/// A finished impact of one ball joint: from the instant at which a contact began with an approach to the instant at
+/// which it ended. A contact that existed at the start, or that a live change ended, is none.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Impact {
+    /// Ball joint, by its index in the scene.
+    pub joint: usize,
+    /// When it began, s.
+    pub start: f64,
+    /// When it ended, s.
+    pub end: f64,
+    /// Rate of the penetration when it began, m/s.
+    pub approach_speed: f64,
+    /// Minus the rate of the penetration when it ended, m/s.
+    pub separation_speed: f64,
+    /// Restitution that the joint asked for when it began.
+    pub asked: f64,
+    /// Restitution that its normal-force law gives an undisturbed impact that is not slower than the floor.
+    pub law: f64,
+    /// Began slower than `impact_speed_floor`: it rebounds higher than asked.
+    pub floored: bool,
+    /// Another ball joint touched meanwhile, or a live change altered the contact: its restitution is not the law's alone.
+    pub disturbed: bool,
+    /// Accepted steps from its beginning to its end, those at which a fixed step meets them included.
+    pub steps: u64,
+    /// Deepest penetration in continuous time, m.
+    pub deepest: f64,
+    /// Largest normal force in continuous time, N.
+    pub peak: f64,
+}
+
+impl Impact {
+    /// Restitution that it really gave: separation speed over approach speed.
+    pub fn given(&self) -> f64 {
+        self.separation_speed / self.approach_speed
+    }
+}
+
+/// Impacts under way and the latest finished ones: part of a simulation's state. Allocates nothing after `new`.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Impacts {
+    /// By joint.
+    under_way: Vec<Option<Impact>>,
+    /// (damping factor, restitution that it gives), by joint: finding it takes an iteration.
+    laws: Vec<(f64, f64)>,
+    /// Finished ones; the n-th lies at n modulo its length.
+    finished: Vec<Impact>,
+    /// Number of finished ones, and of those handed out.
+    count: u64,
+    handed_out: u64,
+}
+
+impl Impacts {
+    /// For `joints` ball joints. A step finishes at most one impact of each, so that all can be had between two steps.
+    pub(super) fn new(joints: usize) -> Self {
+        Self {
+            under_way: vec![None; joints],
+            laws: vec![(0.0, 1.0); joints],
+            finished: vec![Impact::default(); KEPT.max(joints)],
+            count: 0,
+            handed_out: 0,
+        }
+    }
+
+    /// A contact of `joint` begins at `time` with the penetration rate `speed`; `touching`: another joint is in contact.
+    pub(super) fn begin(
+        &mut self,
+        joint: usize,
+        time: f64,
+        speed: f64,
+        asked: f64,
+        coefficients: &Coefficients,
+        touching: bool,
+    ) {
+        for other in self.under_way.iter_mut().flatten() {
+            other.disturbed = true;
+        }
+        let law = &mut self.laws[joint];
+        if law.0 != coefficients.damping {
+            *law = (
+                coefficients.damping,
+                restitution_given(coefficients.damping),
+            );
+        }
+        self.under_way[joint] = (speed > 0.0).then_some(Impact {
+            joint,
+            start: time,
+            approach_speed: speed,
+            asked,
+            law: law.1,
+            floored: speed < coefficients.speed_floor,
+            disturbed: touching,
+            ..Impact::default()
+        });
+    }
+
+    /// A step in which the contact of `joint` was on, or came on: the course of its penetration.
+    pub(super) fn follow(&mut self, joint: usize, course: &Course, coefficients: &Coefficients) {
+        if let Some(impact) = &mut self.under_way[joint] {
+            let floor = coefficients.speed_floor;
+            let (force, _) = course.strongest(coefficients, impact.approach_speed.max(floor));
+            impact.steps += 1;
+            impact.deepest = impact.deepest.max(course.deepest());
+            impact.peak = impact.peak.max(force);
+        }
+    }
+
+    /// The contact of `joint` ends at `time` with the penetration rate `rate`.
+    pub(super) fn end(&mut self, joint: usize, time: f64, rate: f64) {
+        if let Some(mut impact) = self.under_way[joint].take() {
+            impact.end = time;
+            impact.separation_speed = (-rate).max(0.0);
+            let slot = (self.count % self.finished.len() as u64) as usize;
+            self.finished[slot] = impact;
+            self.count += 1;
+        }
+    }
+
+    /// A live change altered the contact of `joint`, and ended it where `touching` is false.
+    pub(super) fn change(&mut self, joint: usize, touching: bool) {
+        let impact = &mut self.under_way[joint];
+        if touching {
+            if let Some(impact) = impact {
+                impact.disturbed = true;
+            }
+        } else {
+            *impact = None;
+        }
+    }
+
+    /// The latest finished ones, at most 64, the oldest first.
+    pub(super) fn latest(&self) -> impl ExactSizeIterator<Item = &Impact> + DoubleEndedIterator {
+        let first = self.count.saturating_sub(KEPT as u64);
+        self.since(first)
+    }
+
+    fn since(&self, first: u64) -> impl ExactSizeIterator<Item = &Impact> + DoubleEndedIterator {
+        let length = self.finished.len() as u64;
+        let most = (self.count - first) as usize;
+        (0..most).map(move |n| &self.finished[((first + n as u64) % length) as usize])
+    }
+
+    /// Appends those that were not handed out yet.
+    pub(super) fn hand_out(&mut self, out: &mut Vec<Impact>) {
+        let oldest = self.count.saturating_sub(self.finished.len() as u64);
+        out.extend(self.since(self.handed_out.max(oldest)));
+        self.handed_out = self.count;
+    }
+}
