@@ -106,7 +106,7 @@ fn restitution(player: &Player, impact: &Impact) -> Row {
         (false, false) => "",
     };
     Row {
-        label: "Restitution of it",
+        label: "Its restitution",
         value: format!(
             "{} of {}{note}",
             value::number(given, 3),
@@ -123,7 +123,7 @@ fn residual(player: &Player) -> Option<Row> {
     let share = ledger.relative_residual().abs();
     Some(Row {
         label: "Energy residual",
-        value: format!("{} of that exchanged", value::power_of_ten(share)),
+        value: format!("{} of exchanged", value::power_of_ten(share)),
         doubtful: share > BALANCED,
         help: format!(
             "Energy that the ledger cannot account for since the start, over the energy exchanged ({}). Amber beyond {}.",

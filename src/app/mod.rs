@@ -12,6 +12,7 @@ mod keys;
 mod overlay;
 mod player;
 mod plots;
+mod stack;
 mod theme;
 mod transport;
 mod value;
