@@ -617,3 +617,45 @@ fn the_chosen_plots_are_shown_with_their_units() {
     harness.run();
     harness.get_by_role_and_label(Role::Label, "Energy, mJ");
 }
+
+#[test]
+fn the_accuracy_of_the_running_scene_stands_beside_the_controls() {
+    let mut harness = window("spcmm");
+    harness.get_by_label("Accuracy");
+    harness.get_by_label("not measured yet");
+    // Nothing has been hit yet, and nothing is said about impacts.
+    assert!(harness.query_by_label("Steps in last impact").is_none());
+    harness.state_mut().player_mut().run_to(9e-3);
+    harness.run();
+    harness.get_by_label("Steps in last impact");
+    harness.get_by_label("Energy residual");
+    let player = harness.state().player();
+    let impact = *player.simulation().impacts().next_back().expect("hit");
+    assert!(impact.steps >= 10, "{impact:?}");
+    let joint = &player.scene().ball_joints[impact.joint].name;
+    let words = format!("{} ({joint})", impact.steps);
+    harness.get_by_label(&words);
+    // A coarse step shows in the count, and real stepping is measured.
+    let player = harness.state_mut().player_mut();
+    player.set("solver.method", "rk4").expect("a method");
+    player.set("solver.step", "20 us").expect("in range");
+    player.reset().expect("starts");
+    player.run_to(9e-3);
+    let impact = *player.simulation().impacts().next_back().expect("hit");
+    assert!(impact.steps < 10, "{impact:?}");
+    player.set_playing(true);
+    harness.run_steps(20);
+    assert!(harness.query_by_label("not measured yet").is_none());
+}
+
+#[test]
+fn the_energy_balance_is_stacked_from_both_sides() {
+    let mut harness = window("spcmm");
+    let plots = harness.state_mut().plots_mut();
+    plots.chosen = vec![jointplay::simulate::Quantity::EnergyBalance];
+    plots.window = jointplay::app::Window::Everything;
+    harness.state_mut().player_mut().run_to(0.05);
+    harness.run();
+    harness.get_by_label("Energy balance, mJ");
+    harness.snapshot("energy_balance");
+}

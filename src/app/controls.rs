@@ -8,6 +8,7 @@ use eframe::egui::{
     TextEdit, Tooltip, Ui,
 };
 
+use super::accuracy;
 use super::icons::{Icon, icon_button};
 use super::player::Player;
 use super::value;
@@ -17,6 +18,8 @@ use crate::scene::{
 };
 use crate::simulate::Effect;
 
+/// Stands with the accuracy that it gives.
+const PRESET: &str = "solver.preset";
 /// Parameters that stand first.
 const FIRST: [&str; 3] = [
     "contact.clearance",
@@ -57,6 +60,7 @@ impl Controls {
             }
         }
         ui.separator();
+        self.accuracy(ui, player, &table);
         self.one_joint(ui, player, &table);
         let mut groups: Vec<&'static str> = Vec::new();
         for parameter in &table {
@@ -68,7 +72,7 @@ impl Controls {
             let rest = || {
                 table
                     .iter()
-                    .filter(|p| p.group == group && !FIRST.contains(&p.key))
+                    .filter(|p| p.group == group && !FIRST.contains(&p.key) && p.key != PRESET)
             };
             if rest().next().is_none() {
                 continue;
@@ -79,6 +83,21 @@ impl Controls {
                 }
             });
         }
+    }
+
+    /// The preset, and how the running scene does under it.
+    fn accuracy(&mut self, ui: &mut Ui, player: &mut Player, table: &[&'static Parameter]) {
+        let header = egui::CollapsingHeader::new(RichText::new("Accuracy").strong())
+            .default_open(true)
+            .show(ui, |ui| {
+                if let Some(parameter) = table.iter().find(|p| p.key == PRESET) {
+                    self.control(ui, player, parameter, PRESET);
+                }
+                accuracy::ui(ui, player);
+            });
+        header.header_response.on_hover_text(
+            "How far the numbers can be trusted. Method, step and tolerance stand under Solver.",
+        );
     }
 
     /// Contact parameters of one ball joint, which beat the scene's.
@@ -151,7 +170,7 @@ impl Controls {
             );
         }
         let beats = player.beats_preset();
-        if key == "solver.preset" && !beats.is_empty() {
+        if key == PRESET && !beats.is_empty() {
             let names: Vec<&str> = beats.iter().filter_map(|k| k.split('.').nth(1)).collect();
             let words = format!(
                 "The scene's file gives {}: it wins over a preset",

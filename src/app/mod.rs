@@ -2,6 +2,7 @@
 //!
 //! `logic` moves the state (keys, stepping, recording), `ui` shows it.
 
+mod accuracy;
 mod controls;
 mod dialogs;
 #[cfg(not(target_arch = "wasm32"))]
@@ -11,6 +12,7 @@ mod keys;
 mod overlay;
 mod player;
 mod plots;
+mod stack;
 mod theme;
 mod transport;
 mod value;

@@ -33,6 +33,9 @@ pub struct Player {
     last_impact: Option<f64>,
     /// States before the latest single steps, oldest first.
     past: VecDeque<Snapshot>,
+    /// Simulated time and seconds of stepping that it took, both fading.
+    stepped: f64,
+    stepping: f64,
 }
 
 /// Keys of the solver that win over its preset.
@@ -46,6 +49,10 @@ const PAST: usize = 64;
 
 /// Seconds of viewing that the automatic window of the plots shows.
 const VIEWING: f64 = 5.0;
+
+/// Seconds of stepping over which the capacity is averaged, and the fewest that say something.
+const MEASURED: f64 = 0.3;
+const LEAST_MEASURED: f64 = 1e-3;
 
 /// Most instants recorded of one long step.
 const MOST_RECORDED: f64 = 64.0;
@@ -75,6 +82,8 @@ impl Player {
             values: Vec::new(),
             last_impact: None,
             past: VecDeque::new(),
+            stepped: 0.0,
+            stepping: 0.0,
             simulation,
         };
         player.start_record();
@@ -152,6 +161,7 @@ impl Player {
         if self.playing {
             let target = self.pacer.begin(dt);
             let clock = Instant::now();
+            let before = self.simulation.time();
             while self.simulation.time() < target
                 && self.pacer.may_step(clock.elapsed().as_secs_f64())
             {
@@ -159,10 +169,25 @@ impl Player {
                     break;
                 }
             }
+            self.measure(
+                self.simulation.time() - before,
+                clock.elapsed().as_secs_f64(),
+            );
             self.pacer.end(dt, target, self.simulation.time());
             self.simulation.sample(self.pacer.shown(), &mut self.frame);
         }
         self.take_peaks();
+    }
+
+    fn measure(&mut self, stepped: f64, stepping: f64) {
+        let keep = libm::exp(-stepping / MEASURED);
+        self.stepped = self.stepped * keep + stepped;
+        self.stepping = self.stepping * keep + stepping;
+    }
+
+    /// Simulated seconds per second of stepping lately, the record included; `None` before enough was stepped.
+    pub fn capacity(&self) -> Option<f64> {
+        (self.stepping > LEAST_MEASURED).then(|| self.stepped / self.stepping)
     }
 
     /// One accepted step, shown at once.

@@ -2,11 +2,12 @@
 
 use eframe::egui::{self, ComboBox, RichText, Ui, Vec2b, vec2};
 use egui_plot::{
-    AxisHints, GridInput, GridMark, HLine, HoverPosition, Line, LineStyle, Plot, PlotPoint,
-    PlotPoints,
+    AxisHints, FilledArea, GridInput, GridMark, HLine, HoverPosition, Line, LineStyle, Plot,
+    PlotPoint, PlotPoints,
 };
 
 use super::player::Player;
+use super::stack::{middles, stack};
 use super::{theme, value};
 use crate::simulate::{Quantity, RECORDED_JOINTS};
 
@@ -251,6 +252,10 @@ impl Plots {
                         );
                     }
                 }
+                if quantity == Quantity::EnergyBalance {
+                    self.balance(plot, &members, dark);
+                    return;
+                }
                 for (index, ((channel, member), line)) in
                     members.iter().zip(&self.lines).enumerate()
                 {
@@ -264,6 +269,38 @@ impl Plots {
                 }
             });
         });
+    }
+
+    /// The terms of the energy balance, stacked: what gives energy above zero, what takes or holds it below.
+    fn balance(&self, plot: &mut egui_plot::PlotUi<'_>, members: &[(usize, &str)], dark: bool) {
+        let mut times = Vec::new();
+        let shown: Vec<(usize, &str)> = (0..members.len())
+            .filter(|&index| !self.hidden.contains(&members[index].0))
+            .map(|index| (index, members[index].1))
+            .collect();
+        let terms: Vec<Vec<f64>> = shown
+            .iter()
+            .map(|&(index, member)| {
+                let points: Vec<[f64; 2]> = self.lines[index].iter().map(|p| [p.x, p.y]).collect();
+                let mut values = Vec::new();
+                times = middles(&points, &mut values);
+                if Quantity::TAKES.contains(&member) {
+                    values.iter_mut().for_each(|value| *value = -*value);
+                }
+                values
+            })
+            .collect();
+        for (&(index, member), (low, high)) in shown.iter().zip(stack(&terms)) {
+            let colour = theme::series(index, dark);
+            if low.len() == times.len() {
+                plot.add(
+                    FilledArea::new(member, &times, &low, &high)
+                        .fill_color(colour.gamma_multiply(0.75))
+                        // Edges would jump where a term changes sides.
+                        .stroke(egui::Stroke::NONE),
+                );
+            }
+        }
     }
 
     /// Quantity with its unit, and its members as switches in the colours of their lines.

@@ -7,7 +7,7 @@ use eframe::egui::{
 
 /// Series colours for plots, dark enough on white and light enough on black; apart for the colour-blind
 /// (after Okabe & Ito).
-const SERIES: [(Color32, Color32); 6] = [
+const SERIES: [(Color32, Color32); 9] = [
     (
         Color32::from_rgb(0x00, 0x72, 0xB2),
         Color32::from_rgb(0x56, 0xB4, 0xE9),
@@ -31,6 +31,18 @@ const SERIES: [(Color32, Color32); 6] = [
     (
         Color32::from_rgb(0x5B, 0x5F, 0xC7),
         Color32::from_rgb(0xA5, 0xA8, 0xF5),
+    ),
+    (
+        Color32::from_rgb(0x7A, 0x4A, 0x1E),
+        Color32::from_rgb(0xC9, 0x9A, 0x6B),
+    ),
+    (
+        Color32::from_rgb(0x6B, 0x6B, 0x6B),
+        Color32::from_rgb(0xB5, 0xB5, 0xB5),
+    ),
+    (
+        Color32::from_rgb(0x9B, 0x1C, 0x31),
+        Color32::from_rgb(0xFF, 0x8A, 0x94),
     ),
 ];
 

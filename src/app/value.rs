@@ -29,6 +29,15 @@ pub fn number(value: f64, digits: usize) -> String {
     format_quantity_digits(value, "", digits)
 }
 
+/// A small share, as a power of ten where a decimal would hide its size: `2e-6`.
+pub fn power_of_ten(share: f64) -> String {
+    if share == 0.0 || (1e-3..1e4).contains(&share.abs()) {
+        number(share, 2)
+    } else {
+        format!("{share:.0e}")
+    }
+}
+
 /// A time with the unit that suits its size.
 pub fn time(seconds: f64) -> String {
     let size = seconds.abs();

@@ -61,6 +61,9 @@ impl Quantity {
         "residual",
     ];
 
+    /// Those of [`Self::BALANCE`] that take energy, or hold it; the others give. All together cancel.
+    pub const TAKES: [&str; 4] = ["restitution", "friction", "kinetic", "elastic"];
+
     /// Sentence-case name.
     pub fn label(self) -> &'static str {
         match self {

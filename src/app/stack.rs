@@ -1,0 +1,74 @@
+//! Terms that add up to nothing, stacked: what gives above zero, what takes below, so that both sides reach equally far.
+
+/// Lower and upper edge of one term at each instant.
+pub type Band = (Vec<f64>, Vec<f64>);
+
+/// Stacks `terms` (each one value per instant) away from zero, positive ones up and negative ones down, in their order.
+pub fn stack(terms: &[Vec<f64>]) -> Vec<Band> {
+    let instants = terms.iter().map(Vec::len).min().unwrap_or(0);
+    let (mut up, mut down) = (vec![0.0; instants], vec![0.0; instants]);
+    terms
+        .iter()
+        .map(|term| {
+            let (mut low, mut high) = (Vec::with_capacity(instants), Vec::with_capacity(instants));
+            for (i, value) in term[..instants].iter().enumerate() {
+                let edge = if *value >= 0.0 {
+                    &mut up[i]
+                } else {
+                    &mut down[i]
+                };
+                let from = *edge;
+                *edge += value;
+                low.push(from.min(*edge));
+                high.push(from.max(*edge));
+            }
+            (low, high)
+        })
+        .collect()
+}
+
+/// The record's points, one or two to a bin, as one value per instant: the middle of each bin. Returns the instants.
+pub fn middles(points: &[[f64; 2]], values: &mut Vec<f64>) -> Vec<f64> {
+    let mut times: Vec<f64> = Vec::with_capacity(points.len());
+    values.clear();
+    for [time, value] in points {
+        match (times.last(), values.last_mut()) {
+            (Some(last), Some(before)) if last == time => *before = 0.5 * (*before + value),
+            _ => {
+                times.push(*time);
+                values.push(*value);
+            }
+        }
+    }
+    times
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bands_touch_and_both_sides_reach_equally_far() {
+        let terms = [
+            vec![3.0, 1.0],
+            vec![2.0, -2.0],
+            vec![-4.0, 3.0],
+            vec![-1.0, -2.0],
+        ];
+        let bands = stack(&terms);
+        assert_eq!(bands[0], (vec![0.0, 0.0], vec![3.0, 1.0]));
+        assert_eq!(bands[1], (vec![3.0, -2.0], vec![5.0, 0.0]));
+        assert_eq!(bands[2], (vec![-4.0, 1.0], vec![0.0, 4.0]));
+        assert_eq!(bands[3], (vec![-5.0, -4.0], vec![-4.0, -2.0]));
+    }
+
+    #[test]
+    fn a_bin_counts_once() {
+        let mut values = Vec::new();
+        let times = middles(
+            &[[0.0, 1.0], [1.0, 2.0], [1.0, 4.0], [2.0, 5.0]],
+            &mut values,
+        );
+        assert_eq!((times, values), (vec![0.0, 1.0, 2.0], vec![1.0, 3.0, 5.0]));
+    }
+}
