@@ -7,6 +7,7 @@
 /// The version that every output file names.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
+pub mod analysis;
 #[cfg(feature = "gui")]
 pub mod app;
 #[cfg(not(target_arch = "wasm32"))]
