@@ -25,12 +25,6 @@ const METHODS: [Method; 6] = [
     Method::Radau5,
     Method::Automatic,
 ];
-const PRESETS: [Preset; 4] = [
-    Preset::Preview,
-    Preset::RealTime,
-    Preset::Accurate,
-    Preset::Reference,
-];
 const AXES: [SignedAxis; 6] = [
     SignedAxis::PlusX,
     SignedAxis::MinusX,
@@ -247,7 +241,7 @@ impl Scene {
             "solver.step" => Value::Number(self.solver.step),
             "solver.tolerance" => Value::Number(self.solver.tolerance),
             "solver.preset" => match &self.solver.preset {
-                Some(preset) => word(&table::PRESETS, &PRESETS, preset),
+                Some(preset) => word(&table::PRESETS, &Preset::ALL, preset),
                 None => Value::Unset,
             },
             "view.down" => word(&table::AXES, &AXES, &self.view.down),
@@ -399,7 +393,7 @@ impl Scene {
             ("solver.method", _) => self.solver.method = item(&table::METHODS, &METHODS, value),
             ("solver.step", _) => self.solver.step = number(value),
             ("solver.tolerance", _) => self.solver.tolerance = number(value),
-            ("solver.preset", _) => self.apply_preset(item(&table::PRESETS, &PRESETS, value)),
+            ("solver.preset", _) => self.apply_preset(item(&table::PRESETS, &Preset::ALL, value)),
             ("view.down", _) => self.view.down = item(&table::AXES, &AXES, value),
             _ => unreachable!("{key} has no field here"),
         }

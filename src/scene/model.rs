@@ -115,6 +115,19 @@ pub struct Solver {
 }
 
 impl Preset {
+    /// All of them, from fast to accurate.
+    pub const ALL: [Self; 4] = [
+        Self::Preview,
+        Self::RealTime,
+        Self::Accurate,
+        Self::Reference,
+    ];
+
+    /// Word of `solver.preset`.
+    pub fn word(self) -> &'static str {
+        super::table::PRESETS[self as usize]
+    }
+
     /// Method, step (s) and tolerance of the preset.
     pub fn point(self) -> (Method, f64, f64) {
         match self {
