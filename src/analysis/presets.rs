@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 use serde::{Deserialize, Serialize};
 
 use super::work_precision::{Yardstick, measure as measure_point};
-use super::{AnalysisError, Effort, Outside, Point, Setting, Standard};
+use super::{AnalysisError, Effort, Outside, Point, Setting, Standard, WorkPrecision};
 use crate::scene::{Preset, Scene};
 
 /// What `jointplay tradeoff --all --write` measured.
@@ -63,14 +63,38 @@ pub fn measured(scene: &str, preset: Preset) -> Option<Measured> {
     record().scenes.get(scene)?.get(preset.word()).copied()
 }
 
-/// Largest error of peak forces that `preset` is chosen for, on the default scene; `None`: as small as can be told.
-pub fn criterion(preset: Preset) -> Option<f64> {
+/// Largest error of the peak forces of the first impacts that a preset is to have on any built-in scene.
+pub fn limit(preset: Preset) -> f64 {
     match preset {
-        Preset::Preview => Some(0.05),
-        Preset::RealTime => Some(0.01),
-        Preset::Accurate => Some(1e-4),
-        Preset::Reference => None,
+        Preset::Preview => 0.05,
+        Preset::RealTime => 0.01,
+        Preset::Accurate => 1e-4,
+        Preset::Reference => 1e-7,
     }
+}
+
+/// The setting that a limit asks for: of those whose peak forces err by at most `limit` on every scene of `found`, the one
+/// with the largest product of its ratios, over the impacts and in settled motion of every scene.
+pub fn choose(found: &[WorkPrecision], limit: f64) -> Option<Setting> {
+    let candidates = found.first()?.points.iter().map(|point| point.setting);
+    let worth = |setting: &Setting| {
+        let mut product = 1.0;
+        for scene in found {
+            let point = scene.points.iter().find(|p| p.setting == *setting)?;
+            if !point.errors.peak.is_some_and(|error| error <= limit) {
+                return None;
+            }
+            product *= point.impacts.ratio?;
+            if let Some(settled) = &point.settled {
+                product *= settled.ratio?;
+            }
+        }
+        Some(product)
+    };
+    candidates
+        .filter_map(|setting| Some((setting, worth(&setting)?)))
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .map(|(setting, _)| setting)
 }
 
 /// Measures `presets` on `scene` as it is now, in seconds; in the same order.

@@ -2,11 +2,11 @@
 
 use super::stretch::{stretch, time_to};
 use super::{AnalysisError, Effort, End, Outside, Setting, Standard};
-use crate::scene::{Preset, Scene};
+use crate::scene::Scene;
 use crate::simulate::{Frame, Simulation, Snapshot};
 
-/// Preset that is asked to reach them.
-const PRESET: Preset = Preset::RealTime;
+/// Tolerance of the automatic pair that is asked to reach them.
+const TOLERANCE: f64 = 1e-5;
 /// Tolerance of the run that settled forces are compared with.
 const CONVERGED: f64 = 1e-10;
 /// Error that is allowed where there is one, relative.
@@ -106,7 +106,7 @@ pub fn reach(scene: &Scene, outside: &mut Outside) -> Result<Vec<Reach>, Analysi
 }
 
 fn one(scene: &Scene, goal: Goal, outside: &mut Outside) -> Result<Reach, AnalysisError> {
-    let setting = Setting::of_preset(scene, PRESET)?;
+    let setting = Setting::automatic(scene, TOLERANCE)?;
     let yardstick = Setting::yardstick(scene)?;
     let integrates = !setting.start(scene)?.mechanism().is_kinematic();
     let effort = Effort {

@@ -77,6 +77,11 @@ impl Setting {
         Self::new(scene, word_of(scene, Method::DormandPrince5)?, tolerance)
     }
 
+    /// The automatic pair at `tolerance`.
+    pub(super) fn automatic(scene: &Scene, tolerance: f64) -> Result<Self, AnalysisError> {
+        Self::new(scene, word_of(scene, Method::Automatic)?, tolerance)
+    }
+
     /// The step of a fixed-step method, s, the tolerance of an adaptive one.
     pub fn value(&self) -> f64 {
         if self.adaptive {

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::stretch::stretch;
 use super::{AnalysisError, Effort, End, Outside, Setting};
-use crate::scene::{Preset, Scene, Vec3};
+use crate::scene::{Scene, Vec3};
 use crate::simulate::{Frame, Peak, Simulation, Snapshot};
 
 /// Impacts that are compared.
@@ -25,6 +25,8 @@ const AFTERWARDS: f64 = 0.1e-3;
 /// Contacts that are all closed for so long have settled, s; and when they must have.
 const QUIET: f64 = 0.15;
 const SETTLED_WITHIN: f64 = 1.2;
+/// Tolerance of the run that brings a scene there: the state that it comes to is given to all alike.
+const SETTLING: f64 = 1e-6;
 /// Untimed beginning of a settled run, in which a method finds its step, and the span that counts, s.
 const WARM_UP: f64 = 0.05;
 const SETTLED_SPAN: f64 = 0.2;
@@ -486,7 +488,7 @@ fn settled_state(
     scene: &Scene,
     outside: &mut Outside,
 ) -> Result<Option<(Snapshot, f64)>, AnalysisError> {
-    let setting = Setting::of_preset(scene, Preset::Accurate)?;
+    let setting = Setting::automatic(scene, SETTLING)?;
     let mut simulation = setting.start(scene)?;
     let mut peaks: Vec<Peak> = Vec::new();
     let mut since = 0.0;
@@ -494,7 +496,10 @@ fn settled_state(
         .filter(|&j| scene.ball_joints[j].contact.clearance > 0.0)
         .collect();
     let mut settled = false;
-    let effort = Effort::FULL;
+    let effort = Effort {
+        seconds: f64::INFINITY,
+        ..Effort::FULL
+    };
     stretch(
         &mut simulation,
         SETTLED_WITHIN,

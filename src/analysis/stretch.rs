@@ -7,9 +7,10 @@ use crate::simulate::Simulation;
 
 /// Steps between two looks at the clock, the cap, and whether to go on.
 const STEPS_IN_A_PIECE: u32 = 32;
-/// A run that takes so many times the time to be measured is not repeated more often than this.
+/// Runs of one setting: at least and at most; and after how many times the time to be measured two are enough.
 const FEWEST_RUNS: usize = 3;
 const MOST_RUNS: usize = 40;
+const LONG: f64 = 4.0;
 
 /// How much work an analysis may take.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,7 +19,7 @@ pub struct Effort {
     pub evaluations: u64,
     /// Seconds by the clock after which it has, too: the algebra of implicit methods is no evaluation.
     pub seconds: f64,
-    /// Seconds that are measured of each run, by repeating it; a run that takes longer is made three times.
+    /// Seconds that are measured of each run, by repeating it.
     pub measured: f64,
     /// Steps of the fixed-step methods, s.
     pub steps: &'static [f64],
@@ -38,7 +39,7 @@ impl Effort {
     /// The whole grid within minutes.
     pub const FULL: Self = Self {
         evaluations: 4_000_000,
-        seconds: 5.0,
+        seconds: 2.0,
         measured: 0.1,
         steps: &[
             1e-3, 500e-6, 200e-6, 100e-6, 50e-6, 20e-6, 10e-6, 5e-6, 2e-6, 1e-6, 0.5e-6,
@@ -148,7 +149,8 @@ pub(super) fn time_to(
             &mut |_| false,
         )?;
         measured += outside.now() - before;
-        if measured >= effort.measured && run + 1 >= FEWEST_RUNS {
+        let long = measured >= LONG * effort.measured && run > 0;
+        if long || (measured >= effort.measured && run + 1 >= FEWEST_RUNS) {
             break;
         }
     }

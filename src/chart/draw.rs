@@ -43,7 +43,7 @@ const GAP: f64 = 18.0;
 const MARKER: f64 = 4.0;
 const LINE: f64 = 1.6;
 /// Width of a letter over the size of the text, on average, generously.
-const LETTER: f64 = 0.54;
+const LETTER: f64 = 0.51;
 
 const INK: Colour = (30, 30, 30);
 const FAINT: Colour = (110, 110, 110);
@@ -273,6 +273,7 @@ fn draw_chart(root: &Canvas, area: &Canvas, chart: &Chart) -> Result<(), SheetEr
                     .iter()
                     .filter_map(|point| inside(point).map(|place| plot.backend_coord(&place)))
                     .collect();
+                along(&path, &mut taken);
                 root.draw(&PathElement::new(path, stroke(series.colour)))
                     .map_err(failed)?;
             }
@@ -294,6 +295,25 @@ fn draw_chart(root: &Canvas, area: &Canvas, chart: &Chart) -> Result<(), SheetEr
         }
     }
     draw_labels(root, &plot, chart, inside, taken)
+}
+
+/// Small areas along a line, for the texts to keep clear of.
+fn along(path: &[(i32, i32)], taken: &mut Vec<Area>) {
+    let step = f64::from(fine(MARKER));
+    for ends in path.windows(2) {
+        let (from, to) = (ends[0], ends[1]);
+        let (dx, dy) = (f64::from(to.0 - from.0), f64::from(to.1 - from.1));
+        let parts = (dx.hypot(dy) / step).ceil().clamp(1.0, 1000.0);
+        for n in 0..parts as u32 {
+            let theta = f64::from(n) / parts;
+            taken.push(Area {
+                x: f64::from(from.0) + theta * dx - 0.5 * step,
+                y: f64::from(from.1) + theta * dy - 0.5 * step,
+                width: step,
+                height: step,
+            });
+        }
+    }
 }
 
 fn draw_levels(

@@ -19,6 +19,8 @@ impl Sheet {
         let failed = |error: &dyn std::fmt::Display| SheetError(error.to_string());
         let mut fonts = fontdb::Database::new();
         fonts.load_font_data(epaint_default_fonts::UBUNTU_LIGHT.to_vec());
+        // Has what the first has not, such as a raised minus sign.
+        fonts.load_font_data(epaint_default_fonts::HACK_REGULAR.to_vec());
         let family = fonts
             .faces()
             .find_map(|face| face.families.first())

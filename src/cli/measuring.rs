@@ -1,7 +1,6 @@
 //! Analyses by the clock of this machine, with a progress bar, until Ctrl-C.
 
 use std::ops::ControlFlow;
-use std::time::Instant;
 
 use super::{Failure, interrupt, progress};
 use crate::analysis::{AnalysisError, Outside};
@@ -21,8 +20,7 @@ pub fn measure<T>(
 ) -> Result<T, Failure> {
     interrupt::listen();
     let bar = progress::bar(!quiet, PARTS as u64);
-    let started = Instant::now();
-    let mut clock = || started.elapsed().as_secs_f64();
+    let mut clock = clock();
     let mut progress = |done: f64| {
         bar.set_position((done * PARTS) as u64);
         if interrupt::asked() {
@@ -43,4 +41,21 @@ pub fn measure<T>(
         (error @ AnalysisError::Start(_), None) => Failure::usage(error.to_string()),
         (error, _) => Failure::new(Failure::DIVERGED, error.to_string()),
     })
+}
+
+/// Seconds of processor time of this thread, which does the stepping: what else runs on the machine does not count.
+#[cfg(unix)]
+fn clock() -> impl FnMut() -> f64 {
+    use rustix::time::{ClockId, clock_gettime};
+    || {
+        let time = clock_gettime(ClockId::ThreadCPUTime);
+        time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
+    }
+}
+
+/// Seconds on the wall.
+#[cfg(not(unix))]
+fn clock() -> impl FnMut() -> f64 {
+    let started = std::time::Instant::now();
+    move || started.elapsed().as_secs_f64()
 }

@@ -128,12 +128,12 @@ impl Preset {
         super::table::PRESETS[self as usize]
     }
 
-    /// Method, step (s) and tolerance of the preset.
+    /// Method, step (s) and tolerance of the preset, chosen by measurement (`docs/tradeoff.md`).
     pub fn point(self) -> (Method, f64, f64) {
         match self {
-            Self::Preview => (Method::Automatic, 10e-6, 1e-3),
-            Self::RealTime => (Method::Automatic, 10e-6, 1e-4),
-            Self::Accurate => (Method::Automatic, 10e-6, 1e-6),
+            Self::Preview => (Method::Automatic, 10e-6, 1e-4),
+            Self::RealTime => (Method::Automatic, 10e-6, 1e-6),
+            Self::Accurate => (Method::Automatic, 10e-6, 1e-7),
             Self::Reference => (Method::DormandPrince5, 10e-6, 1e-11),
         }
     }

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use super::picture::{is_yardstick, picture};
 use super::words::{cost_ratios, end, error, standard, times, value};
-use crate::analysis::presets::{Measured, Record, criterion};
-use crate::analysis::{PartCost, Point, WorkPrecision};
+use crate::analysis::presets::{Measured, Record, choose, limit};
+use crate::analysis::{PartCost, Point, Setting, WorkPrecision};
 use crate::cli::output::Target;
 use crate::cli::{Failure, machine};
 use crate::scene::{BUILT_IN, Preset};
@@ -19,7 +19,8 @@ const TITLE: &str = "# Speed for accuracy";
 const METHOD: &str = "## How it is measured";
 const PRESETS: &str = "## Presets";
 const MODEL: &str = "## What each part of the model costs";
-const PRESET_TABLE: &str = "| Scene | Preset | Setting | Ratio, impacts | Peak error | Position error (m) | Ratio, settled | Force error | Held |";
+const CHOICE_TABLE: &str = "| Preset | Setting | Limit of peak errors | Chosen by this run |";
+const PRESET_TABLE: &str = "| Scene | Preset | Ratio, impacts | Peak error | Position error (m) | Ratio, settled | Force error | Held |";
 const POINT_TABLE: &str = "| Method | Setting | Ratio, impacts | Peak error | Position error (m) | Ratio, settled | Force error | Front |";
 const MODEL_TABLE: &str = "| Scene | With | An evaluation | A simulated second |";
 
@@ -32,7 +33,7 @@ fn scene_heading(name: &str) -> String {
 
 /// Headings and heads of tables of the page, in order: what a test finds in it.
 pub fn headings() -> Vec<String> {
-    let mut all: Vec<String> = [TITLE, METHOD, PRESETS, PRESET_TABLE]
+    let mut all: Vec<String> = [TITLE, METHOD, PRESETS, CHOICE_TABLE, PRESET_TABLE]
         .map(str::to_owned)
         .to_vec();
     for name in BUILT_IN {
@@ -141,12 +142,19 @@ fn page(found: &[WorkPrecision], costs: &[PartCost], machine: &str) -> String {
     line(PRESETS);
     line("");
     line(
-        "Each preset is the fastest point of the default scene's measured front, over the first impacts, whose peak forces err by no",
+        "A preset is for every scene, so it must hold its limit in each of these: the peak forces of the first impacts err by no more.",
     );
-    line("more than a limit; *held* says whether the limit holds in the other scenes as well.");
+    line(
+        "*Chosen by this run*: of the settings that do, the one with the largest product of its ratios, over the impacts and in settled",
+    );
+    line(
+        "motion of every scene. *Held* says whether the preset, as it stands in the program, holds its limit in a scene.",
+    );
     line("");
+    line(CHOICE_TABLE);
+    line(&rule(CHOICE_TABLE));
     for preset in Preset::ALL {
-        line(&format!("- `{}`: {}", preset.word(), limit_words(preset)));
+        line(&choice_row(found, preset));
     }
     line("");
     line(PRESET_TABLE);
@@ -219,30 +227,36 @@ const METHOD_TEXT: [&str; 12] = [
     "- **Front**: nothing else is both faster and more accurate, over the impacts (i) or in settled motion (s).",
     "- Errors are against the same scene at a tolerance at which halving it changes no more than is said with each scene; what is",
     "  smaller than that change reads `<`. A run that reaches the cap on work, or that the divergence guard stops, says so.",
-    "- Time is that of stepping alone, on one core, of the shortest of repeated runs. A setting counts as faster or slower only as",
-    "  far as this repeats: a few per cent.",
+    "- Time is processor time of stepping alone, on one core, of the shortest of repeated runs: nothing else that the machine does",
+    "  counts. It repeats to some per cent; a difference smaller than that is none.",
 ];
 
 fn rule(head: &str) -> String {
     "|---".repeat(head.matches('|').count() - 1) + "|"
 }
 
-fn limit_words(preset: Preset) -> String {
-    match criterion(preset) {
-        Some(limit) => format!("peak forces within {limit:e}"),
-        None => "as close to the floor as steps are worth".to_owned(),
-    }
+/// What a preset is, what it is to hold, and what this run would choose.
+fn choice_row(found: &[WorkPrecision], preset: Preset) -> String {
+    let words = |setting: &Setting| format!("{} {}", setting.method, value(setting));
+    let own = found.first().and_then(|found| found.preset(preset));
+    let own = own.map_or_else(|| "-".to_owned(), |point| words(&point.setting));
+    let chosen = choose(found, limit(preset));
+    let chosen = chosen.map_or_else(|| "nothing".to_owned(), |setting| words(&setting));
+    format!(
+        "| {} | {own} | {:e} | {chosen} |",
+        preset.word(),
+        limit(preset)
+    )
 }
 
 fn preset_row(found: &WorkPrecision, point: &Point, preset: Preset) -> String {
-    let held = match (criterion(preset), point.errors.peak) {
-        (Some(limit), Some(error)) if error <= limit => "yes",
-        (Some(_), _) => "no",
-        (None, _) => "-",
+    let held = match point.errors.peak {
+        Some(error) if error <= limit(preset) => "yes",
+        Some(_) => "no",
+        None => "-",
     };
-    let setting = format!("{} {}", point.setting.method, value(&point.setting));
     format!(
-        "| {} | {} | {setting} | {} | {held} |",
+        "| {} | {} | {} | {held} |",
         found.standard.scene().name,
         preset.word(),
         figures(found, point)

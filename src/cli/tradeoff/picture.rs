@@ -20,7 +20,7 @@ const MARKERS: [Marker; 8] = [
 ];
 /// Errors above this are wrong altogether: how wrong says nothing.
 const WORST: f64 = 1.0;
-const FRONT: &str = "Nothing is both faster and more accurate";
+const FRONT: &str = "On the front: nothing is both faster and more accurate";
 
 /// What one diagram shows of a point: its phase and its error there.
 type View = fn(&Point) -> Option<(&Phase, f64)>;
