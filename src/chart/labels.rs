@@ -9,6 +9,9 @@ pub(super) struct Area {
     pub height: f64,
 }
 
+/// A pair of coordinates, or width and height.
+pub(super) type Pair = (f64, f64);
+
 impl Area {
     fn overlap(&self, other: &Self) -> f64 {
         let x = (self.x + self.width).min(other.x + other.width) - self.x.max(other.x);
@@ -20,7 +23,7 @@ impl Area {
 /// Where each text, of the given size, goes: as near to its point as it can without covering anything in `taken`, inside
 /// `frame`.
 pub(super) fn arrange(
-    wanted: &[((f64, f64), (f64, f64))],
+    wanted: &[(Pair, Pair)],
     mut taken: Vec<Area>,
     frame: Area,
     unit: f64,
