@@ -1,7 +1,7 @@
 //! Jointplay: a 3D laboratory that shows what play in a ball joint does to a machine.
 //!
 //! Floors from the ground up; a module uses only what stands below it (`ARCHITECTURE.md`):
-//! [`contact`] and [`integrate`], [`scene`], [`mechanism`], [`simulate`], [`view`], [`render`], [`app`],
+//! [`contact`] and [`integrate`], [`scene`], [`mechanism`], [`simulate`], [`analysis`], [`chart`] and [`view`], [`render`], [`app`],
 //! and the entries [`cli`] and `main.rs`.
 
 /// The version that every output file names.
@@ -10,6 +10,7 @@ pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 pub mod analysis;
 #[cfg(feature = "gui")]
 pub mod app;
+pub mod chart;
 #[cfg(not(target_arch = "wasm32"))]
 pub mod cli;
 pub mod contact;

@@ -40,6 +40,29 @@ fn the_example_of_the_scene_format_runs() {
     );
 }
 
+#[test]
+fn the_page_of_the_trade_has_the_headings_and_diagrams_that_the_command_writes() {
+    let page = read("docs/tradeoff.md");
+    let lines: Vec<&str> = page.lines().collect();
+    let head = |n: &usize| {
+        let table = lines
+            .get(n + 1)
+            .is_some_and(|next| next.starts_with("|---"));
+        lines[*n].starts_with('#') || table
+    };
+    let written: Vec<&str> = (0..lines.len()).filter(head).map(|n| lines[n]).collect();
+    assert_eq!(
+        written,
+        jointplay::cli::tradeoff::headings(),
+        "jointplay tradeoff --all --write ."
+    );
+    for name in jointplay::scene::BUILT_IN {
+        let diagram = format!("tradeoff-{name}.svg");
+        assert!(page.contains(&format!("({diagram})")), "{diagram}");
+        assert!(read(format!("docs/{diagram}")).starts_with("<svg"));
+    }
+}
+
 /// Every file that a document names is there.
 #[test]
 fn documents_name_files_that_exist() {
@@ -49,6 +72,7 @@ fn documents_name_files_that_exist() {
         "CHANGELOG.md",
         "docs/numerics.md",
         "docs/scene-format.md",
+        "docs/tradeoff.md",
     ] {
         let text = read(document);
         for word in text.split(['`', '(', ')']) {

@@ -28,6 +28,10 @@ pub enum Command {
     Run(RunArguments),
     /// Draw frames without a window.
     Render(RenderArguments),
+    /// Measure what every method costs on a scene and how wrong it is.
+    Tradeoff(TradeoffArguments),
+    /// Measure how fast the default scene runs, against what is asked.
+    Bench(BenchArguments),
     /// Print the reference page of all parameters (Markdown).
     Parameters,
 }
@@ -219,6 +223,46 @@ pub struct RenderArguments {
     #[arg(long)]
     pub force: bool,
     /// No progress bar and no warnings.
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// `tradeoff`.
+#[derive(Debug, Args)]
+#[command(group = clap::ArgGroup::new("what").required(true).args(["scene", "all"]))]
+pub struct TradeoffArguments {
+    /// Name of a built-in scene, or a file (contains `/` or ends in `.toml`).
+    pub scene: Option<String>,
+    /// Change a parameter, e.g. `contact.clearance=0.5mm`; may be repeated, the last wins.
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = change, conflicts_with = "all")]
+    pub changes: Vec<(String, String)>,
+    /// A coarse grid of steps and tolerances, within seconds.
+    #[arg(long)]
+    pub quick: bool,
+    /// Folder to write: points as CSV and JSON, diagrams as SVG and PNG.
+    #[arg(long, value_name = "FOLDER", conflicts_with = "all")]
+    pub out: Option<PathBuf>,
+    /// All built-in scenes.
+    #[arg(long, requires = "write")]
+    pub all: bool,
+    /// Folder of the program's source: write `docs/tradeoff.md` with its diagrams, and `assets/presets.json`, anew.
+    #[arg(long, value_name = "FOLDER", requires = "all")]
+    pub write: Option<PathBuf>,
+    /// Replace a folder of earlier results.
+    #[arg(long)]
+    pub force: bool,
+    /// No progress bar and no warnings.
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// `bench`.
+#[derive(Debug, Args)]
+pub struct BenchArguments {
+    /// Change a parameter of the default scene, e.g. `contact.friction=0.2`; may be repeated, the last wins.
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = change)]
+    pub changes: Vec<(String, String)>,
+    /// No progress bar.
     #[arg(long)]
     pub quiet: bool,
 }

@@ -1,10 +1,13 @@
 //! Command line: what is written there, what comes out, and with which exit code.
 
 mod args;
+mod bench;
 mod check;
 mod failure;
 mod impacts;
 mod interrupt;
+mod machine;
+mod measuring;
 pub mod output;
 mod progress;
 mod provenance;
@@ -13,6 +16,7 @@ mod quantity;
 mod render;
 mod run;
 mod summary;
+pub mod tradeoff;
 
 use std::fmt::Write as _;
 use std::io::{self, Write as _};
@@ -51,6 +55,8 @@ fn dispatch(arguments: Arguments) -> Result<(), Failure> {
         Some(Command::Render(arguments)) => render::render(&arguments),
         #[cfg(not(feature = "gui"))]
         Some(Command::Render(_)) => Err(no_graphics()),
+        Some(Command::Tradeoff(arguments)) => tradeoff::tradeoff(&arguments),
+        Some(Command::Bench(arguments)) => bench::bench(&arguments),
         Some(Command::Parameters) => print(&reference_page()),
     }
 }

@@ -26,12 +26,6 @@ const METHODS: [Method; 7] = [
     Method::Radau5,
     Method::Automatic,
 ];
-const PRESETS: [Preset; 4] = [
-    Preset::Preview,
-    Preset::RealTime,
-    Preset::Accurate,
-    Preset::Reference,
-];
 const AXES: [SignedAxis; 6] = [
     SignedAxis::PlusX,
     SignedAxis::MinusX,
@@ -248,7 +242,7 @@ impl Scene {
             "solver.step" => Value::Number(self.solver.step),
             "solver.tolerance" => Value::Number(self.solver.tolerance),
             "solver.preset" => match &self.solver.preset {
-                Some(preset) => word(&table::PRESETS, &PRESETS, preset),
+                Some(preset) => word(&table::PRESETS, &Preset::ALL, preset),
                 None => Value::Unset,
             },
             "solver.energy_ledger" => {
@@ -403,7 +397,7 @@ impl Scene {
             ("solver.method", _) => self.solver.method = item(&table::METHODS, &METHODS, value),
             ("solver.step", _) => self.solver.step = number(value),
             ("solver.tolerance", _) => self.solver.tolerance = number(value),
-            ("solver.preset", _) => self.apply_preset(item(&table::PRESETS, &PRESETS, value)),
+            ("solver.preset", _) => self.apply_preset(item(&table::PRESETS, &Preset::ALL, value)),
             ("solver.energy_ledger", _) => {
                 self.solver.energy_ledger = item(&table::SWITCHES, &[true, false], value);
             }

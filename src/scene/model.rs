@@ -117,12 +117,25 @@ pub struct Solver {
 }
 
 impl Preset {
-    /// Method, step (s) and tolerance of the preset.
+    /// All of them, from fast to accurate.
+    pub const ALL: [Self; 4] = [
+        Self::Preview,
+        Self::RealTime,
+        Self::Accurate,
+        Self::Reference,
+    ];
+
+    /// Word of `solver.preset`.
+    pub fn word(self) -> &'static str {
+        super::table::PRESETS[self as usize]
+    }
+
+    /// Method, step (s) and tolerance of the preset, chosen by measurement (`docs/tradeoff.md`).
     pub fn point(self) -> (Method, f64, f64) {
         match self {
-            Self::Preview => (Method::Automatic, 10e-6, 1e-3),
-            Self::RealTime => (Method::Automatic, 10e-6, 1e-4),
-            Self::Accurate => (Method::Automatic, 10e-6, 1e-6),
+            Self::Preview => (Method::Automatic, 10e-6, 1e-4),
+            Self::RealTime => (Method::Automatic, 10e-6, 1e-6),
+            Self::Accurate => (Method::Automatic, 10e-6, 1e-7),
             Self::Reference => (Method::DormandPrince5, 10e-6, 1e-11),
         }
     }

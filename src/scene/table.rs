@@ -387,8 +387,8 @@ static TABLE: [Parameter; 27] = [
         Kind::Choice(&PRESETS),
         Value::Unset,
         Scope::Every,
-        "Method, step and tolerance by name: preview (automatic, 1e-3), real-time (automatic, 1e-4), \
-         accurate (automatic, 1e-6), reference (dopri5, 1e-11). A method, step or tolerance that is set as well wins over the preset.",
+        "Method, step and tolerance by name: preview (automatic, 1e-4), real-time (automatic, 1e-6), \
+         accurate (automatic, 1e-7), reference (dopri5, 1e-11). A method, step or tolerance that is set as well wins over the preset.",
         "Solves paper eqs. (55), (58) in time",
     ),
     at_reset(row(

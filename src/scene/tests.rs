@@ -252,12 +252,7 @@ fn presets_say_in_their_help_what_they_are() {
         .find(|p| p.key == "solver.preset")
         .unwrap()
         .help;
-    for preset in [
-        Preset::Preview,
-        Preset::RealTime,
-        Preset::Accurate,
-        Preset::Reference,
-    ] {
+    for preset in Preset::ALL {
         assert!(
             help.contains(&format!("{:e}", preset.point().2)),
             "{preset:?}"

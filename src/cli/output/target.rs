@@ -89,7 +89,7 @@ impl Folder {
     pub fn claim(path: &Path, force: bool) -> Result<Self, Failure> {
         if exists(path) && !path.is_dir() {
             return Err(Failure::io(format!(
-                "cannot write frames to {}: it is a file, not a folder",
+                "cannot write a folder {}: it is a file",
                 path.display()
             )));
         }
@@ -102,7 +102,7 @@ impl Folder {
         if force && has_content(path) && !path.join(MANIFEST).is_file() {
             // --force replaces what an earlier run wrote, never a folder of something else.
             return Err(Failure::io(format!(
-                "{} holds something other than frames (no {MANIFEST} in it); it is left alone, choose another folder",
+                "{} holds something other than earlier results (no {MANIFEST} in it); it is left alone, choose another folder",
                 path.display()
             )));
         }
@@ -156,7 +156,7 @@ impl Folder {
     }
 }
 
-/// The file that says what a folder of frames holds.
+/// The file that says what a folder of results holds.
 pub const MANIFEST: &str = "manifest.json";
 
 fn exists(path: &Path) -> bool {

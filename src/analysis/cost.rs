@@ -1,0 +1,157 @@
+//! What each part of the model costs: the same scene with more and less of it.
+
+use super::stretch::time_to;
+use super::{AnalysisError, Effort, Outside, Setting};
+use crate::integrate::System;
+use crate::mechanism::Mechanism;
+use crate::scene::{Preset, Scene};
+
+/// Preset of the runs.
+const PRESET: Preset = Preset::Accurate;
+/// Evaluations that are timed at once.
+const BATCH: u32 = 200;
+const BATCHES: u32 = 40;
+
+/// A variation of a built-in scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Part {
+    /// Built-in scene.
+    pub scene: &'static str,
+    /// What is different.
+    pub label: &'static str,
+    /// The changes that make it so.
+    pub changes: &'static [(&'static str, &'static str)],
+    /// When an evaluation is timed, s: contacts carry load then.
+    loaded: f64,
+    /// Simulated time of the run, s.
+    pub span: f64,
+}
+
+const fn spcmm(label: &'static str, changes: &'static [(&'static str, &'static str)]) -> Part {
+    Part {
+        scene: "spcmm",
+        label,
+        changes,
+        loaded: 0.4,
+        span: 0.4,
+    }
+}
+
+const fn chain(label: &'static str, changes: &'static [(&'static str, &'static str)]) -> Part {
+    Part {
+        scene: "chain",
+        label,
+        changes,
+        loaded: 2e-3,
+        span: 10e-3,
+    }
+}
+
+/// The variations; the first is what the others are compared with.
+const PARTS: [Part; 10] = [
+    spcmm("3 joints with clearance, with friction, tree", &[]),
+    spcmm("2 joints with clearance", &[("joint.S3.clearance", "0")]),
+    spcmm(
+        "1 joint with clearance",
+        &[("joint.S2.clearance", "0"), ("joint.S3.clearance", "0")],
+    ),
+    spcmm("all joints ideal", &[("contact.clearance", "0")]),
+    spcmm(
+        "3 joints with clearance, without friction",
+        &[("contact.friction", "0")],
+    ),
+    spcmm(
+        "3 joints with clearance, lagrange",
+        &[("formulation", "lagrange")],
+    ),
+    chain("4 links", &[("chain.links", "4")]),
+    chain("16 links", &[("chain.links", "16")]),
+    chain("64 links", &[("chain.links", "64")]),
+    chain("256 links", &[("chain.links", "256")]),
+];
+
+/// What a variation costs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PartCost {
+    /// Which.
+    pub part: Part,
+    /// Seconds by the clock that an evaluation of its equations takes.
+    pub evaluation_s: f64,
+    /// Seconds by the clock for a simulated one over `part.span`.
+    pub cost: f64,
+    /// Evaluations in that span.
+    pub evaluations: u64,
+}
+
+/// Measures all variations, with the preset `accurate`.
+///
+/// # Errors
+/// As [`super::work_precision`].
+pub fn model_costs(effort: &Effort, outside: &mut Outside) -> Result<Vec<PartCost>, AnalysisError> {
+    let parts = PARTS.iter().enumerate();
+    parts
+        .map(|(n, part)| one(part, effort, &mut outside.part(n, PARTS.len())))
+        .collect()
+}
+
+fn one(part: &Part, effort: &Effort, outside: &mut Outside) -> Result<PartCost, AnalysisError> {
+    let owned = |(key, value): &(&str, &str)| ((*key).to_owned(), (*value).to_owned());
+    let changes: Vec<(String, String)> = part.changes.iter().map(owned).collect();
+    let scene = Scene::load(part.scene, &changes)?;
+    let setting = Setting::of_preset(&scene, PRESET)?;
+    let mut simulation = setting.start(&scene)?;
+    // Its number of evaluations, to its end whatever that takes: the times below end with it.
+    while simulation.time() < part.span {
+        simulation.step_until(part.span)?;
+        outside.go_on(0.0)?;
+    }
+    let evaluations = simulation.statistics().evaluations;
+    let seconds = time_to(
+        part.span,
+        &Effort {
+            evaluations: u64::MAX / 2,
+            seconds: f64::INFINITY,
+            ..*effort
+        },
+        outside,
+        |_| setting.start(&scene),
+    )?;
+    Ok(PartCost {
+        part: *part,
+        evaluation_s: evaluation(&setting, &scene, part.loaded, outside)?,
+        cost: seconds / part.span,
+        evaluations,
+    })
+}
+
+/// Seconds of one evaluation at a new instant, the shortest of some batches.
+fn evaluation(
+    setting: &Setting,
+    scene: &Scene,
+    loaded: f64,
+    outside: &mut Outside,
+) -> Result<f64, AnalysisError> {
+    let mut simulation = setting.start(scene)?;
+    simulation.advance_to(loaded)?;
+    let (t, y) = (simulation.time(), simulation.state());
+    let mut mechanism =
+        Mechanism::new(simulation.running_scene()).map_err(crate::simulate::StartError)?;
+    for j in 0..mechanism.contacts.len() {
+        mechanism.contacts.memory_mut()[j] = simulation.contact_memory(j);
+    }
+    let mut dy = vec![0.0; y.len()];
+    let mut shortest = f64::INFINITY;
+    let mut instant = 0.0;
+    for _ in 0..BATCHES {
+        let before = outside.now();
+        for _ in 0..BATCH {
+            // The drives are computed anew only at a new instant.
+            instant += 1e-15;
+            mechanism.derivative(t + instant, std::hint::black_box(y), &mut dy);
+            std::hint::black_box(&mut dy);
+        }
+        shortest = shortest.min(outside.now() - before);
+        outside.go_on(1.0)?;
+    }
+    Ok(shortest / f64::from(BATCH))
+}

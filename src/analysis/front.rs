@@ -1,0 +1,56 @@
+//! Which of several choices nothing beats.
+
+/// Marks the Pareto front of (cost, error) pairs, both better when smaller: those that no other pair beats in one without
+/// being worse in the other. Errors below `floor` are as good as the floor. A pair that is not finite is never on it.
+pub fn front(pairs: &[(f64, f64)], floor: f64) -> Vec<bool> {
+    let known: Vec<(f64, f64)> = pairs
+        .iter()
+        .map(|&(cost, error)| (cost, error.max(floor)))
+        .collect();
+    let beats = |a: (f64, f64), b: (f64, f64)| a.0 <= b.0 && a.1 <= b.1 && a != b;
+    let finite = |pair: (f64, f64), index: usize| {
+        pair.0.is_finite() && pair.1.is_finite() && pairs[index].1.is_finite()
+    };
+    known
+        .iter()
+        .enumerate()
+        .map(|(i, &own)| {
+            finite(own, i)
+                && !known
+                    .iter()
+                    .enumerate()
+                    .any(|(j, &other)| finite(other, j) && beats(other, own))
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_nothing_beats_is_on_the_front() {
+        let pairs = [
+            (1.0, 0.5),
+            (2.0, 0.1),
+            // Dearer and no better than the one before.
+            (3.0, 0.1),
+            // Beaten by the first.
+            (1.5, 0.6),
+            (4.0, 1e-9),
+            // Better only below what can be told.
+            (5.0, 1e-12),
+            (0.5, f64::NAN),
+            (f64::INFINITY, 0.0),
+        ];
+        let marked = front(&pairs, 1e-8);
+        assert_eq!(
+            marked,
+            [true, true, false, false, true, false, false, false]
+        );
+        assert!(front(&pairs, 0.0)[5]);
+        // Equals do not beat each other.
+        assert_eq!(front(&[(1.0, 1.0), (1.0, 1.0)], 0.0), [true, true]);
+        assert!(front(&[], 0.0).is_empty());
+    }
+}

@@ -1,0 +1,123 @@
+//! Presets as measured points: what each costs and how wrong it is, for the built-in scenes as measured once and kept in
+//! the program, and for any scene when asked.
+
+use std::collections::BTreeMap;
+use std::sync::OnceLock;
+
+use serde::{Deserialize, Serialize};
+
+use super::work_precision::{Yardstick, measure as measure_point};
+use super::{AnalysisError, Effort, Outside, Point, Setting, Standard, WorkPrecision};
+use crate::scene::{Preset, Scene};
+
+/// What `jointplay tradeoff --all --write` measured.
+const RECORD: &str = include_str!("../../assets/presets.json");
+
+/// A preset on one scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Measured {
+    /// Largest relative error of the peak forces of the first impacts.
+    pub peak_error: Option<f64>,
+    /// Error of the output body's position at the third impact, m.
+    pub position_error_m: Option<f64>,
+    /// Largest relative error of the mean settled forces; `None` where the scene does not settle.
+    pub settled_error: Option<f64>,
+    /// Speed over the first impacts, over that of Runge-Kutta 4 at 10 microseconds.
+    pub impacts_ratio: Option<f64>,
+    /// The same in settled motion.
+    pub settled_ratio: Option<f64>,
+}
+
+impl Measured {
+    /// The part of a point that is kept.
+    pub fn of(point: &Point) -> Self {
+        Self {
+            peak_error: point.errors.peak,
+            position_error_m: point.errors.position_m,
+            settled_error: point.errors.settled,
+            impacts_ratio: point.impacts.ratio,
+            settled_ratio: point.settled.as_ref().and_then(|phase| phase.ratio),
+        }
+    }
+}
+
+/// What the program keeps of measured presets.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Record {
+    /// Where it was measured.
+    pub machine: String,
+    /// Method and value of each preset when it was measured.
+    pub points: BTreeMap<String, (String, f64)>,
+    /// By scene, then by preset.
+    pub scenes: BTreeMap<String, BTreeMap<String, Measured>>,
+}
+
+/// The record in the program.
+pub fn record() -> &'static Record {
+    static READ: OnceLock<Record> = OnceLock::new();
+    READ.get_or_init(|| serde_json::from_str(RECORD).expect("a test reads the same file"))
+}
+
+/// What `preset` was measured to do on the built-in scene `scene`, with its parameters as they come.
+pub fn measured(scene: &str, preset: Preset) -> Option<Measured> {
+    record().scenes.get(scene)?.get(preset.word()).copied()
+}
+
+/// Largest error of the peak forces of the first impacts that a preset is to have on any built-in scene.
+pub fn limit(preset: Preset) -> f64 {
+    match preset {
+        Preset::Preview => 0.05,
+        Preset::RealTime => 0.01,
+        Preset::Accurate => 1e-4,
+        Preset::Reference => 1e-7,
+    }
+}
+
+/// The setting that a limit asks for: of those whose peak forces err by at most `limit` on every scene of `found`, the one
+/// with the largest product of its ratios, over the impacts and in settled motion of every scene.
+pub fn choose(found: &[WorkPrecision], limit: f64) -> Option<Setting> {
+    let candidates = found.first()?.points.iter().map(|point| point.setting);
+    let worth = |setting: &Setting| {
+        let mut product = 1.0;
+        for scene in found {
+            let point = scene.points.iter().find(|p| p.setting == *setting)?;
+            if !point.errors.peak.is_some_and(|error| error <= limit) {
+                return None;
+            }
+            product *= point.impacts.ratio?;
+            if let Some(settled) = &point.settled {
+                product *= settled.ratio?;
+            }
+        }
+        Some(product)
+    };
+    candidates
+        .filter_map(|setting| Some((setting, worth(&setting)?)))
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .map(|(setting, _)| setting)
+}
+
+/// Measures `presets` on `scene` as it is now, in seconds; in the same order.
+///
+/// # Errors
+/// As [`super::work_precision`].
+pub fn measure(
+    scene: &Scene,
+    presets: &[Preset],
+    outside: &mut Outside,
+) -> Result<Vec<Point>, AnalysisError> {
+    let effort = Effort::QUICK;
+    let parts = presets.len() + 2;
+    let standard = Standard::new(scene, &mut outside.part(0, parts))?;
+    let yardstick = Yardstick::new(&standard, &effort, &mut outside.part(1, parts))?;
+    let mut points = Vec::with_capacity(presets.len());
+    for (n, preset) in presets.iter().enumerate() {
+        let setting = Setting::of_preset(scene, *preset)?;
+        let mut point =
+            measure_point(&standard, setting, &effort, &mut outside.part(n + 2, parts))?;
+        point.preset = Some(*preset);
+        yardstick.divide(&mut point);
+        points.push(point);
+    }
+    Ok(points)
+}

@@ -1,0 +1,225 @@
+//! How far the program gets: three spans of the default scene, each with what is asked of it.
+
+use super::stretch::{stretch, time_to};
+use super::{AnalysisError, Effort, End, Outside, Setting, Standard};
+use crate::scene::Scene;
+use crate::simulate::{Frame, Simulation, Snapshot};
+
+/// Tolerance of the automatic pair that is asked to reach them.
+const TOLERANCE: f64 = 1e-5;
+/// Tolerance of the run that settled forces are compared with.
+const CONVERGED: f64 = 1e-10;
+/// Error that is allowed where there is one, relative.
+const ALLOWED: f64 = 0.01;
+/// Instants of the settled span whose forces are averaged.
+const SAMPLES: u32 = 3000;
+
+/// One of the three spans.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Goal {
+    /// 0 to 1 s, impacts included.
+    FirstSecond,
+    /// 1 s to 4 s, contacts settled.
+    Settled,
+    /// 0 to 10 s with all joints ideal.
+    Ideal,
+}
+
+impl Goal {
+    /// All three.
+    pub const ALL: [Self; 3] = [Self::FirstSecond, Self::Settled, Self::Ideal];
+
+    /// What it is, for a person.
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::FirstSecond => "first second, impacts included",
+            Self::Settled => "settled, 1 s to 4 s",
+            Self::Ideal => "all joints ideal, 10 s",
+        }
+    }
+
+    /// What its error is the error of.
+    pub fn error_of(self) -> &'static str {
+        match self {
+            Self::FirstSecond => "peaks of the first six impacts",
+            Self::Settled => "mean contact forces",
+            Self::Ideal => "-",
+        }
+    }
+
+    /// Simulated seconds in a second by the clock that are asked for.
+    pub fn asked(self) -> f64 {
+        match self {
+            Self::FirstSecond => 40.0,
+            Self::Settled => 300.0,
+            Self::Ideal => 2000.0,
+        }
+    }
+
+    fn span(self) -> (f64, f64) {
+        match self {
+            Self::FirstSecond => (0.0, 1.0),
+            Self::Settled => (1.0, 4.0),
+            Self::Ideal => (0.0, 10.0),
+        }
+    }
+}
+
+/// What was reached.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reach {
+    /// Of what.
+    pub goal: Goal,
+    /// With which method.
+    pub setting: Setting,
+    /// Simulated seconds in a second by the clock.
+    pub speed: f64,
+    /// The same of Runge-Kutta 4 at 10 microseconds; `None` where no differential equation is solved, so that a stepper has
+    /// no part in it.
+    pub yardstick: Option<f64>,
+    /// Error, relative; `None` where nothing is approximated.
+    pub error: Option<f64>,
+}
+
+impl Reach {
+    /// Whether it is what is asked.
+    pub fn met(&self) -> bool {
+        self.speed >= self.goal.asked() && self.error.is_none_or(|error| error <= ALLOWED)
+    }
+}
+
+/// Measures the three spans of `scene`, the default scene.
+///
+/// # Errors
+/// As [`super::work_precision`].
+pub fn reach(scene: &Scene, outside: &mut Outside) -> Result<Vec<Reach>, AnalysisError> {
+    let goals = Goal::ALL.iter().enumerate();
+    goals
+        .map(|(n, goal)| {
+            let mut scene = scene.clone();
+            if *goal == Goal::Ideal {
+                scene.set("contact.clearance", "0")?;
+            }
+            one(&scene, *goal, &mut outside.part(n, Goal::ALL.len()))
+        })
+        .collect()
+}
+
+fn one(scene: &Scene, goal: Goal, outside: &mut Outside) -> Result<Reach, AnalysisError> {
+    let setting = Setting::automatic(scene, TOLERANCE)?;
+    let yardstick = Setting::yardstick(scene)?;
+    let integrates = !setting.start(scene)?.mechanism().is_kinematic();
+    let effort = Effort {
+        measured: 0.5,
+        ..Effort::REFERENCE
+    };
+    let (from, to) = goal.span();
+    let speed = |setting: &Setting, outside: &mut Outside| {
+        let start = snapshot_at(setting, scene, from, outside)?;
+        let seconds = time_to(to, &effort, outside, |_| {
+            let mut simulation = setting.start(scene)?;
+            simulation.restore(&start)?;
+            Ok(simulation)
+        })?;
+        Ok::<_, AnalysisError>((to - from) / seconds)
+    };
+    // Before and after, so that a machine that turns busy in between slows both.
+    let first = speed(&setting, &mut outside.part(0, 4))?;
+    let yardstick = if integrates {
+        Some(speed(&yardstick, &mut outside.part(1, 4))?)
+    } else {
+        None
+    };
+    let second = speed(&setting, &mut outside.part(2, 4))?;
+    let mut last = outside.part(3, 4);
+    let error = match goal {
+        Goal::FirstSecond => {
+            let standard = Standard::new(scene, &mut last)?;
+            let (_, errors, _) = standard.impacts_of(&setting, &effort, &mut last)?;
+            errors.peak
+        }
+        Goal::Settled => {
+            let converged = Setting::reference(scene, CONVERGED)?;
+            let expected = mean_forces(&converged, scene, from, to, &mut last)?;
+            let means = mean_forces(&setting, scene, from, to, &mut last)?;
+            let pairs = means.iter().zip(&expected);
+            pairs
+                .map(|(mean, expected)| (mean / expected - 1.0).abs())
+                .reduce(f64::max)
+        }
+        Goal::Ideal => None,
+    };
+    Ok(Reach {
+        goal,
+        setting,
+        speed: first.max(second),
+        yardstick,
+        error,
+    })
+}
+
+/// The state at `time`, which the method reached itself.
+fn snapshot_at(
+    setting: &Setting,
+    scene: &Scene,
+    time: f64,
+    outside: &mut Outside,
+) -> Result<Snapshot, AnalysisError> {
+    Ok(run_to(setting, scene, time, outside, |_| {})?.snapshot())
+}
+
+fn run_to(
+    setting: &Setting,
+    scene: &Scene,
+    end: f64,
+    outside: &mut Outside,
+    mut seen: impl FnMut(&mut Simulation),
+) -> Result<Simulation, AnalysisError> {
+    let mut simulation = setting.start(scene)?;
+    let ended = stretch(
+        &mut simulation,
+        end,
+        &Effort::REFERENCE,
+        outside,
+        |simulation| {
+            seen(simulation);
+            false
+        },
+    )?;
+    match ended {
+        End::Reached => Ok(simulation),
+        End::Capped => Err(AnalysisError::TooLong {
+            evaluations: Effort::REFERENCE.evaluations,
+        }),
+        // The guard gives the same answer when asked again.
+        End::Stopped(_) => {
+            simulation.step()?;
+            Ok(simulation)
+        }
+    }
+}
+
+/// Mean size of each joint's contact force from `from` to `to`, by a run from the start.
+fn mean_forces(
+    setting: &Setting,
+    scene: &Scene,
+    from: f64,
+    to: f64,
+    outside: &mut Outside,
+) -> Result<Vec<f64>, AnalysisError> {
+    let mut means = vec![0.0; scene.ball_joints.len()];
+    let mut frame = Frame::default();
+    let mut next = 0;
+    let instant = |n: u32| from + (to - from) * (f64::from(n) + 0.5) / f64::from(SAMPLES);
+    run_to(setting, scene, to, outside, |simulation| {
+        while next < SAMPLES && instant(next) <= simulation.time() {
+            simulation.sample(instant(next), &mut frame);
+            for (mean, joint) in means.iter_mut().zip(&frame.joints) {
+                let force = (joint.normal_force + joint.friction_force).norm();
+                *mean += force / f64::from(SAMPLES);
+            }
+            next += 1;
+        }
+    })?;
+    Ok(means)
+}

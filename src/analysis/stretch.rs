@@ -1,0 +1,224 @@
+//! A stretch of stepping under a cap on work, timed piece by piece.
+
+use serde::Serialize;
+
+use super::{AnalysisError, Outside};
+use crate::simulate::Simulation;
+
+/// Steps between two looks at the clock, the cap, and whether to go on.
+const STEPS_IN_A_PIECE: u32 = 32;
+/// Runs of one setting: at least and at most; and after how many times the time to be measured two are enough.
+const FEWEST_RUNS: usize = 3;
+const MOST_RUNS: usize = 40;
+const LONG: f64 = 4.0;
+
+/// How much work an analysis may take.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Effort {
+    /// Evaluations of the equations after which a run has done enough.
+    pub evaluations: u64,
+    /// Seconds by the clock after which it has, too: the algebra of implicit methods is no evaluation.
+    pub seconds: f64,
+    /// Seconds that are measured of each run, by repeating it.
+    pub measured: f64,
+    /// Steps of the fixed-step methods, s.
+    pub steps: &'static [f64],
+    /// Tolerances of the adaptive methods.
+    pub tolerances: &'static [f64],
+}
+
+impl Effort {
+    /// A coarse grid within seconds.
+    pub const QUICK: Self = Self {
+        evaluations: 400_000,
+        seconds: 0.5,
+        measured: 0.02,
+        steps: &[50e-6, 20e-6, 10e-6, 5e-6, 2e-6],
+        tolerances: &[1e-3, 1e-4, 1e-6, 1e-8],
+    };
+    /// The whole grid within minutes.
+    pub const FULL: Self = Self {
+        evaluations: 4_000_000,
+        seconds: 2.0,
+        measured: 0.1,
+        steps: &[
+            1e-3, 500e-6, 200e-6, 100e-6, 50e-6, 20e-6, 10e-6, 5e-6, 2e-6, 1e-6, 0.5e-6,
+        ],
+        tolerances: &[1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11],
+    };
+    /// What the reference may take, whose result everything needs.
+    pub(super) const REFERENCE: Self = Self {
+        evaluations: 40_000_000,
+        seconds: f64::INFINITY,
+        ..Self::FULL
+    };
+}
+
+/// How a run ended.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum End {
+    /// Where it was to.
+    Reached,
+    /// At the cap on work.
+    Capped,
+    /// By the divergence guard, which says why.
+    Stopped(String),
+}
+
+/// Steps `simulation` to exactly `end`; `seen` looks at it after every step and says whether that is enough.
+pub(super) fn stretch(
+    simulation: &mut Simulation,
+    end: f64,
+    effort: &Effort,
+    outside: &mut Outside,
+    mut seen: impl FnMut(&mut Simulation) -> bool,
+) -> Result<End, AnalysisError> {
+    timed_stretch(simulation, end, effort, outside, &mut Vec::new(), &mut seen)
+}
+
+/// The same; `pieces` keeps the shortest time that each piece has taken so far, s.
+fn timed_stretch(
+    simulation: &mut Simulation,
+    end: f64,
+    effort: &Effort,
+    outside: &mut Outside,
+    pieces: &mut Vec<f64>,
+    seen: &mut impl FnMut(&mut Simulation) -> bool,
+) -> Result<End, AnalysisError> {
+    let most = simulation.statistics().evaluations + effort.evaluations;
+    let deadline = outside.now() + effort.seconds;
+    for piece in 0.. {
+        let before = outside.now();
+        let outcome = some_steps(simulation, end, seen);
+        let now = outside.now();
+        match pieces.get_mut(piece) {
+            Some(shortest) => *shortest = shortest.min(now - before),
+            None => pieces.push(now - before),
+        }
+        match outcome {
+            Ok(true) => return Ok(End::Reached),
+            Ok(false) => {}
+            Err(stopped) => return Ok(End::Stopped(stopped.to_string())),
+        }
+        outside.go_on(0.0)?;
+        if simulation.statistics().evaluations > most || now > deadline {
+            return Ok(End::Capped);
+        }
+    }
+    unreachable!("pieces are counted for ever")
+}
+
+/// Whether `end` is reached, or `seen` has seen enough, after a piece.
+fn some_steps(
+    simulation: &mut Simulation,
+    end: f64,
+    seen: &mut impl FnMut(&mut Simulation) -> bool,
+) -> Result<bool, crate::simulate::Stopped> {
+    for _ in 0..STEPS_IN_A_PIECE {
+        if simulation.time() >= end {
+            return Ok(true);
+        }
+        simulation.step_until(end)?;
+        if seen(simulation) {
+            return Ok(true);
+        }
+    }
+    Ok(simulation.time() >= end)
+}
+
+/// Seconds that stepping to `end` takes: that of the shortest run of every piece of it, so that what else the machine does
+/// counts as little as can be. Every run begins with what `start` makes; making it does not count.
+pub(super) fn time_to(
+    end: f64,
+    effort: &Effort,
+    outside: &mut Outside,
+    mut start: impl FnMut(&mut Outside) -> Result<Simulation, AnalysisError>,
+) -> Result<f64, AnalysisError> {
+    let mut pieces = Vec::new();
+    let mut measured = 0.0;
+    for run in 0..MOST_RUNS {
+        let mut simulation = start(outside)?;
+        let before = outside.now();
+        timed_stretch(
+            &mut simulation,
+            end,
+            effort,
+            outside,
+            &mut pieces,
+            &mut |_| false,
+        )?;
+        measured += outside.now() - before;
+        let long = measured >= LONG * effort.measured && run > 0;
+        if long || (measured >= effort.measured && run + 1 >= FEWEST_RUNS) {
+            break;
+        }
+    }
+    Ok(pieces.iter().sum())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::ops::ControlFlow;
+
+    use super::*;
+    use crate::scene::Scene;
+
+    #[test]
+    fn work_is_capped_and_can_be_broken_off() {
+        let scene = Scene::load("spcmm", &[]).expect("built in");
+        let small = Effort {
+            evaluations: 500,
+            ..Effort::QUICK
+        };
+        let mut clock = || 0.0;
+        let mut simulation = Simulation::new(&scene).expect("starts");
+        let mut go_on = |_: f64| ControlFlow::Continue(());
+        let mut outside = Outside::new(&mut clock, &mut go_on);
+        let end = stretch(&mut simulation, 1.0, &small, &mut outside, |_| false);
+        assert_eq!(end, Ok(End::Capped));
+        let evaluations = simulation.statistics().evaluations;
+        assert!((501..1500).contains(&evaluations), "{evaluations}");
+
+        let mut looks = 0;
+        let mut stop = |_: f64| {
+            looks += 1;
+            if looks > 2 {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        };
+        let mut outside = Outside::new(&mut clock, &mut stop);
+        let end = stretch(&mut simulation, 1.0, &Effort::FULL, &mut outside, |_| false);
+        assert_eq!(end, Err(AnalysisError::Cancelled));
+    }
+
+    #[test]
+    fn a_run_takes_the_time_of_its_shortest_pieces() {
+        let scene = Scene::load("pendulum", &[]).expect("built in");
+        // A clock that goes on by 1 s at every look, but by 100 s where a look falls on a busy moment.
+        let (mut time, mut look) = (0.0, 0);
+        let mut clock = || {
+            look += 1;
+            time += if look % 17 == 0 { 100.0 } else { 1.0 };
+            time
+        };
+        let mut go_on = |_: f64| ControlFlow::Continue(());
+        let mut outside = Outside::new(&mut clock, &mut go_on);
+        let effort = Effort {
+            measured: 1e6,
+            seconds: 1e9,
+            ..Effort::QUICK
+        };
+        let mut steps = 0;
+        let seconds = time_to(5e-3, &effort, &mut outside, |_| {
+            let mut simulation = Simulation::new(&scene)?;
+            while simulation.step_until(5e-3).is_ok() && simulation.time() < 5e-3 {}
+            steps = simulation.statistics().steps;
+            Ok(Simulation::new(&scene)?)
+        })
+        .expect("runs");
+        assert_eq!(seconds, (steps as f64 / f64::from(STEPS_IN_A_PIECE)).ceil());
+    }
+}

@@ -1,0 +1,310 @@
+//! What every method costs and how wrong it is, on one scene.
+
+use serde::Serialize;
+
+use super::standard::Work;
+use super::stretch::time_to;
+use super::{AnalysisError, Effort, End, Errors, Outside, Setting, Standard, front};
+use crate::scene::{Preset, Scene};
+
+/// What a run did over the first impacts, or in settled motion.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Phase {
+    /// How it ended. Where it did not reach its end there is no time and no error.
+    pub end: End,
+    /// Simulated time, s.
+    pub simulated_s: f64,
+    /// Seconds by the clock that stepping over it takes.
+    pub wall_s: Option<f64>,
+    /// Speed over that of Runge-Kutta 4 at 10 microseconds on the same span, measured in the same run.
+    pub ratio: Option<f64>,
+    /// Accepted steps.
+    pub steps: u64,
+    /// Evaluations of the equations of motion.
+    pub evaluations: u64,
+    /// Rejected steps.
+    pub rejected: u64,
+    /// No other point is both faster and more accurate in this phase.
+    pub front: bool,
+}
+
+impl Phase {
+    /// Simulated seconds in a second by the clock.
+    pub fn speed(&self) -> Option<f64> {
+        self.wall_s
+            .filter(|wall| *wall > 0.0)
+            .map(|wall| self.simulated_s / wall)
+    }
+
+    /// Seconds by the clock for a simulated one.
+    pub fn cost(&self) -> Option<f64> {
+        self.wall_s.map(|wall| wall / self.simulated_s)
+    }
+}
+
+/// One method at one step or tolerance.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Point {
+    /// Method, step, tolerance.
+    pub setting: Setting,
+    /// The preset that stands for it.
+    #[serde(serialize_with = "as_word")]
+    pub preset: Option<Preset>,
+    /// The first impacts.
+    pub impacts: Phase,
+    /// Settled motion, in a scene that comes to it.
+    pub settled: Option<Phase>,
+    /// How wrong it is.
+    pub errors: Errors,
+}
+
+fn as_word<S: serde::Serializer>(
+    preset: &Option<Preset>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    match preset {
+        Some(preset) => serializer.serialize_str(preset.word()),
+        None => serializer.serialize_none(),
+    }
+}
+
+/// All points of a scene.
+#[derive(Clone, Debug)]
+pub struct WorkPrecision {
+    /// What they are measured against.
+    pub standard: Standard,
+    /// In the order of the methods, each from coarse to fine.
+    pub points: Vec<Point>,
+}
+
+impl WorkPrecision {
+    /// The point that a preset stands for.
+    pub fn preset(&self, preset: Preset) -> Option<&Point> {
+        self.points.iter().find(|p| p.preset == Some(preset))
+    }
+
+    /// The fastest point over the first impacts whose peak forces err by at most `error`.
+    pub fn fastest_within(&self, error: f64) -> Option<&Point> {
+        let good = |p: &&Point| p.errors.peak.is_some_and(|e| e <= error);
+        let cost = |p: &Point| p.impacts.wall_s.unwrap_or(f64::INFINITY);
+        let points = self.points.iter().filter(good);
+        points.min_by(|a, b| cost(a).total_cmp(&cost(b)))
+    }
+
+    /// The fastest point in settled motion whose mean forces err by at most `error`.
+    pub fn fastest_settled_within(&self, error: f64) -> Option<&Point> {
+        let good = |p: &&Point| p.errors.settled.is_some_and(|e| e <= error);
+        let cost = |p: &Point| {
+            p.settled
+                .as_ref()
+                .and_then(|phase| phase.wall_s)
+                .unwrap_or(f64::INFINITY)
+        };
+        let points = self.points.iter().filter(good);
+        points.min_by(|a, b| cost(a).total_cmp(&cost(b)))
+    }
+}
+
+/// Runs every method over its steps or tolerances, and the presets.
+///
+/// # Errors
+/// A scene that has no reference ([`Standard::new`]); [`Outside`]'s no.
+pub fn work_precision(
+    scene: &Scene,
+    effort: &Effort,
+    outside: &mut Outside,
+) -> Result<WorkPrecision, AnalysisError> {
+    let settings = grid(scene, effort)?;
+    let parts = settings.len() + 3;
+    let standard = Standard::new(scene, &mut outside.part(0, parts))?;
+    let mut points = Vec::with_capacity(settings.len());
+    let mut yardstick = Yardstick::new(&standard, effort, &mut outside.part(1, parts))?;
+    for (n, (setting, preset)) in settings.into_iter().enumerate() {
+        let mut part = outside.part(2 + n, parts);
+        let mut point = measure(&standard, setting, effort, &mut part)?;
+        point.preset = preset;
+        points.push(point);
+    }
+    // What else the machine did while the points ran slows the yardstick as little as them.
+    yardstick.again(&standard, effort, &mut outside.part(parts - 1, parts))?;
+    for point in &mut points {
+        yardstick.divide(point);
+    }
+    mark_fronts(&mut points, &standard.floor);
+    Ok(WorkPrecision { standard, points })
+}
+
+/// Every method at its values, the presets among them.
+fn grid(scene: &Scene, effort: &Effort) -> Result<Vec<(Setting, Option<Preset>)>, AnalysisError> {
+    let mut presets = Vec::new();
+    for preset in Preset::ALL {
+        presets.push((Setting::of_preset(scene, preset)?, preset));
+    }
+    let mut settings = Vec::new();
+    for method in Setting::methods() {
+        let probe = Setting::new(scene, method, effort.tolerances[0])?;
+        let mut values = if probe.adaptive {
+            effort.tolerances.to_vec()
+        } else {
+            effort.steps.to_vec()
+        };
+        let own = presets
+            .iter()
+            .filter(|(setting, _)| setting.method == *method);
+        values.extend(own.map(|(setting, _)| setting.value()));
+        values.sort_by(|a, b| b.total_cmp(a));
+        values.dedup();
+        for value in values {
+            let setting = Setting::new(scene, method, value)?;
+            let same = presets
+                .iter()
+                .find(|(own, _)| own.method == *method && own.value() == value);
+            settings.push((setting, same.map(|(_, preset)| *preset)));
+        }
+    }
+    Ok(settings)
+}
+
+/// Runs one setting against `standard`: errors, work and time, without ratios and fronts.
+pub(super) fn measure(
+    standard: &Standard,
+    setting: Setting,
+    effort: &Effort,
+    outside: &mut Outside,
+) -> Result<Point, AnalysisError> {
+    let (end, mut errors, work) = match standard.impacts_of(&setting, effort, outside) {
+        Ok(found) => found,
+        // A method may refuse a scene, say one too large for its matrices.
+        Err(AnalysisError::Start(refused)) => {
+            let end = End::Stopped(refused.to_string());
+            return Ok(Point {
+                setting,
+                preset: None,
+                impacts: phase(end, standard.span, None, &Work::default()),
+                settled: None,
+                errors: Errors::default(),
+            });
+        }
+        Err(error) => return Err(error),
+    };
+    let wall = match end {
+        End::Reached => Some(time_to(standard.span, effort, outside, |_| {
+            standard.start(&setting)
+        })?),
+        _ => None,
+    };
+    let impacts = phase(end, standard.span, wall, &work);
+    let mut settled = None;
+    if let Some((end, error, work)) = standard.settled_of(&setting, effort, outside)?
+        && let Some(span) = &standard.settled
+    {
+        errors.settled = error;
+        let wall = match end {
+            End::Reached => Some(time_to(span.to, effort, outside, |outside| {
+                Ok(standard.resume(span, &setting, effort, outside)?.1)
+            })?),
+            _ => None,
+        };
+        settled = Some(phase(end, span.to - span.from, wall, &work));
+    }
+    Ok(Point {
+        setting,
+        preset: None,
+        impacts,
+        settled,
+        errors,
+    })
+}
+
+fn phase(end: End, simulated_s: f64, wall_s: Option<f64>, work: &Work) -> Phase {
+    Phase {
+        end,
+        simulated_s,
+        wall_s,
+        ratio: None,
+        steps: work.steps,
+        evaluations: work.evaluations,
+        rejected: work.rejected,
+        front: false,
+    }
+}
+
+/// Times of Runge-Kutta 4 at 10 microseconds over both phases, s: the shortest so far.
+pub(super) struct Yardstick {
+    setting: Setting,
+    impacts: Option<f64>,
+    settled: Option<f64>,
+}
+
+impl Yardstick {
+    pub(super) fn new(
+        standard: &Standard,
+        effort: &Effort,
+        outside: &mut Outside,
+    ) -> Result<Self, AnalysisError> {
+        let mut yardstick = Self {
+            setting: Setting::yardstick(standard.scene())?,
+            impacts: None,
+            settled: None,
+        };
+        yardstick.again(standard, effort, outside)?;
+        Ok(yardstick)
+    }
+
+    pub(super) fn again(
+        &mut self,
+        standard: &Standard,
+        effort: &Effort,
+        outside: &mut Outside,
+    ) -> Result<(), AnalysisError> {
+        let point = measure(standard, self.setting, effort, outside)?;
+        let shorter = |a: Option<f64>, b: Option<f64>| match (a, b) {
+            (Some(a), Some(b)) => Some(a.min(b)),
+            (a, b) => a.or(b),
+        };
+        self.impacts = shorter(self.impacts, point.impacts.wall_s);
+        self.settled = shorter(self.settled, point.settled.and_then(|p| p.wall_s));
+        Ok(())
+    }
+
+    pub(super) fn divide(&self, point: &mut Point) {
+        let ratio = |own: Option<f64>, of: Option<f64>| Some(of? / own.filter(|w| *w > 0.0)?);
+        point.impacts.ratio = ratio(point.impacts.wall_s, self.impacts);
+        if let Some(settled) = &mut point.settled {
+            settled.ratio = ratio(settled.wall_s, self.settled);
+        }
+    }
+}
+
+fn mark_fronts(points: &mut [Point], floor: &Errors) {
+    let pair = |phase: &Phase, error: Option<f64>| {
+        let cost = phase.wall_s.unwrap_or(f64::INFINITY);
+        (cost, error.unwrap_or(f64::NAN))
+    };
+    let impacts: Vec<_> = points
+        .iter()
+        .map(|p| pair(&p.impacts, p.errors.peak))
+        .collect();
+    for (point, on) in points
+        .iter_mut()
+        .zip(front(&impacts, floor.peak.unwrap_or(0.0)))
+    {
+        point.impacts.front = on;
+    }
+    let settled: Vec<_> = points
+        .iter()
+        .map(|p| {
+            p.settled
+                .as_ref()
+                .map_or((f64::INFINITY, f64::NAN), |phase| {
+                    pair(phase, p.errors.settled)
+                })
+        })
+        .collect();
+    let on = front(&settled, floor.settled.unwrap_or(0.0));
+    for (point, on) in points.iter_mut().zip(on) {
+        if let Some(settled) = &mut point.settled {
+            settled.front = on;
+        }
+    }
+}

@@ -1,0 +1,453 @@
+//! From a description to SVG, by `plotters`.
+
+use plotters::coord::Shift;
+use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+use super::labels::{Area, arrange};
+use super::ticks::Ruler;
+use super::{Chart, Colour, Marker, Series};
+
+/// Some charts on one page with one legend.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sheet {
+    /// Title over all charts; "" leaves it out.
+    pub title: String,
+    /// Row by row.
+    pub charts: Vec<Chart>,
+    /// Charts in a row.
+    pub columns: usize,
+    /// Width and height, pixels.
+    pub size: (u32, u32),
+    /// A line under everything; "" leaves it out.
+    pub note: String,
+}
+
+/// Why there is no picture.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("cannot draw the chart: {0}")]
+pub struct SheetError(pub(super) String);
+
+/// The drawing library counts in whole numbers: so many of them are a pixel.
+const FINE: u32 = 4;
+/// Sizes of text, pixels.
+const TITLE: f64 = 16.0;
+const HEADING: f64 = 14.0;
+const TEXT: f64 = 12.0;
+/// Height of a row of the legend, length of its sample, gap between entries, pixels.
+const ROW: f64 = 20.0;
+const SAMPLE: f64 = 26.0;
+const GAP: f64 = 18.0;
+/// Half the size of a marker, width of a line, pixels.
+const MARKER: f64 = 4.0;
+const LINE: f64 = 1.6;
+/// Width of a letter over the size of the text, on average, generously.
+const LETTER: f64 = 0.51;
+
+const INK: Colour = (30, 30, 30);
+const FAINT: Colour = (110, 110, 110);
+const GRID: Colour = (214, 214, 214);
+const FINE_GRID: Colour = (238, 238, 238);
+
+type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+type Plot<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<Ruler, Ruler>>;
+
+impl Ranged for Ruler {
+    type FormatOption = DefaultFormatting;
+    type ValueType = f64;
+
+    fn map(&self, place: &f64, (first, last): (i32, i32)) -> i32 {
+        let theta = (place - self.from) / (self.to - self.from);
+        first + (f64::from(last - first) * theta).round() as i32
+    }
+
+    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
+        if hint.weight().allow_light_points() {
+            self.minor.clone()
+        } else {
+            self.ticks.clone()
+        }
+    }
+
+    fn range(&self) -> std::ops::Range<f64> {
+        self.from..self.to
+    }
+}
+
+fn fine(pixels: f64) -> i32 {
+    (pixels * f64::from(FINE)).round() as i32
+}
+
+fn rgb((r, g, b): Colour) -> RGBColor {
+    RGBColor(r, g, b)
+}
+
+fn failed(error: impl std::fmt::Display) -> SheetError {
+    SheetError(error.to_string())
+}
+
+fn style(size: f64, colour: Colour, horizontal: HPos, vertical: VPos) -> TextStyle<'static> {
+    // The library takes the height of a line; the size of the letters is that over 1.24.
+    TextStyle {
+        font: ("sans-serif", 1.24 * size * f64::from(FINE)).into_font(),
+        color: rgb(colour).to_backend_color(),
+        pos: Pos::new(horizontal, vertical),
+    }
+}
+
+impl Sheet {
+    /// The picture as SVG; the same description gives the same bytes.
+    ///
+    /// # Errors
+    /// A page too small for its charts.
+    pub fn svg(&self) -> Result<String, SheetError> {
+        let (width, height) = (self.size.0 * FINE, self.size.1 * FINE);
+        let mut text = String::new();
+        {
+            let root = SVGBackend::with_string(&mut text, (width, height)).into_drawing_area();
+            root.fill(&WHITE).map_err(failed)?;
+            self.draw(&root)?;
+            root.present().map_err(failed)?;
+        }
+        // The page is as large as asked; inside it the finer units stay.
+        let (found, wanted) = (
+            format!("width=\"{width}\" height=\"{height}\""),
+            format!("width=\"{}\" height=\"{}\"", self.size.0, self.size.1),
+        );
+        Ok(text.replacen(&found, &wanted, 1))
+    }
+
+    fn draw(&self, root: &Canvas) -> Result<(), SheetError> {
+        let (width, height) = (f64::from(self.size.0), f64::from(self.size.1));
+        let mut top = 8.0;
+        if !self.title.is_empty() {
+            let style = style(TITLE, INK, HPos::Center, VPos::Top);
+            write(root, &self.title, (0.5 * width, top), &style)?;
+            top += TITLE + 10.0;
+        }
+        let mut bottom = height - 6.0;
+        if !self.note.is_empty() {
+            let style = style(TEXT - 1.0, FAINT, HPos::Center, VPos::Bottom);
+            write(root, &self.note, (0.5 * width, bottom), &style)?;
+            bottom -= TEXT + 8.0;
+        }
+        let rows = self.legend_rows(width);
+        bottom -= ROW * rows.len() as f64;
+        for (n, row) in rows.iter().enumerate() {
+            draw_legend(root, row, width, bottom + ROW * (n as f64 + 0.5))?;
+        }
+        let columns = self.columns.clamp(1, self.charts.len().max(1));
+        let lines = self.charts.len().div_ceil(columns).max(1);
+        let (w, h) = (width / columns as f64, (bottom - top) / lines as f64);
+        if w < 160.0 || h < 120.0 {
+            return Err(SheetError(
+                "the page is too small for its charts".to_owned(),
+            ));
+        }
+        for (n, chart) in self.charts.iter().enumerate() {
+            let (x, y) = ((n % columns) as f64 * w, top + (n / columns) as f64 * h);
+            let area = root.clone().shrink((fine(x), fine(y)), (fine(w), fine(h)));
+            draw_chart(root, &area, chart)?;
+        }
+        Ok(())
+    }
+
+    /// What the legend names, each once, broken into rows.
+    fn legend_rows(&self, width: f64) -> Vec<Vec<&Series>> {
+        let mut rows: Vec<Vec<&Series>> = Vec::new();
+        let mut used = f64::INFINITY;
+        let mut names: Vec<&str> = Vec::new();
+        for series in self.charts.iter().flat_map(|chart| &chart.series) {
+            if series.label.is_empty() || names.contains(&series.label.as_str()) {
+                continue;
+            }
+            names.push(&series.label);
+            let entry = entry_width(series);
+            if used + entry > width - 24.0 {
+                rows.push(Vec::new());
+                used = 0.0;
+            }
+            used += entry;
+            if let Some(row) = rows.last_mut() {
+                row.push(series);
+            }
+        }
+        rows
+    }
+}
+
+fn text_width(text: &str, size: f64) -> f64 {
+    text.chars().count() as f64 * size * LETTER
+}
+
+fn entry_width(series: &Series) -> f64 {
+    SAMPLE + 6.0 + text_width(&series.label, TEXT) + GAP
+}
+
+fn write(
+    root: &Canvas,
+    text: &str,
+    (x, y): (f64, f64),
+    style: &TextStyle,
+) -> Result<(), SheetError> {
+    let at = (fine(x), fine(y));
+    root.draw(&Text::new(text.to_owned(), at, style.clone()))
+        .map_err(failed)
+}
+
+fn draw_legend(root: &Canvas, row: &[&Series], width: f64, y: f64) -> Result<(), SheetError> {
+    let total: f64 = row.iter().map(|series| entry_width(series)).sum();
+    let mut x = 0.5 * (width - total + GAP);
+    let style = style(TEXT, INK, HPos::Left, VPos::Center);
+    for series in row {
+        if series.line {
+            let ends = vec![(fine(x), fine(y)), (fine(x + SAMPLE), fine(y))];
+            root.draw(&PathElement::new(ends, stroke(series.colour)))
+                .map_err(failed)?;
+        }
+        if let Some(marker) = series.marker {
+            draw_marker(
+                root,
+                (fine(x + 0.5 * SAMPLE), fine(y)),
+                marker,
+                series.colour,
+            )?;
+        }
+        write(root, &series.label, (x + SAMPLE + 6.0, y), &style)?;
+        x += entry_width(series);
+    }
+    Ok(())
+}
+
+fn stroke(colour: Colour) -> ShapeStyle {
+    rgb(colour).stroke_width(fine(LINE).unsigned_abs())
+}
+
+fn draw_chart(root: &Canvas, area: &Canvas, chart: &Chart) -> Result<(), SheetError> {
+    let points = || chart.series.iter().flat_map(|series| series.points.iter());
+    let x = Ruler::new(&chart.x, points().map(|p| p.0));
+    let levels = chart.levels.iter().map(|level| level.y);
+    let y = Ruler::new(&chart.y, points().map(|p| p.1).chain(levels));
+    // Room for the longest word at the left.
+    let longest = y
+        .ticks
+        .iter()
+        .map(|&tick| text_width(&y.word(tick), TEXT))
+        .fold(0.0, f64::max);
+    let heading = style(HEADING, INK, HPos::Left, VPos::Top);
+    let mut plot: Plot = ChartBuilder::on(area)
+        .margin_top(fine(6.0))
+        .margin_right(fine(18.0))
+        .margin_left(fine(8.0))
+        .margin_bottom(fine(6.0))
+        .set_label_area_size(LabelAreaPosition::Left, fine(longest + 34.0))
+        .set_label_area_size(LabelAreaPosition::Bottom, fine(46.0))
+        .caption(&chart.title, heading)
+        .build_cartesian_2d(x.clone(), y.clone())
+        .map_err(failed)?;
+    plot.configure_mesh()
+        .bold_line_style(rgb(GRID).stroke_width(FINE))
+        .light_line_style(rgb(FINE_GRID).stroke_width(FINE))
+        .axis_style(rgb(FAINT).stroke_width(FINE))
+        .label_style(style(TEXT, INK, HPos::Center, VPos::Center))
+        .axis_desc_style(style(TEXT + 1.0, INK, HPos::Center, VPos::Center))
+        .x_desc(described(&chart.x.label, &chart.x.unit))
+        .y_desc(described(&chart.y.label, &chart.y.unit))
+        .x_label_formatter(&|tick| x.word(*tick))
+        .y_label_formatter(&|tick| y.word(*tick))
+        .set_all_tick_mark_size(fine(4.0))
+        .draw()
+        .map_err(failed)?;
+    let inside = |&(px, py): &(f64, f64)| {
+        let place = (x.place(px), y.place(py));
+        let good = (x.from..=x.to).contains(&place.0) && (y.from..=y.to).contains(&place.1);
+        good.then_some(place)
+    };
+    let mut taken: Vec<Area> = Vec::new();
+    draw_levels(root, &plot, chart, &x, &y, &mut taken)?;
+    for series in &chart.series {
+        if series.line {
+            for part in series.points.split(|point| inside(point).is_none()) {
+                let path: Vec<(i32, i32)> = part
+                    .iter()
+                    .filter_map(|point| inside(point).map(|place| plot.backend_coord(&place)))
+                    .collect();
+                along(&path, &mut taken);
+                root.draw(&PathElement::new(path, stroke(series.colour)))
+                    .map_err(failed)?;
+            }
+        }
+    }
+    for series in &chart.series {
+        for place in series.points.iter().filter_map(inside) {
+            let at = plot.backend_coord(&place);
+            if let Some(marker) = series.marker {
+                draw_marker(root, at, marker, series.colour)?;
+            }
+            let half = f64::from(fine(MARKER + 1.0));
+            taken.push(Area {
+                x: f64::from(at.0) - half,
+                y: f64::from(at.1) - half,
+                width: 2.0 * half,
+                height: 2.0 * half,
+            });
+        }
+    }
+    draw_labels(root, &plot, chart, inside, taken)
+}
+
+/// Small areas along a line, for the texts to keep clear of.
+fn along(path: &[(i32, i32)], taken: &mut Vec<Area>) {
+    let step = f64::from(fine(MARKER));
+    for ends in path.windows(2) {
+        let (from, to) = (ends[0], ends[1]);
+        let (dx, dy) = (f64::from(to.0 - from.0), f64::from(to.1 - from.1));
+        let parts = (dx.hypot(dy) / step).ceil().clamp(1.0, 1000.0);
+        for n in 0..parts as u32 {
+            let theta = f64::from(n) / parts;
+            taken.push(Area {
+                x: f64::from(from.0) + theta * dx - 0.5 * step,
+                y: f64::from(from.1) + theta * dy - 0.5 * step,
+                width: step,
+                height: step,
+            });
+        }
+    }
+}
+
+fn draw_levels(
+    root: &Canvas,
+    plot: &Plot,
+    chart: &Chart,
+    x: &Ruler,
+    y: &Ruler,
+    taken: &mut Vec<Area>,
+) -> Result<(), SheetError> {
+    for level in &chart.levels {
+        let place = y.place(level.y);
+        if !(y.from..=y.to).contains(&place) {
+            continue;
+        }
+        let (left, at) = plot.backend_coord(&(x.from, place));
+        let (right, _) = plot.backend_coord(&(x.to, place));
+        let dash = fine(5.0);
+        let starts = (left..right).step_by(2 * dash.unsigned_abs() as usize);
+        for from in starts {
+            let ends = vec![(from, at), ((from + dash).min(right), at)];
+            let style = rgb(FAINT).stroke_width(FINE);
+            root.draw(&PathElement::new(ends, style)).map_err(failed)?;
+        }
+        let style = style(TEXT - 1.0, FAINT, HPos::Left, VPos::Bottom);
+        let text = Text::new(
+            level.text.clone(),
+            (left + fine(6.0), at - fine(3.0)),
+            style,
+        );
+        root.draw(&text).map_err(failed)?;
+        taken.push(Area {
+            x: f64::from(left),
+            y: f64::from(at - fine(TEXT + 3.0)),
+            width: f64::from(fine(6.0 + text_width(&level.text, TEXT))),
+            height: f64::from(fine(TEXT + 4.0)),
+        });
+    }
+    Ok(())
+}
+
+fn draw_labels(
+    root: &Canvas,
+    plot: &Plot,
+    chart: &Chart,
+    inside: impl Fn(&(f64, f64)) -> Option<(f64, f64)>,
+    taken: Vec<Area>,
+) -> Result<(), SheetError> {
+    let (xs, ys) = plot.plotting_area().get_pixel_range();
+    let frame = Area {
+        x: f64::from(xs.start),
+        y: f64::from(ys.start),
+        width: f64::from(xs.end - xs.start),
+        height: f64::from(ys.end - ys.start),
+    };
+    let labels: Vec<_> = chart
+        .labels
+        .iter()
+        .filter_map(|label| inside(&label.at).map(|place| (label, plot.backend_coord(&place))))
+        .collect();
+    let wanted: Vec<_> = labels
+        .iter()
+        .map(|(label, (x, y))| {
+            let size = (fine(text_width(&label.text, TEXT)), fine(TEXT + 2.0));
+            (
+                (f64::from(*x), f64::from(*y)),
+                (f64::from(size.0), f64::from(size.1)),
+            )
+        })
+        .collect();
+    let unit = f64::from(fine(MARKER + 3.0));
+    let centre = style(TEXT, INK, HPos::Center, VPos::Center);
+    for ((label, (x, y)), area) in labels.iter().zip(arrange(&wanted, taken, frame, unit)) {
+        let middle = (
+            (area.x + 0.5 * area.width) as i32,
+            (area.y + 0.5 * area.height) as i32,
+        );
+        // A thin line ties a text to its point.
+        let edge = (
+            (*x).clamp(area.x as i32, (area.x + area.width) as i32),
+            (*y).clamp(area.y as i32, (area.y + area.height) as i32),
+        );
+        let tie = PathElement::new(vec![(*x, *y), edge], rgb(FAINT).stroke_width(FINE / 2));
+        root.draw(&tie).map_err(failed)?;
+        let text = Text::new(label.text.clone(), middle, centre.clone());
+        root.draw(&text).map_err(failed)?;
+    }
+    Ok(())
+}
+
+fn described(label: &str, unit: &str) -> String {
+    if unit.is_empty() {
+        label.to_owned()
+    } else {
+        format!("{label} ({unit})")
+    }
+}
+
+fn draw_marker(
+    root: &Canvas,
+    (x, y): (i32, i32),
+    marker: Marker,
+    colour: Colour,
+) -> Result<(), SheetError> {
+    let r = fine(MARKER);
+    let filled = rgb(colour).filled();
+    let around = |corners: &[(f64, f64)]| {
+        let corner = |&(dx, dy): &(f64, f64)| (x + fine(dx * MARKER), y + fine(dy * MARKER));
+        Polygon::new(corners.iter().map(corner).collect::<Vec<_>>(), filled)
+    };
+    let strokes = |lines: [[(i32, i32); 2]; 2]| {
+        lines.into_iter().try_for_each(|[a, b]| {
+            let ends = vec![(x + a.0, y + a.1), (x + b.0, y + b.1)];
+            root.draw(&PathElement::new(ends, stroke(colour)))
+        })
+    };
+    match marker {
+        Marker::Disc => root.draw(&Circle::new((x, y), r, filled)),
+        Marker::Dot => root.draw(&Circle::new((x, y), fine(1.0), filled)),
+        Marker::Ring => root.draw(&Circle::new((x, y), fine(MARKER + 3.0), stroke(colour))),
+        Marker::Square => {
+            let s = fine(0.88 * MARKER);
+            root.draw(&Rectangle::new([(x - s, y - s), (x + s, y + s)], filled))
+        }
+        Marker::Triangle => root.draw(&around(&[(0.0, -1.2), (1.1, 0.8), (-1.1, 0.8)])),
+        Marker::TriangleDown => root.draw(&around(&[(0.0, 1.2), (1.1, -0.8), (-1.1, -0.8)])),
+        Marker::Diamond => root.draw(&around(&[
+            (0.0, -1.25),
+            (1.25, 0.0),
+            (0.0, 1.25),
+            (-1.25, 0.0),
+        ])),
+        Marker::Cross => strokes([[(-r, -r), (r, r)], [(-r, r), (r, -r)]]),
+        Marker::Plus => strokes([[(-r, 0), (r, 0)], [(0, -r), (0, r)]]),
+    }
+    .map_err(failed)
+}

@@ -1,0 +1,51 @@
+//! From SVG to PNG, by `resvg`, with a face of its own: no font of the system has a say.
+
+use std::sync::Arc;
+
+use resvg::tiny_skia::{Pixmap, Transform};
+use resvg::usvg::{Options, Tree, fontdb};
+
+use super::{Sheet, SheetError};
+
+/// Largest edge of a picture, pixels.
+const LARGEST: f32 = 16384.0;
+
+impl Sheet {
+    /// The picture as PNG, `scale` pixels for one of the description.
+    ///
+    /// # Errors
+    /// As [`Sheet::svg`]; a picture without area or with an edge of more than 16384 pixels.
+    pub fn png(&self, scale: f32) -> Result<Vec<u8>, SheetError> {
+        let failed = |error: &dyn std::fmt::Display| SheetError(error.to_string());
+        let mut fonts = fontdb::Database::new();
+        fonts.load_font_data(epaint_default_fonts::UBUNTU_LIGHT.to_vec());
+        // Has what the first has not, such as a raised minus sign.
+        fonts.load_font_data(epaint_default_fonts::HACK_REGULAR.to_vec());
+        let family = fonts
+            .faces()
+            .find_map(|face| face.families.first())
+            .map(|(name, _)| name.clone());
+        fonts.set_sans_serif_family(family.unwrap_or_default());
+        let options = Options {
+            fontdb: Arc::new(fonts),
+            ..Options::default()
+        };
+        let tree = Tree::from_str(&self.svg()?, &options).map_err(|e| failed(&e))?;
+        let (width, height) = (tree.size().width() * scale, tree.size().height() * scale);
+        let fits = |edge: f32| (1.0..=LARGEST).contains(&edge);
+        let pixmap = (fits(width) && fits(height))
+            .then(|| Pixmap::new(width.round() as u32, height.round() as u32))
+            .flatten();
+        let Some(mut pixmap) = pixmap else {
+            return Err(SheetError(format!(
+                "no picture is {width} by {height} pixels"
+            )));
+        };
+        resvg::render(
+            &tree,
+            Transform::from_scale(scale, scale),
+            &mut pixmap.as_mut(),
+        );
+        pixmap.encode_png().map_err(|e| failed(&e))
+    }
+}

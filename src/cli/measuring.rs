@@ -1,0 +1,61 @@
+//! Analyses by the clock of this machine, with a progress bar, until Ctrl-C.
+
+use std::ops::ControlFlow;
+
+use super::{Failure, interrupt, progress};
+use crate::analysis::{AnalysisError, Outside};
+use crate::scene::Scene;
+
+/// Parts of the progress bar.
+const PARTS: f64 = 1000.0;
+
+/// Runs `analysis`; an error of `scene` names the line of its file.
+///
+/// # Errors
+/// As the analysis; Ctrl-C.
+pub fn measure<T>(
+    quiet: bool,
+    scene: Option<&Scene>,
+    analysis: impl FnOnce(&mut Outside) -> Result<T, AnalysisError>,
+) -> Result<T, Failure> {
+    interrupt::listen();
+    let bar = progress::bar(!quiet, PARTS as u64);
+    let mut clock = clock();
+    let mut progress = |done: f64| {
+        bar.set_position((done * PARTS) as u64);
+        if interrupt::asked() {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    };
+    let result = analysis(&mut Outside::new(&mut clock, &mut progress));
+    bar.finish_and_clear();
+    result.map_err(|error| match (error, scene) {
+        (AnalysisError::Cancelled, _) => Failure::new(
+            Failure::INTERRUPTED,
+            "interrupted; nothing was written".to_owned(),
+        ),
+        (AnalysisError::Start(error), Some(scene)) => error.located(scene).into(),
+        (AnalysisError::Setting(error), _) => error.into(),
+        (error @ AnalysisError::Start(_), None) => Failure::usage(error.to_string()),
+        (error, _) => Failure::new(Failure::DIVERGED, error.to_string()),
+    })
+}
+
+/// Seconds of processor time of this thread, which does the stepping: what else runs on the machine does not count.
+#[cfg(unix)]
+fn clock() -> impl FnMut() -> f64 {
+    use rustix::time::{ClockId, clock_gettime};
+    || {
+        let time = clock_gettime(ClockId::ThreadCPUTime);
+        time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
+    }
+}
+
+/// Seconds on the wall.
+#[cfg(not(unix))]
+fn clock() -> impl FnMut() -> f64 {
+    let started = std::time::Instant::now();
+    move || started.elapsed().as_secs_f64()
+}

@@ -1,0 +1,86 @@
+//! `tradeoff`: what every method costs on a scene and how wrong it is, as a table, files and the page of the documents.
+
+mod files;
+mod page;
+mod picture;
+mod words;
+
+pub use page::{RATIO_NOTE, headings};
+pub use words::{grid, percent, times, value};
+
+use std::path::Path;
+
+use super::args::TradeoffArguments;
+use super::{Failure, load, measuring, print, warn};
+use crate::analysis::{Effort, WorkPrecision, model_costs, work_precision};
+use crate::cli::args::SceneArguments;
+use crate::cli::output::Folder;
+use crate::scene::{BUILT_IN, Scene};
+
+/// Does what `tradeoff` asks.
+///
+/// # Errors
+/// Bad input before it starts; a scene without a reference, Ctrl-C and the file system afterwards.
+pub fn tradeoff(arguments: &TradeoffArguments) -> Result<(), Failure> {
+    let effort = if arguments.quick {
+        Effort::QUICK
+    } else {
+        Effort::FULL
+    };
+    match (&arguments.scene, &arguments.write) {
+        (Some(scene), _) => one(scene, arguments, &effort),
+        (None, Some(root)) => all(root, arguments.quiet, &effort),
+        (None, None) => Err(Failure::usage(
+            "name a scene, or write --all --write FOLDER",
+        )),
+    }
+}
+
+fn one(name: &str, arguments: &TradeoffArguments, effort: &Effort) -> Result<(), Failure> {
+    let scene = load(&SceneArguments {
+        scene: name.to_owned(),
+        changes: arguments.changes.clone(),
+    })?;
+    let folder = match &arguments.out {
+        Some(path) => Some((path, Folder::claim(path, arguments.force)?)),
+        None => None,
+    };
+    if !arguments.quiet {
+        // What it says of the solver does not matter here: every method has its turn.
+        let about_solver = |warning: &&String| warning.starts_with("solver.");
+        let warnings = scene.warnings();
+        warnings
+            .iter()
+            .filter(|w| !about_solver(w))
+            .for_each(|w| warn(w));
+    }
+    let found = measure(&scene, effort, arguments.quiet)?;
+    print(&words::text(&found))?;
+    if let Some((path, folder)) = folder {
+        files::fill(folder.scratch(), &found, &scene)?;
+        folder.finish()?;
+        print(&format!("Written           {}\n", path.display()))?;
+    }
+    Ok(())
+}
+
+fn measure(scene: &Scene, effort: &Effort, quiet: bool) -> Result<WorkPrecision, Failure> {
+    measuring::measure(quiet, Some(scene), |outside| {
+        work_precision(scene, effort, outside)
+    })
+}
+
+/// Measures everything that the documents say, and writes it in one go at the end.
+fn all(root: &Path, quiet: bool, effort: &Effort) -> Result<(), Failure> {
+    let targets = page::Targets::claim(root)?;
+    let mut found = Vec::with_capacity(BUILT_IN.len());
+    for name in BUILT_IN {
+        found.push(measure(&Scene::load(name, &[])?, effort, quiet)?);
+    }
+    let costs = measuring::measure(quiet, None, |outside| model_costs(effort, outside))?;
+    targets.write(&found, &costs)?;
+    for found in &found {
+        print(&words::text(found))?;
+    }
+    print(&words::costs(&costs))
+}

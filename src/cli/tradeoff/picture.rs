@@ -1,0 +1,164 @@
+//! The work-precision diagram of a scene.
+
+use super::words::value;
+use crate::analysis::{Phase, Point, Setting, WorkPrecision};
+use crate::chart::{Axis, Chart, Label, Level, Marker, PALETTE, Scale, Series, Sheet};
+
+/// Width of one diagram and height of the page, pixels.
+const WIDTH: u32 = 560;
+const HEIGHT: u32 = 500;
+/// Markers of the methods, in their order; a long list begins again.
+const MARKERS: [Marker; 8] = [
+    Marker::Square,
+    Marker::Disc,
+    Marker::Triangle,
+    Marker::Diamond,
+    Marker::TriangleDown,
+    Marker::Cross,
+    Marker::Plus,
+    Marker::Disc,
+];
+/// Errors above this are wrong altogether: how wrong says nothing.
+const WORST: f64 = 1.0;
+const FRONT: &str = "On the front: nothing is both faster and more accurate";
+
+/// What one diagram shows of a point: its phase and its error there.
+type View = fn(&Point) -> Option<(&Phase, f64)>;
+
+/// Error against time, both phases side by side. `relative`: times over that of Runge-Kutta 4 at 10 microseconds, which mean
+/// something on other machines, too.
+pub(super) fn picture(found: &WorkPrecision, relative: bool, machine: &str) -> Sheet {
+    let floor = &found.standard.floor;
+    let impacts: View = |point| Some((&point.impacts, point.errors.peak?));
+    let settled: View = |point| Some((point.settled.as_ref()?, point.errors.settled?));
+    let mut charts = vec![diagram(
+        found,
+        relative,
+        if found.standard.impacts == 0 {
+            "Reactions"
+        } else {
+            "First impacts"
+        },
+        "Largest relative error of a peak force",
+        impacts,
+        floor.peak,
+    )];
+    if found.standard.settled.is_some() {
+        charts.push(diagram(
+            found,
+            relative,
+            "Settled motion",
+            "Largest relative error of a mean force",
+            settled,
+            floor.settled,
+        ));
+    }
+    let columns = charts.len();
+    Sheet {
+        title: format!("{}: what accuracy costs", found.standard.scene().name),
+        size: (WIDTH * columns.max(2) as u32, HEIGHT),
+        charts,
+        columns,
+        note: format!("jointplay {}, {machine}", crate::VERSION),
+    }
+}
+
+fn diagram(
+    found: &WorkPrecision,
+    relative: bool,
+    title: &str,
+    error: &str,
+    view: View,
+    floor: Option<f64>,
+) -> Chart {
+    let floor = floor.filter(|floor| *floor > 0.0);
+    let place = |point: &Point| {
+        let (phase, error) = view(point)?;
+        let cost = if relative {
+            1.0 / phase.ratio?
+        } else {
+            phase.cost()?
+        };
+        // Below the floor nothing can be told: the point lies on it.
+        let error = error.max(floor.unwrap_or(0.0));
+        (error <= WORST).then_some((cost, error))
+    };
+    let mut series = Vec::new();
+    for (n, method) in Setting::methods().iter().enumerate() {
+        let own = found.points.iter().filter(|p| p.setting.method == *method);
+        // A gap where a point has no place: the line does not cross it.
+        let points = own
+            .map(|p| place(p).unwrap_or((f64::NAN, f64::NAN)))
+            .collect();
+        series.push(Series {
+            label: (*method).to_owned(),
+            points,
+            colour: PALETTE[n % PALETTE.len()],
+            line: true,
+            marker: Some(MARKERS[n % MARKERS.len()]),
+        });
+    }
+    let on_front = |p: &&Point| view(p).is_some_and(|(phase, _)| phase.front);
+    series.push(Series {
+        label: FRONT.to_owned(),
+        points: found
+            .points
+            .iter()
+            .filter(on_front)
+            .filter_map(place)
+            .collect(),
+        colour: (90, 90, 90),
+        line: false,
+        marker: Some(Marker::Ring),
+    });
+    let labels = found
+        .points
+        .iter()
+        .filter_map(|point| {
+            let text = match point.preset {
+                Some(preset) => preset.word().to_owned(),
+                None if is_yardstick(point) => {
+                    format!("{} {}", point.setting.method, value(&point.setting))
+                }
+                None => return None,
+            };
+            Some(Label {
+                at: place(point)?,
+                text,
+            })
+        })
+        .collect();
+    Chart {
+        title: title.to_owned(),
+        x: Axis {
+            label: "Time for a simulated second".to_owned(),
+            unit: if relative {
+                "that of rk4 at 10 us is 1"
+            } else {
+                "s"
+            }
+            .to_owned(),
+            scale: Scale::Logarithmic,
+            range: None,
+        },
+        y: Axis {
+            label: error.to_owned(),
+            scale: Scale::Logarithmic,
+            ..Axis::default()
+        },
+        series,
+        labels,
+        levels: floor
+            .map(|y| Level {
+                y,
+                text: "less cannot be told".to_owned(),
+            })
+            .into_iter()
+            .collect(),
+    }
+}
+
+/// Whether it is Runge-Kutta 4 at 10 microseconds.
+pub(super) fn is_yardstick(point: &Point) -> bool {
+    point.setting.method == "rk4" && point.setting.step_s == 10e-6
+}

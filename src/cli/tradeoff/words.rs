@@ -1,0 +1,335 @@
+//! Numbers and tables of the trade for a person.
+
+use std::fmt::Write as _;
+
+use crate::analysis::{End, PartCost, Phase, Point, Setting, Standard, WorkPrecision};
+use crate::cli::machine;
+use crate::cli::output::significant;
+use crate::scene::format_quantity;
+
+/// A number of times with three digits, `-` where there is none.
+pub fn times(value: Option<f64>) -> String {
+    value.map_or_else(|| "-".to_owned(), |value| significant(value, 3))
+}
+
+/// A relative error as a percentage with two digits.
+pub fn percent(value: Option<f64>) -> String {
+    value.map_or_else(
+        || "-".to_owned(),
+        |value| format!("{} %", significant(100.0 * value, 2)),
+    )
+}
+
+/// A step with its unit, or a tolerance.
+pub fn value(setting: &Setting) -> String {
+    if setting.adaptive {
+        format!("{:e}", setting.tolerance)
+    } else {
+        format_quantity(setting.step_s, "us")
+    }
+}
+
+/// An error with two digits; one below `floor` is as good as that.
+pub(super) fn error(value: Option<f64>, floor: Option<f64>) -> String {
+    match (value, floor) {
+        (None, _) => "-".to_owned(),
+        (Some(value), Some(floor)) if value <= floor => format!("< {}", exponent(floor)),
+        (Some(value), _) => exponent(value),
+    }
+}
+
+/// Two digits: `4.3e-5`, `0.031`, `2.1`; rounding alone is `0`.
+fn exponent(value: f64) -> String {
+    if value == 0.0 {
+        "0".to_owned()
+    } else if (1e-2..1e3).contains(&value) {
+        significant(value, 2)
+    } else {
+        format!("{value:.1e}")
+    }
+}
+
+/// How a phase ended where it did not come to its end.
+pub(super) fn end(phase: &Phase) -> &'static str {
+    match phase.end {
+        End::Reached => "",
+        End::Capped => "capped",
+        End::Stopped(_) => "stopped",
+    }
+}
+
+/// What the errors are measured against, a line each.
+pub(super) fn standard(standard: &Standard) -> Vec<(&'static str, String)> {
+    let ms = |time: f64| format!("{} ms", significant(1e3 * time, 5));
+    let floor = &standard.floor;
+    let names: Vec<&str> = standard
+        .slots
+        .iter()
+        .map(|slot| joint(standard, slot.joint))
+        .collect();
+    let mut lines = vec![
+        (
+            "Reference",
+            format!(
+                "{} at {:e}; at half of it the peaks change by {}, the position by {} m, settled forces by {}",
+                standard.setting.method,
+                standard.setting.tolerance,
+                exponent(floor.peak.unwrap_or(0.0)),
+                exponent(floor.position_m.unwrap_or(0.0)),
+                floor.settled.map_or_else(|| "-".to_owned(), exponent),
+            ),
+        ),
+        (
+            "First impacts",
+            if standard.impacts == 0 {
+                format!(
+                    "none: the largest reactions of {} within {}",
+                    names.join(", "),
+                    ms(standard.span)
+                )
+            } else {
+                format!(
+                    "{} within {}: {}",
+                    standard.impacts,
+                    ms(standard.span),
+                    names.join(", ")
+                )
+            },
+        ),
+    ];
+    lines.push((
+        "Position",
+        match standard.instant_impact {
+            0 => format!("at {}", ms(standard.instant)),
+            n => format!("at impact {n}, {}", ms(standard.instant)),
+        },
+    ));
+    lines.push((
+        "Settled",
+        match &standard.settled {
+            Some(span) => format!("mean contact forces from {} to {}, all methods from the same state", ms(span.from), ms(span.to)),
+            None => "its contacts do not stay closed for 150 ms within the first 1.2 s: nothing to average".to_owned(),
+        },
+    ));
+    lines
+}
+
+fn joint(standard: &Standard, index: usize) -> &str {
+    let joint = standard.scene().ball_joints.get(index);
+    joint.map_or("-", |joint| joint.name.as_str())
+}
+
+/// The whole result as text.
+pub(super) fn text(found: &WorkPrecision) -> String {
+    let mut out = String::new();
+    let mut line = |label: &str, value: &str| {
+        // Writing to a String cannot fail.
+        let _ = writeln!(out, "{label:<18}{value}");
+    };
+    line("Scene", &found.standard.scene().name);
+    for (key, value) in &found.standard.scene().changes {
+        line("  changed", &format!("{key} = {value}"));
+    }
+    line("Machine", &machine::name());
+    for (label, value) in standard(&found.standard) {
+        line(label, &value);
+    }
+    line("Speed", "simulated seconds in a second of stepping");
+    line("Ratio", "speed over that of rk4 at 10 us on the same span");
+    line("*", "nothing else is both faster and more accurate");
+    out.push('\n');
+    out.push_str("First impacts\n");
+    out.push_str(&grid(&impacts(found)));
+    if found.standard.settled.is_some() {
+        out.push_str("\nSettled motion\n");
+        out.push_str(&grid(&settled(found)));
+    }
+    for point in &found.points {
+        if let End::Stopped(why) = &point.impacts.end {
+            let _ = writeln!(
+                out,
+                "{} {}: {why}",
+                point.setting.method,
+                value(&point.setting)
+            );
+        }
+    }
+    out.push('\n');
+    out
+}
+
+fn named(point: &Point) -> [String; 3] {
+    [
+        point.setting.method.to_owned(),
+        value(&point.setting),
+        point.preset.map_or("", |preset| preset.word()).to_owned(),
+    ]
+}
+
+fn speeds(phase: &Phase) -> [String; 5] {
+    [
+        times(phase.speed()),
+        times(phase.ratio),
+        phase.steps.to_string(),
+        phase.evaluations.to_string(),
+        phase.rejected.to_string(),
+    ]
+}
+
+fn mark(phase: &Phase) -> String {
+    if phase.front { "*" } else { end(phase) }.to_owned()
+}
+
+fn impacts(found: &WorkPrecision) -> Vec<Vec<String>> {
+    let floor = &found.standard.floor;
+    let head = [
+        "method",
+        "value",
+        "preset",
+        "speed",
+        "ratio",
+        "steps",
+        "evaluations",
+        "rejected",
+        "peak error",
+        "position error (m)",
+        "energy error",
+        "",
+    ];
+    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    for point in &found.points {
+        let mut row = named(point).to_vec();
+        row.extend(speeds(&point.impacts));
+        row.push(error(point.errors.peak, floor.peak));
+        row.push(error(point.errors.position_m, floor.position_m));
+        row.push(error(point.errors.energy, None));
+        row.push(mark(&point.impacts));
+        rows.push(row);
+    }
+    rows
+}
+
+fn settled(found: &WorkPrecision) -> Vec<Vec<String>> {
+    let head = [
+        "method",
+        "value",
+        "preset",
+        "speed",
+        "ratio",
+        "steps",
+        "evaluations",
+        "rejected",
+        "force error",
+        "",
+    ];
+    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    for point in &found.points {
+        let Some(phase) = &point.settled else {
+            continue;
+        };
+        let mut row = named(point).to_vec();
+        row.extend(speeds(phase));
+        row.push(error(point.errors.settled, found.standard.floor.settled));
+        row.push(mark(phase));
+        rows.push(row);
+    }
+    rows
+}
+
+/// Costs of the parts of the model as text.
+pub(super) fn costs(costs: &[PartCost]) -> String {
+    let head = ["scene", "with", "an evaluation", "a simulated second"];
+    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    for (cost, (evaluation, second)) in costs.iter().zip(cost_ratios(costs)) {
+        rows.push(vec![
+            cost.part.scene.to_owned(),
+            cost.part.label.to_owned(),
+            times(Some(evaluation)),
+            times(Some(second)),
+        ]);
+    }
+    format!(
+        "Cost of the parts of the model, the first row being 1\n{}",
+        grid(&rows)
+    )
+}
+
+/// Cost of an evaluation and of a simulated second over those of the first.
+pub(super) fn cost_ratios(costs: &[PartCost]) -> Vec<(f64, f64)> {
+    let Some(first) = costs.first() else {
+        return Vec::new();
+    };
+    let ratio = |cost: &PartCost| {
+        (
+            cost.evaluation_s / first.evaluation_s,
+            cost.cost / first.cost,
+        )
+    };
+    costs.iter().map(ratio).collect()
+}
+
+/// Rows of cells in columns, the first row being the head: numbers to the right, words to the left.
+pub fn grid(rows: &[Vec<String>]) -> String {
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let cell = |row: &[String], c: usize| row.get(c).cloned().unwrap_or_default();
+    let is_number = |text: &str| {
+        let first = text.chars().next();
+        text == "-" || first.is_some_and(|c| c.is_ascii_digit() || c == '<')
+    };
+    let mut out = String::new();
+    let mut widths = Vec::with_capacity(columns);
+    let mut right = Vec::with_capacity(columns);
+    for c in 0..columns {
+        widths.push(
+            rows.iter()
+                .map(|row| cell(row, c).chars().count())
+                .max()
+                .unwrap_or(0),
+        );
+        let mut body = rows
+            .iter()
+            .skip(1)
+            .map(|row| cell(row, c))
+            .filter(|text| !text.is_empty());
+        right.push(rows.len() > 1 && body.all(|text| is_number(&text)));
+    }
+    for row in rows {
+        let mut line = String::new();
+        for c in 0..columns {
+            let (text, width) = (cell(row, c), widths[c]);
+            // Writing to a String cannot fail.
+            let _ = if right[c] {
+                write!(line, "{text:>width$}  ")
+            } else {
+                write!(line, "{text:<width$}  ")
+            };
+        }
+        out.push_str(line.trim_end());
+        out.push('\n');
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_line_up() {
+        let rows = [["a", "number"], ["word", "1"], ["b", "-"]];
+        let rows: Vec<Vec<String>> = rows
+            .iter()
+            .map(|row| row.map(str::to_owned).to_vec())
+            .collect();
+        assert_eq!(grid(&rows), "a     number\nword       1\nb          -\n");
+    }
+
+    #[test]
+    fn an_error_below_the_floor_says_so() {
+        assert_eq!(error(Some(3e-9), Some(1e-8)), "< 1.0e-8");
+        assert_eq!(error(Some(3.14e-5), Some(1e-8)), "3.1e-5");
+        assert_eq!(error(Some(0.0314), None), "0.031");
+        assert_eq!(error(None, Some(1.0)), "-");
+        assert_eq!(percent(Some(0.01234)), "1.2 %");
+    }
+}

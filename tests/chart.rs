@@ -1,0 +1,112 @@
+//! Charts: the same description gives the same picture, whatever is in it.
+
+use jointplay::chart::{Axis, Chart, Label, Level, Marker, PALETTE, Scale, Series, Sheet};
+
+fn axis(label: &str, unit: &str, scale: Scale) -> Axis {
+    Axis {
+        label: label.to_owned(),
+        unit: unit.to_owned(),
+        scale,
+        range: None,
+    }
+}
+
+fn series(label: &str, points: Vec<(f64, f64)>, n: usize) -> Series {
+    let markers = [
+        Marker::Disc,
+        Marker::Square,
+        Marker::Triangle,
+        Marker::TriangleDown,
+        Marker::Diamond,
+        Marker::Cross,
+        Marker::Plus,
+        Marker::Ring,
+        Marker::Dot,
+    ];
+    Series {
+        label: label.to_owned(),
+        points,
+        colour: PALETTE[n % PALETTE.len()],
+        line: n != 8,
+        marker: Some(markers[n]),
+    }
+}
+
+fn sheet(size: (u32, u32)) -> Sheet {
+    let line = |n: usize| {
+        let point = |k: i32| (0.1 * f64::from(k), (f64::from(k) * 0.3 + n as f64).sin());
+        (0..60).map(point).collect()
+    };
+    let linear = Chart {
+        title: "Phase portrait".to_owned(),
+        x: axis("Eccentricity", "mm", Scale::Linear),
+        y: axis("Speed", "m/s", Scale::Linear),
+        series: (0..9)
+            .map(|n| series(&format!("a < b & {n}"), line(n), n))
+            .collect(),
+        labels: vec![Label {
+            at: (2.0, 0.5),
+            text: "\"here\" & there".to_owned(),
+        }],
+        levels: vec![Level {
+            y: 0.25,
+            text: "level".to_owned(),
+        }],
+    };
+    let broken = vec![
+        (1e-3, 1e-9),
+        (1e-2, f64::NAN),
+        (1e-1, 0.0),
+        (f64::INFINITY, 1.0),
+        (1.0, 1e-2),
+        (10.0, 1.0),
+    ];
+    let log = Chart {
+        title: "Error".to_owned(),
+        x: axis("Time", "s", Scale::Logarithmic),
+        y: axis("Error", "", Scale::Logarithmic),
+        series: vec![series("broken", broken, 1), series("empty", Vec::new(), 2)],
+        ..Chart::default()
+    };
+    Sheet {
+        title: "Two charts".to_owned(),
+        charts: vec![linear, log],
+        columns: 2,
+        size,
+        note: "a note".to_owned(),
+    }
+}
+
+#[test]
+fn text_and_picture_follow_from_the_description_alone() {
+    let sheet = sheet((900, 420));
+    let svg = sheet.svg().unwrap();
+    assert_eq!(svg, sheet.svg().unwrap());
+    assert!(
+        svg.starts_with("<svg width=\"900\" height=\"420\""),
+        "{}",
+        &svg[..80]
+    );
+    // Text stays text, escaped where it must be.
+    for word in [
+        "a &lt; b &amp; 3",
+        "Phase portrait",
+        "Eccentricity (mm)",
+        "broken",
+        "10⁻⁶",
+    ] {
+        assert!(svg.contains(word), "{word}");
+    }
+    assert!(!svg.contains("NaN") && !svg.contains("inf"));
+    let png = sheet.png(1.5).unwrap();
+    assert_eq!(png, sheet.png(1.5).unwrap());
+    let edge = |at: usize| u32::from_be_bytes(png[at..at + 4].try_into().unwrap());
+    assert_eq!((edge(16), edge(20)), (1350, 630));
+}
+
+#[test]
+fn a_page_that_cannot_be_drawn_is_refused() {
+    assert!(sheet((200, 100)).svg().is_err());
+    assert!(sheet((900, 420)).png(0.0).is_err());
+    assert!(sheet((900, 420)).png(1e6).is_err());
+}
