@@ -1,12 +1,13 @@
 //! Jointplay: a 3D laboratory that shows what play in a ball joint does to a machine.
 //!
 //! Floors from the ground up; a module uses only what stands below it (`ARCHITECTURE.md`):
-//! [`contact`] and [`integrate`], [`scene`], [`mechanism`], [`simulate`], [`view`], [`render`], [`app`],
+//! [`contact`] and [`integrate`], [`scene`], [`mechanism`], [`simulate`], [`analysis`] and [`view`], [`render`], [`app`],
 //! and the entries [`cli`] and `main.rs`.
 
 /// The version that every output file names.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
+pub mod analysis;
 #[cfg(feature = "gui")]
 pub mod app;
 #[cfg(not(target_arch = "wasm32"))]

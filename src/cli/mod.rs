@@ -12,6 +12,7 @@ mod quantity;
 mod render;
 mod run;
 mod summary;
+mod sweep;
 
 use std::fmt::Write as _;
 use std::io::{self, Write as _};
@@ -50,6 +51,8 @@ fn dispatch(arguments: Arguments) -> Result<(), Failure> {
         Some(Command::Render(arguments)) => render::render(&arguments),
         #[cfg(not(feature = "gui"))]
         Some(Command::Render(_)) => Err(no_graphics()),
+        Some(Command::Sweep(arguments)) => sweep::sweep(&arguments),
+        Some(Command::Merge(arguments)) => sweep::merge(&arguments),
         Some(Command::Parameters) => print(&reference_page()),
     }
 }

@@ -3,6 +3,7 @@
 mod adaptive;
 mod automatic;
 mod contacts;
+mod displace;
 mod guard;
 mod live;
 mod snapshot;
