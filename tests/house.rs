@@ -15,7 +15,14 @@ const FLOORS: [&[&str]; 9] = [
     &["main", "web"],
 ];
 /// Modules whose results must be the same bits everywhere.
-const EXACT: [&str; 5] = ["contact", "integrate", "scene", "mechanism", "simulate"];
+const EXACT: [&str; 6] = [
+    "contact",
+    "integrate",
+    "scene",
+    "mechanism",
+    "simulate",
+    "analysis",
+];
 
 fn floor(module: &str) -> Option<usize> {
     FLOORS.iter().position(|floor| floor.contains(&module))

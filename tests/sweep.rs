@@ -366,6 +366,11 @@ fn bad_input_is_refused_before_anything_runs() {
             2,
             "--discard must be less",
         ),
+        (
+            "sweep spcmm --vary contact.clearance=0.1mm..1mm:5 --periods 99999999999999 --discard 3 --out a.npz".to_owned(),
+            2,
+            "more than a result holds",
+        ),
         (format!("{SMALL} --out a.csv"), 2, ".npz"),
         (format!("{SMALL} --out no/such/folder/a.npz"), 1, "a.npz"),
         (format!("{SMALL} --shard 4/3 --out a.npz"), 2, "--shard 4/3"),

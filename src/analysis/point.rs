@@ -10,6 +10,8 @@ use crate::simulate::{Effect, Peak};
 const SAMPLES: f64 = 400.0;
 /// A twin's separation over the tolerance: well above what two runs differ by from their steps alone.
 const OVER_TOLERANCE: f64 = 10.0;
+/// Beyond this tolerance a twin's separation is not well above the error of a step any more.
+pub const LOOSEST_FOR_EXPONENT: f64 = SEPARATIONS.1 / OVER_TOLERANCE;
 /// The separation's range, in units of the scales of the tolerance: 10 nm to 1 um in every built-in scene.
 const SEPARATIONS: (f64, f64) = (1e-6, 1e-4);
 /// What tells two sections apart over the tolerance: the errors of the steps of a period add up.

@@ -8,6 +8,9 @@ use super::point::{Plan, PointResult, PointRun};
 use crate::scene::{Scene, SceneError, Value};
 use crate::simulate::Simulation;
 
+/// Most kept sections of all points together: an array of them takes 512 MiB.
+const MOST_SECTIONS: usize = 1 << 26;
+
 /// Why a sweep cannot be.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SweepError {
@@ -20,6 +23,19 @@ pub enum SweepError {
         periods: usize,
         /// Of these discarded.
         discard: usize,
+    },
+    /// More numbers than a result can hold.
+    #[error(
+        "{points} points with {kept} kept sections each are more than a result holds ({most} sections): fewer values in \
+         --vary, fewer --periods, or more of them in --discard"
+    )]
+    TooLarge {
+        /// Points.
+        points: usize,
+        /// Kept sections of a point.
+        kept: usize,
+        /// Most sections.
+        most: usize,
     },
     /// No drive phase.
     #[error("{0}; a sweep needs a driven scene such as spcmm or slider-crank-driven")]
@@ -53,6 +69,14 @@ impl Sweep {
             return Err(SweepError::NothingKept {
                 periods: plan.periods,
                 discard: plan.discard,
+            });
+        }
+        let (points, kept) = (grid.points(), plan.periods - plan.discard);
+        if kept > MOST_SECTIONS / points {
+            return Err(SweepError::TooLarge {
+                points,
+                kept,
+                most: MOST_SECTIONS,
             });
         }
         let layout = Layout::new(&scene, &plan);

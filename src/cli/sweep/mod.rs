@@ -24,7 +24,7 @@ use super::{Failure, interrupt, load, print, progress, warn};
 use crate::analysis::drive::drive_period;
 use crate::analysis::grid::{Axis, FOLLOW_BLOCK, Grid};
 use crate::analysis::layout::Status;
-use crate::analysis::point::Plan;
+use crate::analysis::point::{LOOSEST_FOR_EXPONENT, Plan};
 use crate::analysis::regime::Regime;
 use crate::analysis::sweep::Sweep;
 
@@ -169,7 +169,7 @@ fn meta(sweep: &Sweep) -> Result<Map<String, Json>, Failure> {
     Ok(meta)
 }
 
-/// Warnings of the scene at both ends of the ranges, each once.
+/// Warnings of the scene at both ends of the ranges, each once, and of the sweep itself.
 fn warnings(sweep: &Sweep) -> Vec<String> {
     let mut all = Vec::new();
     for point in [0, sweep.grid().points() - 1] {
@@ -181,6 +181,16 @@ fn warnings(sweep: &Sweep) -> Vec<String> {
                 all.push(warning);
             }
         }
+    }
+    let solver = &sweep.scene().solver;
+    let loose =
+        solver.method.is_adaptive() && solver.tolerance > LOOSEST_FOR_EXPONENT * (1.0 + 1e-9);
+    if loose && sweep.plan().exponent {
+        all.push(format!(
+            "solver.tolerance {:e}: two runs part by their steps' errors alone at this tolerance, so exponents and the \
+             regimes told from them mean little; use {LOOSEST_FOR_EXPONENT:e} or less, or --no-exponent.",
+            solver.tolerance
+        ));
     }
     all
 }

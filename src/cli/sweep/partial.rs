@@ -282,8 +282,8 @@ pub fn difference(own: &Json, wanted: &Json) -> String {
     let (Some(own), Some(wanted)) = (own.as_object(), wanted.as_object()) else {
         return "unreadable".to_owned();
     };
-    let keys = wanted.keys().chain(own.keys());
-    let differing = keys.filter(|key| own.get(*key) != wanted.get(*key)).next();
+    let mut keys = wanted.keys().chain(own.keys());
+    let differing = keys.find(|key| own.get(*key) != wanted.get(*key));
     let show = |value: Option<&Json>| value.map_or("none".to_owned(), Json::to_string);
     differing.map_or("in their order".to_owned(), |key| {
         format!(
