@@ -14,8 +14,9 @@ const OVER_TOLERANCE: f64 = 10.0;
 pub const LOOSEST_FOR_EXPONENT: f64 = SEPARATIONS.1 / OVER_TOLERANCE;
 /// The separation's range, in units of the scales of the tolerance: 10 nm to 1 um in every built-in scene.
 const SEPARATIONS: (f64, f64) = (1e-6, 1e-4);
-/// What tells two sections apart over the tolerance: the errors of the steps of a period add up.
-const RESOLUTION: f64 = 10.0;
+/// What tells two coordinates of a section apart over the tolerance, and what two rates: errors of many steps add up, and
+/// a stiff contact turns those of coordinates into larger ones of rates.
+const RESOLUTION: [f64; 2] = [10.0, 100.0];
 /// Stands for the tolerance of a fixed-step method.
 const FIXED_STEP: f64 = 1e-5;
 
@@ -282,13 +283,13 @@ impl PointResult {
 }
 
 /// What two sections of `scene` must differ by to be different, in the order of [`OBSERVABLES`]: the tolerance times its
-/// scales, and a factor for the errors of many steps.
+/// scales, and a factor.
 pub fn resolution(scene: &Scene, tolerance: f64) -> Vec<f64> {
     let radii = scene.ball_joints.iter().map(|j| j.contact.ball_radius);
     let length = radii.fold(1.0, f64::min);
     let of_group = [length, 0.1, length / 0.1, 1.0];
     (0..OBSERVABLES.len())
-        .map(|i| RESOLUTION * tolerance * of_group[i / 3])
+        .map(|i| RESOLUTION[i / 6] * tolerance * of_group[i / 3])
         .collect()
 }
 

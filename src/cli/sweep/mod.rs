@@ -10,6 +10,7 @@ pub use merge::merge;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc;
 use std::thread;
+use std::time::Instant;
 
 use indicatif::ProgressBar;
 use serde_json::{Map, Value as Json, json};
@@ -74,7 +75,9 @@ pub fn sweep(arguments: &SweepArguments) -> Result<(), Failure> {
     bar.reset_eta();
     let cores = || thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
     let threads = arguments.threads.map_or_else(cores, usize::from);
+    let started = Instant::now();
     let outcome = compute(&sweep, &todo, threads, &mut partial, &bar);
+    let wall = started.elapsed().as_secs_f64();
     bar.finish_and_clear();
     outcome?;
     if todo.iter().any(|b| !partial.has(*b)) {
@@ -93,7 +96,8 @@ pub fn sweep(arguments: &SweepArguments) -> Result<(), Failure> {
             ),
         ));
     }
-    let summary = summarise(&archive, &mut partial)?;
+    let mut summary = summarise(&archive, &mut partial)?;
+    summary.insert("wall_s".into(), json!(wall));
     archive.write(target, &mut partial)?;
     partial.remove()?;
     report(&archive, &summary, &arguments.out, arguments.summary)
@@ -296,8 +300,12 @@ fn report(
         .flatten()
         .map(|(word, number)| format!("{number} {word}"))
         .collect();
+    let wall = summary.get("wall_s").and_then(Json::as_f64);
+    let wall = wall.map_or_else(String::new, |wall| {
+        format!("\nWall time         {wall:.1} s")
+    });
     text += &format!(
-        "\nRegimes           {}\nWritten           {} to {}\nVersion           jointplay {}\n",
+        "\nRegimes           {}{wall}\nWritten           {} to {}\nVersion           jointplay {}\n",
         regimes.join(", "),
         count(number("points"), "point"),
         out.display(),
