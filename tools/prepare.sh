@@ -1,10 +1,12 @@
 # What ./run and ./test need of the machine. Sourced by both, never run by itself.
 
-# System packages (Debian, Ubuntu): a linker; a software graphics driver where there is no GPU; what a window opens at run time.
+# System packages (Debian, Ubuntu): a linker; a software graphics driver where there is no GPU; what a window opens at run
+# time; the scheduler of the example that spreads a sweep.
 packages=(
     gcc libc6-dev
     libvulkan1 mesa-vulkan-drivers libegl1
     libxkbcommon-x11-0 libx11-xcb1 libxcursor1 libxi6 libxrandr2 libwayland-client0
+    parallel
 )
 
 say() {

@@ -1,16 +1,24 @@
-//! What is computed from whole runs: what a method costs and how wrong it is, which choice nothing beats, what each part
-//! of the model costs. Knows no clock and no thread: both come from outside ([`Outside`]).
+//! What is computed from whole runs: what a method costs and how wrong it is, what each part of the model costs, responses
+//! beside the ideal motion, sections, exponents, regimes, sweeps. Knows no thread, and its clock comes from outside ([`Outside`]).
 
 mod cost;
+pub mod drive;
+pub mod exponent;
 mod front;
+pub mod grid;
+pub mod layout;
 mod outside;
 pub mod paper;
+pub mod point;
 pub mod presets;
 mod reach;
+pub mod regime;
 pub mod response;
+pub mod section;
 mod setting;
 mod standard;
 mod stretch;
+pub mod sweep;
 mod work_precision;
 
 pub use cost::{Part, PartCost, model_costs};

@@ -32,6 +32,10 @@ pub enum Command {
     Tradeoff(TradeoffArguments),
     /// Measure how fast the default scene runs, against what is asked.
     Bench(BenchArguments),
+    /// Run a driven scene at many parameter values: sections, forces, regimes, exponents.
+    Sweep(SweepArguments),
+    /// Put the shards of a sweep together.
+    Merge(MergeArguments),
     /// Print the reference page of all parameters (Markdown).
     Parameters,
 }
@@ -89,6 +93,104 @@ pub struct RunArguments {
     /// No progress bar and no warnings.
     #[arg(long)]
     pub quiet: bool,
+}
+
+/// `sweep`.
+#[derive(Debug, Args)]
+pub struct SweepArguments {
+    /// Scene.
+    #[command(flatten)]
+    pub scene: SceneArguments,
+    /// Parameter to vary and its values, N of them, equally spaced, both ends included, e.g.
+    /// `contact.clearance=0.01mm..1mm:200`; twice for a map, the second running fastest.
+    #[arg(long, value_name = "KEY=A..B:N", required = true)]
+    pub vary: Vec<String>,
+    /// Drive periods that each point runs, those discarded included.
+    #[arg(long, value_name = "P")]
+    pub periods: usize,
+    /// Of these, periods at the beginning that are a transient.
+    #[arg(long, value_name = "D")]
+    pub discard: usize,
+    /// Where the sections are taken.
+    #[arg(long, value_enum, value_name = "WHERE", default_value = "phase")]
+    pub section: SectionChoice,
+    /// Drive phase of the sections: a fraction of the period, or an angle such as `90deg`.
+    #[arg(
+        long,
+        value_name = "PHASE",
+        default_value = "0",
+        allow_hyphen_values = true
+    )]
+    pub phase: String,
+    /// Where each point starts from.
+    #[arg(long, value_enum, value_name = "START", default_value = "cold")]
+    pub start: StartChoice,
+    /// Leave out the twin runs that measure the largest Lyapunov exponent.
+    #[arg(long)]
+    pub no_exponent: bool,
+    /// Compute one part of the sweep, e.g. `3/16`; `jointplay merge` puts the parts together.
+    #[arg(long, value_name = "K/M", allow_hyphen_values = true)]
+    pub shard: Option<String>,
+    /// Threads to use [default: one for each core]; the result does not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// File to write, a NumPy archive (.npz).
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Form of the summary on standard output.
+    #[arg(long, value_enum, value_name = "FORM", default_value = "text")]
+    pub summary: SummaryForm,
+    /// Replace an existing file.
+    #[arg(long)]
+    pub force: bool,
+    /// No progress bar and no warnings.
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// `merge`.
+#[derive(Debug, Args)]
+pub struct MergeArguments {
+    /// Files that `sweep --shard` wrote: all of one sweep.
+    #[arg(value_name = "SHARD", required = true)]
+    pub shards: Vec<PathBuf>,
+    /// File to write, a NumPy archive (.npz).
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Form of the summary on standard output.
+    #[arg(long, value_enum, value_name = "FORM", default_value = "text")]
+    pub summary: SummaryForm,
+    /// Replace an existing file.
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// Where the sections of a sweep are taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum SectionChoice {
+    /// At one phase of the drive.
+    Phase,
+}
+
+/// Where each point of a sweep starts from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum StartChoice {
+    /// From the scene's own start.
+    Cold,
+    /// From where the point with the next lower value ended.
+    FollowUp,
+    /// From where the point with the next higher value ended.
+    FollowDown,
+}
+
+impl From<StartChoice> for crate::analysis::grid::Start {
+    fn from(choice: StartChoice) -> Self {
+        match choice {
+            StartChoice::Cold => Self::Cold,
+            StartChoice::FollowUp => Self::FollowUp,
+            StartChoice::FollowDown => Self::FollowDown,
+        }
+    }
 }
 
 /// Form of the summary.

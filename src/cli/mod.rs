@@ -16,6 +16,7 @@ mod quantity;
 mod render;
 mod run;
 mod summary;
+mod sweep;
 pub mod tradeoff;
 
 use std::fmt::Write as _;
@@ -57,6 +58,8 @@ fn dispatch(arguments: Arguments) -> Result<(), Failure> {
         Some(Command::Render(_)) => Err(no_graphics()),
         Some(Command::Tradeoff(arguments)) => tradeoff::tradeoff(&arguments),
         Some(Command::Bench(arguments)) => bench::bench(&arguments),
+        Some(Command::Sweep(arguments)) => sweep::sweep(&arguments),
+        Some(Command::Merge(arguments)) => sweep::merge(&arguments),
         Some(Command::Parameters) => print(&reference_page()),
     }
 }

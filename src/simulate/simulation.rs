@@ -4,6 +4,7 @@ mod adaptive;
 mod automatic;
 mod contacts;
 mod corners;
+mod displace;
 mod doubts;
 mod energy;
 mod guard;

@@ -1,0 +1,199 @@
+//! The period of a scene's drives, and a running scene as an [`Orbit`].
+
+use super::section::Orbit;
+use crate::scene::{Drive, JointKind, Scene};
+use crate::simulate::{Frame, Pose, Simulation, StartError, Stopped};
+
+/// Why a scene has no sections at a drive phase.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum NoPeriod {
+    /// Nothing repeats.
+    #[error(
+        "the scene `{scene}` has no drive that repeats, so there is no drive phase to take sections at"
+    )]
+    None {
+        /// Name of the scene.
+        scene: String,
+    },
+    /// Drives of different periods.
+    #[error(
+        "the drives of the scene `{scene}` have different periods ({first} s and {second} s): there is no one drive phase"
+    )]
+    Different {
+        /// Name of the scene.
+        scene: String,
+        /// Period of one drive, s.
+        first: f64,
+        /// Period of another, s.
+        second: f64,
+    },
+}
+
+/// Period that all drives of `scene` share, s. Drives that stand still do not count.
+///
+/// # Errors
+/// A scene without one.
+pub fn drive_period(scene: &Scene) -> Result<f64, NoPeriod> {
+    let mut period: Option<f64> = None;
+    for joint in &scene.joints {
+        let own = match joint.drive {
+            Some(Drive::Spcmm { .. }) => {
+                let of = |spcmm: &crate::scene::Spcmm| {
+                    let moves = spcmm.amplitude_x != 0.0 || spcmm.amplitude_beta != 0.0;
+                    if moves {
+                        1.0 / spcmm.frequency
+                    } else {
+                        f64::INFINITY
+                    }
+                };
+                scene.spcmm.as_ref().map_or(f64::INFINITY, of)
+            }
+            Some(Drive::Harmonic {
+                frequency,
+                amplitude,
+                ..
+            }) if amplitude != 0.0 => 1.0 / frequency,
+            Some(Drive::Constant { velocity, .. }) if joint.kind == JointKind::Revolute => {
+                std::f64::consts::TAU / velocity.abs()
+            }
+            _ => f64::INFINITY,
+        };
+        if !own.is_finite() {
+            continue;
+        }
+        match period {
+            Some(first) if (first / own - 1.0).abs() > 1e-12 => {
+                return Err(NoPeriod::Different {
+                    scene: scene.name.clone(),
+                    first,
+                    second: own,
+                });
+            }
+            _ => period = Some(own),
+        }
+    }
+    period.ok_or_else(|| NoPeriod::None {
+        scene: scene.name.clone(),
+    })
+}
+
+/// What a section of a scene records: pose of the output body and its rates, named as in the rows of a run.
+pub const OBSERVABLES: [&str; 12] = [
+    "x_m",
+    "y_m",
+    "z_m",
+    "alpha_rad",
+    "beta_rad",
+    "gamma_rad",
+    "vx_m_s",
+    "vy_m_s",
+    "vz_m_s",
+    "alpha_rate_rad_s",
+    "beta_rate_rad_s",
+    "gamma_rate_rad_s",
+];
+
+/// Values of a section in the order of [`OBSERVABLES`].
+pub fn observed(pose: &Pose) -> [f64; 12] {
+    let parts = [pose.position, pose.angles, pose.velocity, pose.angle_rates];
+    std::array::from_fn(|i| parts[i / 3][i % 3])
+}
+
+/// A running scene whose sections are the pose of its output body.
+pub struct Machine {
+    simulation: Simulation,
+    frame: Frame,
+}
+
+impl Machine {
+    /// Starts `scene` at t = 0.
+    ///
+    /// # Errors
+    /// As [`Simulation::new`].
+    pub fn new(scene: &Scene) -> Result<Self, StartError> {
+        Ok(Self::resume(Simulation::new(scene)?))
+    }
+
+    /// Goes on with a simulation.
+    pub fn resume(simulation: Simulation) -> Self {
+        Self {
+            simulation,
+            frame: Frame::default(),
+        }
+    }
+
+    /// The simulation.
+    pub fn simulation(&self) -> &Simulation {
+        &self.simulation
+    }
+
+    /// The simulation, to change a parameter between two sections or take its peaks.
+    pub fn simulation_mut(&mut self) -> &mut Simulation {
+        &mut self.simulation
+    }
+
+    /// Everything at the latest state.
+    pub fn frame(&mut self) -> &Frame {
+        let now = self.simulation.time();
+        self.simulation.sample(now, &mut self.frame);
+        &self.frame
+    }
+}
+
+/// Why a machine cannot go on.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MachineError {
+    /// It cannot start.
+    #[error(transparent)]
+    Start(#[from] StartError),
+    /// The divergence guard.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
+}
+
+impl Orbit for Machine {
+    type Stop = MachineError;
+
+    fn time(&self) -> f64 {
+        self.simulation.time()
+    }
+
+    fn step_until(&mut self, end: f64) -> Result<(), MachineError> {
+        Ok(self.simulation.step_until(end)?)
+    }
+
+    fn state(&self) -> &[f64] {
+        self.simulation.state()
+    }
+
+    fn scales(&self) -> &[f64] {
+        self.simulation.scales()
+    }
+
+    fn twin(&self) -> Result<Self, MachineError> {
+        let mut twin = Simulation::new(self.simulation.running_scene())?;
+        twin.restore(&self.simulation.snapshot())?;
+        Ok(Self::resume(twin))
+    }
+
+    fn displace(&mut self, offset: &[f64]) {
+        self.simulation.displace(offset);
+    }
+
+    /// The same balls touch: elsewhere one run is inside an impact that the other has before it or behind it.
+    fn comparable(&self, twin: &Self) -> bool {
+        (0..self.simulation.running_scene().ball_joints.len()).all(|j| {
+            let touches = |machine: &Self| machine.simulation.contact_memory(j).active;
+            touches(self) == touches(twin)
+        })
+    }
+
+    fn observables(&self) -> usize {
+        OBSERVABLES.len()
+    }
+
+    fn observe(&mut self, out: &mut [f64]) {
+        let values = observed(&self.frame().pose);
+        out.copy_from_slice(&values);
+    }
+}

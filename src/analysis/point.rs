@@ -1,0 +1,355 @@
+//! One point of a sweep: a scene through its periods, and what is told of it.
+
+use super::drive::{Machine, MachineError, OBSERVABLES};
+use super::regime::{Evidence, Regime, classify};
+use super::section::{Orbit, Schedule, Watch};
+use crate::scene::{Scene, Value};
+use crate::simulate::{Effect, Peak};
+
+/// Samples a period, at most, from which means and the probe's error come.
+const SAMPLES: f64 = 400.0;
+/// A twin's separation over the tolerance: well above what two runs differ by from their steps alone.
+const OVER_TOLERANCE: f64 = 10.0;
+/// Beyond this tolerance a twin's separation is not well above the error of a step any more.
+pub const LOOSEST_FOR_EXPONENT: f64 = SEPARATIONS.1 / OVER_TOLERANCE;
+/// The separation's range, in units of the scales of the tolerance: 10 nm to 1 um in every built-in scene.
+const SEPARATIONS: (f64, f64) = (1e-6, 1e-4);
+/// What tells two coordinates of a section apart over the tolerance, and what two rates: errors of many steps add up, and
+/// a stiff contact turns those of coordinates into larger ones of rates.
+const RESOLUTION: [f64; 2] = [10.0, 100.0];
+/// Stands for the tolerance of a fixed-step method.
+const FIXED_STEP: f64 = 1e-5;
+
+/// How long a point runs and where its sections lie.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plan {
+    /// Periods of the drive, those discarded included.
+    pub periods: usize,
+    /// Periods at the beginning that are a transient.
+    pub discard: usize,
+    /// Drive phase of the sections as a fraction of the period, 0 <= phase < 1.
+    pub phase: f64,
+    /// Whether a twin run measures the largest Lyapunov exponent.
+    pub exponent: bool,
+}
+
+/// Per ball joint.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct JointResult {
+    /// Largest normal force of all periods, in continuous time, N.
+    pub peak: f64,
+    /// Largest normal force of the kept periods, N.
+    pub peak_kept: f64,
+    /// Mean normal force over the kept periods, N.
+    pub mean: f64,
+    /// Contacts begun in all periods.
+    pub impacts: u64,
+    /// Contacts begun in the kept periods.
+    pub impacts_kept: u64,
+    /// Time from the point's start to the last separation, s; NaN without one.
+    pub last_separation: f64,
+}
+
+/// What came out of a point.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PointResult {
+    /// When it stopped, s from its start, where the divergence guard stopped it.
+    pub stopped: Option<f64>,
+    /// Ball joints in scene order.
+    pub joints: Vec<JointResult>,
+    /// Largest and root-mean-square distance of the probe tip from the ideal tip over the kept periods, m; `None` where
+    /// the scene has no such reference.
+    pub probe: Option<(f64, f64)>,
+    /// What kind of motion it is.
+    pub regime: Regime,
+    /// From what that was told.
+    pub evidence: Evidence,
+    /// Kept sections, one after the other, in the order of [`OBSERVABLES`].
+    pub sections: Vec<f64>,
+}
+
+/// A point on its way.
+pub struct PointRun {
+    watch: Watch<Machine>,
+    plan: Plan,
+    period: f64,
+    resolution: Vec<f64>,
+    started: f64,
+    impacts_at_start: Vec<u64>,
+    impacts_at_discard: Vec<u64>,
+    peaks: Vec<Peak>,
+    transient_peaks: Vec<f64>,
+    means: Means,
+}
+
+impl PointRun {
+    /// Starts `scene` at t = 0.
+    ///
+    /// # Errors
+    /// A scene that cannot start.
+    pub fn cold(scene: &Scene, plan: Plan, period: f64) -> Result<Self, MachineError> {
+        // Sections lie at (k + phase) T, k = 1, 2, … for phase 0 and k = 0, 1, … else: always as many as periods.
+        let part = if plan.phase > 0.0 { plan.phase } else { 1.0 };
+        Ok(Self::begin(
+            Machine::new(scene)?,
+            plan,
+            period,
+            part * period,
+        ))
+    }
+
+    /// Goes on from the latest section of another point with some parameters changed; `None` where such a change waits
+    /// for a reset, or the scene does not take it.
+    pub fn follow(
+        mut machine: Machine,
+        changes: &[(&str, Value)],
+        plan: Plan,
+        period: f64,
+    ) -> Option<Self> {
+        for (key, value) in changes {
+            if machine.simulation_mut().set_value(key, value) != Ok(Effect::Now) {
+                return None;
+            }
+        }
+        let first = machine.time() + period;
+        Some(Self::begin(machine, plan, period, first))
+    }
+
+    fn begin(mut machine: Machine, plan: Plan, period: f64, first: f64) -> Self {
+        let solver = machine.simulation().running_scene().solver;
+        let tolerance = if solver.method.is_adaptive() {
+            solver.tolerance
+        } else {
+            FIXED_STEP
+        };
+        let schedule = Schedule {
+            first,
+            interval: period,
+            sections: plan.periods,
+            discard: plan.discard,
+        };
+        // A scene that is a function of time alone has no neighbouring motions.
+        let twin = plan.exponent && !machine.simulation().mechanism().is_kinematic();
+        let separation =
+            twin.then(|| (OVER_TOLERANCE * tolerance).clamp(SEPARATIONS.0, SEPARATIONS.1));
+        let mut peaks = Vec::new();
+        let simulation = machine.simulation_mut();
+        if simulation.time() > 0.0 {
+            simulation.take_peaks(&mut peaks);
+        }
+        let impacts = simulation.statistics().impacts.clone();
+        let joints = impacts.len();
+        let started = simulation.time();
+        let mut run = Self {
+            resolution: resolution(simulation.running_scene(), tolerance),
+            means: Means::new(joints, period / SAMPLES),
+            watch: Watch::new(machine, schedule, separation),
+            plan,
+            period,
+            started,
+            impacts_at_discard: impacts.clone(),
+            impacts_at_start: impacts,
+            peaks,
+            transient_peaks: vec![0.0; joints],
+        };
+        if run.plan.discard == 0 {
+            run.begin_keeping();
+        }
+        run
+    }
+
+    /// Whether all periods are through.
+    pub fn is_done(&self) -> bool {
+        self.watch.is_done()
+    }
+
+    /// Sections taken, discarded ones included.
+    pub fn taken(&self) -> usize {
+        self.watch.taken()
+    }
+
+    /// Kept sections so far, in the order of [`OBSERVABLES`].
+    pub fn sections(&self) -> &[f64] {
+        self.watch.sections()
+    }
+
+    /// The running scene.
+    pub fn machine(&self) -> &Machine {
+        self.watch.orbit()
+    }
+
+    /// One step of the scene.
+    ///
+    /// # Errors
+    /// The divergence guard: the point has diverged.
+    pub fn step(&mut self) -> Result<(), MachineError> {
+        let at_section = self.watch.step()?;
+        if self.watch.taken() < self.plan.discard {
+            return Ok(());
+        }
+        if at_section && self.watch.taken() == self.plan.discard {
+            self.begin_keeping();
+        } else {
+            self.means.look(self.watch.orbit_mut(), at_section);
+        }
+        Ok(())
+    }
+
+    /// The transient is over.
+    fn begin_keeping(&mut self) {
+        let machine = self.watch.orbit_mut();
+        let simulation = machine.simulation_mut();
+        simulation.take_peaks(&mut self.peaks);
+        for (largest, peak) in self.transient_peaks.iter_mut().zip(&self.peaks) {
+            *largest = peak.normal;
+        }
+        self.impacts_at_discard
+            .clone_from(&simulation.statistics().impacts);
+        self.means.begin(machine);
+    }
+
+    /// What came out, and the scene in the state of the latest section for the next point to follow.
+    pub fn finish(mut self) -> (PointResult, Machine) {
+        let simulation = self.watch.orbit_mut().simulation_mut();
+        simulation.take_peaks(&mut self.peaks);
+        let statistics = simulation.statistics();
+        let span = self.means.span;
+        let joints = (0..self.peaks.len())
+            .map(|j| {
+                let separation = statistics.last_separation[j];
+                JointResult {
+                    peak: self.peaks[j].normal.max(self.transient_peaks[j]),
+                    peak_kept: self.peaks[j].normal,
+                    mean: self.means.normal[j] / span,
+                    impacts: statistics.impacts[j] - self.impacts_at_start[j],
+                    impacts_kept: statistics.impacts[j] - self.impacts_at_discard[j],
+                    last_separation: if separation > self.started {
+                        separation - self.started
+                    } else {
+                        f64::NAN
+                    },
+                }
+            })
+            .collect();
+        let probe = self.means.probe_now.map(|_| {
+            (
+                self.means.probe_largest,
+                (self.means.probe_square / span).sqrt(),
+            )
+        });
+        let exponent = self.watch.exponent().and_then(|benettin| benettin.result());
+        let sections = self.watch.sections().to_vec();
+        let (regime, evidence) = classify(&sections, &self.resolution, self.period, exponent);
+        let result = PointResult {
+            stopped: None,
+            joints,
+            probe,
+            regime,
+            evidence,
+            sections,
+        };
+        (result, self.watch.into_orbit())
+    }
+
+    /// What came out of a point that the divergence guard stopped: nothing but when.
+    pub fn stopped(self) -> PointResult {
+        PointResult {
+            stopped: Some(self.machine().time() - self.started),
+            ..PointResult::empty(self.transient_peaks.len())
+        }
+    }
+}
+
+impl PointResult {
+    /// A point of which nothing is known.
+    pub fn empty(joints: usize) -> Self {
+        let unknown = JointResult {
+            peak: f64::NAN,
+            peak_kept: f64::NAN,
+            mean: f64::NAN,
+            last_separation: f64::NAN,
+            ..JointResult::default()
+        };
+        let (regime, evidence) = classify(&[], &[1.0], 1.0, None);
+        Self {
+            stopped: None,
+            joints: vec![unknown; joints],
+            probe: None,
+            regime,
+            evidence,
+            sections: Vec::new(),
+        }
+    }
+}
+
+/// What two sections of `scene` must differ by to be different, in the order of [`OBSERVABLES`]: the tolerance times its
+/// scales, and a factor.
+pub fn resolution(scene: &Scene, tolerance: f64) -> Vec<f64> {
+    let radii = scene.ball_joints.iter().map(|j| j.contact.ball_radius);
+    let length = radii.fold(1.0, f64::min);
+    let of_group = [length, 0.1, length / 0.1, 1.0];
+    (0..OBSERVABLES.len())
+        .map(|i| RESOLUTION[i / 6] * tolerance * of_group[i / 3])
+        .collect()
+}
+
+/// Means over time by the trapezoidal rule.
+struct Means {
+    least: f64,
+    latest: f64,
+    span: f64,
+    /// Integral of the normal force per ball joint, N s, and its value at the latest sample.
+    normal: Vec<f64>,
+    normal_now: Vec<f64>,
+    /// Integral of the squared probe error, m^2 s, and its size at the latest sample.
+    probe_square: f64,
+    probe_now: Option<f64>,
+    probe_largest: f64,
+}
+
+impl Means {
+    fn new(joints: usize, least: f64) -> Self {
+        Self {
+            least,
+            latest: f64::NAN,
+            span: 0.0,
+            normal: vec![0.0; joints],
+            normal_now: vec![0.0; joints],
+            probe_square: 0.0,
+            probe_now: None,
+            probe_largest: 0.0,
+        }
+    }
+
+    fn begin(&mut self, machine: &mut Machine) {
+        self.latest = machine.time();
+        self.take(machine, 0.0);
+    }
+
+    /// Takes a sample where the latest one is long enough ago.
+    fn look(&mut self, machine: &mut Machine, at_section: bool) {
+        let ago = machine.time() - self.latest;
+        if ago >= self.least || (at_section && ago > 0.0) {
+            self.latest = machine.time();
+            self.take(machine, ago);
+        }
+    }
+
+    fn take(&mut self, machine: &mut Machine, h: f64) {
+        let frame = machine.frame();
+        self.span += h;
+        let values = self.normal.iter_mut().zip(&mut self.normal_now);
+        for ((sum, now), joint) in values.zip(&frame.joints) {
+            let force = joint.normal_force.norm();
+            *sum += 0.5 * h * (*now + force);
+            *now = force;
+        }
+        if let Some(error) = frame.probe_error {
+            let size = error.norm();
+            let before = self.probe_now.unwrap_or(size);
+            self.probe_square += 0.5 * h * (before * before + size * size);
+            self.probe_largest = self.probe_largest.max(size);
+            self.probe_now = Some(size);
+        }
+    }
+}

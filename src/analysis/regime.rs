@@ -1,0 +1,312 @@
+//! What kind of motion a row of sections shows, with the evidence for it.
+//!
+//! In this order: sections that return to themselves within the resolution are periodic, whatever happens below it; of the
+//! others an exponent above its own uncertainty is chaos, one below it a transient that has not ended, and one that
+//! cannot be told from 0 together with a regular 0-1 test is quasi-periodic, unless the sections still close in on a
+//! cycle. What fits none of these is unclear.
+
+use super::exponent::Exponent;
+
+/// A kind of motion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Regime {
+    /// The evidence is too short or contradicts itself.
+    Unclear,
+    /// It repeats after so many intervals; a motion at rest repeats after one.
+    Periodic(usize),
+    /// Regular, but it never repeats.
+    QuasiPeriodic,
+    /// Neighbouring motions part exponentially.
+    Chaotic,
+    /// Neighbouring motions meet, but the sections have not settled yet: discard more.
+    NotSettled,
+}
+
+impl Regime {
+    /// The word for people and files.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Unclear => "unclear",
+            Self::Periodic(_) => "periodic",
+            Self::QuasiPeriodic => "quasi-periodic",
+            Self::Chaotic => "chaotic",
+            Self::NotSettled => "not settled",
+        }
+    }
+
+    /// The number in files.
+    pub fn code(self) -> i64 {
+        match self {
+            Self::Unclear => 0,
+            Self::Periodic(_) => 1,
+            Self::QuasiPeriodic => 2,
+            Self::Chaotic => 3,
+            Self::NotSettled => 4,
+        }
+    }
+
+    /// Intervals after which it repeats; 0 where it does not.
+    pub fn period(self) -> usize {
+        match self {
+            Self::Periodic(n) => n,
+            _ => 0,
+        }
+    }
+}
+
+/// What a regime was told from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Evidence {
+    /// Sections looked at: the latest half of the kept ones, but at least 32 where there are so many.
+    pub sections: usize,
+    /// Largest distance between two of these sections that should coincide, in units of the resolution: of the period
+    /// named, or without one of period 1.
+    pub return_distance: f64,
+    /// Sections that the resolution tells apart.
+    pub distinct: usize,
+    /// Median correlation of the 0-1 test, near 0 for regular motion and near 1 for chaos; NaN for less than 40 sections.
+    pub zero_one: f64,
+    /// Size of an exponent that may still be none: a separation that grows in proportion to time would show
+    /// ln(n) / n intervals; 1/s.
+    pub exponent_bound: f64,
+    /// Largest Lyapunov exponent, where a twin ran.
+    pub exponent: Option<Exponent>,
+}
+
+/// Fewer sections than this tell nothing.
+const FEWEST: usize = 8;
+/// So many sections are looked at where there are so many.
+const LOOKED_AT: usize = 32;
+/// A period must be seen so many times.
+const RETURNS: usize = 3;
+/// Sections that spread by less than this fraction of what they spread by before are on their way to a cycle.
+const CLOSING: f64 = 0.7;
+/// Above and below this the 0-1 test speaks for chaos and for regular motion where no exponent does.
+const CHAOS: f64 = 0.8;
+const REGULAR: f64 = 0.2;
+
+/// Names the regime of `sections` (one after the other, each as long as `resolution`), taken every `interval` seconds;
+/// `resolution` is what two values must differ by to be different.
+pub fn classify(
+    sections: &[f64],
+    resolution: &[f64],
+    interval: f64,
+    exponent: Option<Exponent>,
+) -> (Regime, Evidence) {
+    let width = resolution.len();
+    let all: Vec<&[f64]> = sections.chunks_exact(width).collect();
+    let from = all.len() - (all.len() / 2).max(LOOKED_AT).min(all.len());
+    let used = &all[from..];
+    let period = (1..=used.len() / RETURNS).find(|&n| spread(used, n, resolution) <= 1.0);
+    let many = all.len().max(2) as f64;
+    let evidence = Evidence {
+        sections: used.len(),
+        return_distance: spread(used, period.unwrap_or(1), resolution),
+        distinct: distinct(used, resolution),
+        zero_one: zero_one(&all, liveliest(used, resolution)),
+        exponent_bound: libm::log(many) / (many * interval),
+        exponent,
+    };
+    let regime = match judge(period, &evidence) {
+        // Close to a bifurcation a cycle attracts so weakly that its exponent looks like none.
+        Regime::QuasiPeriodic if still_closing(used, resolution) => Regime::NotSettled,
+        regime => regime,
+    };
+    (regime, evidence)
+}
+
+/// Whether the sections of the period that fits best come nearer to each other as time goes on.
+fn still_closing(sections: &[&[f64]], resolution: &[f64]) -> bool {
+    let (first, second) = sections.split_at(sections.len() / 2);
+    let by_spread = |&a: &usize, &b: &usize| {
+        let spread = |n| spread(sections, n, resolution);
+        spread(a).total_cmp(&spread(b))
+    };
+    let best = (1..=second.len() / RETURNS).min_by(by_spread);
+    best.is_some_and(|n| spread(second, n, resolution) < CLOSING * spread(first, n, resolution))
+}
+
+fn judge(period: Option<usize>, evidence: &Evidence) -> Regime {
+    if evidence.sections < FEWEST {
+        return Regime::Unclear;
+    }
+    if let Some(n) = period {
+        return Regime::Periodic(n);
+    }
+    let regular = evidence.zero_one < 0.5;
+    let Some(exponent) = &evidence.exponent else {
+        return match evidence.zero_one {
+            k if k > CHAOS => Regime::Chaotic,
+            k if k < REGULAR => Regime::QuasiPeriodic,
+            _ => Regime::Unclear,
+        };
+    };
+    let (bound, doubt) = (evidence.exponent_bound, 2.0 * exponent.standard_error);
+    if exponent.value - doubt > bound {
+        Regime::Chaotic
+    } else if exponent.value + doubt < -bound {
+        Regime::NotSettled
+    } else if exponent.value.abs() <= bound + doubt && regular {
+        Regime::QuasiPeriodic
+    } else {
+        Regime::Unclear
+    }
+}
+
+/// Largest extent, in resolutions, of the sections that coincide if the motion repeats after `n`.
+fn spread(sections: &[&[f64]], n: usize, resolution: &[f64]) -> f64 {
+    let mut largest: f64 = 0.0;
+    for first in 0..n.min(sections.len()) {
+        for (i, resolution) in resolution.iter().enumerate() {
+            let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+            for section in sections[first..].iter().step_by(n) {
+                low = low.min(section[i]);
+                high = high.max(section[i]);
+            }
+            largest = largest.max((high - low) / resolution);
+        }
+    }
+    largest
+}
+
+/// Sections of which no two are within the resolution of each other, taken greedily.
+fn distinct(sections: &[&[f64]], resolution: &[f64]) -> usize {
+    let mut kept: Vec<&[f64]> = Vec::new();
+    for section in sections {
+        let near = |other: &&[f64]| {
+            let pairs = section.iter().zip(other.iter()).zip(resolution);
+            let mut far = pairs.map(|((a, b), r)| (a - b).abs() > *r);
+            !far.any(|far| far)
+        };
+        if !kept.iter().any(near) {
+            kept.push(section);
+        }
+    }
+    kept.len()
+}
+
+/// The observable that moves most in units of its resolution.
+fn liveliest(sections: &[&[f64]], resolution: &[f64]) -> usize {
+    let extent = |i: usize| {
+        let values = sections.iter().map(|section| section[i]);
+        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
+            (l.min(v), h.max(v))
+        });
+        (high - low) / resolution[i]
+    };
+    let by_extent = |&a: &usize, &b: &usize| extent(a).total_cmp(&extent(b));
+    (0..resolution.len()).max_by(by_extent).unwrap_or(0)
+}
+
+/// The 0-1 test for chaos of one observable: median over frequencies of the correlation of the mean square displacement
+/// with time (Gottwald & Melbourne, SIAM J. Appl. Dyn. Syst. 8 (2009) 129, section 3).
+fn zero_one(sections: &[&[f64]], observable: usize) -> f64 {
+    const FREQUENCIES: usize = 61;
+    let n = sections.len();
+    let cut = n / 10;
+    if cut < 4 {
+        return f64::NAN;
+    }
+    let mean = sections.iter().map(|s| s[observable]).sum::<f64>() / n as f64;
+    let mut correlations: Vec<f64> = (0..FREQUENCIES)
+        .map(|m| {
+            // In (pi/5, 4 pi/5): away from resonances with the sampling itself.
+            let part = (m as f64 + 0.5) / FREQUENCIES as f64;
+            let c = std::f64::consts::PI * (0.2 + 0.6 * part);
+            let (mut p, mut q) = (0.0, 0.0);
+            let walk: Vec<(f64, f64)> = (0..n)
+                .map(|j| {
+                    let (sine, cosine) = libm::sincos((j + 1) as f64 * c);
+                    // Less its mean, the observable has no oscillating part to be taken off.
+                    let value = sections[j][observable] - mean;
+                    p += value * cosine;
+                    q += value * sine;
+                    (p, q)
+                })
+                .collect();
+            let displacement = |lag: usize| {
+                let squares = (0..n - cut).map(|j| {
+                    let (dp, dq) = (walk[j + lag].0 - walk[j].0, walk[j + lag].1 - walk[j].1);
+                    dp * dp + dq * dq
+                });
+                squares.sum::<f64>() / (n - cut) as f64
+            };
+            correlation_with_time(&(1..=cut).map(displacement).collect::<Vec<_>>())
+        })
+        .collect();
+    correlations.sort_by(f64::total_cmp);
+    correlations[FREQUENCIES / 2]
+}
+
+/// Correlation of values with 1, 2, 3, …; 0 where they do not vary.
+fn correlation_with_time(values: &[f64]) -> f64 {
+    let n = values.len() as f64;
+    let (mean_t, mean) = (0.5 * (n + 1.0), values.iter().sum::<f64>() / n);
+    let (mut tt, mut tv, mut vv) = (0.0, 0.0, 0.0);
+    for (k, value) in values.iter().enumerate() {
+        let (t, v) = ((k + 1) as f64 - mean_t, value - mean);
+        tt += t * t;
+        tv += t * v;
+        vv += v * v;
+    }
+    if vv > 0.0 { tv / (tt * vv).sqrt() } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn exponent(value: f64) -> Option<Exponent> {
+        Some(Exponent {
+            value,
+            standard_error: 0.01,
+            running: vec![value],
+        })
+    }
+
+    #[test]
+    fn a_motion_at_rest_has_period_one_and_a_cycle_its_length() {
+        let rest = [0.25; 40];
+        assert_eq!(classify(&rest, &[1e-9], 1.0, None).0, Regime::Periodic(1));
+        let cycle: Vec<f64> = (0..60).map(|k| [0.1, 0.7, 0.4][k % 3]).collect();
+        let (regime, evidence) = classify(&cycle, &[1e-9], 1.0, exponent(-1.0));
+        assert_eq!(regime, Regime::Periodic(3));
+        assert_eq!(evidence.distinct, 3);
+        assert_eq!(evidence.return_distance, 0.0);
+    }
+
+    #[test]
+    fn too_few_sections_say_nothing() {
+        assert_eq!(classify(&[0.5; 7], &[1e-9], 1.0, None).0, Regime::Unclear);
+        assert_eq!(classify(&[], &[1e-9], 1.0, None).0, Regime::Unclear);
+    }
+
+    #[test]
+    fn a_drift_is_not_settled_and_never_called_periodic() {
+        let drift: Vec<f64> = (0..60).map(|k| 1e-3 * f64::from(k)).collect();
+        let (regime, evidence) = classify(&drift, &[1.5e-3], 1.0, exponent(-0.5));
+        // Neighbours are within the resolution, the whole is not.
+        assert_eq!(regime, Regime::NotSettled);
+        assert!(evidence.return_distance > 10.0);
+    }
+
+    #[test]
+    fn without_an_exponent_the_zero_one_test_decides() {
+        let mut x = 0.3;
+        let chaos: Vec<f64> = (0..400)
+            .map(|_| {
+                x = 4.0 * x * (1.0 - x);
+                x
+            })
+            .collect();
+        assert_eq!(classify(&chaos, &[1e-9], 1.0, None).0, Regime::Chaotic);
+        let turn = 0.618_033_988_749_894_9;
+        let torus: Vec<f64> = (0..400)
+            .map(|k| libm::cos(std::f64::consts::TAU * turn * f64::from(k)))
+            .collect();
+        assert_eq!(
+            classify(&torus, &[1e-9], 1.0, None).0,
+            Regime::QuasiPeriodic
+        );
+    }
+}

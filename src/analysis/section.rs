@@ -1,0 +1,225 @@
+//! A motion watched at equal intervals of time, the Poincaré section of a driven system, with a twin run beside it that
+//! measures how fast neighbouring motions part.
+
+use super::exponent::Benettin;
+
+/// A motion that can be stepped, observed and followed by a twin: a map, a driven oscillator, a mechanism.
+///
+/// All that [`Watch`] knows of a system; known systems (`tests/known_systems.rs`) and mechanisms go through the same code.
+pub trait Orbit: Sized {
+    /// Why a step failed.
+    type Stop;
+
+    /// Time, s; for a map the number of iterations.
+    fn time(&self) -> f64;
+
+    /// One step of the system's own choice that ends at `end` at the latest, exactly there if it would pass it.
+    ///
+    /// # Errors
+    /// The system cannot go on; it is then where it was.
+    fn step_until(&mut self, end: f64) -> Result<(), Self::Stop>;
+
+    /// Everything that decides the future and moves continuously: coordinates and velocities.
+    fn state(&self) -> &[f64];
+
+    /// What a difference of 1 means for each component of [`Self::state`].
+    fn scales(&self) -> &[f64];
+
+    /// A second run in the same state with the same future.
+    ///
+    /// # Errors
+    /// As [`Self::step_until`].
+    fn twin(&self) -> Result<Self, Self::Stop>;
+
+    /// Adds `offset` to the state.
+    fn displace(&mut self, offset: &[f64]);
+
+    /// Whether the difference of the two states is one in continuous variables alone: where only one of them is in
+    /// contact, a small difference is about to become another one.
+    fn comparable(&self, _twin: &Self) -> bool {
+        true
+    }
+
+    /// Number of values that [`Self::observe`] writes.
+    fn observables(&self) -> usize;
+
+    /// The observed values now.
+    fn observe(&mut self, out: &mut [f64]);
+}
+
+/// When sections are taken, and from where on they count.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Schedule {
+    /// Time of the first section, s.
+    pub first: f64,
+    /// Time from one section to the next, s.
+    pub interval: f64,
+    /// Number of sections, discarded ones included.
+    pub sections: usize,
+    /// Sections at the beginning that are a transient and not kept.
+    pub discard: usize,
+}
+
+impl Schedule {
+    /// Time of section `k`, counted from 0, s.
+    pub fn time(&self, k: usize) -> f64 {
+        self.first + k as f64 * self.interval
+    }
+
+    /// Sections kept.
+    pub fn kept(&self) -> usize {
+        self.sections - self.discard
+    }
+}
+
+/// Sections for which the twin runs before it counts, so that its offset turns into the direction that grows fastest.
+const ALIGNMENT: usize = 5;
+
+/// A motion on its way through its sections.
+pub struct Watch<O: Orbit> {
+    orbit: O,
+    schedule: Schedule,
+    taken: usize,
+    /// Kept sections, one after the other.
+    kept: Vec<f64>,
+    twin: Twin<O>,
+    /// Separation asked for, in units of the scales; `None` measures no exponent.
+    separation: Option<f64>,
+}
+
+enum Twin<O> {
+    None,
+    Running(Box<O>, Box<Benettin>),
+}
+
+impl<O: Orbit> Watch<O> {
+    /// Watches `orbit` from now on. `separation` is that of the twin run in units of the scales of the state: well above
+    /// the error of a step, well below what the motion itself moves; `None` runs no twin.
+    pub fn new(orbit: O, schedule: Schedule, separation: Option<f64>) -> Self {
+        let mut watch = Self {
+            kept: Vec::with_capacity(schedule.kept() * orbit.observables()),
+            orbit,
+            schedule,
+            taken: 0,
+            twin: Twin::None,
+            separation,
+        };
+        watch.maybe_start_twin();
+        watch
+    }
+
+    /// The motion.
+    pub fn orbit(&self) -> &O {
+        &self.orbit
+    }
+
+    /// The motion, to observe more of it.
+    pub fn orbit_mut(&mut self) -> &mut O {
+        &mut self.orbit
+    }
+
+    /// Gives the motion back, in the state of its latest section.
+    pub fn into_orbit(self) -> O {
+        self.orbit
+    }
+
+    /// Sections taken so far.
+    pub fn taken(&self) -> usize {
+        self.taken
+    }
+
+    /// Whether all sections are taken.
+    pub fn is_done(&self) -> bool {
+        self.taken >= self.schedule.sections
+    }
+
+    /// Kept sections so far, one after the other, each as long as [`Orbit::observables`].
+    pub fn sections(&self) -> &[f64] {
+        &self.kept
+    }
+
+    /// What the twin has told so far; `None` without one, or after it failed.
+    pub fn exponent(&self) -> Option<&Benettin> {
+        match &self.twin {
+            Twin::Running(_, benettin) => Some(benettin),
+            Twin::None => None,
+        }
+    }
+
+    /// One step of the motion; `true` where it ended at a section.
+    ///
+    /// # Errors
+    /// The motion cannot go on.
+    pub fn step(&mut self) -> Result<bool, O::Stop> {
+        if self.is_done() {
+            return Ok(false);
+        }
+        let end = self.schedule.time(self.taken);
+        self.orbit.step_until(end)?;
+        let at_section = self.orbit.time() >= end;
+        self.follow(at_section);
+        if at_section {
+            self.taken += 1;
+            if self.taken > self.schedule.discard {
+                let (start, n) = (self.kept.len(), self.orbit.observables());
+                self.kept.resize(start + n, 0.0);
+                self.orbit.observe(&mut self.kept[start..]);
+            }
+            self.maybe_start_twin();
+        }
+        Ok(at_section)
+    }
+
+    /// Steps through all sections.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn finish(&mut self) -> Result<(), O::Stop> {
+        while !self.is_done() {
+            self.step()?;
+        }
+        Ok(())
+    }
+
+    fn maybe_start_twin(&mut self) {
+        let Some(separation) = self.separation else {
+            return;
+        };
+        let start = self.schedule.discard.saturating_sub(ALIGNMENT);
+        if self.taken == start
+            && let Ok(mut twin) = self.orbit.twin()
+        {
+            let mut benettin = Benettin::new(
+                separation,
+                self.schedule.interval,
+                self.orbit.time(),
+                self.schedule.kept(),
+            );
+            benettin.start(&self.orbit, &mut twin);
+            self.twin = Twin::Running(Box::new(twin), Box::new(benettin));
+        }
+        if self.taken == self.schedule.discard
+            && let Twin::Running(_, benettin) = &mut self.twin
+        {
+            benettin.begin_counting();
+        }
+    }
+
+    /// Brings the twin to the time of the motion where it is due. The motion itself never waits for its twin.
+    fn follow(&mut self, at_section: bool) {
+        let Twin::Running(twin, benettin) = &mut self.twin else {
+            return;
+        };
+        if at_section || benettin.is_due(self.orbit.time()) {
+            match benettin.compare(&self.orbit, twin) {
+                Ok(()) if at_section => benettin.end_section(),
+                Ok(()) => {}
+                // A twin that fails leaves the motion without an exponent, not without its sections.
+                Err(_) => {
+                    self.twin = Twin::None;
+                    self.separation = None;
+                }
+            }
+        }
+    }
+}

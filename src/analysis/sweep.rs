@@ -1,0 +1,247 @@
+//! A whole sweep: its scene, its points, and what computes one block of them. Who runs which block, and when, is up to the
+//! caller: a block's record depends on nothing but the sweep and the block's number.
+
+use super::drive::{Machine, NoPeriod, drive_period};
+use super::grid::{Grid, Start};
+use super::layout::Layout;
+use super::point::{Plan, PointResult, PointRun};
+use crate::scene::{Scene, SceneError, Value};
+use crate::simulate::Simulation;
+
+/// Most kept sections of all points together: an array of them takes 512 MiB.
+const MOST_SECTIONS: usize = 1 << 26;
+
+/// Why a sweep cannot be.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SweepError {
+    /// No period to keep.
+    #[error(
+        "--periods {periods} --discard {discard}: the periods include those discarded, so --discard must be less than --periods"
+    )]
+    NothingKept {
+        /// Periods.
+        periods: usize,
+        /// Of these discarded.
+        discard: usize,
+    },
+    /// More numbers than a result can hold.
+    #[error(
+        "{points} points with {kept} kept sections each are more than a result holds ({most} sections): fewer values in \
+         --vary, fewer --periods, or more of them in --discard"
+    )]
+    TooLarge {
+        /// Points.
+        points: usize,
+        /// Kept sections of a point.
+        kept: usize,
+        /// Most sections.
+        most: usize,
+    },
+    /// No drive phase.
+    #[error("{0}; a sweep needs a driven scene such as spcmm or slider-crank-driven")]
+    NoPeriod(#[from] NoPeriod),
+    /// A point that the scene does not take, or that cannot start.
+    #[error("the range leaves what the scene can do at {point}: {error}")]
+    Infeasible {
+        /// Parameters of the point.
+        point: String,
+        /// What is wrong there.
+        error: Box<SceneError>,
+    },
+}
+
+/// A sweep.
+#[derive(Clone, Debug)]
+pub struct Sweep {
+    scene: Scene,
+    grid: Grid,
+    plan: Plan,
+    layout: Layout,
+}
+
+impl Sweep {
+    /// A sweep of `scene`. Every value of each range is tried, with the other range at its ends.
+    ///
+    /// # Errors
+    /// Nothing to keep, no drive phase, a value at which the scene cannot start.
+    pub fn new(scene: Scene, grid: Grid, plan: Plan) -> Result<Self, SweepError> {
+        if plan.discard >= plan.periods {
+            return Err(SweepError::NothingKept {
+                periods: plan.periods,
+                discard: plan.discard,
+            });
+        }
+        let (points, kept) = (grid.points(), plan.periods - plan.discard);
+        if kept > MOST_SECTIONS / points {
+            return Err(SweepError::TooLarge {
+                points,
+                kept,
+                most: MOST_SECTIONS,
+            });
+        }
+        let layout = Layout::new(&scene, &plan);
+        let sweep = Self {
+            scene,
+            grid,
+            plan,
+            layout,
+        };
+        for point in sweep.border() {
+            let scene = sweep.grid.scene(&sweep.scene, point);
+            let started = scene.and_then(|scene| {
+                Simulation::new(&scene).map_err(|error| error.located(&scene))?;
+                Ok(scene)
+            });
+            match started {
+                Ok(scene) => drive_period(&scene).map(|_| ())?,
+                Err(error) => {
+                    return Err(SweepError::Infeasible {
+                        point: sweep.describe(point),
+                        error: Box::new(error),
+                    });
+                }
+            }
+        }
+        Ok(sweep)
+    }
+
+    /// Points at which one range is anywhere and the other at an end.
+    fn border(&self) -> Vec<usize> {
+        let on_border = |point: &usize| {
+            let indices = self.grid.indices(*point);
+            let ends = self.grid.axes().iter().zip(&indices);
+            ends.filter(|(axis, i)| **i == 0 || **i + 1 == axis.count())
+                .count()
+                + 1
+                >= indices.len()
+        };
+        (0..self.grid.points()).filter(on_border).collect()
+    }
+
+    /// Parameters of a point as people write them.
+    pub fn describe(&self, point: usize) -> String {
+        let written = |(key, value): (&str, Value)| {
+            let shown = self
+                .scene
+                .parameter(key)
+                .map(|parameter| parameter.show(&value));
+            format!("{key} = {}", shown.unwrap_or_default())
+        };
+        let settings = self.grid.settings(point).into_iter();
+        settings.map(written).collect::<Vec<_>>().join(", ")
+    }
+
+    /// The scene, without what varies.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// The points.
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// What each point runs through.
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// The arrays of the result.
+    pub fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// Block `b`, not yet begun.
+    pub fn begin(&self, b: usize) -> BlockRun<'_> {
+        BlockRun {
+            sweep: self,
+            order: self.grid.order(b),
+            at: 0,
+            run: None,
+            machine: None,
+            done: Vec::new(),
+        }
+    }
+}
+
+/// A block of points on its way.
+pub struct BlockRun<'a> {
+    sweep: &'a Sweep,
+    order: Vec<usize>,
+    at: usize,
+    run: Option<PointRun>,
+    /// Where the point before ended, if the next one follows it.
+    machine: Option<Machine>,
+    done: Vec<(usize, Option<PointResult>)>,
+}
+
+impl BlockRun<'_> {
+    /// Points finished so far, in the order in which they were computed: index and result, `None` for one that could not
+    /// start.
+    pub fn finished(&self) -> &[(usize, Option<PointResult>)] {
+        &self.done
+    }
+
+    /// The point on its way.
+    pub fn current(&self) -> Option<&PointRun> {
+        self.run.as_ref()
+    }
+
+    /// Whether every point is finished.
+    pub fn is_done(&self) -> bool {
+        self.at >= self.order.len()
+    }
+
+    /// Goes on by at most `steps` steps of the simulation, at most to the end of a point.
+    pub fn advance(&mut self, steps: u32) {
+        if self.is_done() {
+            return;
+        }
+        let Some(mut run) = self.run.take().or_else(|| self.start()) else {
+            self.close(None, None);
+            return;
+        };
+        for _ in 0..steps {
+            if run.step().is_err() {
+                self.close(Some(run.stopped()), None);
+                return;
+            }
+            if run.is_done() {
+                let (result, machine) = run.finish();
+                self.close(Some(result), Some(machine));
+                return;
+            }
+        }
+        self.run = Some(run);
+    }
+
+    /// Starts the point that is next, from the one before it if it follows that.
+    fn start(&mut self) -> Option<PointRun> {
+        let sweep = self.sweep;
+        let point = self.order[self.at];
+        let scene = sweep.grid.scene(&sweep.scene, point).ok()?;
+        let period = drive_period(&scene).ok()?;
+        let followed = self.machine.take().and_then(|machine| {
+            let changes = sweep.grid.settings(point);
+            PointRun::follow(machine, &changes, sweep.plan, period)
+        });
+        followed.or_else(|| PointRun::cold(&scene, sweep.plan, period).ok())
+    }
+
+    /// The point is through; the next one follows `machine`, or starts cold without one.
+    fn close(&mut self, result: Option<PointResult>, machine: Option<Machine>) {
+        self.done.push((self.order[self.at], result));
+        self.at += 1;
+        self.machine = machine.filter(|_| self.sweep.grid.start() != Start::Cold);
+    }
+
+    /// The records of the finished block, in order of its points.
+    pub fn records(mut self) -> Vec<f64> {
+        self.done.sort_by_key(|(point, _)| *point);
+        let mut records = Vec::new();
+        for (_, result) in &self.done {
+            self.sweep.layout.append(result.as_ref(), &mut records);
+        }
+        records
+    }
+}

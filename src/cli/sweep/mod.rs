@@ -1,0 +1,322 @@
+//! `sweep`: one scene at many parameter values, on all cores; `merge`: the shards of a sweep put together.
+
+mod archive;
+mod merge;
+mod options;
+mod partial;
+
+pub use merge::merge;
+
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc;
+use std::thread;
+use std::time::Instant;
+
+use indicatif::ProgressBar;
+use serde_json::{Map, Value as Json, json};
+
+use self::archive::{Archive, Source};
+use self::options::Shard;
+use self::partial::Partial;
+use super::args::{SummaryForm, SweepArguments};
+use super::output::Target;
+use super::summary::count;
+use super::{Failure, interrupt, load, print, progress, warn};
+use crate::analysis::drive::drive_period;
+use crate::analysis::grid::{Axis, FOLLOW_BLOCK, Grid};
+use crate::analysis::layout::Status;
+use crate::analysis::point::{LOOSEST_FOR_EXPONENT, Plan};
+use crate::analysis::regime::Regime;
+use crate::analysis::sweep::Sweep;
+
+/// Steps between two looks for Ctrl-C.
+const STEPS_BETWEEN_LOOKS: u32 = 4096;
+
+/// Does what `sweep` asks.
+///
+/// # Errors
+/// Any: bad input before it starts; Ctrl-C and the file system afterwards.
+pub fn sweep(arguments: &SweepArguments) -> Result<(), Failure> {
+    archive::check_ending(&arguments.out)?;
+    let target = Target::claim(&arguments.out, arguments.force)?;
+    let sweep = read(arguments)?;
+    let shard = match &arguments.shard {
+        Some(text) => Some(options::shard(text)?),
+        None => None,
+    };
+    let archive = Archive::of_sweep(meta(&sweep)?, &sweep, shard.as_ref());
+    let blocks: Vec<usize> = (0..sweep.grid().blocks())
+        .filter(|&b| shard.as_ref().is_none_or(|shard| shard.has(b)))
+        .collect();
+    if !arguments.quiet {
+        warnings(&sweep).iter().for_each(|warning| warn(warning));
+    }
+    let mut partial = Partial::open(&arguments.out, archive.meta(), &sweep, &blocks)?;
+    let todo: Vec<usize> = blocks
+        .iter()
+        .copied()
+        .filter(|b| !partial.has(*b))
+        .collect();
+    let points = |blocks: &[usize]| -> u64 {
+        let lengths = blocks.iter().map(|&b| sweep.grid().block(b).len() as u64);
+        lengths.sum()
+    };
+    let (all, left) = (points(&blocks), points(&todo));
+    if left < all && !arguments.quiet {
+        warn(&format!(
+            "going on where {} stopped: {} of {all} points are done",
+            partial.path().display(),
+            all - left
+        ));
+    }
+    interrupt::listen();
+    let bar = progress::bar(!arguments.quiet, all);
+    bar.set_position(all - left);
+    bar.reset_eta();
+    let cores = || thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
+    let threads = arguments.threads.map_or_else(cores, usize::from);
+    let started = Instant::now();
+    let outcome = compute(&sweep, &todo, threads, &mut partial, &bar);
+    let wall = started.elapsed().as_secs_f64();
+    bar.finish_and_clear();
+    outcome?;
+    if todo.iter().any(|b| !partial.has(*b)) {
+        let left = points(
+            &blocks
+                .into_iter()
+                .filter(|b| !partial.has(*b))
+                .collect::<Vec<_>>(),
+        );
+        return Err(Failure::new(
+            Failure::INTERRUPTED,
+            format!(
+                "interrupted with {} of {all} points done; the same command goes on from {}",
+                all - left,
+                partial.path().display()
+            ),
+        ));
+    }
+    let mut summary = summarise(&archive, &mut partial)?;
+    summary.insert("wall_s".into(), json!(wall));
+    archive.write(target, &mut partial)?;
+    partial.remove()?;
+    report(&archive, &summary, &arguments.out, arguments.summary)
+}
+
+/// The sweep that the arguments ask for.
+fn read(arguments: &SweepArguments) -> Result<Sweep, Failure> {
+    let scene = load(&arguments.scene)?;
+    let usage = |error: &dyn std::fmt::Display| Failure::usage(error.to_string());
+    let axes = arguments.vary.iter().map(|text| Axis::parse(&scene, text));
+    let axes = axes.collect::<Result<Vec<_>, _>>().map_err(|e| usage(&e))?;
+    let grid = Grid::new(&scene, axes, arguments.start.into()).map_err(|e| usage(&e))?;
+    let plan = Plan {
+        periods: arguments.periods,
+        discard: arguments.discard,
+        phase: options::phase(&arguments.phase)?,
+        exponent: !arguments.no_exponent,
+    };
+    Sweep::new(scene, grid, plan).map_err(|e| usage(&e))
+}
+
+/// What made the result: the same for the whole sweep and every shard of it.
+fn meta(sweep: &Sweep) -> Result<Map<String, Json>, Failure> {
+    let scene = sweep.scene();
+    let (grid, plan) = (sweep.grid(), sweep.plan());
+    let mut meta = super::provenance::meta(scene)?;
+    let axes = grid.axes().iter().map(|axis| {
+        json!({
+            "key": axis.key(),
+            "from": axis.value(0),
+            "to": axis.value(axis.count() - 1),
+            "count": axis.count(),
+        })
+    });
+    let varies_period = grid
+        .axes()
+        .iter()
+        .any(|axis| axis.key() == "spcmm.frequency");
+    let period = drive_period(scene).ok().filter(|_| !varies_period);
+    let regimes = [
+        Regime::Unclear,
+        Regime::Periodic(1),
+        Regime::QuasiPeriodic,
+        Regime::Chaotic,
+        Regime::NotSettled,
+    ];
+    let mut words: Map<String, Json> = regimes
+        .iter()
+        .map(|regime| (regime.code().to_string(), json!(regime.word())))
+        .collect();
+    words.insert("-1".to_owned(), json!("none"));
+    let own = json!({
+        "scene_crc32": format!("{:08x}", crc32fast::hash(scene.source.text.as_bytes())),
+        "vary": axes.collect::<Vec<_>>(),
+        "periods": plan.periods,
+        "discard": plan.discard,
+        "section": "phase",
+        "phase": plan.phase,
+        "period_s": period,
+        "start": grid.start().word(),
+        "follow_block": FOLLOW_BLOCK,
+        "exponent": plan.exponent,
+        "statuses": {
+            Status::Done.code().to_string(): "done",
+            Status::Diverged.code().to_string(): "diverged",
+            Status::NoStart.code().to_string(): "could not start",
+        },
+        "regimes": words,
+    });
+    if let Json::Object(own) = own {
+        meta.extend(own);
+    }
+    Ok(meta)
+}
+
+/// Warnings of the scene at both ends of the ranges, each once, and of the sweep itself.
+fn warnings(sweep: &Sweep) -> Vec<String> {
+    let mut all = Vec::new();
+    for point in [0, sweep.grid().points() - 1] {
+        let Ok(scene) = sweep.grid().scene(sweep.scene(), point) else {
+            continue;
+        };
+        for warning in scene.warnings() {
+            if !all.contains(&warning) {
+                all.push(warning);
+            }
+        }
+    }
+    let solver = &sweep.scene().solver;
+    let loose =
+        solver.method.is_adaptive() && solver.tolerance > LOOSEST_FOR_EXPONENT * (1.0 + 1e-9);
+    if loose && sweep.plan().exponent {
+        all.push(format!(
+            "solver.tolerance {:e}: two runs part by their steps' errors alone at this tolerance, so exponents and the \
+             regimes told from them mean little; use {LOOSEST_FOR_EXPONENT:e} or less, or --no-exponent.",
+            solver.tolerance
+        ));
+    }
+    all
+}
+
+/// Computes the blocks `todo` and puts each into `partial` as it is done; stops early after Ctrl-C.
+fn compute(
+    sweep: &Sweep,
+    todo: &[usize],
+    threads: usize,
+    partial: &mut Partial,
+    bar: &ProgressBar,
+) -> Result<(), Failure> {
+    let next = AtomicUsize::new(0);
+    let stop = AtomicBool::new(false);
+    let worker = |send: mpsc::SyncSender<(usize, Vec<f64>)>| {
+        while let Some(&b) = todo.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let mut block = sweep.begin(b);
+            let mut told = 0;
+            while !block.is_done() {
+                if stop.load(Ordering::Relaxed) || interrupt::asked() {
+                    return;
+                }
+                block.advance(STEPS_BETWEEN_LOOKS);
+                let finished = block.finished().len();
+                bar.inc((finished - told) as u64);
+                told = finished;
+            }
+            // The receiver is gone only after a failure, which is reported there.
+            if send.send((b, block.records())).is_err() {
+                return;
+            }
+        }
+    };
+    thread::scope(|scope| {
+        let (send, receive) = mpsc::sync_channel(threads);
+        for _ in 0..threads.min(todo.len()) {
+            let send = send.clone();
+            scope.spawn(|| worker(send));
+        }
+        drop(send);
+        for (b, records) in receive {
+            if let Err(failure) = partial.append(b, &records) {
+                stop.store(true, Ordering::Relaxed);
+                return Err(failure);
+            }
+        }
+        Ok(())
+    })
+}
+
+/// How many points ended how.
+fn summarise(archive: &Archive, source: &mut impl Source) -> Result<Map<String, Json>, Failure> {
+    let statuses = archive.values("status", source)?;
+    let regimes = archive.values("regime", source)?;
+    let with = |values: &[f64], code: i64| values.iter().filter(|v| **v == code as f64).count();
+    let mut summary = Map::new();
+    summary.insert("points".into(), json!(statuses.len()));
+    summary.insert(
+        "diverged".into(),
+        json!(with(&statuses, Status::Diverged.code())),
+    );
+    summary.insert(
+        "no_start".into(),
+        json!(with(&statuses, Status::NoStart.code())),
+    );
+    let words = archive.meta().get("regimes").and_then(Json::as_object);
+    let counts: Map<String, Json> = words
+        .into_iter()
+        .flatten()
+        .filter_map(|(code, word)| {
+            let number = with(&regimes, code.parse().ok()?);
+            (number > 0).then(|| (word.as_str().unwrap_or_default().to_owned(), json!(number)))
+        })
+        .collect();
+    summary.insert("regimes".into(), Json::Object(counts));
+    Ok(summary)
+}
+
+/// Says on standard output what was written.
+fn report(
+    archive: &Archive,
+    summary: &Map<String, Json>,
+    out: &std::path::Path,
+    form: SummaryForm,
+) -> Result<(), Failure> {
+    if form == SummaryForm::Json {
+        let mut all = archive.meta().clone();
+        all.insert("status".into(), json!("done"));
+        all.extend(summary.clone());
+        all.insert("out".into(), json!(out.display().to_string()));
+        return print(&format!("{:#}\n", Json::Object(all)));
+    }
+    let number = |key: &str| summary.get(key).and_then(Json::as_u64).unwrap_or(0);
+    let mut text = format!("Points            {}", number("points"));
+    for (key, what) in [("diverged", "diverged"), ("no_start", "could not start")] {
+        if number(key) > 0 {
+            text += &format!(", {} {what}", number(key));
+        }
+    }
+    let regimes = summary.get("regimes").and_then(Json::as_object);
+    let regimes: Vec<String> = regimes
+        .into_iter()
+        .flatten()
+        .map(|(word, number)| format!("{number} {word}"))
+        .collect();
+    let wall = summary.get("wall_s").and_then(Json::as_f64);
+    let wall = wall.map_or_else(String::new, |wall| {
+        format!("\nWall time         {wall:.1} s")
+    });
+    text += &format!(
+        "\nRegimes           {}{wall}\nWritten           {} to {}\nVersion           jointplay {}\n",
+        regimes.join(", "),
+        count(number("points"), "point"),
+        out.display(),
+        crate::VERSION
+    );
+    print(&text)
+}
+
+impl Shard {
+    /// Whether block `b` belongs to it: every so-manieth, so that all shards have about the same to do.
+    fn has(&self, b: usize) -> bool {
+        b % self.of == self.number - 1
+    }
+}

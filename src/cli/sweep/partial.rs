@@ -1,0 +1,307 @@
+//! The file beside a sweep's output that holds the blocks done so far, so that an interrupted sweep goes on where it
+//! stopped. Removed once the output is written.
+//!
+//! Magic number with the format's version; the settings as JSON behind their length, and their CRC-32; then for each block
+//! its number, the number of its values, the values (float64, little-endian), and the CRC-32 of all these. A block is
+//! appended by one write. What does not check is refused as a whole: a half-read result would look like a whole one.
+
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{BufReader, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+use serde_json::{Map, Value as Json};
+
+use super::archive::Source;
+use crate::analysis::sweep::Sweep;
+use crate::cli::Failure;
+
+/// Magic number, the last character being the format's version.
+const MAGIC: &[u8; 8] = b"JPSWEEP1";
+/// Settings longer than this are none.
+const LONGEST_SETTINGS: u64 = 1 << 20;
+
+/// The blocks of a sweep done so far.
+pub struct Partial {
+    path: PathBuf,
+    file: File,
+    /// Where the blocks begin and end, bytes.
+    start: u64,
+    end: u64,
+    /// Points of each block, and whether it is done.
+    points: Vec<std::ops::Range<usize>>,
+    done: Vec<bool>,
+    record: usize,
+    /// Place of each point among those of the output.
+    place: Vec<usize>,
+}
+
+impl Partial {
+    /// The file beside `out`.
+    fn path_of(out: &Path) -> PathBuf {
+        let mut name = out.as_os_str().to_owned();
+        name.push(".partial");
+        PathBuf::from(name)
+    }
+
+    /// Opens the file beside `out`, or makes it; `blocks` are those of the output.
+    ///
+    /// # Errors
+    /// Input/output: unreadable, damaged, in use; usage: of other settings.
+    pub fn open(
+        out: &Path,
+        settings: &Map<String, Json>,
+        sweep: &Sweep,
+        blocks: &[usize],
+    ) -> Result<Self, Failure> {
+        let path = Self::path_of(out);
+        let failed =
+            |error: std::io::Error| Failure::io(format!("cannot use {}: {error}", path.display()));
+        let file = OpenOptions::new()
+            .read(true)
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .open(&path)
+            .map_err(failed)?;
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => {
+                return Err(Failure::io(format!(
+                    "{} is in use: another run writes the same output",
+                    path.display()
+                )));
+            }
+            // A file system without locks: two runs of one output are then the user's to avoid.
+            Err(TryLockError::Error(error)) => log::warn!("no lock: {error}"),
+        }
+        let grid = sweep.grid();
+        let mut place = vec![usize::MAX; grid.points()];
+        let mut next = 0;
+        for &b in blocks {
+            for point in grid.block(b) {
+                place[point] = next;
+                next += 1;
+            }
+        }
+        let mut partial = Self {
+            file,
+            start: 0,
+            end: 0,
+            points: (0..grid.blocks()).map(|b| grid.block(b)).collect(),
+            done: vec![false; grid.blocks()],
+            record: sweep.layout().record_length(),
+            place,
+            path,
+        };
+        let settings = Json::Object(settings.clone());
+        if partial.length()? == 0 {
+            partial.begin(&settings)?;
+        } else {
+            partial.read(&settings)?;
+        }
+        Ok(partial)
+    }
+
+    /// Its name.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Whether block `b` is done.
+    pub fn has(&self, b: usize) -> bool {
+        self.done[b]
+    }
+
+    /// Puts in the records of block `b`.
+    ///
+    /// # Errors
+    /// Whatever the file system says; the file is then as it was.
+    pub fn append(&mut self, b: usize, records: &[f64]) -> Result<(), Failure> {
+        let mut bytes = Vec::with_capacity(20 + 8 * records.len());
+        bytes.extend((b as u64).to_le_bytes());
+        bytes.extend((records.len() as u64).to_le_bytes());
+        records
+            .iter()
+            .for_each(|value| bytes.extend(value.to_le_bytes()));
+        bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
+        self.file
+            .seek(SeekFrom::Start(self.end))
+            .map_err(self.failed())?;
+        let written = self
+            .file
+            .write_all(&bytes)
+            .and_then(|()| self.file.sync_data());
+        if let Err(error) = written {
+            // Best effort: half a block would make the file worthless.
+            let _ = self.file.set_len(self.end);
+            return Err(self.failed()(error));
+        }
+        self.end += bytes.len() as u64;
+        self.done[b] = true;
+        Ok(())
+    }
+
+    /// Takes the file away: its content is in the output.
+    ///
+    /// # Errors
+    /// Whatever the file system says.
+    pub fn remove(self) -> Result<(), Failure> {
+        std::fs::remove_file(&self.path).map_err(self.failed())
+    }
+
+    fn failed(&self) -> impl Fn(std::io::Error) -> Failure + use<> {
+        let path = self.path.clone();
+        move |error| Failure::io(format!("cannot use {}: {error}", path.display()))
+    }
+
+    fn damaged(&self, what: &str) -> Failure {
+        Failure::io(format!(
+            "{} is damaged ({what}) and not used; delete it to start the sweep again",
+            self.path.display()
+        ))
+    }
+
+    fn length(&self) -> Result<u64, Failure> {
+        Ok(self.file.metadata().map_err(self.failed())?.len())
+    }
+
+    fn begin(&mut self, settings: &Json) -> Result<(), Failure> {
+        let text = settings.to_string();
+        let mut bytes = MAGIC.to_vec();
+        bytes.extend((text.len() as u64).to_le_bytes());
+        bytes.extend(text.as_bytes());
+        bytes.extend(crc32fast::hash(text.as_bytes()).to_le_bytes());
+        self.file.write_all(&bytes).map_err(self.failed())?;
+        self.file.sync_data().map_err(self.failed())?;
+        (self.start, self.end) = (bytes.len() as u64, bytes.len() as u64);
+        Ok(())
+    }
+
+    /// Checks the whole file.
+    fn read(&mut self, settings: &Json) -> Result<(), Failure> {
+        let length = self.length()?;
+        let mut reader = BufReader::new(&self.file);
+        let mut magic = [0; 8];
+        let cut = |_| self.damaged("it is cut short");
+        reader.read_exact(&mut magic).map_err(cut)?;
+        if &magic != MAGIC {
+            let old = magic[..7] == MAGIC[..7];
+            return Err(self.damaged(if old {
+                "it is of another version of the format"
+            } else {
+                "it is no partial sweep"
+            }));
+        }
+        let size = read_u64(&mut reader).map_err(cut)?;
+        if size > LONGEST_SETTINGS.min(length) {
+            return Err(self.damaged("its settings are too long"));
+        }
+        let mut text = vec![0; size as usize];
+        reader.read_exact(&mut text).map_err(cut)?;
+        if read_u32(&mut reader).map_err(cut)? != crc32fast::hash(&text) {
+            return Err(self.damaged("its settings do not match their checksum"));
+        }
+        let own: Json = serde_json::from_slice(&text)
+            .map_err(|_| self.damaged("its settings cannot be read"))?;
+        if own != *settings {
+            return Err(Failure::usage(format!(
+                "{} was begun with other settings ({}); finish that sweep, delete the file, or choose another --out",
+                self.path.display(),
+                difference(&own, settings)
+            )));
+        }
+        let start = (MAGIC.len() + 8 + text.len() + 4) as u64;
+        let mut end = start;
+        let mut done = vec![false; self.done.len()];
+        let mut records = Vec::new();
+        while end < length {
+            let b = self.read_block(&mut reader, &mut records)?;
+            if std::mem::replace(&mut done[b], true) {
+                return Err(self.damaged("a block is in it twice"));
+            }
+            end += 20 + 8 * records.len() as u64;
+        }
+        (self.start, self.end, self.done) = (start, end, done);
+        Ok(())
+    }
+
+    /// Number and records of the next block.
+    fn read_block(&self, reader: &mut impl Read, records: &mut Vec<f64>) -> Result<usize, Failure> {
+        let cut = |_| self.damaged("it is cut short");
+        let mut head = [0; 16];
+        reader.read_exact(&mut head).map_err(cut)?;
+        let number = |at: usize| {
+            let bytes: [u8; 8] = std::array::from_fn(|i| head[at + i]);
+            u64::from_le_bytes(bytes)
+        };
+        let (b, values) = (number(0), number(8));
+        let expected = usize::try_from(b)
+            .ok()
+            .filter(|&b| b < self.points.len())
+            .filter(|&b| self.place[self.points[b].start] != usize::MAX)
+            .map(|b| (b, self.points[b].len() * self.record));
+        let Some((b, expected)) = expected.filter(|(_, n)| *n as u64 == values) else {
+            return Err(self.damaged("a block does not belong to this sweep"));
+        };
+        let mut bytes = vec![0; 8 * expected];
+        reader.read_exact(&mut bytes).map_err(cut)?;
+        let mut checksum = crc32fast::Hasher::new();
+        checksum.update(&head);
+        checksum.update(&bytes);
+        if read_u32(reader).map_err(cut)? != checksum.finalize() {
+            return Err(self.damaged("a block does not match its checksum"));
+        }
+        records.clear();
+        let words = bytes.chunks_exact(8);
+        records.extend(words.map(|word| f64::from_le_bytes(std::array::from_fn(|i| word[i]))));
+        Ok(b)
+    }
+}
+
+impl Source for Partial {
+    fn gather(&mut self, offset: usize, length: usize, out: &mut [f64]) -> Result<(), Failure> {
+        let mut file = &self.file;
+        file.seek(SeekFrom::Start(self.start))
+            .map_err(self.failed())?;
+        let mut reader = BufReader::new(file.take(self.end - self.start));
+        let mut records = Vec::new();
+        for _ in 0..self.done.iter().filter(|done| **done).count() {
+            let b = self.read_block(&mut reader, &mut records)?;
+            let points = self.points[b].clone();
+            for (point, record) in points.zip(records.chunks_exact(self.record)) {
+                let at = self.place[point] * length;
+                out[at..at + length].copy_from_slice(&record[offset..offset + length]);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The first setting in which two differ.
+pub fn difference(own: &Json, wanted: &Json) -> String {
+    let (Some(own), Some(wanted)) = (own.as_object(), wanted.as_object()) else {
+        return "unreadable".to_owned();
+    };
+    let mut keys = wanted.keys().chain(own.keys());
+    let differing = keys.find(|key| own.get(*key) != wanted.get(*key));
+    let show = |value: Option<&Json>| value.map_or("none".to_owned(), Json::to_string);
+    differing.map_or("in their order".to_owned(), |key| {
+        format!(
+            "{key}: {} there, {} now",
+            show(own.get(key)),
+            show(wanted.get(key))
+        )
+    })
+}
+
+fn read_u64(reader: &mut impl Read) -> std::io::Result<u64> {
+    let mut bytes = [0; 8];
+    reader.read_exact(&mut bytes)?;
+    Ok(u64::from_le_bytes(bytes))
+}
+
+fn read_u32(reader: &mut impl Read) -> std::io::Result<u32> {
+    let mut bytes = [0; 4];
+    reader.read_exact(&mut bytes)?;
+    Ok(u32::from_le_bytes(bytes))
+}

@@ -1,0 +1,56 @@
+//! A state moved by hand: what a twin run and its renormalisation need.
+
+use super::Simulation;
+use crate::contact::Slip;
+use crate::integrate::System;
+use crate::mechanism::Memory;
+
+impl Simulation {
+    /// Adds `offset` to coordinates and velocities (as [`Self::state`] orders them) and goes on from there: quaternions
+    /// back to unit length, ideal joints closed again. A joint whose ball the offset puts into its wall is in contact
+    /// from now on, one whose ball it lifts is not; every other contact keeps its memory. Counters stay as they are.
+    ///
+    /// Components of `offset` beyond the state's are ignored, missing ones are 0.
+    pub fn displace(&mut self, offset: &[f64]) {
+        let Self {
+            mechanism, state, ..
+        } = self;
+        for (y, offset) in state.y.iter_mut().zip(offset) {
+            *y += offset;
+        }
+        mechanism.project(state.t, &mut state.y);
+        mechanism.measure(state.t, &state.y);
+        for j in 0..state.memory.len() {
+            if !mechanism.contacts.has_clearance(j) {
+                continue;
+            }
+            // The offset may lie beyond a corner of the friction law.
+            state.memory[j].slip = Slip::Whole;
+            let gap = mechanism.contacts.gaps()[j];
+            let touching = gap.penetration > 0.0;
+            if touching == state.memory[j].active {
+                continue;
+            }
+            state.memory[j] = if touching {
+                let floor = mechanism.contacts.coefficients(j).speed_floor;
+                state.contact_began = true;
+                state.h_next = state.h_next.min(state.h_contact);
+                Memory {
+                    active: true,
+                    approach_speed: gap.rate.max(floor),
+                    floored: gap.rate < floor,
+                    ..Memory::default()
+                }
+            } else {
+                Memory::default()
+            };
+        }
+        self.refresh();
+        self.book_change();
+    }
+
+    /// What a difference of 1 means for each component of [`Self::state`]: the scales of the tolerance.
+    pub fn scales(&self) -> &[f64] {
+        self.mechanism.scale()
+    }
+}

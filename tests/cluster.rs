@@ -1,0 +1,56 @@
+//! The worked example of a scheduler spreads a sweep, merges it, and goes on after a failure.
+#![cfg(target_os = "linux")]
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+const SWEEP: &str = "spcmm --vary contact.clearance=0.2mm..0.4mm:3 --periods 2 --discard 1";
+
+fn example(folder: &Path, line: &str) -> Output {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/sweep-parallel.sh");
+    Command::new(script)
+        .args(line.split_whitespace())
+        .current_dir(folder)
+        .env("JOINTPLAY", env!("CARGO_BIN_EXE_jointplay"))
+        .env("PARALLEL_OPTIONS", "--jobs 2")
+        // parallel keeps its own settings there.
+        .env("HOME", folder)
+        .output()
+        .unwrap()
+}
+
+#[test]
+fn gnu_parallel_spreads_a_sweep_and_goes_on_after_a_failure() {
+    let version = Command::new("parallel").arg("--version").output();
+    let there = version.is_ok_and(|v| String::from_utf8_lossy(&v.stdout).contains("GNU parallel"));
+    assert!(
+        there,
+        "GNU parallel is missing: ./test installs it (Debian, Ubuntu: parallel)"
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let whole = Command::new(env!("CARGO_BIN_EXE_jointplay"))
+        .args(format!("sweep {SWEEP} --out whole.npz").split_whitespace())
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    assert!(whole.status.success());
+
+    // A shard that cannot be written fails, and nothing is merged.
+    fs::create_dir_all(at("spread.npz.shards/2.npz.partial")).unwrap();
+    let failed = example(folder.path(), &format!("2 spread.npz {SWEEP}"));
+    let stderr = String::from_utf8_lossy(&failed.stderr).into_owned();
+    assert!(!failed.status.success() && !at("spread.npz").exists());
+    assert!(stderr.contains("2.npz.partial"), "{stderr}");
+    fs::remove_dir(at("spread.npz.shards/2.npz.partial")).unwrap();
+
+    let done = example(folder.path(), &format!("2 spread.npz {SWEEP}"));
+    assert!(
+        done.status.success(),
+        "{}",
+        String::from_utf8_lossy(&done.stderr)
+    );
+    assert!(fs::read(at("spread.npz")).unwrap() == fs::read(at("whole.npz")).unwrap());
+    assert!(!at("spread.npz.shards").exists());
+}

@@ -1,0 +1,474 @@
+//! Sections, exponents and regimes of systems whose answers are known, through the same code as those of mechanisms.
+
+use jointplay::analysis::exponent::Exponent;
+use jointplay::analysis::regime::{Evidence, Regime, classify};
+use jointplay::analysis::section::{Orbit, Schedule, Watch};
+use jointplay::integrate::{Controller, DormandPrince, RungeKutta4, Stepper, System};
+
+/// A map of the line or the circle, x' = f(x).
+#[derive(Clone)]
+struct Map<F> {
+    f: F,
+    n: f64,
+    x: [f64; 1],
+}
+
+impl<F: Fn(f64) -> f64 + Clone> Orbit for Map<F> {
+    type Stop = ();
+    fn time(&self) -> f64 {
+        self.n
+    }
+    fn step_until(&mut self, end: f64) -> Result<(), ()> {
+        if self.n < end {
+            self.x[0] = (self.f)(self.x[0]);
+            self.n += 1.0;
+        }
+        Ok(())
+    }
+    fn state(&self) -> &[f64] {
+        &self.x
+    }
+    fn scales(&self) -> &[f64] {
+        &[1.0]
+    }
+    fn twin(&self) -> Result<Self, ()> {
+        Ok(self.clone())
+    }
+    fn displace(&mut self, offset: &[f64]) {
+        self.x[0] += offset[0];
+    }
+    fn observables(&self) -> usize {
+        1
+    }
+    fn observe(&mut self, out: &mut [f64]) {
+        out[0] = self.x[0];
+    }
+}
+
+/// x'' = f(t, x, x'): a driven oscillator, stepped by Dormand-Prince with the error control of a simulation.
+#[derive(Clone)]
+struct Force<F>(F);
+
+impl<F: Fn(f64, f64, f64) -> f64> System for Force<F> {
+    fn dimension(&self) -> usize {
+        2
+    }
+    fn positions(&self) -> usize {
+        1
+    }
+    fn derivative(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
+        dy[0] = y[1];
+        dy[1] = (self.0)(t, y[0], y[1]);
+    }
+    fn position_rate(&mut self, _t: f64, y: &[f64], dy: &mut [f64]) {
+        dy[0] = y[1];
+    }
+    fn scale(&self) -> &[f64] {
+        &[1.0, 1.0]
+    }
+}
+
+/// Tolerance of a step.
+const TOLERANCE: f64 = 1e-9;
+
+struct Oscillator<F> {
+    force: Force<F>,
+    stepper: DormandPrince,
+    controller: Controller,
+    t: f64,
+    h: f64,
+    y: [f64; 2],
+    /// Observe the position on the circle, as (cos, sin), instead of on the line.
+    angle: bool,
+}
+
+impl<F: Fn(f64, f64, f64) -> f64 + Clone> Oscillator<F> {
+    fn new(force: F, y: [f64; 2], angle: bool) -> Self {
+        Self {
+            force: Force(force),
+            stepper: DormandPrince::new(2),
+            controller: Controller::new(4),
+            t: 0.0,
+            h: 1e-3,
+            y,
+            angle,
+        }
+    }
+}
+
+impl<F: Fn(f64, f64, f64) -> f64 + Clone> Orbit for Oscillator<F> {
+    type Stop = ();
+    fn time(&self) -> f64 {
+        self.t
+    }
+    fn step_until(&mut self, end: f64) -> Result<(), ()> {
+        let (mut k, mut y, mut k_end) = ([0.0; 2], [0.0; 2], [0.0; 2]);
+        self.force.derivative(self.t, &self.y, &mut k);
+        loop {
+            let cut = self.t + self.h >= end;
+            let h = if cut { end - self.t } else { self.h };
+            let error =
+                self.stepper
+                    .attempt(&mut self.force, self.t, h, &self.y, &k, &mut y, &mut k_end)
+                    / TOLERANCE;
+            if error > 1.0 {
+                self.h = h * self.controller.after_reject(error);
+                continue;
+            }
+            let next = h * self.controller.after_accept(error);
+            self.h = if cut { self.h.max(next) } else { next };
+            self.t = if cut { end } else { self.t + h };
+            self.y = y;
+            return Ok(());
+        }
+    }
+    fn state(&self) -> &[f64] {
+        &self.y
+    }
+    fn scales(&self) -> &[f64] {
+        &[1.0, 1.0]
+    }
+    fn twin(&self) -> Result<Self, ()> {
+        Ok(Self {
+            force: self.force.clone(),
+            stepper: DormandPrince::new(2),
+            ..*self
+        })
+    }
+    fn displace(&mut self, offset: &[f64]) {
+        self.y[0] += offset[0];
+        self.y[1] += offset[1];
+    }
+    fn observables(&self) -> usize {
+        3
+    }
+    fn observe(&mut self, out: &mut [f64]) {
+        let (sine, cosine) = if self.angle {
+            self.y[0].sin_cos()
+        } else {
+            (self.y[0], 0.0)
+        };
+        out.copy_from_slice(&[sine, cosine, self.y[1]]);
+    }
+}
+
+fn watch<O: Orbit>(
+    orbit: O,
+    interval: f64,
+    sections: usize,
+    discard: usize,
+    separation: f64,
+    resolution: f64,
+) -> (Regime, Evidence)
+where
+    O::Stop: std::fmt::Debug,
+{
+    let width = orbit.observables();
+    let schedule = Schedule {
+        first: interval,
+        interval,
+        sections,
+        discard,
+    };
+    let mut watch = Watch::new(orbit, schedule, Some(separation));
+    watch.finish().unwrap();
+    assert_eq!(watch.sections().len(), (sections - discard) * width);
+    let exponent = watch.exponent().and_then(|benettin| benettin.result());
+    classify(
+        watch.sections(),
+        &vec![resolution; width],
+        interval,
+        exponent,
+    )
+}
+
+fn exponent(evidence: &Evidence) -> &Exponent {
+    evidence.exponent.as_ref().unwrap()
+}
+
+/// Evidence without the long row of running estimates.
+fn brief(evidence: &Evidence) -> String {
+    let mut evidence = evidence.clone();
+    if let Some(exponent) = &mut evidence.exponent {
+        exponent.running.clear();
+    }
+    format!("{evidence:?}")
+}
+
+fn map(f: impl Fn(f64) -> f64 + Clone, sections: usize) -> (Regime, Evidence) {
+    let map = Map {
+        f,
+        n: 0.0,
+        x: [0.3],
+    };
+    watch(map, 1.0, sections, sections / 2, 1e-9, 1e-6)
+}
+
+fn logistic(r: f64, sections: usize) -> (Regime, Evidence) {
+    map(move |x| r * x * (1.0 - x), sections)
+}
+
+/// Feigenbaum's cascade: period 2 from 3, 4 from 1 + sqrt 6, 8 from 3.544090, 16 from 3.564407; the window of period 3
+/// from 1 + sqrt 8, doubled at 3.841499.
+#[test]
+fn the_logistic_map_doubles_its_period_where_it_is_known_to() {
+    for (r, period) in [
+        (2.9, 1),
+        (3.01, 2),
+        (3.44, 2),
+        (3.46, 4),
+        (3.543, 4),
+        (3.546, 8),
+        (3.564, 8),
+        (3.565, 16),
+        (3.83, 3),
+        (3.845, 6),
+    ] {
+        let (regime, evidence) = logistic(r, 6000);
+        assert_eq!(
+            regime,
+            Regime::Periodic(period),
+            "r = {r}: {}",
+            brief(&evidence)
+        );
+        assert_eq!(evidence.distinct, period, "r = {r}");
+        assert!(exponent(&evidence).value < 0.0, "r = {r}");
+    }
+}
+
+/// At r = 3.5643 the cycle of period 8 loses a seven-hundredth of its neighbours' distance an iteration.
+#[test]
+fn a_cycle_near_its_doubling_is_not_settled_and_no_torus() {
+    let (regime, evidence) = logistic(3.5643, 3000);
+    assert_eq!(regime, Regime::NotSettled);
+    assert!(exponent(&evidence).value.abs() < evidence.exponent_bound);
+}
+
+#[test]
+fn the_logistic_map_at_four_has_the_exponent_ln_two() {
+    let (regime, evidence) = logistic(4.0, 20_000);
+    assert_eq!(regime, Regime::Chaotic);
+    let e = exponent(&evidence);
+    // Ten thousand iterations: the standard error says how far to trust it.
+    assert!((e.value - 2f64.ln()).abs() < 0.01, "{}", e.value);
+    assert!(e.standard_error < 0.01, "{}", e.standard_error);
+    assert!(evidence.zero_one > 0.9, "{}", evidence.zero_one);
+    assert_eq!(e.running.len(), 10_000);
+    assert_eq!(e.running.last(), Some(&e.value));
+}
+
+/// At a fixed point x* = 1 - 1/r the exponent is ln |2 - r|.
+#[test]
+fn a_fixed_point_has_the_exponent_of_its_slope() {
+    for r in [2.5, 2.8, 1.5] {
+        let (regime, evidence) = logistic(r, 400);
+        assert_eq!(regime, Regime::Periodic(1));
+        let known = f64::ln(f64::abs(2.0 - r));
+        let value = exponent(&evidence).value;
+        // The twin comes no nearer than the rounding of its separation of 1e-9.
+        assert!((value - known).abs() < 1e-4, "r = {r}: {value} {known}");
+    }
+    // The superstable one: the twin falls onto the orbit.
+    let (regime, evidence) = logistic(2.0, 400);
+    assert_eq!(regime, Regime::Periodic(1));
+    assert!(exponent(&evidence).value < -5.0);
+}
+
+/// Arnold's circle map with the golden mean turns for ever without repeating; in its tongue at 1/2 it locks.
+#[test]
+fn the_circle_map_is_quasi_periodic_outside_its_tongues() {
+    let golden = 0.618_033_988_749_894_9;
+    let turn = |omega: f64, k: f64| {
+        let map =
+            move |x: f64| x + omega - k / std::f64::consts::TAU * (std::f64::consts::TAU * x).sin();
+        let orbit = Circle(Map {
+            f: map,
+            n: 0.0,
+            x: [0.2],
+        });
+        watch(orbit, 1.0, 400, 200, 1e-9, 1e-6)
+    };
+    let (regime, evidence) = turn(golden, 0.5);
+    assert_eq!(regime, Regime::QuasiPeriodic, "{}", brief(&evidence));
+    assert!(exponent(&evidence).value.abs() < evidence.exponent_bound);
+    assert!(evidence.zero_one < 0.2);
+    assert_eq!(evidence.distinct, evidence.sections);
+    assert_eq!(turn(0.5, 0.9).0, Regime::Periodic(2));
+    assert_eq!(turn(0.05, 0.9).0, Regime::Periodic(1));
+}
+
+/// A lifted circle map observed on the circle.
+#[derive(Clone)]
+struct Circle<F>(Map<F>);
+
+impl<F: Fn(f64) -> f64 + Clone> Orbit for Circle<F> {
+    type Stop = ();
+    fn time(&self) -> f64 {
+        self.0.time()
+    }
+    fn step_until(&mut self, end: f64) -> Result<(), ()> {
+        self.0.step_until(end)
+    }
+    fn state(&self) -> &[f64] {
+        self.0.state()
+    }
+    fn scales(&self) -> &[f64] {
+        self.0.scales()
+    }
+    fn twin(&self) -> Result<Self, ()> {
+        Ok(self.clone())
+    }
+    fn displace(&mut self, offset: &[f64]) {
+        self.0.displace(offset);
+    }
+    fn observables(&self) -> usize {
+        2
+    }
+    fn observe(&mut self, out: &mut [f64]) {
+        let (sine, cosine) = (std::f64::consts::TAU * self.0.x[0]).sin_cos();
+        out.copy_from_slice(&[cosine, sine]);
+    }
+}
+
+/// Pendulum of Baker & Gollub, Chaotic Dynamics, 2nd ed., section 3: x'' = -x'/q - sin x + g cos(2 t / 3), q = 2. It is
+/// periodic at g = 0.9, has doubled at 1.07, is chaotic at 1.15, turns over once a period at 1.35, has doubled at 1.45 and
+/// doubled again at 1.47, and is chaotic at 1.50.
+#[test]
+fn the_driven_pendulum_is_periodic_and_chaotic_where_it_is_known_to_be() {
+    let drive = 2.0 / 3.0;
+    for (g, expected) in [
+        (0.9, Some(1)),
+        (1.07, Some(2)),
+        (1.15, None),
+        (1.35, Some(1)),
+        (1.45, Some(2)),
+        (1.47, Some(4)),
+        (1.5, None),
+    ] {
+        let force = move |t: f64, x: f64, v: f64| -0.5 * v - x.sin() + g * (drive * t).cos();
+        let orbit = Oscillator::new(force, [0.2, 0.0], true);
+        let period = std::f64::consts::TAU / drive;
+        let (regime, evidence) = watch(orbit, period, 300, 150, 1e-6, 1e-5);
+        let e = exponent(&evidence);
+        match expected {
+            Some(n) => {
+                assert_eq!(regime, Regime::Periodic(n), "g = {g}: {}", brief(&evidence));
+                assert!(
+                    e.value + 2.0 * e.standard_error < 0.0,
+                    "g = {g}: {}",
+                    e.value
+                );
+                // Volume shrinks at the rate 1/q, so no motion can lose its neighbours faster than that in both directions.
+                assert!(e.value > -0.5, "g = {g}: {}", e.value);
+            }
+            None => {
+                assert_eq!(regime, Regime::Chaotic, "g = {g}: {}", brief(&evidence));
+                assert!(evidence.zero_one > 0.8, "g = {g}: {}", evidence.zero_one);
+            }
+        }
+    }
+}
+
+/// Published largest exponents: the damped driven pendulum x'' = -0.05 x' - sin x + 0.6 sin(0.7 t) has 0.1400, Ueda's
+/// oscillator x'' = -0.05 x' - x^3 + 7.5 sin t has 0.1034 (Sprott, Chaos and Time-Series Analysis, 2003, appendix A.5).
+#[test]
+fn exponents_of_driven_oscillators_are_the_published_ones() {
+    let pendulum = |t: f64, x: f64, v: f64| -0.05 * v - x.sin() + 0.6 * (0.7 * t).sin();
+    let ueda = |t: f64, x: f64, v: f64| -0.05 * v - x * x * x + 7.5 * t.sin();
+    let known = [
+        (
+            Oscillator::new(pendulum as fn(f64, f64, f64) -> f64, [0.0, 0.0], true),
+            0.7,
+            0.1400,
+        ),
+        (
+            Oscillator::new(ueda as fn(f64, f64, f64) -> f64, [2.5, 0.0], false),
+            1.0,
+            0.1034,
+        ),
+    ];
+    for (orbit, drive, published) in known {
+        let period = std::f64::consts::TAU / drive;
+        let (regime, evidence) = watch(orbit, period, 2200, 200, 1e-6, 1e-5);
+        let e = exponent(&evidence);
+        assert_eq!(regime, Regime::Chaotic);
+        let miss = (e.value - published).abs();
+        // Three standard errors, and these are to be small against the exponent.
+        assert!(
+            miss < 3.0 * e.standard_error,
+            "{} +- {}: {published}",
+            e.value,
+            e.standard_error
+        );
+        assert!(e.standard_error < 0.05 * published, "{}", e.standard_error);
+    }
+}
+
+/// Parts of this orbit fail in known ways: the watch keeps what it has.
+#[test]
+fn a_motion_that_stops_keeps_its_sections() {
+    struct Wall(f64);
+    impl Orbit for Wall {
+        type Stop = &'static str;
+        fn time(&self) -> f64 {
+            self.0
+        }
+        fn step_until(&mut self, end: f64) -> Result<(), &'static str> {
+            if self.0 >= 4.0 {
+                return Err("wall");
+            }
+            self.0 = end;
+            Ok(())
+        }
+        fn state(&self) -> &[f64] {
+            std::slice::from_ref(&self.0)
+        }
+        fn scales(&self) -> &[f64] {
+            &[1.0]
+        }
+        fn twin(&self) -> Result<Self, &'static str> {
+            Err("no twin")
+        }
+        fn displace(&mut self, _offset: &[f64]) {}
+        fn observables(&self) -> usize {
+            1
+        }
+        fn observe(&mut self, out: &mut [f64]) {
+            out[0] = self.0;
+        }
+    }
+    let schedule = Schedule {
+        first: 1.0,
+        interval: 1.0,
+        sections: 10,
+        discard: 2,
+    };
+    let mut watch = Watch::new(Wall(0.0), schedule, Some(1e-6));
+    assert_eq!(watch.finish(), Err("wall"));
+    assert_eq!(watch.sections(), [3.0, 4.0]);
+    assert!(watch.exponent().is_none());
+}
+
+/// A step of the error of the method that is watched: the fixed-step methods go through the same code.
+#[test]
+fn the_same_section_comes_from_another_stepper() {
+    let force = |t: f64, x: f64, v: f64| -0.5 * v - x.sin() + 0.9 * (2.0 / 3.0 * t).cos();
+    let period = 3.0 * std::f64::consts::PI;
+    let mut adaptive = Oscillator::new(force, [0.2, 0.0], true);
+    while adaptive.time() < period {
+        adaptive.step_until(period).unwrap();
+    }
+    let (mut y, mut k, mut end, mut k_end) = ([0.2, 0.0], [0.0; 2], [0.0; 2], [0.0; 2]);
+    let (mut system, mut stepper) = (Force(force), RungeKutta4::new(2));
+    let n = 4000;
+    let h = period / f64::from(n);
+    for i in 0..n {
+        let t = f64::from(i) * h;
+        system.derivative(t, &y, &mut k);
+        stepper.attempt(&mut system, t, h, &y, &k, &mut end, &mut k_end);
+        y = end;
+    }
+    for (a, b) in adaptive.state().iter().zip(&y) {
+        assert!((a - b).abs() < 1e-7, "{a} {b}");
+    }
+}
