@@ -196,10 +196,7 @@ fn page(found: &[WorkPrecision], costs: &[PartCost], machine: &str) -> String {
     line(
         "Time of one evaluation of the equations with the contacts under load, and of a simulated second with the preset `accurate`",
     );
-    line(
-        "(`spcmm`: the first 0.4 s; `chain`: the first 10 ms), the first row being 1. A chain's joints rattle one after the other, so",
-    );
-    line("that a longer one needs more steps, too.");
+    line("(`spcmm`: the first 0.4 s; `chain`: the first 10 ms), the first row being 1.");
     line("");
     line(MODEL_TABLE);
     line(&rule(MODEL_TABLE));
