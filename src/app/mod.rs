@@ -8,9 +8,11 @@ mod dialogs;
 mod headless;
 mod icons;
 mod keys;
+mod log;
 mod overlay;
 mod player;
 mod plots;
+mod share;
 mod theme;
 mod transport;
 mod value;
@@ -31,9 +33,11 @@ use dialogs::{Answer, Dialog};
 #[cfg(not(target_arch = "wasm32"))]
 pub use headless::{Headless, HeadlessError, Overlay, UiFrame};
 use keys::Action;
+pub use log::{Entry, Event, Log};
 pub use overlay::{force_notes, plate};
 pub use player::Player;
 pub use plots::{Plots, Window};
+pub use share::{CameraPose, LONGEST_LINK, Link, LinkError, SceneText};
 use viewport::Viewport;
 
 /// Below this width the window shows everything in one column, points.

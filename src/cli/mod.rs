@@ -20,11 +20,10 @@ use clap::Parser;
 
 use self::args::{Arguments, Command, SceneArguments};
 pub use self::failure::Failure;
+pub use crate::scene::DEFAULT_SCENE;
 use crate::scene::{BUILT_IN, Scene, reference_page};
 use crate::simulate::Simulation;
 
-/// The scene that opens when none is named.
-pub const DEFAULT_SCENE: &str = "spcmm";
 
 /// Does what the command line says; returns the exit code.
 pub fn main() -> u8 {
