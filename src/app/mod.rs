@@ -8,10 +8,12 @@ mod dialogs;
 mod headless;
 mod icons;
 mod keys;
+mod host;
 mod log;
 mod overlay;
 mod player;
 mod plots;
+mod replay;
 mod share;
 mod theme;
 mod transport;
@@ -33,10 +35,14 @@ use dialogs::{Answer, Dialog};
 #[cfg(not(target_arch = "wasm32"))]
 pub use headless::{Headless, HeadlessError, Overlay, UiFrame};
 use keys::Action;
+#[cfg(not(target_arch = "wasm32"))]
+pub use host::DesktopHost;
+pub use host::{Host, NoHost, OpenedFile, SaveFile};
 pub use log::{Entry, Event, Log};
 pub use overlay::{force_notes, plate};
 pub use player::Player;
 pub use plots::{Plots, Window};
+pub use replay::{Replay, Verdict};
 pub use share::{CameraPose, LONGEST_LINK, Link, LinkError, SceneText};
 use viewport::Viewport;
 
