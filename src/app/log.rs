@@ -132,7 +132,13 @@ mod tests {
         let text = log.text();
         assert_eq!(text.lines().next(), Some("0 contact.clearance=0.5 mm"));
         assert_eq!(Log::read(log.base.clone(), &text), Ok(log));
-        for bad in ["x a=b", "12", "12 ", "-1 a=b", "1 a=b\n18446744073709551615 a=b"] {
+        for bad in [
+            "x a=b",
+            "12",
+            "12 ",
+            "-1 a=b",
+            "1 a=b\n18446744073709551615 a=b",
+        ] {
             assert!(Log::read(Vec::new(), bad).is_err(), "{bad}");
         }
     }

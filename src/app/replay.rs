@@ -136,7 +136,9 @@ impl Replay {
 fn apply(player: &mut Player, entry: &Entry) -> Result<(), String> {
     match &entry.event {
         Event::Set { key, value } => player.set(key, value).map_err(|error| error.to_string())?,
-        Event::Original { key } => player.set_original(key).map_err(|error| error.to_string())?,
+        Event::Original { key } => player
+            .set_original(key)
+            .map_err(|error| error.to_string())?,
         // Taken by the step before.
         Event::Stop => return Ok(()),
     };
@@ -190,10 +192,7 @@ mod tests {
         let (copy, verdict, pieces) = follow(link, 50);
         assert_eq!(verdict, Verdict::Agrees(player.simulation().state_hash()));
         assert_eq!(copy.log(), player.log(), "the copy's own link is the same");
-        assert_eq!(
-            copy.pacer.shown().to_bits(),
-            player.pacer.shown().to_bits()
-        );
+        assert_eq!(copy.pacer.shown().to_bits(), player.pacer.shown().to_bits());
         assert!(pieces > 1, "in more than one frame");
     }
 
@@ -211,7 +210,9 @@ mod tests {
             };
             play(&mut original, 4);
             // Smaller than the ball's eccentricity: the wall closes in over many steps.
-            original.set("contact.clearance", "0.1 mm").expect("in range");
+            original
+                .set("contact.clearance", "0.1 mm")
+                .expect("in range");
             play(&mut original, 3);
             let joint = original.scene().ball_joints[0].name.clone();
             let own = format!("joint.{joint}.clearance");
@@ -222,13 +223,21 @@ mod tests {
             }
             original.step_back();
             original.step_back();
-            original.set("solver.preset", "real-time").expect("a preset");
-            original.set("solver.method", "rosenbrock").expect("a method");
+            original
+                .set("solver.preset", "real-time")
+                .expect("a preset");
+            original
+                .set("solver.method", "rosenbrock")
+                .expect("a method");
             original.set("gravity.y", "2 m/s^2").expect("in range");
             original.set_playing(true);
             play(&mut original, 3);
-            original.set("solver.method", "automatic").expect("a method");
-            original.set_original("contact.clearance").expect("the file's");
+            original
+                .set("solver.method", "automatic")
+                .expect("a method");
+            original
+                .set_original("contact.clearance")
+                .expect("the file's");
             play(&mut original, 5);
             assert!(original.log().entries.len() >= 8);
             agrees(&original);
@@ -239,7 +248,9 @@ mod tests {
     fn changes_before_a_reset_are_what_the_run_starts_with() {
         let mut original = player("spcmm");
         original.run_to(5e-3);
-        original.set("contact.clearance", "0.5 mm").expect("in range");
+        original
+            .set("contact.clearance", "0.5 mm")
+            .expect("in range");
         original.set("spcmm.frequency", "0.4 Hz").expect("in range");
         original.run_to(9e-3);
         original.reset().expect("starts");
@@ -247,7 +258,9 @@ mod tests {
         assert_eq!(original.log().base.len(), 2);
         original.run_to(40e-3);
         // One that waits for the next reset travels, too.
-        original.set("spcmm.frequency", "0.45 Hz").expect("in range");
+        original
+            .set("spcmm.frequency", "0.45 Hz")
+            .expect("in range");
         agrees(&original);
         let (copy, ..) = follow(link_to(&original), 50);
         assert!(copy.is_waiting("spcmm.frequency"));

@@ -203,9 +203,10 @@ impl Link {
                     let hash = (value.len() == 16)
                         .then(|| u64::from_str_radix(value, 16).ok())
                         .flatten();
-                    link.hash = Some(hash.ok_or_else(|| {
-                        wrong("is no state hash: 16 digits, 0 to 9 and a to f")
-                    })?);
+                    link.hash =
+                        Some(hash.ok_or_else(|| {
+                            wrong("is no state hash: 16 digits, 0 to 9 and a to f")
+                        })?);
                 }
                 "scale" => link.time_scale = Some(read_scale(value).map_err(|m| wrong(&m))?),
                 "camera" => link.camera = Some(read_camera(value).map_err(|m| wrong(&m))?),
@@ -352,8 +353,9 @@ impl Link {
 
     /// Whether the link names an instant to go to.
     pub fn has_instant(&self) -> bool {
-        self.steps.is_some_and(|steps| steps > 0)
-            || self.time.is_some_and(|time| time > 0.0)
+        self.steps.is_some()
+            || self.time.is_some()
+            || self.hash.is_some()
             || !self.log.entries.is_empty()
     }
 }
@@ -463,13 +465,7 @@ fn pack(text: &str) -> String {
 }
 
 fn unpack(key: &str, packed: &str) -> Result<String, LinkError> {
-    let damaged = || {
-        fault(
-            key,
-            "",
-            "does not unpack: the link is cut short or damaged",
-        )
-    };
+    let damaged = || fault(key, "", "does not unpack: the link is cut short or damaged");
     let bytes = BASE64.decode(packed).map_err(|_| damaged())?;
     let text = miniz_oxide::inflate::decompress_to_vec_with_limit(&bytes, LARGEST_UNPACKED)
         .map_err(|_| damaged())?;
@@ -578,7 +574,10 @@ mod tests {
                     "{form}"
                 );
             }
-            assert!(text.is_ascii() && !text.contains(['#', '?', ' ', '"']), "{text}");
+            assert!(
+                text.is_ascii() && !text.contains(['#', '?', ' ', '"']),
+                "{text}"
+            );
         }
     }
 
@@ -609,12 +608,16 @@ mod tests {
 
     #[test]
     fn a_link_by_hand_takes_short_names_and_full_keys() {
-        let link = Link::parse("?scene=pendulum&c=0.5mm&cf=0.2&ce=0.8&method=rk4&t=20ms&scale=1:50")
-            .expect("a link");
+        let link =
+            Link::parse("?scene=pendulum&c=0.5mm&cf=0.2&ce=0.8&method=rk4&t=20ms&scale=1:50")
+                .expect("a link");
         let scene = link.load().expect("the scene has these");
         assert_eq!(scene.name, "pendulum");
         assert_eq!(scene.contact.clearance, 0.5e-3);
-        assert_eq!((scene.contact.friction, scene.contact.restitution), (0.2, 0.8));
+        assert_eq!(
+            (scene.contact.friction, scene.contact.restitution),
+            (0.2, 0.8)
+        );
         assert_eq!(link.time, Some(0.02));
         assert_eq!(link.time_scale, Some(0.02));
         assert!(link.has_instant());
@@ -638,7 +641,10 @@ mod tests {
     #[test]
     fn what_is_wrong_in_a_link_is_said() {
         for (text, words) in [
-            ("clearance=0.5mm", "link: clearance: unknown word; did you mean `contact.clearance`?"),
+            (
+                "clearance=0.5mm",
+                "link: clearance: unknown word; did you mean `contact.clearance`?",
+            ),
             ("scale=2", "link: scale = 2: allowed 0.0001 to 1"),
             ("t=5", "link: t = 5: needs a unit"),
             ("t=-5ms", "must not be before the start"),
@@ -660,7 +666,10 @@ mod tests {
             ("scene=pendulun", "did you mean `pendulum`?"),
             ("c=0.5", "contact.clearance = 0.5: needs a unit"),
             ("c=-1mm", "out of range"),
-            ("scene=pendulum&spcmm.frequency=1Hz", "the scene `pendulum` has no such key"),
+            (
+                "scene=pendulum&spcmm.frequency=1Hz",
+                "the scene `pendulum` has no such key",
+            ),
             ("contact.clearence=1mm", "did you mean `contact.clearance`?"),
         ] {
             let error = Link::parse(text).expect("well formed").load();
@@ -716,7 +725,10 @@ mod tests {
     #[test]
     fn a_built_in_scene_is_named_and_any_other_travels() {
         let scene = Scene::load("chain", &[]).expect("built in");
-        assert_eq!(SceneText::of(&scene), SceneText::BuiltIn("chain".to_owned()));
+        assert_eq!(
+            SceneText::of(&scene),
+            SceneText::BuiltIn("chain".to_owned())
+        );
         let text = format!("{}\n# mine\n", scene.source.text);
         let mine = Scene::parse(&text, Some("/home/me/chain.toml"), &[]).expect("reads");
         let name = "chain.toml".to_owned();

@@ -24,7 +24,6 @@ pub use crate::scene::DEFAULT_SCENE;
 use crate::scene::{BUILT_IN, Scene, reference_page};
 use crate::simulate::Simulation;
 
-
 /// Does what the command line says; returns the exit code.
 pub fn main() -> u8 {
     // Prints help, version and usage errors itself; usage errors leave with code 2.

@@ -2,7 +2,6 @@
 
 use toml_edit::{DocumentMut, Item, Table, Value as Toml, value};
 
-use super::table::{contact_part, find};
 use super::{Kind, Scene, SceneError, Value};
 
 impl Scene {
@@ -133,6 +132,7 @@ fn text_of(item: Option<&Item>) -> Option<&str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::table::{contact_part, find};
     use crate::scene::{BUILT_IN, Scope, table};
 
     fn scene(name: &str, changes: &[(&str, &str)]) -> Scene {
@@ -186,7 +186,9 @@ mod tests {
                         assert!(matches!(parameter.scope, Scope::Contact), "{error}");
                         continue;
                     }
-                    let text = changed.to_toml().unwrap_or_else(|e| panic!("{name} {key}: {e}"));
+                    let text = changed
+                        .to_toml()
+                        .unwrap_or_else(|e| panic!("{name} {key}: {e}"));
                     let read = Scene::parse(&text, None, &[]).expect("reads");
                     assert_eq!(bits(&read), bits(&changed), "{name} {key}\n{text}");
                     assert!(read.changes.is_empty());
