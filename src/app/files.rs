@@ -23,7 +23,8 @@ const PATIENCE: f64 = 10.0;
 /// A picture of the viewport on its way back from the graphics adapter.
 pub struct Capture {
     image: Arc<Mutex<Option<Arc<ColorImage>>>>,
-    since: f64,
+    /// When it was asked for, s of viewing; `None` in the frame of the click, whose menu is still open.
+    since: Option<f64>,
 }
 
 impl App {
@@ -184,28 +185,35 @@ impl App {
         ]);
     }
 
-    /// Saves a picture of the viewport, once it is back from the graphics adapter.
+    /// Saves a picture of the viewport, once it is back from the graphics adapter; nothing waits for it.
     pub fn save_picture(&mut self, ctx: &egui::Context) {
-        let image = Arc::new(Mutex::new(None));
-        let (slot, waker) = (image.clone(), ctx.clone());
-        ctx.request_screenshot(move |shot| {
-            *slot.lock().unwrap_or_else(PoisonError::into_inner) = Some(shot);
-            waker.request_repaint();
+        self.capture = Some(Capture {
+            image: Arc::default(),
+            since: None,
         });
-        let since = ctx.input(|input| input.time);
-        self.capture = Some(Capture { image, since });
+        ctx.request_repaint();
     }
 
-    /// Takes the picture that [`Self::save_picture`] asked for, if it is there.
+    /// Asks for the picture that [`Self::save_picture`] is about, and takes it once it is there.
     pub(super) fn receive_picture(&mut self, ctx: &egui::Context) {
-        let Some(capture) = &self.capture else {
+        let Some(capture) = &mut self.capture else {
+            return;
+        };
+        let now = ctx.input(|input| input.time);
+        let Some(since) = capture.since else {
+            capture.since = Some(now);
+            let (slot, waker) = (capture.image.clone(), ctx.clone());
+            ctx.request_screenshot(move |shot| {
+                *slot.lock().unwrap_or_else(PoisonError::into_inner) = Some(shot);
+                waker.request_repaint();
+            });
             return;
         };
         let mut slot = capture.image.lock().unwrap_or_else(PoisonError::into_inner);
-        let (shot, since) = (slot.take(), capture.since);
+        let shot = slot.take();
         drop(slot);
         let Some(shot) = shot else {
-            if ctx.input(|input| input.time) - since > PATIENCE {
+            if now - since > PATIENCE {
                 self.capture = None;
                 self.problem = Some("The picture never came back from the graphics adapter".into());
             }

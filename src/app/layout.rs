@@ -228,16 +228,19 @@ impl App {
     fn picture(&mut self, ui: &mut Ui) -> Option<transport::Asked> {
         let area = ui.max_rect();
         self.picture_rect = area;
-        self.viewport.ui(ui, &self.player);
-        if self.capture.is_some() {
+        let plain = self.capture.is_some();
+        self.viewport.ui(ui, &self.player, plain);
+        if plain {
             // A saved picture has no buttons in it.
             return None;
         }
         let inner = area.shrink(10.0);
         let narrow = area.width() < 520.0;
+        let row = egui::vec2(inner.width(), ui.spacing().interact_size.y);
+        let backwards = egui::Layout::right_to_left(egui::Align::Center);
         let buttons = egui::UiBuilder::new()
-            .max_rect(inner)
-            .layout(egui::Layout::right_to_left(egui::Align::Min));
+            .max_rect(egui::Rect::from_min_size(inner.min, row))
+            .layout(backwards);
         ui.scope_builder(buttons, |ui| {
             ui.menu_button("View options", |ui| {
                 ui.set_min_width(230.0);
@@ -248,9 +251,7 @@ impl App {
                 self.viewport.options_ui(ui);
             });
             if !narrow {
-                ui.with_layout(egui::Layout::right_to_left(egui::Align::Min), |ui| {
-                    self.viewport.camera_buttons(ui, true)
-                });
+                ui.with_layout(backwards, |ui| self.viewport.camera_buttons(ui, true));
             }
         });
         self.settled_hint(ui, inner);

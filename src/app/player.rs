@@ -447,6 +447,32 @@ mod tests {
     }
 
     #[test]
+    fn a_window_that_was_hidden_for_minutes_goes_on_and_does_not_catch_up() {
+        let mut player = player("spcmm");
+        player.pacer.set_scale(0.02);
+        player.set_playing(true);
+        for _ in 0..30 {
+            player.advance(1.0 / 60.0);
+        }
+        let (before, steps) = (player.pacer.shown(), player.steps());
+        // Ten minutes at 1:50 would be 12 s of simulated time.
+        player.advance(600.0);
+        let leap = player.pacer.shown() - before;
+        assert!(
+            leap <= 0.02 * crate::simulate::LONGEST_FRAME + 1e-12,
+            "{leap}"
+        );
+        assert!(player.steps() - steps < 20_000);
+        let before = player.pacer.shown();
+        for _ in 0..30 {
+            player.advance(1.0 / 60.0);
+        }
+        let passed = player.pacer.shown() - before;
+        assert!(passed <= 0.01 + 1e-9, "nothing is owed: {passed}");
+        assert!(player.is_playing());
+    }
+
+    #[test]
     fn another_number_of_links_is_recorded_after_the_reset() {
         let mut player = player("chain");
         let before = player.channels().len();

@@ -200,8 +200,8 @@ impl Viewport {
         self.options.magnification = *next.unwrap_or(&STEPS[0]);
     }
 
-    /// The picture with its overlays, over all of `ui`.
-    pub fn ui(&mut self, ui: &mut Ui, player: &Player) {
+    /// The picture with its overlays, over all of `ui`; a `plain` one says nothing about what the cursor is on.
+    pub fn ui(&mut self, ui: &mut Ui, player: &Player, plain: bool) {
         let (rect, response) = ui.allocate_exact_size(
             ui.available_size().max(vec2(16.0, 16.0)),
             Sense::click_and_drag(),
@@ -238,7 +238,7 @@ impl Viewport {
         let shot = shot!(self, player, &self.camera, size, scale);
         let hovered = response
             .hover_pos()
-            .filter(|_| !response.dragged())
+            .filter(|_| !plain && !response.dragged())
             .map(|pos| (pos - rect.min) * scale)
             .and_then(|pixel| self.view.pick(&shot, Vec2::new(pixel.x, pixel.y)));
         // egui has dropped the clone of the frame before: nothing is copied.
