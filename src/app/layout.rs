@@ -128,8 +128,8 @@ impl App {
         let asked = Panel::bottom("transport")
             .frame(bar)
             .show(ui, |ui| {
-                let asked = ui.add_enabled_ui(free, |ui| transport::ui(ui, &mut self.player));
-                ui.horizontal(|ui| self.sheet_tabs(ui));
+                let asked = ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.player));
+                ui.horizontal(|ui| self.sheet_tabs(ui, false));
                 asked.inner
             })
             .inner;
@@ -155,7 +155,7 @@ impl App {
                         })
                         .inner;
                     let backwards = egui::Layout::right_to_left(egui::Align::Center);
-                    ui.with_layout(backwards, |ui| self.sheet_tabs(ui));
+                    ui.with_layout(backwards, |ui| self.sheet_tabs(ui, true));
                     asked
                 })
                 .inner
@@ -177,12 +177,17 @@ impl App {
         }
     }
 
-    /// What the sheet shows; the chosen one chosen again folds it away.
-    fn sheet_tabs(&mut self, ui: &mut Ui) {
-        for (sheet, name, help) in [
+    /// What the sheet shows; the chosen one chosen again folds it away. `backwards` where the layout runs from right to
+    /// left.
+    fn sheet_tabs(&mut self, ui: &mut Ui, backwards: bool) {
+        let mut tabs = [
             (Sheet::Controls, "Controls", "Parameters shown or hidden"),
             (Sheet::Plots, "Plots", "Plots shown or hidden"),
-        ] {
+        ];
+        if backwards {
+            tabs.reverse();
+        }
+        for (sheet, name, help) in tabs {
             let on = self.sheet == Some(sheet);
             let tab = egui::Button::selectable(on, name);
             if ui.add(tab).on_hover_text(help).clicked() {

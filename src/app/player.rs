@@ -230,9 +230,10 @@ impl Player {
         runs
     }
 
-    /// Puts `time`, s, on show, which lies within the latest step.
+    /// Puts `time`, s, on show, or the latest state where that comes before. A time before the latest step, as after a
+    /// change within one, shows the state at its start, and time goes on from there.
     pub(super) fn show(&mut self, time: f64) {
-        let shown = time.clamp(self.simulation.step_start(), self.simulation.time());
+        let shown = time.min(self.simulation.time());
         self.pacer.jump(shown);
         self.simulation.sample(shown, &mut self.frame);
     }

@@ -241,6 +241,13 @@ mod tests {
             play(&mut original, 5);
             assert!(original.log().entries.len() >= 8);
             agrees(&original);
+            // The change comes at the end of a step whose beginning is on show.
+            original.pacer.set_scale(1e-4);
+            original.set_playing(true);
+            original.advance(1.0 / 60.0);
+            assert!(original.pacer.shown() < original.simulation().time());
+            original.set("contact.friction", "0.1").expect("in range");
+            agrees(&original);
         }
     }
 
