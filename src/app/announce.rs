@@ -14,6 +14,8 @@ const MOST_JOINTS: usize = 6;
 #[derive(Debug, Default)]
 pub struct Announcer {
     text: String,
+    /// The same without the impacts.
+    standing: String,
     /// What counts as an event when it changes.
     occasion: String,
     reported: f64,
@@ -46,8 +48,8 @@ impl Announcer {
             player.stopped().is_some()
         );
         let event = occasion != self.occasion;
-        let text = sentences(player, news, self.strongest);
-        if text == self.text {
+        let standing = sentences(player, news, None);
+        if standing == self.standing && self.strongest.is_none() {
             return (false, None);
         }
         let wait = self.reported + INTERVAL - now;
@@ -55,7 +57,8 @@ impl Announcer {
             return (false, Some(wait));
         }
         self.occasion = occasion;
-        self.text = text;
+        self.text = sentences(player, news, self.strongest);
+        self.standing = standing;
         self.reported = now;
         self.strongest = None;
         (true, None)

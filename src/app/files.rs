@@ -384,6 +384,8 @@ mod tests {
         let mut player = player("spcmm");
         player.run_to(9e-3);
         player.advance(0.0);
+        // On show is now the end of the record.
+        player.single_step();
         let text = record_csv(&player);
         let mut lines = text.lines();
         let header: Vec<&str> = lines.next().expect("a header").split(',').collect();

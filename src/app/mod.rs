@@ -29,7 +29,7 @@ use eframe::egui_wgpu;
 use web_time::Instant;
 
 use crate::render;
-use crate::scene::{DEFAULT_SCENE, Scene, SceneError};
+use crate::scene::{DEFAULT_SCENE, Scene};
 use crate::simulate::{Simulation, StartError};
 use crate::view::{Preset, ViewOptions};
 
@@ -486,11 +486,12 @@ impl eframe::App for App {
 }
 
 /// Why the window could not open.
+#[cfg(not(target_arch = "wasm32"))]
 #[derive(Debug, thiserror::Error)]
 pub enum WindowError {
     /// The scene cannot start.
     #[error(transparent)]
-    Start(#[from] SceneError),
+    Start(#[from] crate::scene::SceneError),
     /// No graphics adapter.
     #[error(transparent)]
     NoAdapter(#[from] render::NoAdapter),
