@@ -883,3 +883,20 @@ mod frames {
         assert_eq!(names(folder.path()), [""; 0]);
     }
 }
+
+#[cfg(feature = "gui")]
+#[test]
+fn a_bad_link_is_refused_before_any_window_opens() {
+    let folder = tempfile::tempdir().unwrap();
+    for (link, words) in [
+        ("?scene=pendulum&c=5", "contact.clearance = 5: needs a unit"),
+        ("#scene=pendulun", "did you mean `pendulum`?"),
+        ("t=5", "link: t = 5: needs a unit"),
+    ] {
+        let outcome = jointplay(folder.path(), &format!("view --link {link}"));
+        assert_eq!(outcome.code, Some(2), "{}", outcome.stderr);
+        assert!(outcome.stderr.contains(words), "{}", outcome.stderr);
+    }
+    let outcome = jointplay(folder.path(), "view pendulum --link ?c=1mm");
+    assert_eq!(outcome.code, Some(2), "{}", outcome.stderr);
+}

@@ -11,7 +11,7 @@ use eframe::egui::{
 use super::accuracy;
 use super::icons::{Icon, icon_button};
 use super::player::Player;
-use super::value;
+use super::{theme, value};
 use crate::scene::{
     Kind, Parameter, SceneError, Scope, Value, format_quantity, format_quantity_digits,
     from_display, to_display,
@@ -26,6 +26,9 @@ const FIRST: [&str; 3] = [
     "contact.friction",
     "contact.restitution",
 ];
+
+/// Side of the button that takes a change back, points.
+const UNDO: f32 = 22.0;
 
 /// State of the controls that is not the simulation's: half-typed values and what was wrong with them.
 #[derive(Default)]
@@ -215,7 +218,8 @@ impl Controls {
         let Value::Number(si) = *now else {
             return;
         };
-        self.heading(ui, player, 114.0, parameter, key, |this, ui, player| {
+        let room = 92.0 + theme::side(ui, UNDO);
+        self.heading(ui, player, room, parameter, key, |this, ui, player| {
             this.default_button(ui, player, parameter, key, name, now);
             this.entry(ui, player, parameter, key, name, now);
         });
@@ -250,7 +254,8 @@ impl Controls {
         now: &Value,
         words: &[&'static str],
     ) {
-        self.heading(ui, player, 190.0, parameter, key, |this, ui, player| {
+        let room = 168.0 + theme::side(ui, UNDO);
+        self.heading(ui, player, room, parameter, key, |this, ui, player| {
             this.default_button(ui, player, parameter, key, name, now);
             let mut chosen = None;
             let width = ui.available_width().min(170.0);
@@ -290,7 +295,8 @@ impl Controls {
         let Value::Count(mut count) = *now else {
             return;
         };
-        self.heading(ui, player, 100.0, parameter, key, |this, ui, player| {
+        let room = 78.0 + theme::side(ui, UNDO);
+        self.heading(ui, player, room, parameter, key, |this, ui, player| {
             this.default_button(ui, player, parameter, key, name, now);
             let response = ui.add(
                 DragValue::new(&mut count)
@@ -359,6 +365,7 @@ impl Controls {
         let response = ui.add(
             TextEdit::singleline(&mut text)
                 .desired_width(84.0)
+                .min_size(egui::vec2(0.0, ui.spacing().interact_size.y))
                 .align(egui::Align2::RIGHT_CENTER)
                 .background_color(ui.visuals().faint_bg_color)
                 .margin(egui::Margin::symmetric(6, 3)),
@@ -395,7 +402,7 @@ impl Controls {
         name: &str,
         now: &Value,
     ) {
-        let size = 22.0;
+        let size = theme::side(ui, UNDO);
         // A place kept free where there is nothing to undo: rows stay aligned.
         let Some(original) = player.original(key).filter(|original| original != now) else {
             ui.allocate_space(egui::Vec2::splat(size));

@@ -2,6 +2,7 @@
 
 use eframe::egui::{self, Id, Modal, RichText, TextEdit, Ui};
 
+use super::host::SaveFile;
 use super::keys::{BINDINGS, POINTER};
 use super::player::Player;
 
@@ -19,6 +20,15 @@ pub enum Dialog {
         /// Why it could not be opened.
         error: Option<String>,
     },
+    /// Saves files: the path of the first as typed so far and what was wrong with it.
+    Save {
+        /// Path.
+        path: String,
+        /// The files, named as suggested.
+        files: Vec<SaveFile>,
+        /// Why they could not be saved.
+        error: Option<String>,
+    },
 }
 
 /// What a dialog asks for.
@@ -28,10 +38,17 @@ pub enum Answer {
     Close,
     /// Open this scene.
     Open(String),
+    /// Save under this path.
+    Save(String),
 }
 
 /// Shows `dialog`.
-pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player) -> Option<Answer> {
+pub fn ui(
+    ctx: &egui::Context,
+    dialog: &mut Dialog,
+    player: &Player,
+    renderer: &str,
+) -> Option<Answer> {
     let mut answer = None;
     let widest = (ctx.content_rect().width() - 48.0).min(520.0);
     let frame = egui::Frame::window(&ctx.global_style());
@@ -43,13 +60,17 @@ pub fn ui(ctx: &egui::Context, dialog: &mut Dialog, player: &Player) -> Option<A
                 Dialog::Help => "Keys",
                 Dialog::About => "About Jointplay",
                 Dialog::Open { .. } => "Open a scene file",
+                Dialog::Save { .. } => "Save as",
             };
             ui.heading(title);
             ui.add_space(6.0);
             match dialog {
                 Dialog::Help => help(ui),
-                Dialog::About => about(ui, player),
+                Dialog::About => about(ui, player, renderer),
                 Dialog::Open { path, error } => answer = open(ui, path, error.as_deref()),
+                Dialog::Save { path, files, error } => {
+                    answer = save(ui, path, files, error.as_deref());
+                }
             }
             ui.add_space(8.0);
             if ui.button("Close").clicked() {
@@ -86,8 +107,12 @@ fn help(ui: &mut Ui) {
         });
 }
 
-fn about(ui: &mut Ui, player: &Player) {
+fn about(ui: &mut Ui, player: &Player, renderer: &str) {
     ui.label(format!("Version {}", crate::VERSION));
+    if !renderer.is_empty() {
+        ui.label(format!("Drawn with {renderer}"))
+            .on_hover_text("Graphics interface and adapter");
+    }
     ui.label("A 3D laboratory that shows what play in a ball joint does to a machine.");
     ui.add_space(6.0);
     let scene = player.scene();
@@ -112,10 +137,32 @@ fn about(ui: &mut Ui, player: &Player) {
 
 fn open(ui: &mut Ui, path: &mut String, error: Option<&str>) -> Option<Answer> {
     ui.label("Path of a scene file (.toml), or the name of a built-in scene. A file can also be dropped on the window.");
+    path_field(ui, path, "scene.toml", "Open", error).map(Answer::Open)
+}
+
+fn save(ui: &mut Ui, path: &mut String, files: &[SaveFile], error: Option<&str>) -> Option<Answer> {
+    ui.label("Path of the file. A name without folders goes to the folder that the program was started in.");
+    if let [first, rest @ ..] = files {
+        for file in rest {
+            let ending = file.name.strip_prefix(&first.name).unwrap_or(&file.name);
+            ui.label(RichText::new(format!("What made it is saved beside it (…{ending})")).weak());
+        }
+    }
+    path_field(ui, path, "name", "Save", error).map(Answer::Save)
+}
+
+/// A path with a button below it; the path once it is entered.
+fn path_field(
+    ui: &mut Ui,
+    path: &mut String,
+    hint: &str,
+    button: &str,
+    error: Option<&str>,
+) -> Option<String> {
     let field = ui.add(
         TextEdit::singleline(path)
             .desired_width(f32::INFINITY)
-            .hint_text("scene.toml"),
+            .hint_text(hint),
     );
     let entered = field.lost_focus() && ui.input(|i| i.key_pressed(egui::Key::Enter));
     if !entered && ui.memory(|memory| memory.focused().is_none()) {
@@ -126,7 +173,7 @@ fn open(ui: &mut Ui, path: &mut String, error: Option<&str>) -> Option<Answer> {
         ui.label(RichText::new(error).color(ui.visuals().error_fg_color));
     }
     let clicked = ui
-        .add_enabled(!path.trim().is_empty(), egui::Button::new("Open"))
+        .add_enabled(!path.trim().is_empty(), egui::Button::new(button))
         .clicked();
-    ((clicked || entered) && !path.trim().is_empty()).then(|| Answer::Open(path.trim().to_owned()))
+    ((clicked || entered) && !path.trim().is_empty()).then(|| path.trim().to_owned())
 }

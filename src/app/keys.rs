@@ -101,11 +101,17 @@ pub const BINDINGS: [Binding; 28] = [
 
 /// Mouse and touch, for the overlay.
 pub const POINTER: [(&str, &str); 6] = [
-    ("Drag", "Turn the view"),
-    ("Right or middle drag, shift-drag", "Shift the view"),
+    ("Drag, one finger", "Turn the view"),
+    (
+        "Right or middle drag, shift-drag, two fingers",
+        "Shift the view",
+    ),
     ("Wheel, pinch", "Come nearer to what is under the cursor"),
     ("Hover", "What is known about a part"),
-    ("Double-click", "Follow a body or joint; the ground lets go"),
+    (
+        "Double-click, double tap",
+        "Follow a body or joint; the ground lets go",
+    ),
     ("Drop a file", "Open a scene"),
 ];
 

@@ -3,43 +3,58 @@
 //! `logic` moves the state (keys, stepping, recording), `ui` shows it.
 
 mod accuracy;
+mod announce;
 mod controls;
 mod dialogs;
+mod files;
+mod header;
 #[cfg(not(target_arch = "wasm32"))]
 mod headless;
+mod host;
 mod icons;
 mod keys;
+mod layout;
+mod log;
 mod overlay;
 mod player;
 mod plots;
+mod replay;
+mod share;
 mod stack;
 mod theme;
 mod transport;
 mod value;
 mod viewport;
 
-use eframe::egui::{
-    self, CentralPanel, ComboBox, Frame, Panel, RichText, ScrollArea, ThemePreference, Ui,
-};
+use eframe::egui::{self, ThemePreference, Ui};
 use eframe::egui_wgpu;
+use web_time::Instant;
 
 use crate::render;
-use crate::scene::{BUILT_IN, Scene, SceneError};
-use crate::simulate::StartError;
+use crate::scene::{DEFAULT_SCENE, Scene};
+use crate::simulate::{Simulation, StartError};
 use crate::view::{Preset, ViewOptions};
 
+use announce::Announcer;
 use controls::Controls;
 use dialogs::{Answer, Dialog};
 #[cfg(not(target_arch = "wasm32"))]
 pub use headless::{Headless, HeadlessError, Overlay, UiFrame};
+#[cfg(not(target_arch = "wasm32"))]
+pub use host::DesktopHost;
+pub use host::{Host, NoHost, OpenedFile, SaveFile};
 use keys::Action;
+use layout::Sheet;
+pub use log::{Entry, Event, Log};
 pub use overlay::{force_notes, plate};
 pub use player::Player;
 pub use plots::{Plots, Window};
+pub use replay::{Replay, Verdict};
+pub use share::{CameraPose, LONGEST_LINK, Link, LinkError, SceneText};
 use viewport::Viewport;
 
-/// Below this width the window shows everything in one column, points.
-const NARROW: f32 = 760.0;
+/// Most stepping towards the state of a link in one frame, s: the window still answers twenty times a second.
+const REPLAY_BUDGET: f64 = 0.03;
 
 /// How the application starts.
 #[derive(Clone, Debug)]
@@ -54,6 +69,10 @@ pub struct AppOptions {
     pub time_scale: f64,
     /// Choices about the picture.
     pub view: ViewOptions,
+    /// The link that `scene` comes from: its state is reproduced.
+    pub link: Option<Link>,
+    /// What to tell the user at once, say why a link could not be opened.
+    pub problem: Option<String>,
 }
 
 impl AppOptions {
@@ -68,7 +87,60 @@ impl AppOptions {
                 magnification: 20.0,
                 ..ViewOptions::default()
             },
+            link: None,
+            problem: None,
         }
+    }
+
+    /// What a link asks for: a URL, a query (`?…`), a fragment (`#…`) or bare pairs. Nothing in it is the default scene.
+    ///
+    /// # Errors
+    /// A link that cannot be read, a scene that it does not describe rightly or that cannot start; in words.
+    pub fn from_link(text: &str) -> Result<Self, String> {
+        let link = Link::parse(text).map_err(|error| error.to_string())?;
+        let scene = link.load().map_err(|error| format!("link: {error}"))?;
+        Simulation::new(&scene).map_err(|error| format!("link: {}", error.located(&scene)))?;
+        let mut options = Self::new(scene);
+        options.playing = link.playing.unwrap_or(!link.has_instant());
+        if let Some(scale) = link.time_scale {
+            options.time_scale = scale;
+        }
+        if let Some(magnification) = link.magnification {
+            options.view.magnification = magnification;
+        }
+        options.link = Some(link);
+        Ok(options)
+    }
+
+    /// As [`Self::from_link`]; of a bad link the default scene, and the reason as [`Self::problem`].
+    pub fn from_link_or_default(text: &str) -> Self {
+        Self::from_link(text).unwrap_or_else(|problem| {
+            let scene = Scene::load(DEFAULT_SCENE, &[]).expect("built-in scenes are right");
+            Self {
+                problem: Some(problem),
+                ..Self::new(scene)
+            }
+        })
+    }
+}
+
+/// What was just done, told for a few seconds.
+struct Notice {
+    text: String,
+    /// When it was first shown, s of viewing.
+    since: Option<f64>,
+}
+
+impl Notice {
+    fn new(text: impl Into<String>) -> Self {
+        let (text, since) = (text.into(), None);
+        Self { text, since }
+    }
+
+    /// Longer words take longer to read.
+    fn time_left(&mut self, now: f64) -> f64 {
+        let length = 3.0 + 0.05 * self.text.len() as f64;
+        *self.since.get_or_insert(now) + length - now
     }
 }
 
@@ -84,6 +156,23 @@ pub struct App {
     show_controls: bool,
     show_plots: bool,
     hint_dismissed: bool,
+    /// Of a small window: what its sheet shows.
+    sheet: Option<Sheet>,
+    compact: bool,
+    /// Whether a finger was ever seen.
+    touched: bool,
+    /// Whether the controls have the size for fingers; `None` before the first pass.
+    fingers: Option<bool>,
+    host: Box<dyn Host>,
+    replay: Option<Replay>,
+    verdict: Option<Verdict>,
+    notice: Option<Notice>,
+    announcer: Announcer,
+    capture: Option<files::Capture>,
+    /// Where the 3D view is, points.
+    picture_rect: egui::Rect,
+    /// The graphics adapter and its interface; "" without a window.
+    renderer: String,
 }
 
 impl App {
@@ -112,15 +201,38 @@ impl App {
         let mut player = Player::new(&options.scene)?;
         player.pacer.set_scale(options.time_scale);
         player.set_playing(options.playing);
+        let mut viewport = Viewport::new(&player, options.view);
+        if let Some(pose) = options.link.as_ref().and_then(|link| link.camera) {
+            viewport.set_pose(pose);
+        }
+        let replay = options.link.and_then(Replay::new);
+        if replay.is_some() {
+            player.set_playing(false);
+        }
         Ok(Self {
-            viewport: Viewport::new(&player, options.view),
+            viewport,
             controls: Controls::default(),
             plots: Plots::default(),
             dialog: None,
-            problem: None,
+            problem: options.problem,
             show_controls: true,
             show_plots: true,
             hint_dismissed: false,
+            sheet: Some(Sheet::Controls),
+            compact: false,
+            touched: false,
+            fingers: None,
+            host: Box::new(NoHost),
+            replay,
+            verdict: None,
+            notice: None,
+            announcer: Announcer::default(),
+            capture: None,
+            picture_rect: egui::Rect::ZERO,
+            renderer: state.map_or_else(String::new, |state| {
+                let info = state.adapter.get_info();
+                format!("{} {}", info.backend, info.name).trim().to_owned()
+            }),
             player,
         })
     }
@@ -157,9 +269,71 @@ impl App {
         }
     }
 
+    /// What the mechanism is doing, in sentences; about once a second, and when something happens, there are new ones.
+    pub fn announcement(&self) -> &str {
+        self.announcer.text()
+    }
+
+    /// What became of the link that the application was opened with.
+    pub fn verdict(&self) -> Option<&Verdict> {
+        self.verdict.as_ref()
+    }
+
+    /// How far the way to the state of a link is, 0 to 1; `None` where none is on its way.
+    pub fn replaying(&self) -> Option<f32> {
+        let replay = self.replay.as_ref()?;
+        Some(replay.fraction(&self.player))
+    }
+
+    /// Stays where the way to the state of a link has come to.
+    fn cancel_replay(&mut self) {
+        if self.replay.take().is_some() {
+            let reason = "it was stopped on the way".to_owned();
+            self.verdict = Some(Verdict::Failed(reason));
+            self.viewport.arrive(&self.player);
+        }
+    }
+
+    /// Opens what a link says in the place of the running scene; on an error that one stays, the reason is shown and
+    /// returned.
+    ///
+    /// # Errors
+    /// As [`AppOptions::from_link`].
+    pub fn open_link(&mut self, text: &str) -> Result<(), String> {
+        let opened = AppOptions::from_link(text).and_then(|options| {
+            self.show_scene(&options.scene)?;
+            self.player.pacer.set_scale(options.time_scale);
+            self.player.set_playing(options.playing);
+            self.viewport.options.magnification = options.view.magnification;
+            if let Some(link) = options.link {
+                if let Some(pose) = link.camera {
+                    self.viewport.set_pose(pose);
+                }
+                self.replay = Replay::new(link);
+            }
+            if self.replay.is_some() {
+                self.player.set_playing(false);
+            }
+            Ok(())
+        });
+        self.problem = opened.clone().err();
+        opened
+    }
+
     /// Moves the state on by `dt` seconds; whether it goes on moving by itself.
     pub fn advance(&mut self, dt: f64) -> bool {
+        if let Some(replay) = &mut self.replay {
+            let clock = Instant::now();
+            let may_step = || clock.elapsed().as_secs_f64() < REPLAY_BUDGET;
+            self.verdict = replay.advance(&mut self.player, may_step);
+            if self.verdict.is_some() {
+                self.replay = None;
+                self.viewport.arrive(&self.player);
+            }
+            return true;
+        }
         self.player.advance(dt);
+        self.announcer.observe(&self.player);
         let moves = self.viewport.advance(&self.player, dt as f32);
         moves || self.player.is_playing()
     }
@@ -172,12 +346,21 @@ impl App {
         self.viewport.show_scene(&self.player);
         self.controls.clear();
         self.problem = None;
+        self.replay = None;
+        self.verdict = None;
         Ok(())
     }
 
     fn act(&mut self, ctx: &egui::Context, action: Action) {
         // Under a dialog the machine is out of reach.
         if self.dialog.is_some() && !matches!(action, Action::Help | Action::Close) {
+            return;
+        }
+        let moves = matches!(
+            action,
+            Action::PlayPause | Action::Step | Action::StepBack | Action::Reset
+        );
+        if self.replay.is_some() && moves {
             return;
         }
         let player = &mut self.player;
@@ -203,6 +386,8 @@ impl App {
                 let on = !(arrows.normal || arrows.friction);
                 (arrows.normal, arrows.friction) = (on, on);
             }
+            Action::Panel if self.compact => self.fold(Sheet::Controls),
+            Action::Plots if self.compact => self.fold(Sheet::Plots),
             Action::Panel => self.show_controls = !self.show_controls,
             Action::Plots => self.show_plots = !self.show_plots,
             Action::Theme => ctx.set_theme(match ctx.theme() {
@@ -217,257 +402,50 @@ impl App {
                 };
             }
             Action::Close => {
-                self.dialog = None;
-                self.problem = None;
+                if self.dialog.take().is_none() {
+                    self.cancel_replay();
+                    self.problem = None;
+                }
             }
         }
     }
 
-    /// A scene file dropped on the window.
-    fn take_dropped(&mut self, ctx: &egui::Context) {
-        let Some(file) = ctx.input(|input| input.raw.dropped_files.first().cloned()) else {
-            return;
-        };
-        let name = file.path().display().to_string();
-        let opened = dropped_text(&*file).and_then(|text| {
-            Scene::parse(&text, Some(&name), &[]).map_err(|error| error.to_string())
-        });
-        self.problem = opened.and_then(|scene| self.show_scene(&scene)).err();
-    }
-
-    /// Everything, in whatever space there is.
-    pub fn show(&mut self, ui: &mut Ui) {
-        let narrow = ui.available_width() < NARROW;
-        let margin = egui::Margin::symmetric(12, 8);
-        let bar = Frame::side_top_panel(ui.style()).inner_margin(margin);
-        Panel::top("header")
-            .frame(bar)
-            .show(ui, |ui| self.header(ui, narrow));
-        self.problem_banner(ui, bar);
-        if narrow {
-            self.one_column(ui, bar);
-        } else {
-            self.side_by_side(ui, bar);
+    /// Tells what goes on, if it is time.
+    fn report(&mut self, ctx: &egui::Context) {
+        let now = ctx.input(|input| input.time);
+        let (told, wait) = self.announcer.update(now, &self.player, &self.news());
+        if told {
+            self.host.announce(self.announcer.text());
+            ctx.request_repaint();
         }
-        self.dialog_ui(ui.ctx());
-    }
-
-    fn side_by_side(&mut self, ui: &mut Ui, bar: Frame) {
-        let Self {
-            player,
-            controls,
-            plots,
-            show_controls,
-            show_plots,
-            ..
-        } = self;
-        Panel::left("controls")
-            .frame(bar)
-            .default_size(300.0)
-            .size_range(240.0..=480.0)
-            .show_collapsible(ui, show_controls, |ui| {
-                ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-                    // Room for the scroll bar beside the fields.
-                    ui.set_max_width(ui.available_width() - 10.0);
-                    ui.spacing_mut().item_spacing.y = 5.0;
-                    controls.ui(ui, player);
-                });
-            });
-        Panel::bottom("plots")
-            .frame(bar)
-            .resizable(true)
-            .default_size(230.0)
-            .size_range(150.0..=600.0)
-            .show_collapsible(ui, show_plots, |ui| {
-                // Else the panel would shrink to what the plots leave of it.
-                ui.take_available_space();
-                plots.header(ui, player);
-                plots.ui(ui, player);
-            });
-        let asked = Panel::bottom("transport")
-            .frame(bar)
-            .show(ui, |ui| transport::ui(ui, player))
-            .inner;
-        let stop = CentralPanel::no_frame()
-            .show(ui, |ui| self.picture(ui))
-            .inner;
-        if asked.or(stop).is_some() {
-            self.reset();
+        if let Some(wait) = wait {
+            ctx.request_repaint_after(std::time::Duration::from_secs_f64(wait));
         }
     }
 
-    fn one_column(&mut self, ui: &mut Ui, bar: Frame) {
-        let height = (ui.available_height() * 0.42).max(160.0);
-        let stop = Panel::top("picture")
-            .frame(Frame::NONE)
-            .exact_size(height)
-            .show(ui, |ui| self.picture(ui))
-            .inner;
-        let Self {
-            player,
-            controls,
-            plots,
-            show_controls,
-            show_plots,
-            ..
-        } = self;
-        let asked = Panel::top("transport")
-            .frame(bar)
-            .show(ui, |ui| transport::ui(ui, player))
-            .inner;
-        CentralPanel::default().frame(bar).show(ui, |ui| {
-            ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-                ui.set_max_width(ui.available_width() - 10.0);
-                if *show_controls {
-                    controls.ui(ui, player);
-                    ui.separator();
-                }
-                if *show_plots {
-                    plots.header(ui, player);
-                    ui.allocate_ui(egui::vec2(ui.available_width(), 340.0), |ui| {
-                        plots.ui(ui, player)
-                    });
-                }
-            });
+    /// The report for screen readers: in the accessibility tree, read out politely when it changes.
+    fn summary(&self, ui: &mut Ui) {
+        let place = egui::Rect::from_min_size(ui.max_rect().min, egui::Vec2::ZERO);
+        let id = egui::Id::unique("summary");
+        let response = ui.interact(place, id, egui::Sense::hover());
+        let words = self.announcer.text();
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Status, true, words));
+        ui.ctx().accesskit_node_builder(id, |node| {
+            node.set_live(egui::accesskit::Live::Polite);
         });
-        if asked.or(stop).is_some() {
-            self.reset();
-        }
-    }
-
-    /// The 3D view with its buttons and, after a stop, the reason.
-    fn picture(&mut self, ui: &mut Ui) -> Option<transport::Asked> {
-        let area = ui.max_rect();
-        self.viewport.ui(ui, &self.player);
-        let inner = area.shrink(10.0);
-        let narrow = area.width() < 520.0;
-        let buttons = egui::UiBuilder::new()
-            .max_rect(inner)
-            .layout(egui::Layout::right_to_left(egui::Align::Min));
-        ui.scope_builder(buttons, |ui| {
-            ui.menu_button("View options", |ui| {
-                ui.set_min_width(230.0);
-                if narrow {
-                    ui.horizontal_wrapped(|ui| self.viewport.camera_buttons(ui, false));
-                    ui.separator();
-                }
-                self.viewport.options_ui(ui);
-            });
-            if !narrow {
-                ui.with_layout(egui::Layout::right_to_left(egui::Align::Min), |ui| {
-                    self.viewport.camera_buttons(ui, true)
-                });
-            }
-        });
-        self.settled_hint(ui, inner);
-        let middle = egui::UiBuilder::new().max_rect(inner.shrink2(egui::vec2(0.0, 44.0)));
-        ui.scope_builder(middle, |ui| transport::banner(ui, &self.player))
-            .inner
-    }
-
-    /// What to do when nothing happens any more, in the middle of the lower edge.
-    fn settled_hint(&mut self, ui: &mut Ui, area: egui::Rect) {
-        let player = &self.player;
-        if self.hint_dismissed || !player.is_playing() || !player.has_settled() {
-            return;
-        }
-        let size = egui::vec2(186.0, 26.0);
-        let place = egui::Align2::CENTER_BOTTOM.align_size_within_rect(size, area);
-        let row = egui::UiBuilder::new()
-            .max_rect(place)
-            .layout(egui::Layout::left_to_right(egui::Align::Center));
-        let fill = ui.visuals().window_fill.gamma_multiply(0.8);
-        ui.painter().rect_filled(place, 6.0, fill);
-        ui.scope_builder(row, |ui| {
-            ui.add_space(8.0);
-            ui.label(RichText::new("Settled: R restarts").weak())
-                .on_hover_text("No ball has struck its socket for 0.2 s of simulated time");
-            let close = ui
-                .add(egui::Button::new("×").frame(false))
-                .on_hover_text("Do not show this again")
-                .accessible_name("Dismiss the hint");
-            self.hint_dismissed |= close.clicked();
-        });
-    }
-
-    fn header(&mut self, ui: &mut Ui, narrow: bool) {
-        ui.horizontal(|ui| {
-            if !narrow {
-                ui.label(RichText::new("Jointplay").heading().strong());
-                ui.add_space(8.0);
-            }
-            let name = self.player.scene().name.clone();
-            let mut wanted = None;
-            ComboBox::from_id_salt("scene")
-                .width(if narrow { 110.0 } else { 170.0 })
-                .selected_text(&name)
-                .show_ui(ui, |ui| {
-                    for built_in in BUILT_IN {
-                        if ui.selectable_label(name == built_in, built_in).clicked() {
-                            wanted = Some(built_in);
-                        }
-                    }
-                })
-                .response
-                .on_hover_text(&self.player.scene().title)
-                .accessible_name("Scene");
-            if let Some(wanted) = wanted {
-                self.problem = self.open(wanted).err();
-            }
-            if ui
-                .button("Open…")
-                .on_hover_text("Open a scene file")
-                .clicked()
-            {
-                self.dialog = Some(Dialog::Open {
-                    path: String::new(),
-                    error: None,
-                });
-            }
-            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                if ui
-                    .button("?")
-                    .on_hover_text("Keys (?)")
-                    .accessible_name("Keys")
-                    .clicked()
-                {
-                    self.dialog = Some(Dialog::Help);
-                }
-                // What does not fit is left out rather than laid over the rest; a key stands for the theme.
-                let room = ui.available_width();
-                if room > 80.0 && ui.button("About").clicked() {
-                    self.dialog = Some(Dialog::About);
-                }
-                if room > 200.0 {
-                    theme_box(ui);
-                }
-            });
-        });
-    }
-
-    fn problem_banner(&mut self, ui: &mut Ui, bar: Frame) {
-        let Some(problem) = self.problem.clone() else {
-            return;
-        };
-        let colour = ui.visuals().error_fg_color;
-        Panel::top("problem")
-            .frame(bar.fill(colour.gamma_multiply(0.14)))
-            .show(ui, |ui| {
-                ui.horizontal_wrapped(|ui| {
-                    ui.label(RichText::new(problem).color(colour));
-                    if ui.button("Dismiss").clicked() {
-                        self.problem = None;
-                    }
-                });
-            });
     }
 
     fn dialog_ui(&mut self, ctx: &egui::Context) {
         let Some(mut dialog) = self.dialog.take() else {
             return;
         };
-        match dialogs::ui(ctx, &mut dialog, &self.player) {
+        match dialogs::ui(ctx, &mut dialog, &self.player, &self.renderer) {
             Some(Answer::Close) => {}
+            Some(Answer::Save(path)) => {
+                if let Dialog::Save { files, .. } = dialog {
+                    self.save_as(path, files);
+                }
+            }
             Some(Answer::Open(argument)) => {
                 if let Err(reason) = self.open(&argument) {
                     self.dialog = Some(Dialog::Open {
@@ -481,50 +459,6 @@ impl App {
     }
 }
 
-#[cfg(not(target_arch = "wasm32"))]
-fn dropped_text(file: &dyn egui::DroppedFile) -> Result<String, String> {
-    let name = file.path().display();
-    let bytes = file.bytes().map_err(|error| format!("{name}: {error}"))?;
-    String::from_utf8(bytes).map_err(|_| format!("{name}: not a text file"))
-}
-
-#[cfg(target_arch = "wasm32")]
-fn dropped_text(file: &dyn egui::DroppedFile) -> Result<String, String> {
-    Err(format!(
-        "{}: a browser hands files over only later; this page cannot open them",
-        file.path().display()
-    ))
-}
-
-/// Light, dark or as the system asks.
-fn theme_box(ui: &mut Ui) {
-    let label = |preference| match preference {
-        ThemePreference::System => "System theme",
-        ThemePreference::Light => "Light",
-        ThemePreference::Dark => "Dark",
-    };
-    let mut preference = ui.ctx().options(|options| options.theme_preference);
-    let before = preference;
-    ComboBox::from_id_salt("theme")
-        .width(104.0)
-        .selected_text(label(preference))
-        .show_ui(ui, |ui| {
-            for choice in [
-                ThemePreference::System,
-                ThemePreference::Light,
-                ThemePreference::Dark,
-            ] {
-                ui.selectable_value(&mut preference, choice, label(choice));
-            }
-        })
-        .response
-        .on_hover_text("Light or dark (key T)")
-        .accessible_name("Theme");
-    if preference != before {
-        ui.ctx().set_theme(preference);
-    }
-}
-
 impl eframe::App for App {
     fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
         // Behind another window nothing is shown and time stands still.
@@ -534,11 +468,13 @@ impl eframe::App for App {
         for action in keys::pressed(ctx) {
             self.act(ctx, action);
         }
-        self.take_dropped(ctx);
+        self.receive_files(ctx);
+        self.receive_picture(ctx);
         let dt = ctx.input(|input| input.stable_dt);
         if self.advance(f64::from(dt)) {
             ctx.request_repaint();
         }
+        self.report(ctx);
     }
 
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
@@ -552,11 +488,12 @@ impl eframe::App for App {
 }
 
 /// Why the window could not open.
+#[cfg(not(target_arch = "wasm32"))]
 #[derive(Debug, thiserror::Error)]
 pub enum WindowError {
     /// The scene cannot start.
     #[error(transparent)]
-    Start(#[from] SceneError),
+    Start(#[from] crate::scene::SceneError),
     /// No graphics adapter.
     #[error(transparent)]
     NoAdapter(#[from] render::NoAdapter),
@@ -581,7 +518,11 @@ pub fn run_native(options: AppOptions) -> Result<(), WindowError> {
     };
     // The scene's own error must come out typed, not as the window's.
     Player::new(&options.scene).map_err(|error| error.located(&options.scene))?;
-    let create: eframe::AppCreator<'_> = Box::new(|cc| Ok(Box::new(App::new(cc, options)?)));
+    let create: eframe::AppCreator<'_> = Box::new(|cc| {
+        let mut app = App::new(cc, options)?;
+        app.set_host(Box::new(DesktopHost::default()));
+        Ok(Box::new(app))
+    });
     eframe::run_native("Jointplay", native, create).map_err(|error| match error {
         eframe::Error::Wgpu(egui_wgpu::WgpuError::RequestAdapterError(_)) => {
             render::NoAdapter.into()

@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use web_time::Instant;
 
+use super::log::{Event, Log};
 use crate::scene::{Scene, SceneError, Value};
 use crate::simulate::{
     Channels, Effect, Frame, History, Pacer, Peak, Simulation, Snapshot, StartError, Stopped,
@@ -31,8 +32,10 @@ pub struct Player {
     values: Vec<f64>,
     /// When a ball last struck, s; `None` before the first time.
     last_impact: Option<f64>,
-    /// States before the latest single steps, oldest first.
-    past: VecDeque<Snapshot>,
+    /// States before the latest single steps, oldest first, with the length that the log had.
+    past: VecDeque<(Snapshot, usize)>,
+    /// What was done since the start.
+    log: Log,
     /// Simulated time and seconds of stepping that it took, both fading.
     stepped: f64,
     stepping: f64,
@@ -84,6 +87,7 @@ impl Player {
             past: VecDeque::new(),
             stepped: 0.0,
             stepping: 0.0,
+            log: Log::new(&scene.changes),
             simulation,
         };
         player.start_record();
@@ -123,6 +127,16 @@ impl Player {
     /// The recorded past.
     pub fn history(&self) -> &History {
         &self.history
+    }
+
+    /// What was done to the run since its start.
+    pub fn log(&self) -> &Log {
+        &self.log
+    }
+
+    /// Accepted steps since the start.
+    pub fn steps(&self) -> u64 {
+        self.simulation.statistics().steps
     }
 
     /// Length of the past that plots show unless told otherwise, s: some seconds of viewing.
@@ -199,20 +213,22 @@ impl Player {
         if self.past.len() == PAST {
             self.past.pop_front();
         }
-        self.past.push_back(self.simulation.snapshot());
+        self.past
+            .push_back((self.simulation.snapshot(), self.log.entries.len()));
         self.step();
         self.show_latest();
     }
 
     /// Takes the latest single step back; nothing where there is none.
     pub fn step_back(&mut self) {
-        let Some(snapshot) = self.past.pop_back() else {
+        let Some((snapshot, entries)) = self.past.pop_back() else {
             return;
         };
         self.playing = false;
         // A scene that has run once starts again.
         if self.simulation.restore(&snapshot).is_ok() {
             self.stopped = None;
+            self.log.entries.truncate(entries);
             self.show_latest();
         }
     }
@@ -231,6 +247,22 @@ impl Player {
         self.simulation.sample(shown, &mut self.frame);
     }
 
+    /// One step towards an instant that a link names, with its record; false when the guard stopped the run.
+    pub(super) fn replay_step(&mut self) -> bool {
+        let runs = self.step();
+        // Step by step, so that the record holds every peak.
+        self.take_peaks();
+        runs
+    }
+
+    /// Puts `time`, s, on show, or the latest state where that comes before. A time before the latest step, as after a
+    /// change within one, shows the state at its start, and time goes on from there.
+    pub(super) fn show(&mut self, time: f64) {
+        let shown = time.min(self.simulation.time());
+        self.pacer.jump(shown);
+        self.simulation.sample(shown, &mut self.frame);
+    }
+
     /// Back to t = 0 with every change applied.
     ///
     /// # Errors
@@ -238,6 +270,7 @@ impl Player {
     pub fn reset(&mut self) -> Result<(), StartError> {
         self.simulation.reset()?;
         self.stopped = None;
+        self.log = Log::new(&self.simulation.scene().changes);
         let channels = Channels::of(self.simulation.running_scene());
         if channels.list() != self.channels.list() {
             self.history = History::new(channels.len(), FINEST_BIN);
@@ -253,6 +286,7 @@ impl Player {
     /// As [`Simulation::set`]; nothing has changed then.
     pub fn set(&mut self, key: &str, value: &str) -> Result<Effect, SceneError> {
         let effect = self.simulation.set(key, value)?;
+        self.log.set(self.steps(), key, value);
         if key == "solver.preset" {
             // Chosen here, a preset is to have effect: it replaces what was set by name before.
             for by_name in SOLVER_KEYS {
@@ -277,6 +311,10 @@ impl Player {
     pub fn set_original(&mut self, key: &str) -> Result<Effect, SceneError> {
         let value = self.original.get(key)?;
         let effect = self.simulation.set_value(key, &value)?;
+        let event = Event::Original {
+            key: key.to_owned(),
+        };
+        self.log.push(self.steps(), event);
         self.after_change();
         Ok(effect)
     }
@@ -331,6 +369,7 @@ impl Player {
             Err(stopped) => {
                 self.playing = false;
                 self.stopped = Some(stopped);
+                self.log.push(self.steps(), Event::Stop);
                 false
             }
         }
@@ -431,6 +470,32 @@ mod tests {
                 "{point:?}: {fall}"
             );
         }
+    }
+
+    #[test]
+    fn a_window_that_was_hidden_for_minutes_goes_on_and_does_not_catch_up() {
+        let mut player = player("spcmm");
+        player.pacer.set_scale(0.02);
+        player.set_playing(true);
+        for _ in 0..30 {
+            player.advance(1.0 / 60.0);
+        }
+        let (before, steps) = (player.pacer.shown(), player.steps());
+        // Ten minutes at 1:50 would be 12 s of simulated time.
+        player.advance(600.0);
+        let leap = player.pacer.shown() - before;
+        assert!(
+            leap <= 0.02 * crate::simulate::LONGEST_FRAME + 1e-12,
+            "{leap}"
+        );
+        assert!(player.steps() - steps < 20_000);
+        let before = player.pacer.shown();
+        for _ in 0..30 {
+            player.advance(1.0 / 60.0);
+        }
+        let passed = player.pacer.shown() - before;
+        assert!(passed <= 0.01 + 1e-9, "nothing is owed: {passed}");
+        assert!(player.is_playing());
     }
 
     #[test]

@@ -208,7 +208,7 @@ impl Plots {
                 .formatter(|mark, _| tick(mark.value));
             let mut plot = Plot::new(("plot", quantity))
                 .width(space.x - 12.0)
-                .height((space.y - 38.0).max(60.0))
+                .height((space.y - 20.0 - theme::side(ui, 18.0)).max(60.0))
                 .allow_drag(false)
                 .allow_zoom(false)
                 .allow_scroll(false)
@@ -308,7 +308,8 @@ impl Plots {
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             ui.spacing_mut().button_padding = vec2(4.0, 1.0);
-            ui.spacing_mut().interact_size.y = 18.0;
+            let height = theme::side(ui, 18.0);
+            ui.spacing_mut().interact_size.y = height;
             ui.label(RichText::new(format!("{}, {}", quantity.label(), quantity.unit().0)).small())
                 .on_hover_text(quantity.help());
             ui.add_space(4.0);
@@ -319,7 +320,11 @@ impl Plots {
                 if !on {
                     text = text.strikethrough().color(ui.visuals().weak_text_color());
                 }
-                let response = ui.add(egui::Button::new(text).frame(false));
+                let response = ui.add(
+                    egui::Button::new(text)
+                        .frame(false)
+                        .min_size(vec2(theme::side(ui, 0.0), 0.0)),
+                );
                 if response.on_hover_text("Line shown or hidden").clicked() {
                     if on {
                         self.hidden.push(*channel);

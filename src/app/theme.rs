@@ -52,16 +52,45 @@ pub fn series(index: usize, dark: bool) -> Color32 {
     if dark { on_dark } else { on_light }
 }
 
+/// Least side of what a finger hits, points.
+pub const FINGER: f32 = 44.0;
+
+/// Gives controls the size for a mouse, or for fingers.
+pub fn apply_size(ctx: &egui::Context, fingers: bool) {
+    ctx.all_styles_mut(|style| {
+        let spacing = &mut style.spacing;
+        spacing.interact_size = if fingers {
+            vec2(FINGER, FINGER)
+        } else {
+            vec2(40.0, 26.0)
+        };
+        spacing.icon_width = if fingers { 22.0 } else { 16.0 };
+        spacing.combo_height = if fingers { 320.0 } else { 200.0 };
+    });
+    // A finger moves on the way and does not come down twice on the same point.
+    ctx.options_mut(|options| {
+        options.input_options.max_click_dist = if fingers { 16.0 } else { 6.0 };
+    });
+}
+
+/// Side of a small button, points: `mouse` where there is no need to make it larger.
+pub fn side(ui: &egui::Ui, mouse: f32) -> f32 {
+    if ui.spacing().interact_size.y >= FINGER {
+        FINGER
+    } else {
+        mouse
+    }
+}
+
 /// Sets both themes' styles.
 pub fn apply(ctx: &egui::Context) {
+    apply_size(ctx, false);
     ctx.style_mut_of(Theme::Light, |style| style.visuals = light());
     ctx.style_mut_of(Theme::Dark, |style| style.visuals = dark());
     ctx.all_styles_mut(|style| {
         let spacing = &mut style.spacing;
         spacing.item_spacing = vec2(8.0, 6.0);
         spacing.button_padding = vec2(10.0, 4.0);
-        spacing.interact_size = vec2(40.0, 26.0);
-        spacing.icon_width = 16.0;
         spacing.combo_width = 120.0;
         spacing.tooltip_width = 340.0;
         spacing.menu_margin = Margin::same(8);

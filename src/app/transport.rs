@@ -4,7 +4,7 @@ use eframe::egui::{self, ComboBox, RichText, Slider, Ui};
 
 use super::icons::{Icon, icon_button};
 use super::player::Player;
-use super::value;
+use super::{theme, value};
 use crate::simulate::SCALE_RANGE;
 
 /// Time scales that a list offers.
@@ -40,57 +40,72 @@ pub fn next_scale(scale: f64, faster: bool) -> f64 {
 
 /// The bar: one row, or two where it is narrow.
 pub fn ui(ui: &mut Ui, player: &mut Player) -> Option<Asked> {
-    let mut asked = None;
     let narrow = ui.available_width() < 620.0;
     let row = egui::Layout::left_to_right(egui::Align::Center);
-    let size = egui::vec2(ui.available_width(), PLAY);
-    ui.allocate_ui_with_layout(size, row, |ui| {
-        let help = if player.has_waiting() {
-            "Back to t = 0; applies the changes that wait for it (key R)"
-        } else {
-            "Back to t = 0 (key R)"
-        };
-        if icon_button(ui, Icon::Restart, "Reset", help, 30.0, false).clicked() {
-            asked = Some(Asked::Reset);
-        }
-        let (icon, name, help) = if player.is_playing() {
-            (Icon::Pause, "Pause", "Stand still (space)")
-        } else {
-            (Icon::Play, "Play", "Let time pass (space)")
-        };
-        let runs = player.stopped().is_none();
-        ui.add_enabled_ui(runs, |ui| {
-            if icon_button(ui, icon, name, help, PLAY, true).clicked() {
-                player.set_playing(!player.is_playing());
+    let size = egui::vec2(ui.available_width(), theme::side(ui, PLAY));
+    let asked = ui
+        .allocate_ui_with_layout(size, row, |ui| {
+            let asked = buttons(ui, player);
+            if !narrow {
+                ui.add_space(6.0);
+                speed(ui, player, narrow);
             }
-            if icon_button(
-                ui,
-                Icon::Step,
-                "Step",
-                "One step of the solver (right arrow; left arrow takes it back)",
-                30.0,
-                false,
-            )
-            .clicked()
-            {
-                player.single_step();
-            }
-        });
-        ui.add_space(6.0);
-        ui.label(
-            RichText::new(value::time(player.pacer.shown()))
-                .monospace()
-                .strong(),
-        )
-        .on_hover_text("Simulated time");
-        if !narrow {
-            ui.add_space(6.0);
-            speed(ui, player, narrow);
-        }
-    });
+            asked
+        })
+        .inner;
     if narrow {
         ui.horizontal(|ui| speed(ui, player, narrow));
     }
+    asked
+}
+
+/// The bar in one row, without what has no room there.
+pub fn row(ui: &mut Ui, player: &mut Player) -> Option<Asked> {
+    ui.horizontal(|ui| {
+        let asked = buttons(ui, player);
+        scales(ui, player);
+        if ui.available_width() > 120.0 {
+            reached(ui, player);
+        }
+        asked
+    })
+    .inner
+}
+
+/// Reset, play, step, and the time.
+fn buttons(ui: &mut Ui, player: &mut Player) -> Option<Asked> {
+    let mut asked = None;
+    let (small, large) = (theme::side(ui, 30.0), theme::side(ui, PLAY));
+    let help = if player.has_waiting() {
+        "Back to t = 0; applies the changes that wait for it (key R)"
+    } else {
+        "Back to t = 0 (key R)"
+    };
+    if icon_button(ui, Icon::Restart, "Reset", help, small, false).clicked() {
+        asked = Some(Asked::Reset);
+    }
+    let (icon, name, help) = if player.is_playing() {
+        (Icon::Pause, "Pause", "Stand still (space)")
+    } else {
+        (Icon::Play, "Play", "Let time pass (space)")
+    };
+    let runs = player.stopped().is_none();
+    ui.add_enabled_ui(runs, |ui| {
+        if icon_button(ui, icon, name, help, large, true).clicked() {
+            player.set_playing(!player.is_playing());
+        }
+        let help = "One step of the solver (right arrow; left arrow takes it back)";
+        if icon_button(ui, Icon::Step, "Step", help, small, false).clicked() {
+            player.single_step();
+        }
+    });
+    ui.add_space(6.0);
+    ui.label(
+        RichText::new(value::time(player.pacer.shown()))
+            .monospace()
+            .strong(),
+    )
+    .on_hover_text("Simulated time");
     asked
 }
 
@@ -111,6 +126,12 @@ fn speed(ui: &mut Ui, player: &mut Player, narrow: bool) {
         player.pacer.set_scale(scale);
     }
     response.accessible_name("Time scale");
+    scales(ui, player);
+    reached(ui, player);
+}
+
+/// Time scales to choose from.
+fn scales(ui: &mut Ui, player: &mut Player) {
     ComboBox::from_id_salt("time scale")
         .width(78.0)
         .selected_text(value::time_scale(player.pacer.scale()))
@@ -128,7 +149,6 @@ fn speed(ui: &mut Ui, player: &mut Player, narrow: bool) {
         .response
         .on_hover_text("Simulated against real time")
         .accessible_name("Time scale preset");
-    reached(ui, player);
 }
 
 /// What the machine makes of it.

@@ -10,6 +10,7 @@ use glam::{Vec2, Vec3};
 
 use super::overlay;
 use super::player::Player;
+use super::share::CameraPose;
 use crate::render;
 use crate::scene::format_quantity_digits;
 use crate::simulate::ContactState;
@@ -54,6 +55,10 @@ pub struct Viewport {
     trail: Vec<Vec3>,
     followed: Option<Picked>,
     time: f64,
+    /// The user has turned, moved or chosen the view: it is no longer the one that a scene opens with.
+    moved: bool,
+    /// More than one finger was down since the last time that none was.
+    pinched: bool,
 }
 
 impl Viewport {
@@ -71,7 +76,36 @@ impl Viewport {
             trail: Vec::new(),
             followed: None,
             time: player.pacer.shown(),
+            moved: false,
+            pinched: false,
         }
+    }
+
+    /// Where the camera stands or is going; `None` where it shows everything as at the start.
+    pub fn pose(&self) -> Option<CameraPose> {
+        let camera = self.goal.unwrap_or(self.camera);
+        self.moved.then(|| CameraPose {
+            yaw: camera.yaw,
+            pitch: camera.pitch,
+            distance: camera.distance,
+            target: camera.target.to_array(),
+        })
+    }
+
+    /// Puts the camera there.
+    pub fn set_pose(&mut self, pose: CameraPose) {
+        self.camera.yaw = pose.yaw;
+        self.camera.pitch = pose.pitch;
+        self.camera.distance = pose.distance;
+        self.camera.target = Vec3::from_array(pose.target);
+        (self.goal, self.fit_pending, self.moved) = (None, false, true);
+    }
+
+    /// After a leap in time: what was remembered from before has no part in the picture.
+    pub fn arrive(&mut self, player: &Player) {
+        self.arrows.clear();
+        self.trail.clear();
+        self.time = player.pacer.shown();
     }
 
     /// Shows another scene, or the same one after a reset that changed its shapes; the choices stay.
@@ -128,6 +162,7 @@ impl Viewport {
         goal.preset(preset);
         self.goal = Some(goal);
         self.fit_pending = true;
+        self.moved = true;
     }
 
     /// Shows everything from where the camera looks.
@@ -145,6 +180,7 @@ impl Viewport {
                 .close_up(&mut goal, joint, scene, player.frame(), &self.options);
             self.goal = Some(goal);
             self.fit_pending = false;
+            self.moved = true;
             self.follow(None);
         }
     }
@@ -164,8 +200,8 @@ impl Viewport {
         self.options.magnification = *next.unwrap_or(&STEPS[0]);
     }
 
-    /// The picture with its overlays, over all of `ui`.
-    pub fn ui(&mut self, ui: &mut Ui, player: &Player) {
+    /// The picture with its overlays, over all of `ui`; a `plain` one says nothing about what the cursor is on.
+    pub fn ui(&mut self, ui: &mut Ui, player: &Player, plain: bool) {
         let (rect, response) = ui.allocate_exact_size(
             ui.available_size().max(vec2(16.0, 16.0)),
             Sense::click_and_drag(),
@@ -202,13 +238,18 @@ impl Viewport {
         let shot = shot!(self, player, &self.camera, size, scale);
         let hovered = response
             .hover_pos()
-            .filter(|_| !response.dragged())
+            .filter(|_| !plain && !response.dragged())
             .map(|pos| (pos - rect.min) * scale)
             .and_then(|pixel| self.view.pick(&shot, Vec2::new(pixel.x, pixel.y)));
         // egui has dropped the clone of the frame before: nothing is copied.
         self.view.build(&shot, Arc::make_mut(&mut self.list));
         if response.double_clicked() {
-            self.follow(hovered.map(|hit| hit.what));
+            // A finger that has left hovers over nothing.
+            let tapped = response
+                .interact_pointer_pos()
+                .map(|pos| (pos - rect.min) * scale)
+                .and_then(|pixel| self.view.pick(&shot, Vec2::new(pixel.x, pixel.y)));
+            self.follow(tapped.map(|hit| hit.what));
         }
         let painter = ui.painter_at(rect);
         painter.add(render::Viewport::shape(rect, self.list.clone()));
@@ -254,7 +295,30 @@ impl Viewport {
         size: [u32; 2],
         scale: f32,
     ) {
-        let shift = ui.input(|i| i.modifiers.shift);
+        let (shift, fingers, touches) =
+            ui.input(|i| (i.modifiers.shift, i.multi_touch(), i.any_touches()));
+        self.pinched &= touches;
+        if let Some(fingers) = fingers
+            && (self.pinched || rect.contains(fingers.center_pos))
+        {
+            self.pinched = true;
+            self.moved = true;
+            self.goal = None;
+            let shift = fingers.translation_delta * scale;
+            self.camera.pan(Vec2::new(shift.x, shift.y), size);
+            self.zoom(
+                player,
+                fingers.zoom_delta,
+                fingers.center_pos,
+                rect,
+                size,
+                scale,
+            );
+        }
+        if self.pinched {
+            // The finger that stays down longer turns nothing.
+            return;
+        }
         let delta = response.drag_delta() * scale;
         let delta = Vec2::new(delta.x, delta.y);
         let pans = response.dragged_by(PointerButton::Secondary)
@@ -262,32 +326,49 @@ impl Viewport {
             || (shift && response.dragged_by(PointerButton::Primary));
         if pans {
             self.goal = None;
+            self.moved = true;
             self.camera.pan(delta, size);
         } else if response.dragged_by(PointerButton::Primary) {
             self.goal = None;
+            self.moved = true;
             self.camera.orbit(delta);
         }
         if let Some(pos) = response.hover_pos() {
             let (scroll, pinch) = ui.input(|i| (i.smooth_scroll_delta().y, i.zoom_delta()));
             let factor = (scroll * 0.004).exp() * pinch;
-            if factor != 1.0 {
-                self.goal = None;
-                let cursor = (pos - rect.min) * scale;
-                let shot = shot!(self, player, &self.camera, size, scale);
-                let hit = self.view.pick(&shot, Vec2::new(cursor.x, cursor.y));
-                let bounds = self.view.bounds();
-                // Over the ground the whole machine stays in place, and neither end of the way loses it.
-                let point = hit.map_or(bounds.centre, |hit| hit.point);
-                let from = self.camera.eye().distance(bounds.centre);
-                let lost = match hit {
-                    _ if factor < 1.0 => from > FARTHEST * bounds.radius,
-                    Some(_) => false,
-                    None => from < bounds.radius,
-                };
-                if !lost {
-                    self.camera.zoom_about(factor, point, size);
-                }
-            }
+            self.zoom(player, factor, pos, rect, size, scale);
+        }
+    }
+
+    /// Comes nearer by `factor` to what is at `pos`, points.
+    fn zoom(
+        &mut self,
+        player: &Player,
+        factor: f32,
+        pos: Pos2,
+        rect: Rect,
+        size: [u32; 2],
+        scale: f32,
+    ) {
+        if factor == 1.0 {
+            return;
+        }
+        self.goal = None;
+        self.moved = true;
+        let cursor = (pos - rect.min) * scale;
+        let shot = shot!(self, player, &self.camera, size, scale);
+        let hit = self.view.pick(&shot, Vec2::new(cursor.x, cursor.y));
+        let bounds = self.view.bounds();
+        // Over the ground the whole machine stays in place, and neither end of the way loses it.
+        let point = hit.map_or(bounds.centre, |hit| hit.point);
+        let from = self.camera.eye().distance(bounds.centre);
+        let lost = match hit {
+            _ if factor < 1.0 => from > FARTHEST * bounds.radius,
+            Some(_) => false,
+            None => from < bounds.radius,
+        };
+        if !lost {
+            self.camera.zoom_about(factor, point, size);
         }
     }
 

@@ -59,6 +59,9 @@ pub struct ViewArguments {
     /// Change a parameter, e.g. `contact.clearance=0.5mm`; may be repeated, the last wins.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = change)]
     pub changes: Vec<(String, String)>,
+    /// Open a share link, e.g. `?scene=pendulum&c=0.5mm&t=20ms`, and reproduce its state.
+    #[arg(long, value_name = "LINK", conflicts_with_all = ["scene", "changes"])]
+    pub link: Option<String>,
 }
 
 /// `run`.

@@ -26,11 +26,9 @@ use clap::Parser;
 
 use self::args::{Arguments, Command, SceneArguments};
 pub use self::failure::Failure;
+pub use crate::scene::DEFAULT_SCENE;
 use crate::scene::{BUILT_IN, Scene, reference_page};
 use crate::simulate::Simulation;
-
-/// The scene that opens when none is named.
-pub const DEFAULT_SCENE: &str = "spcmm";
 
 /// Does what the command line says; returns the exit code.
 pub fn main() -> u8 {
@@ -47,8 +45,12 @@ pub fn main() -> u8 {
 
 fn dispatch(arguments: Arguments) -> Result<(), Failure> {
     match arguments.command {
-        None => view(DEFAULT_SCENE, &[]),
-        Some(Command::View(arguments)) => view(&arguments.scene, &arguments.changes),
+        None => view(DEFAULT_SCENE, &[], None),
+        Some(Command::View(arguments)) => view(
+            &arguments.scene,
+            &arguments.changes,
+            arguments.link.as_deref(),
+        ),
         Some(Command::Scenes) => print(&scenes()?),
         Some(Command::Check(arguments)) => check::check(&arguments),
         Some(Command::Run(arguments)) => run::run(&arguments),
@@ -65,10 +67,13 @@ fn dispatch(arguments: Arguments) -> Result<(), Failure> {
 }
 
 #[cfg(feature = "gui")]
-fn view(scene: &str, changes: &[(String, String)]) -> Result<(), Failure> {
+fn view(scene: &str, changes: &[(String, String)], link: Option<&str>) -> Result<(), Failure> {
     use crate::app::{AppOptions, WindowError, run_native};
-    let scene = Scene::load(scene, changes)?;
-    run_native(AppOptions::new(scene)).map_err(|error| {
+    let options = match link {
+        Some(link) => AppOptions::from_link(link).map_err(Failure::usage)?,
+        None => AppOptions::new(Scene::load(scene, changes)?),
+    };
+    run_native(options).map_err(|error| {
         let code = match error {
             WindowError::Start(_) => Failure::USAGE,
             WindowError::NoAdapter(_) => Failure::NO_ADAPTER,
@@ -92,7 +97,7 @@ fn no_display() -> bool {
 }
 
 #[cfg(not(feature = "gui"))]
-fn view(_scene: &str, _changes: &[(String, String)]) -> Result<(), Failure> {
+fn view(_scene: &str, _changes: &[(String, String)], _link: Option<&str>) -> Result<(), Failure> {
     Err(no_graphics())
 }
 

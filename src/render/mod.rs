@@ -4,6 +4,7 @@
 //! The picture is gamma-encoded once, at the end of `shaders/scene.wgsl`; everything after that copies bytes.
 
 mod callback;
+mod image;
 #[cfg(test)]
 mod look;
 mod meshes;
@@ -17,7 +18,8 @@ mod tests;
 
 pub use callback::{Viewport, install};
 pub use eframe::egui_wgpu::wgpu;
+pub use image::Image;
 #[cfg(not(target_arch = "wasm32"))]
-pub use offscreen::{Image, NoAdapter, Offscreen, RenderError};
+pub use offscreen::{NoAdapter, Offscreen, RenderError};
 pub use renderer::Renderer;
 pub use target::Target;

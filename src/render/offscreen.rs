@@ -1,6 +1,6 @@
 //! Pictures without a window.
 
-use super::{Renderer, Target, wgpu};
+use super::{Image, Renderer, Target, wgpu};
 use crate::view::DrawList;
 
 /// No graphics adapter on this machine.
@@ -28,44 +28,6 @@ pub enum RenderError {
     /// The device failed while drawing or reading back.
     #[error("the graphics adapter failed: {0}")]
     Device(String),
-}
-
-/// 8-bit picture, rows from the top, sRGB-encoded, opaque.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Image {
-    /// Pixels per row.
-    pub width: u32,
-    /// Rows.
-    pub height: u32,
-    /// Red, green, blue, opacity for each pixel.
-    pub rgba: Vec<u8>,
-}
-
-impl Image {
-    /// As the bytes of a PNG file; `texts` are its keyword and text pairs (`Software`, `Description`, …; Latin-1).
-    ///
-    /// # Errors
-    /// A text that PNG cannot hold.
-    pub fn png(&self, texts: &[(&str, &str)]) -> Result<Vec<u8>, png::EncodingError> {
-        let mut bytes = Vec::new();
-        let mut encoder = png::Encoder::new(&mut bytes, self.width, self.height);
-        encoder.set_color(png::ColorType::Rgba);
-        encoder.set_depth(png::BitDepth::Eight);
-        encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
-        for (keyword, text) in texts {
-            encoder.add_text_chunk((*keyword).to_owned(), (*text).to_owned())?;
-        }
-        let mut writer = encoder.write_header()?;
-        writer.write_image_data(&self.rgba)?;
-        writer.finish()?;
-        Ok(bytes)
-    }
-
-    /// Red, green, blue of the pixel in column `x` of row `y`.
-    pub fn pixel(&self, x: u32, y: u32) -> [u8; 3] {
-        let i = 4 * (y as usize * self.width as usize + x as usize);
-        [self.rgba[i], self.rgba[i + 1], self.rgba[i + 2]]
-    }
 }
 
 /// A device without a window, with its renderer.

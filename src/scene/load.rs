@@ -13,6 +13,9 @@ pub const BUILT_IN: [&str; 5] = [
     "chain",
 ];
 
+/// The scene that opens when none is named.
+pub const DEFAULT_SCENE: &str = BUILT_IN[0];
+
 /// The largest file that is read, bytes: a scene is a few kilobytes.
 const MAX_BYTES: u64 = 4 << 20;
 

@@ -17,6 +17,7 @@ mod table;
 #[cfg(test)]
 mod tests;
 mod units;
+mod write;
 
 pub use error::SceneError;
 pub use load::*;

@@ -142,6 +142,43 @@ pub struct Channel {
     pub member: String,
 }
 
+impl Channel {
+    /// Name of its column in a file, with the SI unit: that of `run` for the same quantity.
+    pub fn column(&self) -> String {
+        let member = self.member.as_str();
+        let angle = match member {
+            "α" => "alpha",
+            "β" => "beta",
+            "γ" => "gamma",
+            other => other,
+        };
+        match self.quantity {
+            Quantity::NormalForce => format!("{member}_normal_N"),
+            Quantity::FrictionForce => format!("{member}_friction_N"),
+            Quantity::Eccentricity => format!("{member}_eccentricity_m"),
+            Quantity::Penetration => format!("{member}_penetration_m"),
+            Quantity::Position => format!("{member}_m"),
+            Quantity::Angles => format!("{angle}_rad"),
+            Quantity::Velocity => format!("v{member}_m_s"),
+            Quantity::AngleRates => format!("{angle}_rate_rad_s"),
+            Quantity::Acceleration => format!("a{member}_m_s2"),
+            Quantity::AngleAccelerations => format!("{angle}_accel_rad_s2"),
+            Quantity::ActuatorForce => format!("{member}_actuator_N"),
+            Quantity::ActuatorTorque => format!("{member}_actuator_Nm"),
+            Quantity::Energy => format!("{member}_J"),
+            Quantity::EnergyBalance => match member {
+                "drives" => "drive_work_J".to_owned(),
+                "changes" => "change_work_J".to_owned(),
+                "restitution" | "friction" => format!("{member}_loss_J"),
+                "kinetic" | "elastic" => format!("{member}_change_J"),
+                "residual" => "energy_residual_J".to_owned(),
+                other => format!("{other}_work_J"),
+            },
+            Quantity::ProbeError => format!("probe_error_{member}_m"),
+        }
+    }
+}
+
 /// The channels of one scene, in the order in which [`Channels::read`] writes them.
 #[derive(Clone, Debug, Default)]
 pub struct Channels {

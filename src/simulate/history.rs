@@ -114,11 +114,7 @@ impl History {
             return;
         };
         let (from, to) = (from.max(start), to.min(end));
-        // Two bins of room: the window seldom starts and ends on a bin's edge.
-        let most_bins = most_bins.clamp(2, BINS - 2) as f64;
-        let level = (0..LEVELS)
-            .find(|&level| (to - from) / self.width(level) <= most_bins)
-            .unwrap_or(LEVELS - 1);
+        let level = self.level(to - from, most_bins);
         let width = self.width(level);
         let first = self.index(level, from);
         let last = self.index(level, to);
@@ -143,6 +139,34 @@ impl History {
                 out.push([time, f64::from(b)]);
             }
         }
+    }
+
+    /// Everything that is kept in at most so many rows: time of each bin's middle in s, then the least and the greatest
+    /// value of each channel in it, channel after channel.
+    pub fn rows(&self, most_bins: usize) -> Vec<(f64, Vec<(f32, f32)>)> {
+        let Some((start, end)) = self.span() else {
+            return Vec::new();
+        };
+        let level = self.level(end - start, most_bins);
+        let width = self.width(level);
+        (self.index(level, start)..=self.index(level, end))
+            .filter_map(|index| {
+                let values: Option<Vec<(f32, f32)>> = (0..self.channels)
+                    .map(|channel| self.range(level, index, channel))
+                    .collect();
+                let time = ((index as f64 + 0.5) * width).clamp(start, end);
+                values.map(|values| (time, values))
+            })
+            .collect()
+    }
+
+    /// The narrowest bins of which `most_bins` cover `length` seconds.
+    fn level(&self, length: f64, most_bins: usize) -> usize {
+        // Two bins of room: the window seldom starts and ends on a bin's edge.
+        let most_bins = most_bins.clamp(2, BINS - 2) as f64;
+        (0..LEVELS)
+            .find(|&level| length / self.width(level) <= most_bins)
+            .unwrap_or(LEVELS - 1)
     }
 
     fn width(&self, level: usize) -> f64 {

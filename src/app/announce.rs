@@ -1,0 +1,220 @@
+//! What the mechanism is doing, in sentences for somebody who does not see the picture.
+
+use super::player::Player;
+use super::value;
+use crate::scene::format_quantity_digits;
+use crate::simulate::ContactState;
+
+/// Least time between two reports unless something happens, s.
+const INTERVAL: f64 = 1.0;
+/// Ball joints that are told one by one; of more, only how many.
+const MOST_JOINTS: usize = 6;
+
+/// Makes a report about once a second, and at once when something happens.
+#[derive(Debug, Default)]
+pub struct Announcer {
+    text: String,
+    /// The same without the impacts.
+    standing: String,
+    /// What counts as an event when it changes.
+    occasion: String,
+    reported: f64,
+    /// Strongest impact since the last report: ball joint, N, s.
+    strongest: Option<(usize, f64, f64)>,
+}
+
+impl Announcer {
+    /// The latest report.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// Takes a frame into account.
+    pub fn observe(&mut self, player: &Player) {
+        for (joint, peak) in player.peaks().iter().enumerate() {
+            if peak.normal > self.strongest.map_or(0.0, |(_, force, _)| force) {
+                self.strongest = Some((joint, peak.normal, peak.time));
+            }
+        }
+    }
+
+    /// Reports at `now`, s of viewing, if it is time: whether there is a new report, and after how long to ask again where
+    /// one is due later. `news` is what the application itself has to say.
+    pub fn update(&mut self, now: f64, player: &Player, news: &str) -> (bool, Option<f64>) {
+        let occasion = format!(
+            "{} {} {} {news}",
+            player.scene().name,
+            player.is_playing(),
+            player.stopped().is_some()
+        );
+        let event = occasion != self.occasion;
+        let standing = sentences(player, news, None);
+        if standing == self.standing && self.strongest.is_none() {
+            return (false, None);
+        }
+        let wait = self.reported + INTERVAL - now;
+        if !event && wait > 0.0 {
+            return (false, Some(wait));
+        }
+        self.occasion = occasion;
+        self.text = sentences(player, news, self.strongest);
+        self.standing = standing;
+        self.reported = now;
+        self.strongest = None;
+        (true, None)
+    }
+}
+
+fn sentences(player: &Player, news: &str, strongest: Option<(usize, f64, f64)>) -> String {
+    let scene = player.scene();
+    let mut parts = Vec::new();
+    if !news.is_empty() {
+        parts.push(format!("{}.", news.trim_end_matches('.')));
+    }
+    parts.push(format!("{}.", scene.title));
+    let time = duration(player.pacer.shown());
+    parts.push(if let Some(stopped) = player.stopped() {
+        format!("The run has stopped at {time}: {}.", stopped.what)
+    } else if player.is_playing() {
+        let scale = value::time_scale(player.pacer.scale());
+        format!("Running at time scale {scale}, {time}.")
+    } else {
+        format!("Paused at {time}.")
+    });
+    parts.extend(joints(player));
+    if let Some((joint, force, time)) = strongest
+        && let Some(joint) = scene.ball_joints.get(joint)
+    {
+        parts.push(format!(
+            "Largest normal force since the last report: {} at {}, at {}.",
+            newtons(force),
+            joint.name,
+            duration(time)
+        ));
+    }
+    parts.join(" ")
+}
+
+fn joints(player: &Player) -> Option<String> {
+    let scene = player.scene();
+    let settled = player.has_settled();
+    let reports = &player.frame().joints;
+    if reports.is_empty() {
+        return None;
+    }
+    if reports.len() > MOST_JOINTS {
+        let free = reports
+            .iter()
+            .filter(|joint| joint.state == ContactState::Free);
+        let free = free.count();
+        return Some(format!(
+            "Of {} ball joints {free} are free and {} in contact.",
+            reports.len(),
+            reports.len() - free
+        ));
+    }
+    let each: Vec<String> = scene
+        .ball_joints
+        .iter()
+        .zip(reports)
+        .map(|(joint, report)| {
+            let force = newtons(report.normal_force.norm());
+            let name = &joint.name;
+            match report.state {
+                ContactState::Free => format!("{name} free"),
+                ContactState::Ideal => format!("{name} ideal, {force}"),
+                _ if settled => format!("{name} settled, {force}"),
+                ContactState::Stick => format!("{name} in contact, sticking, {force}"),
+                ContactState::Slip => format!("{name} in contact, sliding, {force}"),
+            }
+        })
+        .collect();
+    Some(format!("{}.", each.join("; ")))
+}
+
+fn newtons(force: f64) -> String {
+    format!("{} newtons", format_quantity_digits(force, "", 3))
+}
+
+fn duration(seconds: f64) -> String {
+    if seconds == 0.0 {
+        "the start".to_owned()
+    } else if seconds >= 1.0 {
+        format!("{seconds:.2} seconds")
+    } else if seconds >= 1e-3 {
+        format!("{:.2} milliseconds", seconds * 1e3)
+    } else {
+        format!("{:.1} microseconds", seconds * 1e6)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Scene;
+
+    fn player(scene: &str) -> Player {
+        Player::new(&Scene::load(scene, &[]).expect("built in")).expect("starts")
+    }
+
+    #[test]
+    fn a_report_says_what_goes_on_and_how_hard_it_hit() {
+        let mut player = player("pendulum");
+        let mut announcer = Announcer::default();
+        assert_eq!(announcer.update(0.0, &player, ""), (true, None));
+        assert_eq!(
+            announcer.text(),
+            "Pendulum on a ball joint. Paused at the start. S1 free."
+        );
+        player.pacer.set_scale(0.02);
+        player.set_playing(true);
+        assert!(announcer.update(0.1, &player, "").0, "at once");
+        assert!(announcer.text().contains("Running at time scale 1:50"));
+        let (mut reports, mut hit) = (0, false);
+        for frame in 0..120 {
+            player.advance(1.0 / 60.0);
+            announcer.observe(&player);
+            let now = 0.1 + f64::from(frame) / 60.0;
+            if announcer.update(now, &player, "").0 {
+                reports += 1;
+                hit |= announcer.text().contains("Largest normal force since");
+            }
+        }
+        assert!((1..=2).contains(&reports), "{reports} in two seconds");
+        assert!(hit, "{}", announcer.text());
+        player.set_playing(false);
+        assert!(announcer.update(2.2, &player, "").0);
+        assert!(!announcer.update(9.0, &player, "").0, "nothing new");
+        player.single_step();
+        let (told, wait) = announcer.update(2.3, &player, "");
+        assert!(!told && wait.is_some_and(|wait| wait > 0.8));
+        assert!(announcer.update(3.3, &player, "").0);
+        assert!(announcer.update(3.4, &player, "Link copied").0);
+        assert!(announcer.text().starts_with("Link copied. Pendulum"));
+    }
+
+    #[test]
+    fn settled_joints_and_long_chains_are_told_in_short() {
+        let mut rests = player("spcmm");
+        rests.pacer.set_scale(1.0);
+        rests.set_playing(true);
+        for _ in 0..40 {
+            rests.advance(1.0 / 60.0);
+        }
+        // On a slow machine a frame may fall short of its target.
+        while !rests.has_settled() {
+            rests.advance(1.0 / 60.0);
+        }
+        let mut announcer = Announcer::default();
+        announcer.update(0.0, &rests, "");
+        let text = announcer.text();
+        assert!(
+            text.contains("S1 settled, ") && text.contains(" newtons"),
+            "{text}"
+        );
+        let mut announcer = Announcer::default();
+        announcer.update(0.0, &player("chain"), "");
+        let all_free = "Of 8 ball joints 8 are free and 0 in contact.";
+        assert!(announcer.text().ends_with(all_free), "{}", announcer.text());
+    }
+}

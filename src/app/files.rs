@@ -1,0 +1,442 @@
+//! Links and files: what comes in from outside, and what is given out.
+
+use std::fmt::Write as _;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use eframe::egui::{self, ColorImage, Rect};
+use serde_json::{Map, json};
+
+use super::dialogs::Dialog;
+use super::host::{Host, SaveFile};
+use super::player::Player;
+use super::replay::Verdict;
+use super::share::{Link, SceneText};
+use super::{App, Notice};
+use crate::render::Image;
+use crate::scene::{Scene, Value};
+
+/// Rows of a saved record.
+const ROWS: usize = 1000;
+/// Time after which a picture that never came is given up, s.
+const PATIENCE: f64 = 10.0;
+
+/// A picture of the viewport on its way back from the graphics adapter.
+pub struct Capture {
+    image: Arc<Mutex<Option<Arc<ColorImage>>>>,
+    /// When it was asked for, s of viewing; `None` in the frame of the click, whose menu is still open.
+    since: Option<f64>,
+}
+
+impl App {
+    /// Gives the application the services of the place it runs in.
+    pub fn set_host(&mut self, host: Box<dyn Host>) {
+        self.host = host;
+    }
+
+    /// What leads to the present state.
+    pub fn link(&self) -> Link {
+        if let Some(replay) = &self.replay {
+            return replay.link().clone();
+        }
+        let player = &self.player;
+        Link {
+            scene: SceneText::of(player.wanted()),
+            log: player.log().clone(),
+            steps: Some(player.steps()),
+            time: Some(player.pacer.shown()),
+            hash: Some(player.simulation().state_hash()),
+            time_scale: Some(player.pacer.scale()),
+            camera: self.viewport.pose(),
+            magnification: Some(self.viewport.options.magnification),
+            playing: Some(player.is_playing()),
+            version: Some(crate::VERSION.to_owned()),
+        }
+    }
+
+    /// The present state as the fragment of a URL, whatever its length and without the `#`: for a page that has to start
+    /// again. [`super::AppOptions::from_link`] takes it back.
+    pub fn share_state(&self) -> String {
+        self.link().format()
+    }
+
+    /// Copies a link to the present state.
+    pub fn copy_link(&mut self, ctx: &egui::Context) {
+        match self.link().format_short(self.player.wanted()) {
+            Ok((fragment, note)) => {
+                let link = format!("{}#{fragment}", self.host.address());
+                ctx.copy_text(link.clone());
+                self.host.shared(&link);
+                self.notice = Some(Notice::new(note.unwrap_or("Link copied".to_owned())));
+            }
+            Err(reason) => self.problem = Some(reason),
+        }
+    }
+
+    /// Opens the text of a scene file; on an error the running scene stays, the reason is shown and returned.
+    ///
+    /// # Errors
+    /// No text, or no scene.
+    pub fn open_bytes(&mut self, name: &str, bytes: Vec<u8>) -> Result<(), String> {
+        let opened = String::from_utf8(bytes)
+            .map_err(|_| format!("{name}: not a text file"))
+            .and_then(|text| {
+                Scene::parse(&text, Some(name), &[]).map_err(|error| error.to_string())
+            })
+            .and_then(|scene| self.show_scene(&scene));
+        self.problem = opened.clone().err();
+        opened
+    }
+
+    /// Lets the user choose a scene file.
+    pub(super) fn choose_file(&mut self) {
+        if !self.host.pick_file() {
+            self.dialog = Some(Dialog::Open {
+                path: String::new(),
+                error: None,
+            });
+        }
+    }
+
+    /// Files that were dropped, or chosen a while ago.
+    pub(super) fn receive_files(&mut self, ctx: &egui::Context) {
+        // The last of several dropped at once is the one that shows.
+        for file in ctx.input(|input| input.raw.dropped_files.clone()) {
+            self.host.read_dropped(file);
+        }
+        while let Some(file) = self.host.opened() {
+            match file.content {
+                // The reason is shown.
+                Ok(bytes) => drop(self.open_bytes(&file.name, bytes)),
+                Err(reason) => self.problem = Some(format!("{}: {reason}", file.name)),
+            }
+        }
+    }
+
+    /// Gives files to the host, or asks for a path first.
+    fn save(&mut self, files: Vec<SaveFile>) {
+        if self.host.asks_for_path() {
+            self.dialog = Some(Dialog::Save {
+                path: files.first().map_or(String::new(), |f| f.name.clone()),
+                files,
+                error: None,
+            });
+        } else {
+            match self.host.save(&files) {
+                Ok(done) => self.notice = Some(Notice::new(done)),
+                Err(reason) => self.problem = Some(reason),
+            }
+        }
+    }
+
+    /// The answer to [`Dialog::Save`].
+    pub(super) fn save_as(&mut self, path: String, files: Vec<SaveFile>) {
+        let suggested = files.first().map_or(String::new(), |f| f.name.clone());
+        let renamed: Vec<SaveFile> = files
+            .iter()
+            .map(|file| SaveFile {
+                // What belongs to the first file is named after it.
+                name: file.name.replacen(&suggested, &path, 1),
+                ..file.clone()
+            })
+            .collect();
+        match self.host.save(&renamed) {
+            Ok(done) => self.notice = Some(Notice::new(done)),
+            Err(reason) => {
+                self.dialog = Some(Dialog::Save {
+                    path,
+                    files,
+                    error: Some(reason),
+                });
+            }
+        }
+    }
+
+    /// Saves the scene file, the changes in it.
+    pub fn save_scene(&mut self) {
+        let scene = self.player.wanted();
+        match scene.to_toml() {
+            Ok(text) => {
+                let name = format!("{}.toml", scene.name);
+                self.save(vec![SaveFile {
+                    name,
+                    mime: "application/toml",
+                    bytes: text.into_bytes(),
+                }]);
+            }
+            Err(error) => self.problem = Some(format!("The scene cannot be saved: {error}")),
+        }
+    }
+
+    /// Saves what the plots recorded.
+    pub fn save_record(&mut self) {
+        let name = format!("{}.csv", self.file_stem());
+        let (rows, meta) = (record_csv(&self.player), meta(&self.player));
+        self.save(vec![
+            SaveFile {
+                name: name.clone(),
+                mime: "text/csv",
+                bytes: rows.into_bytes(),
+            },
+            SaveFile {
+                name: format!("{name}.meta.json"),
+                mime: "application/json",
+                bytes: meta.into_bytes(),
+            },
+        ]);
+    }
+
+    /// Saves a picture of the viewport, once it is back from the graphics adapter; nothing waits for it.
+    pub fn save_picture(&mut self, ctx: &egui::Context) {
+        self.capture = Some(Capture {
+            image: Arc::default(),
+            since: None,
+        });
+        ctx.request_repaint();
+    }
+
+    /// Asks for the picture that [`Self::save_picture`] is about, and takes it once it is there.
+    pub(super) fn receive_picture(&mut self, ctx: &egui::Context) {
+        let Some(capture) = &mut self.capture else {
+            return;
+        };
+        let now = ctx.input(|input| input.time);
+        let Some(since) = capture.since else {
+            capture.since = Some(now);
+            let (slot, waker) = (capture.image.clone(), ctx.clone());
+            ctx.request_screenshot(move |shot| {
+                *slot.lock().unwrap_or_else(PoisonError::into_inner) = Some(shot);
+                waker.request_repaint();
+            });
+            return;
+        };
+        let mut slot = capture.image.lock().unwrap_or_else(PoisonError::into_inner);
+        let shot = slot.take();
+        drop(slot);
+        let Some(shot) = shot else {
+            if now - since > PATIENCE {
+                self.capture = None;
+                self.problem = Some("The picture never came back from the graphics adapter".into());
+            }
+            ctx.request_repaint();
+            return;
+        };
+        self.capture = None;
+        let image = cut(&shot, self.picture_rect, ctx.pixels_per_point());
+        let described = describe(&self.player);
+        let software = format!("jointplay {}", crate::VERSION);
+        let texts = [
+            ("Software", software.as_str()),
+            ("Description", described.as_str()),
+        ];
+        match image.png(&texts) {
+            Ok(bytes) => self.save(vec![SaveFile {
+                name: format!("{}.png", self.file_stem()),
+                mime: "image/png",
+                bytes,
+            }]),
+            Err(error) => self.problem = Some(format!("The picture cannot be saved: {error}")),
+        }
+    }
+
+    /// Scene and time, for the names of files.
+    fn file_stem(&self) -> String {
+        let time = self.player.pacer.shown() * 1e3;
+        format!("{}-{time:.3}ms", self.player.scene().name)
+    }
+
+    /// What the application itself has to say, in a sentence; "" for nothing.
+    pub(super) fn news(&self) -> String {
+        if let Some(problem) = &self.problem {
+            // The rest is the line of the file with a mark under it.
+            return problem.lines().next().unwrap_or("").to_owned();
+        }
+        if self.replay.is_some() {
+            return "Reproducing the state of the link".to_owned();
+        }
+        match (&self.notice, &self.verdict) {
+            (Some(notice), _) => notice.text.clone(),
+            (None, Some(verdict)) => verdict_words(verdict),
+            (None, None) => String::new(),
+        }
+    }
+}
+
+/// A verdict in a sentence.
+pub fn verdict_words(verdict: &Verdict) -> String {
+    match verdict {
+        Verdict::Agrees(hash) => format!("State reproduced: hash {hash:016x} agrees"),
+        Verdict::Differs {
+            expected,
+            found,
+            version,
+        } => {
+            let made = version.as_deref().unwrap_or("another version");
+            format!(
+                "State differs: hash {found:016x}, the link says {expected:016x}. It was made by version {made}, this is {}",
+                crate::VERSION
+            )
+        }
+        Verdict::Reached => "State of the link reached; it has no hash to compare with".to_owned(),
+        Verdict::Failed(reason) => format!("State of the link not reproduced: {reason}"),
+    }
+}
+
+/// The record as a table: time, then the least and the greatest value of each channel since the row before; SI units.
+fn record_csv(player: &Player) -> String {
+    let mut text = String::from("t_s");
+    for channel in player.channels().list() {
+        let column = channel.column();
+        // Writing to a String cannot fail.
+        let _ = write!(text, ",{column}_min,{column}_max");
+    }
+    text.push('\n');
+    for (time, values) in player.history().rows(ROWS) {
+        let _ = write!(text, "{time:.9e}");
+        for (least, greatest) in values {
+            let _ = write!(text, ",{least:e},{greatest:e}");
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// What made the record.
+fn meta(player: &Player) -> String {
+    let scene = player.scene();
+    let word = |key: &str| match scene.get(key) {
+        Ok(Value::Choice(word)) => word,
+        _ => "-",
+    };
+    let changed: Map<String, serde_json::Value> = scene
+        .changes
+        .iter()
+        .map(|(key, value)| (key.clone(), json!(value)))
+        .collect();
+    let link = Link {
+        scene: SceneText::of(player.wanted()),
+        log: player.log().clone(),
+        steps: Some(player.steps()),
+        hash: Some(player.simulation().state_hash()),
+        ..Link::default()
+    };
+    let meta = json!({
+        "program": "jointplay",
+        "version": crate::VERSION,
+        "scene": scene.name,
+        "scene_file": scene.source.file,
+        "changed_parameters": changed,
+        "formulation": word("formulation"),
+        "method": word("solver.method"),
+        "step_s": scene.solver.step,
+        "tolerance": scene.solver.tolerance,
+        "time_s": player.simulation().time(),
+        "state_hash": format!("{:016x}", player.simulation().state_hash()),
+        "link": link.format(),
+    });
+    format!("{meta:#}\n")
+}
+
+/// What a picture shows, for its own text; letters that PNG cannot hold are replaced.
+fn describe(player: &Player) -> String {
+    let mut words = format!(
+        "{} at t = {} s, state hash {:016x}",
+        player.scene().name,
+        player.pacer.shown(),
+        player.simulation().state_hash()
+    );
+    for (key, value) in &player.scene().changes {
+        let _ = write!(words, ", {key} = {value}");
+    }
+    let latin = |c: char| if u32::from(c) < 256 { c } else { '?' };
+    words.chars().map(latin).collect()
+}
+
+/// The part of a picture of the whole window that `rect`, points, covers.
+fn cut(shot: &ColorImage, rect: Rect, scale: f32) -> Image {
+    let pixel = |point: f32, most: usize| ((point * scale).round().max(0.0) as usize).min(most);
+    let [width, height] = shot.size;
+    let (left, right) = (pixel(rect.left(), width), pixel(rect.right(), width));
+    let (top, bottom) = (pixel(rect.top(), height), pixel(rect.bottom(), height));
+    let mut rgba = Vec::with_capacity(4 * right.saturating_sub(left) * bottom.saturating_sub(top));
+    for row in top..bottom {
+        for pixel in &shot.pixels[row * width + left..row * width + right.max(left)] {
+            rgba.extend([pixel.r(), pixel.g(), pixel.b(), 255]);
+        }
+    }
+    Image {
+        width: right.saturating_sub(left) as u32,
+        height: bottom.saturating_sub(top) as u32,
+        rgba,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::Quantity;
+
+    fn player(scene: &str) -> Player {
+        Player::new(&Scene::load(scene, &[]).expect("built in")).expect("starts")
+    }
+
+    #[test]
+    fn the_record_has_a_row_for_each_instant_and_holds_the_peak() {
+        let mut player = player("spcmm");
+        player.run_to(9e-3);
+        player.advance(0.0);
+        // On show is now the end of the record.
+        player.single_step();
+        let text = record_csv(&player);
+        let mut lines = text.lines();
+        let header: Vec<&str> = lines.next().expect("a header").split(',').collect();
+        assert_eq!(header.len(), 1 + 2 * player.channels().len());
+        let column = |name: &str| header.iter().position(|h| *h == name).expect("a column");
+        let (peak, least) = (column("S1_normal_N_max"), column("S1_normal_N_min"));
+        let rows: Vec<Vec<f64>> = lines
+            .map(|line| {
+                line.split(',')
+                    .map(|v| v.parse().expect("a number"))
+                    .collect()
+            })
+            .collect();
+        assert!((50..=ROWS).contains(&rows.len()), "{}", rows.len());
+        assert!(rows.windows(2).all(|pair| pair[0][0] < pair[1][0]));
+        assert!(
+            rows.iter()
+                .all(|row| row.len() == header.len() && row[least] <= row[peak])
+        );
+        let strongest = rows.iter().map(|row| row[peak]).fold(0.0, f64::max);
+        let in_record = player.simulation().statistics().peak_normal[0];
+        assert!(
+            (strongest / in_record - 1.0).abs() < 1e-6,
+            "{strongest} {in_record}"
+        );
+        let last = rows.last().expect("rows");
+        let channels = player.channels().list();
+        let x = channels
+            .iter()
+            .position(|c| c.quantity == Quantity::Position);
+        let shown = player.frame().pose.position.x;
+        let x = last[2 + 2 * x.expect("recorded")];
+        assert!((x / shown - 1.0).abs() < 1e-5, "{x} {shown}");
+        let meta: serde_json::Value = serde_json::from_str(&meta(&player)).expect("JSON");
+        assert_eq!(meta["method"], "automatic");
+        let link = Link::parse(meta["link"].as_str().expect("a text")).expect("a link");
+        assert_eq!(link.steps, Some(player.steps()));
+    }
+
+    #[test]
+    fn the_part_of_the_window_that_is_cut_out_stays_inside_it() {
+        let pixels = (0..12 * 8)
+            .map(|i| egui::Color32::from_rgb(i, 0, 0))
+            .collect();
+        let shot = ColorImage::new([12, 8], pixels);
+        let rect = |x0, y0, x1, y1| Rect::from_min_max(egui::pos2(x0, y0), egui::pos2(x1, y1));
+        let image = cut(&shot, rect(1.0, 2.0, 3.0, 3.0), 2.0);
+        assert_eq!((image.width, image.height), (4, 2));
+        assert_eq!(&image.rgba[..4], [4 * 12 + 2, 0, 0, 255]);
+        let image = cut(&shot, rect(-5.0, 0.0, 99.0, 99.0), 2.0);
+        assert_eq!((image.width, image.height), (12, 8));
+        assert_eq!(cut(&shot, rect(50.0, 50.0, 60.0, 60.0), 1.0).rgba.len(), 0);
+    }
+}

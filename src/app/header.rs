@@ -1,0 +1,217 @@
+//! The bar at the top, its menus, and the strips below it.
+
+use eframe::egui::{self, ComboBox, Frame, Panel, RichText, ThemePreference, Ui};
+
+use super::App;
+use super::dialogs::Dialog;
+use super::files::verdict_words;
+use super::replay::Verdict;
+use crate::scene::BUILT_IN;
+
+impl App {
+    pub(super) fn header(&mut self, ui: &mut Ui, compact: bool) {
+        ui.horizontal(|ui| {
+            if !compact {
+                ui.label(RichText::new("Jointplay").heading().strong());
+                ui.add_space(8.0);
+            }
+            self.scene_box(ui, compact);
+            if compact {
+                ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                    ui.menu_button("Menu", |ui| self.menu(ui))
+                        .response
+                        .on_hover_text("Open, save, share, theme, keys");
+                });
+                return;
+            }
+            if ui
+                .button("Open…")
+                .on_hover_text("Open a scene file")
+                .clicked()
+            {
+                self.choose_file();
+            }
+            ui.menu_button("Save", |ui| self.save_menu(ui))
+                .response
+                .on_hover_text("Save a picture, the record or the scene");
+            self.link_button(ui);
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                if ui
+                    .button("?")
+                    .on_hover_text("Keys (?)")
+                    .accessible_name("Keys")
+                    .clicked()
+                {
+                    self.dialog = Some(Dialog::Help);
+                }
+                // What does not fit is left out rather than laid over the rest; a key stands for the theme.
+                let room = ui.available_width();
+                if room > 80.0 && ui.button("About").clicked() {
+                    self.dialog = Some(Dialog::About);
+                }
+                if room > 200.0 {
+                    theme_box(ui);
+                }
+            });
+        });
+    }
+
+    fn scene_box(&mut self, ui: &mut Ui, compact: bool) {
+        let name = self.player.scene().name.clone();
+        let mut wanted = None;
+        ComboBox::from_id_salt("scene")
+            .width(if compact { 150.0 } else { 170.0 })
+            .selected_text(&name)
+            .show_ui(ui, |ui| {
+                for built_in in BUILT_IN {
+                    if ui.selectable_label(name == built_in, built_in).clicked() {
+                        wanted = Some(built_in);
+                    }
+                }
+            })
+            .response
+            .on_hover_text(&self.player.scene().title)
+            .accessible_name("Scene");
+        if let Some(wanted) = wanted {
+            self.problem = self.open(wanted).err();
+        }
+    }
+
+    fn link_button(&mut self, ui: &mut Ui) {
+        let help =
+            "Copies a link that opens this scene in this state, with every change made on the way";
+        if ui.button("Copy link").on_hover_text(help).clicked() {
+            self.copy_link(ui.ctx());
+        }
+    }
+
+    fn save_menu(&mut self, ui: &mut Ui) {
+        if ui
+            .button("Picture…")
+            .on_hover_text("The 3D view as it is, PNG")
+            .clicked()
+        {
+            self.save_picture(ui.ctx());
+        }
+        if ui
+            .button("Record…")
+            .on_hover_text("What the plots recorded since the reset, CSV")
+            .clicked()
+        {
+            self.save_record();
+        }
+        if ui
+            .button("Scene…")
+            .on_hover_text("The scene file with the changed values in it, TOML")
+            .clicked()
+        {
+            self.save_scene();
+        }
+    }
+
+    /// Everything that has no room in a small header.
+    fn menu(&mut self, ui: &mut Ui) {
+        ui.set_min_width(180.0);
+        if ui
+            .button("Open…")
+            .on_hover_text("Open a scene file")
+            .clicked()
+        {
+            self.choose_file();
+        }
+        self.link_button(ui);
+        ui.separator();
+        ui.label(RichText::new("Save").small().weak());
+        self.save_menu(ui);
+        ui.separator();
+        theme_box(ui);
+        if ui.button("Keys").on_hover_text("Keys (?)").clicked() {
+            self.dialog = Some(Dialog::Help);
+        }
+        if ui.button("About").clicked() {
+            self.dialog = Some(Dialog::About);
+        }
+    }
+
+    /// What went wrong, how far a link has come, and what became of it.
+    pub(super) fn strips(&mut self, ui: &mut Ui, bar: Frame) {
+        if let Some(problem) = self.problem.clone() {
+            let colour = ui.visuals().error_fg_color;
+            if strip(ui, bar, "problem", &problem, colour) {
+                self.problem = None;
+            }
+        }
+        if let Some(replay) = &self.replay {
+            let fraction = replay.fraction(&self.player);
+            let mut cancelled = false;
+            Panel::top("replay").frame(bar).show(ui, |ui| {
+                ui.horizontal_wrapped(|ui| {
+                    let percent = (fraction * 100.0).floor();
+                    ui.label(format!("Reproducing the state of the link… {percent} %"));
+                    ui.add(egui::ProgressBar::new(fraction).desired_width(120.0));
+                    cancelled = ui
+                        .button("Stop here")
+                        .on_hover_text("Stay at the time that the run has reached (Esc)")
+                        .clicked();
+                });
+            });
+            if cancelled {
+                self.cancel_replay();
+            }
+        }
+        if let Some(verdict) = &self.verdict {
+            let colour = match verdict {
+                Verdict::Agrees(_) => ui.visuals().selection.stroke.color,
+                Verdict::Reached => ui.visuals().weak_text_color(),
+                Verdict::Differs { .. } => ui.visuals().warn_fg_color,
+                Verdict::Failed(_) => ui.visuals().error_fg_color,
+            };
+            if strip(ui, bar, "verdict", &verdict_words(verdict), colour) {
+                self.verdict = None;
+            }
+        }
+    }
+}
+
+/// A coloured strip with a sentence; whether it was dismissed.
+fn strip(ui: &mut Ui, bar: Frame, id: &'static str, words: &str, colour: egui::Color32) -> bool {
+    Panel::top(id)
+        .frame(bar.fill(colour.gamma_multiply(0.14)))
+        .show(ui, |ui| {
+            ui.horizontal_wrapped(|ui| {
+                ui.label(RichText::new(words).color(colour));
+                ui.button("Dismiss").clicked()
+            })
+            .inner
+        })
+        .inner
+}
+
+/// Light, dark or as the system asks.
+fn theme_box(ui: &mut Ui) {
+    let label = |preference| match preference {
+        ThemePreference::System => "System theme",
+        ThemePreference::Light => "Light",
+        ThemePreference::Dark => "Dark",
+    };
+    let mut preference = ui.ctx().options(|options| options.theme_preference);
+    let before = preference;
+    ComboBox::from_id_salt("theme")
+        .width(104.0)
+        .selected_text(label(preference))
+        .show_ui(ui, |ui| {
+            for choice in [
+                ThemePreference::System,
+                ThemePreference::Light,
+                ThemePreference::Dark,
+            ] {
+                ui.selectable_value(&mut preference, choice, label(choice));
+            }
+        })
+        .response
+        .on_hover_text("Light or dark (key T)")
+        .accessible_name("Theme");
+    if preference != before {
+        ui.ctx().set_theme(preference);
+    }
+}

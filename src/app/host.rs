@@ -1,0 +1,165 @@
+//! What the application asks of the place it runs in: a desktop window or a web page.
+
+use std::sync::Arc;
+
+use eframe::egui;
+
+/// A file to be saved, with what describes it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SaveFile {
+    /// Name, as suggested by the application or as the user has changed it; on the desktop a path.
+    pub name: String,
+    /// Media type.
+    pub mime: &'static str,
+    /// Content.
+    pub bytes: Vec<u8>,
+}
+
+/// A file that the user chose or dropped.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct OpenedFile {
+    /// Its name.
+    pub name: String,
+    /// Its content, or why it could not be read.
+    pub content: Result<Vec<u8>, String>,
+}
+
+/// Services of the desktop or the page. The application works without any ([`NoHost`]).
+///
+/// Nothing here waits: what takes time is answered later through [`Self::opened`], after which the host asks egui for a
+/// repaint.
+pub trait Host {
+    /// Address that a share link's fragment is hung on; "" gives out the fragment alone.
+    fn address(&self) -> String {
+        String::new()
+    }
+
+    /// A link was made and is on the clipboard: put it where links stand, say the address bar.
+    fn shared(&mut self, _link: &str) {}
+
+    /// Whether the user is to be asked for a path before [`Self::save`]; else the host gives the files their places.
+    fn asks_for_path(&self) -> bool {
+        false
+    }
+
+    /// Saves `files`; the answer says where they are.
+    ///
+    /// # Errors
+    /// Why not, in words.
+    fn save(&mut self, _files: &[SaveFile]) -> Result<String, String> {
+        Err("Files cannot be saved here".to_owned())
+    }
+
+    /// Lets the user choose a scene file; false where the application is to ask for a path instead.
+    fn pick_file(&mut self) -> bool {
+        false
+    }
+
+    /// Reads a dropped file, now or later.
+    fn read_dropped(&mut self, file: Arc<dyn egui::DroppedFile + Send + Sync>);
+
+    /// The next file that was chosen, or dropped and read.
+    fn opened(&mut self) -> Option<OpenedFile>;
+
+    /// Something worth telling somebody who does not see the picture; the same sentences are in the accessibility tree.
+    fn announce(&mut self, _text: &str) {}
+}
+
+/// Nothing to ask: headless frames and tests.
+#[derive(Debug, Default)]
+pub struct NoHost;
+
+impl Host for NoHost {
+    fn read_dropped(&mut self, _file: Arc<dyn egui::DroppedFile + Send + Sync>) {}
+
+    fn opened(&mut self) -> Option<OpenedFile> {
+        None
+    }
+}
+
+#[cfg(not(target_arch = "wasm32"))]
+pub use desktop::DesktopHost;
+
+#[cfg(not(target_arch = "wasm32"))]
+mod desktop {
+    use std::collections::VecDeque;
+    use std::io::Write as _;
+    use std::path::Path;
+    use std::sync::Arc;
+
+    use eframe::egui;
+
+    use super::{Host, OpenedFile, SaveFile};
+
+    /// Files of the desktop.
+    #[derive(Debug, Default)]
+    pub struct DesktopHost {
+        opened: VecDeque<OpenedFile>,
+    }
+
+    impl Host for DesktopHost {
+        fn asks_for_path(&self) -> bool {
+            true
+        }
+
+        fn save(&mut self, files: &[SaveFile]) -> Result<String, String> {
+            for file in files {
+                let path = Path::new(&file.name);
+                let cannot = |why: String| format!("cannot write {}: {why}", path.display());
+                if path.file_name().is_none() || path.is_dir() {
+                    return Err(cannot("it names a folder".to_owned()));
+                }
+                if path.symlink_metadata().is_ok() {
+                    return Err(cannot(
+                        "it is already there; choose another name".to_owned(),
+                    ));
+                }
+            }
+            for file in files {
+                write_whole(Path::new(&file.name), &file.bytes)?;
+            }
+            let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
+            Ok(format!("Saved {}", names.join(" and ")))
+        }
+
+        fn read_dropped(&mut self, file: Arc<dyn egui::DroppedFile + Send + Sync>) {
+            self.opened.push_back(OpenedFile {
+                name: file.path().display().to_string(),
+                content: file.bytes(),
+            });
+        }
+
+        fn opened(&mut self) -> Option<OpenedFile> {
+            self.opened.pop_front()
+        }
+    }
+
+    /// Writes beside the final name, then renames: the file appears whole or not at all.
+    fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), String> {
+        let cannot = |error: &std::io::Error| {
+            // tempfile adds the name of its own scratch file, which helps nobody.
+            let text = error.to_string();
+            let cause = text.split(" at path ").next().unwrap_or(&text).to_owned();
+            format!("cannot write {}: {cause}", path.display())
+        };
+        let folder = match path.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => folder,
+            _ => Path::new("."),
+        };
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".jointplay-");
+        // Temporary files are private by default; an output file follows the user's umask as any other.
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            builder.permissions(std::fs::Permissions::from_mode(0o666));
+        }
+        let mut scratch = builder.tempfile_in(folder).map_err(|e| cannot(&e))?;
+        scratch.write_all(bytes).map_err(|e| cannot(&e))?;
+        scratch.as_file().sync_all().map_err(|e| cannot(&e))?;
+        scratch
+            .persist_noclobber(path)
+            .map_err(|e| cannot(&e.error))?;
+        Ok(())
+    }
+}

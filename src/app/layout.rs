@@ -1,0 +1,327 @@
+//! Where everything goes: side by side on a large window; on a small one the picture, and a sheet that folds away.
+
+use eframe::egui::{self, CentralPanel, Frame, Panel, RichText, ScrollArea, Ui};
+
+use super::{App, theme, transport};
+
+/// Below this width or height the window is small, points.
+const NARROW: f32 = 760.0;
+const SHORT: f32 = 480.0;
+
+/// Arrangement of the window.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Arrangement {
+    /// Panels beside and below the picture.
+    Large,
+    /// Picture above, sheet below.
+    Upright,
+    /// Picture on the left, sheet on the right.
+    Lying,
+}
+
+/// What the sheet of a small window shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sheet {
+    /// Parameters.
+    Controls,
+    /// Plots.
+    Plots,
+}
+
+impl App {
+    /// Everything, in whatever space there is.
+    pub fn show(&mut self, ui: &mut Ui) {
+        let size = ui.available_size();
+        let arrangement = if size.y < SHORT {
+            Arrangement::Lying
+        } else if size.x < NARROW {
+            Arrangement::Upright
+        } else {
+            Arrangement::Large
+        };
+        let compact = arrangement != Arrangement::Large;
+        self.compact = compact;
+        self.touched |= ui.input(|input| input.has_touch_screen());
+        let fingers = compact || self.touched;
+        if self.fingers != Some(fingers) {
+            // Of the next pass: all of one pass has one size.
+            theme::apply_size(ui.ctx(), fingers);
+            self.fingers = Some(fingers);
+            ui.ctx().request_discard("controls of another size");
+        }
+        self.summary(ui);
+        let margin = if arrangement == Arrangement::Lying {
+            egui::Margin::symmetric(12, 4)
+        } else {
+            egui::Margin::symmetric(12, 8)
+        };
+        let bar = Frame::side_top_panel(ui.style()).inner_margin(margin);
+        Panel::top("header")
+            .frame(bar)
+            .show(ui, |ui| self.header(ui, compact));
+        self.strips(ui, bar);
+        match arrangement {
+            Arrangement::Large => self.side_by_side(ui, bar),
+            Arrangement::Upright => self.upright(ui, bar),
+            Arrangement::Lying => self.lying(ui, bar),
+        }
+        self.dialog_ui(ui.ctx());
+    }
+
+    fn side_by_side(&mut self, ui: &mut Ui, bar: Frame) {
+        let free = self.replay.is_none();
+        let Self {
+            player,
+            controls,
+            plots,
+            show_controls,
+            show_plots,
+            ..
+        } = self;
+        Panel::left("controls")
+            .frame(bar)
+            .default_size(300.0)
+            .size_range(240.0..=480.0)
+            .show_collapsible(ui, show_controls, |ui| {
+                ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+                    // Room for the scroll bar beside the fields.
+                    ui.set_max_width(ui.available_width() - 10.0);
+                    ui.spacing_mut().item_spacing.y = 5.0;
+                    ui.add_enabled_ui(free, |ui| controls.ui(ui, player));
+                });
+            });
+        Panel::bottom("plots")
+            .frame(bar)
+            .resizable(true)
+            .default_size(230.0)
+            .size_range(150.0..=600.0)
+            .show_collapsible(ui, show_plots, |ui| {
+                // Else the panel would shrink to what the plots leave of it.
+                ui.take_available_space();
+                plots.header(ui, player);
+                plots.ui(ui, player);
+            });
+        let asked = Panel::bottom("transport")
+            .frame(bar)
+            .show(ui, |ui| {
+                ui.add_enabled_ui(free, |ui| transport::ui(ui, player))
+                    .inner
+            })
+            .inner;
+        let stop = CentralPanel::no_frame()
+            .show(ui, |ui| self.picture(ui))
+            .inner;
+        if asked.or(stop).is_some() {
+            self.reset();
+        }
+    }
+
+    fn upright(&mut self, ui: &mut Ui, bar: Frame) {
+        if self.sheet.is_some() {
+            let height = (ui.available_height() * 0.42).max(160.0);
+            Panel::bottom("sheet")
+                .frame(bar)
+                .exact_size(height)
+                .show(ui, |ui| self.sheet(ui));
+        }
+        let free = self.replay.is_none();
+        let asked = Panel::bottom("transport")
+            .frame(bar)
+            .show(ui, |ui| {
+                let asked = ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.player));
+                ui.horizontal(|ui| self.sheet_tabs(ui, false));
+                asked.inner
+            })
+            .inner;
+        let stop = CentralPanel::no_frame()
+            .show(ui, |ui| self.picture(ui))
+            .inner;
+        if asked.or(stop).is_some() {
+            self.reset();
+        }
+    }
+
+    fn lying(&mut self, ui: &mut Ui, bar: Frame) {
+        let free = self.replay.is_none();
+        let asked = Panel::bottom("transport")
+            .frame(bar)
+            .show(ui, |ui| {
+                ui.horizontal(|ui| {
+                    let room = ui.available_width() - 190.0;
+                    let asked = ui
+                        .allocate_ui(egui::vec2(room, ui.spacing().interact_size.y), |ui| {
+                            ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.player))
+                                .inner
+                        })
+                        .inner;
+                    let backwards = egui::Layout::right_to_left(egui::Align::Center);
+                    ui.with_layout(backwards, |ui| self.sheet_tabs(ui, true));
+                    asked
+                })
+                .inner
+            })
+            .inner;
+        if self.sheet.is_some() {
+            let width = (ui.available_width() * 0.42).clamp(260.0, 340.0);
+            Panel::right("sheet beside")
+                .frame(bar)
+                .resizable(false)
+                .exact_size(width)
+                .show(ui, |ui| self.sheet(ui));
+        }
+        let stop = CentralPanel::no_frame()
+            .show(ui, |ui| self.picture(ui))
+            .inner;
+        if asked.or(stop).is_some() {
+            self.reset();
+        }
+    }
+
+    /// What the sheet shows; the chosen one chosen again folds it away. `backwards` where the layout runs from right to
+    /// left.
+    fn sheet_tabs(&mut self, ui: &mut Ui, backwards: bool) {
+        let mut tabs = [
+            (Sheet::Controls, "Controls", "Parameters shown or hidden"),
+            (Sheet::Plots, "Plots", "Plots shown or hidden"),
+        ];
+        if backwards {
+            tabs.reverse();
+        }
+        for (sheet, name, help) in tabs {
+            let on = self.sheet == Some(sheet);
+            let tab = egui::Button::selectable(on, name);
+            if ui.add(tab).on_hover_text(help).clicked() {
+                self.fold(sheet);
+            }
+        }
+    }
+
+    /// Shows `sheet`, or folds it away where it is on show.
+    pub(super) fn fold(&mut self, sheet: Sheet) {
+        self.sheet = (self.sheet != Some(sheet)).then_some(sheet);
+    }
+
+    fn sheet(&mut self, ui: &mut Ui) {
+        let free = self.replay.is_none();
+        let Self {
+            player,
+            controls,
+            plots,
+            sheet,
+            ..
+        } = self;
+        ScrollArea::vertical()
+            .id_salt("sheet")
+            .auto_shrink(false)
+            .show(ui, |ui| {
+                ui.set_max_width(ui.available_width() - 10.0);
+                match sheet {
+                    Some(Sheet::Controls) => {
+                        ui.add_enabled_ui(free, |ui| controls.ui(ui, player));
+                    }
+                    Some(Sheet::Plots) => {
+                        plots.header(ui, player);
+                        let size = egui::vec2(ui.available_width(), 340.0);
+                        ui.allocate_ui(size, |ui| plots.ui(ui, player));
+                    }
+                    None => {}
+                }
+            });
+    }
+
+    /// The 3D view with its buttons and, after a stop, the reason.
+    fn picture(&mut self, ui: &mut Ui) -> Option<transport::Asked> {
+        let area = ui.max_rect();
+        self.picture_rect = area;
+        let plain = self.capture.is_some();
+        self.viewport.ui(ui, &self.player, plain);
+        if plain {
+            // A saved picture has no buttons in it.
+            return None;
+        }
+        let inner = area.shrink(10.0);
+        let narrow = area.width() < 520.0;
+        let row = egui::vec2(inner.width(), ui.spacing().interact_size.y);
+        let backwards = egui::Layout::right_to_left(egui::Align::Center);
+        let buttons = egui::UiBuilder::new()
+            .max_rect(egui::Rect::from_min_size(inner.min, row))
+            .layout(backwards);
+        ui.scope_builder(buttons, |ui| {
+            ui.menu_button("View options", |ui| {
+                ui.set_min_width(230.0);
+                if narrow {
+                    ui.horizontal_wrapped(|ui| self.viewport.camera_buttons(ui, false));
+                    ui.separator();
+                }
+                self.viewport.options_ui(ui);
+            });
+            if !narrow {
+                ui.with_layout(backwards, |ui| self.viewport.camera_buttons(ui, true));
+            }
+        });
+        self.settled_hint(ui, inner);
+        self.notice_plate(ui, inner);
+        let middle = egui::UiBuilder::new().max_rect(inner.shrink2(egui::vec2(0.0, 44.0)));
+        ui.scope_builder(middle, |ui| transport::banner(ui, &self.player))
+            .inner
+    }
+
+    /// What to do when nothing happens any more, in the middle of the lower edge.
+    fn settled_hint(&mut self, ui: &mut Ui, area: egui::Rect) {
+        let player = &self.player;
+        if self.hint_dismissed || !player.is_playing() || !player.has_settled() {
+            return;
+        }
+        let words = "Settled: R restarts";
+        let height = ui.spacing().interact_size.y;
+        let size = egui::vec2(160.0 + height, height);
+        let place = egui::Align2::CENTER_BOTTOM.align_size_within_rect(size, area);
+        let row = egui::UiBuilder::new()
+            .max_rect(place)
+            .layout(egui::Layout::left_to_right(egui::Align::Center));
+        let fill = ui.visuals().window_fill.gamma_multiply(0.8);
+        ui.painter().rect_filled(place, 6.0, fill);
+        ui.scope_builder(row, |ui| {
+            ui.add_space(8.0);
+            ui.label(RichText::new(words).weak())
+                .on_hover_text("No ball has struck its socket for 0.2 s of simulated time");
+            let close = ui
+                .add(
+                    egui::Button::new("×")
+                        .frame(false)
+                        .min_size(egui::Vec2::splat(height)),
+                )
+                .on_hover_text("Do not show this again")
+                .accessible_name("Dismiss the hint");
+            self.hint_dismissed |= close.clicked();
+        });
+    }
+
+    /// What was just done, for a few seconds.
+    fn notice_plate(&mut self, ui: &Ui, area: egui::Rect) {
+        let now = ui.input(|input| input.time);
+        let Some(notice) = &mut self.notice else {
+            return;
+        };
+        let left = notice.time_left(now);
+        if left <= 0.0 {
+            self.notice = None;
+            return;
+        }
+        ui.ctx()
+            .request_repaint_after(std::time::Duration::from_secs_f64(left));
+        let font = egui::TextStyle::Body.resolve(ui.style());
+        let colour = ui.visuals().text_color();
+        let width = (area.width() - 24.0).max(40.0);
+        let words = ui
+            .painter()
+            .layout(notice.text.clone(), font, colour, width);
+        let above = egui::vec2(0.0, ui.spacing().interact_size.y + 8.0);
+        let place = egui::Align2::CENTER_BOTTOM
+            .align_size_within_rect(words.size(), area.translate(-above));
+        let fill = ui.visuals().window_fill.gamma_multiply(0.92);
+        ui.painter()
+            .rect_filled(place.expand2(egui::vec2(10.0, 5.0)), 6.0, fill);
+        ui.painter().galley(place.min, words, colour);
+    }
+}

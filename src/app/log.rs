@@ -1,0 +1,145 @@
+//! What was done to a run since its start: enough to take the same steps again and get the same bits.
+//!
+//! A change happens between two steps, so the number of steps taken says exactly when. Sampling and drawing never change a
+//! step and are not in it.
+
+/// What happened between two steps.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Event {
+    /// A parameter was given a value, as a user writes it.
+    Set {
+        /// Key.
+        key: String,
+        /// Value.
+        value: String,
+    },
+    /// A parameter was given back the value of the scene's file.
+    Original {
+        /// Key.
+        key: String,
+    },
+    /// A step was tried and the divergence guard refused it.
+    Stop,
+}
+
+/// An event and the number of steps taken before it since the start.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// Accepted steps before it.
+    pub steps: u64,
+    /// What happened.
+    pub event: Event,
+}
+
+/// The start of a run and every event since.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Log {
+    /// Changes of the scene's file that the run started with, in order.
+    pub base: Vec<(String, String)>,
+    /// Events in order.
+    pub entries: Vec<Entry>,
+}
+
+impl Log {
+    /// An empty log of a run that starts with these changes.
+    pub fn new(base: &[(String, String)]) -> Self {
+        Self {
+            base: base.to_vec(),
+            entries: Vec::new(),
+        }
+    }
+
+    /// Adds a change of `key` to `value`.
+    pub fn set(&mut self, steps: u64, key: &str, value: &str) {
+        // One line for one event: line breaks separate no more than spaces do.
+        let value = value.split_whitespace().collect::<Vec<_>>().join(" ");
+        let key = key.to_owned();
+        self.push(steps, Event::Set { key, value });
+    }
+
+    /// Adds an event.
+    pub fn push(&mut self, steps: u64, event: Event) {
+        self.entries.push(Entry { steps, event });
+    }
+
+    /// The entries as text: a line each, with the steps since the line before.
+    pub fn text(&self) -> String {
+        let mut text = String::new();
+        let mut before = 0;
+        for entry in &self.entries {
+            let steps = entry.steps.saturating_sub(before);
+            before = entry.steps;
+            text.push_str(&match &entry.event {
+                Event::Set { key, value } => format!("{steps} {key}={value}\n"),
+                Event::Original { key } => format!("{steps} {key}\n"),
+                Event::Stop => format!("{steps} !\n"),
+            });
+        }
+        text
+    }
+
+    /// Reads what [`Self::text`] wrote.
+    ///
+    /// # Errors
+    /// The line that is none.
+    pub fn read(base: Vec<(String, String)>, text: &str) -> Result<Self, String> {
+        let mut log = Self {
+            base,
+            entries: Vec::new(),
+        };
+        let mut before = 0_u64;
+        for line in text.lines() {
+            let wrong = || {
+                let start: String = line.chars().take(60).collect();
+                format!("`{start}` is no line of a log")
+            };
+            let (steps, what) = line.split_once(' ').ok_or_else(wrong)?;
+            let more: u64 = steps.parse().map_err(|_| wrong())?;
+            before = before.checked_add(more).ok_or_else(wrong)?;
+            if what.is_empty() {
+                return Err(wrong());
+            }
+            log.push(
+                before,
+                match what.split_once('=') {
+                    Some((key, value)) => Event::Set {
+                        key: key.to_owned(),
+                        value: value.to_owned(),
+                    },
+                    None if what == "!" => Event::Stop,
+                    None => Event::Original {
+                        key: what.to_owned(),
+                    },
+                },
+            );
+        }
+        Ok(log)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_log_survives_as_text() {
+        let mut log = Log::new(&[("contact.friction".to_owned(), "0.2".to_owned())]);
+        log.set(0, "contact.clearance", " 0.5\n mm");
+        log.set(120, "joint.S1.clearance", "0.4 mm");
+        let key = "contact.clearance".to_owned();
+        log.push(120, Event::Original { key });
+        log.push(7_000_000_000, Event::Stop);
+        let text = log.text();
+        assert_eq!(text.lines().next(), Some("0 contact.clearance=0.5 mm"));
+        assert_eq!(Log::read(log.base.clone(), &text), Ok(log));
+        for bad in [
+            "x a=b",
+            "12",
+            "12 ",
+            "-1 a=b",
+            "1 a=b\n18446744073709551615 a=b",
+        ] {
+            assert!(Log::read(Vec::new(), bad).is_err(), "{bad}");
+        }
+    }
+}

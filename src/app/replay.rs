@@ -1,0 +1,333 @@
+//! Takes a run to the instant that a link names, a bounded share of each frame, and says whether the state is the same.
+
+use super::log::{Entry, Event};
+use super::player::Player;
+use super::share::Link;
+
+/// What became of a link.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// The state has the hash of the link.
+    Agrees(u64),
+    /// It has another.
+    Differs {
+        /// Hash of the link.
+        expected: u64,
+        /// Hash of the state.
+        found: u64,
+        /// Version of the program that made the link.
+        version: Option<String>,
+    },
+    /// The instant is reached; the link has no hash to compare with.
+    Reached,
+    /// It could not be reached, and why.
+    Failed(String),
+}
+
+/// A link on its way.
+#[derive(Debug)]
+pub struct Replay {
+    link: Link,
+    next: usize,
+}
+
+impl Replay {
+    /// The way to the instant of `link`; `None` where it names none.
+    pub fn new(link: Link) -> Option<Self> {
+        link.has_instant().then_some(Self { link, next: 0 })
+    }
+
+    /// The link.
+    pub fn link(&self) -> &Link {
+        &self.link
+    }
+
+    /// Part of the way that lies behind, 0 to 1.
+    pub fn fraction(&self, player: &Player) -> f32 {
+        let part = match (self.link.steps, self.link.time) {
+            (Some(steps), _) if steps > 0 => player.steps() as f64 / steps as f64,
+            (None, Some(time)) if time > 0.0 => player.simulation().time() / time,
+            _ => 1.0,
+        };
+        part.clamp(0.0, 1.0) as f32
+    }
+
+    /// Goes on while `may_step`; the verdict once it is there.
+    pub fn advance(
+        &mut self,
+        player: &mut Player,
+        mut may_step: impl FnMut() -> bool,
+    ) -> Option<Verdict> {
+        loop {
+            while let Some(entry) = self.due(player) {
+                self.next += 1;
+                if let Err(reason) = apply(player, &entry) {
+                    return Some(Verdict::Failed(reason));
+                }
+            }
+            if self.missed_stop(player) {
+                let reason = "the run does not stop where the link's run did";
+                return Some(Verdict::Failed(reason.to_owned()));
+            }
+            if self.is_there(player) {
+                return Some(self.arrive(player));
+            }
+            if !may_step() {
+                player.show(player.simulation().time());
+                return None;
+            }
+            if !player.replay_step() {
+                return Some(match self.due(player) {
+                    // As it was: the guard's refusal is itself the next event of the log.
+                    Some(Entry {
+                        event: Event::Stop, ..
+                    }) => {
+                        self.next += 1;
+                        continue;
+                    }
+                    _ if self.link.steps.is_none() => Verdict::Reached,
+                    _ => Verdict::Failed("the run stopped before it was there".to_owned()),
+                });
+            }
+        }
+    }
+
+    /// The next event, if it belongs between the steps taken and the next one. A stop is due only as the outcome of a step.
+    fn due(&self, player: &Player) -> Option<Entry> {
+        let entry = self.link.log.entries.get(self.next)?;
+        let stop_to_come = entry.event == Event::Stop && player.stopped().is_none();
+        (entry.steps <= player.steps() && !stop_to_come).then(|| entry.clone())
+    }
+
+    /// Whether a step was taken that the link's run was refused.
+    fn missed_stop(&self, player: &Player) -> bool {
+        self.link.log.entries.get(self.next).is_some_and(|entry| {
+            entry.event == Event::Stop && entry.steps < player.steps() && player.stopped().is_none()
+        })
+    }
+
+    fn is_there(&self, player: &Player) -> bool {
+        let events = self.next >= self.link.log.entries.len();
+        events
+            && match (self.link.steps, self.link.time) {
+                (Some(steps), _) => player.steps() >= steps,
+                (None, Some(time)) => player.simulation().time() >= time,
+                (None, None) => true,
+            }
+    }
+
+    fn arrive(&self, player: &mut Player) -> Verdict {
+        let time = self.link.time.unwrap_or(player.simulation().time());
+        player.show(time);
+        player.set_playing(self.link.playing == Some(true));
+        let found = player.simulation().state_hash();
+        match self.link.hash {
+            None => Verdict::Reached,
+            Some(expected) if expected == found => Verdict::Agrees(found),
+            Some(expected) => Verdict::Differs {
+                expected,
+                found,
+                version: self.link.version.clone(),
+            },
+        }
+    }
+}
+
+fn apply(player: &mut Player, entry: &Entry) -> Result<(), String> {
+    match &entry.event {
+        Event::Set { key, value } => player.set(key, value).map_err(|error| error.to_string())?,
+        Event::Original { key } => player
+            .set_original(key)
+            .map_err(|error| error.to_string())?,
+        // Taken by the step before.
+        Event::Stop => return Ok(()),
+    };
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::app::log::Log;
+    use crate::app::share::SceneText;
+    use crate::scene::Scene;
+
+    fn player(scene: &str) -> Player {
+        Player::new(&Scene::load(scene, &[]).expect("built in")).expect("starts")
+    }
+
+    /// A link to where `player` is, through its text.
+    fn link_to(player: &Player) -> Link {
+        let link = Link {
+            scene: SceneText::of(player.scene()),
+            log: player.log().clone(),
+            steps: Some(player.steps()),
+            time: Some(player.pacer.shown()),
+            hash: Some(player.simulation().state_hash()),
+            ..Link::default()
+        };
+        Link::parse(&link.format()).expect("a link")
+    }
+
+    /// Follows `link` in pieces of `piece` steps.
+    fn follow(link: Link, piece: u32) -> (Player, Verdict, u32) {
+        let mut player = Player::new(&link.load().expect("loads")).expect("starts");
+        let mut replay = Replay::new(link).expect("an instant");
+        for pieces in 1.. {
+            let mut left = piece;
+            let verdict = replay.advance(&mut player, || {
+                left = left.saturating_sub(1);
+                left > 0
+            });
+            if let Some(verdict) = verdict {
+                return (player, verdict, pieces);
+            }
+            assert!((0.0..1.0).contains(&replay.fraction(&player)));
+        }
+        unreachable!()
+    }
+
+    fn agrees(player: &Player) {
+        let link = link_to(player);
+        let (copy, verdict, pieces) = follow(link, 50);
+        assert_eq!(verdict, Verdict::Agrees(player.simulation().state_hash()));
+        assert_eq!(copy.log(), player.log(), "the copy's own link is the same");
+        assert_eq!(copy.pacer.shown().to_bits(), player.pacer.shown().to_bits());
+        assert!(pieces > 1, "in more than one frame");
+    }
+
+    #[test]
+    fn live_changes_of_every_kind_are_reproduced_bit_by_bit() {
+        for scene in ["spcmm", "pendulum", "slider-crank"] {
+            let mut original = player(scene);
+            original.set("contact.friction", "0.3").expect("in range");
+            original.pacer.set_scale(0.5);
+            original.set_playing(true);
+            let play = |original: &mut Player, frames: usize| {
+                for _ in 0..frames {
+                    original.advance(1.0 / 60.0);
+                }
+            };
+            play(&mut original, 4);
+            // Smaller than the ball's eccentricity: the wall closes in over many steps.
+            original
+                .set("contact.clearance", "0.1 mm")
+                .expect("in range");
+            play(&mut original, 3);
+            let joint = original.scene().ball_joints[0].name.clone();
+            let own = format!("joint.{joint}.clearance");
+            original.set(&own, "0.4 mm").expect("in range");
+            original.set_playing(false);
+            for _ in 0..9 {
+                original.single_step();
+            }
+            original.step_back();
+            original.step_back();
+            original
+                .set("solver.preset", "real-time")
+                .expect("a preset");
+            original
+                .set("solver.method", "rosenbrock")
+                .expect("a method");
+            original.set("gravity.y", "2 m/s^2").expect("in range");
+            original.set_playing(true);
+            play(&mut original, 3);
+            original
+                .set("solver.method", "automatic")
+                .expect("a method");
+            original
+                .set_original("contact.clearance")
+                .expect("the file's");
+            play(&mut original, 5);
+            assert!(original.log().entries.len() >= 8);
+            agrees(&original);
+            // The change comes at the end of a step whose beginning is on show.
+            original.pacer.set_scale(1e-4);
+            original.set_playing(true);
+            original.advance(1.0 / 60.0);
+            assert!(original.pacer.shown() < original.simulation().time());
+            original.set("contact.friction", "0.1").expect("in range");
+            agrees(&original);
+        }
+    }
+
+    #[test]
+    fn changes_before_a_reset_are_what_the_run_starts_with() {
+        let mut original = player("spcmm");
+        original.run_to(5e-3);
+        original
+            .set("contact.clearance", "0.5 mm")
+            .expect("in range");
+        original.set("spcmm.frequency", "0.4 Hz").expect("in range");
+        original.run_to(9e-3);
+        original.reset().expect("starts");
+        assert!(original.log().entries.is_empty());
+        assert_eq!(original.log().base.len(), 2);
+        original.run_to(40e-3);
+        // One that waits for the next reset travels, too.
+        original
+            .set("spcmm.frequency", "0.45 Hz")
+            .expect("in range");
+        agrees(&original);
+        let (copy, ..) = follow(link_to(&original), 50);
+        assert!(copy.is_waiting("spcmm.frequency"));
+    }
+
+    #[test]
+    fn a_run_that_the_guard_stopped_stops_again() {
+        let mut original = player("spcmm");
+        original.set("solver.method", "rk4").expect("a method");
+        original.set("solver.step", "1 ms").expect("in range");
+        original.run_to(0.5);
+        assert!(original.stopped().is_some());
+        original.set("solver.step", "10 us").expect("in range");
+        let (copy, verdict, _) = follow(link_to(&original), 5);
+        assert_eq!(verdict, Verdict::Agrees(original.simulation().state_hash()));
+        assert_eq!(copy.stopped(), original.stopped());
+
+        // Taken back, the refused step leaves no trace.
+        let mut original = player("spcmm");
+        original.set("solver.method", "rk4").expect("a method");
+        original.set("solver.step", "1 ms").expect("in range");
+        while original.stopped().is_none() {
+            original.single_step();
+        }
+        original.step_back();
+        assert!(original.stopped().is_none());
+        let events = original.log().entries.iter().map(|entry| &entry.event);
+        assert!(!events.clone().any(|event| *event == Event::Stop));
+        assert_eq!(
+            follow(link_to(&original), 5).1,
+            Verdict::Agrees(original.simulation().state_hash())
+        );
+    }
+
+    #[test]
+    fn another_state_or_a_wrong_event_is_told() {
+        let mut original = player("pendulum");
+        original.run_to(20e-3);
+        let mut link = link_to(&original);
+        link.steps = link.steps.map(|steps| steps + 1);
+        assert!(matches!(follow(link, 50).1, Verdict::Differs { .. }));
+
+        let mut link = link_to(&original);
+        link.log.set(3, "contact.clearance", "0.5 kg");
+        let Verdict::Failed(reason) = follow(link, 50).1 else {
+            panic!("a mass is no clearance");
+        };
+        assert!(reason.contains("wrong unit"), "{reason}");
+
+        let mut link = link_to(&original);
+        link.log.push(3, Event::Stop);
+        assert!(matches!(follow(link, 50).1, Verdict::Failed(_)));
+    }
+
+    #[test]
+    fn a_time_alone_is_reached_and_shown_exactly() {
+        let link = Link::parse("?scene=spcmm&c=0.5mm&t=9.5ms").expect("a link");
+        let (player, verdict, _) = follow(link, 5);
+        assert_eq!(verdict, Verdict::Reached);
+        assert_eq!(player.pacer.shown(), 9.5e-3);
+        assert_eq!(player.log(), &Log::new(&player.scene().changes));
+    }
+}

@@ -1,0 +1,737 @@
+//! Share links: a scene, what was changed in it, and how to take a run to the same instant again, as the query or the
+//! fragment of a URL.
+//!
+//! A link carries the log of a run and no state: what it holds is checked by the same table as anything a user types, a
+//! person can read and write it, and it outlives the program's inner layout. The price is the stepping from t = 0, which
+//! takes no longer than the run itself did. The state hash proves the result.
+
+use std::fmt::Write as _;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::URL_SAFE_NO_PAD as BASE64;
+
+use super::log::Log;
+use crate::scene::{DEFAULT_SCENE, Dimension, Scene, SceneError, built_in_text, parse_quantity};
+use crate::simulate::SCALE_RANGE;
+
+/// Longest link that is given out, characters: what mail, chats and every browser still pass on.
+pub const LONGEST_LINK: usize = 32_000;
+/// Longest link that is read, characters.
+const LONGEST_READ: usize = 1 << 20;
+/// Most bytes that a packed part of a link may unpack to.
+const LARGEST_UNPACKED: usize = 4 << 20;
+
+/// Short names of parameters.
+pub const ALIASES: [(&str, &str); 4] = [
+    ("c", "contact.clearance"),
+    ("cf", "contact.friction"),
+    ("ce", "contact.restitution"),
+    ("method", "solver.method"),
+];
+
+/// Words of a link that are no parameters.
+const WORDS: [&str; 13] = [
+    "scene",
+    "file",
+    "text",
+    "t",
+    "steps",
+    "hash",
+    "log",
+    "scale",
+    "camera",
+    "magnification",
+    "play",
+    "version",
+    "renderer",
+];
+
+/// A link that cannot be read: what is wrong and what is allowed.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{}{message}", place(.key, .value))]
+pub struct LinkError {
+    /// Word or key at fault; empty where it is the whole link.
+    pub key: String,
+    /// Value at fault, shortened.
+    pub value: String,
+    /// What is wrong and what is allowed.
+    pub message: String,
+}
+
+fn place(key: &str, value: &str) -> String {
+    match (key, value) {
+        ("", _) => "link: ".to_owned(),
+        (key, "") => format!("link: {key}: "),
+        (key, value) => format!("link: {key} = {value}: "),
+    }
+}
+
+/// Where the scene of a link comes from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum SceneText {
+    /// A built-in scene, by name.
+    BuiltIn(String),
+    /// A file that travels in the link.
+    File {
+        /// Its name, without folders.
+        name: String,
+        /// Its TOML text.
+        text: String,
+    },
+}
+
+/// Where the camera stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CameraPose {
+    /// Turn about the vertical, rad.
+    pub yaw: f32,
+    /// Height angle, rad.
+    pub pitch: f32,
+    /// Eye to target, m.
+    pub distance: f32,
+    /// What it looks at, m.
+    pub target: [f32; 3],
+}
+
+/// What a link says.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Link {
+    /// The scene.
+    pub scene: SceneText,
+    /// Changes that the run starts with, and what was changed on the way.
+    pub log: Log,
+    /// Steps to take; without it the run goes to `time`.
+    pub steps: Option<u64>,
+    /// Time to show, s.
+    pub time: Option<f64>,
+    /// Hash of the state after the last step.
+    pub hash: Option<u64>,
+    /// Simulated seconds per second.
+    pub time_scale: Option<f64>,
+    /// Point of view; without it everything is shown.
+    pub camera: Option<CameraPose>,
+    /// Magnification of the play.
+    pub magnification: Option<f32>,
+    /// Whether time passes once the state is there; where it is left out, only if the link names no instant.
+    pub playing: Option<bool>,
+    /// Version of the program that made the link.
+    pub version: Option<String>,
+}
+
+impl Default for Link {
+    fn default() -> Self {
+        Self {
+            scene: SceneText::BuiltIn(DEFAULT_SCENE.to_owned()),
+            log: Log::default(),
+            steps: None,
+            time: None,
+            hash: None,
+            time_scale: None,
+            camera: None,
+            magnification: None,
+            playing: None,
+            version: None,
+        }
+    }
+}
+
+impl Link {
+    /// Reads a whole URL, a query (`?…`), a fragment (`#…`) or the bare pairs. A fragment that names a scene stands for
+    /// itself; else the query's pairs come first and the fragment's win over them.
+    ///
+    /// # Errors
+    /// An unknown word, a value that is none, a packed part that does not unpack. Whether the scene has the parameters and
+    /// allows the values shows only in [`Self::load`].
+    pub fn parse(text: &str) -> Result<Self, LinkError> {
+        let text = text.trim();
+        if text.len() > LONGEST_READ {
+            return Err(fault(
+                "",
+                "",
+                format!("longer than {LONGEST_READ} characters"),
+            ));
+        }
+        let (before, fragment) = text.split_once('#').unwrap_or((text, ""));
+        let query = match before.split_once('?') {
+            Some((_, query)) => query,
+            // No URL: the pairs themselves, unless there is a fragment behind a plain address.
+            None if fragment.is_empty() && before.contains('=') => before,
+            None => "",
+        };
+        let pairs = |part: &str| -> Vec<(String, String)> {
+            form_urlencoded::parse(part.as_bytes())
+                .map(|(key, value)| (key.into_owned(), value.into_owned()))
+                .collect()
+        };
+        let (mut all, last) = (pairs(query), pairs(fragment));
+        if last.iter().any(|(key, _)| key == "scene" || key == "text") {
+            all.clear();
+        }
+        all.extend(last);
+        Self::from_pairs(&all)
+    }
+
+    fn from_pairs(pairs: &[(String, String)]) -> Result<Self, LinkError> {
+        let mut link = Self::default();
+        let (mut name, mut file, mut log) = (None, None, None);
+        let mut base: Vec<(String, String)> = Vec::new();
+        for (key, value) in pairs {
+            let value = value.trim();
+            let wrong = |message: &str| fault(key, value, message);
+            match key.as_str() {
+                "scene" => name = Some(value.to_owned()),
+                "file" => {
+                    let last = value.rsplit(['/', '\\']).next().unwrap_or(value);
+                    let clean: String = last.chars().filter(|c| !c.is_control()).collect();
+                    name = Some(clean);
+                }
+                "text" => file = Some(unpack(key, value)?),
+                "log" => log = Some(unpack(key, value)?),
+                "t" => {
+                    let time = parse_quantity(value, Dimension::Time)
+                        .map_err(|error| wrong(&error.to_string()))?;
+                    if time < 0.0 {
+                        return Err(wrong("must not be before the start; allowed 0 s and later"));
+                    }
+                    link.time = Some(time);
+                }
+                "steps" => {
+                    let steps = value.parse().map_err(|_| wrong("is no number of steps"))?;
+                    link.steps = Some(steps);
+                }
+                "hash" => {
+                    let hash = (value.len() == 16)
+                        .then(|| u64::from_str_radix(value, 16).ok())
+                        .flatten();
+                    link.hash =
+                        Some(hash.ok_or_else(|| {
+                            wrong("is no state hash: 16 digits, 0 to 9 and a to f")
+                        })?);
+                }
+                "scale" => link.time_scale = Some(read_scale(value).map_err(|m| wrong(&m))?),
+                "camera" => link.camera = Some(read_camera(value).map_err(|m| wrong(&m))?),
+                "magnification" => {
+                    let factor = value.parse::<f32>().ok();
+                    let fine = factor.filter(|factor| (1.0..=100.0).contains(factor));
+                    link.magnification = Some(fine.ok_or_else(|| wrong("allowed 1 to 100"))?);
+                }
+                "play" => {
+                    link.playing = Some(match value {
+                        "1" => true,
+                        "0" => false,
+                        _ => return Err(wrong("allowed 0 (paused) and 1 (playing)")),
+                    });
+                }
+                "version" => link.version = Some(value.chars().take(40).collect()),
+                // The page's own, and what other sites hang on to links.
+                "renderer" | "fbclid" | "gclid" => {}
+                other if other.starts_with("utm_") => {}
+                other => {
+                    let alias = ALIASES.iter().find(|(short, _)| *short == other);
+                    let full = alias.map_or(other, |(_, full)| full);
+                    if !full.contains('.') && full != "formulation" {
+                        return Err(fault(other, "", unknown(other)));
+                    }
+                    base.retain(|(before, _)| before != full);
+                    base.push((full.to_owned(), value.to_owned()));
+                }
+            }
+        }
+        link.log = match log {
+            Some(text) => Log::read(base, &text).map_err(|message| fault("log", "", message))?,
+            None => Log::new(&base),
+        };
+        let last = link.log.entries.last().map_or(0, |entry| entry.steps);
+        if last > 0 && link.steps.is_none_or(|steps| steps < last) {
+            return Err(fault("log", "", "goes on after the last step of the link"));
+        }
+        link.scene = match (file, name) {
+            (Some(text), name) => SceneText::File {
+                name: name.unwrap_or_else(|| "link.toml".to_owned()),
+                text,
+            },
+            (None, Some(name)) => {
+                if name.contains('/') || name.ends_with(".toml") {
+                    let message = "a link names a built-in scene; a file travels in `text`";
+                    return Err(fault("scene", &name, message));
+                }
+                SceneText::BuiltIn(name)
+            }
+            (None, None) => link.scene,
+        };
+        Ok(link)
+    }
+
+    /// The pairs, as a query or a fragment holds them, without the sign before it.
+    pub fn format(&self) -> String {
+        let mut out = form_urlencoded::Serializer::new(String::new());
+        let mut packed = Vec::new();
+        match &self.scene {
+            SceneText::BuiltIn(name) => {
+                out.append_pair("scene", name);
+            }
+            SceneText::File { name, text } => {
+                out.append_pair("file", name);
+                packed.push(("text", pack(text)));
+            }
+        }
+        for (key, value) in &self.log.base {
+            out.append_pair(key, value);
+        }
+        let mut add = |key: &str, value: Option<String>| {
+            if let Some(value) = value {
+                out.append_pair(key, &value);
+            }
+        };
+        // Shortest digits that read back to the same bits.
+        add("t", self.time.map(|time| format!("{time}s")));
+        add("steps", self.steps.map(|steps| steps.to_string()));
+        add("scale", self.time_scale.map(|scale| scale.to_string()));
+        add("camera", self.camera.map(write_camera));
+        add(
+            "magnification",
+            self.magnification.map(|factor| factor.to_string()),
+        );
+        add(
+            "play",
+            self.playing.map(|playing| u8::from(playing).to_string()),
+        );
+        add("version", self.version.clone());
+        add("hash", self.hash.map(|hash| format!("{hash:016x}")));
+        if !self.log.entries.is_empty() {
+            packed.push(("log", pack(&self.log.text())));
+        }
+        for (key, value) in packed {
+            out.append_pair(key, &value);
+        }
+        out.finish()
+    }
+
+    /// As [`Self::format`], short enough to pass on; with a note where something had to be left out.
+    ///
+    /// # Errors
+    /// A scene file that is too large to travel in a link, in words.
+    pub fn format_short(&self, wanted: &Scene) -> Result<(String, Option<String>), String> {
+        let whole = self.format();
+        if whole.len() <= LONGEST_LINK {
+            return Ok((whole, None));
+        }
+        let start = Self {
+            log: Log::new(&wanted.changes),
+            steps: None,
+            time: None,
+            hash: None,
+            playing: None,
+            ..self.clone()
+        }
+        .format();
+        if start.len() <= LONGEST_LINK {
+            let note = format!(
+                "This run has more changes than fit in a link of {LONGEST_LINK} characters ({}): the link starts the \
+                 scene with the values as they are now, at t = 0",
+                whole.len()
+            );
+            return Ok((start, Some(note)));
+        }
+        Err(format!(
+            "The scene file is too large for a link: {} characters packed, {LONGEST_LINK} fit. Save the scene file and pass \
+             it on instead",
+            start.len()
+        ))
+    }
+
+    /// The scene with the changes that the run starts with.
+    ///
+    /// # Errors
+    /// As [`Scene::load`].
+    pub fn load(&self) -> Result<Scene, SceneError> {
+        match &self.scene {
+            SceneText::BuiltIn(name) => Scene::load(name, &self.log.base),
+            SceneText::File { name, text } => Scene::parse(text, Some(name), &self.log.base),
+        }
+    }
+
+    /// Whether the link names an instant to go to.
+    pub fn has_instant(&self) -> bool {
+        self.steps.is_some()
+            || self.time.is_some()
+            || self.hash.is_some()
+            || !self.log.entries.is_empty()
+    }
+}
+
+impl SceneText {
+    /// Where `scene` comes from.
+    pub fn of(scene: &Scene) -> Self {
+        let text = &scene.source.text;
+        if built_in_text(&scene.name) == Some(text) {
+            return Self::BuiltIn(scene.name.clone());
+        }
+        let path = scene.source.file.as_deref().unwrap_or("scene.toml");
+        Self::File {
+            name: path.rsplit(['/', '\\']).next().unwrap_or(path).to_owned(),
+            text: text.clone(),
+        }
+    }
+}
+
+fn fault(key: &str, value: &str, message: impl Into<String>) -> LinkError {
+    let short = |text: &str| -> String {
+        let clean = text.chars().map(|c| if c.is_control() { ' ' } else { c });
+        let mut short: String = clean.take(60).collect();
+        if short.len() < text.len() {
+            short.push('…');
+        }
+        short
+    };
+    LinkError {
+        key: short(key),
+        value: short(value),
+        message: message.into(),
+    }
+}
+
+fn unknown(key: &str) -> String {
+    let short = ALIASES.iter().map(|(short, _)| *short);
+    let known: Vec<&str> = WORDS.into_iter().chain(short).collect();
+    let mut message = "unknown word".to_owned();
+    let parameter = crate::scene::table()
+        .iter()
+        .find(|parameter| parameter.key.rsplit('.').next() == Some(key));
+    if let Some(parameter) = parameter {
+        // Writing to a String cannot fail.
+        let _ = write!(message, "; did you mean `{}`?", parameter.key);
+    }
+    let _ = write!(
+        message,
+        "; allowed: {}, and every parameter by its key, for example contact.clearance",
+        known.join(", ")
+    );
+    message
+}
+
+fn read_scale(text: &str) -> Result<f64, String> {
+    let scale = match text.split_once(':') {
+        Some(("1", slower)) => slower.parse::<f64>().ok().map(|slower| 1.0 / slower),
+        Some(_) => None,
+        None => text.parse::<f64>().ok(),
+    };
+    let (least, greatest) = SCALE_RANGE;
+    scale
+        .filter(|scale| (least..=greatest).contains(scale))
+        .ok_or_else(|| format!("allowed {least} to {greatest}, or 1:1 to 1:{}", 1.0 / least))
+}
+
+fn read_camera(text: &str) -> Result<CameraPose, String> {
+    let numbers: Option<Vec<f32>> = text
+        .split([' ', ','])
+        .filter(|part| !part.is_empty())
+        .map(|part| part.parse().ok().filter(|number: &f32| number.is_finite()))
+        .collect();
+    let numbers = numbers.unwrap_or_default();
+    let steepest = std::f32::consts::FRAC_PI_2;
+    match numbers[..] {
+        [yaw, pitch, distance, x, y, z]
+            if yaw.abs() <= 1e3
+                && pitch.abs() <= steepest
+                && (1e-4..=1e4).contains(&distance)
+                && [x, y, z].iter().all(|part| part.abs() <= 1e4) =>
+        {
+            Ok(CameraPose {
+                yaw,
+                pitch,
+                distance,
+                target: [x, y, z],
+            })
+        }
+        _ => Err(
+            "is no camera: yaw and pitch (-1.57 to 1.57) in rad, distance (0.0001 to 10000) and target x, y, z \
+             (-10000 to 10000) in m"
+                .to_owned(),
+        ),
+    }
+}
+
+fn write_camera(camera: CameraPose) -> String {
+    let [x, y, z] = camera.target;
+    format!(
+        "{} {} {} {x} {y} {z}",
+        camera.yaw, camera.pitch, camera.distance
+    )
+}
+
+fn pack(text: &str) -> String {
+    BASE64.encode(miniz_oxide::deflate::compress_to_vec(text.as_bytes(), 9))
+}
+
+fn unpack(key: &str, packed: &str) -> Result<String, LinkError> {
+    let damaged = || fault(key, "", "does not unpack: the link is cut short or damaged");
+    let bytes = BASE64.decode(packed).map_err(|_| damaged())?;
+    let text = miniz_oxide::inflate::decompress_to_vec_with_limit(&bytes, LARGEST_UNPACKED)
+        .map_err(|_| damaged())?;
+    String::from_utf8(text).map_err(|_| damaged())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::app::log::Event;
+
+    /// Numbers that look random and are the same each time (splitmix64).
+    struct Chance(u64);
+
+    impl Chance {
+        fn next(&mut self) -> u64 {
+            self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+            let mut z = self.0;
+            z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            z ^ (z >> 31)
+        }
+
+        fn below(&mut self, end: u64) -> u64 {
+            self.next() % end
+        }
+
+        fn maybe<T>(&mut self, make: impl FnOnce(&mut Self) -> T) -> Option<T> {
+            (self.below(3) > 0).then(|| make(self))
+        }
+
+        fn unit(&mut self) -> f64 {
+            (self.next() >> 11) as f64 / (1_u64 << 53) as f64
+        }
+
+        fn text(&mut self, most: u64) -> String {
+            const LETTERS: [char; 14] = [
+                'a', 'Z', '0', ' ', '&', '=', '#', '?', '+', '%', '"', 'µ', '\n', '🦀',
+            ];
+            let length = 1 + self.below(most);
+            (0..length)
+                .map(|_| LETTERS[self.below(LETTERS.len() as u64) as usize])
+                .collect()
+        }
+
+        fn link(&mut self) -> Link {
+            let mut log = Log::default();
+            for index in 0..self.below(4) {
+                let value = format!("x{}x", self.text(9)).replace('\n', " ");
+                log.base.push((format!("contact.k{index}"), value));
+            }
+            let mut steps = 0;
+            for _ in 0..self.below(6) {
+                steps += self.below(1 << 40);
+                if self.below(2) == 0 {
+                    log.set(steps, "joint.S1.friction", &self.text(9));
+                } else {
+                    let key = "solver.preset".to_owned();
+                    log.push(steps, Event::Original { key });
+                }
+            }
+            Link {
+                scene: if self.below(2) == 0 {
+                    SceneText::BuiltIn("pendulum".to_owned())
+                } else {
+                    SceneText::File {
+                        name: format!("a{}.toml", self.text(6)).replace(['\n', '/'], "_"),
+                        text: self.text(300),
+                    }
+                },
+                log,
+                steps: Some(steps + self.below(100)),
+                time: self.maybe(|c| c.unit() * 1e3),
+                hash: self.maybe(Self::next),
+                time_scale: self.maybe(|c| 1e-4 + 0.9 * c.unit()),
+                camera: self.maybe(|c| CameraPose {
+                    yaw: c.unit() as f32,
+                    pitch: 1.5 - 3.0 * c.unit() as f32,
+                    distance: 0.1 + c.unit() as f32,
+                    target: [0; 3].map(|_| c.unit() as f32 - 0.5),
+                }),
+                magnification: self.maybe(|c| 1.0 + 99.0 * c.unit() as f32),
+                playing: self.maybe(|c| c.below(2) == 0),
+                version: self.maybe(|_| "0.1.0".to_owned()),
+            }
+        }
+    }
+
+    #[test]
+    fn every_link_reads_back_to_the_same_bits() {
+        let mut chance = Chance(1);
+        for _ in 0..500 {
+            let link = chance.link();
+            let text = link.format();
+            for form in [
+                text.clone(),
+                format!("?{text}"),
+                format!("#{text}"),
+                format!("https://example.org/lab/index.html?c=1mm&renderer=webgl#{text}"),
+            ] {
+                let read = Link::parse(&form).unwrap_or_else(|error| panic!("{error}\n{form}"));
+                assert_eq!(read, link, "{form}");
+                assert_eq!(
+                    read.time.map(f64::to_bits),
+                    link.time.map(f64::to_bits),
+                    "{form}"
+                );
+            }
+            assert!(
+                text.is_ascii() && !text.contains(['#', '?', ' ', '"']),
+                "{text}"
+            );
+        }
+    }
+
+    #[test]
+    fn no_text_whatever_makes_it_panic() {
+        let mut chance = Chance(2);
+        let mut read = 0;
+        for _ in 0..3000 {
+            let mut bytes = chance.link().format().into_bytes();
+            for _ in 0..=chance.below(4) {
+                let at = chance.below(bytes.len() as u64) as usize;
+                match chance.below(3) {
+                    0 => bytes[at] = chance.below(256) as u8,
+                    1 => bytes.truncate(at.max(1)),
+                    _ => bytes.insert(at, b"&=%#?-+0"[chance.below(8) as usize]),
+                }
+            }
+            if let Ok(link) = Link::parse(&String::from_utf8_lossy(&bytes)) {
+                read += 1;
+                // A scene of nonsense is refused in words.
+                assert!(link.load().is_err() || link.log.base.is_empty());
+            }
+            // Nor does anything else.
+            let _ = Link::parse(&chance.text(200));
+        }
+        assert!(read > 100, "{read} were links still");
+    }
+
+    #[test]
+    fn a_link_by_hand_takes_short_names_and_full_keys() {
+        let link =
+            Link::parse("?scene=pendulum&c=0.5mm&cf=0.2&ce=0.8&method=rk4&t=20ms&scale=1:50")
+                .expect("a link");
+        let scene = link.load().expect("the scene has these");
+        assert_eq!(scene.name, "pendulum");
+        assert_eq!(scene.contact.clearance, 0.5e-3);
+        assert_eq!(
+            (scene.contact.friction, scene.contact.restitution),
+            (0.2, 0.8)
+        );
+        assert_eq!(link.time, Some(0.02));
+        assert_eq!(link.time_scale, Some(0.02));
+        assert!(link.has_instant());
+
+        let link = Link::parse("joint.S1.clearance=0.5+mm&view.down=%2Bx").expect("a link");
+        assert_eq!(link.scene, SceneText::BuiltIn(DEFAULT_SCENE.to_owned()));
+        let scene = link.load().expect("the scene has these");
+        assert_eq!(scene.ball_joints[0].contact.clearance, 0.5e-3);
+        assert!(!link.has_instant());
+
+        // The fragment wins, and alone counts where it names a scene.
+        let both = |text: &str| Link::parse(text).expect("a link").log.base;
+        let clearance = |value: &str| vec![("contact.clearance".to_owned(), value.to_owned())];
+        assert_eq!(both("/?c=1mm#c=2mm"), clearance("2mm"));
+        assert_eq!(both("/?c=1mm#scene=pendulum"), Vec::new());
+        assert_eq!(both("http://localhost:1/a?c=1mm"), clearance("1mm"));
+        assert_eq!(both("http://localhost:1/a"), Vec::new());
+        assert_eq!(both(""), Vec::new());
+    }
+
+    #[test]
+    fn what_is_wrong_in_a_link_is_said() {
+        for (text, words) in [
+            (
+                "clearance=0.5mm",
+                "link: clearance: unknown word; did you mean `contact.clearance`?",
+            ),
+            ("scale=2", "link: scale = 2: allowed 0.0001 to 1"),
+            ("t=5", "link: t = 5: needs a unit"),
+            ("t=-5ms", "must not be before the start"),
+            ("steps=many", "is no number of steps"),
+            ("hash=12", "is no state hash"),
+            ("camera=1,2,3", "is no camera"),
+            ("camera=0,0,nan,0,0,0", "is no camera"),
+            ("magnification=1000", "allowed 1 to 100"),
+            ("play=yes", "allowed 0 (paused) and 1 (playing)"),
+            ("text=%%%", "does not unpack"),
+            ("log=AAAA", "does not unpack"),
+            ("scene=/etc/passwd", "a link names a built-in scene"),
+            ("scene=../mine.toml", "a link names a built-in scene"),
+        ] {
+            let error = Link::parse(text).expect_err(text).to_string();
+            assert!(error.contains(words), "{text}: {error}");
+        }
+        for (text, words) in [
+            ("scene=pendulun", "did you mean `pendulum`?"),
+            ("c=0.5", "contact.clearance = 0.5: needs a unit"),
+            ("c=-1mm", "out of range"),
+            (
+                "scene=pendulum&spcmm.frequency=1Hz",
+                "the scene `pendulum` has no such key",
+            ),
+            ("contact.clearence=1mm", "did you mean `contact.clearance`?"),
+        ] {
+            let error = Link::parse(text).expect("well formed").load();
+            let error = error.expect_err(text).to_string();
+            assert!(error.contains(words), "{text}: {error}");
+        }
+    }
+
+    #[test]
+    fn a_small_bomb_does_not_unpack() {
+        let zeros = "0".repeat(LARGEST_UNPACKED + 1);
+        let packed = pack(&zeros);
+        assert!(packed.len() < 10_000);
+        let error = Link::parse(&format!("text={packed}")).expect_err("too large");
+        assert!(error.to_string().contains("does not unpack"));
+        let long = "x".repeat(LONGEST_READ + 1);
+        assert!(Link::parse(&long).is_err());
+    }
+
+    #[test]
+    fn a_link_that_would_be_too_long_leaves_the_run_out_or_says_so() {
+        let mut chance = Chance(3);
+        let scene = Scene::load("pendulum", &[("contact.friction".into(), "0.3".into())])
+            .expect("built in");
+        let mut link = Link {
+            scene: SceneText::of(&scene),
+            steps: Some(1 << 40),
+            hash: Some(7),
+            ..Link::default()
+        };
+        for index in 0..8000 {
+            let value = format!("{} mm", chance.unit());
+            link.log.set(index, "contact.clearance", &value);
+        }
+        assert!(link.format().len() > LONGEST_LINK);
+        let (short, note) = link.format_short(&scene).expect("the start fits");
+        assert!(short.len() <= LONGEST_LINK && note.is_some());
+        let start = Link::parse(&short).expect("a link");
+        assert_eq!(start.log.base, scene.changes);
+        assert!(!start.has_instant() && start.hash.is_none());
+
+        let noise: String = (0..40_000)
+            .map(|_| char::from(b'a' + chance.below(26) as u8))
+            .collect();
+        link.scene = SceneText::File {
+            name: "mine.toml".to_owned(),
+            text: noise,
+        };
+        let error = link.format_short(&scene).expect_err("does not fit");
+        assert!(error.contains("too large for a link"), "{error}");
+    }
+
+    #[test]
+    fn a_built_in_scene_is_named_and_any_other_travels() {
+        let scene = Scene::load("chain", &[]).expect("built in");
+        assert_eq!(
+            SceneText::of(&scene),
+            SceneText::BuiltIn("chain".to_owned())
+        );
+        let text = format!("{}\n# mine\n", scene.source.text);
+        let mine = Scene::parse(&text, Some("/home/me/chain.toml"), &[]).expect("reads");
+        let name = "chain.toml".to_owned();
+        assert_eq!(SceneText::of(&mine), SceneText::File { name, text });
+    }
+}

@@ -1,0 +1,258 @@
+//! A scene back to TOML: the text it was read from, with the changed values in their places; comments and order stay.
+
+use toml_edit::{DocumentMut, Item, Table, Value as Toml, value};
+
+use super::{Kind, Scene, SceneError, Value};
+
+impl Scene {
+    /// The text of a scene file that reads to this scene, its changes included.
+    ///
+    /// # Errors
+    /// A change that the format has no place for: that of one joint of a chain.
+    pub fn to_toml(&self) -> Result<String, SceneError> {
+        let lost = |key: &str, message: String| SceneError {
+            key: Some(key.to_owned()),
+            message,
+            ..SceneError::default()
+        };
+        let mut document: DocumentMut = self
+            .source
+            .text
+            .parse()
+            .map_err(|error: toml_edit::TomlError| lost("", error.message().to_owned()))?;
+        for (key, _) in &self.changes {
+            self.write_change(&mut document, key)?;
+        }
+        let text = document.to_string();
+        // What was written is what was meant, or nothing is given out.
+        let read = Self::parse(&text, self.source.file.as_deref(), &[])?;
+        for (key, _) in &self.changes {
+            if read.get(key)? != self.get(key)? {
+                return Err(lost(key, "cannot be written to a scene file".to_owned()));
+            }
+        }
+        Ok(text)
+    }
+
+    fn write_change(&self, document: &mut DocumentMut, key: &str) -> Result<(), SceneError> {
+        let parameter = self.parameter(key)?;
+        let item = self.item(key)?;
+        if let Some((name, part)) = key
+            .strip_prefix("joint.")
+            .and_then(|rest| rest.rsplit_once('.'))
+        {
+            let joints = document.get_mut("ball_joint");
+            let placed = match joints {
+                Some(Item::ArrayOfTables(tables)) => {
+                    let own = |table: &&mut Table| text_of(table.get("name")) == Some(name);
+                    tables
+                        .iter_mut()
+                        .find(own)
+                        .map(|table| put(table, part, item))
+                }
+                Some(Item::Value(Toml::Array(array))) => array
+                    .iter_mut()
+                    .filter_map(Toml::as_inline_table_mut)
+                    .find(|table| table.get("name").and_then(Toml::as_str) == Some(name))
+                    .map(|table| {
+                        if let Item::Value(item) = item {
+                            table.insert(part, item);
+                        }
+                    }),
+                _ => None,
+            };
+            return placed.ok_or_else(|| SceneError {
+                key: Some(key.to_owned()),
+                message: "a scene file has no place for a value of one joint of a chain; reset it, or set it for all joints"
+                    .to_owned(),
+                ..SceneError::default()
+            });
+        }
+        match parameter.key.split_once('.') {
+            None => put(document.as_table_mut(), parameter.key, item),
+            Some((section, part)) => {
+                let fresh = !document.contains_key(section);
+                let table = document
+                    .entry(section)
+                    .or_insert_with(|| Item::Table(Table::new()));
+                // A section that names one component of gravity has 0 for the others.
+                if fresh && section == "gravity" {
+                    for part in ["x", "y", "z"] {
+                        place(table, part, self.item(&format!("gravity.{part}"))?);
+                    }
+                } else {
+                    place(table, part, item);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Present value of `key` as it stands in a file: pure numbers and counts bare, all else as a text.
+    fn item(&self, key: &str) -> Result<Item, SceneError> {
+        let parameter = self.parameter(key)?;
+        let now = self.get(key)?;
+        let text = parameter.write(&now);
+        let bare = matches!(parameter.kind, Kind::Number { display: "", .. })
+            || matches!(parameter.kind, Kind::Count { .. });
+        Ok(match (&now, text.parse::<Toml>()) {
+            (Value::Number(_) | Value::Count(_), Ok(number)) if bare => value(number),
+            _ => value(text),
+        })
+    }
+}
+
+/// Puts `item` into a section, which is a table or an inline one.
+fn place(section: &mut Item, name: &str, item: Item) {
+    match (section, item) {
+        (Item::Table(table), item) => put(table, name, item),
+        (Item::Value(Toml::InlineTable(table)), Item::Value(item)) => {
+            table.insert(name, item);
+        }
+        // The scene was read from this text: a section is a table.
+        _ => {}
+    }
+}
+
+/// Puts `item` into `table`; a comment behind the old value stays.
+fn put(table: &mut Table, name: &str, mut item: Item) {
+    if let (Some(old), Some(new)) = (
+        table.get(name).and_then(Item::as_value),
+        item.as_value_mut(),
+    ) {
+        *new.decor_mut() = old.decor().clone();
+    }
+    table.insert(name, item);
+}
+
+fn text_of(item: Option<&Item>) -> Option<&str> {
+    item.and_then(Item::as_str)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::table::{contact_part, find};
+    use crate::scene::{BUILT_IN, Scope, table};
+
+    fn scene(name: &str, changes: &[(&str, &str)]) -> Scene {
+        let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
+        let changes: Vec<(String, String)> = changes.iter().map(own).collect();
+        Scene::load(name, &changes).expect("in range")
+    }
+
+    /// Everything that the simulation reads.
+    fn bits(scene: &Scene) -> String {
+        let mut plain = scene.clone();
+        plain.changes.clear();
+        plain.source = Default::default();
+        for joint in &mut plain.ball_joints {
+            joint.overrides.sort_unstable();
+        }
+        format!("{plain:?}")
+    }
+
+    #[test]
+    fn a_scene_without_changes_is_its_own_text() {
+        for name in BUILT_IN {
+            let scene = scene(name, &[]);
+            assert_eq!(scene.to_toml().as_deref(), Ok(scene.source.text.as_str()));
+        }
+    }
+
+    #[test]
+    fn every_parameter_is_written_so_that_it_reads_back_to_the_same_scene() {
+        for name in BUILT_IN {
+            let plain = scene(name, &[]);
+            for parameter in plain.parameters() {
+                let other = match parameter.kind {
+                    // Inside every range, and no round number.
+                    Kind::Number { slider, .. } => {
+                        Value::Number(slider.0 + 0.377_123_456_789 * (slider.1 - slider.0))
+                    }
+                    Kind::Count { .. } => Value::Count(3),
+                    Kind::Choice(words) => Value::Choice(words[words.len() - 1]),
+                };
+                let mut keys = vec![parameter.key.to_owned()];
+                if let Some(part) = contact_part(parameter)
+                    && plain.chain.is_none()
+                {
+                    keys.push(format!("joint.{}.{part}", plain.ball_joints[0].name));
+                }
+                for key in keys {
+                    let mut changed = plain.clone();
+                    if let Err(error) = changed.set_value(&key, &other) {
+                        // A law may refuse the restitution that the scene has, and the like.
+                        assert!(matches!(parameter.scope, Scope::Contact), "{error}");
+                        continue;
+                    }
+                    let text = changed
+                        .to_toml()
+                        .unwrap_or_else(|e| panic!("{name} {key}: {e}"));
+                    let read = Scene::parse(&text, None, &[]).expect("reads");
+                    assert_eq!(bits(&read), bits(&changed), "{name} {key}\n{text}");
+                    assert!(read.changes.is_empty());
+                    let comments = |text: &str| text.matches('#').count();
+                    assert_eq!(comments(&text), comments(&plain.source.text), "{key}");
+                }
+            }
+        }
+        assert!(find("contact.clearance").is_some() && table().len() > 20);
+    }
+
+    #[test]
+    fn changes_that_depend_on_each_other_come_out_as_they_are() {
+        let changes = [
+            ("contact.clearance", "0.5 mm"),
+            ("joint.S1.clearance", "0.2 mm"),
+            ("joint.S1.friction", "0.4"),
+            ("solver.method", "rk4"),
+            ("solver.preset", "preview"),
+            ("gravity.x", "3 m/s^2"),
+            ("formulation", "lagrange"),
+        ];
+        for name in ["spcmm", "pendulum"] {
+            let changed = scene(name, &changes);
+            let text = changed.to_toml().expect("has its places");
+            let read = Scene::parse(&text, None, &[]).expect("reads");
+            assert_eq!(bits(&read), bits(&changed), "{text}");
+        }
+    }
+
+    #[test]
+    fn gravity_that_the_file_leaves_out_is_written_whole() {
+        let text = scene("pendulum", &[])
+            .source
+            .text
+            .replace("[gravity]\nz = \"-9.81 m/s^2\"\n", "");
+        let mut bare = Scene::parse(&text, None, &[]).expect("reads");
+        assert_eq!(bare.gravity.z, -9.81);
+        bare.set("gravity.x", "1 m/s^2").expect("in range");
+        let read = Scene::parse(&bare.to_toml().expect("written"), None, &[]).expect("reads");
+        assert_eq!(read.gravity, bare.gravity);
+    }
+
+    #[test]
+    fn inline_sections_and_lists_keep_their_form() {
+        let text = scene("pendulum", &[]).source.text.replace(
+            "[[ball_joint]]\nname = \"S1\"\nsocket = { body = \"world\", at = [0, 0, 0] }\nball = { body = \"rod\", at = \"0 0 100 mm\" }\nopening = [0, -1, 0]\n",
+            "",
+        );
+        let inline = "ball_joint = [{ name = \"S1\", socket = { body = \"world\" }, ball = { body = \"rod\", at = \"0 0 100 mm\" } }]\nsolver = { step = \"5 us\" } # short\n";
+        let text = format!("{inline}{text}");
+        let mut changed = Scene::parse(&text, None, &[]).expect("reads");
+        changed.set("joint.S1.clearance", "0.2 mm").expect("ok");
+        changed.set("solver.step", "7 us").expect("ok");
+        let written = changed.to_toml().expect("written");
+        let read = Scene::parse(&written, None, &[]).expect("reads");
+        assert_eq!(bits(&read), bits(&changed), "{written}");
+        assert!(written.contains("# short"));
+    }
+
+    #[test]
+    fn one_joint_of_a_chain_has_no_place_and_that_is_said() {
+        let changed = scene("chain", &[("joint.J2.clearance", "0.5 mm")]);
+        let error = changed.to_toml().expect_err("no place").to_string();
+        assert!(error.starts_with("joint.J2.clearance: "), "{error}");
+    }
+}

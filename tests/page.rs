@@ -1,0 +1,736 @@
+//! What a web page needs of the application and the desktop has as well: links, files, fingers, small screens, reports for
+//! screen readers.
+#![cfg(feature = "gui")]
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+use std::sync::Arc;
+
+use eframe::egui::{
+    self, Event, Key, Modifiers, PointerButton, Pos2, TouchDeviceId, TouchId, TouchPhase,
+    accesskit::{Live, Role},
+    pos2, vec2,
+};
+use egui_kittest::{
+    Harness, SnapshotResults,
+    kittest::{NodeT as _, Queryable as _},
+};
+use jointplay::app::{
+    App, AppOptions, CameraPose, DesktopHost, Host, Link, OpenedFile, SaveFile, Verdict,
+};
+use jointplay::cli::output::Table;
+use jointplay::scene::{DEFAULT_SCENE, Scene};
+use jointplay::simulate::{Channels, Frame, Quantity, Simulation};
+
+/// What a host was asked for.
+#[derive(Default)]
+struct Calls {
+    shared: Vec<String>,
+    saved: Vec<SaveFile>,
+    announced: Vec<String>,
+    picked: usize,
+    to_open: VecDeque<OpenedFile>,
+}
+
+/// A page without a browser.
+struct Page(Rc<RefCell<Calls>>);
+
+impl Host for Page {
+    fn address(&self) -> String {
+        "https://example.org/lab/".to_owned()
+    }
+
+    fn shared(&mut self, link: &str) {
+        self.0.borrow_mut().shared.push(link.to_owned());
+    }
+
+    fn save(&mut self, files: &[SaveFile]) -> Result<String, String> {
+        self.0.borrow_mut().saved.extend_from_slice(files);
+        Ok(format!("Saved {}", files[0].name))
+    }
+
+    fn pick_file(&mut self) -> bool {
+        self.0.borrow_mut().picked += 1;
+        true
+    }
+
+    fn read_dropped(&mut self, file: Arc<dyn egui::DroppedFile + Send + Sync>) {
+        self.0.borrow_mut().to_open.push_back(OpenedFile {
+            name: file.path().display().to_string(),
+            content: file.bytes(),
+        });
+    }
+
+    fn opened(&mut self) -> Option<OpenedFile> {
+        self.0.borrow_mut().to_open.pop_front()
+    }
+
+    fn announce(&mut self, text: &str) {
+        self.0.borrow_mut().announced.push(text.to_owned());
+    }
+}
+
+/// A file in the hand of the mouse.
+#[derive(Debug)]
+struct Dropped(PathBuf, &'static [u8]);
+
+impl egui::DroppedFile for Dropped {
+    fn path(&self) -> &Path {
+        &self.0
+    }
+
+    fn bytes(&self) -> Result<Vec<u8>, String> {
+        Ok(self.1.to_vec())
+    }
+}
+
+fn open(options: AppOptions, size: [f32; 2]) -> (Harness<'static, App>, Rc<RefCell<Calls>>) {
+    let mut options = options;
+    options.theme = egui::Theme::Light.into();
+    let calls = Rc::new(RefCell::new(Calls::default()));
+    let page = Page(calls.clone());
+    let mut harness = Harness::builder()
+        .with_size(size)
+        .with_theme(egui::Theme::Light)
+        .with_step_dt(1.0 / 60.0)
+        .with_max_steps(60)
+        .wgpu()
+        .build_eframe(move |cc| {
+            let mut app = App::new(cc, options).expect("the scene starts");
+            app.set_host(Box::new(page));
+            app
+        });
+    harness.run_steps(3);
+    (harness, calls)
+}
+
+/// `scene` at t = 0, paused.
+fn window(scene: &str, size: [f32; 2]) -> (Harness<'static, App>, Rc<RefCell<Calls>>) {
+    let mut options = AppOptions::new(Scene::load(scene, &[]).expect("a built-in scene"));
+    options.playing = false;
+    open(options, size)
+}
+
+/// The one label whose text contains `words`; the report for screen readers may say the same.
+fn label(harness: &Harness<'_, App>, words: &str) -> bool {
+    let labels = harness
+        .query_all_by_label_contains(words)
+        .filter(|node| node.accesskit_node().role() == Role::Label);
+    labels.count() == 1
+}
+
+const LARGE: [f32; 2] = [1280.0, 800.0];
+const UPRIGHT: [f32; 2] = [390.0, 844.0];
+const LYING: [f32; 2] = [844.0, 390.0];
+
+fn click(harness: &mut Harness<'_, App>, label: &str) {
+    harness.get_by_label(label).click();
+    harness.run_steps(3);
+}
+
+fn hash(harness: &Harness<'_, App>) -> u64 {
+    harness.state().player().simulation().state_hash()
+}
+
+/// Runs until the link's state is reached, or not.
+fn verdict(harness: &mut Harness<'_, App>) -> Verdict {
+    for _ in 0..600 {
+        if let Some(verdict) = harness.state().verdict() {
+            return verdict.clone();
+        }
+        harness.step();
+    }
+    panic!("no verdict after ten seconds");
+}
+
+#[test]
+fn a_copied_link_opens_the_same_state_with_the_same_bits() {
+    let (mut harness, calls) = window("spcmm", LARGE);
+    click(&mut harness, "Play");
+    harness.run_steps(30);
+    harness
+        .get_by_role_and_label(Role::Slider, "Clearance")
+        .set_value_accesskit(0.55);
+    harness.run_steps(30);
+    harness
+        .get_by_role_and_label(Role::Slider, "Friction coefficient")
+        .set_value_accesskit(0.4);
+    harness.run_steps(20);
+    click(&mut harness, "Pause");
+    click(&mut harness, "Step");
+    harness.key_press(Key::Num2);
+    harness.run();
+    click(&mut harness, "Copy link");
+    assert!(harness.state().announcement().starts_with("Link copied."));
+    let link = calls.borrow().shared.last().expect("shared").clone();
+    assert!(
+        link.starts_with("https://example.org/lab/#scene=spcmm&"),
+        "{link}"
+    );
+    assert!(link.len() < 600, "{} characters", link.len());
+
+    let options = AppOptions::from_link(&link).expect("a link");
+    assert_eq!(
+        options.scene.contact.clearance, 0.3e-3,
+        "the change came on the way"
+    );
+    let (mut copy, _) = open(options, LARGE);
+    assert_eq!(verdict(&mut copy), Verdict::Agrees(hash(&harness)));
+    copy.run();
+    assert_eq!(hash(&copy), hash(&harness));
+    let (mine, theirs) = (harness.state().player(), copy.state().player());
+    assert_eq!(mine.pacer.shown().to_bits(), theirs.pacer.shown().to_bits());
+    assert_eq!(theirs.scene().contact.friction, 0.4);
+    assert!(!theirs.is_playing());
+    let words = format!("State reproduced: hash {:016x} agrees", hash(&harness));
+    assert!(label(&copy, &words));
+    assert!(copy.state().announcement().starts_with(&words));
+    // It goes on with the same bits, and its own link is the same.
+    assert_eq!(copy.state().share_state(), harness.state().share_state());
+    for harness in [&mut harness, &mut copy] {
+        harness.state_mut().player_mut().run_to(0.1);
+    }
+    assert_eq!(hash(&copy), hash(&harness));
+    click(&mut copy, "Dismiss");
+    assert!(!label(&copy, &words));
+
+    let wrong = link
+        .replace("hash=", "hash=0000000000000000&was=")
+        .replace("&was=", "&utm_was=");
+    let (mut copy, _) = open(AppOptions::from_link(&wrong).expect("a link"), LARGE);
+    assert!(matches!(
+        verdict(&mut copy),
+        Verdict::Differs { expected: 0, .. }
+    ));
+    copy.run();
+    assert!(label(&copy, "State differs: hash"));
+}
+
+#[test]
+fn a_long_way_shows_how_far_it_is_and_can_be_stopped() {
+    let link = "?scene=spcmm&method=rk4&solver.step=1us&t=100s";
+    let options = AppOptions::from_link(link).expect("a link");
+    let (mut harness, _) = open(options, LARGE);
+    let first = harness.state().replaying().expect("on its way");
+    harness.get_by_label_contains("Reproducing the state of the link… 0 %");
+    harness.run_steps(3);
+    let then = harness.state().replaying().expect("on its way still");
+    assert!(then > first, "{first} {then}");
+    // Meanwhile nothing else moves the machine.
+    harness.key_press(Key::Space);
+    harness.key_press(Key::R);
+    harness.step();
+    assert!(harness.state().replaying().is_some_and(|now| now > first));
+    assert!(harness.state().share_state().contains("t=100s"));
+    click(&mut harness, "Stop here");
+    assert!(harness.state().replaying().is_none());
+    assert!(matches!(
+        harness.state().verdict(),
+        Some(Verdict::Failed(_))
+    ));
+    assert!(harness.state().player().simulation().time() > 0.0);
+    click(&mut harness, "Step");
+    harness.key_press(Key::R);
+    harness.run();
+    assert_eq!(harness.state().player().simulation().time(), 0.0);
+}
+
+#[test]
+fn a_bad_link_is_explained_and_the_default_scene_runs() {
+    for (link, words) in [
+        ("?scene=pendulun", "did you mean `pendulum`?"),
+        ("?c=5", "contact.clearance = 5: needs a unit"),
+        ("?scene=spcmm&spcmm.amplitude_x=500mm", "amplitude_x"),
+        ("#scene=pendulum&log=AAAA", "cut short or damaged"),
+        ("?speed=3", "unknown word"),
+    ] {
+        assert!(AppOptions::from_link(link).is_err(), "{link}");
+        let (mut harness, _) = open(AppOptions::from_link_or_default(link), LARGE);
+        assert!(label(&harness, "link: "));
+        assert!(
+            harness.state().announcement().contains(words),
+            "{link}: {}",
+            harness.state().announcement()
+        );
+        let player = harness.state().player();
+        assert_eq!(player.scene().name, DEFAULT_SCENE);
+        assert!(player.is_playing());
+        assert!(harness.state_mut().open_link("?c=2").is_err());
+    }
+    let options = AppOptions::from_link_or_default("?scene=pendulum&c=0.5mm&scale=1:10");
+    assert_eq!(
+        (options.problem, options.playing, options.time_scale),
+        (None, true, 0.1)
+    );
+    assert_eq!(options.scene.contact.clearance, 0.5e-3);
+}
+
+fn touch(harness: &Harness<'_, App>, id: u64, phase: TouchPhase, pos: Pos2) {
+    harness.event(Event::Touch {
+        device_id: TouchDeviceId(0),
+        id: TouchId(id),
+        phase,
+        pos,
+        force: None,
+    });
+    // The first finger is the pointer, too.
+    if id == 1 {
+        let button = |pressed| Event::PointerButton {
+            pos,
+            button: PointerButton::Primary,
+            pressed,
+            modifiers: Modifiers::default(),
+        };
+        match phase {
+            TouchPhase::Start => {
+                harness.event(Event::PointerMoved(pos));
+                harness.event(button(true));
+            }
+            TouchPhase::Move => harness.event(Event::PointerMoved(pos)),
+            TouchPhase::End | TouchPhase::Cancel => {
+                harness.event(button(false));
+                harness.event(Event::PointerGone);
+            }
+        }
+    }
+}
+
+fn camera(harness: &Harness<'_, App>) -> Option<CameraPose> {
+    let link = Link::parse(&harness.state().share_state()).expect("a link");
+    link.camera
+}
+
+#[test]
+fn one_finger_turns_and_two_shift_and_come_nearer() {
+    let (mut harness, _) = window("spcmm", UPRIGHT);
+    assert!(camera(&harness).is_none(), "as the scene opens");
+    let middle = harness.get_by_label("3D view").rect().center();
+    touch(&harness, 1, TouchPhase::Start, middle);
+    harness.step();
+    for step in 1..=5 {
+        let pos = middle + vec2(12.0 * step as f32, 0.0);
+        touch(&harness, 1, TouchPhase::Move, pos);
+        harness.step();
+    }
+    touch(&harness, 1, TouchPhase::End, middle + vec2(60.0, 0.0));
+    harness.run_steps(3);
+    let turned = camera(&harness).expect("turned");
+    touch(&harness, 1, TouchPhase::Start, middle);
+    harness.step();
+    touch(&harness, 1, TouchPhase::Move, middle + vec2(30.0, 0.0));
+    harness.step();
+    touch(&harness, 1, TouchPhase::Move, middle + vec2(60.0, 0.0));
+    harness.step();
+    touch(&harness, 1, TouchPhase::End, middle + vec2(60.0, 0.0));
+    harness.run_steps(3);
+    let again = camera(&harness).expect("turned");
+    assert!((again.yaw - turned.yaw).abs() > 0.1, "{turned:?} {again:?}");
+    assert_eq!(again.target, turned.target);
+    assert_eq!(again.distance, turned.distance);
+
+    // Both fingers side by side: a shift.
+    let fingers = |harness: &Harness<'_, App>, phase, apart: f32, shift: f32| {
+        touch(harness, 1, phase, middle + vec2(shift - apart, 0.0));
+        touch(harness, 2, phase, middle + vec2(shift + apart, 0.0));
+    };
+    fingers(&harness, TouchPhase::Start, 40.0, 0.0);
+    harness.step();
+    for step in 1..=4 {
+        fingers(&harness, TouchPhase::Move, 40.0, 10.0 * step as f32);
+        harness.step();
+    }
+    let shifted = camera(&harness).expect("shifted");
+    assert_eq!((shifted.yaw, shifted.pitch), (again.yaw, again.pitch));
+    assert_ne!(shifted.target, again.target);
+    // Then apart: nearer.
+    for step in 1..=4 {
+        fingers(&harness, TouchPhase::Move, 40.0 + 10.0 * step as f32, 40.0);
+        harness.step();
+    }
+    let nearer = camera(&harness).expect("nearer");
+    assert!(
+        nearer.distance < 0.8 * shifted.distance,
+        "{shifted:?} {nearer:?}"
+    );
+    assert_eq!((nearer.yaw, nearer.pitch), (again.yaw, again.pitch));
+    // The finger that stays longer turns nothing.
+    touch(&harness, 2, TouchPhase::End, middle + vec2(120.0, 0.0));
+    harness.step();
+    touch(&harness, 1, TouchPhase::Move, middle + vec2(-90.0, 30.0));
+    harness.step();
+    touch(&harness, 1, TouchPhase::End, middle + vec2(-90.0, 30.0));
+    harness.run_steps(3);
+    let after = camera(&harness).expect("a camera");
+    assert_eq!((after.yaw, after.pitch), (again.yaw, again.pitch));
+}
+
+#[test]
+fn a_double_tap_follows_what_it_hits() {
+    let (mut harness, _) = window("spcmm", LARGE);
+    // The first touch makes the controls larger and the picture a little smaller.
+    let ground = harness.get_by_label("3D view").rect().left_bottom() + vec2(200.0, -40.0);
+    touch(&harness, 1, TouchPhase::Start, ground);
+    harness.step();
+    touch(&harness, 1, TouchPhase::End, ground);
+    harness.run_steps(60);
+    harness.key_press(Key::F);
+    harness.run();
+    // The middle of the platform, in the isometric view that the window starts with.
+    let view = harness.get_by_label("3D view").rect();
+    let platform = view.lerp_inside(vec2(0.571, 0.722));
+    harness.hover_at(platform);
+    harness.run_steps(60);
+    harness.get_by_label_contains("Angular speed");
+    harness.remove_cursor();
+    harness.run();
+    // A finger is no mouse: the second tap comes down a little beside the first.
+    for beside in [0.0, 7.0] {
+        touch(&harness, 1, TouchPhase::Start, platform + vec2(beside, 0.0));
+        harness.step();
+        touch(&harness, 1, TouchPhase::End, platform + vec2(beside, 0.0));
+        harness.step();
+    }
+    harness.run_steps(3);
+    click(&mut harness, "View options");
+    harness.get_by_label("Stop following");
+}
+
+#[test]
+fn small_screens_have_controls_for_fingers_and_a_sheet_that_folds() {
+    for size in [UPRIGHT, LYING] {
+        let (mut harness, _) = window("spcmm", size);
+        harness.run();
+        let view = harness.get_by_label("3D view").rect();
+        assert!(
+            view.width() > 240.0 && view.height() > 200.0,
+            "{size:?}: {view:?}"
+        );
+        let mut seen = 0;
+        for name in [
+            "Reset",
+            "Play",
+            "Step",
+            "Menu",
+            "View options",
+            "Controls",
+            "Plots",
+        ] {
+            let rect = harness.get_by_role_and_label(Role::Button, name).rect();
+            assert!(rect.size().min_elem() >= 43.5, "{size:?} {name}: {rect:?}");
+            assert!(
+                rect.right() <= size[0] && rect.bottom() <= size[1],
+                "{name}: {rect:?}"
+            );
+            seen += 1;
+        }
+        for (role, name) in [
+            (Role::ComboBox, "Scene"),
+            (Role::ComboBox, "Time scale preset"),
+            (Role::Slider, "Clearance"),
+            (Role::TextInput, "Clearance"),
+        ] {
+            let rect = harness.get_by_role_and_label(role, name).rect();
+            assert!(rect.size().min_elem() >= 43.5, "{size:?} {name}: {rect:?}");
+            assert!(rect.right() <= size[0], "{size:?} {name}: {rect:?}");
+            seen += 1;
+        }
+        assert_eq!(seen, 11);
+        // Nothing that can be hit lies over another thing.
+        let rects: Vec<egui::Rect> = ["Reset", "Play", "Step", "Controls", "Plots"]
+            .map(|name| harness.get_by_role_and_label(Role::Button, name).rect())
+            .into();
+        for (i, a) in rects.iter().enumerate() {
+            for b in &rects[i + 1..] {
+                assert!(
+                    !a.shrink(1.0).intersects(b.shrink(1.0)),
+                    "{size:?}: {a:?} {b:?}"
+                );
+            }
+        }
+
+        click(&mut harness, "Controls");
+        harness.run();
+        let wide = harness.get_by_label("3D view").rect();
+        assert!(
+            wide.area() > 1.3 * view.area(),
+            "{size:?}: {view:?} {wide:?}"
+        );
+        assert!(
+            harness
+                .query_by_role_and_label(Role::Slider, "Clearance")
+                .is_none()
+        );
+        harness.key_press(Key::P);
+        harness.run();
+        harness.get_by_label("Choose plots");
+        click(&mut harness, "Menu");
+        for name in [
+            "Open…",
+            "Copy link",
+            "Picture…",
+            "Record…",
+            "Scene…",
+            "Keys",
+            "About",
+        ] {
+            harness.get_by_label(name);
+        }
+    }
+}
+
+#[test]
+fn a_finger_makes_the_controls_of_a_large_window_large_as_well() {
+    let (mut harness, _) = window("spcmm", LARGE);
+    let height = |harness: &Harness<'_, App>| harness.get_by_label("Open…").rect().height();
+    assert!(height(&harness) < 30.0);
+    touch(&harness, 1, TouchPhase::Start, pos2(700.0, 300.0));
+    harness.step();
+    touch(&harness, 1, TouchPhase::End, pos2(700.0, 300.0));
+    harness.run_steps(3);
+    assert!(height(&harness) >= 43.5);
+}
+
+#[test]
+fn scene_record_and_picture_are_saved() {
+    let (mut harness, calls) = window("spcmm", LARGE);
+    let player = harness.state_mut().player_mut();
+    player
+        .set("contact.clearance", "0.45 mm")
+        .expect("in range");
+    player.run_to(12e-3);
+    harness.run();
+    click(&mut harness, "Save");
+    click(&mut harness, "Scene…");
+    let saved = calls.borrow_mut().saved.remove(0);
+    assert_eq!(
+        (saved.name.as_str(), saved.mime),
+        ("spcmm.toml", "application/toml")
+    );
+    let text = String::from_utf8(saved.bytes).expect("text");
+    let scene = Scene::parse(&text, Some("spcmm.toml"), &[]).expect("a scene");
+    assert_eq!(scene.contact.clearance, 0.45e-3);
+    let changes = [("contact.clearance".to_owned(), "0.45 mm".to_owned())];
+    let hashes = [scene, Scene::load("spcmm", &changes).expect("in range")].map(|scene| {
+        let mut simulation = Simulation::new(&scene).expect("starts");
+        simulation.advance_to(20e-3).expect("runs");
+        simulation.state_hash()
+    });
+    assert_eq!(hashes[0], hashes[1], "the same scene");
+
+    click(&mut harness, "Save");
+    click(&mut harness, "Record…");
+    let record = calls.borrow_mut().saved.remove(0);
+    assert_eq!(
+        (record.name.as_str(), record.mime),
+        ("spcmm-12.000ms.csv", "text/csv")
+    );
+    let text = String::from_utf8(record.bytes).expect("text");
+    assert!(
+        text.starts_with("t_s,S1_normal_N_min,S1_normal_N_max,"),
+        "{text:.80}"
+    );
+    let meta = calls.borrow_mut().saved.remove(0);
+    assert_eq!(meta.name, "spcmm-12.000ms.csv.meta.json");
+
+    click(&mut harness, "Save");
+    click(&mut harness, "Picture…");
+    harness.run_steps(4);
+    let picture = calls.borrow_mut().saved.remove(0);
+    assert_eq!(
+        (picture.name.as_str(), picture.mime),
+        ("spcmm-12.000ms.png", "image/png")
+    );
+    let mut reader = png::Decoder::new(std::io::Cursor::new(picture.bytes.as_slice()))
+        .read_info()
+        .expect("a PNG file");
+    let mut rgba = vec![0; reader.output_buffer_size().expect("fits in memory")];
+    reader.next_frame(&mut rgba).expect("whole");
+    let view = harness.get_by_label("3D view").rect();
+    let info = reader.info();
+    assert_eq!(
+        (info.width, info.height),
+        (view.width() as u32, view.height() as u32)
+    );
+    let texts = &info.uncompressed_latin1_text;
+    assert!(
+        texts
+            .iter()
+            .any(|t| t.text.contains("contact.clearance = 0.45 mm"))
+    );
+    let pixels: std::collections::HashSet<&[u8]> = rgba.chunks_exact(4).collect();
+    assert!(
+        pixels.len() > 500,
+        "an empty picture has few colours: {}",
+        pixels.len()
+    );
+    // Where the button was on the screen, there is the ground.
+    let button = harness
+        .get_by_role_and_label(Role::Button, "View options")
+        .rect();
+    let at = (button.left_top() + vec2(6.0, 10.0)) - view.min;
+    let pixel = |x: f32, y: f32| {
+        let i = 4 * (y as usize * info.width as usize + x as usize);
+        [0, 1, 2].map(|c| i32::from(rgba[i + c]))
+    };
+    let (on, beside) = (pixel(at.x, at.y), pixel(at.x - 16.0, at.y));
+    let apart = (0..3).map(|c| (on[c] - beside[c]).abs()).max();
+    assert!(apart < Some(6), "{on:?} {beside:?}");
+}
+
+#[test]
+fn on_the_desktop_a_path_is_asked_for_and_nothing_is_overwritten() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("mine.csv").display().to_string();
+    let (mut harness, _) = window("pendulum", LARGE);
+    harness
+        .state_mut()
+        .set_host(Box::new(DesktopHost::default()));
+    for again in [false, true] {
+        click(&mut harness, "Save");
+        click(&mut harness, "Record…");
+        harness
+            .get_by_role_and_label(Role::TextInput, "Path")
+            .focus();
+        harness.step();
+        harness.key_press_modifiers(Modifiers::COMMAND, Key::A);
+        harness.step();
+        harness
+            .get_by_role_and_label(Role::TextInput, "Path")
+            .type_text(&path);
+        harness.step();
+        harness.key_press(Key::Enter);
+        harness.run_steps(3);
+        let refused = label(&harness, "it is already there");
+        assert_eq!(refused, again);
+    }
+    let mut names: Vec<_> = std::fs::read_dir(folder.path())
+        .expect("the folder")
+        .map(|entry| entry.expect("an entry").file_name())
+        .collect();
+    names.sort();
+    assert_eq!(names, ["mine.csv", "mine.csv.meta.json"]);
+}
+
+#[test]
+fn a_chosen_or_dropped_file_opens_and_a_bad_one_leaves_the_running_scene() {
+    let (mut harness, calls) = window("spcmm", LARGE);
+    click(&mut harness, "Open…");
+    assert_eq!(calls.borrow().picked, 1);
+    assert!(harness.query_by_label("Path").is_none(), "the host asks");
+    let file = |name: &str, content| OpenedFile {
+        name: name.to_owned(),
+        content,
+    };
+    for (bad, words) in [
+        (Ok(b"name = [".to_vec()), "mine.toml:1"),
+        (Ok(vec![0xff, 0xfe]), "not a text file"),
+        (Err("it is gone".to_owned()), "it is gone"),
+    ] {
+        calls.borrow_mut().to_open.push_back(file("mine.toml", bad));
+        harness.run_steps(3);
+        assert!(label(&harness, words), "{words}");
+        assert_eq!(harness.state().player().scene().name, "spcmm");
+    }
+    let text = Scene::load("pendulum", &[]).expect("built in").source.text;
+    let mine = text.replace("name = \"pendulum\"", "name = \"mine\"");
+    calls
+        .borrow_mut()
+        .to_open
+        .push_back(file("mine.toml", Ok(mine.into_bytes())));
+    harness.run_steps(3);
+    assert_eq!(harness.state().player().scene().name, "mine");
+    assert!(!label(&harness, "it is gone"));
+    // The file travels in the link.
+    let options = AppOptions::from_link(&harness.state().share_state()).expect("a link");
+    assert_eq!(options.scene.name, "mine");
+
+    let dropped = Dropped(PathBuf::from("bad.toml"), b"[contact]\nclearance = 3\n");
+    harness.input_mut().dropped_files.push(Arc::new(dropped));
+    harness.run_steps(3);
+    assert!(label(&harness, "bad.toml:2"));
+    assert_eq!(harness.state().player().scene().name, "mine");
+}
+
+#[test]
+fn keys_and_tab_work_before_anything_was_clicked() {
+    let (mut harness, _) = window("spcmm", LARGE);
+    harness.key_press(Key::ArrowRight);
+    harness.step();
+    assert_eq!(harness.state().player().steps(), 1);
+    harness.key_press(Key::Tab);
+    harness.run_steps(2);
+    assert!(harness.ctx.memory(|memory| memory.focused()).is_some());
+}
+
+#[test]
+fn what_goes_on_is_told_to_who_does_not_see_it() {
+    let (mut harness, calls) = window("pendulum", LARGE);
+    assert_eq!(
+        harness.state().announcement(),
+        "Pendulum on a ball joint. Paused at the start. S1 free."
+    );
+    harness.key_press(Key::Space);
+    harness.run_steps(2);
+    harness.run_steps(120);
+    harness.key_press(Key::Space);
+    harness.run_steps(3);
+    let words = harness.state().announcement().to_owned();
+    assert!(
+        words.contains("Paused at ") && words.contains("S1 "),
+        "{words}"
+    );
+    let told = calls.borrow().announced.clone();
+    assert_eq!(told.last(), Some(&words));
+    assert!(
+        told.iter()
+            .any(|text| text.contains("Running at time scale 1:50"))
+    );
+    assert!(
+        told.iter()
+            .any(|text| text.contains("Largest normal force since the last report"))
+    );
+    assert!((4..=6).contains(&told.len()), "{told:#?}");
+    let node = harness.get_by_role_and_label(Role::Status, &words);
+    assert_eq!(node.accesskit_node().live(), Live::Polite);
+}
+
+#[test]
+fn the_about_box_names_version_state_and_adapter() {
+    let (mut harness, _) = window("pendulum", LARGE);
+    click(&mut harness, "About");
+    harness.get_by_label_contains("Drawn with ");
+    harness.get_by_label(&format!("Version {}", jointplay::VERSION));
+    harness.get_by_label(&format!("{:016x}", hash(&harness)));
+}
+
+#[test]
+fn recorded_channels_have_the_columns_of_a_run() {
+    for name in jointplay::scene::BUILT_IN {
+        let scene = Scene::load(name, &[]).expect("built in");
+        let mut frame = Frame::default();
+        Simulation::new(&scene)
+            .expect("starts")
+            .sample(0.0, &mut frame);
+        let table = Table::new(&scene, &frame);
+        for channel in Channels::of(&scene).list() {
+            // A run has friction as a vector.
+            let own = channel.quantity == Quantity::FrictionForce;
+            let there = table.names().contains(&channel.column());
+            assert_eq!(there, !own, "{name}: {}", channel.column());
+        }
+    }
+}
+
+#[test]
+fn pictures() {
+    let mut results = SnapshotResults::new();
+    for (name, size) in [("phone_upright", UPRIGHT), ("phone_lying", LYING)] {
+        let (mut harness, _) = window("spcmm", size);
+        harness.state_mut().player_mut().run_to(7.85e-3);
+        harness.run();
+        harness.snapshot(name);
+        results.extend_harness(&mut harness);
+    }
+}
