@@ -15,6 +15,8 @@ mod theme;
 mod transport;
 mod value;
 mod viewport;
+#[cfg(not(target_arch = "wasm32"))]
+mod window;
 
 use eframe::egui::{
     self, CentralPanel, ComboBox, Frame, Panel, RichText, ScrollArea, ThemePreference, Ui,
@@ -22,7 +24,7 @@ use eframe::egui::{
 use eframe::egui_wgpu;
 
 use crate::render;
-use crate::scene::{BUILT_IN, Scene, SceneError};
+use crate::scene::{BUILT_IN, Scene};
 use crate::simulate::StartError;
 use crate::view::{Preset, ViewOptions};
 
@@ -35,6 +37,8 @@ pub use overlay::{force_notes, plate};
 pub use player::Player;
 pub use plots::{Plots, Window};
 use viewport::Viewport;
+#[cfg(not(target_arch = "wasm32"))]
+pub use window::{WindowError, run_native};
 
 /// Below this width the window shows everything in one column, points.
 const NARROW: f32 = 760.0;
@@ -142,6 +146,11 @@ impl App {
     pub fn open(&mut self, argument: &str) -> Result<(), String> {
         let scene = Scene::load(argument, &[]).map_err(|error| error.to_string())?;
         self.show_scene(&scene)
+    }
+
+    /// Shows `problem` above everything until it is dismissed.
+    pub fn report(&mut self, problem: String) {
+        self.problem = Some(problem);
     }
 
     /// Back to t = 0 with every change applied.
@@ -542,48 +551,4 @@ impl eframe::App for App {
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
         self.show(ui);
     }
-
-    #[cfg(target_arch = "wasm32")]
-    fn as_any_mut(&mut self) -> Option<&mut dyn std::any::Any> {
-        Some(&mut *self)
-    }
-}
-
-/// Why the window could not open.
-#[derive(Debug, thiserror::Error)]
-pub enum WindowError {
-    /// The scene cannot start.
-    #[error(transparent)]
-    Start(#[from] SceneError),
-    /// No graphics adapter.
-    #[error(transparent)]
-    NoAdapter(#[from] render::NoAdapter),
-    /// No display, or anything else that the window system said.
-    #[error("cannot open a window: {0}")]
-    Window(String),
-}
-
-/// Opens the window and returns when it is closed.
-///
-/// # Errors
-/// A scene that cannot start, no graphics adapter, no display.
-#[cfg(not(target_arch = "wasm32"))]
-pub fn run_native(options: AppOptions) -> Result<(), WindowError> {
-    let native = eframe::NativeOptions {
-        viewport: egui::ViewportBuilder::default()
-            .with_title("Jointplay")
-            .with_app_id("jointplay")
-            .with_inner_size([1280.0, 800.0])
-            .with_min_inner_size([360.0, 480.0]),
-        ..Default::default()
-    };
-    // The scene's own error must come out typed, not as the window's.
-    Player::new(&options.scene).map_err(|error| error.located(&options.scene))?;
-    let create: eframe::AppCreator<'_> = Box::new(|cc| Ok(Box::new(App::new(cc, options)?)));
-    eframe::run_native("Jointplay", native, create).map_err(|error| match error {
-        eframe::Error::Wgpu(egui_wgpu::WgpuError::RequestAdapterError(_)) => {
-            render::NoAdapter.into()
-        }
-        other => WindowError::Window(other.to_string()),
-    })
 }
