@@ -62,7 +62,11 @@ impl Run {
     /// Text: the divergence guard stopped it.
     #[wasm_bindgen(js_name = advanceTo)]
     pub fn advance_to(&mut self, time: f64) -> Result<(), JsError> {
-        Ok(self.simulation.advance_to(time)?)
+        // The last step is cut, as that of `jointplay run` is.
+        while self.simulation.time() < time {
+            self.simulation.step_until(time)?;
+        }
+        Ok(())
     }
 
     /// Simulated time, s.
