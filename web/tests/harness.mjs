@@ -41,13 +41,15 @@ const FLAGS = [
 ];
 
 /** Small, because a software adapter draws some hundred thousand pixels a second. */
-export const SIZE = { width: 900, height: 600 };
+export const SIZE = { width: 800, height: 560 };
 
 /** Longest wait for anything, ms: software rendering on a busy machine is slow. */
-const PATIENCE = 30_000;
+const PATIENCE = 60_000;
 
 let server;
 let browser;
+/** Pages that a failed test left open: they would take the time of the next. */
+const opened = new Set();
 
 /** Serves the page below a sub-path; the address of its folder. */
 async function serve() {
@@ -84,14 +86,16 @@ export async function quit() {
 export async function open(query = '', options = {}) {
     const { backend, size = SIZE, fragment = '', before, context = {}, expectTrouble = false } = options;
     const address = await serve();
+    for (const lab of opened) await lab.close({ errors: true });
     const own = await (await launch()).newContext({ viewport: size, ...context });
     const page = await own.newPage();
     const lab = new Lab(own, page);
+    opened.add(lab);
     page.setDefaultTimeout(PATIENCE);
     if (before) await page.addInitScript(before);
     const parts = [query, backend ? `renderer=${backend}` : ''].filter(Boolean).join('&');
     await page.goto(`${address}${parts ? `?${parts}` : ''}${fragment ? `#${fragment}` : ''}`);
-    await page.waitForFunction(() => globalThis.jointplay?.ready || globalThis.jointplay?.trouble, null, { timeout: 60_000 });
+    await page.waitForFunction(() => globalThis.jointplay?.ready || globalThis.jointplay?.trouble);
     if (!expectTrouble) {
         const trouble = await page.evaluate(() => globalThis.jointplay.trouble);
         assert.equal(trouble, null, `the page did not start: ${JSON.stringify(trouble)}`);
@@ -113,6 +117,7 @@ export class Lab {
 
     /** Closes the page. Errors on its console fail the test unless `errors` says that they belong to it. */
     async close({ errors = false } = {}) {
+        opened.delete(this);
         await this.context.close();
         if (!errors) assert.deepEqual(this.errors, [], 'errors on the console');
     }
