@@ -27,6 +27,8 @@ function showTrouble(title, text, report) {
     $('trouble').hidden = false;
     $('report').hidden = $('copy').hidden = !report;
     if (report) $('report').value = report;
+    // A graphics driver may be at fault; the other way to draw avoids most of it.
+    $('plainer').hidden = laboratory.backend !== 'webgpu';
     $('laboratory').hidden = true;
     $('notice').hidden = false;
     document.title = `${title} - Jointplay`;
@@ -44,6 +46,10 @@ function crashed(message) {
 globalThis.jointplayCrashed = crashed;
 
 $('reload').addEventListener('click', () => location.reload());
+$('plainer').addEventListener('click', () => {
+    query.set('renderer', 'webgl');
+    location.search = query;
+});
 $('copy').addEventListener('click', async () => {
     const report = $('report');
     report.select();
@@ -119,10 +125,10 @@ async function begin(Page, found) {
     const failures = [];
     for (const backend of found) {
         const page = new Page();
+        laboratory.backend = backend;
         try {
             await page.start(freshCanvas(), backend, [...query].flat());
             laboratory.page = page;
-            laboratory.backend = backend;
             return null;
         } catch (error) {
             failures.push(`${backend}: ${error?.message ?? error}`);
