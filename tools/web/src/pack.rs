@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use wasm_bindgen_cli_support::Bindgen;
 
@@ -18,8 +18,7 @@ const PARTS: [&str; 2] = ["web/main.js", "web/page.css"];
 pub fn pack(library: &Path, folder: &Path, compress: bool) -> Result<(), String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     check_replaceable(folder)?;
-    let scratch = folder.with_extension("new");
-    remove(&scratch)?;
+    let scratch = scratch_beside(folder)?;
     fs::create_dir_all(&scratch).map_err(|e| failed(&scratch, &e))?;
 
     Bindgen::new()
@@ -59,6 +58,19 @@ pub fn pack(library: &Path, folder: &Path, compress: bool) -> Result<(), String>
     }
     remove(folder)?;
     fs::rename(&scratch, folder).map_err(|e| failed(folder, &e))
+}
+
+/// A folder that nobody has, on the same disk.
+fn scratch_beside(folder: &Path) -> Result<PathBuf, String> {
+    let name = folder.file_name().ok_or_else(|| {
+        let folder = folder.display();
+        format!("{folder}: name the folder itself, e.g. dist")
+    })?;
+    let name = format!(".{}.{}", name.to_string_lossy(), std::process::id());
+    let scratch = folder.with_file_name(name);
+    // Left by a tool that was killed and had the same number.
+    remove(&scratch)?;
+    Ok(scratch)
 }
 
 /// Only a page of ours, or nothing, may be replaced.
