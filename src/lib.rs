@@ -2,7 +2,7 @@
 //!
 //! Floors from the ground up; a module uses only what stands below it (`ARCHITECTURE.md`):
 //! [`contact`] and [`integrate`], [`scene`], [`mechanism`], [`simulate`], [`analysis`], [`chart`] and [`view`], [`render`], [`app`],
-//! and the entries [`cli`] and `main.rs`.
+//! and the entries [`cli`], `main.rs` and [`web`].
 
 /// The version that every output file names.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -22,3 +22,4 @@ pub mod scene;
 pub mod simulate;
 #[cfg(feature = "gui")]
 pub mod view;
+pub mod web;

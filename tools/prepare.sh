@@ -13,11 +13,11 @@ say() {
     printf '== %s\n' "$*" >&2
 }
 
-# Installs the missing packages where that needs no password; else prints the command and goes on.
+# Installs those of the given packages that are missing where that needs no password; else prints the command and goes on.
 prepare_packages() {
     command -v dpkg-query > /dev/null && command -v apt-get > /dev/null || return 0
     local missing=() package
-    for package in "${packages[@]}"; do
+    for package in "$@"; do
         dpkg-query -W -f='${Status}' "$package" 2> /dev/null | grep -q 'install ok installed' || missing+=("$package")
     done
     ((${#missing[@]})) || return 0
@@ -56,8 +56,34 @@ prepare_environment() {
     fi
 }
 
+# What the tests of the page need: Node, a browser, and the packages of web/package-lock.json.
+prepare_browser() {
+    local needed=() browser
+    command -v node > /dev/null || needed+=(nodejs)
+    command -v npm > /dev/null || needed+=(npm)
+    browser=$(command -v chromium || command -v chromium-browser || command -v google-chrome || true)
+    [[ -n $browser ]] || needed+=(chromium)
+    ((${#needed[@]} == 0)) || prepare_packages "${needed[@]}"
+    for program in node npm; do
+        if ! command -v $program > /dev/null; then
+            say "the tests of the page need $program: install Node 18 or newer"
+            exit 1
+        fi
+    done
+    export CHROMIUM=${CHROMIUM:-${browser:-$(command -v chromium || true)}}
+    if [[ -z $CHROMIUM ]]; then
+        say "the tests of the page need Chromium: install it, or name it: CHROMIUM=/path/to/chromium"
+        exit 1
+    fi
+    if ! cmp -s "$root/web/package-lock.json" "$root/web/node_modules/.from"; then
+        say "installing what the tests of the page use"
+        npm ci --silent --no-audit --no-fund --prefix "$root/web"
+        cp "$root/web/package-lock.json" "$root/web/node_modules/.from"
+    fi
+}
+
 prepare() {
-    prepare_packages
+    prepare_packages "${packages[@]}"
     prepare_rust
     prepare_environment
 }

@@ -25,6 +25,8 @@ mod theme;
 mod transport;
 mod value;
 mod viewport;
+#[cfg(not(target_arch = "wasm32"))]
+mod window;
 
 use eframe::egui::{self, ThemePreference, Ui};
 use eframe::egui_wgpu;
@@ -52,6 +54,8 @@ pub use plots::{Plots, Window};
 pub use replay::{Replay, Verdict};
 pub use share::{CameraPose, LONGEST_LINK, Link, LinkError, SceneText};
 use viewport::Viewport;
+#[cfg(not(target_arch = "wasm32"))]
+pub use window::{WindowError, run_native};
 
 /// Most stepping towards the state of a link in one frame, s: the window still answers twenty times a second.
 const REPLAY_BUDGET: f64 = 0.03;
@@ -258,6 +262,11 @@ impl App {
         self.show_scene(&scene)
     }
 
+    /// Shows `problem` above everything until it is dismissed.
+    pub fn report(&mut self, problem: String) {
+        self.problem = Some(problem);
+    }
+
     /// Back to t = 0 with every change applied.
     pub fn reset(&mut self) {
         match self.player.reset() {
@@ -411,7 +420,7 @@ impl App {
     }
 
     /// Tells what goes on, if it is time.
-    fn report(&mut self, ctx: &egui::Context) {
+    fn announce(&mut self, ctx: &egui::Context) {
         let now = ctx.input(|input| input.time);
         let (told, wait) = self.announcer.update(now, &self.player, &self.news());
         if told {
@@ -474,7 +483,7 @@ impl eframe::App for App {
         if self.advance(f64::from(dt)) {
             ctx.request_repaint();
         }
-        self.report(ctx);
+        self.announce(ctx);
     }
 
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
@@ -485,48 +494,4 @@ impl eframe::App for App {
     fn as_any_mut(&mut self) -> Option<&mut dyn std::any::Any> {
         Some(&mut *self)
     }
-}
-
-/// Why the window could not open.
-#[cfg(not(target_arch = "wasm32"))]
-#[derive(Debug, thiserror::Error)]
-pub enum WindowError {
-    /// The scene cannot start.
-    #[error(transparent)]
-    Start(#[from] crate::scene::SceneError),
-    /// No graphics adapter.
-    #[error(transparent)]
-    NoAdapter(#[from] render::NoAdapter),
-    /// No display, or anything else that the window system said.
-    #[error("cannot open a window: {0}")]
-    Window(String),
-}
-
-/// Opens the window and returns when it is closed.
-///
-/// # Errors
-/// A scene that cannot start, no graphics adapter, no display.
-#[cfg(not(target_arch = "wasm32"))]
-pub fn run_native(options: AppOptions) -> Result<(), WindowError> {
-    let native = eframe::NativeOptions {
-        viewport: egui::ViewportBuilder::default()
-            .with_title("Jointplay")
-            .with_app_id("jointplay")
-            .with_inner_size([1280.0, 800.0])
-            .with_min_inner_size([360.0, 480.0]),
-        ..Default::default()
-    };
-    // The scene's own error must come out typed, not as the window's.
-    Player::new(&options.scene).map_err(|error| error.located(&options.scene))?;
-    let create: eframe::AppCreator<'_> = Box::new(|cc| {
-        let mut app = App::new(cc, options)?;
-        app.set_host(Box::new(DesktopHost::default()));
-        Ok(Box::new(app))
-    });
-    eframe::run_native("Jointplay", native, create).map_err(|error| match error {
-        eframe::Error::Wgpu(egui_wgpu::WgpuError::RequestAdapterError(_)) => {
-            render::NoAdapter.into()
-        }
-        other => WindowError::Window(other.to_string()),
-    })
 }

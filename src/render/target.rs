@@ -14,6 +14,10 @@ pub struct Target {
     size: [u32; 2],
     pub(super) samples: wgpu::TextureView,
     pub(super) depth: wgpu::TextureView,
+    #[cfg_attr(
+        target_arch = "wasm32",
+        expect(dead_code, reason = "only read back offscreen")
+    )]
     pub(super) picture: wgpu::Texture,
     pub(super) picture_view: wgpu::TextureView,
 }

@@ -1,0 +1,50 @@
+//! The desktop window.
+
+use eframe::egui;
+use eframe::egui_wgpu;
+
+use super::{App, AppOptions, DesktopHost, Player};
+use crate::render;
+use crate::scene::SceneError;
+
+/// Why the window could not open.
+#[derive(Debug, thiserror::Error)]
+pub enum WindowError {
+    /// The scene cannot start.
+    #[error(transparent)]
+    Start(#[from] SceneError),
+    /// No graphics adapter.
+    #[error(transparent)]
+    NoAdapter(#[from] render::NoAdapter),
+    /// No display, or anything else that the window system said.
+    #[error("cannot open a window: {0}")]
+    Window(String),
+}
+
+/// Opens the window and returns when it is closed.
+///
+/// # Errors
+/// A scene that cannot start, no graphics adapter, no display.
+pub fn run_native(options: AppOptions) -> Result<(), WindowError> {
+    let native = eframe::NativeOptions {
+        viewport: egui::ViewportBuilder::default()
+            .with_title("Jointplay")
+            .with_app_id("jointplay")
+            .with_inner_size([1280.0, 800.0])
+            .with_min_inner_size([360.0, 480.0]),
+        ..Default::default()
+    };
+    // The scene's own error must come out typed, not as the window's.
+    Player::new(&options.scene).map_err(|error| error.located(&options.scene))?;
+    let create: eframe::AppCreator<'_> = Box::new(|cc| {
+        let mut app = App::new(cc, options)?;
+        app.set_host(Box::new(DesktopHost::default()));
+        Ok(Box::new(app))
+    });
+    eframe::run_native("Jointplay", native, create).map_err(|error| match error {
+        eframe::Error::Wgpu(egui_wgpu::WgpuError::RequestAdapterError(_)) => {
+            render::NoAdapter.into()
+        }
+        other => WindowError::Window(other.to_string()),
+    })
+}

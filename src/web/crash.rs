@@ -1,0 +1,49 @@
+//! What a panic leaves on the page: a text to report.
+
+use std::cell::RefCell;
+
+use wasm_bindgen::prelude::*;
+
+use crate::scene::Scene;
+
+thread_local! {
+    /// What was running, as the report says it.
+    static RUNNING: RefCell<String> = const { RefCell::new(String::new()) };
+}
+
+#[wasm_bindgen]
+extern "C" {
+    /// Shows the report instead of the canvas (`web/main.js`).
+    #[wasm_bindgen(js_namespace = globalThis, js_name = jointplayCrashed, catch)]
+    fn crashed(report: &str) -> Result<(), JsValue>;
+}
+
+/// From now on a panic is shown on the page.
+pub fn explain_panics() {
+    let previous = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |info| {
+        let what = info.payload_as_str().unwrap_or("unknown cause");
+        let place = info
+            .location()
+            .map(|place| format!("{}:{}", place.file(), place.line()))
+            .unwrap_or_default();
+        let running = RUNNING.with_borrow(String::clone);
+        let report = format!(
+            "jointplay {} failed inside: {what}\nat {place}\n{running}",
+            crate::VERSION
+        );
+        // Without a page, as in a script, there is nothing to show it on.
+        let _ = crashed(&report);
+        previous(info);
+    }));
+}
+
+/// Tells what is running, for a report.
+pub fn note(scene: &Scene, renderer: &str) {
+    let mut text = format!("scene: {}\n", scene.name);
+    for (key, value) in &scene.changes {
+        text.push_str(&format!("changed: {key} = {value}\n"));
+    }
+    text.push_str(&format!("renderer: {renderer}"));
+    RUNNING.set(text);
+}

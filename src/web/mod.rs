@@ -1,0 +1,19 @@
+//! Browser entry: the same application on a canvas (`web/main.js` calls it), and runs without a picture.
+
+#[cfg(all(target_arch = "wasm32", feature = "gui"))]
+mod crash;
+#[cfg(all(target_arch = "wasm32", feature = "gui"))]
+mod mirror;
+#[cfg(all(target_arch = "wasm32", feature = "gui"))]
+mod page;
+#[cfg(feature = "gui")]
+mod query;
+#[cfg(target_arch = "wasm32")]
+mod run;
+
+#[cfg(all(target_arch = "wasm32", feature = "gui"))]
+pub use page::Page;
+#[cfg(feature = "gui")]
+pub use query::{Query, QueryError};
+#[cfg(target_arch = "wasm32")]
+pub use run::{Run, choices, scenes, version};

@@ -1,0 +1,135 @@
+//! From the compiled library to a folder that any static host can serve.
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use wasm_bindgen_cli_support::Bindgen;
+
+/// Name of the files that the glue's generator writes.
+const NAME: &str = "jointplay";
+/// The page's own files, from the root of the project.
+const PAGE: &str = "index.html";
+/// Scripts and styles beside it, copied as they are.
+const PARTS: [&str; 2] = ["web/main.js", "web/page.css"];
+
+/// Writes the page into `folder`, which is made anew and replaced only as a whole. `compress`: also each file as
+/// `<file>.br`, with a table of what weighs how much.
+pub fn pack(library: &Path, folder: &Path, compress: bool) -> Result<(), String> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    check_replaceable(folder)?;
+    let scratch = scratch_beside(folder)?;
+    fs::create_dir_all(&scratch).map_err(|e| failed(&scratch, &e))?;
+
+    Bindgen::new()
+        .input_path(library)
+        .web(true)
+        .and_then(|bindgen| {
+            bindgen
+                .out_name(NAME)
+                .typescript(false)
+                .remove_name_section(true)
+                .remove_producers_section(true)
+                .generate(&scratch)
+        })
+        .map_err(|e| format!("{}: {e:#}", library.display()))?;
+
+    let wasm = scratch.join(format!("{NAME}_bg.wasm"));
+    let code = fs::read(&wasm).map_err(|e| failed(&wasm, &e))?;
+    for part in PARTS {
+        let from = root.join(part);
+        let name = from.file_name().expect("a file");
+        fs::copy(&from, scratch.join(name)).map_err(|e| failed(&from, &e))?;
+    }
+    let mut all = code.clone();
+    for part in PARTS.map(|part| root.join(part)) {
+        all.extend(fs::read(&part).map_err(|e| failed(&part, &e))?);
+    }
+    let from = root.join(PAGE);
+    let page = fs::read_to_string(&from).map_err(|e| failed(&from, &e))?;
+    // The build in every address: a browser never joins new scripts to old code from its cache.
+    let page = page
+        .replace("{{build}}", &format!("{:016x}", hash(&all)))
+        .replace("{{wasm_bytes}}", &code.len().to_string());
+    let to = scratch.join(PAGE);
+    fs::write(&to, page).map_err(|e| failed(&to, &e))?;
+    if compress {
+        compress_all(&scratch)?;
+    }
+    remove(folder)?;
+    fs::rename(&scratch, folder).map_err(|e| failed(folder, &e))
+}
+
+/// A folder that nobody has, on the same disk.
+fn scratch_beside(folder: &Path) -> Result<PathBuf, String> {
+    let name = folder.file_name().ok_or_else(|| {
+        let folder = folder.display();
+        format!("{folder}: name the folder itself, e.g. dist")
+    })?;
+    let name = format!(".{}.{}", name.to_string_lossy(), std::process::id());
+    let scratch = folder.with_file_name(name);
+    // Left by a tool that was killed and had the same number.
+    remove(&scratch)?;
+    Ok(scratch)
+}
+
+/// Only a page of ours, or nothing, may be replaced.
+fn check_replaceable(folder: &Path) -> Result<(), String> {
+    let Ok(mut entries) = fs::read_dir(folder) else {
+        return Ok(());
+    };
+    let ours = folder.join(format!("{NAME}_bg.wasm")).exists();
+    if ours || entries.next().is_none() {
+        return Ok(());
+    }
+    Err(format!(
+        "{}: holds something else than this page; name an empty or a new folder",
+        folder.display()
+    ))
+}
+
+fn compress_all(folder: &Path) -> Result<(), String> {
+    let entries = fs::read_dir(folder).map_err(|e| failed(folder, &e))?;
+    let mut files: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
+    files.sort();
+    let (mut raw, mut packed) = (0, 0);
+    println!("{:>10} {:>10}  file", "bytes", "brotli");
+    for file in files {
+        let bytes = fs::read(&file).map_err(|e| failed(&file, &e))?;
+        let small = brotli(&bytes).map_err(|e| failed(&file, &e))?;
+        let name = file.file_name().expect("a file").to_string_lossy();
+        println!("{:>10} {:>10}  {name}", bytes.len(), small.len());
+        (raw, packed) = (raw + bytes.len(), packed + small.len());
+        let to = file.with_file_name(format!("{name}.br"));
+        fs::write(&to, small).map_err(|e| failed(&to, &e))?;
+    }
+    println!("{raw:>10} {packed:>10}  together");
+    Ok(())
+}
+
+fn brotli(bytes: &[u8]) -> std::io::Result<Vec<u8>> {
+    const BUFFER: usize = 1 << 16;
+    const QUALITY: u32 = 11;
+    const WINDOW: u32 = 22;
+    let mut writer = brotli::CompressorWriter::new(Vec::new(), BUFFER, QUALITY, WINDOW);
+    writer.write_all(bytes)?;
+    Ok(writer.into_inner())
+}
+
+/// FNV-1a, 64 bit.
+fn hash(bytes: &[u8]) -> u64 {
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
+    })
+}
+
+fn remove(folder: &Path) -> Result<(), String> {
+    match fs::remove_dir_all(folder) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(failed(folder, &e)),
+        _ => Ok(()),
+    }
+}
+
+fn failed(path: &Path, error: &std::io::Error) -> String {
+    format!("{}: {error}", path.display())
+}

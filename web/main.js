@@ -1,0 +1,176 @@
+// Loads the laboratory, shows how far that is, and says what is wrong where it cannot run.
+
+const script = document.getElementById('program');
+const build = new URL(import.meta.url).search;
+const query = new URLSearchParams(location.search);
+const $ = (id) => document.getElementById(id);
+
+/** What the tests and the rest of the page hold on to: `page` (src/web/page.rs), and how the start went. */
+const laboratory = { page: null, backend: null, ready: false, trouble: null };
+globalThis.jointplay = laboratory;
+
+const LEFT_OUT = {
+    wasm: 'This browser cannot run WebAssembly, which the laboratory is compiled to.',
+    graphics:
+        'The laboratory draws with WebGPU or WebGL2, and this browser offers neither. They may be switched off in its ' +
+        'settings, or the graphics driver is not supported. A current Firefox, Chrome, Edge or Safari has at least WebGL2.',
+};
+
+/** Replaces whatever is on the page by a message; `report` is a text that the user can copy. */
+function showTrouble(title, text, report) {
+    // What went wrong first is the cause of the rest.
+    if (laboratory.trouble) return;
+    laboratory.trouble = { title, text, report };
+    $('trouble-title').textContent = title;
+    $('trouble-text').textContent = text;
+    $('loading').hidden = true;
+    $('trouble').hidden = false;
+    $('report').hidden = $('copy').hidden = !report;
+    if (report) $('report').value = report;
+    // A graphics driver may be at fault; the other way to draw avoids most of it.
+    $('plainer').hidden = laboratory.backend !== 'webgpu';
+    $('laboratory').hidden = true;
+    $('notice').hidden = false;
+    document.title = `${title} - Jointplay`;
+}
+
+/** Called by the panic hook, src/web/crash.rs. */
+function crashed(message) {
+    const report = `${message}\naddress: ${location.href}\nbrowser: ${navigator.userAgent}`;
+    showTrouble(
+        'The laboratory has stopped',
+        'This is a mistake in the program. Please report the text below with what you did just before.',
+        report,
+    );
+}
+globalThis.jointplayCrashed = crashed;
+
+$('reload').addEventListener('click', () => location.reload());
+$('plainer').addEventListener('click', () => {
+    query.set('renderer', 'webgl');
+    location.search = query;
+});
+$('copy').addEventListener('click', async () => {
+    const report = $('report');
+    report.select();
+    try {
+        await navigator.clipboard.writeText(report.value);
+        $('copy').textContent = 'Copied';
+    } catch {
+        $('copy').textContent = 'Selected: press Ctrl+C';
+    }
+});
+// What no panic hook sees: a trap in the compiled code, and anything that keeps the laboratory from starting.
+function uncaught(error) {
+    const fatal = !laboratory.ready || error instanceof WebAssembly.RuntimeError;
+    if (fatal && error) crashed(error.stack ?? String(error));
+}
+addEventListener('error', (event) => uncaught(event.error));
+addEventListener('unhandledrejection', (event) => uncaught(event.reason));
+
+function stage(text, part) {
+    $('stage').textContent = text;
+    if (part === undefined) $('progress').removeAttribute('value');
+    else $('progress').value = part;
+}
+
+/** The compiled code, with the progress of its download on the page. */
+async function download(address, bytes) {
+    const response = await fetch(address);
+    if (!response.ok) throw new Error(`${address}: ${response.status} ${response.statusText}`);
+    const megabytes = (n) => (n / 1e6).toFixed(1);
+    let got = 0;
+    const counted = response.body.pipeThrough(
+        new TransformStream({
+            transform(chunk, out) {
+                got += chunk.byteLength;
+                stage(`Loading: ${megabytes(got)} of ${megabytes(bytes)} MB`, Math.min(got / bytes, 1));
+                out.enqueue(chunk);
+            },
+        }),
+    );
+    // Compiled while it arrives, which a browser does only for this type.
+    return new Response(counted, { headers: { 'Content-Type': 'application/wasm' } });
+}
+
+/** Backends to try, best first. */
+async function backends() {
+    const asked = query.get('renderer');
+    const webgl = Boolean(document.createElement('canvas').getContext('webgl2'));
+    let webgpu = false;
+    if (asked !== 'webgl') {
+        try {
+            webgpu = Boolean(await navigator.gpu?.requestAdapter());
+        } catch {
+            // A browser that has the object but no adapter for this page.
+        }
+    }
+    const found = [];
+    if (webgpu) found.push('webgpu');
+    if (webgl && asked !== 'webgpu') found.push('webgl');
+    return found;
+}
+
+/** A canvas keeps the kind of its first context: each attempt gets a fresh one. */
+function freshCanvas() {
+    const old = $('laboratory');
+    const canvas = old.cloneNode(false);
+    canvas.hidden = false;
+    old.replaceWith(canvas);
+    return canvas;
+}
+
+/** Starts on the first backend that works; what the others said goes to the console. */
+async function begin(Page, found) {
+    const failures = [];
+    for (const backend of found) {
+        const page = new Page();
+        laboratory.backend = backend;
+        try {
+            await page.start(freshCanvas(), backend, [...query].flat());
+            laboratory.page = page;
+            return null;
+        } catch (error) {
+            failures.push(`${backend}: ${error?.message ?? error}`);
+            console.warn('no start with', failures.at(-1));
+        }
+    }
+    return failures.join('\n');
+}
+
+/** Shows the canvas once it holds a picture. */
+async function firstPicture(page) {
+    const frame = () => new Promise((done) => requestAnimationFrame(done));
+    // The frame that is drawn is on the screen when the next begins.
+    while (page.frames() < 2 && !laboratory.trouble) await frame();
+    await frame();
+    if (laboratory.trouble) return;
+    $('notice').hidden = true;
+    $('laboratory').focus();
+    laboratory.ready = true;
+    performance.mark('first picture');
+}
+
+async function main() {
+    if (typeof WebAssembly !== 'object') return showTrouble('Something is missing', LEFT_OUT.wasm);
+    $('loading').hidden = false;
+    stage('Loading', 0);
+    const found = await backends();
+    if (found.length === 0) return showTrouble('Something is missing', LEFT_OUT.graphics);
+    let bindings;
+    try {
+        const code = download(`jointplay_bg.wasm${build}`, Number(script.dataset.wasmBytes));
+        // Should it fail while the script is still on its way: it is reported where it is waited for.
+        code.catch(() => {});
+        bindings = await import(`./jointplay.js${build}`);
+        await bindings.default({ module_or_path: code });
+    } catch (error) {
+        return showTrouble('The laboratory could not be loaded', `${error?.message ?? error}`);
+    }
+    stage('Starting');
+    const failure = await begin(bindings.Page, found);
+    if (failure) return showTrouble('The laboratory could not start', failure);
+    await firstPicture(laboratory.page);
+}
+
+main();

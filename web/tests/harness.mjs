@@ -1,0 +1,284 @@
+// Opens the page in a real browser and drives it by the role and label of its controls, as a person would.
+//
+//     const lab = await open('scene=pendulum&paused', { backend: 'webgl' });
+//     await lab.click('Button', 'Step');
+//     assert.equal((await lab.state()).steps, 1);
+//     await lab.close();        // fails the test if the console has errors
+//
+// `PAGE`: folder of the page; `NATIVE`: the native program; `CHROMIUM`: the browser. ./test sets what it builds.
+
+import assert from 'node:assert/strict';
+import { spawn, execFile } from 'node:child_process';
+import fs from 'node:fs';
+import os from 'node:os';
+import path from 'node:path';
+import { fileURLToPath } from 'node:url';
+import { promisify } from 'node:util';
+
+import pixelmatch from 'pixelmatch';
+import { chromium } from 'playwright-core';
+import { PNG } from 'pngjs';
+
+export const ROOT = fileURLToPath(new URL('../../', import.meta.url));
+export const PAGE = path.resolve(process.env.PAGE ?? path.join(ROOT, 'target/page'));
+const NATIVE = process.env.NATIVE ?? path.join(ROOT, 'target/debug/jointplay');
+const TOOL = path.join(ROOT, 'target/tools/debug/jointplay-web');
+/** What a failed test leaves behind. */
+const FAILED = path.join(ROOT, 'web/failed');
+
+// One set for both backends. Without the Vulkan flags WebGPU starts and draws nothing.
+const FLAGS = [
+    '--no-sandbox',
+    '--enable-unsafe-webgpu',
+    '--enable-features=Vulkan',
+    '--use-vulkan=swiftshader',
+    '--use-angle=swiftshader',
+    '--disable-quic',
+    '--no-first-run',
+    '--disable-background-networking',
+    '--disable-component-update',
+    '--disable-sync',
+];
+
+/** Small, because a software adapter draws some hundred thousand pixels a second. */
+export const SIZE = { width: 800, height: 560 };
+
+/** Longest wait for anything, ms: software rendering on a busy machine is slow. */
+const PATIENCE = 60_000;
+
+let server;
+let browser;
+/** Pages that a failed test left open: they would take the time of the next. */
+const opened = new Set();
+
+/** Serves the page below a sub-path; the address of its folder. */
+async function serve() {
+    if (server) return server.address;
+    const child = spawn(TOOL, ['serve', path.dirname(PAGE)], { stdio: ['ignore', 'pipe', 'inherit'] });
+    const link = await new Promise((found, failed) => {
+        child.once('error', failed);
+        child.once('exit', (code) => failed(new Error(`${TOOL} ended with ${code}`)));
+        child.stdout.once('data', (text) => found(String(text).trim()));
+    });
+    server = { child, address: `${link}${path.basename(PAGE)}/` };
+    return server.address;
+}
+
+async function launch() {
+    const executablePath = process.env.CHROMIUM ?? '/usr/bin/chromium';
+    browser ??= await chromium.launch({ executablePath, headless: true, args: FLAGS });
+    return browser;
+}
+
+/** Ends browser and server; call once after all tests of a file. */
+export async function quit() {
+    await browser?.close();
+    server?.child.removeAllListeners('exit');
+    server?.child.kill();
+    browser = server = undefined;
+}
+
+/**
+ * Opens the page. `query`: what follows `?`. Options: `backend` 'webgl' or 'webgpu' (appended to the query), `size`
+ * {width, height}, `fragment` (what follows `#`), `before` (a function that runs in the page before its scripts),
+ * `context` (options of a Playwright context, e.g. {hasTouch: true}), `expectTrouble` (do not wait for a picture).
+ */
+export async function open(query = '', options = {}) {
+    const { backend, size = SIZE, fragment = '', before, context = {}, expectTrouble = false } = options;
+    const address = await serve();
+    for (const lab of opened) await lab.close({ errors: true });
+    const own = await (await launch()).newContext({ viewport: size, ...context });
+    const page = await own.newPage();
+    const lab = new Lab(own, page);
+    opened.add(lab);
+    page.setDefaultTimeout(PATIENCE);
+    if (before) await page.addInitScript(before);
+    const parts = [query, backend ? `renderer=${backend}` : ''].filter(Boolean).join('&');
+    await page.goto(`${address}${parts ? `?${parts}` : ''}${fragment ? `#${fragment}` : ''}`);
+    await page.waitForFunction(() => globalThis.jointplay?.ready || globalThis.jointplay?.trouble);
+    if (!expectTrouble) {
+        const trouble = await page.evaluate(() => globalThis.jointplay.trouble);
+        assert.equal(trouble, null, `the page did not start: ${JSON.stringify(trouble)}`);
+    }
+    return lab;
+}
+
+/** A page under test. */
+export class Lab {
+    constructor(context, page) {
+        this.context = context;
+        /** The Playwright page. */
+        this.page = page;
+        /** What the console said as an error. */
+        this.errors = [];
+        page.on('console', (message) => message.type() === 'error' && this.errors.push(message.text()));
+        page.on('pageerror', (error) => this.errors.push(String(error)));
+    }
+
+    /** Closes the page. Errors on its console fail the test unless `errors` says that they belong to it. */
+    async close({ errors = false } = {}) {
+        opened.delete(this);
+        await this.context.close();
+        if (!errors) assert.deepEqual(this.errors, [], 'errors on the console');
+    }
+
+    /** What the laboratory is doing: see `state` in src/web/page.rs. */
+    async state() {
+        return JSON.parse(await this.page.evaluate(() => globalThis.jointplay.page.state()));
+    }
+
+    /** Controls and texts on show: [{role, label, text, value, on, disabled, rect}], see src/web/mirror.rs. */
+    async widgets() {
+        return JSON.parse((await this.page.evaluate(() => globalThis.jointplay.page.widgets())) || '[]');
+    }
+
+    /** The control of this role and label; waits for it. */
+    async find(role, label) {
+        let widgets = [];
+        const found = await this.until(async () => {
+            widgets = await this.widgets();
+            return widgets.find((widget) => widget.role === role && widget.label === label);
+        }, () => `no ${role} "${label}" among ${widgets.map((w) => `${w.role} "${w.label}"`).join(', ')}`);
+        return found;
+    }
+
+    /** Whether such a control is on show now. */
+    async has(role, label) {
+        return (await this.widgets()).some((widget) => widget.role === role && widget.label === label);
+    }
+
+    /** Clicks the middle of a control. */
+    async click(role, label) {
+        await this.drawn();
+        const [x, y] = middle(await this.find(role, label));
+        await this.page.mouse.move(x, y);
+        await this.drawn();
+        await this.page.mouse.click(x, y, { delay: 60 });
+        await this.drawn();
+    }
+
+    /** Drags with the left button along `points` [[x, y], …], a frame at least between two of them. */
+    async drag(points) {
+        const [first, ...rest] = points;
+        const { mouse } = this.page;
+        await mouse.move(...first);
+        await this.drawn();
+        await mouse.down();
+        await this.drawn();
+        for (const point of rest) {
+            await mouse.move(...point);
+            await this.drawn();
+        }
+        await mouse.up();
+        await this.drawn();
+    }
+
+    /** Drags a slider to `part` (0 left, 1 right end) of its travel. */
+    async slide(label, part) {
+        const { rect } = await this.find('Slider', label);
+        const [x0, y0, x1, y1] = rect;
+        const [y, from] = [(y0 + y1) / 2, (x0 + x1) / 2];
+        const to = x0 + part * (x1 - x0);
+        await this.drag([[from, y], [(from + to) / 2, y], [to, y]]);
+    }
+
+    /** Presses a key, as Playwright names it. */
+    async key(name) {
+        await this.page.keyboard.press(name, { delay: 60 });
+        await this.drawn();
+    }
+
+    /** Pauses and runs on to `seconds`. */
+    async runTo(seconds) {
+        await this.page.evaluate((time) => globalThis.jointplay.page.runTo(time), seconds);
+        await this.drawn();
+    }
+
+    /** Waits until the page is drawn anew, or for a while where it has no reason to. */
+    async drawn() {
+        const frames = () => this.page.evaluate(() => globalThis.jointplay.page.frames());
+        const before = await frames();
+        const end = Date.now() + 1000;
+        while ((await frames()) === before && Date.now() < end) await sleep(20);
+    }
+
+    /** Waits until nothing moves on the page any more. */
+    async still() {
+        const frames = () => this.page.evaluate(() => globalThis.jointplay.page.frames());
+        await this.until(async () => {
+            const before = await frames();
+            await sleep(700);
+            return (await frames()) === before;
+        }, 'the page does not come to rest');
+    }
+
+    /** Waits until `test` gives something true, and gives that back. `message`: a text, or a function that makes one. */
+    async until(test, message, patience = PATIENCE) {
+        const end = Date.now() + patience;
+        for (;;) {
+            const result = await test();
+            if (result) return result;
+            if (Date.now() > end) assert.fail(typeof message === 'function' ? message() : message);
+            await sleep(50);
+        }
+    }
+
+    /** What stands on the screen, a pngjs picture. `clip`: {x, y, width, height}. */
+    async pixels(clip) {
+        return PNG.sync.read(await this.page.screenshot({ clip }));
+    }
+}
+
+export const sleep = (milliseconds) => new Promise((done) => setTimeout(done, milliseconds));
+
+export function middle({ rect: [x0, y0, x1, y1] }) {
+    return [(x0 + x1) / 2, (y0 + y1) / 2];
+}
+
+/** Number of different colours: an empty picture has few. */
+export function colours(picture) {
+    const seen = new Set();
+    for (let at = 0; at < picture.data.length; at += 4) seen.add(picture.data.readUInt32LE(at));
+    return seen.size;
+}
+
+/** Part of a picture. */
+export function crop(picture, { x, y, width, height }) {
+    const part = new PNG({ width, height });
+    PNG.bitblt(picture, part, x, y, width, height, 0, 0);
+    return part;
+}
+
+/** Share of the pixels that differ visibly; with `name`, both pictures and their difference are kept if it is above `limit`. */
+export function difference(a, b, name, limit) {
+    assert.deepEqual([a.width, a.height], [b.width, b.height]);
+    const out = new PNG({ width: a.width, height: a.height });
+    const share = pixelmatch(a.data, b.data, out.data, a.width, a.height, { threshold: 0.15 }) / (a.width * a.height);
+    if (name && share > limit) {
+        fs.mkdirSync(FAILED, { recursive: true });
+        for (const [kind, picture] of Object.entries({ page: a, native: b, difference: out })) {
+            fs.writeFileSync(path.join(FAILED, `${name}.${kind}.png`), PNG.sync.write(picture));
+        }
+    }
+    return share;
+}
+
+const run = promisify(execFile);
+
+/** Standard output of the native program. */
+export async function native(...args) {
+    const { stdout } = await run(NATIVE, args, { maxBuffer: 1 << 26 });
+    return stdout;
+}
+
+/** The frame that the native program draws of the whole window at `seconds`. */
+export async function nativeWindow(scene, seconds, { width, height } = SIZE, theme = 'light') {
+    const folder = fs.mkdtempSync(path.join(os.tmpdir(), 'jointplay-frame-'));
+    try {
+        const size = `${width}x${height}`;
+        await native('render', scene, '--ui', '--at', `${seconds}s`, '--size', size, '--theme', theme, '--out', folder, '--force', '--quiet');
+        return PNG.sync.read(fs.readFileSync(path.join(folder, 'frame_00000.png')));
+    } finally {
+        fs.rmSync(folder, { recursive: true, force: true });
+    }
+}

@@ -1,0 +1,230 @@
+// The page in a browser: it loads on both backends, shows what the native window shows, and obeys.
+
+import assert from 'node:assert/strict';
+import fs from 'node:fs';
+import path from 'node:path';
+import { after, test } from 'node:test';
+
+import { colours, crop, difference, nativeWindow, open, PAGE, quit, sleep } from './harness.mjs';
+
+after(quit);
+
+/** An instant of the first impacts, s: arrows are on show. */
+const INSTANT = 0.00785;
+
+/**
+ * Largest share of pixels that may differ from the native frame of the same state. Edges and letters lie elsewhere by
+ * parts of a pixel on another driver; a missing body or panel is some per cent.
+ */
+const TOLERANCE = 0.01;
+
+for (const backend of ['webgl', 'webgpu']) {
+    test(`${backend}: the page shows the same picture as the native window`, async (t) => {
+        const frames = Promise.all([nativeWindow('spcmm', INSTANT), nativeWindow('spcmm', 0.3)]);
+        const lab = await open('paused&theme=light', { backend });
+        const { renderer } = await lab.state();
+        assert.match(renderer, backend === 'webgl' ? /^gl / : /^webgpu /i);
+        await lab.runTo(INSTANT);
+        await lab.still();
+        assert.equal((await lab.state()).shown_s, INSTANT);
+        const shown = await lab.pixels();
+        assert.ok(colours(shown) > 500, `${colours(shown)} colours: an empty picture?`);
+        const [same, later] = await frames;
+        const share = difference(shown, same, `window_${backend}`, TOLERANCE);
+        t.diagnostic(`${share} of the pixels differ from the native frame`);
+        assert.ok(share < TOLERANCE, `${share} of the pixels differ`);
+        // The comparison sees a change of the mechanism alone.
+        const other = difference(shown, later);
+        assert.ok(other > 2 * share, `another instant differs by ${other}, the same by ${share}`);
+        await lab.close();
+    });
+
+    test(`${backend}: pause, step, reset and the clearance slider`, async () => {
+        const lab = await open('', { backend });
+        await lab.until(async () => (await lab.state()).time_s > 0, 'time does not pass');
+        await lab.click('Button', 'Pause');
+        await lab.until(async () => !(await lab.state()).playing, 'it does not pause');
+        const paused = await lab.state();
+        await sleep(300);
+        assert.equal((await lab.state()).state_hash, paused.state_hash, 'time stands still');
+        await lab.click('Button', 'Step');
+        await lab.until(async () => (await lab.state()).steps === paused.steps + 1, 'no step');
+        await lab.key('ArrowLeft');
+        await lab.until(async () => (await lab.state()).state_hash === paused.state_hash, 'no step back');
+        await lab.click('Button', 'Reset');
+        await lab.until(async () => (await lab.state()).time_s === 0, 'no reset');
+        const start = await lab.state();
+
+        await lab.runTo(0.02);
+        const plain = await lab.state();
+        await lab.click('Button', 'Reset');
+        await lab.until(async () => (await lab.state()).state_hash === start.state_hash, 'a reset is a new start');
+        await lab.slide('Clearance', 0.9);
+        const changed = (await lab.state()).changed_parameters['contact.clearance'];
+        assert.ok(parseFloat(changed) > 0.3, `the slider set ${changed}`);
+        await lab.click('Button', 'Reset');
+        await lab.runTo(0.02);
+        const loose = await lab.state();
+        assert.notEqual(loose.state_hash, plain.state_hash);
+        // A longer fall through the play: the first impact is harder.
+        assert.ok(Math.max(...loose.peak_normal_N) > Math.max(...plain.peak_normal_N));
+        await lab.close();
+    });
+}
+
+test('what it draws changes while it plays', async () => {
+    const lab = await open('theme=light', { backend: 'webgl' });
+    const view = { x: 320, y: 60, width: 460, height: 200 };
+    const first = crop(await lab.pixels(), view);
+    await lab.until(async () => (await lab.state()).time_s > 0.004, 'time does not pass');
+    assert.ok(difference(first, crop(await lab.pixels(), view)) > 0.0005);
+    await lab.close();
+});
+
+test('a hidden tab stands still, and does not catch up', async () => {
+    const lab = await open('', { backend: 'webgl' });
+    await lab.until(async () => (await lab.state()).time_s > 0, 'time does not pass');
+    const hide = (hidden) =>
+        lab.page.evaluate((hidden) => {
+            Object.defineProperty(document, 'hidden', { configurable: true, get: () => hidden });
+            Object.defineProperty(document, 'visibilityState', { configurable: true, get: () => (hidden ? 'hidden' : 'visible') });
+            document.dispatchEvent(new Event('visibilitychange'));
+        }, hidden);
+    await hide(true);
+    await sleep(300);
+    const before = await lab.state();
+    await sleep(3000);
+    assert.equal((await lab.state()).state_hash, before.state_hash, 'time passes in a hidden tab');
+    await hide(false);
+    const after = await lab.until(async () => {
+        const state = await lab.state();
+        return state.shown_s > before.shown_s && state;
+    }, 'time does not pass again');
+    // At 1:50, three hidden seconds would be 60 ms.
+    assert.ok(after.shown_s - before.shown_s < 0.03, `${after.shown_s - before.shown_s} s at once`);
+    await lab.close();
+});
+
+test('a frame never steps longer than its share, however far behind the machine is', async () => {
+    // A step of 0.1 us: thousands of times slower than life.
+    const lab = await open('solver.method=rk4&solver.step=0.1us', { backend: 'webgl' });
+    for (let k = 0; k < 8; k += 1) await lab.key('ArrowUp');
+    const first = await lab.state();
+    await sleep(4000);
+    const later = await lab.state();
+    const frames = later.frames - first.frames;
+    assert.ok(frames >= 4, `${frames} frames in 4 s`);
+    // To keep real time, a frame of a tenth of a second would take a million steps. 12 ms are enough for some thousand.
+    const steps = (later.steps - first.steps) / frames;
+    assert.ok(steps > 10 && steps < 20_000, `${steps} steps a frame`);
+    await lab.find('Button', 'Pause');
+    assert.ok((await lab.widgets()).some((widget) => /^reached 1:/.test(widget.label)), 'nothing says how far it keeps up');
+    await lab.close();
+});
+
+test('an address by hand sets scene and parameters; a bad one says what is wrong beside a running scene', async () => {
+    const lab = await open('scene=pendulum&c=0.5mm&paused', { backend: 'webgl' });
+    const state = await lab.state();
+    assert.equal(state.scene, 'pendulum');
+    assert.equal(state.playing, false);
+    assert.deepEqual(Object.keys(state.changed_parameters), ['contact.clearance']);
+    await lab.close();
+    const bad = await open('scene=pendulun', { backend: 'webgl' });
+    assert.equal((await bad.state()).scene, 'spcmm');
+    await bad.until(async () => (await bad.widgets()).some((w) => w.label.includes('did you mean `pendulum`')), 'no word about it');
+    await bad.click('Button', 'Dismiss');
+    await bad.until(async () => !(await bad.has('Button', 'Dismiss')), 'it stays');
+    await bad.close();
+});
+
+test('without WebGPU and WebGL2 a plain page says what is missing', async () => {
+    const lab = await open('', {
+        expectTrouble: true,
+        before: () => {
+            Object.defineProperty(Navigator.prototype, 'gpu', { get: () => undefined });
+            const { getContext } = HTMLCanvasElement.prototype;
+            HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
+                return kind === 'webgl2' ? null : getContext.call(this, kind, ...rest);
+            };
+        },
+    });
+    const text = await lab.page.locator('#trouble').innerText();
+    assert.match(text, /Something is missing/);
+    assert.match(text, /WebGPU or WebGL2/);
+    assert.ok(await lab.page.locator('canvas').isHidden());
+    await lab.close();
+});
+
+test('where WebGPU does not start, WebGL2 takes over', async () => {
+    const lab = await open('', {
+        before: () => {
+            GPUAdapter.prototype.requestDevice = () => Promise.reject(new DOMException('no device', 'OperationError'));
+        },
+    });
+    assert.match((await lab.state()).renderer, /^gl /);
+    assert.ok(colours(await lab.pixels()) > 500);
+    await lab.close();
+});
+
+test('a failed download is told, and can be tried again', async () => {
+    const lab = await open('', {
+        expectTrouble: true,
+        before: () => {
+            const { fetch } = globalThis;
+            globalThis.fetch = (address, ...rest) => (String(address).includes('.wasm') ? Promise.resolve(new Response('', { status: 503 })) : fetch(address, ...rest));
+        },
+    });
+    const text = await lab.page.locator('#trouble').innerText();
+    assert.match(text, /could not be loaded/);
+    assert.match(text, /503/);
+    assert.ok(await lab.page.locator('#reload').isVisible());
+    await lab.close();
+});
+
+test('loading shows its progress', async () => {
+    const lab = await open('paused', {
+        backend: 'webgl',
+        before: () => {
+            globalThis.stages = [];
+            addEventListener('DOMContentLoaded', () => {
+                const [bar, stage] = [document.getElementById('progress'), document.getElementById('stage')];
+                new MutationObserver(() => globalThis.stages.push([bar.value, stage.textContent])).observe(stage, { childList: true });
+            });
+        },
+    });
+    const stages = await lab.page.evaluate(() => globalThis.stages);
+    const loading = stages.filter(([, text]) => /^Loading: .* of .* MB$/.test(text));
+    assert.ok(loading.length > 3, JSON.stringify(stages));
+    const bytes = fs.statSync(path.join(PAGE, 'jointplay_bg.wasm')).size;
+    assert.match(loading.at(-1)[1], new RegExp(`of ${(bytes / 1e6).toFixed(1)} MB`));
+    assert.equal(loading.at(-1)[0], 1, 'the bar ends full');
+    assert.ok(await lab.page.locator('#notice').isHidden());
+    await lab.close();
+});
+
+test('a crash leaves a report that names version, scene and renderer', async () => {
+    const lab = await open('scene=pendulum&c=0.5mm&paused', { backend: 'webgl' });
+    await lab.page.evaluate(() => globalThis.jointplay.page.crash());
+    await lab.page.locator('#trouble').waitFor();
+    const report = await lab.page.locator('#report').inputValue();
+    for (const part of [/^jointplay \d+\.\d+\.\d+ failed inside: a crash was asked for$/m, /^at src\/web\/page\.rs:\d+$/m, /^scene: pendulum$/m, /^changed: contact\.clearance = 0\.5/m, /^renderer: gl /m, /^browser: /m, /^address: http/m]) {
+        assert.match(report, part);
+    }
+    assert.ok(await lab.page.locator('#copy').isVisible());
+    assert.ok(await lab.page.locator('#reload').isVisible());
+    // This was WebGL2 already: there is nothing plainer to try.
+    assert.ok(await lab.page.locator('#plainer').isHidden());
+    assert.ok(await lab.page.locator('canvas').isHidden());
+    await lab.close({ errors: true });
+});
+
+test('the page weighs at most 3 MB as a browser downloads it', (t) => {
+    const LIMIT = 3_000_000;
+    const files = fs.readdirSync(PAGE).filter((file) => file.endsWith('.br'));
+    assert.equal(files.length, fs.readdirSync(PAGE).length / 2, 'every file is there compressed, too');
+    const sizes = files.map((file) => [file.slice(0, -3), fs.statSync(path.join(PAGE, file)).size]);
+    for (const [file, size] of sizes) t.diagnostic(`${file}: ${size} bytes with brotli`);
+    const sum = sizes.reduce((sum, [, size]) => sum + size, 0);
+    t.diagnostic(`together: ${sum} bytes of ${LIMIT}`);
+    assert.ok(sum <= LIMIT, `${sum} bytes`);
+});
