@@ -53,10 +53,11 @@ fn an_undisturbed_impact_gives_what_its_law_gives() {
                 ("solver.step", "2 us"),
             ];
             // Euler's method is of first order: some parts in a thousand at 2 us.
-            let bound = if method == "semi-implicit-euler" {
-                2e-2
-            } else {
-                1e-3
+            let bound = match method {
+                "semi-implicit-euler" => 2e-2,
+                // Its own damping comes on top, by as much as the step is of the impact.
+                "imex-euler" => 8e-2,
+                _ => 1e-3,
             };
             let found = impacts(&mut flung(&changes), 0.02);
             let first = found.first().unwrap();
@@ -152,19 +153,24 @@ fn methods_agree_about_the_first_impacts() {
     for method in METHODS {
         let changes = [("solver.method", method), ("solver.step", "2 us")];
         let found = of("pendulum", &changes, 0.02);
+        // The implicit Euler method damps by as much as its step is of the impact.
+        let loose = if method == "imex-euler" { 10.0 } else { 1.0 };
         for (a, b) in found.iter().zip(&reference).take(2) {
             println!("{method}: {:.5} against {:.5}", a.given(), b.given());
             assert!(
-                (a.given() - b.given()).abs() < 1e-2,
-                "{method}: {a:?} {b:?}"
-            );
-            assert!((a.start - b.start).abs() < 2e-5, "{method}: {a:?} {b:?}");
-            assert!(
-                (a.peak / b.peak - 1.0).abs() < 3e-2,
+                (a.given() - b.given()).abs() < 1e-2 * loose,
                 "{method}: {a:?} {b:?}"
             );
             assert!(
-                (a.deepest / b.deepest - 1.0).abs() < 2e-2,
+                (a.start - b.start).abs() < 2e-5 * loose,
+                "{method}: {a:?} {b:?}"
+            );
+            assert!(
+                (a.peak / b.peak - 1.0).abs() < 3e-2 * loose,
+                "{method}: {a:?} {b:?}"
+            );
+            assert!(
+                (a.deepest / b.deepest - 1.0).abs() < 2e-2 * loose,
                 "{method}: {a:?} {b:?}"
             );
         }

@@ -196,7 +196,6 @@ fn finer_steps_and_tolerances_err_less_and_cost_more() {
         steps: &[10e-6, 1e-6],
         tolerances: &[1e-4, 1e-8],
         seconds: f64::INFINITY,
-        ..Effort::QUICK
     };
     let found = measure(|outside| work_precision(&scene, &effort, outside), u64::MAX).unwrap();
     for method in Setting::methods() {

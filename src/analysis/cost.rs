@@ -48,8 +48,12 @@ const fn chain(label: &'static str, changes: &'static [(&'static str, &'static s
 }
 
 /// The variations; the first is what the others are compared with.
-const PARTS: [Part; 10] = [
+const PARTS: [Part; 11] = [
     spcmm("3 joints with clearance, with friction, tree", &[]),
+    spcmm(
+        "the same without the energy ledger",
+        &[("solver.energy_ledger", "off")],
+    ),
     spcmm("2 joints with clearance", &[("joint.S3.clearance", "0")]),
     spcmm(
         "1 joint with clearance",

@@ -396,10 +396,10 @@ fn work(simulation: &Simulation, before: &Work) -> Work {
     }
 }
 
-/// Residual of the energy balance since the start, of the energy exchanged: the one place where it is read. No run has
-/// one as long as [`Simulation`] keeps no account of its energies.
-fn energy_residual(_simulation: &Simulation) -> Option<f64> {
-    None
+/// Size of the residual of the energy balance since the start, of the energy exchanged; `None` where none was kept.
+fn energy_residual(simulation: &Simulation) -> Option<f64> {
+    let ledger = simulation.ledger()?;
+    Some(ledger.relative_residual().abs())
 }
 
 /// The reference must reach its end: the error says why it did not.

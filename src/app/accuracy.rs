@@ -1,6 +1,6 @@
 //! How far the numbers on show can be trusted: what the preset was measured to do, and how the running scene does.
 
-use eframe::egui::{Grid, ProgressBar, RichText, Ui};
+use eframe::egui::{Label, ProgressBar, RichText, Ui, vec2};
 
 use super::host::{Host, Running};
 use super::player::Player;
@@ -10,6 +10,8 @@ use crate::analysis::task::{Job, Message, SceneSource};
 use crate::scene::{Preset, Value};
 use crate::simulate::Impact;
 
+/// Width of the names, points.
+const LABELS: f32 = 122.0;
 /// Fewer steps than this do not resolve an impact.
 const STEPS_OF_AN_IMPACT: u64 = 10;
 /// Error beyond which a measured preset is to be doubted.
@@ -23,6 +25,24 @@ struct Row {
     value: String,
     doubtful: bool,
     help: String,
+}
+
+impl Row {
+    fn ui(&self, ui: &mut Ui) {
+        ui.horizontal(|ui| {
+            let height = ui.spacing().interact_size.y * 0.8;
+            ui.allocate_ui(vec2(LABELS, height), |ui| {
+                ui.set_width(LABELS);
+                ui.label(self.label).on_hover_text(&self.help);
+            });
+            let mut text = RichText::new(&self.value);
+            if self.doubtful {
+                text = text.color(ui.visuals().warn_fg_color).strong();
+            }
+            ui.add(Label::new(text).truncate())
+                .on_hover_text(&self.help);
+        });
+    }
 }
 
 /// What the preset was measured to do on a scene.
@@ -82,24 +102,16 @@ impl Accuracy {
             list.extend(self.measured(player, preset));
         }
         list.extend(rows(player));
-        Grid::new("accuracy")
-            .num_columns(2)
-            .spacing([12.0, 4.0])
-            .show(ui, |ui| {
-                for row in list {
-                    ui.label(row.label).on_hover_text(&row.help);
-                    let mut text = RichText::new(&row.value);
-                    if row.doubtful {
-                        text = text.color(ui.visuals().warn_fg_color).strong();
-                    }
-                    ui.label(text).on_hover_text(&row.help);
-                    ui.end_row();
-                }
-            });
+        for row in list {
+            row.ui(ui);
+        }
         if let Some(preset) = preset {
             self.measure_ui(ui, player, preset);
         }
-        for doubt in player.simulation().doubts() {
+        // What a control says already is not said again.
+        let said = player.warnings();
+        let doubts = player.simulation().doubts().into_iter();
+        for doubt in doubts.filter(|doubt| !said.contains(doubt)) {
             let words = RichText::new(doubt).small();
             ui.label(words.color(ui.visuals().warn_fg_color));
         }
@@ -221,6 +233,7 @@ fn rows(player: &Player) -> Vec<Row> {
     if let Some(impact) = player.simulation().impacts().next_back() {
         rows.push(steps(player, impact));
         rows.push(restitution(player, impact));
+        rows.extend(flags(impact));
     }
     rows.extend(residual(player));
     rows
@@ -243,14 +256,18 @@ fn solver(player: &Player, preset: Option<Preset>) -> Row {
     } else {
         crate::scene::format_quantity(solver.step, "us")
     };
-    let name = preset.map_or_else(|| "no preset".to_owned(), |p| p.word().to_owned());
+    let name = preset.map_or_else(
+        || "no preset".to_owned(),
+        |preset| format!("what the preset {} has", preset.word()),
+    );
     Row {
-        label: "Solver",
-        value: format!("{method} {size}, {name}"),
+        label: "Runs with",
+        value: format!("{method} {size}"),
         doubtful: false,
-        help: "Method with its tolerance, or its fixed step, and the preset that has these. They stand under Solver; a \
-               measured error is given for presets only."
-            .to_owned(),
+        help: format!(
+            "Method with its tolerance, or its fixed step: {name}. They stand under Solver; a measured error is given for presets \
+             only."
+        ),
     }
 }
 
@@ -286,30 +303,17 @@ fn steps(player: &Player, impact: &Impact) -> Row {
 
 fn restitution(player: &Player, impact: &Impact) -> Row {
     let given = impact.given();
-    let mut help = format!(
+    let help = format!(
         "Separation speed over approach speed of the latest impact, in {}: asked for {}, an undisturbed impact under its \
          normal-force law gives {}.",
         joint(player, impact.joint),
         value::number(impact.asked, 3),
         value::number(impact.law, 3),
     );
-    if impact.disturbed {
-        help.push_str(" Another joint touched meanwhile, or its parameters changed: the ratio is not the law's alone.");
-    }
-    if impact.floored {
-        help.push_str(
-            " It began slower than the impact speed floor, so it rebounds higher than asked.",
-        );
-    }
-    let note = match (impact.disturbed, impact.floored) {
-        (true, _) => ", disturbed",
-        (false, true) => ", slow",
-        (false, false) => "",
-    };
     Row {
         label: "Its restitution",
         value: format!(
-            "{} of {}{note}",
+            "{} of {}",
             value::number(given, 3),
             value::number(impact.asked, 3)
         ),
@@ -317,6 +321,27 @@ fn restitution(player: &Player, impact: &Impact) -> Row {
         doubtful: !impact.disturbed && !impact.floored && (given - impact.law).abs() > 0.02,
         help,
     }
+}
+
+/// Why the restitution of an impact is not its law's.
+fn flags(impact: &Impact) -> Option<Row> {
+    let (value, help) = match (impact.disturbed, impact.floored) {
+        (true, _) => (
+            "disturbed",
+            "Another joint touched meanwhile, or the parameters of the contact changed: the ratio is not the law's alone.",
+        ),
+        (false, true) => (
+            "slow",
+            "The impact began slower than the impact speed floor, so it rebounds higher than asked.",
+        ),
+        (false, false) => return None,
+    };
+    Some(Row {
+        label: "",
+        value: value.to_owned(),
+        doubtful: false,
+        help: help.to_owned(),
+    })
 }
 
 fn residual(player: &Player) -> Option<Row> {

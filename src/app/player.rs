@@ -343,6 +343,11 @@ impl Player {
             .any(|(key, _)| self.is_waiting(key))
     }
 
+    /// What is allowed but may not mean what the user expects.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
     /// What to know about the present value of `key`, if anything.
     pub fn warning(&self, key: &str) -> Option<&str> {
         let last = key.rsplit('.').next().unwrap_or(key);

@@ -20,8 +20,8 @@ const METHOD: &str = "## How it is measured";
 const PRESETS: &str = "## Presets";
 const MODEL: &str = "## What each part of the model costs";
 const CHOICE_TABLE: &str = "| Preset | Setting | Limit of peak errors | Chosen by this run |";
-const PRESET_TABLE: &str = "| Scene | Preset | Ratio, impacts | Peak error | Position error (m) | Ratio, settled | Force error | Held |";
-const POINT_TABLE: &str = "| Method | Setting | Ratio, impacts | Peak error | Position error (m) | Ratio, settled | Force error | Front |";
+const PRESET_TABLE: &str = "| Scene | Preset | Ratio, impacts | Peak error | Position error (m) | Energy error | Ratio, settled | Force error | Held |";
+const POINT_TABLE: &str = "| Method | Setting | Ratio, impacts | Peak error | Position error (m) | Energy error | Ratio, settled | Force error | Front |";
 const MODEL_TABLE: &str = "| Scene | With | An evaluation | A simulated second |";
 
 /// How ratios are meant.
@@ -213,13 +213,14 @@ fn page(found: &[WorkPrecision], costs: &[PartCost], machine: &str) -> String {
     out
 }
 
-const METHOD_TEXT: [&str; 12] = [
+const METHOD_TEXT: [&str; 13] = [
     "Every method runs over its steps or tolerances, twice: over the first impacts, from the start; and over 0.2 s of settled",
     "motion, all from the same state. For after some tens of impacts two good runs have parted, and only statistics can be compared.",
     "",
     "- **Peak error**: the largest relative error among the peak forces of the first six impacts, each within its own span of time",
     "  (half-way to the same joint's contacts before and after). Peaks are those of continuous time.",
     "- **Position error**: of the output body at the instant of the third impact.",
+    "- **Energy error**: residual of the energy balance over the first impacts, of the energy exchanged (`docs/numerics.md`).",
     "- **Force error**: the largest relative error among the joints' mean contact forces in settled motion.",
     "- **Front**: nothing else is both faster and more accurate, over the impacts (i) or in settled motion (s).",
     "- Errors are against the same scene at a tolerance at which halving it changes no more than is said with each scene; what is",
@@ -272,10 +273,11 @@ fn figures(found: &WorkPrecision, point: &Point) -> String {
     };
     let settled = point.settled.as_ref();
     format!(
-        "{} | {} | {} | {} | {}",
+        "{} | {} | {} | {} | {} | {}",
         ratio(end(&point.impacts), point.impacts.ratio),
         error(point.errors.peak, floor.peak),
         error(point.errors.position_m, floor.position_m),
+        error(point.errors.energy, None),
         settled.map_or_else(|| "-".to_owned(), |phase| ratio(end(phase), phase.ratio)),
         error(point.errors.settled, floor.settled),
     )

@@ -9,13 +9,17 @@ const HELD_BY_STABILITY: f64 = 3.0;
 /// Steps that must be held by stability, or taken since the latest contact began, before the implicit method is tried.
 const HELD_STEPS: u32 = 8;
 const SETTLED_STEPS: u32 = 60;
-/// Over so many implicit steps the progress per evaluation must be this many times the explicit method's; else the
-/// explicit one has its turn for so many steps.
+/// Over so many implicit steps the progress per cost must be this many times the explicit method's; else the explicit one
+/// has its turn for so many steps, and twice as many after each trial in a row that fails.
 const TRIAL_STEPS: u32 = 12;
 const WORTH_IT: f64 = 2.0;
 const EXPLICIT_TURN: u32 = 200;
+const LONGEST_TURN: u32 = 6400;
 /// Evaluations of one explicit step.
 const EXPLICIT_EVALUATIONS: f64 = 6.0;
+/// Dense algebra of an implicit step, in evaluations: the square of the velocity coordinates over this. (An evaluation is linear
+/// in them and a factorisation cubic; measured on chains of 4 to 16 links.)
+const SQUARE_OF_AN_EVALUATION: f64 = 36.0;
 /// More velocity coordinates than this are refused by the implicit methods, whose matrices are dense.
 const LARGEST_DENSE: usize = 1024;
 /// More velocity coordinates than this make a dense factorisation dearer than many explicit steps.
@@ -31,15 +35,18 @@ pub(super) struct Choice {
     pub(super) wait: u32,
     /// Explicit step at the latest change to the implicit method, s.
     pub(super) h_explicit: f64,
-    /// Time and evaluations of the implicit steps on trial.
+    /// Time and cost, in evaluations, of the implicit steps on trial.
     pub(super) progress: f64,
-    pub(super) cost: u64,
+    pub(super) cost: f64,
     pub(super) steps: u32,
+    /// Trials in a row that failed.
+    pub(super) failures: u32,
 }
 
 impl Simulation {
     /// Which method of the automatic pair takes the next step, after one of size `h` that took so many evaluations.
     pub(super) fn vote(&mut self, h: f64, stiffness: f64, evaluations: u64) {
+        let velocities = self.state.y.len() - self.mechanism.positions();
         let state = &mut self.state;
         let choice = &mut state.choice;
         if state.contact_began {
@@ -54,17 +61,22 @@ impl Simulation {
         }
         if state.implicit {
             choice.progress += h;
-            choice.cost += evaluations;
+            let algebra = (velocities * velocities) as f64 / SQUARE_OF_AN_EVALUATION;
+            choice.cost += evaluations as f64 + algebra;
             choice.steps += 1;
             if choice.steps >= TRIAL_STEPS {
                 let explicit = choice.h_explicit / EXPLICIT_EVALUATIONS;
-                if choice.progress < WORTH_IT * explicit * choice.cost as f64 {
+                if choice.progress < WORTH_IT * explicit * choice.cost {
                     state.implicit = false;
                     state.controller = controller_of(Method::Automatic, false);
                     state.h_next = choice.h_explicit;
-                    choice.wait = EXPLICIT_TURN;
+                    let turn = EXPLICIT_TURN << choice.failures.min(8);
+                    choice.wait = turn.min(LONGEST_TURN);
+                    choice.failures += 1;
+                } else {
+                    choice.failures = 0;
                 }
-                (choice.progress, choice.cost, choice.steps) = (0.0, 0, 0);
+                (choice.progress, choice.cost, choice.steps) = (0.0, 0.0, 0);
             }
             return;
         }
@@ -79,12 +91,12 @@ impl Simulation {
             return;
         }
         let settled = choice.held >= HELD_STEPS || choice.since_contact >= SETTLED_STEPS;
-        let velocities = state.y.len() - self.mechanism.positions();
         if settled && velocities <= LARGEST_IMPLICIT && state.memory.iter().any(|m| m.active) {
             state.implicit = true;
             state.controller = controller_of(Method::Automatic, true);
             *choice = Choice {
                 h_explicit: h,
+                failures: choice.failures,
                 ..Choice::default()
             };
         }
