@@ -16,6 +16,7 @@ mod host;
 mod icons;
 mod keys;
 mod layout;
+mod load;
 mod log;
 mod overlay;
 mod player;
@@ -25,8 +26,10 @@ mod share;
 mod stack;
 mod theme;
 mod transport;
+mod twin;
 mod value;
 mod viewport;
+mod watch;
 #[cfg(not(target_arch = "wasm32"))]
 mod window;
 
