@@ -159,10 +159,11 @@ impl Player {
         self.twin.as_deref()
     }
 
-    /// Where the twin is at the time on show.
-    pub fn ghost(&mut self) -> Option<&Frame> {
-        let shown = self.pacer.shown();
-        self.twin.as_mut().map(|twin| twin.frame(shown))
+    /// Puts the twin where it is at the time on show.
+    pub(super) fn place_ghost(&mut self) {
+        if let Some(twin) = &mut self.twin {
+            twin.place(self.pacer.shown());
+        }
     }
 
     /// Starts a twin run from the present state, or ends it. The run itself never changes by it.

@@ -57,6 +57,7 @@ impl Twin {
             ended: None,
         };
         twin.measure(run);
+        twin.place(run.time());
         Ok(twin)
     }
 
@@ -93,9 +94,13 @@ impl Twin {
         }
     }
 
-    /// The twin's state near `time`, s, the latest that comes before or at it.
-    pub fn frame(&mut self, time: f64) -> &Frame {
+    /// Puts the state at `time`, s, or the nearest within the latest step, in [`Self::frame`].
+    pub fn place(&mut self, time: f64) {
         self.simulation.sample(time, &mut self.frame);
+    }
+
+    /// The state on show.
+    pub fn frame(&self) -> &Frame {
         &self.frame
     }
 
