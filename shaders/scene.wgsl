@@ -167,6 +167,11 @@ fn mark(in: Surface) -> vec3<f32> {
     return finish(mark(in), in.clip.xy, 0.6);
 }
 
+// A second state of the machine, seen through.
+@fragment fn fs_ghost(in: Surface) -> @location(0) vec4<f32> {
+    return finish(mark(in), in.clip.xy, in.colour.a);
+}
+
 // Light about a joint that was hit: strongest round the socket, gone at its own edge.
 @fragment fn fs_halo(in: Surface) -> @location(0) vec4<f32> {
     let facing = max(dot(normalize(in.normal), normalize(globals.eye.xyz - in.world)), 0.0);

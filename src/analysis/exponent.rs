@@ -175,26 +175,33 @@ impl Benettin {
     /// Moves the twin away from the orbit in a direction that is nobody's own.
     fn push_away<O: Orbit>(&mut self, orbit: &O, twin: &mut O) {
         let scales = orbit.scales();
-        let mut norm = 0.0;
         self.difference.clear();
-        for i in 0..scales.len() {
-            // Weyl's sequence: fixed, spread, and aligned with no coordinate.
-            let part = (0.618_033_988_749_894_9 * (i + 1) as f64).fract() - 0.5;
-            norm += part * part;
-            self.difference.push(part);
-        }
-        let factor = self.separation / norm.sqrt();
-        let states = orbit.state().iter().zip(twin.state()).zip(scales);
-        for (d, ((a, b), scale)) in self.difference.iter_mut().zip(states) {
-            *d = a - b + factor * scale * *d;
+        self.difference.extend(offset(scales, self.separation));
+        let states = orbit.state().iter().zip(twin.state());
+        for (d, (a, b)) in self.difference.iter_mut().zip(states) {
+            *d += a - b;
         }
         twin.displace(&self.difference);
     }
 }
 
-/// Euclidean distance of two states in units of their scales.
+/// An offset of length `separation` in units of `scales`, in a direction that is nobody's own.
+pub fn offset(scales: &[f64], separation: f64) -> impl Iterator<Item = f64> {
+    // Weyl's sequence: fixed, spread, and aligned with no coordinate.
+    let part = |i: usize| (0.618_033_988_749_894_9 * (i + 1) as f64).fract() - 0.5;
+    let square: f64 = (0..scales.len()).map(|i| part(i) * part(i)).sum();
+    let factor = separation / square.sqrt();
+    let scales = scales.iter().enumerate();
+    scales.map(move |(i, scale)| factor * scale * part(i))
+}
+
 fn distance<O: Orbit>(a: &O, b: &O) -> f64 {
-    let pairs = a.state().iter().zip(b.state()).zip(a.scales());
+    scaled_distance(a.state(), b.state(), a.scales())
+}
+
+/// Euclidean distance of two states in units of their scales.
+pub fn scaled_distance(a: &[f64], b: &[f64], scales: &[f64]) -> f64 {
+    let pairs = a.iter().zip(b).zip(scales);
     let square: f64 = pairs
         .map(|((a, b), scale)| {
             let d = (a - b) / scale;

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use serde::{Deserialize, Serialize};
+
 use crate::scene::{Kind, Scene, SceneError, Value};
 
 /// Points that `follow` joins into one block: each block starts cold at its first point, so that neither threads nor
@@ -222,7 +224,7 @@ impl Axis {
 }
 
 /// Where a point starts from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Start {
     /// Every point from the scene's own start.
     Cold,

@@ -19,6 +19,7 @@ mod setting;
 mod standard;
 mod stretch;
 pub mod sweep;
+pub mod swept;
 pub mod task;
 mod work_precision;
 

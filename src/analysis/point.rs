@@ -158,6 +158,16 @@ impl PointRun {
         run
     }
 
+    /// Time of the first section, discarded ones included, s.
+    pub fn first(&self) -> f64 {
+        self.watch.schedule().first
+    }
+
+    /// Whether it began at the scene's own start.
+    pub fn is_cold(&self) -> bool {
+        self.started == 0.0
+    }
+
     /// Whether all periods are through.
     pub fn is_done(&self) -> bool {
         self.watch.is_done()

@@ -108,6 +108,11 @@ impl<O: Orbit> Watch<O> {
         watch
     }
 
+    /// When its sections are.
+    pub fn schedule(&self) -> &Schedule {
+        &self.schedule
+    }
+
     /// The motion.
     pub fn orbit(&self) -> &O {
         &self.orbit

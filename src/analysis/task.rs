@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 use serde::{Deserialize, Serialize};
 
 use super::presets::{self, Measured};
+use super::swept::{self, Range, SweepTask, SweptPoint};
 use super::{AnalysisError, Outside};
 use crate::scene::{Preset, Scene, SceneError};
 
@@ -48,6 +49,8 @@ pub enum Job {
         /// Words of `solver.preset`.
         presets: Vec<String>,
     },
+    /// Points over a range of a parameter.
+    Sweep(SweepTask),
 }
 
 /// What a computation says on its way.
@@ -57,6 +60,10 @@ pub enum Message {
     Progress(f64),
     /// The presets asked for, by their words.
     Presets(Vec<(String, Measured)>),
+    /// The ranges of a sweep that can be; its points follow.
+    Ranges(Vec<Range>),
+    /// A point of a sweep.
+    Point(Box<SweptPoint>),
     /// All was said.
     Done,
     /// Why there is no result.
@@ -72,6 +79,7 @@ pub fn perform(
 ) {
     let outcome = match job {
         Job::Presets { scene, presets } => measure_presets(scene, presets, clock, tell),
+        Job::Sweep(task) => swept::run(task, tell),
     };
     let last = match outcome {
         Ok(()) => Message::Done,
@@ -82,7 +90,7 @@ pub fn perform(
     let _ = tell(last);
 }
 
-enum Failure {
+pub(super) enum Failure {
     Cancelled,
     Said(String),
 }

@@ -250,6 +250,9 @@ impl App {
             // The rest is the line of the file with a mark under it.
             return problem.lines().next().unwrap_or("").to_owned();
         }
+        if self.load.is_some() {
+            return "Running to the chosen section".to_owned();
+        }
         if self.replay.is_some() {
             return "Reproducing the state of the link".to_owned();
         }

@@ -35,6 +35,11 @@ impl App {
                 .response
                 .on_hover_text("Save a picture, the record or the scene");
             self.link_button(ui);
+            let bench = egui::Button::selectable(self.show_bench, "Bench");
+            let help = "Chaos bench shown or hidden (key B): phase portrait, Poincaré section, sweeps, twin run";
+            if ui.add(bench).on_hover_text(help).clicked() {
+                self.show_bench = !self.show_bench;
+            }
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 if ui
                     .button("?")
@@ -148,6 +153,23 @@ impl App {
                 ui.horizontal_wrapped(|ui| {
                     let percent = (fraction * 100.0).floor();
                     ui.label(format!("Reproducing the state of the link… {percent} %"));
+                    ui.add(egui::ProgressBar::new(fraction).desired_width(120.0));
+                    cancelled = ui
+                        .button("Stop here")
+                        .on_hover_text("Stay at the time that the run has reached (Esc)")
+                        .clicked();
+                });
+            });
+            if cancelled {
+                self.cancel_replay();
+            }
+        }
+        if let Some(fraction) = self.loading() {
+            let mut cancelled = false;
+            Panel::top("load").frame(bar).show(ui, |ui| {
+                ui.horizontal_wrapped(|ui| {
+                    let percent = (fraction * 100.0).floor();
+                    ui.label(format!("Running to the chosen section… {percent} %"));
                     ui.add(egui::ProgressBar::new(fraction).desired_width(120.0));
                     cancelled = ui
                         .button("Stop here")

@@ -21,6 +21,7 @@ pub enum Action {
     Arrows,
     Panel,
     Plots,
+    Bench,
     Theme,
     Help,
     Close,
@@ -48,7 +49,7 @@ const fn bind(key: Key, action: Action, written: &'static str, help: &'static st
 }
 
 /// All keys.
-pub const BINDINGS: [Binding; 28] = [
+pub const BINDINGS: [Binding; 29] = [
     bind(Key::Space, Action::PlayPause, "Space", "Play or pause"),
     bind(
         Key::ArrowRight,
@@ -92,6 +93,7 @@ pub const BINDINGS: [Binding; 28] = [
     bind(Key::A, Action::Arrows, "A", "Force arrows on or off"),
     bind(Key::C, Action::Panel, "C", "Controls shown or hidden"),
     bind(Key::P, Action::Plots, "P", "Plots shown or hidden"),
+    bind(Key::B, Action::Bench, "B", "Chaos bench shown or hidden"),
     bind(Key::T, Action::Theme, "T", "Light or dark"),
     bind(Key::Questionmark, Action::Help, "?", "This list"),
     bind(Key::Slash, Action::Help, "", ""),

@@ -26,6 +26,8 @@ pub enum Sheet {
     Controls,
     /// Plots.
     Plots,
+    /// Chaos bench.
+    Bench,
 }
 
 impl App {
@@ -69,14 +71,16 @@ impl App {
     }
 
     fn side_by_side(&mut self, ui: &mut Ui, bar: Frame) {
-        let free = self.replay.is_none();
+        let free = !self.is_under_way();
         let Self {
             player,
             controls,
             accuracy,
             plots,
+            bench,
             show_controls,
             show_plots,
+            show_bench,
             ..
         } = self;
         Panel::left("controls")
@@ -90,6 +94,21 @@ impl App {
                     ui.spacing_mut().item_spacing.y = 5.0;
                     ui.add_enabled_ui(free, |ui| controls.ui(ui, player, accuracy));
                 });
+            });
+        let load = Panel::right("bench")
+            .frame(bar)
+            .resizable(true)
+            .default_size(400.0)
+            .size_range(300.0..=640.0)
+            .show_collapsible(ui, show_bench, |ui| {
+                ScrollArea::vertical()
+                    .id_salt("bench")
+                    .auto_shrink(false)
+                    .show(ui, |ui| {
+                        ui.set_max_width(ui.available_width() - 10.0);
+                        ui.add_enabled_ui(free, |ui| bench.ui(ui, player)).inner
+                    })
+                    .inner
             });
         Panel::bottom("plots")
             .frame(bar)
@@ -112,6 +131,9 @@ impl App {
         let stop = CentralPanel::no_frame()
             .show(ui, |ui| self.picture(ui))
             .inner;
+        if let Some(load) = load.and_then(|shown| shown.inner) {
+            self.start_load(load);
+        }
         if asked.or(stop).is_some() {
             self.reset();
         }
@@ -125,7 +147,7 @@ impl App {
                 .exact_size(height)
                 .show(ui, |ui| self.sheet(ui));
         }
-        let free = self.replay.is_none();
+        let free = !self.is_under_way();
         let asked = Panel::bottom("transport")
             .frame(bar)
             .show(ui, |ui| {
@@ -143,12 +165,12 @@ impl App {
     }
 
     fn lying(&mut self, ui: &mut Ui, bar: Frame) {
-        let free = self.replay.is_none();
+        let free = !self.is_under_way();
         let asked = Panel::bottom("transport")
             .frame(bar)
             .show(ui, |ui| {
                 ui.horizontal(|ui| {
-                    let room = ui.available_width() - 190.0;
+                    let room = ui.available_width() - 270.0;
                     let asked = ui
                         .allocate_ui(egui::vec2(room, ui.spacing().interact_size.y), |ui| {
                             ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.player))
@@ -184,6 +206,7 @@ impl App {
         let mut tabs = [
             (Sheet::Controls, "Controls", "Parameters shown or hidden"),
             (Sheet::Plots, "Plots", "Plots shown or hidden"),
+            (Sheet::Bench, "Bench", "Chaos bench shown or hidden"),
         ];
         if backwards {
             tabs.reverse();
@@ -203,15 +226,17 @@ impl App {
     }
 
     fn sheet(&mut self, ui: &mut Ui) {
-        let free = self.replay.is_none();
+        let free = !self.is_under_way();
         let Self {
             player,
             controls,
             accuracy,
             plots,
+            bench,
             sheet,
             ..
         } = self;
+        let mut load = None;
         ScrollArea::vertical()
             .id_salt("sheet")
             .auto_shrink(false)
@@ -226,9 +251,15 @@ impl App {
                         let size = egui::vec2(ui.available_width(), 340.0);
                         ui.allocate_ui(size, |ui| plots.ui(ui, player));
                     }
+                    Some(Sheet::Bench) => {
+                        load = ui.add_enabled_ui(free, |ui| bench.ui(ui, player)).inner;
+                    }
                     None => {}
                 }
             });
+        if let Some(load) = load {
+            self.start_load(load);
+        }
     }
 
     /// The 3D view with its buttons and, after a stop, the reason.
@@ -236,6 +267,7 @@ impl App {
         let area = ui.max_rect();
         self.picture_rect = area;
         let plain = self.capture.is_some();
+        self.player.place_ghost();
         self.viewport.ui(ui, &self.player, plain);
         if plain {
             // A saved picture has no buttons in it.

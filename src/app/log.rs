@@ -18,9 +18,30 @@ pub enum Event {
         /// Key.
         key: String,
     },
+    /// From here on steps end at `first`, at `first + interval`, and so on, at `sections` instants, s.
+    Sections {
+        /// The first.
+        first: Number,
+        /// From one to the next.
+        interval: Number,
+        /// How many.
+        sections: u64,
+    },
     /// A step was tried and the divergence guard refused it.
     Stop,
 }
+
+/// A finite number that is compared by its bits.
+#[derive(Clone, Copy, Debug)]
+pub struct Number(pub f64);
+
+impl PartialEq for Number {
+    fn eq(&self, other: &Self) -> bool {
+        self.0.to_bits() == other.0.to_bits()
+    }
+}
+
+impl Eq for Number {}
 
 /// An event and the number of steps taken before it since the start.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -72,6 +93,11 @@ impl Log {
             text.push_str(&match &entry.event {
                 Event::Set { key, value } => format!("{steps} {key}={value}\n"),
                 Event::Original { key } => format!("{steps} {key}\n"),
+                Event::Sections {
+                    first,
+                    interval,
+                    sections,
+                } => format!("{steps} |{} {} {sections}\n", first.0, interval.0),
                 Event::Stop => format!("{steps} !\n"),
             });
         }
@@ -99,6 +125,10 @@ impl Log {
             if what.is_empty() {
                 return Err(wrong());
             }
+            if let Some(text) = what.strip_prefix('|') {
+                log.push(before, read_sections(text).ok_or_else(wrong)?);
+                continue;
+            }
             log.push(
                 before,
                 match what.split_once('=') {
@@ -117,6 +147,22 @@ impl Log {
     }
 }
 
+/// Reads `FIRST INTERVAL SECTIONS`.
+fn read_sections(text: &str) -> Option<Event> {
+    let mut parts = text.split(' ');
+    let mut number = || {
+        let value = parts.next()?.parse::<f64>().ok()?;
+        (value.is_finite() && value > 0.0).then_some(Number(value))
+    };
+    let (first, interval) = (number()?, number()?);
+    let sections = parts.next()?.parse().ok()?;
+    parts.next().is_none().then_some(Event::Sections {
+        first,
+        interval,
+        sections,
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -128,6 +174,12 @@ mod tests {
         log.set(120, "joint.S1.clearance", "0.4 mm");
         let key = "contact.clearance".to_owned();
         log.push(120, Event::Original { key });
+        let sections = Event::Sections {
+            first: Number(0.1 + 0.2),
+            interval: Number(2.0),
+            sections: 30,
+        };
+        log.push(130, sections);
         log.push(7_000_000_000, Event::Stop);
         let text = log.text();
         assert_eq!(text.lines().next(), Some("0 contact.clearance=0.5 mm"));
@@ -138,6 +190,10 @@ mod tests {
             "12 ",
             "-1 a=b",
             "1 a=b\n18446744073709551615 a=b",
+            "1 |2 2",
+            "1 |0 2 3",
+            "1 |1 NaN 3",
+            "1 |1 2 3 4",
         ] {
             assert!(Log::read(Vec::new(), bad).is_err(), "{bad}");
         }

@@ -6,6 +6,7 @@ mod accuracy;
 mod announce;
 #[cfg(not(target_arch = "wasm32"))]
 mod background;
+mod bench;
 mod controls;
 mod dialogs;
 mod files;
@@ -16,6 +17,7 @@ mod host;
 mod icons;
 mod keys;
 mod layout;
+mod load;
 mod log;
 mod overlay;
 mod player;
@@ -25,8 +27,10 @@ mod share;
 mod stack;
 mod theme;
 mod transport;
+mod twin;
 mod value;
 mod viewport;
+mod watch;
 #[cfg(not(target_arch = "wasm32"))]
 mod window;
 
@@ -41,6 +45,7 @@ use crate::view::{Preset, ViewOptions};
 
 use accuracy::Accuracy;
 use announce::Announcer;
+use bench::Bench;
 use controls::Controls;
 use dialogs::{Answer, Dialog};
 #[cfg(not(target_arch = "wasm32"))]
@@ -50,6 +55,7 @@ pub use host::DesktopHost;
 pub use host::{Host, NoHost, OpenedFile, Running, SaveFile};
 use keys::Action;
 use layout::Sheet;
+use load::Load;
 pub use log::{Entry, Event, Log};
 pub use overlay::{force_notes, plate};
 pub use player::Player;
@@ -161,11 +167,13 @@ pub struct App {
     accuracy: Accuracy,
     viewport: Viewport,
     plots: Plots,
+    bench: Bench,
     dialog: Option<Dialog>,
     /// What the last attempt to open or reset said.
     problem: Option<String>,
     show_controls: bool,
     show_plots: bool,
+    show_bench: bool,
     hint_dismissed: bool,
     /// Of a small window: what its sheet shows.
     sheet: Option<Sheet>,
@@ -176,6 +184,8 @@ pub struct App {
     fingers: Option<bool>,
     host: Box<dyn Host>,
     replay: Option<Replay>,
+    /// The way to a section of a sweep, and whether a twin is to follow from there.
+    load: Option<(Load, bool)>,
     verdict: Option<Verdict>,
     notice: Option<Notice>,
     announcer: Announcer,
@@ -225,10 +235,12 @@ impl App {
             controls: Controls::default(),
             accuracy: Accuracy::default(),
             plots: Plots::default(),
+            bench: Bench::default(),
             dialog: None,
             problem: options.problem,
             show_controls: true,
             show_plots: true,
+            show_bench: false,
             hint_dismissed: false,
             sheet: Some(Sheet::Controls),
             compact: false,
@@ -236,6 +248,7 @@ impl App {
             fingers: None,
             host: Box::new(NoHost),
             replay,
+            load: None,
             verdict: None,
             notice: None,
             announcer: Announcer::default(),
@@ -262,6 +275,63 @@ impl App {
     /// Which plots are shown.
     pub fn plots_mut(&mut self) -> &mut Plots {
         &mut self.plots
+    }
+
+    /// The chaos bench.
+    pub fn bench(&self) -> &Bench {
+        &self.bench
+    }
+
+    /// Whether the run is on its way to the state of a link or to a section of a sweep: it is out of reach until then.
+    fn is_under_way(&self) -> bool {
+        self.replay.is_some() || self.load.is_some()
+    }
+
+    /// How far the way to a section of a sweep is, 0 to 1; `None` where none is on its way.
+    pub fn loading(&self) -> Option<f32> {
+        let (load, _) = self.load.as_ref()?;
+        Some(load.fraction(&self.player))
+    }
+
+    /// Runs the scene of a sweep anew towards a section.
+    fn start_load(&mut self, load: Load) {
+        let phase = self.player.watch().phase();
+        let twin = self.player.twin().is_some();
+        let pose = self.viewport.pose();
+        let same = load.scene.text == self.player.wanted().source.text;
+        let scene = load.scene.scene().map_err(|error| error.to_string());
+        self.problem = scene.and_then(|scene| self.show_scene(&scene)).err();
+        if self.problem.is_none() {
+            self.player.set_playing(false);
+            self.player.set_phase(phase);
+            if let Some(pose) = pose.filter(|_| same) {
+                self.viewport.set_pose(pose);
+            }
+            self.load = Some((load, twin));
+        }
+    }
+
+    /// Goes on towards a section within the budget of a frame.
+    fn advance_load(&mut self) {
+        let Some((load, twin)) = &mut self.load else {
+            return;
+        };
+        let clock = Instant::now();
+        let may_step = || clock.elapsed().as_secs_f64() < REPLAY_BUDGET;
+        let Some(arrival) = load.advance(&mut self.player, may_step) else {
+            return;
+        };
+        let arrival = arrival.and_then(|()| {
+            self.player
+                .set_twin(*twin)
+                .map_err(|error| error.to_string())
+        });
+        match arrival {
+            Ok(()) => self.player.set_playing(true),
+            Err(why) => self.problem = Some(why),
+        }
+        self.load = None;
+        self.viewport.arrive(&self.player);
     }
 
     /// Opens a built-in scene or a file; on an error the running scene stays and the reason is shown.
@@ -302,8 +372,11 @@ impl App {
         Some(replay.fraction(&self.player))
     }
 
-    /// Stays where the way to the state of a link has come to.
+    /// Stays where the way to the state of a link, or to a section, has come to.
     fn cancel_replay(&mut self) {
+        if self.load.take().is_some() {
+            self.viewport.arrive(&self.player);
+        }
         if self.replay.take().is_some() {
             let reason = "it was stopped on the way".to_owned();
             self.verdict = Some(Verdict::Failed(reason));
@@ -349,6 +422,10 @@ impl App {
             }
             return true;
         }
+        if self.load.is_some() {
+            self.advance_load();
+            return true;
+        }
         self.player.advance(dt);
         self.announcer.observe(&self.player);
         let moves = self.viewport.advance(&self.player, dt as f32);
@@ -364,6 +441,7 @@ impl App {
         self.controls.clear();
         self.problem = None;
         self.replay = None;
+        self.load = None;
         self.verdict = None;
         Ok(())
     }
@@ -377,7 +455,7 @@ impl App {
             action,
             Action::PlayPause | Action::Step | Action::StepBack | Action::Reset
         );
-        if self.replay.is_some() && moves {
+        if self.is_under_way() && moves {
             return;
         }
         let player = &mut self.player;
@@ -403,6 +481,8 @@ impl App {
                 let on = !(arrows.normal || arrows.friction);
                 (arrows.normal, arrows.friction) = (on, on);
             }
+            Action::Bench if self.compact => self.fold(Sheet::Bench),
+            Action::Bench => self.show_bench = !self.show_bench,
             Action::Panel if self.compact => self.fold(Sheet::Controls),
             Action::Plots if self.compact => self.fold(Sheet::Plots),
             Action::Panel => self.show_controls = !self.show_controls,
@@ -487,7 +567,8 @@ impl eframe::App for App {
         }
         self.receive_files(ctx);
         self.receive_picture(ctx);
-        if self.accuracy.update(self.host.as_mut()) {
+        let measuring = self.accuracy.update(self.host.as_mut());
+        if self.bench.update(self.host.as_mut()) || measuring {
             ctx.request_repaint_after(POLL);
         }
         let dt = ctx.input(|input| input.stable_dt);

@@ -4,7 +4,10 @@ use std::collections::VecDeque;
 
 use web_time::Instant;
 
-use super::log::{Event, Log};
+use super::log::{Event, Log, Number};
+use super::twin::Twin;
+use super::watch::Watch;
+use crate::analysis::section::Schedule;
 use crate::scene::{Scene, SceneError, Value};
 use crate::simulate::{
     Channels, Effect, Frame, History, Pacer, Peak, Simulation, Snapshot, StartError, Stopped,
@@ -36,6 +39,10 @@ pub struct Player {
     past: VecDeque<(Snapshot, usize)>,
     /// What was done since the start.
     log: Log,
+    /// Instants at which steps end.
+    sections: Option<Schedule>,
+    watch: Watch,
+    twin: Option<Box<Twin>>,
     /// Simulated time and seconds of stepping that it took, both fading.
     stepped: f64,
     stepping: f64,
@@ -88,6 +95,9 @@ impl Player {
             stepped: 0.0,
             stepping: 0.0,
             log: Log::new(&scene.changes),
+            sections: None,
+            watch: Watch::new(scene),
+            twin: None,
             simulation,
         };
         player.start_record();
@@ -132,6 +142,67 @@ impl Player {
     /// What was done to the run since its start.
     pub fn log(&self) -> &Log {
         &self.log
+    }
+
+    /// What the chaos bench keeps of the run.
+    pub fn watch(&self) -> &Watch {
+        &self.watch
+    }
+
+    /// Another drive phase of the sections.
+    pub fn set_phase(&mut self, phase: f64) {
+        self.watch.set_phase(phase, self.simulation.time());
+    }
+
+    /// The twin run, if there is one.
+    pub fn twin(&self) -> Option<&Twin> {
+        self.twin.as_deref()
+    }
+
+    /// Puts the twin where it is at the time on show.
+    pub(super) fn place_ghost(&mut self) {
+        if let Some(twin) = &mut self.twin {
+            twin.place(self.pacer.shown());
+        }
+    }
+
+    /// Starts a twin run from the present state, or ends it. The run itself never changes by it.
+    ///
+    /// # Errors
+    /// The twin cannot start.
+    pub fn set_twin(&mut self, on: bool) -> Result<(), StartError> {
+        self.twin = None;
+        if on {
+            self.twin = Some(Box::new(Twin::new(&self.simulation)?));
+        }
+        Ok(())
+    }
+
+    /// The state changed by other means than a step.
+    fn restart_twin(&mut self) {
+        if self.twin.is_some() {
+            // A scene that runs starts again.
+            self.twin = Twin::new(&self.simulation).ok().map(Box::new);
+        }
+    }
+
+    /// From now on steps end at the instants of `schedule`.
+    pub(super) fn end_steps_at(&mut self, schedule: Schedule) {
+        let event = Event::Sections {
+            first: Number(schedule.first),
+            interval: Number(schedule.interval),
+            sections: schedule.sections as u64,
+        };
+        self.log.push(self.steps(), event);
+        self.past.clear();
+        self.sections = Some(schedule);
+    }
+
+    /// Instants of the schedule that are still to come.
+    pub(super) fn sections_to_come(&self) -> usize {
+        let now = self.simulation.time();
+        self.sections
+            .map_or(0, |schedule| schedule.sections - passed(&schedule, now))
     }
 
     /// Accepted steps since the start.
@@ -229,6 +300,8 @@ impl Player {
         if self.simulation.restore(&snapshot).is_ok() {
             self.stopped = None;
             self.log.entries.truncate(entries);
+            self.watch.back_to(self.simulation.time());
+            self.restart_twin();
             self.show_latest();
         }
     }
@@ -271,6 +344,9 @@ impl Player {
         self.simulation.reset()?;
         self.stopped = None;
         self.log = Log::new(&self.simulation.scene().changes);
+        self.sections = None;
+        self.watch.begin(self.simulation.running_scene(), 0.0);
+        self.restart_twin();
         let channels = Channels::of(self.simulation.running_scene());
         if channels.list() != self.channels.list() {
             self.history = History::new(channels.len(), FINEST_BIN);
@@ -322,6 +398,9 @@ impl Player {
     fn after_change(&mut self) {
         self.warnings = self.wanted().warnings();
         self.past.clear();
+        self.watch
+            .begin(self.simulation.running_scene(), self.simulation.time());
+        self.restart_twin();
         // What was recorded before steps were taken back belongs to another future.
         let recorded = self.history.span().map_or(0.0, |(_, end)| end);
         if recorded > self.simulation.time() {
@@ -366,8 +445,12 @@ impl Player {
 
     /// One step with its record; false when the guard stopped it.
     fn step(&mut self) -> bool {
-        match self.simulation.step() {
+        match self.simulation.step_until(self.next_section()) {
             Ok(()) => {
+                self.watch.step(&mut self.simulation);
+                if let Some(twin) = &mut self.twin {
+                    twin.follow(&self.simulation);
+                }
                 self.record();
                 true
             }
@@ -378,6 +461,16 @@ impl Player {
                 false
             }
         }
+    }
+
+    /// Where the next step ends at the latest, s.
+    fn next_section(&self) -> f64 {
+        let now = self.simulation.time();
+        let schedule = self.sections.as_ref();
+        schedule.map_or(f64::INFINITY, |schedule| match passed(schedule, now) {
+            k if k < schedule.sections => schedule.time(k),
+            _ => f64::INFINITY,
+        })
     }
 
     fn record(&mut self) {
@@ -395,6 +488,7 @@ impl Player {
             self.simulation.sample(time, &mut self.recorded);
             self.channels.read(&self.recorded, &mut self.values);
             self.history.push(time, &self.values);
+            self.watch.record(&self.recorded);
         }
     }
 
@@ -426,6 +520,17 @@ impl Player {
             }
         }
     }
+}
+
+/// Instants of `schedule` up to `now`, s.
+fn passed(schedule: &Schedule, now: f64) -> usize {
+    let guess = ((now - schedule.first) / schedule.interval).floor();
+    // Within one, whatever the rounding; a negative guess is 0.
+    let mut k = (guess as usize).saturating_sub(1).min(schedule.sections);
+    while k < schedule.sections && schedule.time(k) <= now {
+        k += 1;
+    }
+    k
 }
 
 #[cfg(test)]

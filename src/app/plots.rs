@@ -349,7 +349,7 @@ fn clearances(player: &Player) -> Vec<f64> {
 }
 
 /// About `count` marks at 1, 2 or 5 times a power of ten.
-fn marks(input: &GridInput, count: f64) -> Vec<GridMark> {
+pub(super) fn marks(input: &GridInput, count: f64) -> Vec<GridMark> {
     let (least, greatest) = input.bounds;
     let rough = (greatest - least) / count;
     if !(rough.is_finite() && rough > 0.0) {
@@ -385,7 +385,7 @@ impl Window {
 }
 
 /// Unit of a time axis of this length, and its size in seconds.
-fn time_axis(length: f64) -> (&'static str, f64) {
+pub(super) fn time_axis(length: f64) -> (&'static str, f64) {
     if length >= 0.5 {
         ("s", 1.0)
     } else if length >= 5e-4 {
@@ -396,7 +396,7 @@ fn time_axis(length: f64) -> (&'static str, f64) {
 }
 
 /// A mark on an axis.
-fn tick(mark: f64) -> String {
+pub(super) fn tick(mark: f64) -> String {
     value::number(mark, 6)
 }
 

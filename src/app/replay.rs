@@ -3,6 +3,7 @@
 use super::log::{Entry, Event};
 use super::player::Player;
 use super::share::Link;
+use crate::analysis::section::Schedule;
 
 /// What became of a link.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -139,6 +140,19 @@ fn apply(player: &mut Player, entry: &Entry) -> Result<(), String> {
         Event::Original { key } => player
             .set_original(key)
             .map_err(|error| error.to_string())?,
+        Event::Sections {
+            first,
+            interval,
+            sections,
+        } => {
+            player.end_steps_at(Schedule {
+                first: first.0,
+                interval: interval.0,
+                sections: usize::try_from(*sections).unwrap_or(usize::MAX),
+                discard: 0,
+            });
+            return Ok(());
+        }
         // Taken by the step before.
         Event::Stop => return Ok(()),
     };

@@ -243,6 +243,10 @@ impl Viewport {
             .and_then(|pixel| self.view.pick(&shot, Vec2::new(pixel.x, pixel.y)));
         // egui has dropped the clone of the frame before: nothing is copied.
         self.view.build(&shot, Arc::make_mut(&mut self.list));
+        if let Some(twin) = player.twin() {
+            let list = Arc::make_mut(&mut self.list);
+            self.view.add_ghost(&shot, twin.frame(), list);
+        }
         if response.double_clicked() {
             // A finger that has left hovers over nothing.
             let tapped = response

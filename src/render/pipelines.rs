@@ -20,6 +20,7 @@ pub(super) struct Pipelines {
     pub solid: wgpu::RenderPipeline,
     pub floor: wgpu::RenderPipeline,
     pub line: wgpu::RenderPipeline,
+    pub ghost: wgpu::RenderPipeline,
     pub halo: wgpu::RenderPipeline,
     pub socket_far: wgpu::RenderPipeline,
     pub socket_near: wgpu::RenderPipeline,
@@ -151,6 +152,7 @@ impl Pipelines {
                 buffers: &lines,
                 ..flat("line", "vs_line", "fs_line", TriangleStrip)
             }),
+            ghost: make(glass("ghost", "fs_ghost", Back)),
             halo: make(glass("halo", "fs_halo", Back)),
             socket_far: make(glass("socket, far side", "fs_socket", Front)),
             socket_near: make(glass("socket, near side", "fs_socket", Back)),

@@ -159,6 +159,7 @@ impl Renderer {
         }
         self.packed.clear();
         let solid = self.pack(&list.solid);
+        let ghost = self.pack(&list.ghost);
         let arrows = self.pack(&list.arrows);
         let overlay = self.pack(&list.overlay);
         let halos = [self.pack_one(Mesh::Sphere.index(), &list.halos)];
@@ -217,6 +218,7 @@ impl Renderer {
             pass.set_vertex_buffer(0, self.lines.buffer.slice(..bytes));
             pass.draw(0..4, 0..list.lines.len() as u32);
         }
+        self.draw_meshes(&mut pass, &pipelines.ghost, &ghost);
         self.draw_meshes(&mut pass, &pipelines.halo, &halos);
         self.draw_meshes(&mut pass, &pipelines.socket_far, &sockets);
         self.draw_meshes(&mut pass, &pipelines.socket_near, &sockets);

@@ -256,9 +256,29 @@ impl SceneView {
         }
     }
 
+    /// Adds the moving parts as they stand in `ghost`, another state of the scene of `shot`, to the list that was built of
+    /// it. Where both states are the same nothing is seen.
+    pub fn add_ghost(&self, shot: &Shot<'_>, ghost: &Frame, out: &mut DrawList) {
+        let palette = Palette::of(shot.options.theme);
+        let joints = drawn::joints(shot.scene, ghost, out.magnification);
+        for part in self.parts.iter().filter(|part| part.body.is_some()) {
+            push_solid(&mut out.ghost, &part.place(ghost, &joints), palette.ghost);
+        }
+        for joint in &joints {
+            let size = Mat3::from_diagonal(Vec3::splat(joint.ball_radius));
+            let ball = placed(size, joint.ball_centre, palette.ghost);
+            out.ghost.push(Mesh::Sphere, ball);
+        }
+    }
+
     fn start(&self, shot: &Shot<'_>, palette: &Palette, out: &mut DrawList) {
         let meshes = Mesh::SHARED + self.plates.len();
-        for layer in [&mut out.solid, &mut out.arrows, &mut out.overlay] {
+        for layer in [
+            &mut out.solid,
+            &mut out.ghost,
+            &mut out.arrows,
+            &mut out.overlay,
+        ] {
             layer.clear(meshes);
         }
         out.halos.clear();

@@ -244,6 +244,8 @@ pub struct DrawList {
     pub solid: Layer,
     /// Solid things seen through all others where these stand before them: force arrows.
     pub arrows: Layer,
+    /// A second state of the machine, translucent over the solid things.
+    pub ghost: Layer,
     /// Balls of light about joints that were hit.
     pub halos: Vec<Instance>,
     /// Sockets, farthest first: for each the half that stands and, fainter, the half that is cut away.
@@ -287,6 +289,7 @@ impl Default for DrawList {
             floor: None,
             plates: Arc::new([]),
             solid: Layer::default(),
+            ghost: Layer::default(),
             arrows: Layer::default(),
             halos: Vec::new(),
             sockets: Vec::new(),

@@ -86,6 +86,8 @@ pub struct Palette {
     pub ball: Material,
     /// Sockets (opacity applies).
     pub socket: Material,
+    /// Parts of a second state (opacity applies).
+    pub ghost: Material,
     /// Factor on all light.
     pub exposure: f32,
 }
@@ -116,6 +118,11 @@ impl Palette {
                     roughness: 0.15,
                     metal: 0.0,
                 },
+                ghost: Material {
+                    colour: Colour::hex(0x7B2FBE).with_opacity(0.40),
+                    roughness: 0.5,
+                    metal: 0.0,
+                },
                 exposure: 1.0,
             },
             Theme::Dark => Self {
@@ -138,6 +145,11 @@ impl Palette {
                 socket: Material {
                     colour: Colour::hex(0x8CC4F0).with_opacity(0.17),
                     roughness: 0.15,
+                    metal: 0.0,
+                },
+                ghost: Material {
+                    colour: Colour::hex(0xC9A0FF).with_opacity(0.40),
+                    roughness: 0.5,
                     metal: 0.0,
                 },
                 exposure: 0.92,

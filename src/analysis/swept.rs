@@ -1,0 +1,390 @@
+//! A sweep as a computation that travels as plain data, and tells every point as soon as it is through.
+
+use std::ops::ControlFlow;
+
+use serde::{Deserialize, Serialize};
+
+use super::drive::drive_period;
+use super::grid::{Axis, Grid, Start};
+use super::point::{Plan, PointResult};
+use super::sweep::{BlockRun, Sweep};
+use super::task::{Failure, Message, SceneSource};
+
+/// Steps of a simulation between two looks at whether to go on.
+const STEPS: u32 = 400;
+/// Coordinates of the output body: x, y, z in m, alpha, beta, gamma in rad.
+pub const COORDINATES: usize = 6;
+/// Most kept sections of all points together: what a window holds and draws.
+const MOST_SECTIONS: usize = 200_000;
+
+/// What a sweep is asked for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SweepTask {
+    /// The scene, without what varies.
+    pub scene: SceneSource,
+    /// Ranges as on the command line: `contact.clearance=0.01mm..1mm:200`.
+    pub vary: Vec<String>,
+    /// Periods of the drive at each point, those discarded included.
+    pub periods: usize,
+    /// Of these a transient.
+    pub discard: usize,
+    /// Drive phase of the sections as a fraction of the period, 0 <= phase < 1.
+    pub phase: f64,
+    /// Where points start from.
+    pub start: Start,
+    /// Whether the largest Lyapunov exponent is measured.
+    pub exponent: bool,
+}
+
+/// One varied parameter of a sweep that runs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Range {
+    /// Key.
+    pub key: String,
+    /// First value, SI.
+    pub from: f64,
+    /// Last value, SI.
+    pub to: f64,
+    /// Number of values.
+    pub count: usize,
+}
+
+/// One point of a sweep. What is not known of it is `None`, so that it travels as JSON.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SweptPoint {
+    /// Number in the sweep, the last range running fastest.
+    pub index: usize,
+    /// Value of each varied parameter, SI.
+    pub values: Vec<f64>,
+    /// Keys and values as a user writes them; they read back to the same bits.
+    pub settings: Vec<(String, String)>,
+    /// The point that it followed; `None` for a cold start.
+    pub after: Option<usize>,
+    /// Time of its first section, discarded ones included, s.
+    pub first: f64,
+    /// Time from one section to the next, s.
+    pub interval: f64,
+    /// When the divergence guard stopped it, s from its start; it has no sections then.
+    pub diverged: Option<f64>,
+    /// What kind of motion it is, in a word, with its period where it has one; "" where it did not end.
+    pub regime: String,
+    /// Number of the regime in files; -1 where it did not end.
+    pub regime_code: i64,
+    /// Largest Lyapunov exponent and its standard error, 1/s.
+    pub exponent: Option<(f64, Option<f64>)>,
+    /// Kept sections: the six coordinates of each, SI.
+    pub sections: Vec<[f64; COORDINATES]>,
+    /// Largest normal force in any joint over the kept periods, N.
+    pub peak: Option<f64>,
+    /// Largest and root-mean-square error of the probe over the kept periods, m.
+    pub probe: Option<(f64, f64)>,
+}
+
+/// Computes a sweep point by point, the coarse outline first where points do not follow each other.
+pub(super) fn run(
+    task: &SweepTask,
+    tell: &mut dyn FnMut(Message) -> ControlFlow<()>,
+) -> Result<(), Failure> {
+    let mut say = |message| match tell(message) {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(Failure::Cancelled),
+    };
+    let scene = task.scene.scene()?;
+    let axes = task.vary.iter().map(|text| Axis::parse(&scene, text));
+    let axes = axes.collect::<Result<Vec<_>, _>>().map_err(said)?;
+    let ranges = axes.iter().map(|axis| Range {
+        key: axis.key().to_owned(),
+        from: axis.value(0),
+        to: axis.value(axis.count() - 1),
+        count: axis.count(),
+    });
+    let ranges: Vec<Range> = ranges.collect();
+    if !(0.0..1.0).contains(&task.phase) {
+        return Err(Failure::Said(format!(
+            "drive phase {}: allowed 0 to below 1 period",
+            task.phase
+        )));
+    }
+    let plan = Plan {
+        periods: task.periods,
+        discard: task.discard,
+        phase: task.phase,
+        exponent: task.exponent,
+    };
+    let grid = Grid::new(&scene, axes, task.start).map_err(said)?;
+    let kept = task.periods.saturating_sub(task.discard);
+    if kept.saturating_mul(grid.points()) > MOST_SECTIONS {
+        return Err(Failure::Said(format!(
+            "{} points with {kept} kept sections each are more than the window draws ({MOST_SECTIONS} sections): take fewer \
+             values or periods, or run `jointplay sweep`",
+            grid.points()
+        )));
+    }
+    let sweep = Sweep::new(scene, grid, plan).map_err(said)?;
+    say(Message::Ranges(ranges))?;
+    let blocks = sweep.grid().blocks();
+    let mut through = 0;
+    for b in coarse_first(blocks) {
+        let mut block = Block::new(&sweep, b);
+        while !block.run.is_done() {
+            block.advance();
+            if let Some(point) = block.latest() {
+                through += 1;
+                say(Message::Point(Box::new(point)))?;
+            }
+            let part = block
+                .run
+                .current()
+                .map_or(0.0, |run| run.taken() as f64 / task.periods as f64);
+            say(Message::Progress(
+                (through as f64 + part) / sweep.grid().points() as f64,
+            ))?;
+        }
+    }
+    Ok(())
+}
+
+fn said(error: impl ToString) -> Failure {
+    Failure::Said(error.to_string())
+}
+
+/// 0 to n - 1, each number once: the ends, then what halves the gaps, and so on.
+fn coarse_first(n: usize) -> Vec<usize> {
+    let mut order = Vec::with_capacity(n);
+    let Some(last) = n.checked_sub(1) else {
+        return order;
+    };
+    let mut seen = vec![false; n];
+    let mut stride = n.next_power_of_two();
+    while stride > 0 {
+        for i in (0..n).step_by(stride).chain([last]) {
+            if !std::mem::replace(&mut seen[i], true) {
+                order.push(i);
+            }
+        }
+        stride /= 2;
+    }
+    order
+}
+
+/// A block on its way, with what it takes to tell how its points can be reached again.
+struct Block<'a> {
+    sweep: &'a Sweep,
+    run: BlockRun<'a>,
+    told: usize,
+    /// First section of the point on its way, s, and whether it starts cold.
+    first: Option<(f64, bool)>,
+    /// The point before: its number and the time of its last section, s.
+    before: Option<(usize, f64)>,
+}
+
+impl<'a> Block<'a> {
+    fn new(sweep: &'a Sweep, b: usize) -> Self {
+        Self {
+            run: sweep.begin(b),
+            sweep,
+            told: 0,
+            first: None,
+            before: None,
+        }
+    }
+
+    fn advance(&mut self) {
+        if self.run.current().is_none() {
+            // One step begins the point, whose start tells the times of its sections.
+            self.run.advance(1);
+            self.first = self.run.current().map(|run| (run.first(), run.is_cold()));
+        } else {
+            self.run.advance(STEPS);
+        }
+    }
+
+    /// The point that was just finished, if one was.
+    fn latest(&mut self) -> Option<SweptPoint> {
+        let (index, result) = self.run.finished().get(self.told)?;
+        self.told += 1;
+        let (first, cold) = self.first.take().unwrap_or((0.0, true));
+        let before = self.before.take();
+        let settings = self.sweep.grid().settings(*index);
+        let scene = self.sweep.grid().scene(self.sweep.scene(), *index).ok();
+        let interval = scene.as_ref().and_then(|scene| drive_period(scene).ok());
+        let interval = interval.unwrap_or(0.0);
+        let write = |key: &str, value| {
+            let parameter = self.sweep.scene().parameter(key);
+            parameter.map_or_else(|_| String::new(), |parameter| parameter.write(value))
+        };
+        let mut point = SweptPoint {
+            index: *index,
+            values: Vec::new(),
+            settings: settings
+                .iter()
+                .map(|(key, value)| ((*key).to_owned(), write(key, value)))
+                .collect(),
+            after: before.filter(|_| !cold).map(|(index, _)| index),
+            first,
+            interval,
+            diverged: None,
+            regime: String::new(),
+            regime_code: -1,
+            exponent: None,
+            sections: Vec::new(),
+            peak: None,
+            probe: None,
+        };
+        let indices = self.sweep.grid().indices(*index).into_iter();
+        let axes = self.sweep.grid().axes().iter().zip(indices);
+        point.values.extend(axes.map(|(axis, i)| axis.value(i)));
+        match result {
+            None => point.diverged = Some(0.0),
+            Some(PointResult {
+                stopped: Some(time),
+                ..
+            }) => point.diverged = Some(*time),
+            Some(result) => {
+                tell_result(&mut point, result);
+                let periods = self.sweep.plan().periods;
+                self.before = Some((*index, first + (periods - 1) as f64 * interval));
+            }
+        }
+        Some(point)
+    }
+}
+
+fn tell_result(point: &mut SweptPoint, result: &PointResult) {
+    let finite = |value: f64| value.is_finite().then_some(value);
+    point.regime = match result.regime.period() {
+        0 => result.regime.word().to_owned(),
+        n => format!("{} {n}", result.regime.word()),
+    };
+    point.regime_code = result.regime.code();
+    point.exponent = result
+        .evidence
+        .exponent
+        .as_ref()
+        .and_then(|exponent| Some((finite(exponent.value)?, finite(exponent.standard_error))));
+    let rows = result
+        .sections
+        .chunks_exact(super::drive::OBSERVABLES.len());
+    point.sections = rows.map(|row| std::array::from_fn(|i| row[i])).collect();
+    let peaks = result.joints.iter().map(|joint| joint.peak_kept);
+    point.peak = finite(peaks.fold(f64::NEG_INFINITY, f64::max));
+    point.probe = result.probe;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::task::{Job, perform};
+    use crate::scene::Scene;
+
+    fn task(vary: &[&str]) -> SweepTask {
+        let changes = [("spcmm.frequency".to_owned(), "5 Hz".to_owned())];
+        let scene = Scene::load("spcmm", &changes).expect("built in");
+        SweepTask {
+            scene: SceneSource::of(&scene),
+            vary: vary.iter().map(|&text| text.to_owned()).collect(),
+            periods: 3,
+            discard: 1,
+            phase: 0.25,
+            start: Start::Cold,
+            exponent: false,
+        }
+    }
+
+    fn told(task: SweepTask, most: usize) -> Vec<Message> {
+        let mut said = Vec::new();
+        // It travels as text, there and back.
+        let text = serde_json::to_string(&Job::Sweep(task)).expect("plain data");
+        let job = serde_json::from_str(&text).expect("its own text");
+        perform(&job, &mut || 0.0, &mut |message| {
+            let text = serde_json::to_string(&message).expect("plain data");
+            said.push(serde_json::from_str(&text).expect("its own text"));
+            if said.len() < most {
+                ControlFlow::Continue(())
+            } else {
+                ControlFlow::Break(())
+            }
+        });
+        said
+    }
+
+    fn points(said: &[Message]) -> Vec<&SweptPoint> {
+        let point = |message| match message {
+            &Message::Point(ref point) => Some(&**point),
+            _ => None,
+        };
+        said.iter().filter_map(point).collect()
+    }
+
+    #[test]
+    fn the_outline_comes_first_and_every_number_once() {
+        assert_eq!(coarse_first(9), [0, 8, 4, 2, 6, 1, 3, 5, 7]);
+        for n in 0..40 {
+            let mut order = coarse_first(n);
+            order.sort_unstable();
+            assert!(order.into_iter().eq(0..n), "{n}");
+        }
+    }
+
+    #[test]
+    fn points_are_what_the_sweep_records_and_say_how_to_get_there() {
+        let task = task(&["contact.clearance=0.2mm..0.4mm:3"]);
+        let said = told(task.clone(), usize::MAX);
+        assert_eq!(said.last(), Some(&Message::Done));
+        let points = points(&said);
+        let order: Vec<usize> = points.iter().map(|point| point.index).collect();
+        assert_eq!(order, [0, 2, 1]);
+        for point in points {
+            assert_eq!(point.sections.len(), 2);
+            assert_eq!((point.first, point.interval), (0.05, 0.2));
+            assert!(point.peak.is_some_and(|peak| peak > 1.0) && !point.regime.is_empty());
+            // The same section again, by the same steps.
+            let mut source = task.scene.clone();
+            source.changes.extend(point.settings.iter().cloned());
+            let scene = source.scene().expect("its own settings");
+            let mut machine = crate::analysis::drive::Machine::new(&scene).expect("starts");
+            for k in 0..task.periods {
+                let end = point.first + k as f64 * point.interval;
+                while machine.simulation().time() < end {
+                    machine.simulation_mut().step_until(end).expect("runs");
+                }
+            }
+            let pose = machine.frame().pose;
+            let found = crate::analysis::drive::observed(&pose);
+            assert_eq!(found[..6], *point.sections.last().expect("kept"));
+        }
+    }
+
+    #[test]
+    fn a_followed_point_names_the_one_before() {
+        let mut task = task(&["contact.friction=0.1..0.3:3"]);
+        task.start = Start::FollowDown;
+        let said = told(task, usize::MAX);
+        let points = points(&said);
+        let after: Vec<_> = points.iter().map(|p| (p.index, p.after)).collect();
+        assert_eq!(after, [(2, None), (1, Some(2)), (0, Some(1))]);
+        let first: Vec<f64> = points.iter().map(|p| p.first).collect();
+        assert!((first[1] - 0.65).abs() < 1e-12 && (first[2] - 1.25).abs() < 1e-12);
+    }
+
+    #[test]
+    fn it_ends_when_told_and_bad_ranges_are_explained() {
+        let good = task(&["contact.friction=0.1..0.3:3"]);
+        assert_eq!(told(good, 3).len(), 3);
+        for (vary, words) in [
+            ("contact.friction=0.3..0.1:3", "reversed"),
+            ("contact.friction=0.3", "expected KEY=A..B:N"),
+            (
+                "contact.friction=0.1..0.3:900000",
+                "more than the window draws",
+            ),
+            ("contact.clearance=0.1mm..20mm:3", "below the ball radius"),
+        ] {
+            let said = told(task(&[vary]), usize::MAX);
+            let [Message::Failed(why)] = &said[..] else {
+                panic!("{vary}: {said:?}");
+            };
+            assert!(why.contains(words), "{why}");
+        }
+    }
+}

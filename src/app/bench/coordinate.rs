@@ -1,0 +1,74 @@
+//! The coordinate of the output body that the bench shows.
+
+use eframe::egui::{ComboBox, Ui};
+
+use super::super::watch::Observed;
+use super::plane::Axis;
+use crate::simulate::Quantity;
+
+/// One of x, y, z, alpha, beta, gamma, by its place in a section.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Coordinate(usize);
+
+/// Their names.
+const NAMES: [&str; 6] = ["x", "y", "z", "α", "β", "γ"];
+/// Those of the paper come first.
+const ORDER: [usize; 6] = [0, 4, 1, 2, 3, 5];
+
+impl Default for Coordinate {
+    fn default() -> Self {
+        Self(ORDER[0])
+    }
+}
+
+impl Coordinate {
+    /// Its place in a section.
+    pub fn index(self) -> usize {
+        self.0
+    }
+
+    fn quantities(self) -> [Quantity; 2] {
+        if self.0 < 3 {
+            [Quantity::Position, Quantity::Velocity]
+        } else {
+            [Quantity::Angles, Quantity::AngleRates]
+        }
+    }
+
+    /// The axis of the coordinate.
+    pub fn axis(self) -> Axis {
+        Axis::new(NAMES[self.0], self.quantities()[0].unit().0)
+    }
+
+    /// The axis of its rate.
+    pub fn rate_axis(self) -> Axis {
+        let name = format!("rate of {}", NAMES[self.0]);
+        Axis::new(name, self.quantities()[1].unit().0)
+    }
+
+    /// A coordinate, SI, in the unit of [`Self::axis`].
+    pub fn shown(self, si: f64) -> f64 {
+        si / self.quantities()[0].unit().1
+    }
+
+    /// Coordinate and rate in the units of their axes.
+    pub fn of(self, state: &Observed) -> [f64; 2] {
+        let rate = self.quantities()[1].unit().1;
+        [self.shown(state[self.0]), state[6 + self.0] / rate]
+    }
+
+    /// The choice of it.
+    pub fn ui(&mut self, ui: &mut Ui) {
+        ComboBox::from_id_salt("coordinate")
+            .width(64.0)
+            .selected_text(NAMES[self.0])
+            .show_ui(ui, |ui| {
+                for index in ORDER {
+                    ui.selectable_value(&mut self.0, index, NAMES[index]);
+                }
+            })
+            .response
+            .on_hover_text("Coordinate of the output body that all plots of the bench show")
+            .accessible_name("Coordinate");
+    }
+}

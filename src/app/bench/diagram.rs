@@ -1,0 +1,267 @@
+//! The bifurcation diagram of a sweep, and what else it found at each value; a click picks a section.
+
+use eframe::egui::{ComboBox, Pos2, RichText, Sense, Ui};
+use egui_plot::{HLine, LineStyle, PlotPoint, PlotPoints, PlotTransform, Points, VLine};
+
+use super::super::theme;
+use super::coordinate::Coordinate;
+use super::plane::{Axis, plane};
+use super::portrait::title;
+use super::sweep::Swept;
+use crate::analysis::swept::SweptPoint;
+use crate::scene::{table, to_display};
+
+const HEIGHT: f32 = 230.0;
+/// How near a click must come to a point, points.
+const NEAR: f32 = 16.0;
+
+/// What stands over the varied parameter.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Ordinate {
+    #[default]
+    Sections,
+    Exponent,
+    Peak,
+    Probe,
+}
+
+impl Ordinate {
+    const ALL: [Self; 4] = [Self::Sections, Self::Exponent, Self::Peak, Self::Probe];
+
+    fn label(self) -> &'static str {
+        match self {
+            Self::Sections => "Sections",
+            Self::Exponent => "Exponent",
+            Self::Peak => "Peak force",
+            Self::Probe => "Probe error",
+        }
+    }
+
+    fn axis(self, coordinate: Coordinate) -> Axis {
+        match self {
+            Self::Sections => coordinate.axis(),
+            Self::Exponent => Axis::new("largest Lyapunov exponent", "1/s"),
+            Self::Peak => Axis::new("peak normal force", "N"),
+            Self::Probe => Axis::new("largest probe error", "µm"),
+        }
+    }
+}
+
+/// One kind of motion: number in files, word, place in the row of colours.
+const REGIMES: [(i64, &str, usize); 5] = [
+    (1, "periodic", 0),
+    (2, "quasi-periodic", 2),
+    (3, "chaotic", 1),
+    (4, "not settled", 4),
+    (0, "unclear", 7),
+];
+
+/// A drawn point: where, and which section of which point of the sweep it is.
+type Mark = (PlotPoint, usize, usize);
+
+/// The diagram.
+#[derive(Default)]
+pub struct Diagram {
+    ordinate: Ordinate,
+    /// What the marks were made for; `None` where they are to be made again.
+    made: Option<(Ordinate, Coordinate)>,
+    marks: [Vec<PlotPoint>; REGIMES.len()],
+    all: Vec<Mark>,
+    diverged: Vec<f64>,
+    transform: Option<PlotTransform>,
+    /// What was picked last.
+    picked: Option<(usize, usize)>,
+}
+
+impl Diagram {
+    /// For a new sweep.
+    pub fn clear(&mut self) {
+        (self.made, self.picked, self.transform) = (None, None, None);
+    }
+
+    /// A point came.
+    pub fn renew(&mut self) {
+        self.made = None;
+    }
+
+    /// Where a section was drawn last, points of the screen.
+    pub fn place(&self, index: usize, section: usize) -> Option<Pos2> {
+        let is = |mark: &&Mark| (mark.1, mark.2) == (index, section);
+        let (point, ..) = self.all.iter().find(is)?;
+        Some(self.transform.as_ref()?.position_from_point(point))
+    }
+
+    /// The diagram of `swept`; the point and its kept section that were clicked.
+    pub fn ui(
+        &mut self,
+        ui: &mut Ui,
+        swept: &Swept,
+        coordinate: Coordinate,
+    ) -> Option<(usize, usize)> {
+        let parameter = table().iter().find(|p| p.key == swept.range.key);
+        let unit = parameter.map_or("", |parameter| parameter.display_unit());
+        let label = parameter.map_or(swept.range.key.as_str(), |parameter| parameter.label);
+        let shown = |si: f64| to_display(si, unit);
+        self.head(ui, swept);
+        if self.made != Some((self.ordinate, coordinate)) {
+            self.make(swept, coordinate, &shown);
+        }
+        let across = Axis::new(label, unit);
+        let up = self.ordinate.axis(coordinate);
+        title(
+            ui,
+            &format!("{} over {}", up.title(), across.title()),
+            "What the sweep found at each value. A click on a point runs the scene with that value from its start to that \
+             section, and plays on from there.",
+        );
+        let dark = ui.visuals().dark_mode;
+        let (faint, bad) = (ui.visuals().weak_text_color(), ui.visuals().error_fg_color);
+        let (from, to) = (shown(swept.range.from), shown(swept.range.to));
+        let margin = if to > from {
+            0.03 * (to - from)
+        } else {
+            0.5 * from.abs().max(1e-3)
+        };
+        let picked = self.picked;
+        let now = self
+            .all
+            .iter()
+            .find(|mark| picked == Some((mark.1, mark.2)))
+            .map(|mark| mark.0);
+        let response = plane(ui, "diagram", &across, &up, HEIGHT)
+            .sense(Sense::click())
+            .show(ui, |plot| {
+                plot.set_plot_bounds_x(from - margin..=to + margin);
+                plot.set_auto_bounds([false, true]);
+                if self.ordinate == Ordinate::Exponent {
+                    plot.hline(HLine::new("0", 0.0).color(faint).width(1.0));
+                }
+                for value in &self.diverged {
+                    let line = VLine::new("diverged", *value).color(bad);
+                    plot.vline(line.style(LineStyle::dotted_dense()).width(1.0));
+                }
+                for ((_, word, colour), marks) in REGIMES.iter().zip(&self.marks) {
+                    let points = Points::new(*word, PlotPoints::Borrowed(marks));
+                    plot.points(points.color(theme::series(*colour, dark)).radius(1.8));
+                }
+                if let Some(now) = now {
+                    let ring = Points::new("loaded", PlotPoints::Owned(vec![now]));
+                    plot.points(ring.color(faint).filled(false).radius(6.0));
+                }
+            });
+        let clicked = response.response.clicked();
+        let pointer = response.response.interact_pointer_pos();
+        self.transform = Some(response.transform);
+        self.key(ui, swept, dark);
+        let at = pointer.filter(|_| clicked)?;
+        let nearest = self
+            .all
+            .iter()
+            .map(|mark| {
+                (
+                    response.transform.position_from_point(&mark.0).distance(at),
+                    mark,
+                )
+            })
+            .min_by(|a, b| a.0.total_cmp(&b.0))?;
+        if nearest.0 > theme::side(ui, NEAR) {
+            return None;
+        }
+        self.picked = Some((nearest.1.1, nearest.1.2));
+        self.picked
+    }
+
+    fn head(&mut self, ui: &mut Ui, swept: &Swept) {
+        ui.horizontal_wrapped(|ui| {
+            ComboBox::from_id_salt("ordinate")
+                .width(110.0)
+                .selected_text(self.ordinate.label())
+                .show_ui(ui, |ui| {
+                    for ordinate in Ordinate::ALL {
+                        ui.selectable_value(&mut self.ordinate, ordinate, ordinate.label());
+                    }
+                })
+                .response
+                .on_hover_text("What the diagram shows over the varied parameter")
+                .accessible_name("Diagram of");
+            let come = swept.points.iter().flatten().count();
+            let words = format!("{come} of {} values", swept.points.len());
+            ui.label(RichText::new(words).small().weak())
+                .on_hover_text("Values of the varied parameter that are through");
+        });
+    }
+
+    /// What the colours mean, as far as they occur.
+    fn key(&self, ui: &mut Ui, swept: &Swept, dark: bool) {
+        ui.horizontal_wrapped(|ui| {
+            for (code, word, colour) in REGIMES {
+                let points = swept.points.iter().flatten();
+                let count = points.filter(|point| point.regime_code == code).count();
+                if count > 0 {
+                    let text = RichText::new(format!("{word} {count}")).small().strong();
+                    ui.label(text.color(theme::series(colour, dark)))
+                        .on_hover_text("Kind of motion, and at how many values it was found");
+                }
+            }
+            if !self.diverged.is_empty() {
+                let words = format!("diverged {}", self.diverged.len());
+                ui.label(
+                    RichText::new(words)
+                        .small()
+                        .strong()
+                        .color(ui.visuals().error_fg_color),
+                )
+                .on_hover_text(
+                    "Values at which the divergence guard stopped the run, or that could not start",
+                );
+            }
+        });
+    }
+
+    fn make(&mut self, swept: &Swept, coordinate: Coordinate, shown: &dyn Fn(f64) -> f64) {
+        self.marks.iter_mut().for_each(Vec::clear);
+        self.all.clear();
+        self.diverged.clear();
+        for point in swept.points.iter().flatten() {
+            let Some(value) = point.values.first().map(|&si| shown(si)) else {
+                continue;
+            };
+            if point.diverged.is_some() {
+                self.diverged.push(value);
+                continue;
+            }
+            let is = |regime: &(i64, &str, usize)| regime.0 == point.regime_code;
+            let place = REGIMES.iter().position(is).unwrap_or(REGIMES.len() - 1);
+            let mut add = |up: f64, section| {
+                let at = PlotPoint::new(value, up);
+                self.marks[place].push(at);
+                self.all.push((at, point.index, section));
+            };
+            match self.ordinate {
+                Ordinate::Sections => {
+                    for (k, section) in point.sections.iter().enumerate() {
+                        add(coordinate.shown(section[coordinate.index()]), k);
+                    }
+                }
+                other => {
+                    if let Some(up) = other.of(point) {
+                        add(up, point.sections.len().saturating_sub(1));
+                    }
+                }
+            }
+        }
+        self.made = Some((self.ordinate, coordinate));
+    }
+}
+
+impl Ordinate {
+    /// The one value of a point, in the unit of its axis.
+    fn of(self, point: &SweptPoint) -> Option<f64> {
+        match self {
+            Self::Sections => None,
+            Self::Exponent => point.exponent.map(|(value, _)| value),
+            Self::Peak => point.peak,
+            Self::Probe => point.probe.map(|(largest, _)| 1e6 * largest),
+        }
+    }
+}

@@ -1,0 +1,89 @@
+//! A plot of one quantity over another in the bench: no legend, no dragging, units on the axes.
+
+use eframe::egui::{self, Rangef, Sense, Ui, Vec2b};
+use egui_plot::{AxisHints, HoverPosition, Plot};
+
+use super::super::plots::{marks, tick};
+use super::super::value;
+
+/// Name and unit of an axis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Axis {
+    /// What it shows.
+    pub name: String,
+    /// Unit; "" for a pure number.
+    pub unit: String,
+}
+
+impl Axis {
+    /// An axis.
+    pub fn new(name: impl Into<String>, unit: impl Into<String>) -> Self {
+        let (name, unit) = (name.into(), unit.into());
+        Self { name, unit }
+    }
+
+    /// Name and unit, as a title says it.
+    pub fn title(&self) -> String {
+        with_unit(&self.name, &self.unit, ", ")
+    }
+}
+
+fn with_unit(text: &str, unit: &str, between: &str) -> String {
+    if unit.is_empty() {
+        text.to_owned()
+    } else {
+        format!("{text}{between}{unit}")
+    }
+}
+
+/// A plot of `up` over `across`, `height` points high and as wide as there is room.
+pub fn plane<'a>(ui: &Ui, id: &'static str, across: &Axis, up: &Axis, height: f32) -> Plot<'a> {
+    let faint = ui.visuals().weak_text_color();
+    let font = egui::TextStyle::Small.resolve(ui.style());
+    let hints = |hints: AxisHints<'a>| hints.tick_label_color(faint).tick_label_font(font.clone());
+    let unit = across.unit.clone();
+    let below = hints(AxisHints::new_x())
+        .label_spacing(Rangef::new(24.0, 28.0))
+        .formatter(move |mark, _| with_unit(&tick(mark.value), &unit, " "));
+    let beside = hints(AxisHints::new_y())
+        .min_thickness(46.0)
+        .label_spacing(Rangef::new(14.0, 18.0))
+        .formatter(|mark, _| tick(mark.value));
+    let (across, up) = (across.clone(), up.clone());
+    Plot::new(id)
+        .width(ui.available_width() - 12.0)
+        .height(height)
+        // A finger that moves over it scrolls.
+        .sense(Sense::hover())
+        .allow_drag(false)
+        .allow_zoom(false)
+        .allow_scroll(false)
+        .allow_boxed_zoom(false)
+        .allow_axis_zoom_drag(false)
+        .allow_double_click_reset(false)
+        .auto_bounds(Vec2b::new(true, true))
+        .custom_x_axes(vec![below])
+        .custom_y_axes(vec![beside])
+        .x_grid_spacer(|input| marks(&input, 4.0))
+        .y_grid_spacer(|input| marks(&input, 5.0))
+        .grid_color(faint.gamma_multiply(0.35))
+        .grid_fade(0.0)
+        .label_formatter(move |position| match position {
+            HoverPosition::NearDataPoint {
+                plot_name,
+                position,
+                ..
+            } => {
+                let line = |axis: &Axis, value| {
+                    let number = value::number(value, 6);
+                    format!("{} {}", axis.name, with_unit(&number, &axis.unit, " "))
+                };
+                Some(format!(
+                    "{plot_name}\n{}\n{}",
+                    line(&up, position.y),
+                    line(&across, position.x)
+                ))
+            }
+            HoverPosition::Elsewhere { .. } => None,
+        })
+}

@@ -1,0 +1,113 @@
+//! Phase portrait of the output body, and its Poincaré section at the drive phase.
+
+use eframe::egui::{RichText, Slider, SliderClamping, Ui};
+use egui_plot::{Line, PlotPoint, PlotPoints, Points};
+
+use super::super::player::Player;
+use super::super::watch::Observed;
+use super::super::{theme, value};
+use super::coordinate::Coordinate;
+use super::plane::{Axis, plane};
+
+/// Height of each plot, points.
+const HEIGHT: f32 = 190.0;
+
+/// What is kept between two frames: lists that are filled anew in each.
+#[derive(Default)]
+pub struct Portrait {
+    orbit: Vec<PlotPoint>,
+    sections: Vec<PlotPoint>,
+}
+
+impl Portrait {
+    /// Rate over coordinate: the orbit of the last periods and the sections.
+    pub fn ui(&mut self, ui: &mut Ui, player: &mut Player, coordinate: Coordinate) {
+        self.read(player, coordinate);
+        let (across, up) = (coordinate.axis(), coordinate.rate_axis());
+        let dark = ui.visuals().dark_mode;
+        title(
+            ui,
+            &format!("Phase portrait: {} over {}", up.title(), across.title()),
+            "The orbit of the last periods of the drive, at most 1000 instants in each, with the latest state and the sections",
+        );
+        let (line, mark) = (theme::series(0, dark), theme::series(1, dark));
+        let Self { orbit, sections } = self;
+        plane(ui, "portrait", &across, &up, HEIGHT).show(ui, |plot| {
+            let series = PlotPoints::Borrowed(orbit);
+            plot.line(Line::new("Orbit", series).color(line).width(1.2));
+            let series = PlotPoints::Borrowed(sections);
+            plot.points(Points::new("Section", series).color(mark).radius(2.5));
+            if let Some(last) = orbit.last() {
+                let now = PlotPoints::Owned(vec![*last]);
+                plot.points(Points::new("Latest state", now).color(line).radius(4.0));
+            }
+        });
+        match player.watch().period().map_err(ToOwned::to_owned) {
+            Err(why) => {
+                ui.label(RichText::new(format!("No Poincaré section: {why}")).weak());
+            }
+            Ok(period) => self.section(ui, player, period, &across, &up),
+        }
+    }
+
+    fn section(&self, ui: &mut Ui, player: &mut Player, period: f64, across: &Axis, up: &Axis) {
+        let mark = theme::series(1, ui.visuals().dark_mode);
+        title(
+            ui,
+            &format!("Poincaré section: {} over {}", up.title(), across.title()),
+            "The state once in each period of the drive, at its phase; a periodic motion is a few points, chaos a cloud. \
+             Cleared by a reset and by a changed parameter.",
+        );
+        plane(ui, "section", across, up, HEIGHT).show(ui, |plot| {
+            let series = PlotPoints::Borrowed(&self.sections);
+            plot.points(Points::new("Section", series).color(mark).radius(2.5));
+        });
+        ui.horizontal_wrapped(|ui| {
+            ui.label("Drive phase");
+            let mut degrees = 360.0 * player.watch().phase();
+            let slider = Slider::new(&mut degrees, 0.0..=359.0)
+                .suffix("°")
+                .max_decimals(1)
+                .clamping(SliderClamping::Always);
+            let changed = ui
+                .add(slider)
+                .on_hover_text(
+                    "Where in the period of the drive sections are taken, of the running scene and of the next sweep; 0° is \
+                     the phase at t = 0. Another phase starts the section anew.",
+                )
+                .accessible_name("Drive phase")
+                .changed();
+            if changed {
+                player.set_phase(degrees / 360.0);
+            }
+        });
+        ui.label(
+            RichText::new(format!(
+                "{} sections, one every {}",
+                self.sections.len(),
+                value::time(period)
+            ))
+            .small()
+            .weak(),
+        )
+        .on_hover_text("Sections of the running scene since its start or its latest change, and the period of its drive");
+    }
+
+    fn read(&mut self, player: &Player, coordinate: Coordinate) {
+        let watch = player.watch();
+        let point = |(_, state): &(f64, Observed)| {
+            let [across, up] = coordinate.of(state);
+            PlotPoint::new(across, up)
+        };
+        self.orbit.clear();
+        self.orbit.extend(watch.orbit().map(point));
+        self.sections.clear();
+        self.sections.extend(watch.sections().map(point));
+    }
+}
+
+/// Heading of a plot.
+pub fn title(ui: &mut Ui, words: &str, help: &str) {
+    ui.add_space(4.0);
+    ui.label(RichText::new(words).small()).on_hover_text(help);
+}

@@ -1,0 +1,188 @@
+//! A second run beside the first, displaced by next to nothing: how fast neighbouring motions part, without ever bringing
+//! them together again. The run knows nothing of its twin.
+
+use crate::analysis::exponent::{offset, scaled_distance};
+use crate::simulate::{Frame, Simulation, StartError};
+
+/// The displacement, in units of the scales of the state.
+pub const DISPLACEMENT: f64 = 1e-9;
+/// Distances kept: when there are so many, every second one goes.
+const KEPT: usize = 4096;
+/// The growing part ends where the distance first reaches this share of its largest value.
+const GROWN: f64 = 0.1;
+/// Fewer distances than this give no slope.
+const FEWEST: usize = 8;
+
+/// A straight line through logarithms of distances.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fit {
+    /// Slope of the natural logarithm, 1/s.
+    pub slope: f64,
+    /// Natural logarithm of the line's distance at `from`.
+    pub start: f64,
+    /// Times between which it was fitted, s.
+    pub from: f64,
+    /// See `from`.
+    pub to: f64,
+}
+
+/// The twin and what it told.
+pub struct Twin {
+    simulation: Simulation,
+    frame: Frame,
+    /// Time in s, distance in units of the scales.
+    distances: Vec<[f64; 2]>,
+    /// Every so manyth step is kept.
+    stride: u64,
+    steps: u64,
+    ended: Option<String>,
+}
+
+impl Twin {
+    /// Displaces a copy of `run` as it is now.
+    ///
+    /// # Errors
+    /// The copy cannot start; a scene that runs can.
+    pub fn new(run: &Simulation) -> Result<Self, StartError> {
+        let mut simulation = Simulation::new(run.running_scene())?;
+        simulation.restore(&run.snapshot())?;
+        let away: Vec<f64> = offset(run.scales(), DISPLACEMENT).collect();
+        simulation.displace(&away);
+        let mut twin = Self {
+            simulation,
+            frame: Frame::default(),
+            distances: Vec::with_capacity(KEPT),
+            stride: 1,
+            steps: 0,
+            ended: None,
+        };
+        twin.measure(run);
+        twin.place(run.time());
+        Ok(twin)
+    }
+
+    /// Brings the twin to the time of `run`, which has just taken a step.
+    pub fn follow(&mut self, run: &Simulation) {
+        if self.ended.is_some() {
+            return;
+        }
+        while self.simulation.time() < run.time() {
+            if let Err(stopped) = self.simulation.step_until(run.time()) {
+                self.ended = Some(stopped.to_string());
+                return;
+            }
+        }
+        self.steps += 1;
+        if self.steps.is_multiple_of(self.stride) {
+            self.measure(run);
+        }
+    }
+
+    fn measure(&mut self, run: &Simulation) {
+        let distance = scaled_distance(run.state(), self.simulation.state(), run.scales());
+        if self.distances.len() == KEPT {
+            let mut keep = false;
+            self.distances.retain(|_| {
+                keep = !keep;
+                keep
+            });
+            self.stride *= 2;
+        }
+        // Two motions that have become one to the last bit have no logarithm.
+        if distance > 0.0 && distance.is_finite() {
+            self.distances.push([run.time(), distance]);
+        }
+    }
+
+    /// Puts the state at `time`, s, or the nearest within the latest step, in [`Self::frame`].
+    pub fn place(&mut self, time: f64) {
+        self.simulation.sample(time, &mut self.frame);
+    }
+
+    /// The state on show.
+    pub fn frame(&self) -> &Frame {
+        &self.frame
+    }
+
+    /// Time in s and distance in units of the scales, in order.
+    pub fn distances(&self) -> &[[f64; 2]] {
+        &self.distances
+    }
+
+    /// Why it ended before the run.
+    pub fn ended(&self) -> Option<&str> {
+        self.ended.as_deref()
+    }
+
+    /// Slope of the logarithm over the growing part, by least squares: from the displacement to where the distance first
+    /// reaches a tenth of its largest value; over everything where it does not grow.
+    pub fn fit(&self) -> Option<Fit> {
+        let largest = self.distances.iter().map(|d| d[1]).fold(0.0, f64::max);
+        let end = self.distances.iter().position(|d| d[1] >= GROWN * largest);
+        let growing = &self.distances[..end.map_or(0, |end| end + 1)];
+        fit(if growing.len() < FEWEST {
+            &self.distances
+        } else {
+            growing
+        })
+    }
+}
+
+/// The line through ln(distance) over time.
+fn fit(distances: &[[f64; 2]]) -> Option<Fit> {
+    let (first, last) = (distances.first()?, distances.last()?);
+    if distances.len() < FEWEST {
+        return None;
+    }
+    let n = distances.len() as f64;
+    let mean_time = distances.iter().map(|d| d[0]).sum::<f64>() / n;
+    let mean = distances.iter().map(|d| libm::log(d[1])).sum::<f64>() / n;
+    let (mut across, mut along) = (0.0, 0.0);
+    for [time, distance] in distances {
+        across += (time - mean_time) * (libm::log(*distance) - mean);
+        along += (time - mean_time) * (time - mean_time);
+    }
+    let slope = across / along;
+    slope.is_finite().then_some(Fit {
+        slope,
+        start: mean + slope * (first[0] - mean_time),
+        from: first[0],
+        to: last[0],
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Scene;
+
+    #[test]
+    fn the_slope_of_an_exponential_is_its_rate() {
+        let grows = |t: f64| [t, 1e-9 * libm::exp(3.5 * t)];
+        let line: Vec<[f64; 2]> = (0..50).map(|i| grows(f64::from(i) * 0.1)).collect();
+        let found = fit(&line).expect("points");
+        assert!((found.slope - 3.5).abs() < 1e-12 && (found.from, found.to) == (0.0, 4.9));
+        assert!((found.start - libm::log(1e-9)).abs() < 1e-9);
+        assert_eq!(fit(&line[..7]), None);
+    }
+
+    #[test]
+    fn a_twin_starts_a_billionth_away_and_thins_its_record() {
+        let changes = [("contact.friction".to_owned(), "0".to_owned())];
+        let scene = Scene::load("spcmm", &changes).expect("built in");
+        let mut run = Simulation::new(&scene).expect("starts");
+        let mut twin = Twin::new(&run).expect("starts");
+        let start = twin.distances()[0];
+        assert!((start[1] / DISPLACEMENT - 1.0).abs() < 1e-6, "{start:?}");
+        for _ in 0..3 * KEPT {
+            run.step().expect("runs");
+            twin.follow(&run);
+            assert_eq!(twin.simulation.time(), run.time());
+        }
+        assert!(twin.distances().len() <= KEPT && twin.stride > 1);
+        assert!(twin.distances().is_sorted_by(|a, b| a[0] < b[0]));
+        let fit = twin.fit().expect("grows");
+        println!("{fit:?}, {:?}", twin.distances().last());
+        assert!(fit.slope > 0.0, "{fit:?}");
+    }
+}

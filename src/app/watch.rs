@@ -1,0 +1,188 @@
+//! What the chaos bench keeps of the running scene: the orbit of the last periods, and its Poincaré section at the drive
+//! phase.
+
+use std::collections::VecDeque;
+
+use crate::analysis::drive::{OBSERVABLES, drive_period, observed};
+use crate::scene::Scene;
+use crate::simulate::{Frame, Simulation};
+
+/// Instants kept in one period of the drive, at most.
+const PER_PERIOD: f64 = 1000.0;
+/// Periods whose orbit is kept.
+pub const PERIODS: usize = 6;
+/// Sections kept: the oldest go.
+const SECTIONS: usize = 20_000;
+/// Stands for the period where there is none, s.
+const NO_PERIOD: f64 = 1.0;
+
+/// Pose of the output body and its rates, in the order of [`OBSERVABLES`].
+pub type Observed = [f64; OBSERVABLES.len()];
+
+/// The orbit and the section of one run.
+pub struct Watch {
+    period: Result<f64, String>,
+    phase: f64,
+    /// Number of the section that comes next: it is at (next + phase) T.
+    next: u64,
+    orbit: VecDeque<(f64, Observed)>,
+    sections: VecDeque<(f64, Observed)>,
+    frame: Frame,
+}
+
+impl Watch {
+    /// Watches a run of `scene` that begins.
+    pub fn new(scene: &Scene) -> Self {
+        Self {
+            period: drive_period(scene).map_err(|why| why.to_string()),
+            phase: 0.0,
+            next: 0,
+            orbit: VecDeque::new(),
+            sections: VecDeque::new(),
+            frame: Frame::default(),
+        }
+    }
+
+    /// Period of the drives, s, or why there is none.
+    pub fn period(&self) -> Result<f64, &str> {
+        self.period.as_ref().copied().map_err(String::as_str)
+    }
+
+    /// Drive phase of the sections, 0 <= phase < 1.
+    pub fn phase(&self) -> f64 {
+        self.phase
+    }
+
+    /// Another drive phase: sections at the old one go.
+    pub fn set_phase(&mut self, phase: f64, now: f64) {
+        if phase != self.phase && (0.0..1.0).contains(&phase) {
+            self.phase = phase;
+            self.sections.clear();
+            self.seek(now);
+        }
+    }
+
+    /// The orbit of the last periods, oldest first: time in s, state.
+    pub fn orbit(&self) -> impl DoubleEndedIterator<Item = &(f64, Observed)> {
+        self.orbit.iter()
+    }
+
+    /// The sections, oldest first: time in s, state.
+    pub fn sections(&self) -> impl ExactSizeIterator<Item = &(f64, Observed)> {
+        self.sections.iter()
+    }
+
+    /// After a change at `now`, s: what was is another motion's.
+    pub fn begin(&mut self, scene: &Scene, now: f64) {
+        self.period = drive_period(scene).map_err(|why| why.to_string());
+        self.orbit.clear();
+        self.sections.clear();
+        self.seek(now);
+    }
+
+    /// Steps were taken back to `now`, s.
+    pub fn back_to(&mut self, now: f64) {
+        for list in [&mut self.orbit, &mut self.sections] {
+            while list.back().is_some_and(|(time, _)| *time > now) {
+                list.pop_back();
+            }
+        }
+        self.seek(now);
+    }
+
+    /// The section after `now`, s, is the next.
+    fn seek(&mut self, now: f64) {
+        if let Ok(period) = self.period {
+            let passed = (now / period - self.phase).floor() + 1.0;
+            self.next = passed.max(0.0) as u64;
+        }
+    }
+
+    fn next_time(&self) -> Option<f64> {
+        let period = *self.period.as_ref().ok()?;
+        Some((self.next as f64 + self.phase) * period)
+    }
+
+    /// An instant that was recorded; those too close to the one before are left out.
+    pub fn record(&mut self, frame: &Frame) {
+        let period = self.period.as_ref().copied().unwrap_or(NO_PERIOD);
+        let before = self.orbit.back().map(|(time, _)| *time);
+        if before.is_some_and(|before| frame.time - before < period / PER_PERIOD) {
+            return;
+        }
+        let oldest = frame.time - PERIODS as f64 * period;
+        while self.orbit.front().is_some_and(|(time, _)| *time < oldest) {
+            self.orbit.pop_front();
+        }
+        self.orbit.push_back((frame.time, observed(&frame.pose)));
+    }
+
+    /// A step was taken: sections within it are interpolated. Sampling never changes a run.
+    pub fn step(&mut self, simulation: &mut Simulation) {
+        while let Some(time) = self.next_time().filter(|time| *time <= simulation.time()) {
+            simulation.sample(time, &mut self.frame);
+            if self.sections.len() == SECTIONS {
+                self.sections.pop_front();
+            }
+            self.sections.push_back((time, observed(&self.frame.pose)));
+            self.next += 1;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run(watch: &mut Watch, simulation: &mut Simulation, to: f64) {
+        let mut frame = Frame::default();
+        while simulation.time() < to {
+            simulation.step().expect("runs");
+            watch.step(simulation);
+            simulation.sample(simulation.time(), &mut frame);
+            watch.record(&frame);
+        }
+    }
+
+    #[test]
+    fn sections_lie_at_the_drive_phase_and_the_orbit_is_as_long_as_it_says() {
+        let changes = [("spcmm.frequency".to_owned(), "5 Hz".to_owned())];
+        let scene = Scene::load("spcmm", &changes).expect("built in");
+        let mut simulation = Simulation::new(&scene).expect("starts");
+        let mut watch = Watch::new(&scene);
+        assert_eq!(watch.period(), Ok(0.2));
+        watch.set_phase(0.25, 0.0);
+        run(&mut watch, &mut simulation, 0.7);
+        let times = |watch: &Watch| watch.sections().map(|(time, _)| *time).collect::<Vec<_>>();
+        let near = |a: &[f64], b: &[f64]| {
+            a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12)
+        };
+        assert!(near(&times(&watch), &[0.05, 0.25, 0.45, 0.65]));
+        watch.back_to(0.5);
+        assert!(near(&times(&watch), &[0.05, 0.25, 0.45]));
+        run(&mut watch, &mut simulation, 0.9);
+        watch.set_phase(0.75, simulation.time());
+        run(&mut watch, &mut simulation, 2.0);
+        assert!(near(&times(&watch), &[0.95, 1.15, 1.35, 1.55, 1.75, 1.95]));
+        let first = watch.orbit().next().expect("recorded").0;
+        assert!((0.7..0.9).contains(&first), "{first}");
+        assert!(watch.orbit().count() <= PERIODS * 1000 + 1);
+        watch.begin(&scene, simulation.time());
+        assert_eq!((watch.sections().len(), watch.orbit().count()), (0, 0));
+    }
+
+    #[test]
+    fn a_scene_without_a_drive_has_an_orbit_and_no_sections() {
+        let scene = Scene::load("pendulum", &[]).expect("built in");
+        let mut simulation = Simulation::new(&scene).expect("starts");
+        let mut watch = Watch::new(&scene);
+        assert!(
+            watch
+                .period()
+                .expect_err("hangs")
+                .contains("no drive phase")
+        );
+        run(&mut watch, &mut simulation, 0.1);
+        assert!(watch.orbit().count() > 20 && watch.sections().len() == 0);
+    }
+}

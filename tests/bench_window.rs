@@ -1,0 +1,292 @@
+//! The chaos bench of the window, driven by role and label.
+#![cfg(feature = "gui")]
+
+use eframe::egui::{self, Key, Modifiers, accesskit::Role};
+use egui_kittest::{Harness, SnapshotResults, kittest::Queryable as _};
+use jointplay::analysis::drive::observed;
+use jointplay::app::{App, AppOptions, DesktopHost, Link, Player, Replay, Verdict};
+use jointplay::scene::Scene;
+
+/// The window on `scene` with some changes, paused at t = 0, its bench open.
+fn sized(
+    scene: &str,
+    changes: &[(&str, &str)],
+    size: [f32; 2],
+    theme: egui::Theme,
+) -> Harness<'static, App> {
+    let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
+    let changes: Vec<_> = changes.iter().map(own).collect();
+    let mut options = AppOptions::new(Scene::load(scene, &changes).expect("a built-in scene"));
+    options.playing = false;
+    options.theme = theme.into();
+    let mut harness = Harness::builder()
+        .with_size(size)
+        .with_theme(theme)
+        .with_step_dt(1.0 / 60.0)
+        .with_max_steps(60)
+        .wgpu()
+        .build_eframe(move |cc| App::new(cc, options).expect("the scene starts"));
+    harness
+        .state_mut()
+        .set_host(Box::new(DesktopHost::default()));
+    harness.run();
+    harness.key_press(Key::B);
+    harness.run();
+    harness
+}
+
+/// Large enough that all of the bench is on it.
+fn window(scene: &str, changes: &[(&str, &str)]) -> Harness<'static, App> {
+    sized(scene, changes, [1400.0, 1500.0], egui::Theme::Light)
+}
+
+const FAST: (&str, &str) = ("spcmm.frequency", "5 Hz");
+
+fn click(harness: &mut Harness<'_, App>, role: Role, label: &str) {
+    harness.get_by_role_and_label(role, label).click();
+    harness.step();
+    harness.step();
+}
+
+fn type_into(harness: &mut Harness<'_, App>, label: &str, text: &str) {
+    harness
+        .get_by_role_and_label(Role::TextInput, label)
+        .focus();
+    harness.step();
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::A);
+    harness.step();
+    harness
+        .get_by_role_and_label(Role::TextInput, label)
+        .type_text(text);
+    harness.step();
+}
+
+fn set_number(harness: &mut Harness<'_, App>, label: &str, number: f64) {
+    harness
+        .get_by_role_and_label(Role::SpinButton, label)
+        .set_value_accesskit(number);
+    harness.step();
+    harness.step();
+}
+
+/// Asks for a sweep of so many values from `from` to `to`.
+fn sweep(harness: &mut Harness<'_, App>, from: &str, to: &str, values: f64) {
+    type_into(harness, "From", from);
+    type_into(harness, "To", to);
+    set_number(harness, "Values", values);
+    set_number(harness, "Periods", 4.0);
+    set_number(harness, "Discard", 1.0);
+    click(harness, Role::Button, "Start sweep");
+}
+
+fn wait(harness: &mut Harness<'_, App>, mut done: impl FnMut(&App) -> bool) {
+    let begun = std::time::Instant::now();
+    while !done(harness.state()) {
+        assert!(begun.elapsed().as_secs() < 120, "no end");
+        std::thread::sleep(std::time::Duration::from_millis(20));
+        harness.run_steps(1);
+    }
+}
+
+fn come(app: &App) -> usize {
+    let swept = app.bench().swept();
+    swept.map_or(0, |swept| swept.points.iter().flatten().count())
+}
+
+#[test]
+fn a_sweep_fills_the_diagram_and_a_click_loads_the_section() {
+    let mut harness = window("spcmm", &[FAST]);
+    sweep(&mut harness, "0.2 mm", "0.4", 3.0);
+    assert!(harness.state().bench().is_sweeping());
+    wait(&mut harness, |app| !app.bench().is_sweeping());
+    assert_eq!(come(harness.state()), 3);
+    harness.run_steps(3);
+    harness.get_by_label("3 of 3 values");
+
+    let bench = harness.state().bench();
+    let point = bench.swept().expect("swept").points[2].clone();
+    let point = point.expect("came");
+    assert_eq!(point.sections.len(), 3);
+    let at = bench.place(2, 1).expect("drawn");
+    // The nearest of the marks is meant, whichever lies there.
+    let value = point.sections[1];
+    harness.hover_at(at);
+    harness.step();
+    harness.drag_at(at);
+    harness.step();
+    harness.drop_at(at);
+    harness.step();
+    assert!(harness.state().loading().is_some(), "on its way");
+    assert!(!harness.state().player().is_playing());
+    harness.get_by_label_contains("Running to the chosen section");
+    wait(&mut harness, |app| app.loading().is_none());
+
+    let player = harness.state_mut().player_mut();
+    player.set_playing(false);
+    let scene = player.simulation().scene();
+    assert!((scene.contact.clearance - 0.4e-3).abs() < 1e-15);
+    // Sections at phase 0 are at T, 2 T, …; the first was discarded, and the second kept one was clicked.
+    let steps = player.steps();
+    let log = player.log().clone();
+    let mut again = Player::new(scene).expect("starts");
+    let link = Link {
+        scene: jointplay::app::SceneText::of(scene),
+        log,
+        steps: Some(steps),
+        hash: Some(player.simulation().state_hash()),
+        ..Link::default()
+    };
+    let link = Link::parse(&link.format()).expect("a link");
+    let mut replay = Replay::new(link).expect("an instant");
+    // On the way it passes the very section of the sweep.
+    let mut passed = false;
+    let verdict = loop {
+        let verdict = replay.advance(&mut again, {
+            let mut steps = 2;
+            move || {
+                steps -= 1;
+                steps > 0
+            }
+        });
+        let found = observed(&again.frame().pose);
+        passed |= again.simulation().time() == 0.6000000000000001 && found[..6] == value;
+        if let Some(verdict) = verdict {
+            break verdict;
+        }
+    };
+    assert!(matches!(verdict, Verdict::Agrees(_)), "{verdict:?}");
+    assert!(passed, "bit by bit the section that was clicked");
+    assert!(again.simulation().time() < 0.7, "it plays from there");
+}
+
+#[test]
+fn a_sweep_is_cancelled_and_keeps_what_it_has() {
+    let mut harness = window("spcmm", &[FAST]);
+    sweep(&mut harness, "0.1 mm", "0.9 mm", 2000.0);
+    wait(&mut harness, |app| come(app) >= 2);
+    click(&mut harness, Role::Button, "Cancel sweep");
+    assert!(!harness.state().bench().is_sweeping());
+    let there = come(harness.state());
+    assert!((2..2000).contains(&there));
+    harness.run_steps(10);
+    assert_eq!(come(harness.state()), there);
+    harness.get_by_role_and_label(Role::Button, "Start sweep");
+}
+
+#[test]
+fn a_bad_range_is_explained() {
+    let mut harness = window("spcmm", &[FAST]);
+    for (from, to, words) in [
+        ("0.4 mm", "0.2 mm", "The range is reversed"),
+        ("0.1 mm", "20 mm", "below the ball radius"),
+        ("0.1 mm", "2 kg", "wrong unit"),
+    ] {
+        sweep(&mut harness, from, to, 3.0);
+        wait(&mut harness, |app| !app.bench().is_sweeping());
+        harness.run_steps(2);
+        harness.get_by_label_contains(words);
+        assert!(harness.query_by_label_contains("--vary").is_none());
+        assert_eq!(come(harness.state()), 0);
+    }
+}
+
+#[test]
+fn the_portrait_and_the_section_fill_while_the_scene_runs() {
+    let mut harness = window("spcmm", &[FAST]);
+    harness.get_by_label("Poincaré section: rate of x, m/s over x, mm");
+    let slider = harness.get_by_role_and_label(Role::Slider, "Drive phase");
+    slider.set_value_accesskit(90.0);
+    harness.run();
+    assert_eq!(harness.state().player().watch().phase(), 0.25);
+    harness.state_mut().player_mut().pacer.set_scale(1.0);
+    click(&mut harness, Role::Button, "Play");
+    wait(&mut harness, |app| app.player().watch().sections().len() >= 3);
+    let player = harness.state_mut().player_mut();
+    player.set_playing(false);
+    assert!(player.watch().orbit().count() > 300);
+    let (time, _) = player.watch().sections().next().expect("taken");
+    assert!((time - 0.05).abs() < 1e-12);
+    player.set("contact.friction", "0.3").expect("in range");
+    assert_eq!(player.watch().sections().len(), 0);
+    player.run_to(1.5);
+    assert!(player.watch().sections().len() > 0);
+    click(&mut harness, Role::Button, "Reset");
+    assert_eq!(harness.state().player().watch().sections().len(), 0);
+}
+
+#[test]
+fn a_scene_without_a_drive_says_that_it_has_no_phase() {
+    let mut harness = window("pendulum", &[]);
+    harness.get_by_label_contains("No Poincaré section");
+    harness.get_by_label_contains("No sweep");
+    harness.get_by_label_contains("Phase portrait");
+    harness.state_mut().player_mut().run_to(0.1);
+    harness.run();
+    assert!(harness.state().player().watch().orbit().count() > 20);
+}
+
+#[test]
+fn a_twin_parts_from_the_run_and_leaves_it_alone() {
+    let changes = [FAST, ("contact.friction", "0")];
+    let mut harness = window("spcmm", &changes);
+    click(&mut harness, Role::CheckBox, "Twin run");
+    let player = harness.state_mut().player_mut();
+    assert!(player.twin().is_some());
+    player.run_to(0.1);
+    let hash = player.simulation().state_hash();
+    let twin = player.twin().expect("on");
+    let slope = twin.fit().expect("grows").slope;
+    assert!(slope > 0.0, "{slope}");
+    let (first, last) = (twin.distances()[0], twin.distances().last().expect("many"));
+    assert!(last[1] > 1e3 * first[1], "{first:?} {last:?}");
+    harness.run();
+    harness.get_by_label_contains("Slope ");
+
+    click(&mut harness, Role::CheckBox, "Twin run");
+    let player = harness.state_mut().player_mut();
+    assert!(player.twin().is_none());
+    player.reset().expect("starts");
+    player.run_to(0.1);
+    assert_eq!(player.simulation().state_hash(), hash, "the same bits");
+}
+
+#[test]
+fn an_ideal_mechanism_has_no_twin() {
+    let harness = window("spcmm", &[("contact.clearance", "0")]);
+    let switch = harness.get_by_role_and_label(Role::CheckBox, "Twin run");
+    assert!(switch.accesskit_node().is_disabled());
+}
+
+/// After some periods, with a sweep and a twin.
+fn used(size: [f32; 2], theme: egui::Theme) -> Harness<'static, App> {
+    let mut harness = sized("spcmm", &[FAST, ("contact.friction", "0.05")], size, theme);
+    harness
+        .state_mut()
+        .player_mut()
+        .set_twin(true)
+        .expect("starts");
+    harness.state_mut().player_mut().run_to(1.0);
+    harness.run();
+    harness
+}
+
+#[test]
+fn pictures() {
+    let mut results = SnapshotResults::new();
+    for (name, size, theme) in [
+        ("bench_wide_light", [1280.0, 800.0], egui::Theme::Light),
+        ("bench_wide_dark", [1280.0, 800.0], egui::Theme::Dark),
+        ("bench_narrow", [420.0, 800.0], egui::Theme::Light),
+    ] {
+        let mut harness = used(size, theme);
+        harness.snapshot(name);
+        results.extend_harness(&mut harness);
+    }
+    let mut harness = window("spcmm", &[FAST]);
+    sweep(&mut harness, "0.05 mm", "0.8 mm", 9.0);
+    wait(&mut harness, |app| !app.bench().is_sweeping());
+    harness.remove_cursor();
+    harness.run();
+    harness.snapshot("bench_sweep");
+    results.extend_harness(&mut harness);
+}
