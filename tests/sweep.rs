@@ -207,12 +207,12 @@ fn an_interrupted_sweep_goes_on_where_it_stopped_and_a_damaged_part_is_refused()
             "sweep spcmm --vary contact.clearance=0.2mm..0.3mm:12 --periods 6 --discard 2 --threads 2 --out {out}"
         )
     };
-    let child = command(folder.path(), &line("a.npz"))
+    let mut child = command(folder.path(), &line("a.npz"))
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    // Once two blocks are in: the settings take less than 6000 bytes, a block some hundred numbers.
+    // Once some blocks are in.
     let length = || fs::metadata(at("a.npz.partial")).map_or(0, |file| file.len());
     let mut grown = Vec::new();
     while grown.len() < 4 {
@@ -220,6 +220,10 @@ fn an_interrupted_sweep_goes_on_where_it_stopped_and_a_damaged_part_is_refused()
         if now > 0 && grown.last() != Some(&now) {
             grown.push(now);
         }
+        assert!(
+            child.try_wait().unwrap().is_none(),
+            "over before it could be interrupted"
+        );
         std::thread::sleep(std::time::Duration::from_millis(1));
     }
     let interrupted = Command::new("kill")

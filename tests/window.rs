@@ -659,3 +659,33 @@ fn the_energy_balance_is_stacked_from_both_sides() {
     harness.get_by_label("Energy balance, mJ");
     harness.snapshot("energy_balance");
 }
+
+#[test]
+fn a_preset_is_measured_beside_the_running_scene() {
+    let mut harness = window("pendulum");
+    harness
+        .state_mut()
+        .set_host(Box::new(jointplay::app::DesktopHost::default()));
+    // As it comes, the scene was measured for the program.
+    assert!(harness.query_by_label("not measured").is_none());
+    let player = harness.state_mut().player_mut();
+    player.set("contact.clearance", "0.2 mm").expect("in range");
+    player.set("solver.preset", "preview").expect("a preset");
+    harness.run_steps(2);
+    let unknown = |harness: &Harness<'_, App>| harness.query_all_by_label("not measured").count();
+    assert_eq!(unknown(&harness), 2);
+    click(&mut harness, "Measure preset");
+    let begun = std::time::Instant::now();
+    while unknown(&harness) > 0 {
+        assert!(begun.elapsed().as_secs() < 120, "no answer");
+        std::thread::sleep(std::time::Duration::from_millis(50));
+        harness.run_steps(1);
+    }
+    harness.get_by_label("Peak force error");
+    // What is measured belongs to these values.
+    let player = harness.state_mut().player_mut();
+    player.set("contact.clearance", "0.3 mm").expect("in range");
+    player.set("contact.friction", "0.3").expect("in range");
+    harness.run_steps(2);
+    assert_eq!(unknown(&harness), 2);
+}

@@ -1,5 +1,6 @@
 // The browser's services for the laboratory: the other half of src/web/host.rs.
 
+const build = new URL(import.meta.url).search;
 const $ = (id) => document.getElementById(id);
 
 /** Least time between two reports to a screen reader while nothing happens, ms: it speaks slower than they are made. */
@@ -10,6 +11,9 @@ const KEEP = 60_000;
 /** `laboratory`: what web/main.js knows; `lost(start, why)`: called when the graphics of that start are gone. */
 export function makeHost(laboratory, lost) {
     let reported = -Infinity;
+    /** Computations: number to {worker, messages}. */
+    const work = new Map();
+    let works = 0;
 
     /** On the clipboard, by whatever way the browser allows. */
     async function copy(text) {
@@ -68,6 +72,32 @@ export function makeHost(laboratory, lost) {
         },
 
         pick: () => picker.click(),
+
+        startWork(job) {
+            if (typeof Worker !== 'function') return undefined;
+            const worker = new Worker(new URL(`worker.js${build}`, import.meta.url), { type: 'module' });
+            const messages = [];
+            const failed = (reason) => messages.push(JSON.stringify({ Failed: `the computation broke off: ${reason}` }));
+            worker.addEventListener('message', ({ data }) => messages.push(data));
+            worker.addEventListener('error', (event) => {
+                // Told in the window instead of as a failure of the page.
+                event.preventDefault();
+                failed(event.message ?? 'the worker could not start');
+            });
+            try {
+                worker.postMessage({ code: laboratory.code(), job });
+            } catch (error) {
+                failed(error);
+            }
+            works += 1;
+            work.set(works, { worker, messages });
+            return works;
+        },
+        pollWork: (number) => work.get(number)?.messages.shift(),
+        endWork(number) {
+            work.get(number)?.worker.terminate();
+            work.delete(number);
+        },
 
         announce(text, event) {
             $('summary').textContent = text;

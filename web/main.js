@@ -225,6 +225,7 @@ async function main() {
     }
     stage('Starting');
     laboratory.page = new bindings.Page();
+    laboratory.code = () => bindings.default.__wbindgen_wasm_module;
     const failure = await begin(found);
     if (failure) return showTrouble('The laboratory could not start', failure);
     // Another link pasted into the address bar of the open page.

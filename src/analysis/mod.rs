@@ -19,6 +19,7 @@ mod setting;
 mod standard;
 mod stretch;
 pub mod sweep;
+pub mod task;
 mod work_precision;
 
 pub use cost::{Part, PartCost, model_costs};

@@ -1,13 +1,19 @@
 //! How far the numbers on show can be trusted: what the preset was measured to do, and how the running scene does.
 
-use eframe::egui::{Grid, RichText, Ui};
+use eframe::egui::{Grid, ProgressBar, RichText, Ui};
 
+use super::host::{Host, Running};
 use super::player::Player;
 use super::value;
+use crate::analysis::presets::{self, Measured};
+use crate::analysis::task::{Job, Message, SceneSource};
+use crate::scene::{Preset, Value};
 use crate::simulate::Impact;
 
 /// Fewer steps than this do not resolve an impact.
 const STEPS_OF_AN_IMPACT: u64 = 10;
+/// Error beyond which a measured preset is to be doubted.
+const DOUBTFUL_ERROR: f64 = 0.05;
 /// Share of the exchanged energy beyond which the balance is out.
 const BALANCED: f64 = 1e-3;
 
@@ -19,22 +25,195 @@ struct Row {
     help: String,
 }
 
-/// The rows about the running scene.
-pub fn ui(ui: &mut Ui, player: &Player) {
-    Grid::new("accuracy")
-        .num_columns(2)
-        .spacing([12.0, 4.0])
-        .show(ui, |ui| {
-            for row in rows(player) {
-                ui.label(row.label).on_hover_text(&row.help);
-                let mut text = RichText::new(&row.value);
-                if row.doubtful {
-                    text = text.color(ui.visuals().warn_fg_color).strong();
-                }
-                ui.label(text).on_hover_text(&row.help);
-                ui.end_row();
+/// What the preset was measured to do on a scene.
+struct Found {
+    scene: SceneSource,
+    preset: Preset,
+    measured: Measured,
+}
+
+/// The panel: a measurement under way, and the latest one.
+#[derive(Default)]
+pub struct Accuracy {
+    asked: Option<(Job, SceneSource, Preset)>,
+    running: Option<(Box<dyn Running>, SceneSource, Preset)>,
+    progress: f64,
+    found: Option<Found>,
+    problem: Option<String>,
+}
+
+impl Accuracy {
+    /// Starts what was asked for, and takes in what a measurement said; whether one is under way.
+    pub fn update(&mut self, host: &mut dyn Host) -> bool {
+        if let Some((job, scene, preset)) = self.asked.take() {
+            self.progress = 0.0;
+            self.problem = None;
+            match host.start(job) {
+                Some(running) => self.running = Some((running, scene, preset)),
+                None => self.problem = Some("It cannot be measured here".to_owned()),
             }
-        });
+        }
+        while let Some((running, scene, preset)) = &mut self.running {
+            match running.poll() {
+                None => return true,
+                Some(Message::Progress(done)) => self.progress = done,
+                Some(Message::Presets(list)) => {
+                    self.found = list.first().map(|(_, measured)| Found {
+                        scene: scene.clone(),
+                        preset: *preset,
+                        measured: *measured,
+                    });
+                }
+                Some(Message::Done) => self.running = None,
+                Some(Message::Failed(why)) => {
+                    self.problem = Some(why);
+                    self.running = None;
+                }
+            }
+        }
+        false
+    }
+
+    /// Everything below the choice of the preset.
+    pub fn ui(&mut self, ui: &mut Ui, player: &Player) {
+        let preset = preset_of(player);
+        let mut list = vec![solver(player, preset)];
+        if let Some(preset) = preset {
+            list.extend(self.measured(player, preset));
+        }
+        list.extend(rows(player));
+        Grid::new("accuracy")
+            .num_columns(2)
+            .spacing([12.0, 4.0])
+            .show(ui, |ui| {
+                for row in list {
+                    ui.label(row.label).on_hover_text(&row.help);
+                    let mut text = RichText::new(&row.value);
+                    if row.doubtful {
+                        text = text.color(ui.visuals().warn_fg_color).strong();
+                    }
+                    ui.label(text).on_hover_text(&row.help);
+                    ui.end_row();
+                }
+            });
+        if let Some(preset) = preset {
+            self.measure_ui(ui, player, preset);
+        }
+        for doubt in player.simulation().doubts() {
+            let words = RichText::new(doubt).small();
+            ui.label(words.color(ui.visuals().warn_fg_color));
+        }
+    }
+
+    fn measure_ui(&mut self, ui: &mut Ui, player: &Player, preset: Preset) {
+        if self.running.is_some() {
+            ui.horizontal(|ui| {
+                if ui
+                    .button("Cancel")
+                    .on_hover_text("End the measurement")
+                    .clicked()
+                {
+                    self.running = None;
+                }
+                ui.add(
+                    ProgressBar::new(self.progress as f32)
+                        .show_percentage()
+                        .desired_width(ui.available_width()),
+                );
+            });
+        } else if ui
+            .button("Measure preset")
+            .on_hover_text(
+                "Runs this scene with its present values under the preset and under a reference that is converged, beside the \
+                 running one, and compares forces and speed. Takes seconds.",
+            )
+            .clicked()
+        {
+            let scene = model_of(player);
+            let job = Job::Presets {
+                scene: scene.clone(),
+                presets: vec![preset.word().to_owned()],
+            };
+            self.asked = Some((job, scene, preset));
+        }
+        if let Some(problem) = &self.problem {
+            ui.label(
+                RichText::new(problem)
+                    .small()
+                    .color(ui.visuals().error_fg_color),
+            );
+        }
+    }
+
+    /// What `preset` was measured to do on the scene as it is.
+    fn measured(&self, player: &Player, preset: Preset) -> Vec<Row> {
+        let scene = model_of(player);
+        let own = self.found.as_ref();
+        let here = own.filter(|found| found.preset == preset && found.scene == scene);
+        let (measured, place) = match here {
+            Some(found) => (
+                Some(found.measured),
+                "on this scene with its present values",
+            ),
+            None if scene.changes.is_empty() && player.wanted().source.file.is_none() => (
+                presets::measured(&player.wanted().name, preset),
+                "on this scene as it comes with the program",
+            ),
+            None => (None, ""),
+        };
+        let row = |label, error: Option<f64>, what: &str| Row {
+            label,
+            value: match (&measured, error) {
+                (None, _) => "not measured".to_owned(),
+                (Some(_), None) => "does not apply".to_owned(),
+                (Some(_), Some(error)) => value::percent(error),
+            },
+            doubtful: error.is_some_and(|error| error > DOUBTFUL_ERROR),
+            help: match measured {
+                None => {
+                    format!("{what} It was not measured for these values: press Measure preset.")
+                }
+                Some(_) => format!("{what} Measured {place}, against a converged run."),
+            },
+        };
+        vec![
+            row(
+                "Peak force error",
+                measured.and_then(|m| m.peak_error),
+                "Largest relative error of the peak forces of the first six impacts under this preset.",
+            ),
+            row(
+                "Settled force error",
+                measured.and_then(|m| m.settled_error),
+                "Largest relative error of the mean contact forces in settled motion under this preset; does not apply where \
+                 the motion does not settle soon.",
+            ),
+        ]
+    }
+}
+
+/// The preset whose method and tolerance are in force, chosen by its name or not.
+fn preset_of(player: &Player) -> Option<Preset> {
+    let solver = &player.wanted().solver;
+    let is = |preset: &Preset| {
+        let (method, step, tolerance) = preset.point();
+        method == solver.method
+            && if method.is_adaptive() {
+                tolerance == solver.tolerance
+            } else {
+                step == solver.step
+            }
+    };
+    let chosen = solver.preset.filter(|preset| is(preset));
+    chosen.or_else(|| Preset::ALL.into_iter().find(is))
+}
+
+/// The scene with what makes its motion, without choices of solver and view.
+fn model_of(player: &Player) -> SceneSource {
+    let mut scene = SceneSource::of(player.wanted());
+    let kept = |key: &str| !key.starts_with("solver.") && !key.starts_with("view.");
+    scene.changes.retain(|(key, _)| kept(key));
+    scene
 }
 
 fn rows(player: &Player) -> Vec<Row> {
@@ -51,6 +230,28 @@ fn rows(player: &Player) -> Vec<Row> {
 fn joint(player: &Player, index: usize) -> &str {
     let joints = &player.scene().ball_joints;
     joints.get(index).map_or("", |joint| &joint.name)
+}
+
+fn solver(player: &Player, preset: Option<Preset>) -> Row {
+    let solver = &player.wanted().solver;
+    let method = match player.wanted().get("solver.method") {
+        Ok(Value::Choice(word)) => word,
+        _ => "",
+    };
+    let size = if solver.method.is_adaptive() {
+        value::power_of_ten(solver.tolerance)
+    } else {
+        crate::scene::format_quantity(solver.step, "us")
+    };
+    let name = preset.map_or_else(|| "no preset".to_owned(), |p| p.word().to_owned());
+    Row {
+        label: "Solver",
+        value: format!("{method} {size}, {name}"),
+        doubtful: false,
+        help: "Method with its tolerance, or its fixed step, and the preset that has these. They stand under Solver; a \
+               measured error is given for presets only."
+            .to_owned(),
+    }
 }
 
 fn capacity(player: &Player) -> Row {

@@ -8,7 +8,7 @@ use eframe::egui::{
     TextEdit, Tooltip, Ui,
 };
 
-use super::accuracy;
+use super::accuracy::Accuracy;
 use super::icons::{Icon, icon_button};
 use super::player::Player;
 use super::{theme, value};
@@ -51,7 +51,7 @@ impl Controls {
     }
 
     /// All controls, one under the other.
-    pub fn ui(&mut self, ui: &mut Ui, player: &mut Player) {
+    pub fn ui(&mut self, ui: &mut Ui, player: &mut Player, accuracy: &mut Accuracy) {
         let table = player.wanted().parameters();
         ui.label(RichText::new(&player.scene().title).small().weak())
             .on_hover_text(&player.scene().description);
@@ -63,7 +63,7 @@ impl Controls {
             }
         }
         ui.separator();
-        self.accuracy(ui, player, &table);
+        self.accuracy_ui(ui, player, accuracy, &table);
         self.one_joint(ui, player, &table);
         let mut groups: Vec<&'static str> = Vec::new();
         for parameter in &table {
@@ -89,14 +89,20 @@ impl Controls {
     }
 
     /// The preset, and how the running scene does under it.
-    fn accuracy(&mut self, ui: &mut Ui, player: &mut Player, table: &[&'static Parameter]) {
+    fn accuracy_ui(
+        &mut self,
+        ui: &mut Ui,
+        player: &mut Player,
+        accuracy: &mut Accuracy,
+        table: &[&'static Parameter],
+    ) {
         let header = egui::CollapsingHeader::new(RichText::new("Accuracy").strong())
             .default_open(true)
             .show(ui, |ui| {
                 if let Some(parameter) = table.iter().find(|p| p.key == PRESET) {
                     self.control(ui, player, parameter, PRESET);
                 }
-                accuracy::ui(ui, player);
+                accuracy.ui(ui, player);
             });
         header.header_response.on_hover_text(
             "How far the numbers can be trusted. Method, step and tolerance stand under Solver.",

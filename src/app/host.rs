@@ -4,6 +4,17 @@ use std::sync::Arc;
 
 use eframe::egui;
 
+use crate::analysis::task::{Job, Message};
+
+/// A computation beside the interface.
+pub trait Running {
+    /// What it said next, if anything; after [`Message::Done`] or [`Message::Failed`] nothing more comes.
+    fn poll(&mut self) -> Option<Message>;
+
+    /// Ends it; what it said so far can still be had.
+    fn cancel(&mut self);
+}
+
 /// A file to be saved, with what describes it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SaveFile {
@@ -64,6 +75,11 @@ pub trait Host {
     /// The next file that was chosen, or dropped and read.
     fn opened(&mut self) -> Option<OpenedFile>;
 
+    /// Starts a long computation beside the interface; `None` where that cannot be.
+    fn start(&mut self, _job: Job) -> Option<Box<dyn Running>> {
+        None
+    }
+
     /// What goes on, for somebody who does not see the picture; the same sentences are in the accessibility tree. `event`:
     /// something has happened, rather than gone on.
     fn announce(&mut self, _text: &str, _event: bool) {}
@@ -93,7 +109,8 @@ mod desktop {
 
     use eframe::egui;
 
-    use super::{Host, OpenedFile, SaveFile};
+    use super::super::background::Thread;
+    use super::{Host, Job, OpenedFile, Running, SaveFile};
 
     /// Files of the desktop.
     #[derive(Debug, Default)]
@@ -135,6 +152,10 @@ mod desktop {
 
         fn opened(&mut self) -> Option<OpenedFile> {
             self.opened.pop_front()
+        }
+
+        fn start(&mut self, job: Job) -> Option<Box<dyn Running>> {
+            Some(Box::new(Thread::start(job)?))
         }
     }
 

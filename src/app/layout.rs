@@ -73,6 +73,7 @@ impl App {
         let Self {
             player,
             controls,
+            accuracy,
             plots,
             show_controls,
             show_plots,
@@ -87,7 +88,7 @@ impl App {
                     // Room for the scroll bar beside the fields.
                     ui.set_max_width(ui.available_width() - 10.0);
                     ui.spacing_mut().item_spacing.y = 5.0;
-                    ui.add_enabled_ui(free, |ui| controls.ui(ui, player));
+                    ui.add_enabled_ui(free, |ui| controls.ui(ui, player, accuracy));
                 });
             });
         Panel::bottom("plots")
@@ -206,6 +207,7 @@ impl App {
         let Self {
             player,
             controls,
+            accuracy,
             plots,
             sheet,
             ..
@@ -217,7 +219,7 @@ impl App {
                 ui.set_max_width(ui.available_width() - 10.0);
                 match sheet {
                     Some(Sheet::Controls) => {
-                        ui.add_enabled_ui(free, |ui| controls.ui(ui, player));
+                        ui.add_enabled_ui(free, |ui| controls.ui(ui, player, accuracy));
                     }
                     Some(Sheet::Plots) => {
                         plots.header(ui, player);

@@ -4,6 +4,8 @@
 
 mod accuracy;
 mod announce;
+#[cfg(not(target_arch = "wasm32"))]
+mod background;
 mod controls;
 mod dialogs;
 mod files;
@@ -37,6 +39,7 @@ use crate::scene::{DEFAULT_SCENE, Scene};
 use crate::simulate::{Simulation, StartError};
 use crate::view::{Preset, ViewOptions};
 
+use accuracy::Accuracy;
 use announce::Announcer;
 use controls::Controls;
 use dialogs::{Answer, Dialog};
@@ -44,7 +47,7 @@ use dialogs::{Answer, Dialog};
 pub use headless::{Headless, HeadlessError, Overlay, UiFrame};
 #[cfg(not(target_arch = "wasm32"))]
 pub use host::DesktopHost;
-pub use host::{Host, NoHost, OpenedFile, SaveFile};
+pub use host::{Host, NoHost, OpenedFile, Running, SaveFile};
 use keys::Action;
 use layout::Sheet;
 pub use log::{Entry, Event, Log};
@@ -59,6 +62,9 @@ pub use window::{WindowError, run_native};
 
 /// Most stepping towards the state of a link in one frame, s: the window still answers twenty times a second.
 const REPLAY_BUDGET: f64 = 0.03;
+
+/// How often a computation beside the interface is asked how far it is.
+const POLL: std::time::Duration = std::time::Duration::from_millis(100);
 
 /// How the application starts.
 #[derive(Clone, Debug)]
@@ -155,6 +161,7 @@ impl Notice {
 pub struct App {
     player: Player,
     controls: Controls,
+    accuracy: Accuracy,
     viewport: Viewport,
     plots: Plots,
     dialog: Option<Dialog>,
@@ -214,6 +221,7 @@ impl App {
         let mut app = Self {
             viewport,
             controls: Controls::default(),
+            accuracy: Accuracy::default(),
             plots: Plots::default(),
             dialog: None,
             problem: options.problem,
@@ -497,6 +505,9 @@ impl eframe::App for App {
         }
         self.receive_files(ctx);
         self.receive_picture(ctx);
+        if self.accuracy.update(self.host.as_mut()) {
+            ctx.request_repaint_after(POLL);
+        }
         let dt = ctx.input(|input| input.stable_dt);
         if self.advance(f64::from(dt)) {
             ctx.request_repaint();

@@ -38,6 +38,16 @@ pub fn power_of_ten(share: f64) -> String {
     }
 }
 
+/// A share in per cent, two digits, however small.
+pub fn percent(share: f64) -> String {
+    let percent = 100.0 * share;
+    if percent == 0.0 || percent >= 0.01 {
+        format!("{} %", number(percent, 2))
+    } else {
+        format!("{percent:.0e} %")
+    }
+}
+
 /// A time with the unit that suits its size.
 pub fn time(seconds: f64) -> String {
     let size = seconds.abs();

@@ -8,7 +8,9 @@ use std::sync::Arc;
 use eframe::egui;
 use wasm_bindgen::prelude::*;
 
-use crate::app::{Host, OpenedFile, SaveFile};
+use super::work::Worker;
+use crate::analysis::task::Job;
+use crate::app::{Host, OpenedFile, Running, SaveFile};
 
 #[wasm_bindgen]
 extern "C" {
@@ -97,6 +99,10 @@ impl Host for WebHost {
 
     fn opened(&mut self) -> Option<OpenedFile> {
         self.inbox.files.borrow_mut().pop_front()
+    }
+
+    fn start(&mut self, job: Job) -> Option<Box<dyn Running>> {
+        Some(Box::new(Worker::start(&job)?))
     }
 
     fn announce(&mut self, text: &str, event: bool) {

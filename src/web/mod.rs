@@ -10,8 +10,12 @@ mod mirror;
 mod page;
 #[cfg(target_arch = "wasm32")]
 mod run;
+#[cfg(all(target_arch = "wasm32", feature = "gui"))]
+mod work;
 
 #[cfg(all(target_arch = "wasm32", feature = "gui"))]
 pub use page::Page;
 #[cfg(target_arch = "wasm32")]
 pub use run::{Run, choices, scenes, version};
+#[cfg(all(target_arch = "wasm32", feature = "gui"))]
+pub use work::perform;

@@ -15,6 +15,9 @@ const FINGER = 36;
 test('one finger orbits, two pan and pinch', async () => {
     const lab = await open('play=0', { backend, size: PHONE, context: { hasTouch: true } });
     const camera = async () => (await lab.state()).camera;
+    // Until somebody turns it, the camera keeps everything in sight and is nobody's choice.
+    assert.equal(await camera(), null);
+    await lab.fingers([[200, 200], [190, 200], [180, 200]]);
     const start = await camera();
     await lab.fingers([[200, 200], [230, 200], [260, 220]]);
     const turned = await camera();

@@ -1,0 +1,186 @@
+//! Long computations as plain data, so that a thread on the desktop and a worker in the browser do the same.
+
+use std::ops::ControlFlow;
+
+use serde::{Deserialize, Serialize};
+
+use super::presets::{self, Measured};
+use super::{AnalysisError, Outside};
+use crate::scene::{Preset, Scene, SceneError};
+
+/// A scene as it travels: text and changes, from which it is read again.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SceneSource {
+    /// The TOML text.
+    pub text: String,
+    /// Its file, for messages.
+    pub file: Option<String>,
+    /// Changed parameters, as a user writes them.
+    pub changes: Vec<(String, String)>,
+}
+
+impl SceneSource {
+    /// What `scene` was read from.
+    pub fn of(scene: &Scene) -> Self {
+        Self {
+            text: scene.source.text.clone(),
+            file: scene.source.file.clone(),
+            changes: scene.changes.clone(),
+        }
+    }
+
+    /// The scene.
+    ///
+    /// # Errors
+    /// As [`Scene::parse`].
+    pub fn scene(&self) -> Result<Scene, SceneError> {
+        Scene::parse(&self.text, self.file.as_deref(), &self.changes)
+    }
+}
+
+/// What is to be computed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Job {
+    /// Cost and error of presets on a scene as it is.
+    Presets {
+        /// The scene.
+        scene: SceneSource,
+        /// Words of `solver.preset`.
+        presets: Vec<String>,
+    },
+}
+
+/// What a computation says on its way.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Message {
+    /// Fraction done, 0 to 1.
+    Progress(f64),
+    /// The presets asked for, by their words.
+    Presets(Vec<(String, Measured)>),
+    /// All was said.
+    Done,
+    /// Why there is no result.
+    Failed(String),
+}
+
+/// Computes `job`. `clock` gives seconds from any start; `tell` takes each message and may break off.
+/// The last message is [`Message::Done`] or [`Message::Failed`], unless it was broken off.
+pub fn perform(
+    job: &Job,
+    clock: &mut dyn FnMut() -> f64,
+    tell: &mut dyn FnMut(Message) -> ControlFlow<()>,
+) {
+    let outcome = match job {
+        Job::Presets { scene, presets } => measure_presets(scene, presets, clock, tell),
+    };
+    let last = match outcome {
+        Ok(()) => Message::Done,
+        Err(Failure::Cancelled) => return,
+        Err(Failure::Said(words)) => Message::Failed(words),
+    };
+    // Nothing follows that could be broken off.
+    let _ = tell(last);
+}
+
+enum Failure {
+    Cancelled,
+    Said(String),
+}
+
+impl From<AnalysisError> for Failure {
+    fn from(error: AnalysisError) -> Self {
+        match error {
+            AnalysisError::Cancelled => Self::Cancelled,
+            other => Self::Said(other.to_string()),
+        }
+    }
+}
+
+impl From<SceneError> for Failure {
+    fn from(error: SceneError) -> Self {
+        Self::Said(error.to_string())
+    }
+}
+
+fn measure_presets(
+    scene: &SceneSource,
+    words: &[String],
+    clock: &mut dyn FnMut() -> f64,
+    tell: &mut dyn FnMut(Message) -> ControlFlow<()>,
+) -> Result<(), Failure> {
+    let scene = scene.scene()?;
+    let presets: Vec<Preset> = words
+        .iter()
+        .map(|word| {
+            let found = Preset::ALL.into_iter().find(|preset| preset.word() == word);
+            found.ok_or_else(|| Failure::Said(format!("no preset is called {word}")))
+        })
+        .collect::<Result<_, _>>()?;
+    let mut progress = |done| tell(Message::Progress(done));
+    let points = presets::measure(&scene, &presets, &mut Outside::new(clock, &mut progress))?;
+    let measured = points.iter().map(Measured::of);
+    let message = Message::Presets(words.iter().cloned().zip(measured).collect());
+    match tell(message) {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(Failure::Cancelled),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn job(changes: &[(&str, &str)], presets: &[&str]) -> Job {
+        let own = |&(k, v): &(&str, &str)| (k.to_owned(), v.to_owned());
+        let changes: Vec<_> = changes.iter().map(own).collect();
+        let scene = Scene::load("pendulum", &changes).expect("built in");
+        Job::Presets {
+            scene: SceneSource::of(&scene),
+            presets: presets.iter().map(|&word| word.to_owned()).collect(),
+        }
+    }
+
+    fn messages(job: &Job, most: usize) -> Vec<Message> {
+        let mut ticks = 0.0;
+        let mut clock = || {
+            ticks += 1e-3;
+            ticks
+        };
+        let mut said = Vec::new();
+        perform(job, &mut clock, &mut |message| {
+            said.push(message);
+            if said.len() < most {
+                ControlFlow::Continue(())
+            } else {
+                ControlFlow::Break(())
+            }
+        });
+        said
+    }
+
+    #[test]
+    fn a_preset_is_measured_on_the_scene_as_it_is() {
+        let job = job(&[("contact.clearance", "0.2 mm")], &["preview"]);
+        // It travels as text.
+        let text = serde_json::to_string(&job).expect("plain data");
+        let job: Job = serde_json::from_str(&text).expect("its own text");
+        let said = messages(&job, usize::MAX);
+        assert_eq!(said.last(), Some(&Message::Done));
+        let Some(Message::Presets(found)) = said.iter().rev().nth(1) else {
+            panic!("{said:?}");
+        };
+        let error = found[0].1.peak_error.expect("the pendulum has impacts");
+        assert!(error > 0.0 && error < 0.2, "{error}");
+        assert!(
+            said.iter()
+                .any(|m| matches!(m, Message::Progress(p) if *p > 0.5))
+        );
+    }
+
+    #[test]
+    fn it_ends_when_told_and_says_what_is_wrong() {
+        assert_eq!(messages(&job(&[], &["preview"]), 3).len(), 3);
+        let said = messages(&job(&[], &["quick"]), usize::MAX);
+        assert!(matches!(&said[..], [Message::Failed(why)] if why.contains("quick")));
+    }
+}

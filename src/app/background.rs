@@ -1,0 +1,74 @@
+//! A computation on a thread of its own.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
+
+use web_time::Instant;
+
+use super::host::Running;
+use crate::analysis::task::{Job, Message, perform};
+
+/// A thread that computes a job. Dropping it ends the computation.
+pub struct Thread {
+    messages: Option<Receiver<Message>>,
+    cancelled: Arc<AtomicBool>,
+}
+
+impl Thread {
+    /// Starts `job`; `None` where the system gives no thread.
+    pub fn start(job: Job) -> Option<Self> {
+        let (sender, messages) = channel();
+        let cancelled = Arc::new(AtomicBool::new(false));
+        let asked = Arc::clone(&cancelled);
+        let work = move || {
+            let start = Instant::now();
+            let mut clock = move || start.elapsed().as_secs_f64();
+            perform(&job, &mut clock, &mut |message| {
+                // Nobody listens any more: the same as cancelled.
+                if asked.load(Ordering::Relaxed) || sender.send(message).is_err() {
+                    ControlFlow::Break(())
+                } else {
+                    ControlFlow::Continue(())
+                }
+            });
+        };
+        let builder = std::thread::Builder::new().name("computation".to_owned());
+        builder.spawn(work).ok()?;
+        Some(Self {
+            messages: Some(messages),
+            cancelled,
+        })
+    }
+}
+
+impl Running for Thread {
+    fn poll(&mut self) -> Option<Message> {
+        match self.messages.as_ref()?.try_recv() {
+            Ok(message) => {
+                if matches!(message, Message::Done | Message::Failed(_)) {
+                    self.messages = None;
+                }
+                Some(message)
+            }
+            Err(TryRecvError::Empty) => None,
+            Err(TryRecvError::Disconnected) => {
+                self.messages = None;
+                // A thread that ends without a last word was cancelled, or something in it broke.
+                let cancelled = self.cancelled.load(Ordering::Relaxed);
+                (!cancelled).then(|| Message::Failed("the computation broke off".to_owned()))
+            }
+        }
+    }
+
+    fn cancel(&mut self) {
+        self.cancelled.store(true, Ordering::Relaxed);
+    }
+}
+
+impl Drop for Thread {
+    fn drop(&mut self) {
+        self.cancel();
+    }
+}
