@@ -85,7 +85,7 @@ export function makeHost(laboratory, lost) {
                 failed(event.message ?? 'the worker could not start');
             });
             try {
-                worker.postMessage({ code: laboratory.code(), job });
+                worker.postMessage({ code: laboratory.code, job });
             } catch (error) {
                 failed(error);
             }

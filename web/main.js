@@ -11,8 +11,8 @@ const LOSS_SPAN = 60_000;
 /** Pauses before the attempts to start them again, ms: after a crash the browser needs a moment. */
 const PAUSES = [0, 500, 3000];
 
-/** What the tests and the rest of the page hold on to: `page` (src/web/page.rs), and how the starts went. */
-const laboratory = { page: null, backend: null, ready: false, trouble: null, starts: 0, losses: [] };
+/** What the tests and the rest of the page hold on to: `page` (src/web/page.rs), the compiled code, and how the starts went. */
+const laboratory = { page: null, code: null, backend: null, ready: false, trouble: null, starts: 0, losses: [] };
 globalThis.jointplay = laboratory;
 
 const LEFT_OUT = {
@@ -93,7 +93,7 @@ function stage(text, part) {
     else $('progress').value = part;
 }
 
-/** The compiled code, with the progress of its download on the page. */
+/** The compiled code; the progress of its download is on the page. */
 async function download(address, bytes) {
     const response = await fetch(address);
     if (!response.ok) throw new Error(`${address}: ${response.status} ${response.statusText}`);
@@ -109,7 +109,7 @@ async function download(address, bytes) {
         }),
     );
     // Compiled while it arrives, which a browser does only for this type.
-    return new Response(counted, { headers: { 'Content-Type': 'application/wasm' } });
+    return WebAssembly.compileStreaming(new Response(counted, { headers: { 'Content-Type': 'application/wasm' } }));
 }
 
 /** Backends to try, best first. */
@@ -219,13 +219,13 @@ async function main() {
         const { makeHost } = await import(`./host.js${build}`);
         globalThis.jointplayHost = makeHost(laboratory, lost);
         bindings = await import(`./jointplay.js${build}`);
-        await bindings.default({ module_or_path: code });
+        laboratory.code = await code;
+        await bindings.default({ module_or_path: laboratory.code });
     } catch (error) {
         return showTrouble('The laboratory could not be loaded', `${error?.message ?? error}`);
     }
     stage('Starting');
     laboratory.page = new bindings.Page();
-    laboratory.code = () => bindings.default.__wbindgen_wasm_module;
     const failure = await begin(found);
     if (failure) return showTrouble('The laboratory could not start', failure);
     // Another link pasted into the address bar of the open page.

@@ -354,6 +354,13 @@ impl App {
         opened
     }
 
+    /// Pauses and runs on until `time`, s, whatever it takes. What struck on the way is in the record, and no longer glows.
+    pub fn run_to(&mut self, time: f64) {
+        self.player.run_to(time);
+        self.player.advance(0.0);
+        self.viewport.arrive(&self.player);
+    }
+
     /// Moves the state on by `dt` seconds; whether it goes on moving by itself.
     pub fn advance(&mut self, dt: f64) -> bool {
         if let Some(replay) = &mut self.replay {

@@ -160,7 +160,7 @@ impl Page {
     #[wasm_bindgen(js_name = runTo)]
     pub fn run_to(&self, time: f64) {
         self.with(|laboratory| {
-            laboratory.app.player_mut().run_to(time);
+            laboratory.app.run_to(time);
             laboratory.ctx.request_repaint();
         });
     }

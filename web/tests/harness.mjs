@@ -193,15 +193,18 @@ export class Lab {
      */
     async fingers(...paths) {
         const cdp = await this.context.newCDPSession(this.page);
-        const send = (type, touchPoints) => cdp.send('Input.dispatchTouchEvent', { type, touchPoints });
+        const send = async (type, touchPoints) => {
+            const before = await this.frames();
+            await cdp.send('Input.dispatchTouchEvent', { type, touchPoints });
+            // No longer: a finger that rests for 0.8 s is a long press, and turns nothing.
+            await this.drawn({ before, patience: 300 });
+        };
         const at = (step, count = paths.length) => paths.slice(0, count).map((path, id) => ({ x: path[step][0], y: path[step][1], id }));
         for (let count = 1; count <= paths.length; count += 1) {
             await send('touchStart', at(0, count));
-            await this.drawn();
         }
         for (let step = 1; step < paths[0].length; step += 1) {
             await send('touchMove', at(step));
-            await this.drawn();
         }
         await send('touchEnd', []);
         await cdp.detach();
@@ -254,21 +257,24 @@ export class Lab {
         await this.drawn();
     }
 
-    /** Waits until the page is drawn anew, or for a while where it has no reason to. */
-    async drawn() {
-        const frames = () => this.page.evaluate(() => globalThis.jointplay.page.frames());
-        const before = await frames();
-        const end = Date.now() + 1000;
-        while ((await frames()) === before && Date.now() < end) await sleep(20);
+    /** Frames drawn so far. */
+    frames() {
+        return this.page.evaluate(() => globalThis.jointplay.page.frames());
+    }
+
+    /** Waits until the page is drawn anew since it had `before` frames, or for a while, ms, where it has no reason to. */
+    async drawn({ before, patience = 1000 } = {}) {
+        const start = before ?? (await this.frames());
+        const end = Date.now() + patience;
+        while ((await this.frames()) === start && Date.now() < end) await sleep(20);
     }
 
     /** Waits until nothing moves on the page any more. */
     async still() {
-        const frames = () => this.page.evaluate(() => globalThis.jointplay.page.frames());
         await this.until(async () => {
-            const before = await frames();
+            const before = await this.frames();
             await sleep(700);
-            return (await frames()) === before;
+            return (await this.frames()) === before;
         }, 'the page does not come to rest');
     }
 

@@ -161,7 +161,6 @@ test('a preset is measured in a worker: it says how far it is, can be cancelled,
     const lab = await open('scene=pendulum&c=0.2mm', { backend, size: { width: 800, height: 1000 } });
     const progress = async () => (await lab.widgets()).find(({ role }) => role === 'ProgressIndicator');
     const workers = () => lab.page.workers().length;
-    await lab.fold('Accuracy');
     await lab.click('Button', 'Measure preset');
     await lab.find('Button', 'Cancel');
     await lab.until(() => workers() === 1, 'no worker');
