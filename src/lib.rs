@@ -10,6 +10,8 @@ pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 pub mod analysis;
 #[cfg(feature = "gui")]
 pub mod app;
+// The page draws its plots itself, and downloads nothing that it does not use.
+#[cfg(not(target_arch = "wasm32"))]
 pub mod chart;
 #[cfg(not(target_arch = "wasm32"))]
 pub mod cli;

@@ -42,8 +42,9 @@ impl Host for Page {
         "https://example.org/lab/".to_owned()
     }
 
-    fn shared(&mut self, link: &str) {
+    fn shared(&mut self, link: &str) -> bool {
         self.0.borrow_mut().shared.push(link.to_owned());
+        false
     }
 
     fn save(&mut self, files: &[SaveFile]) -> Result<String, String> {
@@ -67,7 +68,7 @@ impl Host for Page {
         self.0.borrow_mut().to_open.pop_front()
     }
 
-    fn announce(&mut self, text: &str) {
+    fn announce(&mut self, text: &str, _event: bool) {
         self.0.borrow_mut().announced.push(text.to_owned());
     }
 }

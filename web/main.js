@@ -5,8 +5,14 @@ const build = new URL(import.meta.url).search;
 const query = new URLSearchParams(location.search);
 const $ = (id) => document.getElementById(id);
 
-/** What the tests and the rest of the page hold on to: `page` (src/web/page.rs), and how the start went. */
-const laboratory = { page: null, backend: null, ready: false, trouble: null };
+/** Losses of the graphics within `LOSS_SPAN`, ms, after which the page does not start them again by itself. */
+const MOST_LOSSES = 3;
+const LOSS_SPAN = 60_000;
+/** Pauses before the attempts to start them again, ms: after a crash the browser needs a moment. */
+const PAUSES = [0, 500, 3000];
+
+/** What the tests and the rest of the page hold on to: `page` (src/web/page.rs), the compiled code, and how the starts went. */
+const laboratory = { page: null, code: null, backend: null, ready: false, trouble: null, starts: 0, losses: [] };
 globalThis.jointplay = laboratory;
 
 const LEFT_OUT = {
@@ -16,39 +22,52 @@ const LEFT_OUT = {
         'settings, or the graphics driver is not supported. A current Firefox, Chrome, Edge or Safari has at least WebGL2.',
 };
 
-/** Replaces whatever is on the page by a message; `report` is a text that the user can copy. */
-function showTrouble(title, text, report) {
+/**
+ * Replaces whatever is on the page by a message; `report` is a text that the user can copy, `link` the fragment that leads
+ * back to where the laboratory was.
+ */
+function showTrouble(title, text, report, link) {
     // What went wrong first is the cause of the rest.
     if (laboratory.trouble) return;
-    laboratory.trouble = { title, text, report };
+    laboratory.trouble = { title, text, report, link };
     $('trouble-title').textContent = title;
     $('trouble-text').textContent = text;
     $('loading').hidden = true;
     $('trouble').hidden = false;
     $('report').hidden = $('copy').hidden = !report;
     if (report) $('report').value = report;
+    $('again').hidden = !link;
     // A graphics driver may be at fault; the other way to draw avoids most of it.
     $('plainer').hidden = laboratory.backend !== 'webgpu';
     $('laboratory').hidden = true;
     $('notice').hidden = false;
+    $('reload').textContent = link ? 'Start anew' : 'Reload';
+    (link ? $('again') : $('reload')).focus();
     document.title = `${title} - Jointplay`;
 }
 
 /** Called by the panic hook, src/web/crash.rs. */
-function crashed(message) {
+function crashed(message, link) {
     const report = `${message}\naddress: ${location.href}\nbrowser: ${navigator.userAgent}`;
     showTrouble(
         'The laboratory has stopped',
         'This is a mistake in the program. Please report the text below with what you did just before.',
         report,
+        link,
     );
 }
 globalThis.jointplayCrashed = crashed;
 
-$('reload').addEventListener('click', () => location.reload());
+/** Loads the page anew, with another query or fragment. */
+function reload(search, fragment) {
+    history.replaceState(null, '', location.pathname + search + (fragment ? `#${fragment}` : ''));
+    location.reload();
+}
+$('reload').addEventListener('click', () => reload(location.search, laboratory.trouble.link ? '' : location.hash.slice(1)));
+$('again').addEventListener('click', () => reload(location.search, laboratory.trouble.link));
 $('plainer').addEventListener('click', () => {
     query.set('renderer', 'webgl');
-    location.search = query;
+    reload(`?${query}`, laboratory.trouble.link ?? location.hash.slice(1));
 });
 $('copy').addEventListener('click', async () => {
     const report = $('report');
@@ -63,7 +82,7 @@ $('copy').addEventListener('click', async () => {
 // What no panic hook sees: a trap in the compiled code, and anything that keeps the laboratory from starting.
 function uncaught(error) {
     const fatal = !laboratory.ready || error instanceof WebAssembly.RuntimeError;
-    if (fatal && error) crashed(error.stack ?? String(error));
+    if (fatal && error) crashed(error.stack ?? String(error), null);
 }
 addEventListener('error', (event) => uncaught(event.error));
 addEventListener('unhandledrejection', (event) => uncaught(event.reason));
@@ -74,7 +93,7 @@ function stage(text, part) {
     else $('progress').value = part;
 }
 
-/** The compiled code, with the progress of its download on the page. */
+/** The compiled code; the progress of its download is on the page. */
 async function download(address, bytes) {
     const response = await fetch(address);
     if (!response.ok) throw new Error(`${address}: ${response.status} ${response.statusText}`);
@@ -90,7 +109,7 @@ async function download(address, bytes) {
         }),
     );
     // Compiled while it arrives, which a browser does only for this type.
-    return new Response(counted, { headers: { 'Content-Type': 'application/wasm' } });
+    return WebAssembly.compileStreaming(new Response(counted, { headers: { 'Content-Type': 'application/wasm' } }));
 }
 
 /** Backends to try, best first. */
@@ -117,38 +136,73 @@ function freshCanvas() {
     const canvas = old.cloneNode(false);
     canvas.hidden = false;
     old.replaceWith(canvas);
+    const start = laboratory.starts;
+    canvas.addEventListener('webglcontextlost', () => lost(start, 'the WebGL2 context was lost'));
     return canvas;
 }
 
 /** Starts on the first backend that works; what the others said goes to the console. */
-async function begin(Page, found) {
+async function begin(found) {
+    const { page } = laboratory;
     const failures = [];
     for (const backend of found) {
-        const page = new Page();
         laboratory.backend = backend;
+        laboratory.starts += 1;
         try {
-            await page.start(freshCanvas(), backend, [...query].flat());
-            laboratory.page = page;
+            await page.start(freshCanvas(), backend, laboratory.starts, location.search + location.hash);
             return null;
         } catch (error) {
             failures.push(`${backend}: ${error?.message ?? error}`);
             console.warn('no start with', failures.at(-1));
         }
     }
-    return failures.join('\n');
+    return failures.join('\n') || 'neither WebGPU nor WebGL2 is there';
 }
 
 /** Shows the canvas once it holds a picture. */
-async function firstPicture(page) {
+async function firstPicture() {
+    const { page, starts } = laboratory;
+    const gone = () => laboratory.trouble || laboratory.starts !== starts;
     const frame = () => new Promise((done) => requestAnimationFrame(done));
+    const before = page.frames();
     // The frame that is drawn is on the screen when the next begins.
-    while (page.frames() < 2 && !laboratory.trouble) await frame();
+    while (page.frames() < before + 2 && !gone()) await frame();
     await frame();
-    if (laboratory.trouble) return;
+    if (gone()) return;
     $('notice').hidden = true;
     $('laboratory').focus();
     laboratory.ready = true;
     performance.mark('first picture');
+}
+
+/** The graphics of start number `start` are gone: the laboratory goes on with others. */
+async function lost(start, why) {
+    if (laboratory.trouble || start !== laboratory.starts) return;
+    const { page, losses } = laboratory;
+    console.warn('graphics lost:', why);
+    laboratory.ready = false;
+    // What still comes from the old ones is no news.
+    laboratory.starts += 1;
+    page.suspend();
+    $('loading').hidden = $('notice').hidden = false;
+    stage('The graphics of this browser were lost: starting them again');
+    const now = performance.now();
+    losses.push(now);
+    let failure = `${why}, ${losses.length} times since the page was opened`;
+    if (losses.filter((time) => now - time < LOSS_SPAN).length <= MOST_LOSSES) {
+        for (const pause of PAUSES) {
+            await new Promise((done) => setTimeout(done, pause));
+            failure = await begin(await backends());
+            if (!failure) return firstPicture();
+        }
+    }
+    showTrouble(
+        'The graphics were lost',
+        `This browser took its graphics back and does not give them again (${failure}). The simulation is still there: ` +
+            'reload to go on from the same state.',
+        null,
+        page.link(),
+    );
 }
 
 async function main() {
@@ -162,15 +216,21 @@ async function main() {
         const code = download(`jointplay_bg.wasm${build}`, Number(script.dataset.wasmBytes));
         // Should it fail while the script is still on its way: it is reported where it is waited for.
         code.catch(() => {});
+        const { makeHost } = await import(`./host.js${build}`);
+        globalThis.jointplayHost = makeHost(laboratory, lost);
         bindings = await import(`./jointplay.js${build}`);
-        await bindings.default({ module_or_path: code });
+        laboratory.code = await code;
+        await bindings.default({ module_or_path: laboratory.code });
     } catch (error) {
         return showTrouble('The laboratory could not be loaded', `${error?.message ?? error}`);
     }
     stage('Starting');
-    const failure = await begin(bindings.Page, found);
+    laboratory.page = new bindings.Page();
+    const failure = await begin(found);
     if (failure) return showTrouble('The laboratory could not start', failure);
-    await firstPicture(laboratory.page);
+    // Another link pasted into the address bar of the open page.
+    addEventListener('hashchange', () => laboratory.page.openLink(location.search + location.hash));
+    await firstPicture();
 }
 
 main();

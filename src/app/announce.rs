@@ -19,6 +19,8 @@ pub struct Announcer {
     /// What counts as an event when it changes.
     occasion: String,
     reported: f64,
+    /// Whether the latest report is about one.
+    event: bool,
     /// Strongest impact since the last report: ball joint, N, s.
     strongest: Option<(usize, f64, f64)>,
 }
@@ -27,6 +29,11 @@ impl Announcer {
     /// The latest report.
     pub fn text(&self) -> &str {
         &self.text
+    }
+
+    /// Whether the latest report was made because something happened, and not because time has passed.
+    pub fn is_event(&self) -> bool {
+        self.event
     }
 
     /// Takes a frame into account.
@@ -56,7 +63,7 @@ impl Announcer {
         if !event && wait > 0.0 {
             return (false, Some(wait));
         }
-        self.occasion = occasion;
+        (self.occasion, self.event) = (occasion, event);
         self.text = sentences(player, news, self.strongest);
         self.standing = standing;
         self.reported = now;
@@ -169,6 +176,7 @@ mod tests {
         player.pacer.set_scale(0.02);
         player.set_playing(true);
         assert!(announcer.update(0.1, &player, "").0, "at once");
+        assert!(announcer.is_event());
         assert!(announcer.text().contains("Running at time scale 1:50"));
         let (mut reports, mut hit) = (0, false);
         for frame in 0..120 {
@@ -181,6 +189,7 @@ mod tests {
             }
         }
         assert!((1..=2).contains(&reports), "{reports} in two seconds");
+        assert!(!announcer.is_event());
         assert!(hit, "{}", announcer.text());
         player.set_playing(false);
         assert!(announcer.update(2.2, &player, "").0);

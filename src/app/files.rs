@@ -49,6 +49,7 @@ impl App {
             camera: self.viewport.pose(),
             magnification: Some(self.viewport.options.magnification),
             playing: Some(player.is_playing()),
+            theme: None,
             version: Some(crate::VERSION.to_owned()),
         }
     }
@@ -64,12 +65,18 @@ impl App {
         match self.link().format_short(self.player.wanted()) {
             Ok((fragment, note)) => {
                 let link = format!("{}#{fragment}", self.host.address());
-                ctx.copy_text(link.clone());
-                self.host.shared(&link);
-                self.notice = Some(Notice::new(note.unwrap_or("Link copied".to_owned())));
+                if !self.host.shared(&link) {
+                    ctx.copy_text(link);
+                }
+                self.say(note.unwrap_or("Link copied".to_owned()));
             }
             Err(reason) => self.problem = Some(reason),
         }
+    }
+
+    /// Tells the user something, for a few seconds.
+    pub fn say(&mut self, text: String) {
+        self.notice = Some(Notice::new(text));
     }
 
     /// Opens the text of a scene file; on an error the running scene stays, the reason is shown and returned.

@@ -197,11 +197,24 @@ impl App {
 
 /// A coloured strip with a sentence; whether it was dismissed.
 fn strip(ui: &mut Ui, bar: Frame, id: &'static str, words: &str, colour: egui::Color32) -> bool {
+    // Nothing lies under the panel that would shine through.
+    let fill = ui.visuals().panel_fill.lerp_to_gamma(colour, 0.14);
     Panel::top(id)
-        .frame(bar.fill(colour.gamma_multiply(0.14)))
+        .frame(bar.fill(fill))
         .show(ui, |ui| {
-            ui.horizontal_wrapped(|ui| {
-                ui.label(RichText::new(words).color(colour));
+            let narrow = ui.available_width() < 520.0;
+            let words = egui::Label::new(RichText::new(words).color(colour)).wrap();
+            if narrow {
+                ui.add(words);
+                return ui.button("Dismiss").clicked();
+            }
+            ui.horizontal_top(|ui| {
+                // What the button needs, and the gap before it.
+                let room = ui.available_width() - 90.0;
+                ui.vertical(|ui| {
+                    ui.set_max_width(room);
+                    ui.add(words);
+                });
                 ui.button("Dismiss").clicked()
             })
             .inner

@@ -105,7 +105,7 @@ impl Headless {
         let mut app = self
             .app(frame.options.clone())
             .map_err(|error| error.located(&frame.options.scene))?;
-        app.player_mut().run_to(frame.at);
+        app.run_to(frame.at);
         self.app_frame(&mut app, frame.size, frame.scale)
             .map_err(Into::into)
     }

@@ -45,8 +45,11 @@ pub trait Host {
         String::new()
     }
 
-    /// A link was made and is on the clipboard: put it where links stand, say the address bar.
-    fn shared(&mut self, _link: &str) {}
+    /// A link was made: put it where links stand, say the address bar. Whether the host puts it on the clipboard, too; else
+    /// egui does.
+    fn shared(&mut self, _link: &str) -> bool {
+        false
+    }
 
     /// Whether the user is to be asked for a path before [`Self::save`]; else the host gives the files their places.
     fn asks_for_path(&self) -> bool {
@@ -77,8 +80,9 @@ pub trait Host {
         None
     }
 
-    /// Something worth telling somebody who does not see the picture; the same sentences are in the accessibility tree.
-    fn announce(&mut self, _text: &str) {}
+    /// What goes on, for somebody who does not see the picture; the same sentences are in the accessibility tree. `event`:
+    /// something has happened, rather than gone on.
+    fn announce(&mut self, _text: &str, _event: bool) {}
 }
 
 /// Nothing to ask: headless frames and tests.

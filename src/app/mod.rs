@@ -124,6 +124,9 @@ impl AppOptions {
         if let Some(magnification) = link.magnification {
             options.view.magnification = magnification;
         }
+        if let Some(theme) = link.theme {
+            options.theme = theme;
+        }
         options.link = Some(link);
         Ok(options)
     }
@@ -214,11 +217,6 @@ impl App {
         state: Option<&egui_wgpu::RenderState>,
         options: AppOptions,
     ) -> Result<Self, StartError> {
-        theme::apply(ctx);
-        ctx.set_theme(options.theme);
-        if let Some(state) = state {
-            render::install(state);
-        }
         let mut player = Player::new(&options.scene)?;
         player.pacer.set_scale(options.time_scale);
         player.set_playing(options.playing);
@@ -230,7 +228,7 @@ impl App {
         if replay.is_some() {
             player.set_playing(false);
         }
-        Ok(Self {
+        let mut app = Self {
             viewport,
             controls: Controls::default(),
             accuracy: Accuracy::default(),
@@ -254,12 +252,31 @@ impl App {
             announcer: Announcer::default(),
             capture: None,
             picture_rect: egui::Rect::ZERO,
-            renderer: state.map_or_else(String::new, |state| {
-                let info = state.adapter.get_info();
-                format!("{} {}", info.backend, info.name).trim().to_owned()
-            }),
+            renderer: String::new(),
             player,
-        })
+        };
+        app.attach(ctx, state, options.theme);
+        Ok(app)
+    }
+
+    /// Goes on in another window, or with other graphics after the first were lost: nothing else changes.
+    pub fn attach(
+        &mut self,
+        ctx: &egui::Context,
+        state: Option<&egui_wgpu::RenderState>,
+        theme: ThemePreference,
+    ) {
+        theme::apply(ctx);
+        ctx.set_theme(theme);
+        self.renderer = String::new();
+        if let Some(state) = state {
+            render::install(state);
+            let info = state.adapter.get_info();
+            self.renderer = format!("{} {}", info.backend, info.name).trim().to_owned();
+        }
+        self.fingers = None;
+        // A picture on its way is lost.
+        self.capture = None;
     }
 
     /// The running scene.
@@ -410,6 +427,13 @@ impl App {
         opened
     }
 
+    /// Pauses and runs on until `time`, s, whatever it takes. What struck on the way is in the record, and no longer glows.
+    pub fn run_to(&mut self, time: f64) {
+        self.player.run_to(time);
+        self.player.advance(0.0);
+        self.viewport.arrive(&self.player);
+    }
+
     /// Moves the state on by `dt` seconds; whether it goes on moving by itself.
     pub fn advance(&mut self, dt: f64) -> bool {
         if let Some(replay) = &mut self.replay {
@@ -512,7 +536,8 @@ impl App {
         let now = ctx.input(|input| input.time);
         let (told, wait) = self.announcer.update(now, &self.player, &self.news());
         if told {
-            self.host.announce(self.announcer.text());
+            let event = self.announcer.is_event();
+            self.host.announce(self.announcer.text(), event);
             ctx.request_repaint();
         }
         if let Some(wait) = wait {

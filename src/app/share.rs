@@ -9,6 +9,7 @@ use std::fmt::Write as _;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::URL_SAFE_NO_PAD as BASE64;
+use eframe::egui::ThemePreference;
 
 use super::log::Log;
 use crate::scene::{DEFAULT_SCENE, Dimension, Scene, SceneError, built_in_text, parse_quantity};
@@ -30,7 +31,7 @@ pub const ALIASES: [(&str, &str); 4] = [
 ];
 
 /// Words of a link that are no parameters.
-const WORDS: [&str; 13] = [
+const WORDS: [&str; 14] = [
     "scene",
     "file",
     "text",
@@ -44,6 +45,16 @@ const WORDS: [&str; 13] = [
     "play",
     "version",
     "renderer",
+    "theme",
+];
+
+/// Ways to draw that a page takes; the program's window finds its own.
+const RENDERERS: [&str; 2] = ["webgpu", "webgl"];
+
+const THEMES: [(&str, ThemePreference); 3] = [
+    ("light", ThemePreference::Light),
+    ("dark", ThemePreference::Dark),
+    ("system", ThemePreference::System),
 ];
 
 /// A link that cannot be read: what is wrong and what is allowed.
@@ -114,6 +125,8 @@ pub struct Link {
     pub magnification: Option<f32>,
     /// Whether time passes once the state is there; where it is left out, only if the link names no instant.
     pub playing: Option<bool>,
+    /// Light, dark, or as the system asks.
+    pub theme: Option<ThemePreference>,
     /// Version of the program that made the link.
     pub version: Option<String>,
 }
@@ -130,6 +143,7 @@ impl Default for Link {
             camera: None,
             magnification: None,
             playing: None,
+            theme: None,
             version: None,
         }
     }
@@ -223,8 +237,17 @@ impl Link {
                     });
                 }
                 "version" => link.version = Some(value.chars().take(40).collect()),
-                // The page's own, and what other sites hang on to links.
-                "renderer" | "fbclid" | "gclid" => {}
+                "theme" => {
+                    let known = THEMES.iter().find(|(word, _)| *word == value);
+                    let theme = known.map(|(_, theme)| *theme);
+                    link.theme =
+                        Some(theme.ok_or_else(|| wrong("allowed light, dark and system"))?);
+                }
+                // Chosen before the application starts, by `web/main.js`.
+                "renderer" if RENDERERS.contains(&value) => {}
+                "renderer" => return Err(wrong("allowed webgpu and webgl")),
+                // What other sites hang on to links.
+                "fbclid" | "gclid" => {}
                 other if other.starts_with("utm_") => {}
                 other => {
                     let alias = ALIASES.iter().find(|(short, _)| *short == other);
@@ -296,6 +319,8 @@ impl Link {
             "play",
             self.playing.map(|playing| u8::from(playing).to_string()),
         );
+        let theme = THEMES.iter().find(|(_, theme)| self.theme == Some(*theme));
+        add("theme", theme.map(|(word, _)| (*word).to_owned()));
         add("version", self.version.clone());
         add("hash", self.hash.map(|hash| format!("{hash:016x}")));
         if !self.log.entries.is_empty() {
@@ -549,6 +574,7 @@ mod tests {
                 }),
                 magnification: self.maybe(|c| 1.0 + 99.0 * c.unit() as f32),
                 playing: self.maybe(|c| c.below(2) == 0),
+                theme: self.maybe(|c| THEMES[c.below(3) as usize].1),
                 version: self.maybe(|_| "0.1.0".to_owned()),
             }
         }

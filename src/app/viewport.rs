@@ -50,6 +50,8 @@ pub struct Viewport {
     /// Where the camera is going; `None` once it is there.
     goal: Option<Camera>,
     fit_pending: bool,
+    /// Width over height of the picture that was last fitted.
+    fitted: f32,
     arrows: ArrowMemory,
     list: Arc<DrawList>,
     trail: Vec<Vec3>,
@@ -69,6 +71,7 @@ impl Viewport {
             camera: view.camera(),
             goal: None,
             fit_pending: true,
+            fitted: 1.0,
             view,
             options,
             arrows: ArrowMemory::new(),
@@ -215,8 +218,12 @@ impl Viewport {
             Theme::Light
         };
 
-        if self.fit_pending {
+        let aspect = size[0] as f32 / size[1] as f32;
+        // A sheet that folds away, or a phone that is turned, would leave half of the mechanism outside.
+        let reshaped = !(0.8..=1.25).contains(&(aspect / self.fitted));
+        if self.fit_pending || (reshaped && !self.moved) {
             self.fit_pending = false;
+            self.fitted = aspect;
             // The first picture of a scene starts where it should be.
             let first = self.list.size == [0, 0];
             let mut goal = self.goal.unwrap_or(self.camera);

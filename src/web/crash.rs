@@ -7,15 +7,15 @@ use wasm_bindgen::prelude::*;
 use crate::scene::Scene;
 
 thread_local! {
-    /// What was running, as the report says it.
-    static RUNNING: RefCell<String> = const { RefCell::new(String::new()) };
+    /// What was running, as the report says it, and the link to it.
+    static RUNNING: RefCell<(String, String)> = const { RefCell::new((String::new(), String::new())) };
 }
 
 #[wasm_bindgen]
 extern "C" {
     /// Shows the report instead of the canvas (`web/main.js`).
     #[wasm_bindgen(js_namespace = globalThis, js_name = jointplayCrashed, catch)]
-    fn crashed(report: &str) -> Result<(), JsValue>;
+    fn crashed(report: &str, link: &str) -> Result<(), JsValue>;
 }
 
 /// From now on a panic is shown on the page.
@@ -27,23 +27,23 @@ pub fn explain_panics() {
             .location()
             .map(|place| format!("{}:{}", place.file(), place.line()))
             .unwrap_or_default();
-        let running = RUNNING.with_borrow(String::clone);
+        let (running, link) = RUNNING.with_borrow(Clone::clone);
         let report = format!(
             "jointplay {} failed inside: {what}\nat {place}\n{running}",
             crate::VERSION
         );
         // Without a page, as in a script, there is nothing to show it on.
-        let _ = crashed(&report);
+        let _ = crashed(&report, &link);
         previous(info);
     }));
 }
 
-/// Tells what is running, for a report.
-pub fn note(scene: &Scene, renderer: &str) {
+/// Tells what is running, for a report. `link`: the fragment that leads back to it.
+pub fn note(scene: &Scene, renderer: &str, link: String) {
     let mut text = format!("scene: {}\n", scene.name);
     for (key, value) in &scene.changes {
         text.push_str(&format!("changed: {key} = {value}\n"));
     }
-    text.push_str(&format!("renderer: {renderer}"));
-    RUNNING.set(text);
+    text.push_str(&format!("renderer: {renderer}\nstate: #{link}"));
+    RUNNING.set((text, link));
 }

@@ -3,17 +3,19 @@
 #[cfg(all(target_arch = "wasm32", feature = "gui"))]
 mod crash;
 #[cfg(all(target_arch = "wasm32", feature = "gui"))]
+mod host;
+#[cfg(all(target_arch = "wasm32", feature = "gui"))]
 mod mirror;
 #[cfg(all(target_arch = "wasm32", feature = "gui"))]
 mod page;
-#[cfg(feature = "gui")]
-mod query;
 #[cfg(target_arch = "wasm32")]
 mod run;
+#[cfg(all(target_arch = "wasm32", feature = "gui"))]
+mod work;
 
 #[cfg(all(target_arch = "wasm32", feature = "gui"))]
 pub use page::Page;
-#[cfg(feature = "gui")]
-pub use query::{Query, QueryError};
 #[cfg(target_arch = "wasm32")]
 pub use run::{Run, choices, scenes, version};
+#[cfg(all(target_arch = "wasm32", feature = "gui"))]
+pub use work::perform;

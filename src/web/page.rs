@@ -1,32 +1,45 @@
 //! The application on a canvas, and what the page and its tests ask of it.
 
+use std::cell::RefCell;
+use std::rc::Rc;
+use std::sync::Arc;
+
 use eframe::egui;
-use eframe::egui_wgpu::{WgpuConfiguration, WgpuSetupCreateNew};
+use eframe::egui_wgpu::{RenderState, WgpuConfiguration, WgpuSetupCreateNew};
 use eframe::web_sys::HtmlCanvasElement;
 use serde_json::json;
 use wasm_bindgen::prelude::*;
 
 use super::crash;
+use super::host::{Inbox, WebHost, are_graphics_lost, graphics_lost};
 use super::mirror::Mirror;
-use super::query::Query;
-use crate::app::App;
+use crate::app::{App, AppOptions, OpenedFile};
 use crate::render::wgpu::Backends;
+
+/// Time between two notes of what is running, s: what a crash report and a new start go back to.
+const NOTE_INTERVAL: f64 = 2.0;
 
 /// The laboratory on a page.
 #[wasm_bindgen]
 pub struct Page {
     runner: eframe::WebRunner,
+    /// Outlives the canvas: graphics that are lost take nothing else with them.
+    laboratory: Rc<RefCell<Option<Laboratory>>>,
+    inbox: Rc<Inbox>,
 }
 
 /// The application with what only a page needs.
-struct PageApp {
+struct Laboratory {
     app: App,
     ctx: egui::Context,
     renderer: String,
     frames: u32,
-    /// Scene and changes that a crash report would name.
-    noted: (String, Vec<(String, String)>),
+    /// When what is running was last noted, s of viewing.
+    noted: Option<f64>,
 }
+
+/// What eframe runs: the laboratory on one canvas.
+struct OnCanvas(Rc<RefCell<Option<Laboratory>>>);
 
 #[wasm_bindgen]
 impl Page {
@@ -35,23 +48,26 @@ impl Page {
     #[allow(clippy::new_without_default, reason = "JavaScript knows no Default")]
     pub fn new() -> Self {
         crash::explain_panics();
-        // A second start on the same page finds the logger installed.
+        // A second page of the same code finds the logger installed.
         let _ = eframe::WebLogger::init(log::LevelFilter::Warn);
         Self {
             runner: eframe::WebRunner::new(),
+            laboratory: Rc::default(),
+            inbox: Rc::default(),
         }
     }
 
-    /// Starts on `canvas` with `backend` (`webgpu` or `webgl`). `query`: keys and values of the address, in turn. What
-    /// is wrong in it is shown beside the default scene.
+    /// Draws on `canvas` with `backend` (`webgpu` or `webgl`) from now on; `start` counts the starts. The first one opens
+    /// `link`: the address from its `?` on. What is wrong in it is shown beside the default scene.
     ///
     /// # Errors
-    /// Text: the backend does not work here.
+    /// Text: the backend does not work here. A laboratory that was running is still there for the next attempt.
     pub async fn start(
         &self,
         canvas: HtmlCanvasElement,
         backend: String,
-        query: Vec<String>,
+        start: u32,
+        link: String,
     ) -> Result<(), JsValue> {
         let mut setup = WgpuSetupCreateNew::without_display_handle();
         setup.instance_descriptor.backends = if backend == "webgl" {
@@ -66,28 +82,75 @@ impl Page {
             },
             ..Default::default()
         };
-        let create: eframe::AppCreator<'static> =
-            Box::new(move |cc| Ok(Box::new(PageApp::new(cc, &query)?)));
+        let (laboratory, inbox) = (self.laboratory.clone(), self.inbox.clone());
+        let create: eframe::AppCreator<'static> = Box::new(move |cc| {
+            if let Some(state) = &cc.wgpu_render_state {
+                watch(state, &backend, start);
+            }
+            inbox.attach(&cc.egui_ctx);
+            let mut slot = laboratory.borrow_mut();
+            match &mut *slot {
+                Some(laboratory) => laboratory.attach(cc),
+                None => *slot = Some(Laboratory::new(cc, &link, inbox)?),
+            }
+            drop(slot);
+            Ok(Box::new(OnCanvas(laboratory)))
+        });
         self.runner.start(canvas, options, create).await
+    }
+
+    /// Lets go of the canvas; the laboratory waits for the next [`Self::start`].
+    pub fn suspend(&self) {
+        self.runner.destroy();
     }
 
     /// Frames drawn so far.
     pub fn frames(&self) -> u32 {
-        self.with(|page| page.frames).unwrap_or(0)
+        self.with(|laboratory| laboratory.frames).unwrap_or(0)
     }
 
-    /// What the laboratory is doing, as JSON: version, scene, changed parameters, time, state hash, renderer.
+    /// What the laboratory is doing, as JSON: version, scene, changed parameters, time, state hash, camera, renderer.
     pub fn state(&self) -> Option<String> {
-        self.with(|page| page.state())
+        self.with(|laboratory| laboratory.state())
+    }
+
+    /// The present state as a link's fragment, to start again with.
+    pub fn link(&self) -> Option<String> {
+        self.with(|laboratory| laboratory.app.share_state())
+    }
+
+    /// Opens the address from its `?` on, as somebody has changed it.
+    #[wasm_bindgen(js_name = openLink)]
+    pub fn open_link(&self, link: &str) {
+        self.with(|laboratory| {
+            // The reason is shown.
+            let _ = laboratory.app.open_link(link);
+            laboratory.ctx.request_repaint();
+        });
+    }
+
+    /// Opens a file that was chosen.
+    #[wasm_bindgen(js_name = openFile)]
+    pub fn open_file(&self, name: String, bytes: Vec<u8>) {
+        let content = Ok(bytes);
+        self.inbox.put(OpenedFile { name, content });
+    }
+
+    /// Tells the user something, for a few seconds.
+    pub fn say(&self, text: String) {
+        self.with(|laboratory| {
+            laboratory.app.say(text);
+            laboratory.ctx.request_repaint();
+        });
     }
 
     /// The controls on show, as JSON (`src/web/mirror.rs`). Empty the first time: the mirror starts with the next frame.
     pub fn widgets(&self) -> Option<String> {
-        self.with(|page| {
-            let mirror = page.ctx.plugin_or_default::<Mirror>();
+        self.with(|laboratory| {
+            let mirror = laboratory.ctx.plugin_or_default::<Mirror>();
             let widgets = mirror.lock().widgets.clone();
             if widgets.is_empty() {
-                page.ctx.request_repaint();
+                laboratory.ctx.request_repaint();
             }
             widgets
         })
@@ -96,70 +159,87 @@ impl Page {
     /// Pauses and runs on until simulated `time`, s.
     #[wasm_bindgen(js_name = runTo)]
     pub fn run_to(&self, time: f64) {
-        self.with(|page| {
-            page.app.player_mut().run_to(time);
-            page.ctx.request_repaint();
+        self.with(|laboratory| {
+            laboratory.app.run_to(time);
+            laboratory.ctx.request_repaint();
         });
     }
 
     /// Panics in the next frame, so that a test sees what a crash leaves on the page.
     pub fn crash(&self) {
-        self.with(|page| {
-            page.ctx.add_plugin(Crash);
-            page.ctx.request_repaint();
+        self.with(|laboratory| {
+            laboratory.ctx.add_plugin(Crash);
+            laboratory.ctx.request_repaint();
         });
     }
 
-    fn with<T>(&self, ask: impl FnOnce(&mut PageApp) -> T) -> Option<T> {
-        self.runner
-            .app_mut::<PageApp>()
-            .map(|mut page| ask(&mut page))
+    fn with<T>(&self, ask: impl FnOnce(&mut Laboratory) -> T) -> Option<T> {
+        // After a panic it stays borrowed.
+        self.laboratory.try_borrow_mut().ok()?.as_mut().map(ask)
     }
 }
 
-impl PageApp {
+/// Tells the page when the graphics of start number `start` go.
+fn watch(state: &RenderState, backend: &str, start: u32) {
+    if backend == "webgl" {
+        // The canvas has an event for it, before which calls may fail already.
+        state.device.on_uncaptured_error(Arc::new(|error| {
+            if are_graphics_lost() {
+                log::warn!("drawing without graphics: {error}");
+            } else {
+                panic!("{error}");
+            }
+        }));
+    } else {
+        let callback = move |_, why: String| graphics_lost(start, &why);
+        state.device.set_device_lost_callback(callback);
+    }
+}
+
+fn describe(cc: &eframe::CreationContext<'_>) -> String {
+    cc.wgpu_render_state.as_ref().map_or_else(
+        || "none".to_owned(),
+        |state| {
+            let info = state.adapter.get_info();
+            format!("{} ({})", info.backend, info.name)
+        },
+    )
+}
+
+impl Laboratory {
     fn new(
         cc: &eframe::CreationContext<'_>,
-        query: &[String],
+        link: &str,
+        inbox: Rc<Inbox>,
     ) -> Result<Self, Box<dyn std::error::Error + Send + Sync>> {
-        let pairs = query
-            .chunks_exact(2)
-            .map(|pair| (pair[0].as_str(), pair[1].as_str()));
-        let mut problem = None;
-        let options = match Query::read(pairs).and_then(|query| query.options()) {
-            Ok(options) => options,
-            Err(error) => {
-                problem = Some(error.to_string());
-                Query::default().options()?
-            }
-        };
-        let mut app = App::new(cc, options)?;
-        if let Some(problem) = problem {
-            app.report(problem);
-        }
-        let renderer = cc.wgpu_render_state.as_ref().map_or_else(
-            || "none".to_owned(),
-            |state| {
-                let info = state.adapter.get_info();
-                format!("{} ({})", info.backend, info.name)
-            },
-        );
-        let mut page = Self {
+        let mut app = App::new(cc, AppOptions::from_link_or_default(link))?;
+        app.set_host(Box::new(WebHost { inbox }));
+        Ok(Self {
             app,
             ctx: cc.egui_ctx.clone(),
-            renderer,
+            renderer: describe(cc),
             frames: 0,
-            noted: Default::default(),
-        };
-        page.note();
-        Ok(page)
+            noted: None,
+        })
     }
 
+    /// Goes on with other graphics.
+    fn attach(&mut self, cc: &eframe::CreationContext<'_>) {
+        let theme = self.ctx.options(|options| options.theme_preference);
+        self.app
+            .attach(&cc.egui_ctx, cc.wgpu_render_state.as_ref(), theme);
+        self.ctx = cc.egui_ctx.clone();
+        self.renderer = describe(cc);
+        self.noted = None;
+    }
+
+    /// Tells the crash report what is running.
     fn note(&mut self) {
-        let scene = self.app.player().wanted();
-        if self.noted.0 != scene.name || self.noted.1 != scene.changes {
-            self.noted = (scene.name.clone(), scene.changes.clone());
-            crash::note(scene, &self.renderer);
+        let now = self.ctx.input(|input| input.time);
+        if self.noted.is_none_or(|noted| now - noted > NOTE_INTERVAL) {
+            self.noted = Some(now);
+            let scene = self.app.player().wanted();
+            crash::note(scene, &self.renderer, self.app.share_state());
         }
     }
 
@@ -171,17 +251,27 @@ impl PageApp {
             .iter()
             .map(|(key, value)| (key.clone(), json!(value)))
             .collect();
+        let camera = self.app.link().camera.map(|camera| {
+            json!({
+                "yaw_rad": camera.yaw,
+                "pitch_rad": camera.pitch,
+                "distance_m": camera.distance,
+                "target_m": camera.target,
+            })
+        });
         json!({
             "version": crate::VERSION,
             "scene": scene.name,
             "changed_parameters": changes,
             "playing": player.is_playing(),
+            "replaying": self.app.replaying(),
             "stopped": player.stopped().map(ToString::to_string),
             "time_s": player.simulation().time(),
             "shown_s": player.pacer.shown(),
             "steps": player.simulation().statistics().steps,
             "peak_normal_N": player.simulation().statistics().peak_normal,
             "state_hash": format!("{:016x}", player.simulation().state_hash()),
+            "camera": camera,
             "renderer": self.renderer,
             "frames": self.frames,
         })
@@ -189,19 +279,19 @@ impl PageApp {
     }
 }
 
-impl eframe::App for PageApp {
+impl eframe::App for OnCanvas {
     fn logic(&mut self, ctx: &egui::Context, frame: &mut eframe::Frame) {
-        self.app.logic(ctx, frame);
-        self.note();
+        if let Some(laboratory) = &mut *self.0.borrow_mut() {
+            laboratory.app.logic(ctx, frame);
+            laboratory.note();
+        }
     }
 
     fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
-        self.app.ui(ui, frame);
-        self.frames = self.frames.wrapping_add(1);
-    }
-
-    fn as_any_mut(&mut self) -> Option<&mut dyn std::any::Any> {
-        Some(self)
+        if let Some(laboratory) = &mut *self.0.borrow_mut() {
+            laboratory.app.ui(ui, frame);
+            laboratory.frames = laboratory.frames.wrapping_add(1);
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 // Opens the page in a real browser and drives it by the role and label of its controls, as a person would.
 //
-//     const lab = await open('scene=pendulum&paused', { backend: 'webgl' });
+//     const lab = await open('scene=pendulum&play=0', { backend: 'webgl' });
 //     await lab.click('Button', 'Step');
 //     assert.equal((await lab.state()).steps, 1);
 //     await lab.close();        // fails the test if the console has errors
@@ -95,7 +95,7 @@ export async function open(query = '', options = {}) {
     if (before) await page.addInitScript(before);
     const parts = [query, backend ? `renderer=${backend}` : ''].filter(Boolean).join('&');
     await page.goto(`${address}${parts ? `?${parts}` : ''}${fragment ? `#${fragment}` : ''}`);
-    await page.waitForFunction(() => globalThis.jointplay?.ready || globalThis.jointplay?.trouble);
+    await lab.started();
     if (!expectTrouble) {
         const trouble = await page.evaluate(() => globalThis.jointplay.trouble);
         assert.equal(trouble, null, `the page did not start: ${JSON.stringify(trouble)}`);
@@ -120,6 +120,11 @@ export class Lab {
         opened.delete(this);
         await this.context.close();
         if (!errors) assert.deepEqual(this.errors, [], 'errors on the console');
+    }
+
+    /** Waits until the laboratory, or what keeps it from running, is on show. */
+    async started() {
+        await this.page.waitForFunction(() => globalThis.jointplay?.ready || globalThis.jointplay?.trouble);
     }
 
     /** What the laboratory is doing: see `state` in src/web/page.rs. */
@@ -182,6 +187,64 @@ export class Lab {
         await this.drag([[from, y], [(from + to) / 2, y], [to, y]]);
     }
 
+    /**
+     * Fingers on the screen: each of `paths` is one's way [[x, y], …], all of one length. They come down one after the other,
+     * move together, and are lifted.
+     */
+    async fingers(...paths) {
+        const cdp = await this.context.newCDPSession(this.page);
+        const send = async (type, touchPoints) => {
+            const before = await this.frames();
+            await cdp.send('Input.dispatchTouchEvent', { type, touchPoints });
+            // No longer: a finger that rests for 0.8 s is a long press, and turns nothing.
+            await this.drawn({ before, patience: 300 });
+        };
+        const at = (step, count = paths.length) => paths.slice(0, count).map((path, id) => ({ x: path[step][0], y: path[step][1], id }));
+        for (let count = 1; count <= paths.length; count += 1) {
+            await send('touchStart', at(0, count));
+        }
+        for (let step = 1; step < paths[0].length; step += 1) {
+            await send('touchMove', at(step));
+        }
+        await send('touchEnd', []);
+        await cdp.detach();
+        await this.drawn();
+    }
+
+    /** Taps a control with a finger. */
+    async tap(role, label) {
+        await this.drawn();
+        await this.fingers([middle(await this.find(role, label))]);
+        await this.drawn();
+    }
+
+    /** Lets a file fall on the laboratory. */
+    async drop(name, text) {
+        await this.page.evaluate(([name, text]) => {
+            const dataTransfer = new DataTransfer();
+            dataTransfer.items.add(new File([text], name));
+            const canvas = document.getElementById('laboratory');
+            for (const kind of ['dragover', 'drop']) {
+                canvas.dispatchEvent(new DragEvent(kind, { dataTransfer, bubbles: true, cancelable: true }));
+            }
+        }, [name, text]);
+        await this.drawn();
+    }
+
+    /** What a screen reader can read of the machine. */
+    async summary() {
+        return this.page.locator('#summary').textContent();
+    }
+
+    /** The widget whose text has `words`; waits for it. */
+    async says(words) {
+        let widgets = [];
+        return this.until(async () => {
+            widgets = await this.widgets();
+            return widgets.find(({ label, text }) => label?.includes(words) || text?.includes(words));
+        }, () => `nothing says "${words}": ${widgets.map((w) => w.label).join(' | ')}`);
+    }
+
     /** Presses a key, as Playwright names it. */
     async key(name) {
         await this.page.keyboard.press(name, { delay: 60 });
@@ -194,21 +257,24 @@ export class Lab {
         await this.drawn();
     }
 
-    /** Waits until the page is drawn anew, or for a while where it has no reason to. */
-    async drawn() {
-        const frames = () => this.page.evaluate(() => globalThis.jointplay.page.frames());
-        const before = await frames();
-        const end = Date.now() + 1000;
-        while ((await frames()) === before && Date.now() < end) await sleep(20);
+    /** Frames drawn so far. */
+    frames() {
+        return this.page.evaluate(() => globalThis.jointplay.page.frames());
+    }
+
+    /** Waits until the page is drawn anew since it had `before` frames, or for a while, ms, where it has no reason to. */
+    async drawn({ before, patience = 1000 } = {}) {
+        const start = before ?? (await this.frames());
+        const end = Date.now() + patience;
+        while ((await this.frames()) === start && Date.now() < end) await sleep(20);
     }
 
     /** Waits until nothing moves on the page any more. */
     async still() {
-        const frames = () => this.page.evaluate(() => globalThis.jointplay.page.frames());
         await this.until(async () => {
-            const before = await frames();
+            const before = await this.frames();
             await sleep(700);
-            return (await frames()) === before;
+            return (await this.frames()) === before;
         }, 'the page does not come to rest');
     }
 

@@ -21,7 +21,7 @@ const TOLERANCE = 0.01;
 for (const backend of ['webgl', 'webgpu']) {
     test(`${backend}: the page shows the same picture as the native window`, async (t) => {
         const frames = Promise.all([nativeWindow('spcmm', INSTANT), nativeWindow('spcmm', 0.3)]);
-        const lab = await open('paused&theme=light', { backend });
+        const lab = await open('play=0&theme=light', { backend });
         const { renderer } = await lab.state();
         assert.match(renderer, backend === 'webgl' ? /^gl / : /^webgpu /i);
         await lab.runTo(INSTANT);
@@ -123,7 +123,7 @@ test('a frame never steps longer than its share, however far behind the machine 
 });
 
 test('an address by hand sets scene and parameters; a bad one says what is wrong beside a running scene', async () => {
-    const lab = await open('scene=pendulum&c=0.5mm&paused', { backend: 'webgl' });
+    const lab = await open('scene=pendulum&c=0.5mm&play=0', { backend: 'webgl' });
     const state = await lab.state();
     assert.equal(state.scene, 'pendulum');
     assert.equal(state.playing, false);
@@ -182,7 +182,7 @@ test('a failed download is told, and can be tried again', async () => {
 });
 
 test('loading shows its progress', async () => {
-    const lab = await open('paused', {
+    const lab = await open('play=0', {
         backend: 'webgl',
         before: () => {
             globalThis.stages = [];
@@ -203,7 +203,7 @@ test('loading shows its progress', async () => {
 });
 
 test('a crash leaves a report that names version, scene and renderer', async () => {
-    const lab = await open('scene=pendulum&c=0.5mm&paused', { backend: 'webgl' });
+    const lab = await open('scene=pendulum&c=0.5mm&play=0', { backend: 'webgl' });
     await lab.page.evaluate(() => globalThis.jointplay.page.crash());
     await lab.page.locator('#trouble').waitFor();
     const report = await lab.page.locator('#report').inputValue();

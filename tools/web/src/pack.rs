@@ -11,7 +11,12 @@ const NAME: &str = "jointplay";
 /// The page's own files, from the root of the project.
 const PAGE: &str = "index.html";
 /// Scripts and styles beside it, copied as they are.
-const PARTS: [&str; 2] = ["web/main.js", "web/page.css"];
+const PARTS: [&str; 4] = [
+    "web/main.js",
+    "web/host.js",
+    "web/worker.js",
+    "web/page.css",
+];
 
 /// Writes the page into `folder`, which is made anew and replaced only as a whole. `compress`: also each file as
 /// `<file>.br`, with a table of what weighs how much.

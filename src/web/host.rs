@@ -1,0 +1,111 @@
+//! The browser's services for the application; `web/host.js` is their other half.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::rc::Rc;
+use std::sync::Arc;
+
+use eframe::egui;
+use wasm_bindgen::prelude::*;
+
+use super::work::Worker;
+use crate::analysis::task::Job;
+use crate::app::{Host, OpenedFile, Running, SaveFile};
+
+#[wasm_bindgen]
+extern "C" {
+    #[wasm_bindgen(js_namespace = jointplayHost)]
+    fn address() -> String;
+    #[wasm_bindgen(js_namespace = jointplayHost)]
+    fn shared(link: &str);
+    #[wasm_bindgen(js_namespace = jointplayHost)]
+    fn save(name: &str, mime: &str, bytes: &[u8]);
+    #[wasm_bindgen(js_namespace = jointplayHost)]
+    fn pick();
+    #[wasm_bindgen(js_namespace = jointplayHost)]
+    fn announce(text: &str, event: bool);
+    /// Tells that the graphics of start number `start` are gone.
+    #[wasm_bindgen(js_namespace = jointplayHost, js_name = graphicsLost)]
+    pub fn graphics_lost(start: u32, why: &str);
+    /// Whether the graphics on show are gone, which an error may tell before the event does.
+    #[wasm_bindgen(js_namespace = jointplayHost, js_name = areGraphicsLost)]
+    pub fn are_graphics_lost() -> bool;
+}
+
+/// Files on their way in, and the window to wake for them.
+#[derive(Default)]
+pub struct Inbox {
+    files: RefCell<VecDeque<OpenedFile>>,
+    ctx: RefCell<egui::Context>,
+}
+
+impl Inbox {
+    /// The window that is woken from now on.
+    pub fn attach(&self, ctx: &egui::Context) {
+        self.ctx.replace(ctx.clone());
+    }
+
+    /// The window.
+    pub fn ctx(&self) -> egui::Context {
+        self.ctx.borrow().clone()
+    }
+
+    /// A file has come.
+    pub fn put(&self, file: OpenedFile) {
+        self.files.borrow_mut().push_back(file);
+        self.ctx().request_repaint();
+    }
+}
+
+/// The page around the application.
+pub struct WebHost {
+    /// What comes in.
+    pub inbox: Rc<Inbox>,
+}
+
+impl Host for WebHost {
+    fn address(&self) -> String {
+        address()
+    }
+
+    fn shared(&mut self, link: &str) -> bool {
+        shared(link);
+        true
+    }
+
+    fn save(&mut self, files: &[SaveFile]) -> Result<String, String> {
+        for file in files {
+            save(&file.name, file.mime, &file.bytes);
+        }
+        let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
+        Ok(format!("Downloading {}", names.join(" and ")))
+    }
+
+    fn pick_file(&mut self) -> bool {
+        pick();
+        true
+    }
+
+    fn read_dropped(&mut self, file: Arc<dyn egui::DroppedFile + Send + Sync>) {
+        let inbox = self.inbox.clone();
+        wasm_bindgen_futures::spawn_local(async move {
+            let content = file.bytes_async().await;
+            inbox.put(OpenedFile {
+                name: file.path().display().to_string(),
+                content,
+            });
+        });
+    }
+
+    fn opened(&mut self) -> Option<OpenedFile> {
+        self.inbox.files.borrow_mut().pop_front()
+    }
+
+    fn start(&mut self, job: Job) -> Option<Box<dyn Running>> {
+        Some(Box::new(Worker::start(&job)?))
+    }
+
+    fn announce(&mut self, text: &str, event: bool) {
+        announce(text, event);
+    }
+}

@@ -1,0 +1,96 @@
+//! Long computations in a worker of the page: both ends. `web/worker.js` is one, `web/host.js` keeps it.
+
+use std::ops::ControlFlow;
+
+use wasm_bindgen::prelude::*;
+use web_time::Instant;
+
+use crate::analysis::task::{self, Job, Message};
+use crate::app::Running;
+
+#[wasm_bindgen]
+extern "C" {
+    /// In the worker: hands a message on to the page.
+    #[wasm_bindgen(js_namespace = jointplayWork)]
+    fn tell(message: &str);
+    /// On the page: starts a worker on a job; its number.
+    #[wasm_bindgen(js_namespace = jointplayHost, js_name = startWork)]
+    fn start_work(job: &str) -> Option<u32>;
+    /// On the page: what a worker said next.
+    #[wasm_bindgen(js_namespace = jointplayHost, js_name = pollWork)]
+    fn poll_work(worker: u32) -> Option<String>;
+    /// On the page: ends a worker.
+    #[wasm_bindgen(js_namespace = jointplayHost, js_name = endWork)]
+    fn end_work(worker: u32);
+}
+
+fn say(message: &Message) {
+    // Plain data of this program.
+    tell(&serde_json::to_string(message).expect("a message is JSON"));
+}
+
+/// In the worker: computes a job, as JSON, and tells each message, as JSON.
+#[wasm_bindgen]
+pub fn perform(job: &str) {
+    std::panic::set_hook(Box::new(|info| {
+        say(&Message::Failed(format!(
+            "the computation failed inside: {info}"
+        )));
+    }));
+    let start = Instant::now();
+    match serde_json::from_str::<Job>(job) {
+        Ok(job) => task::perform(
+            &job,
+            &mut || start.elapsed().as_secs_f64(),
+            &mut |message| {
+                say(&message);
+                // The page ends the worker where it wants no more.
+                ControlFlow::Continue(())
+            },
+        ),
+        Err(error) => say(&Message::Failed(format!("not a computation: {error}"))),
+    }
+}
+
+/// On the page: a worker at work. Dropping it ends it.
+pub struct Worker {
+    number: u32,
+    finished: bool,
+}
+
+impl Worker {
+    /// Starts `job`; `None` where the browser has no workers.
+    pub fn start(job: &Job) -> Option<Self> {
+        let job = serde_json::to_string(job).ok()?;
+        Some(Self {
+            number: start_work(&job)?,
+            finished: false,
+        })
+    }
+}
+
+impl Running for Worker {
+    fn poll(&mut self) -> Option<Message> {
+        if self.finished {
+            return None;
+        }
+        let text = poll_work(self.number)?;
+        let message = serde_json::from_str(&text)
+            .unwrap_or_else(|_| Message::Failed(format!("the computation broke off: {text}")));
+        if matches!(message, Message::Done | Message::Failed(_)) {
+            self.finished = true;
+            end_work(self.number);
+        }
+        Some(message)
+    }
+
+    fn cancel(&mut self) {
+        end_work(self.number);
+    }
+}
+
+impl Drop for Worker {
+    fn drop(&mut self) {
+        self.cancel();
+    }
+}

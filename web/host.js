@@ -1,0 +1,114 @@
+// The browser's services for the laboratory: the other half of src/web/host.rs.
+
+const build = new URL(import.meta.url).search;
+const $ = (id) => document.getElementById(id);
+
+/** Least time between two reports to a screen reader while nothing happens, ms: it speaks slower than they are made. */
+const REPORT_INTERVAL = 10_000;
+/** Time that a download needs its data for, ms. */
+const KEEP = 60_000;
+
+/** `laboratory`: what web/main.js knows; `lost(start, why)`: called when the graphics of that start are gone. */
+export function makeHost(laboratory, lost) {
+    let reported = -Infinity;
+    /** Computations: number to {worker, messages}. */
+    const work = new Map();
+    let works = 0;
+
+    /** On the clipboard, by whatever way the browser allows. */
+    async function copy(text) {
+        try {
+            await navigator.clipboard.writeText(text);
+            return true;
+        } catch {
+            // Not a secure address, or not allowed: as pages did before.
+            const field = document.createElement('textarea');
+            field.value = text;
+            field.className = 'apart';
+            document.body.append(field);
+            field.select();
+            const done = document.execCommand('copy');
+            field.remove();
+            $('laboratory').focus();
+            return done;
+        }
+    }
+
+    const picker = document.createElement('input');
+    picker.type = 'file';
+    picker.accept = '.toml';
+    picker.id = 'picker';
+    picker.hidden = true;
+    picker.addEventListener('change', async () => {
+        const [file] = picker.files;
+        if (file) laboratory.page.openFile(file.name, new Uint8Array(await file.arrayBuffer()));
+        // The same file, changed meanwhile, can be chosen again.
+        picker.value = '';
+        $('laboratory').focus();
+    });
+    document.body.append(picker);
+
+    return {
+        address: () => location.origin + location.pathname,
+
+        shared(link) {
+            // The query stays for what is not in the link: which renderer to use.
+            history.replaceState(null, '', location.pathname + location.search + new URL(link).hash);
+            copy(link).then((done) => {
+                if (!done) laboratory.page.say('The link is in the address bar: this browser keeps it off the clipboard');
+            });
+        },
+
+        save(name, mime, bytes) {
+            // A copy: the view into the program's memory is gone when this returns.
+            const address = URL.createObjectURL(new Blob([bytes.slice()], { type: mime }));
+            const link = document.createElement('a');
+            link.href = address;
+            link.download = name;
+            document.body.append(link);
+            link.click();
+            link.remove();
+            setTimeout(() => URL.revokeObjectURL(address), KEEP);
+        },
+
+        pick: () => picker.click(),
+
+        startWork(job) {
+            if (typeof Worker !== 'function') return undefined;
+            const worker = new Worker(new URL(`worker.js${build}`, import.meta.url), { type: 'module' });
+            const messages = [];
+            const failed = (reason) => messages.push(JSON.stringify({ Failed: `the computation broke off: ${reason}` }));
+            worker.addEventListener('message', ({ data }) => messages.push(data));
+            worker.addEventListener('error', (event) => {
+                // Told in the window instead of as a failure of the page.
+                event.preventDefault();
+                failed(event.message ?? 'the worker could not start');
+            });
+            try {
+                worker.postMessage({ code: laboratory.code, job });
+            } catch (error) {
+                failed(error);
+            }
+            works += 1;
+            work.set(works, { worker, messages });
+            return works;
+        },
+        pollWork: (number) => work.get(number)?.messages.shift(),
+        endWork(number) {
+            work.get(number)?.worker.terminate();
+            work.delete(number);
+        },
+
+        announce(text, event) {
+            $('summary').textContent = text;
+            if (!event && performance.now() - reported < REPORT_INTERVAL) return;
+            reported = performance.now();
+            $('report-aloud').textContent = text;
+        },
+
+        // Not within the call: the laboratory is busy with a frame.
+        graphicsLost: (start, why) => setTimeout(() => lost(start, why)),
+
+        areGraphicsLost: () => laboratory.backend === 'webgl' && Boolean($('laboratory').getContext('webgl2')?.isContextLost()),
+    };
+}

@@ -1,0 +1,73 @@
+// The page on a phone: fingers, and a screen that is narrow or low.
+
+import assert from 'node:assert/strict';
+import { after, test } from 'node:test';
+
+import { colours, crop, difference, open, quit } from './harness.mjs';
+
+after(quit);
+
+const backend = 'webgl';
+const PHONE = { width: 390, height: 844 };
+/** Least size of what a finger is to hit, CSS pixels. */
+const FINGER = 36;
+
+test('one finger orbits, two pan and pinch', async () => {
+    const lab = await open('play=0', { backend, size: PHONE, context: { hasTouch: true } });
+    const camera = async () => (await lab.state()).camera;
+    // Until somebody turns it, the camera keeps everything in sight and is nobody's choice.
+    assert.equal(await camera(), null);
+    await lab.fingers([[200, 200], [190, 200], [180, 200]]);
+    const start = await camera();
+    await lab.fingers([[200, 200], [230, 200], [260, 220]]);
+    const turned = await camera();
+    assert.ok(Math.abs(turned.yaw_rad - start.yaw_rad) > 0.05 && Math.abs(turned.pitch_rad - start.pitch_rad) > 0.01, JSON.stringify([start, turned]));
+    assert.equal(turned.distance_m, start.distance_m);
+    assert.deepEqual(turned.target_m, start.target_m);
+
+    const apart = (d) => [[200 - d, 220], [200 + d, 220]];
+    const pinch = [30, 50, 80].map(apart);
+    await lab.fingers(pinch.map(([left]) => left), pinch.map(([, right]) => right));
+    const near = await camera();
+    assert.ok(near.distance_m < 0.7 * turned.distance_m, `${turned.distance_m} m to ${near.distance_m} m`);
+    assert.ok(Math.abs(near.yaw_rad - turned.yaw_rad) < 0.02, 'a pinch does not orbit');
+
+    await lab.fingers([[150, 180], [170, 200], [190, 230]], [[250, 180], [270, 200], [290, 230]]);
+    const moved = await camera();
+    const way = Math.hypot(...moved.target_m.map((x, k) => x - near.target_m[k]));
+    assert.ok(way > 0.02 * near.distance_m, `the target moved ${way} m`);
+    assert.ok(Math.abs(moved.distance_m / near.distance_m - 1) < 0.05);
+    assert.ok(Math.abs(moved.yaw_rad - near.yaw_rad) < 0.02, 'two fingers do not orbit');
+    await lab.close();
+});
+
+for (const [name, size] of [['upright', PHONE], ['lying', { width: 844, height: 390 }]]) {
+    test(`a phone held ${name}: the panel folds, the controls are there for fingers, the mechanism is in sight`, async () => {
+        const lab = await open('theme=light&play=0', { backend, size, context: { hasTouch: true } });
+        await lab.find('Slider', 'Clearance');
+        const open_ = await lab.pixels();
+        await lab.tap('Button', 'Controls');
+        await lab.until(async () => !(await lab.has('Slider', 'Clearance')), 'the panel does not fold');
+        await lab.still();
+        const folded = await lab.pixels();
+        // The picture has taken the place of the panel, and there is a mechanism in it.
+        const view = name === 'upright' ? { x: 0, y: 100, width: 390, height: 560 } : { x: 0, y: 60, width: 844, height: 250 };
+        assert.ok(colours(crop(folded, view)) > 400, `${colours(crop(folded, view))} colours`);
+        assert.ok(difference(open_, folded) > 0.05);
+        await lab.runTo(0.3);
+        await lab.still();
+        assert.ok(difference(crop(folded, view), crop(await lab.pixels(), view)) > 0.002, 'the mechanism is out of sight');
+
+        const buttons = (await lab.widgets()).filter(({ role, label }) => role === 'Button' && ['Play', 'Step', 'Reset', 'Controls', 'Plots', 'Menu'].includes(label));
+        assert.ok(buttons.length >= 5, buttons.map(({ label }) => label).join(', '));
+        for (const { label, rect: [x0, y0, x1, y1] } of buttons) {
+            assert.ok(x0 >= 0 && y0 >= 0 && x1 <= size.width && y1 <= size.height, `${label} is outside`);
+            assert.ok(y1 - y0 >= FINGER && x1 - x0 >= FINGER, `${label} is ${x1 - x0} x ${y1 - y0}`);
+        }
+        await lab.tap('Button', 'Play');
+        await lab.until(async () => (await lab.state()).playing, 'a finger does not start it');
+        await lab.tap('Button', 'Controls');
+        await lab.find('Slider', 'Clearance');
+        await lab.close();
+    });
+}
