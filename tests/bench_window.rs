@@ -282,11 +282,21 @@ fn pictures() {
         ("bench_wide_light", [1280.0, 800.0], egui::Theme::Light),
         ("bench_wide_dark", [1280.0, 800.0], egui::Theme::Dark),
         ("bench_narrow", [420.0, 800.0], egui::Theme::Light),
+        ("bench_lying", [844.0, 390.0], egui::Theme::Dark),
     ] {
         let mut harness = used(size, theme);
         harness.snapshot(name);
         results.extend_harness(&mut harness);
     }
+    // Parted long ago, seen from near.
+    let mut harness = used([1280.0, 800.0], egui::Theme::Dark);
+    let player = harness.state_mut().player_mut();
+    player.set("contact.friction", "0").expect("in range");
+    player.run_to(1.3);
+    harness.key_press(Key::Num5);
+    harness.run();
+    harness.snapshot("bench_ghost");
+    results.extend_harness(&mut harness);
     let mut harness = window("spcmm", &[FAST]);
     sweep(&mut harness, "0.05 mm", "0.8 mm", 9.0);
     wait(&mut harness, |app| !app.bench().is_sweeping());
