@@ -2,7 +2,10 @@
 #![cfg(feature = "gui")]
 
 use eframe::egui::{self, Key, Modifiers, accesskit::Role};
-use egui_kittest::{Harness, SnapshotResults, kittest::Queryable as _};
+use egui_kittest::{
+    Harness, SnapshotResults,
+    kittest::{NodeT as _, Queryable as _},
+};
 use jointplay::analysis::drive::observed;
 use jointplay::app::{App, AppOptions, DesktopHost, Link, Player, Replay, Verdict};
 use jointplay::scene::Scene;
@@ -118,7 +121,7 @@ fn a_sweep_fills_the_diagram_and_a_click_loads_the_section() {
     harness.step();
     assert!(harness.state().loading().is_some(), "on its way");
     assert!(!harness.state().player().is_playing());
-    harness.get_by_label_contains("Running to the chosen section");
+    harness.get_by_label_contains("Running to the chosen section…");
     wait(&mut harness, |app| app.loading().is_none());
 
     let player = harness.state_mut().player_mut();
@@ -200,7 +203,9 @@ fn the_portrait_and_the_section_fill_while_the_scene_runs() {
     assert_eq!(harness.state().player().watch().phase(), 0.25);
     harness.state_mut().player_mut().pacer.set_scale(1.0);
     click(&mut harness, Role::Button, "Play");
-    wait(&mut harness, |app| app.player().watch().sections().len() >= 3);
+    wait(&mut harness, |app| {
+        app.player().watch().sections().len() >= 3
+    });
     let player = harness.state_mut().player_mut();
     player.set_playing(false);
     assert!(player.watch().orbit().count() > 300);
@@ -277,11 +282,21 @@ fn pictures() {
         ("bench_wide_light", [1280.0, 800.0], egui::Theme::Light),
         ("bench_wide_dark", [1280.0, 800.0], egui::Theme::Dark),
         ("bench_narrow", [420.0, 800.0], egui::Theme::Light),
+        ("bench_lying", [844.0, 390.0], egui::Theme::Dark),
     ] {
         let mut harness = used(size, theme);
         harness.snapshot(name);
         results.extend_harness(&mut harness);
     }
+    // Parted long ago, seen from near.
+    let mut harness = used([1280.0, 800.0], egui::Theme::Dark);
+    let player = harness.state_mut().player_mut();
+    player.set("contact.friction", "0").expect("in range");
+    player.run_to(1.3);
+    harness.key_press(Key::Num5);
+    harness.run();
+    harness.snapshot("bench_ghost");
+    results.extend_harness(&mut harness);
     let mut harness = window("spcmm", &[FAST]);
     sweep(&mut harness, "0.05 mm", "0.8 mm", 9.0);
     wait(&mut harness, |app| !app.bench().is_sweeping());

@@ -309,11 +309,12 @@ mod tests {
     }
 
     fn points(said: &[Message]) -> Vec<&SweptPoint> {
-        let point = |message| match message {
-            &Message::Point(ref point) => Some(&**point),
-            _ => None,
-        };
-        said.iter().filter_map(point).collect()
+        said.iter()
+            .filter_map(|message| match message {
+                Message::Point(point) => Some(&**point),
+                _ => None,
+            })
+            .collect()
     }
 
     #[test]

@@ -7,7 +7,7 @@ mod plane;
 mod portrait;
 mod sweep;
 
-use eframe::egui::{RichText, Ui};
+use eframe::egui::{CollapsingHeader, RichText, Ui};
 
 use super::host::Host;
 use super::load::Load;
@@ -54,15 +54,33 @@ impl Bench {
             ui.label("Coordinate");
             self.coordinate.ui(ui);
         });
-        self.portrait.ui(ui, player, self.coordinate);
-        ui.separator();
-        divergence::ui(ui, player, &mut self.problem);
-        if let Some(problem) = &self.problem {
-            let words = RichText::new(problem).small();
-            ui.label(words.color(ui.visuals().error_fg_color));
-        }
-        ui.separator();
-        ui.label(RichText::new("Sweep").strong());
-        self.sweep.ui(ui, player, self.coordinate)
+        let Self {
+            coordinate,
+            portrait,
+            sweep,
+            problem,
+        } = self;
+        let help = "The running scene in its phase space";
+        part(ui, "Portrait and section", help, |ui| {
+            portrait.ui(ui, player, *coordinate);
+        });
+        let help = "How fast neighbouring motions of the running scene part";
+        part(ui, "Neighbouring motion", help, |ui| {
+            divergence::ui(ui, player, problem);
+            if let Some(problem) = problem {
+                let words = RichText::new(problem.as_str()).small();
+                ui.label(words.color(ui.visuals().error_fg_color));
+            }
+        });
+        let help = "The scene at many values of a parameter: the bifurcation diagram";
+        part(ui, "Sweep", help, |ui| sweep.ui(ui, player, *coordinate)).flatten()
     }
+}
+
+/// A part of the bench that folds away; what it gives where it is open.
+fn part<R>(ui: &mut Ui, name: &str, help: &str, content: impl FnOnce(&mut Ui) -> R) -> Option<R> {
+    let header = CollapsingHeader::new(RichText::new(name).strong()).default_open(true);
+    let shown = header.show_unindented(ui, content);
+    shown.header_response.on_hover_text(help);
+    shown.body_returned
 }

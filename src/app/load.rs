@@ -99,3 +99,64 @@ impl Load {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::drive::observed;
+    use crate::analysis::grid::Start;
+    use crate::analysis::swept::SweepTask;
+    use crate::analysis::task::{Job, Message, perform};
+    use crate::scene::Scene;
+    use std::ops::ControlFlow;
+
+    #[test]
+    fn a_followed_point_is_reached_by_the_same_steps() {
+        let changes = [("spcmm.frequency".to_owned(), "5 Hz".to_owned())];
+        let scene = Scene::load("spcmm", &changes).expect("built in");
+        let task = SweepTask {
+            scene: SceneSource::of(&scene),
+            vary: vec!["contact.clearance=0.2mm..0.4mm:3".to_owned()],
+            periods: 3,
+            discard: 1,
+            phase: 0.25,
+            start: Start::FollowDown,
+            exponent: false,
+        };
+        let mut points = vec![None; 3];
+        perform(&Job::Sweep(task.clone()), &mut || 0.0, &mut |message| {
+            if let Message::Point(point) = message {
+                let index = point.index;
+                points[index] = Some(*point);
+            }
+            ControlFlow::Continue(())
+        });
+        let find = |index: usize| points.get(index)?.as_ref();
+        for (index, kept) in [(2, 0), (1, 1), (0, 0)] {
+            let way = Load::new(&task.scene, find, index, task.discard + kept, 3);
+            let mut way = way.expect("all came");
+            let scene = way.scene.scene().expect("its settings");
+            let mut player = Player::new(&scene).expect("starts");
+            let arrival = loop {
+                let mut left = 100;
+                let arrival = way.advance(&mut player, || {
+                    left -= 1;
+                    left > 0
+                });
+                if let Some(arrival) = arrival {
+                    break arrival;
+                }
+            };
+            assert_eq!((arrival, way.fraction(&player)), (Ok(()), 1.0));
+            let point = find(index).expect("came");
+            let state = observed(&player.frame().pose);
+            assert_eq!(state[..6], point.sections[kept], "point {index}");
+            let wanted = player.wanted().contact.clearance;
+            assert_eq!(wanted, point.values[0]);
+        }
+        // One that was cancelled away leaves no way to those after it.
+        points[1] = None;
+        let find = |index: usize| points.get(index)?.as_ref();
+        assert_eq!(Load::new(&task.scene, find, 0, 1, 3), None);
+    }
+}

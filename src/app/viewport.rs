@@ -274,6 +274,9 @@ impl Viewport {
         if let Some(name) = self.followed.and_then(|picked| name_of(player, picked)) {
             notes.push(format!("following {name}"));
         }
+        if player.twin().is_some() {
+            notes.push("ghost: the twin run".to_owned());
+        }
         overlay::time(
             &painter,
             rect,

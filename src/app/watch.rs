@@ -31,16 +31,18 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Watches a run of `scene` that begins.
+    /// Watches a run of `scene` that begins; its start is no section.
     pub fn new(scene: &Scene) -> Self {
-        Self {
+        let mut watch = Self {
             period: drive_period(scene).map_err(|why| why.to_string()),
             phase: 0.0,
             next: 0,
             orbit: VecDeque::new(),
             sections: VecDeque::new(),
             frame: Frame::default(),
-        }
+        };
+        watch.seek(0.0);
+        watch
     }
 
     /// Period of the drives, s, or why there is none.
@@ -151,6 +153,11 @@ mod tests {
         let mut simulation = Simulation::new(&scene).expect("starts");
         let mut watch = Watch::new(&scene);
         assert_eq!(watch.period(), Ok(0.2));
+        // Not the start itself.
+        run(&mut watch, &mut simulation, 0.21);
+        assert_eq!(watch.sections().len(), 1);
+        simulation.reset().expect("starts");
+        watch.begin(&scene, 0.0);
         watch.set_phase(0.25, 0.0);
         run(&mut watch, &mut simulation, 0.7);
         let times = |watch: &Watch| watch.sections().map(|(time, _)| *time).collect::<Vec<_>>();

@@ -41,6 +41,8 @@ struct Recipe<'a> {
     compare: wgpu::CompareFunction,
     write_depth: bool,
     blend: bool,
+    /// Drawn a little farther away than it is.
+    behind: bool,
 }
 
 impl Pipelines {
@@ -124,6 +126,8 @@ impl Pipelines {
             compare: Less,
             write_depth: true,
             blend: false,
+            // Keeps a surface from shadowing itself.
+            behind: fragment.is_none(),
         };
         let flat = |label, vertex, fragment, topology| Recipe {
             buffers: &[],
@@ -152,7 +156,11 @@ impl Pipelines {
                 buffers: &lines,
                 ..flat("line", "vs_line", "fs_line", TriangleStrip)
             }),
-            ghost: make(glass("ghost", "fs_ghost", Back)),
+            // Where it all but coincides with the solid parts it is not seen, rather than in patches.
+            ghost: make(Recipe {
+                behind: true,
+                ..glass("ghost", "fs_ghost", Back)
+            }),
             halo: make(glass("halo", "fs_halo", Back)),
             socket_far: make(glass("socket, far side", "fs_socket", Front)),
             socket_near: make(glass("socket, near side", "fs_socket", Back)),
@@ -214,8 +222,7 @@ fn pipeline(
             depth_write_enabled: Some(recipe.write_depth),
             depth_compare: Some(recipe.compare),
             stencil: Default::default(),
-            // Keeps a surface from shadowing itself.
-            bias: if casts_shadow {
+            bias: if recipe.behind {
                 wgpu::DepthBiasState {
                     constant: 2,
                     slope_scale: 2.0,

@@ -106,7 +106,7 @@ impl Diagram {
         if self.made != Some((self.ordinate, coordinate)) {
             self.make(swept, coordinate, &shown);
         }
-        let across = Axis::new(label, unit);
+        let across = Axis::new(label.to_lowercase(), unit);
         let up = self.ordinate.axis(coordinate);
         title(
             ui,

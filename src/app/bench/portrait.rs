@@ -4,10 +4,11 @@ use eframe::egui::{RichText, Slider, SliderClamping, Ui};
 use egui_plot::{Line, PlotPoint, PlotPoints, Points};
 
 use super::super::player::Player;
+use super::super::theme;
 use super::super::watch::Observed;
-use super::super::{theme, value};
 use super::coordinate::Coordinate;
 use super::plane::{Axis, plane};
+use crate::scene::format_quantity_digits;
 
 /// Height of each plot, points.
 const HEIGHT: f32 = 190.0;
@@ -83,9 +84,9 @@ impl Portrait {
         });
         ui.label(
             RichText::new(format!(
-                "{} sections, one every {}",
+                "Sections: {}, one every {}",
                 self.sections.len(),
-                value::time(period)
+                format_quantity_digits(period, "s", 5)
             ))
             .small()
             .weak(),
