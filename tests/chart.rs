@@ -1,6 +1,6 @@
 //! Charts: the same description gives the same picture, whatever is in it.
 
-use jointplay::chart::{Axis, Chart, Label, Level, Marker, PALETTE, Scale, Series, Sheet};
+use jointplay::chart::{Axis, Chart, Label, Level, Map, Marker, PALETTE, Scale, Series, Sheet};
 
 fn axis(label: &str, unit: &str, scale: Scale) -> Axis {
     Axis {
@@ -52,6 +52,7 @@ fn sheet(size: (u32, u32)) -> Sheet {
             y: 0.25,
             text: "level".to_owned(),
         }],
+        map: None,
     };
     let broken = vec![
         (1e-3, 1e-9),
@@ -109,4 +110,84 @@ fn a_page_that_cannot_be_drawn_is_refused() {
     assert!(sheet((200, 100)).svg().is_err());
     assert!(sheet((900, 420)).png(0.0).is_err());
     assert!(sheet((900, 420)).png(1e6).is_err());
+}
+
+#[test]
+fn a_map_has_a_cell_for_each_value_and_a_scale() {
+    let chart = |map: Map| Chart {
+        x: axis("Clearance", "mm", Scale::Linear),
+        y: axis("Friction", "", Scale::Linear),
+        map: Some(map),
+        ..Chart::default()
+    };
+    let sizes = Map {
+        xs: vec![0.1, 0.2, 0.3, 0.4],
+        ys: vec![1.0, 2.0, 3.0],
+        values: (0..12)
+            .map(|n| if n == 5 { f64::NAN } else { f64::from(n) })
+            .collect(),
+        scale: axis("Force", "kN", Scale::Linear),
+        names: Vec::new(),
+    };
+    let kinds = Map {
+        values: (0..12).map(|n| f64::from(n % 2)).collect(),
+        names: vec![(0.0, "even".to_owned()), (1.0, "odd".to_owned())],
+        ..sizes.clone()
+    };
+    let sheet = Sheet {
+        title: String::new(),
+        charts: vec![chart(sizes), chart(kinds)],
+        columns: 2,
+        size: (900, 360),
+        note: String::new(),
+    };
+    let svg = sheet.svg().unwrap();
+    for word in ["kN", "even", "odd", "Clearance (mm)"] {
+        assert!(svg.contains(word), "{word}");
+    }
+    // Lowest and highest value have the ends of the scale's colours, what is not known is grey, and every kind its own.
+    for (colour, least) in [
+        ("#440154", 1),
+        ("#FDE725", 1),
+        ("#E1E1E1", 1),
+        ("#0072B2", 6),
+        ("#D55E00", 6),
+    ] {
+        let found = svg.to_uppercase().matches(&colour.to_uppercase()).count();
+        assert!(found >= least, "{colour}: {found}");
+    }
+    assert!(sheet.png(1.0).is_ok());
+}
+
+#[test]
+fn a_hundred_thousand_points_make_no_large_file() {
+    let sheet = |line: bool| {
+        let place = |k: i32| {
+            let a = f64::from(k) * 1e-3;
+            (a.sin(), (1.7 * a).cos())
+        };
+        let series = Series {
+            label: String::new(),
+            points: (0..100_000).map(place).collect(),
+            colour: PALETTE[1],
+            line,
+            marker: (!line).then_some(Marker::Dot),
+        };
+        Sheet {
+            title: String::new(),
+            charts: vec![Chart {
+                series: vec![series],
+                ..Chart::default()
+            }],
+            columns: 1,
+            size: (600, 400),
+            note: String::new(),
+        }
+        .svg()
+        .unwrap()
+    };
+    assert!(sheet(true).len() < 200_000, "{}", sheet(true).len());
+    // One dot a pixel at most.
+    let dots = sheet(false).matches("<circle").count();
+    assert!((1000..20_000).contains(&dots), "{dots}");
 }

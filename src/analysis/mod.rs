@@ -1,5 +1,5 @@
 //! What is computed from whole runs: what a method costs and how wrong it is, what each part of the model costs, responses
-//! beside the ideal motion, sections, exponents, regimes, sweeps. Knows no thread, and its clock comes from outside ([`Outside`]).
+//! beside the ideal motion, sections, exponents, regimes, sweeps, the paper's section 4. Knows no thread, and its clock comes from outside ([`Outside`]).
 
 mod cost;
 pub mod drive;
@@ -13,6 +13,7 @@ pub mod point;
 pub mod presets;
 mod reach;
 pub mod regime;
+pub mod reproduction;
 pub mod response;
 pub mod section;
 mod setting;

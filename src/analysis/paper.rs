@@ -1,6 +1,11 @@
 //! What Sheng & Chen print in sections 4.2 and 4.3, number by number and statement by statement, and what this
 //! program gets for the same. Nothing is tuned to match; the paper leaves one dimension out and contradicts itself in places.
 
+pub mod chaos;
+mod words;
+
+pub use words::{Agreement, Comparison, compare};
+
 use super::response::{Extremes, Response};
 
 /// Simulated time of the paper's runs: one period of trajectory (59), s.
@@ -195,6 +200,13 @@ pub const PUBLISHED: &[Published] = {
     ]
 };
 
+/// Peaks that the text gives for Figure 17, whose run it does not name: what is measured, the paper's own program (Matlab) and the
+/// commercial one that it is compared with (Adams), SI units.
+pub const VERIFICATION: [(&str, Quantity, f64, f64); 2] = [
+    ("17e", Quantity::AccelerationX, 319.2, 291.0),
+    ("17f", Quantity::AccelerationBeta, 1754.0, 1571.0),
+];
+
 /// Whether a statement of the paper holds here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
@@ -208,9 +220,11 @@ pub enum Verdict {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Statement {
     /// Where the paper makes it.
-    pub place: &'static str,
+    pub place: std::borrow::Cow<'static, str>,
     /// What it says, in other words.
     pub says: String,
+    /// What must hold here for it to count as confirmed.
+    pub criterion: String,
     /// Whether that holds here.
     pub verdict: Verdict,
     /// The numbers behind the verdict.
@@ -229,8 +243,10 @@ fn series(runs: &Runs, cases: [Case; 3], quantity: Quantity) -> Option<[f64; 3]>
     Some([value(cases[0])?, value(cases[1])?, value(cases[2])?])
 }
 
-const BY_CLEARANCE: [Case; 3] = [CASES[0], CASES[1], CASES[2]];
-const BY_FRICTION: [Case; 3] = [CASES[3], CASES[0], CASES[4]];
+/// The runs of Figures 5 to 10 and 18 to 20, clearance ascending.
+pub const BY_CLEARANCE: [Case; 3] = [CASES[0], CASES[1], CASES[2]];
+/// The runs of Figures 11 to 16 and 21 to 23, friction ascending.
+pub const BY_FRICTION: [Case; 3] = [CASES[3], CASES[0], CASES[4]];
 
 fn verdict(holds: bool) -> Verdict {
     if holds {
@@ -266,8 +282,10 @@ fn grows(
         .map(|(name, value)| format!("{name}: {value:.4} {unit}"))
         .collect();
     Some(Statement {
-        place,
+        place: place.into(),
         says: format!("{what} grows with the {cause}"),
+        criterion: "larger at each of the three values than at the one before, in continuous time"
+            .to_owned(),
         verdict: verdict(values[0] < values[1] && values[1] < values[2]),
         evidence: listed.join(", "),
     })
@@ -291,12 +309,14 @@ pub fn response_statements(runs: &Runs) -> Vec<Statement> {
         // Amplitude of x in (59).
         let share = widest.full.deviation[0] / 0.025;
         out.push(Statement {
-            place: "4.2.1, Figure 5a",
+            place: "4.2.1, Figure 5a".into(),
             says: "the displacement in x shows no obvious deviation whatever the clearance"
+                .to_owned(),
+            criterion: "at 0.7 mm, x leaves the ideal motion by less than 5 % of its amplitude"
                 .to_owned(),
             verdict: verdict(share < 0.05),
             evidence: format!(
-                "0.7 mm: at most {:.3} mm, {:.1} % of the amplitude (an obvious deviation: 5 %)",
+                "0.7 mm: at most {:.3} mm, {:.1} % of the amplitude",
                 widest.full.deviation[0] * 1e3,
                 share * 100.0
             ),
@@ -377,6 +397,7 @@ pub fn response_statements(runs: &Runs) -> Vec<Statement> {
         ),
     ];
     out.extend(more.into_iter().flatten());
+    out.extend(words::further_statements(runs));
     out
 }
 

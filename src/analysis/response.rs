@@ -144,6 +144,34 @@ impl Ideal {
     }
 }
 
+/// One instant of a run.
+pub struct Look<'a> {
+    /// Time, s.
+    pub time: f64,
+    /// The run.
+    pub frame: &'a Frame,
+    /// The ideal motion, where there is one.
+    pub ideal: Option<&'a Pose>,
+    /// Whether it is a whole multiple of the sampling interval; otherwise it is one of four instants of a step.
+    pub sample: bool,
+    /// Largest constraint violation of the `lagrange` form so far, m or rad.
+    pub constraint_drift: f64,
+}
+
+impl Look<'_> {
+    /// Coordinates x, y, z, alpha, beta, gamma, their rates and their second derivatives, SI units.
+    pub fn derivatives(&self) -> [[f64; COORDINATES]; 3] {
+        derivatives(&self.frame.pose)
+    }
+
+    /// Coordinates less those of the ideal motion, m and rad; NaN without one.
+    pub fn deviation(&self) -> [f64; COORDINATES] {
+        self.ideal.map_or([f64::NAN; COORDINATES], |ideal| {
+            deviation(&self.frame.pose, ideal)
+        })
+    }
+}
+
 /// Runs `scene` for `duration` (s) and compares it with its ideal motion; `every` (s) is the interval of
 /// [`Response::sampled`]. `go_on` hears the simulated time after every step and may end the run by false.
 ///
@@ -153,6 +181,20 @@ pub fn respond(
     scene: &Scene,
     duration: f64,
     every: f64,
+    go_on: impl FnMut(f64) -> bool,
+) -> Result<Response, ResponseError> {
+    respond_seen(scene, duration, every, |_| (), go_on)
+}
+
+/// [`respond`], with every instant that it looks at shown to `see`, in order of time.
+///
+/// # Errors
+/// As [`respond`].
+pub fn respond_seen(
+    scene: &Scene,
+    duration: f64,
+    every: f64,
+    mut see: impl FnMut(&Look),
     mut go_on: impl FnMut(f64) -> bool,
 ) -> Result<Response, ResponseError> {
     let mut simulation = Simulation::new(scene)?;
@@ -185,6 +227,15 @@ pub fn respond(
             };
             simulation.sample(time, &mut frame);
             let pose = ideal.at(time);
+            if time <= duration {
+                see(&Look {
+                    time,
+                    frame: &frame,
+                    ideal: pose,
+                    sample: is_sample,
+                    constraint_drift: simulation.statistics().constraint_drift,
+                });
+            }
             if is_sample {
                 sampled.take(&frame, pose);
                 next_sample += 1;

@@ -8,6 +8,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use super::labels::{Area, arrange};
 use super::ticks::Ruler;
 use super::{Chart, Colour, Marker, Series};
+use super::{heat, thin};
 
 /// Some charts on one page with one legend.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,11 +31,11 @@ pub struct Sheet {
 pub struct SheetError(pub(super) String);
 
 /// The drawing library counts in whole numbers: so many of them are a pixel.
-const FINE: u32 = 4;
+pub(super) const FINE: u32 = 4;
 /// Sizes of text, pixels.
 const TITLE: f64 = 16.0;
 const HEADING: f64 = 14.0;
-const TEXT: f64 = 12.0;
+pub(super) const TEXT: f64 = 12.0;
 /// Height of a row of the legend, length of its sample, gap between entries, pixels.
 const ROW: f64 = 20.0;
 const SAMPLE: f64 = 26.0;
@@ -45,13 +46,13 @@ const LINE: f64 = 1.6;
 /// Width of a letter over the size of the text, on average, generously.
 const LETTER: f64 = 0.51;
 
-const INK: Colour = (30, 30, 30);
-const FAINT: Colour = (110, 110, 110);
+pub(super) const INK: Colour = (30, 30, 30);
+pub(super) const FAINT: Colour = (110, 110, 110);
 const GRID: Colour = (214, 214, 214);
 const FINE_GRID: Colour = (238, 238, 238);
 
-type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-type Plot<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<Ruler, Ruler>>;
+pub(super) type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+pub(super) type Plot<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<Ruler, Ruler>>;
 
 impl Ranged for Ruler {
     type FormatOption = DefaultFormatting;
@@ -75,19 +76,24 @@ impl Ranged for Ruler {
     }
 }
 
-fn fine(pixels: f64) -> i32 {
+pub(super) fn fine(pixels: f64) -> i32 {
     (pixels * f64::from(FINE)).round() as i32
 }
 
-fn rgb((r, g, b): Colour) -> RGBColor {
+pub(super) fn rgb((r, g, b): Colour) -> RGBColor {
     RGBColor(r, g, b)
 }
 
-fn failed(error: impl std::fmt::Display) -> SheetError {
+pub(super) fn failed(error: impl std::fmt::Display) -> SheetError {
     SheetError(error.to_string())
 }
 
-fn style(size: f64, colour: Colour, horizontal: HPos, vertical: VPos) -> TextStyle<'static> {
+pub(super) fn style(
+    size: f64,
+    colour: Colour,
+    horizontal: HPos,
+    vertical: VPos,
+) -> TextStyle<'static> {
     // The library takes the height of a line; the size of the letters is that over 1.24.
     TextStyle {
         font: ("sans-serif", 1.24 * size * f64::from(FINE)).into_font(),
@@ -185,7 +191,7 @@ fn entry_width(series: &Series) -> f64 {
     SAMPLE + 6.0 + text_width(&series.label, TEXT) + GAP
 }
 
-fn write(
+pub(super) fn write(
     root: &Canvas,
     text: &str,
     (x, y): (f64, f64),
@@ -225,10 +231,24 @@ fn stroke(colour: Colour) -> ShapeStyle {
 }
 
 fn draw_chart(root: &Canvas, area: &Canvas, chart: &Chart) -> Result<(), SheetError> {
-    let points = || chart.series.iter().flat_map(|series| series.points.iter());
-    let x = Ruler::new(&chart.x, points().map(|p| p.0));
+    let ends = chart.map.as_ref().map(heat::ends).unwrap_or_default();
+    let points = || {
+        let series = chart.series.iter();
+        series.flat_map(|series| series.points.iter()).chain(&ends)
+    };
+    let mut x = Ruler::new(&chart.x, points().map(|p| p.0));
     let levels = chart.levels.iter().map(|level| level.y);
-    let y = Ruler::new(&chart.y, points().map(|p| p.1).chain(levels));
+    let mut y = Ruler::new(&chart.y, points().map(|p| p.1).chain(levels));
+    if let (Some(_), [low, high]) = (&chart.map, &ends[..]) {
+        // Cells fill the chart.
+        x.narrow(low.0, high.0);
+        y.narrow(low.1, high.1);
+    }
+    let beside = if chart.map.is_some() {
+        heat::SCALE_WIDTH
+    } else {
+        0.0
+    };
     // Room for the longest word at the left.
     let longest = y
         .ticks
@@ -238,7 +258,7 @@ fn draw_chart(root: &Canvas, area: &Canvas, chart: &Chart) -> Result<(), SheetEr
     let heading = style(HEADING, INK, HPos::Left, VPos::Top);
     let mut plot: Plot = ChartBuilder::on(area)
         .margin_top(fine(6.0))
-        .margin_right(fine(18.0))
+        .margin_right(fine(18.0 + beside))
         .margin_left(fine(8.0))
         .margin_bottom(fine(6.0))
         .set_label_area_size(LabelAreaPosition::Left, fine(longest + 34.0))
@@ -265,6 +285,18 @@ fn draw_chart(root: &Canvas, area: &Canvas, chart: &Chart) -> Result<(), SheetEr
         good.then_some(place)
     };
     let mut taken: Vec<Area> = Vec::new();
+    if let Some(map) = &chart.map {
+        heat::cells(root, &plot, map, &x, &y)?;
+        let (xs, ys) = plot.plotting_area().get_pixel_range();
+        let pixels = |at: i32| f64::from(at) / f64::from(FINE);
+        heat::scale(
+            root,
+            map,
+            pixels(xs.end) + 14.0,
+            pixels(ys.start) + 16.0,
+            pixels(ys.end),
+        )?;
+    }
     draw_levels(root, &plot, chart, &x, &y, &mut taken)?;
     for series in &chart.series {
         if series.line {
@@ -273,17 +305,28 @@ fn draw_chart(root: &Canvas, area: &Canvas, chart: &Chart) -> Result<(), SheetEr
                     .iter()
                     .filter_map(|point| inside(point).map(|place| plot.backend_coord(&place)))
                     .collect();
-                along(&path, &mut taken);
+                // Finer than a quarter of a pixel nobody sees.
+                let path = thin::line(&path, 1.0);
+                if !chart.labels.is_empty() {
+                    along(&path, &mut taken);
+                }
                 root.draw(&PathElement::new(path, stroke(series.colour)))
                     .map_err(failed)?;
             }
         }
     }
     for series in &chart.series {
-        for place in series.points.iter().filter_map(inside) {
-            let at = plot.backend_coord(&place);
+        let all = series.points.iter().filter_map(inside);
+        let mut all: Vec<_> = all.map(|place| plot.backend_coord(&place)).collect();
+        if series.marker == Some(Marker::Dot) {
+            all = thin::cloud(all.into_iter(), fine(1.0));
+        }
+        for at in all {
             if let Some(marker) = series.marker {
                 draw_marker(root, at, marker, series.colour)?;
+            }
+            if chart.labels.is_empty() {
+                continue;
             }
             let half = f64::from(fine(MARKER + 1.0));
             taken.push(Area {
@@ -432,7 +475,7 @@ fn draw_marker(
     };
     match marker {
         Marker::Disc => root.draw(&Circle::new((x, y), r, filled)),
-        Marker::Dot => root.draw(&Circle::new((x, y), fine(1.0), filled)),
+        Marker::Dot => root.draw(&Circle::new((x, y), fine(1.25), filled)),
         Marker::Ring => root.draw(&Circle::new((x, y), fine(MARKER + 3.0), stroke(colour))),
         Marker::Square => {
             let s = fine(0.88 * MARKER);

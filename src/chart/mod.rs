@@ -3,8 +3,10 @@
 //! Knows nothing of mechanisms and needs no screen.
 
 mod draw;
+mod heat;
 mod labels;
 mod png;
+mod thin;
 mod ticks;
 
 pub use draw::{Sheet, SheetError};
@@ -104,6 +106,21 @@ pub struct Level {
     pub text: String,
 }
 
+/// A field of cells whose colours are values.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Map {
+    /// Middles of the cells along the horizontal axis, ascending.
+    pub xs: Vec<f64>,
+    /// Middles of the cells along the vertical axis, ascending.
+    pub ys: Vec<f64>,
+    /// Values row by row, from the lowest row; one that is not finite is grey.
+    pub values: Vec<f64>,
+    /// How values count, and their unit.
+    pub scale: Axis,
+    /// For kinds instead of sizes: the value of each kind and its name. Empty for sizes.
+    pub names: Vec<(f64, String)>,
+}
+
 /// One pair of axes with what is in it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Chart {
@@ -119,4 +136,6 @@ pub struct Chart {
     pub labels: Vec<Label>,
     /// Lines across.
     pub levels: Vec<Level>,
+    /// Cells under everything else.
+    pub map: Option<Map>,
 }

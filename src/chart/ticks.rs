@@ -82,6 +82,14 @@ impl Ruler {
         ruler
     }
 
+    /// Ends at these values.
+    pub(super) fn narrow(&mut self, from: f64, to: f64) {
+        (self.from, self.to) = (self.place(from), self.place(to));
+        let inside = |tick: &f64| (self.from..=self.to).contains(tick);
+        self.ticks.retain(inside);
+        self.minor.retain(inside);
+    }
+
     /// Where `value` is; not finite where the axis has no such place.
     pub(super) fn place(&self, value: f64) -> f64 {
         place(self.scale, value)

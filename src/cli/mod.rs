@@ -14,6 +14,7 @@ mod provenance;
 mod quantity;
 #[cfg(feature = "gui")]
 mod render;
+pub mod reproduce;
 mod run;
 mod summary;
 mod sweep;
@@ -62,6 +63,7 @@ fn dispatch(arguments: Arguments) -> Result<(), Failure> {
         Some(Command::Bench(arguments)) => bench::bench(&arguments),
         Some(Command::Sweep(arguments)) => sweep::sweep(&arguments),
         Some(Command::Merge(arguments)) => sweep::merge(&arguments),
+        Some(Command::Reproduce(arguments)) => reproduce::reproduce(&arguments),
         Some(Command::Parameters) => print(&reference_page()),
     }
 }

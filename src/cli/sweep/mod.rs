@@ -5,6 +5,7 @@ mod merge;
 mod options;
 mod partial;
 
+pub(super) use archive::{Archive, Source};
 pub use merge::merge;
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -15,7 +16,6 @@ use std::time::Instant;
 use indicatif::ProgressBar;
 use serde_json::{Map, Value as Json, json};
 
-use self::archive::{Archive, Source};
 use self::options::Shard;
 use self::partial::Partial;
 use super::args::{SummaryForm, SweepArguments};
@@ -120,7 +120,7 @@ fn read(arguments: &SweepArguments) -> Result<Sweep, Failure> {
 }
 
 /// What made the result: the same for the whole sweep and every shard of it.
-fn meta(sweep: &Sweep) -> Result<Map<String, Json>, Failure> {
+pub(super) fn meta(sweep: &Sweep) -> Result<Map<String, Json>, Failure> {
     let scene = sweep.scene();
     let (grid, plan) = (sweep.grid(), sweep.plan());
     let mut meta = super::provenance::meta(scene)?;

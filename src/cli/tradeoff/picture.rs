@@ -155,6 +155,7 @@ fn diagram(
             })
             .into_iter()
             .collect(),
+        map: None,
     }
 }
 

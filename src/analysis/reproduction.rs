@@ -1,0 +1,648 @@
+//! Everything that section 4 of the paper needs, as jobs that any number of threads may do in any order, and what comes out of them.
+
+use super::grid::{Axis, Grid, RangeError, Start};
+use super::paper::chaos::{Found, Loop, Swept};
+use super::paper::{self, BY_CLEARANCE, BY_FRICTION, CASES, Case, DURATION, SAMPLING, Statement};
+use super::point::{Plan, resolution};
+use super::regime::Regime;
+use super::response::{COORDINATES, Look, Response, ResponseError, respond_seen};
+use super::sweep::{Sweep, SweepError};
+use crate::scene::{Scene, SceneError};
+use crate::simulate::{Frame, Simulation};
+
+/// Period of trajectory (59), s.
+pub const PERIOD: f64 = 2.0;
+/// Points of a settled curve in a period.
+const CURVE_POINTS: usize = 800;
+/// Indices of x and beta among the coordinates.
+const PICKED: [usize; 2] = [0, 4];
+
+/// How much is computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Extent {
+    /// Periods before a settled curve is taken.
+    pub settle: usize,
+    /// Periods of the paper's runs and how many of them are discarded.
+    pub runs: (usize, usize),
+    /// Values of clearance and of friction in the bifurcation diagrams.
+    pub values: [usize; 2],
+    /// Periods and discarded periods of each.
+    pub sweep: (usize, usize),
+    /// Values of friction and of clearance in the map.
+    pub map: [usize; 2],
+    /// Periods and discarded periods of each.
+    pub map_periods: (usize, usize),
+}
+
+impl Extent {
+    /// The whole report.
+    pub const FULL: Self = Self {
+        settle: 30,
+        runs: (200, 50),
+        values: [100, 40],
+        sweep: (100, 40),
+        map: [16, 16],
+        map_periods: (40, 16),
+    };
+    /// A report that shows how it looks, within seconds.
+    pub const QUICK: Self = Self {
+        settle: 5,
+        runs: (14, 4),
+        values: [5, 4],
+        sweep: (12, 4),
+        map: [3, 4],
+        map_periods: (12, 4),
+    };
+}
+
+/// Columns of a [`Row`].
+pub const COLUMNS: [&str; 15] = [
+    "t_s",
+    "x_m",
+    "vx_m_s",
+    "ax_m_s2",
+    "beta_rad",
+    "beta_rate_rad_s",
+    "beta_accel_rad_s2",
+    "S1_normal_N",
+    "S2_normal_N",
+    "S3_normal_N",
+    "x_deviation_m",
+    "beta_deviation_rad",
+    "probe_error_m",
+    "constraint_drift",
+    "sample",
+];
+
+/// One instant of a run, in the order of [`COLUMNS`]; `sample` is 1 at whole multiples of the paper's output step.
+pub type Row = [f64; COLUMNS.len()];
+
+fn row(look: &Look) -> Row {
+    let [c, r, a] = look.derivatives();
+    let deviation = look.deviation();
+    let force = |j: usize| {
+        look.frame
+            .joints
+            .get(j)
+            .map_or(f64::NAN, |j| j.normal_force.norm())
+    };
+    let (x, beta) = (PICKED[0], PICKED[1]);
+    [
+        look.time,
+        c[x],
+        r[x],
+        a[x],
+        c[beta],
+        r[beta],
+        a[beta],
+        force(0),
+        force(1),
+        force(2),
+        deviation[x],
+        deviation[beta],
+        look.frame.probe_error.map_or(f64::NAN, |e| e.norm()),
+        look.constraint_drift,
+        f64::from(u8::from(look.sample)),
+    ]
+}
+
+/// A run of section 4.2 with everything that its figures show.
+#[derive(Clone, Debug)]
+pub struct Traced {
+    /// Name in files.
+    pub name: String,
+    /// Clearance and friction.
+    pub case: Case,
+    /// Peaks and separations.
+    pub response: Response,
+    /// All instants, in order of time.
+    pub rows: Vec<Row>,
+}
+
+/// A sweep with the records of all its points.
+#[derive(Clone, Debug)]
+pub struct Swathe {
+    /// Name in files.
+    pub name: &'static str,
+    /// What was swept.
+    pub sweep: Sweep,
+    /// A record a point, one after the other; empty until its blocks are put in.
+    pub records: Vec<f64>,
+}
+
+impl Swathe {
+    /// Values of the array called `name`, those of a point together; empty if there is none.
+    pub fn values(&self, name: &str) -> Vec<f64> {
+        let layout = self.sweep.layout();
+        let Some(at) = layout.columns().iter().position(|c| c.name == name) else {
+            return Vec::new();
+        };
+        let (offset, length) = (layout.offset(at), layout.values_in(&layout.columns()[at]));
+        let records = self.records.chunks_exact(layout.record_length());
+        records
+            .flat_map(|r| r[offset..offset + length].to_vec())
+            .collect()
+    }
+
+    /// The points along its last axis, whose values are multiplied by `factor`.
+    pub fn swept(&self, factor: f64) -> Vec<Swept> {
+        let Some(axis) = self.sweep.grid().axes().last() else {
+            return Vec::new();
+        };
+        let kept = self.sweep.layout().kept();
+        let column = |name: &str| self.values(name);
+        let (regimes, periods) = (column("regime"), column("period"));
+        let exponents = column("exponent_per_s");
+        let errors = column("exponent_standard_error_per_s");
+        let (x, beta) = (column("section_x_m"), column("section_beta_rad"));
+        let part = |all: &[f64], k: usize| all[k * kept..(k + 1) * kept].to_vec();
+        axis.values()
+            .enumerate()
+            .map(|(k, value)| Swept {
+                value: value * factor,
+                regime: regime_word(regimes[k] as i64),
+                period: periods[k] as usize,
+                exponent: (exponents[k], errors[k]),
+                sections: [part(&x, k), part(&beta, k)],
+            })
+            .collect()
+    }
+}
+
+/// The word of a regime's number in files.
+pub fn regime_word(code: i64) -> &'static str {
+    let all = [
+        Regime::Unclear,
+        Regime::Periodic(1),
+        Regime::QuasiPeriodic,
+        Regime::Chaotic,
+        Regime::NotSettled,
+    ];
+    all.into_iter()
+        .find(|r| r.code() == code)
+        .map_or("none", Regime::word)
+}
+
+/// Why there is no report.
+#[derive(Clone, Debug, thiserror::Error)]
+#[allow(missing_docs)]
+pub enum ReproductionError {
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    #[error(transparent)]
+    Range(#[from] RangeError),
+    #[error(transparent)]
+    Sweep(#[from] SweepError),
+    #[error("{name}: {error}")]
+    Run { name: String, error: ResponseError },
+}
+
+/// What there is to do.
+pub struct Work {
+    extent: Extent,
+    runs: Vec<(String, Case, Scene)>,
+    /// Scenes of settled curves, in the order of [`CASES`].
+    curves: Vec<(Case, Scene)>,
+    swathes: Vec<Swathe>,
+    jobs: Vec<Job>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Job {
+    Run(usize),
+    Curve(usize),
+    Block(usize, usize),
+}
+
+/// What came out of a job.
+pub enum Outcome {
+    /// A run of section 4.2.
+    Run(Box<(Response, Vec<Row>)>),
+    /// A settled curve.
+    Curve(Loop),
+    /// Records of a block.
+    Block(Vec<f64>),
+}
+
+/// Everything that was found.
+pub struct Findings {
+    /// How much was computed.
+    pub extent: Extent,
+    /// The paper's runs, in the order of [`CASES`].
+    pub runs: Vec<Traced>,
+    /// The first of them with all bodies and multipliers, and with ideal joints.
+    pub lagrange: Traced,
+    /// Ideal joints.
+    pub ideal: Traced,
+    /// Settled curves, in the order of [`CASES`].
+    pub curves: Vec<Loop>,
+    /// Sweeps: [`Findings::swathe`] finds one by name.
+    pub swathes: Vec<Swathe>,
+    /// What two sections must differ by in x (m) and beta (rad) to be different.
+    pub resolution: [f64; 2],
+}
+
+const SCENE: &str = "spcmm";
+
+fn scene(case: Case, more: &[(&str, &str)]) -> Result<Scene, SceneError> {
+    let mut changes = case.changes();
+    changes.extend(more.iter().map(|&(k, v)| (k.to_owned(), v.to_owned())));
+    Scene::load(SCENE, &changes)
+}
+
+fn swathe(
+    name: &'static str,
+    case: Case,
+    vary: &[String],
+    start: Start,
+    (periods, discard): (usize, usize),
+    exponent: bool,
+) -> Result<Swathe, ReproductionError> {
+    let scene = scene(case, &[])?;
+    let axes = vary.iter().map(|text| Axis::parse(&scene, text));
+    let grid = Grid::new(&scene, axes.collect::<Result<Vec<_>, _>>()?, start)?;
+    let plan = Plan {
+        periods,
+        discard,
+        phase: 0.0,
+        exponent,
+    };
+    Ok(Swathe {
+        name,
+        sweep: Sweep::new(scene, grid, plan)?,
+        records: Vec::new(),
+    })
+}
+
+impl Work {
+    /// All jobs of a report.
+    ///
+    /// # Errors
+    /// An extent that no sweep can have.
+    pub fn new(extent: Extent) -> Result<Self, ReproductionError> {
+        let mut runs = Vec::new();
+        for case in CASES {
+            runs.push((file_name(case), case, scene(case, &[])?));
+        }
+        let nominal = CASES[0];
+        runs.push((
+            "lagrange".to_owned(),
+            nominal,
+            scene(nominal, &[("formulation", "lagrange")])?,
+        ));
+        let ideal = scene(nominal, &[("contact.clearance", "0")])?;
+        runs.push(("ideal".to_owned(), nominal, ideal));
+        let curves = CASES.iter().map(|&case| Ok((case, scene(case, &[])?)));
+        let curves = curves.collect::<Result<Vec<_>, SceneError>>()?;
+        let clearance = |n: usize| vec![format!("contact.clearance=0.01mm..1mm:{n}")];
+        let friction = |n: usize| vec![format!("contact.friction=0.01..0.4:{n}")];
+        let [c, f] = extent.values;
+        let [map_f, map_c] = extent.map;
+        let map = [friction(map_f), clearance(map_c)].concat();
+        let cases = [
+            vec!["contact.clearance=0.3mm..0.7mm:3".to_owned()],
+            vec!["contact.friction=0.15..0.25:3".to_owned()],
+        ];
+        let (up, down, cold) = (Start::FollowUp, Start::FollowDown, Start::Cold);
+        let swathes = vec![
+            swathe(
+                "runs_by_clearance",
+                nominal,
+                &cases[0],
+                cold,
+                extent.runs,
+                true,
+            )?,
+            swathe(
+                "runs_by_friction",
+                nominal,
+                &cases[1],
+                cold,
+                extent.runs,
+                true,
+            )?,
+            swathe(
+                "clearance_up",
+                nominal,
+                &clearance(c),
+                up,
+                extent.sweep,
+                false,
+            )?,
+            swathe(
+                "clearance_down",
+                nominal,
+                &clearance(c),
+                down,
+                extent.sweep,
+                false,
+            )?,
+            swathe(
+                "friction_up",
+                nominal,
+                &friction(f),
+                up,
+                extent.sweep,
+                false,
+            )?,
+            swathe(
+                "friction_down",
+                nominal,
+                &friction(f),
+                down,
+                extent.sweep,
+                false,
+            )?,
+            swathe(
+                "clearance_cold",
+                nominal,
+                &clearance(c),
+                cold,
+                extent.sweep,
+                true,
+            )?,
+            swathe(
+                "friction_cold",
+                nominal,
+                &friction(f),
+                cold,
+                extent.sweep,
+                true,
+            )?,
+            swathe("map", nominal, &map, cold, extent.map_periods, true)?,
+        ];
+        // Blocks that take longest come first, so that no thread is left with one at the end.
+        let mut jobs: Vec<Job> = Vec::new();
+        for (s, swathe) in swathes.iter().enumerate() {
+            jobs.extend((0..swathe.sweep.grid().blocks()).map(|b| Job::Block(s, b)));
+        }
+        jobs.extend((0..curves.len()).map(Job::Curve));
+        jobs.extend((0..runs.len()).map(Job::Run));
+        Ok(Self {
+            extent,
+            runs,
+            curves,
+            swathes,
+            jobs,
+        })
+    }
+
+    /// Number of jobs.
+    pub fn jobs(&self) -> usize {
+        self.jobs.len()
+    }
+
+    /// Simulated time of a job, s; a twin run counts as another.
+    pub fn length(&self, job: usize) -> f64 {
+        match self.jobs[job] {
+            Job::Run(_) => DURATION,
+            Job::Curve(_) => PERIOD * (self.extent.settle + 2) as f64,
+            Job::Block(s, b) => {
+                let sweep = &self.swathes[s].sweep;
+                let twin = if sweep.plan().exponent { 2.0 } else { 1.0 };
+                let points = sweep.grid().block(b).len();
+                PERIOD * twin * (sweep.plan().periods * points) as f64
+            }
+        }
+    }
+
+    /// Does job `job`; `go_on` hears how much of [`Self::length`] is done and may end it by false.
+    ///
+    /// # Errors
+    /// A run that the divergence guard stopped, `go_on`. Points of a sweep that diverge are no error.
+    pub fn run(
+        &self,
+        job: usize,
+        mut go_on: impl FnMut(f64) -> bool,
+    ) -> Result<Outcome, ReproductionError> {
+        let failed = |name: &str, error| ReproductionError::Run {
+            name: name.to_owned(),
+            error,
+        };
+        match self.jobs[job] {
+            Job::Run(n) => {
+                let (name, _, scene) = &self.runs[n];
+                let mut rows = Vec::new();
+                let see = |look: &Look| rows.push(row(look));
+                let response = respond_seen(scene, DURATION, SAMPLING, see, go_on);
+                let response = response.map_err(|e| failed(name, e))?;
+                Ok(Outcome::Run(Box::new((response, rows))))
+            }
+            Job::Curve(n) => {
+                let (case, scene) = &self.curves[n];
+                let curve = curve(*case, scene, self.extent.settle, go_on);
+                Ok(Outcome::Curve(
+                    curve.map_err(|e| failed("settled curve", e))?,
+                ))
+            }
+            Job::Block(s, b) => {
+                let sweep = &self.swathes[s].sweep;
+                let all = sweep.plan().periods as f64;
+                let share = self.length(job) / sweep.grid().block(b).len() as f64;
+                let mut block = sweep.begin(b);
+                while !block.is_done() {
+                    block.advance(2048);
+                    let now = block.current().map_or(0.0, |run| run.taken() as f64 / all);
+                    if !go_on(share * (block.finished().len() as f64 + now)) {
+                        return Err(failed(self.swathes[s].name, ResponseError::Cancelled));
+                    }
+                }
+                Ok(Outcome::Block(block.records()))
+            }
+        }
+    }
+
+    /// Puts the outcomes of all jobs together, in their order.
+    ///
+    /// # Panics
+    /// If there is not one outcome for each job.
+    pub fn gather(mut self, outcomes: Vec<Outcome>) -> Findings {
+        assert_eq!(outcomes.len(), self.jobs.len(), "an outcome a job");
+        let mut runs = Vec::new();
+        let mut curves = Vec::new();
+        for (job, outcome) in self.jobs.iter().zip(outcomes) {
+            match (job, outcome) {
+                (Job::Run(n), Outcome::Run(found)) => {
+                    let (name, case, _) = &self.runs[*n];
+                    let (response, rows) = *found;
+                    runs.push(Traced {
+                        name: name.clone(),
+                        case: *case,
+                        response,
+                        rows,
+                    });
+                }
+                (Job::Curve(_), Outcome::Curve(curve)) => curves.push(curve),
+                // Blocks of a sweep come in order of their points.
+                (Job::Block(s, _), Outcome::Block(records)) => {
+                    self.swathes[*s].records.extend(records);
+                }
+                _ => unreachable!("a job has an outcome of its kind"),
+            }
+        }
+        let ideal = runs.pop().expect("the last run is the ideal one");
+        let lagrange = runs.pop().expect("the last but one has multipliers");
+        let nominal = &self.runs[0].2;
+        let all = resolution(nominal, nominal.solver.tolerance);
+        Findings {
+            extent: self.extent,
+            runs,
+            lagrange,
+            ideal,
+            curves,
+            swathes: self.swathes,
+            resolution: PICKED.map(|i| all[i]),
+        }
+    }
+}
+
+/// Name of a run in files.
+fn file_name(case: Case) -> String {
+    format!("response_c{}mm_cf{}", case.clearance, case.friction)
+}
+
+/// The period after `settle` and one more, at equal phases.
+fn curve(
+    case: Case,
+    scene: &Scene,
+    settle: usize,
+    mut go_on: impl FnMut(f64) -> bool,
+) -> Result<Loop, ResponseError> {
+    let mut simulation = Simulation::new(scene)?;
+    let mut frame = Frame::default();
+    let mut found = Loop {
+        case,
+        coordinates: [Vec::new(), Vec::new()],
+        rates: [Vec::new(), Vec::new()],
+        width: [0.0; 2],
+    };
+    let mut before: Vec<[f64; COORDINATES]> = Vec::new();
+    for n in 0..=2 * CURVE_POINTS {
+        let time = PERIOD * (settle as f64 + n as f64 / CURVE_POINTS as f64);
+        while simulation.time() < time {
+            if !go_on(simulation.time()) {
+                return Err(ResponseError::Cancelled);
+            }
+            simulation.step()?;
+        }
+        simulation.sample(time, &mut frame);
+        let pose = &frame.pose;
+        let coordinates = [
+            pose.position.x,
+            pose.position.y,
+            pose.position.z,
+            pose.angles.x,
+            pose.angles.y,
+            pose.angles.z,
+        ];
+        if n < CURVE_POINTS {
+            before.push(coordinates);
+            continue;
+        }
+        let rates = [pose.velocity.x, pose.angle_rates.y];
+        for (which, i) in PICKED.into_iter().enumerate() {
+            found.coordinates[which].push(coordinates[i]);
+            found.rates[which].push(rates[which]);
+            if let Some(earlier) = before.get(n - CURVE_POINTS) {
+                let width = (coordinates[i] - earlier[i]).abs();
+                found.width[which] = found.width[which].max(width);
+            }
+        }
+    }
+    Ok(found)
+}
+
+impl Findings {
+    /// The sweep called `name`.
+    ///
+    /// # Panics
+    /// If there is none.
+    pub fn swathe(&self, name: &str) -> &Swathe {
+        let found = self.swathes.iter().find(|s| s.name == name);
+        found.expect("named as in Work::new")
+    }
+
+    /// Runs as [`paper`] takes them.
+    pub fn responses(&self) -> Vec<(Case, Response)> {
+        self.runs
+            .iter()
+            .map(|r| (r.case, r.response.clone()))
+            .collect()
+    }
+
+    /// The run of `case`.
+    pub fn run(&self, case: Case) -> Option<&Traced> {
+        self.runs.iter().find(|run| run.case == case)
+    }
+
+    /// Settled curves of three runs.
+    pub fn loops(&self, cases: [Case; 3]) -> Vec<Loop> {
+        let of = |case: Case| self.curves.iter().find(|l| l.case == case).cloned();
+        cases.into_iter().filter_map(of).collect()
+    }
+
+    /// What the statements of section 4.3 rest on.
+    pub fn chaos(&self) -> Found {
+        let mm = 1e3;
+        let swept = |name, factor| self.swathe(name).swept(factor);
+        Found {
+            loops: [self.loops(BY_CLEARANCE), self.loops(BY_FRICTION)],
+            runs: [
+                swept("runs_by_clearance", mm),
+                swept("runs_by_friction", 1.0),
+            ],
+            sweeps: [swept("clearance_cold", mm), swept("friction_cold", 1.0)],
+            resolution: self.resolution,
+        }
+    }
+
+    /// Largest distance of the two formulations in x (m) and beta (rad) at the paper's output step.
+    pub fn formulations_apart(&self) -> [f64; 2] {
+        let samples = |run: &Traced| -> Vec<Row> {
+            run.rows.iter().filter(|r| r[14] == 1.0).copied().collect()
+        };
+        let (tree, lagrange) = (samples(&self.runs[0]), samples(&self.lagrange));
+        [1, 4].map(|i| {
+            let pairs = tree.iter().zip(&lagrange);
+            pairs.map(|(a, b)| (a[i] - b[i]).abs()).fold(0.0, f64::max)
+        })
+    }
+
+    /// Every qualitative statement of section 4 and of the conclusions.
+    pub fn statements(&self) -> Vec<Statement> {
+        let mut all = paper::response_statements(&self.responses());
+        let (apart, tree) = (self.formulations_apart(), &self.runs[0].response.full);
+        let shares = [0, 1].map(|k| apart[k] / tree.deviation[PICKED[k]]);
+        let verified = Statement {
+            place: "4.2.3 and first conclusion".into(),
+            says: "an independent formulation of the same mechanism moves alike".to_owned(),
+            criterion: "x and beta of the tree and the lagrange formulation stay within 5 % of their largest deviation from \
+                        the ideal motion"
+                .to_owned(),
+            verdict: if shares.iter().all(|s| *s < 0.05) {
+                paper::Verdict::Confirmed
+            } else {
+                paper::Verdict::NotConfirmed
+            },
+            evidence: format!(
+                "x: {:.3e} mm, {:.2} %; beta: {:.3e} mrad, {:.2} %",
+                apart[0] * 1e3,
+                shares[0] * 100.0,
+                apart[1] * 1e3,
+                shares[1] * 100.0
+            ),
+        };
+        let conclusion = paper::chaos::second_conclusion(&all);
+        all.push(verified);
+        all.extend(paper::chaos::statements(&self.chaos()));
+        // The conclusions stand together at the end.
+        let at = all
+            .iter()
+            .position(|s| s.place.starts_with("5,"))
+            .unwrap_or(all.len());
+        all.splice(at..at, conclusion);
+        let (section, conclusions): (Vec<_>, Vec<_>) =
+            all.into_iter().partition(|s| !s.place.starts_with("5,"));
+        [section, conclusions].concat()
+    }
+}

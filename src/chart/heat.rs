@@ -1,0 +1,172 @@
+//! Maps: a field of cells whose colours are values, with the scale beside it.
+
+use plotters::prelude::*;
+
+use super::draw::{
+    Canvas, FAINT, FINE, INK, Plot, SheetError, TEXT, failed, fine, rgb, style, write,
+};
+use super::ticks::Ruler;
+use super::{Axis, Colour, Map, PALETTE};
+use plotters::style::text_anchor::{HPos, VPos};
+
+/// Width of the scale with its words, pixels.
+pub(super) const SCALE_WIDTH: f64 = 92.0;
+const BAR: f64 = 16.0;
+const GROUND: Colour = (225, 225, 225);
+
+/// What a map's values mean in colours.
+pub(super) struct Legend {
+    ruler: Ruler,
+}
+
+impl Legend {
+    pub(super) fn new(map: &Map) -> Self {
+        let axis = Axis {
+            label: String::new(),
+            range: None,
+            ..map.scale.clone()
+        };
+        let mut ruler = Ruler::new(&axis, map.values.iter().copied());
+        // The scale ends where the values do.
+        let (from, to) = map
+            .values
+            .iter()
+            .map(|v| ruler.place(*v))
+            .filter(|v| v.is_finite())
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
+                (a.min(v), b.max(v))
+            });
+        if from < to {
+            (ruler.from, ruler.to) = (from, to);
+            ruler.ticks.retain(|t| (from..=to).contains(t));
+        }
+        Self { ruler }
+    }
+
+    fn colour(&self, map: &Map, value: f64) -> Colour {
+        if !map.names.is_empty() {
+            let place = map.names.iter().position(|(code, _)| *code == value);
+            return place.map_or(GROUND, |n| PALETTE[(n + 1) % PALETTE.len()]);
+        }
+        let place = self.ruler.place(value);
+        if !place.is_finite() {
+            return GROUND;
+        }
+        let RGBColor(r, g, b) =
+            ViridisRGB.get_color_normalized(place, self.ruler.from, self.ruler.to);
+        (r, g, b)
+    }
+}
+
+/// The edges of cells around `centres`: half way between, and as far beyond the ends.
+fn edges(centres: &[f64]) -> Vec<f64> {
+    let Some((&first, &last)) = centres.first().zip(centres.last()) else {
+        return Vec::new();
+    };
+    if centres.len() < 2 {
+        let half = if first == 0.0 { 0.5 } else { 0.5 * first.abs() };
+        return vec![first - half, first + half];
+    }
+    let middles: Vec<f64> = centres.windows(2).map(|w| 0.5 * (w[0] + w[1])).collect();
+    let mut all = vec![2.0 * first - middles[0]];
+    all.extend(&middles);
+    all.push(2.0 * last - middles[middles.len() - 1]);
+    all
+}
+
+/// Ends of the cells along both axes, for the axes to reach.
+pub(super) fn ends(map: &Map) -> Vec<(f64, f64)> {
+    let (xs, ys) = (edges(&map.xs), edges(&map.ys));
+    let corner = |(x, y): (Option<&f64>, Option<&f64>)| Some((*x?, *y?));
+    [(xs.first(), ys.first()), (xs.last(), ys.last())]
+        .into_iter()
+        .filter_map(corner)
+        .collect()
+}
+
+/// Draws the cells.
+pub(super) fn cells(
+    root: &Canvas,
+    plot: &Plot,
+    map: &Map,
+    x: &Ruler,
+    y: &Ruler,
+) -> Result<(), SheetError> {
+    let legend = Legend::new(map);
+    let (xs, ys) = (edges(&map.xs), edges(&map.ys));
+    for (j, rows) in ys.windows(2).enumerate() {
+        for (i, columns) in xs.windows(2).enumerate() {
+            let value = map
+                .values
+                .get(j * map.xs.len() + i)
+                .copied()
+                .unwrap_or(f64::NAN);
+            let a = plot.backend_coord(&(x.place(columns[0]), y.place(rows[0])));
+            let b = plot.backend_coord(&(x.place(columns[1]), y.place(rows[1])));
+            let filled = rgb(legend.colour(map, value)).filled();
+            root.draw(&Rectangle::new([a, b], filled)).map_err(failed)?;
+        }
+    }
+    Ok(())
+}
+
+/// Draws the scale in the column of width [`SCALE_WIDTH`] from `left`, between `top` and `bottom`, pixels.
+pub(super) fn scale(
+    root: &Canvas,
+    map: &Map,
+    left: f64,
+    top: f64,
+    bottom: f64,
+) -> Result<(), SheetError> {
+    let legend = Legend::new(map);
+    let words = style(TEXT, INK, HPos::Left, VPos::Center);
+    let patch = |from: f64, to: f64, colour: Colour| {
+        let corners = [(fine(left), fine(from)), (fine(left + BAR), fine(to))];
+        root.draw(&Rectangle::new(corners, rgb(colour).filled()))
+            .map_err(failed)
+    };
+    if !map.names.is_empty() {
+        for (n, (code, name)) in map.names.iter().enumerate() {
+            let y = top + 20.0 * n as f64;
+            patch(y, y + 14.0, legend.colour(map, *code))?;
+            write(root, name, (left + BAR + 6.0, y + 7.0), &words)?;
+        }
+        return Ok(());
+    }
+    const PARTS: u32 = 64;
+    let at = |share: f64| bottom + (top - bottom) * share;
+    let ruler = &legend.ruler;
+    for n in 0..PARTS {
+        let (a, b) = (
+            f64::from(n) / f64::from(PARTS),
+            f64::from(n + 1) / f64::from(PARTS),
+        );
+        let place = ruler.from + (ruler.to - ruler.from) * 0.5 * (a + b);
+        let RGBColor(r, g, bl) = ViridisRGB.get_color_normalized(place, ruler.from, ruler.to);
+        patch(at(b), at(a), (r, g, bl))?;
+    }
+    for tick in &ruler.ticks {
+        let y = at((tick - ruler.from) / (ruler.to - ruler.from));
+        let ends = vec![
+            (fine(left + BAR), fine(y)),
+            (fine(left + BAR + 4.0), fine(y)),
+        ];
+        root.draw(&PathElement::new(ends, rgb(FAINT).stroke_width(FINE)))
+            .map_err(failed)?;
+        write(root, &ruler.word(*tick), (left + BAR + 7.0, y), &words)?;
+    }
+    let unit = style(TEXT, INK, HPos::Left, VPos::Bottom);
+    write(root, &map.scale.unit, (left, top - 6.0), &unit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::edges;
+
+    #[test]
+    fn cells_lie_around_their_values() {
+        assert_eq!(edges(&[1.0, 2.0, 4.0]), [0.5, 1.5, 3.0, 5.0]);
+        assert_eq!(edges(&[2.0]), [1.0, 3.0]);
+        assert!(edges(&[]).is_empty());
+    }
+}

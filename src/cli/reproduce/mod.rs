@@ -1,0 +1,155 @@
+//! `reproduce`: everything of the paper's section 4 in one go, as data, plots and one page that sets it beside the paper.
+
+mod compute;
+mod data;
+mod figures;
+mod page;
+mod text;
+
+use std::path::Path;
+use std::thread;
+use std::time::Instant;
+
+use serde_json::{Value as Json, json};
+
+use super::args::ReproduceArguments;
+use super::output::{Folder, MANIFEST};
+use super::{Failure, interrupt, print, progress};
+use crate::analysis::paper::{Agreement, Verdict};
+use crate::analysis::reproduction::{Extent, Findings, Work};
+
+/// Does what `reproduce` asks.
+///
+/// # Errors
+/// A folder that cannot be written, before anything is computed; Ctrl-C, the file system.
+pub fn reproduce(arguments: &ReproduceArguments) -> Result<(), Failure> {
+    let folder = Folder::claim(&arguments.out, arguments.force)?;
+    let extent = if arguments.quick {
+        Extent::QUICK
+    } else {
+        Extent::FULL
+    };
+    interrupt::listen();
+    let cores = || thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
+    let threads = arguments.threads.map_or_else(cores, usize::from);
+    let started = Instant::now();
+    let work = Work::new(extent).map_err(|error| Failure::usage(error.to_string()))?;
+    let length = (0..work.jobs()).map(|job| work.length(job)).sum::<f64>();
+    let bar = progress::bar(!arguments.quiet, length.ceil() as u64);
+    let found = compute::compute(work, threads, &bar);
+    bar.finish_and_clear();
+    let found = found?;
+    fill(folder.scratch(), &found)?;
+    folder.finish()?;
+    print(&summary(
+        &found,
+        &arguments.out,
+        started.elapsed().as_secs_f64(),
+    ))
+}
+
+/// Computes a report of any extent and writes it to `out`, which must not exist or be empty.
+///
+/// # Errors
+/// As [`reproduce`].
+pub fn into_folder(out: &Path, extent: Extent, threads: usize) -> Result<(), Failure> {
+    let folder = Folder::claim(out, false)?;
+    let work = Work::new(extent).map_err(|error| Failure::usage(error.to_string()))?;
+    let found = compute::compute(work, threads, &progress::bar(false, 1))?;
+    fill(folder.scratch(), &found)?;
+    folder.finish()
+}
+
+/// Writes all files into `folder`.
+fn fill(folder: &Path, found: &Findings) -> Result<(), Failure> {
+    let mut files = data::write(&folder.join("data"), found)?;
+    let drawn = figures::all(found);
+    let plots = folder.join("plots");
+    make(&plots)?;
+    let mut pictures = Vec::new();
+    for (name, sheet) in &drawn {
+        if interrupt::asked() {
+            return Err(interrupted());
+        }
+        let drawing = |error: crate::chart::SheetError| Failure::io(format!("{name}: {error}"));
+        let svg = sheet.svg().map_err(drawing)?;
+        save(&plots.join(format!("{name}.svg")), svg.as_bytes())?;
+        save(
+            &plots.join(format!("{name}.png")),
+            &sheet.png(1.5).map_err(drawing)?,
+        )?;
+        files.extend(["svg", "png"].map(|ending| format!("plots/{name}.{ending}")));
+        pictures.push(((*name).to_owned(), svg));
+    }
+    let page = page::page(found, &pictures)?;
+    save(&folder.join("index.html"), page.as_bytes())?;
+    files.push("index.html".to_owned());
+    files.sort();
+    let mut meta = meta(found)?;
+    meta.insert("files".into(), json!(files));
+    let text = format!("{:#}\n", Json::Object(meta));
+    save(&folder.join(MANIFEST), text.as_bytes())
+}
+
+/// What made the report.
+fn meta(found: &Findings) -> Result<serde_json::Map<String, Json>, Failure> {
+    let scene = found.swathe("clearance_cold").sweep.scene();
+    let mut meta = super::provenance::meta(scene)?;
+    meta.insert("command".into(), json!(command(found)));
+    meta.insert("simulated_s".into(), json!(text::simulated(found)));
+    Ok(meta)
+}
+
+fn command(found: &Findings) -> &'static str {
+    if found.extent == Extent::FULL {
+        "jointplay reproduce --out report/"
+    } else {
+        "jointplay reproduce --out report/ --quick"
+    }
+}
+
+fn make(folder: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(folder)
+        .map_err(|e| Failure::io(format!("cannot write {}: {e}", folder.display())))
+}
+
+fn save(path: &Path, content: &[u8]) -> Result<(), Failure> {
+    std::fs::write(path, content)
+        .map_err(|e| Failure::io(format!("cannot write {}: {e}", path.display())))
+}
+
+fn interrupted() -> Failure {
+    Failure::new(Failure::INTERRUPTED, "interrupted; nothing was written")
+}
+
+/// What was found, in a few lines.
+fn summary(found: &Findings, out: &Path, wall: f64) -> String {
+    let statements = found.statements();
+    let confirmed = statements
+        .iter()
+        .filter(|s| s.verdict == Verdict::Confirmed)
+        .count();
+    let compared = crate::analysis::paper::compare(&found.responses());
+    let with = |agreement| {
+        compared
+            .iter()
+            .filter(|c| c.agreement() == agreement)
+            .count()
+    };
+    format!(
+        "Numbers           {} of {} agree within 10 %, {} more within a factor of 2, {} differ\n\
+         Statements        {confirmed} of {} confirmed\n\
+         Simulated         {:.0} s\n\
+         Wall time         {wall:.1} s\n\
+         Written           {}\n\
+         Version           jointplay {}\n",
+        with(Agreement::Agrees),
+        compared.len(),
+        with(Agreement::Near),
+        with(Agreement::Differs),
+        statements.len(),
+        text::simulated(found),
+        out.join("index.html").display(),
+        crate::VERSION
+    )
+}

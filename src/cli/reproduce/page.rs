@@ -1,0 +1,642 @@
+//! The page: each figure of the paper beside what this program gets. One file, nothing from the network.
+
+use std::fmt::Write as _;
+
+use super::text::{self, Compared};
+use super::{command, meta};
+use crate::analysis::paper::chaos::word;
+use crate::analysis::paper::{Quantity, Statement, VERIFICATION, Verdict};
+use crate::analysis::reproduction::{Findings, PERIOD};
+use crate::cli::Failure;
+use crate::cli::output::significant;
+
+const STYLE: &str = include_str!("page.css");
+
+/// A figure: its number in the paper ("" beyond it), name of its picture, heading, caption.
+type Entry = (&'static str, &'static str, &'static str, &'static str);
+
+/// Sections of the page with their figures.
+const SECTIONS: [(&str, &str, &[Entry]); 5] = [
+    (
+        "clearance",
+        "Response to clearance",
+        &[
+            (
+                "5",
+                "figure-05",
+                "Figure 5: displacement",
+                "Position x and angle β of the platform at friction 0.2. Above, the whole period: the curves of the three clearances lie on each other. Below, their distance from the motion with ideal joints while the balls bounce.",
+            ),
+            (
+                "6",
+                "figure-06",
+                "Figure 6: velocity",
+                "Every impact is a step in velocity. After the last one the curves follow the drive.",
+            ),
+            (
+                "7",
+                "figure-07",
+                "Figure 7: acceleration",
+                "Accelerations peak inside impacts that last about a millisecond; samples 1 ms apart see a peak only by chance.",
+            ),
+            (
+                "8",
+                "figure-08",
+                "Figure 8: contact forces at 0.3 mm",
+                "Each spike is one impact of a ball on its socket.",
+            ),
+            (
+                "9",
+                "figure-09",
+                "Figure 9: contact forces at 0.5 mm",
+                "A wider gap gives the ball a longer fall and a harder landing.",
+            ),
+            (
+                "10",
+                "figure-10",
+                "Figure 10: contact forces at 0.7 mm",
+                "The hardest and the longest bouncing of the three.",
+            ),
+        ],
+    ),
+    (
+        "friction",
+        "Response to friction",
+        &[
+            (
+                "11",
+                "figure-11",
+                "Figure 11: displacement",
+                "As Figure 5, at 0.3 mm and three friction coefficients.",
+            ),
+            (
+                "12",
+                "figure-12",
+                "Figure 12: velocity",
+                "Friction acts on sliding balls only; the first landings are the same whatever it is.",
+            ),
+            (
+                "13",
+                "figure-13",
+                "Figure 13: acceleration",
+                "The paper's numbers for x fall as friction grows, while its text says that they rise.",
+            ),
+            (
+                "14",
+                "figure-14",
+                "Figure 14: contact forces at friction 0.15",
+                "0.3 mm of clearance, as in the two figures that follow.",
+            ),
+            (
+                "15",
+                "figure-15",
+                "Figure 15: contact forces at friction 0.20",
+                "The same run as Figure 8. The paper prints other peaks for it here than there.",
+            ),
+            (
+                "16",
+                "figure-16",
+                "Figure 16: contact forces at friction 0.25",
+                "The largest friction of the three.",
+            ),
+        ],
+    ),
+    (
+        "verification",
+        "Verification",
+        &[
+            (
+                "17",
+                "figure-17",
+                "Figure 17: two formulations and the ideal motion",
+                "The paper compares its own program with a commercial one; here two formulations that share no equations of motion stand for them: a spanning forest with independent coordinates, and all bodies with multipliers and Baumgarte stabilisation, the paper's own. Clearance 0.3 mm, friction 0.2.",
+            ),
+            (
+                "",
+                "figure-17-drift",
+                "Drift of the Baumgarte form",
+                "Left, how far the formulations are apart at equal times. Right, the largest violation of a constraint of the lagrange form so far: stabilisation bounds it and does not remove it.",
+            ),
+        ],
+    ),
+    (
+        "chaos",
+        "Phase portraits, sections and bifurcations",
+        &[
+            (
+                "18",
+                "figure-18",
+                "Figure 18: phase portraits by clearance",
+                "Above, one period of settled motion; below, the first period with its impacts.",
+            ),
+            (
+                "19",
+                "figure-19",
+                "Figure 19: Poincaré sections by clearance",
+                "One point a drive period, at the phase of the start, transient discarded. Sections that coincide in the picture are drawn once.",
+            ),
+            (
+                "20",
+                "figure-20",
+                "Figure 20: bifurcation over clearance",
+                "Above, all kept sections at each clearance, from a cold start at every value and following the motion upward and downward. Below, how much the sections of one point spread, and how far the followed branches are from the cold start: hysteresis would stand above the resolution.",
+            ),
+            (
+                "21",
+                "figure-21",
+                "Figure 21: phase portraits by friction",
+                "As Figure 18, at 0.3 mm.",
+            ),
+            (
+                "22",
+                "figure-22",
+                "Figure 22: Poincaré sections by friction",
+                "As Figure 19, at 0.3 mm.",
+            ),
+            (
+                "23",
+                "figure-23",
+                "Figure 23: bifurcation over friction",
+                "As Figure 20, at 0.3 mm.",
+            ),
+        ],
+    ),
+    (
+        "beyond",
+        "Beyond the paper",
+        &[
+            (
+                "",
+                "exponent-clearance",
+                "Largest Lyapunov exponent over clearance",
+                "From two nearby runs. Below 0, neighbouring motions meet; above it they part exponentially, which is what chaos means. Right, how the estimate settles as the run gets longer, for clearances spread over the range.",
+            ),
+            (
+                "",
+                "exponent-friction",
+                "Largest Lyapunov exponent over friction",
+                "The same at 0.3 mm.",
+            ),
+            (
+                "",
+                "map",
+                "Clearance and friction together",
+                "Every cell is one run from a cold start: its regime, the largest contact force (in the first impacts), the probe's error in settled motion, and the exponent.",
+            ),
+            (
+                "",
+                "probe",
+                "What clearance does to the instrument",
+                "Distance of the probe tip from where an ideal machine would have it, which is what a coordinate measuring machine would report wrongly. Left, in settled motion; right, with the first period's impacts.",
+            ),
+        ],
+    ),
+];
+
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+}
+
+/// The whole page.
+///
+/// # Errors
+/// A scene without the keys that every scene has.
+pub(super) fn page(found: &Findings, pictures: &[(String, String)]) -> Result<String, Failure> {
+    let compared = text::compared(found);
+    let statements = found.statements();
+    let mut out = String::with_capacity(1 << 20);
+    // Writing to a String cannot fail.
+    let _ = write!(
+        out,
+        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <title>Section 4 of Sheng &amp; Chen, reproduced</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n"
+    );
+    header(&mut out, &compared, &statements);
+    out.push_str("<main>\n");
+    contents(&mut out);
+    caveats(&mut out);
+    for (id, title, entries) in SECTIONS {
+        let _ = writeln!(out, "<h2 id=\"{id}\">{title}</h2>");
+        for entry in entries {
+            figure(&mut out, entry, pictures);
+            after(&mut out, entry, &compared, found);
+        }
+    }
+    statement_table(&mut out, &statements);
+    provenance(&mut out, found)?;
+    out.push_str("</main>\n</body>\n</html>\n");
+    Ok(out)
+}
+
+fn header(out: &mut String, compared: &[Compared], statements: &[Statement]) {
+    let with = |word: &str| {
+        compared
+            .iter()
+            .filter(|c| c.agreement.starts_with(word))
+            .count()
+    };
+    let confirmed = statements
+        .iter()
+        .filter(|s| s.verdict == Verdict::Confirmed)
+        .count();
+    let _ = write!(
+        out,
+        "<header>\n<h1>Clearance in a parallel measuring machine: section 4, reproduced</h1>\n\
+         <p class=\"lead\">Every figure and number of section 4 of Sheng &amp; Chen's study of a spatial parallel coordinate measuring \
+         machine with clearance in its ball joints, beside what Jointplay computes for the same. \
+         Where they disagree, the page says so.</p>\n\
+         <div class=\"cards\">\n\
+         <div class=\"card\"><b>{} of {}</b><span>printed numbers agree within 10 %</span></div>\n\
+         <div class=\"card\"><b>{}</b><span>more lie within a factor of 2</span></div>\n\
+         <div class=\"card\"><b>{}</b><span>differ by more</span></div>\n\
+         <div class=\"card\"><b>{confirmed} of {}</b><span>qualitative statements confirmed</span></div>\n\
+         </div>\n</header>\n",
+        with("agrees"),
+        compared.len(),
+        with("within"),
+        with("differs"),
+        statements.len()
+    );
+}
+
+fn contents(out: &mut String) {
+    out.push_str("<nav aria-label=\"Contents\"><ol>\n<li><a href=\"#caveats\">What a comparison can mean</a></li>\n");
+    for (id, title, entries) in SECTIONS {
+        let _ = writeln!(out, "<li><a href=\"#{id}\">{title}</a><ol>");
+        for (_, name, heading, _) in entries {
+            let _ = writeln!(out, "<li><a href=\"#{name}\">{heading}</a></li>");
+        }
+        out.push_str("</ol></li>\n");
+    }
+    out.push_str(
+        "<li><a href=\"#statements\">Statements, one by one</a></li>\n<li><a href=\"#provenance\">How this was made</a></li>\n</ol></nav>\n",
+    );
+}
+
+fn caveats(out: &mut String) {
+    out.push_str(
+        "<h2 id=\"caveats\">What a comparison can mean</h2>\n\
+         <ul>\n\
+         <li>The paper does not print one dimension of the mechanism, a<sub>1</sub>, the distance of the sliders' plane from the origin. \
+         The value used here, 32 mm, keeps the prescribed trajectory within reach all period long, and among such \
+         values brings peak velocity and peak force nearest to the printed ones: it is the only number chosen with an eye on the results. Orders of magnitude and trends can be expected to agree, \
+         last digits cannot.</li>\n\
+         <li>It contradicts itself: Figures 8 and 15 are the same run (0.3 mm, friction 0.2) with different peaks, and so are Figures 5b and 11b, \
+         6 and 12 for that run. Where the paper has two values no program can match both; both are compared.</li>\n\
+         <li>For Figure 13a the text says that peaks rise with friction; the numbers beside it fall.</li>\n\
+         <li>The text about Figures 19 and 22 calls the same motions quasi-periodic that it calls periodic at Figures 18, 20 and 23.</li>\n\
+         <li>Its runs are reported every 1 ms, about as long as an impact lasts. Peaks are therefore given twice: in continuous time, and sampled at \
+         1 ms as the paper samples. The verdict goes by the sampled value where there is one: <span class=\"ok\">agrees within 10 %</span>, \
+         <span class=\"near\">within a factor of 2</span>, <span class=\"off\">differs</span>.</li>\n\
+         </ul>\n",
+    );
+}
+
+fn figure(out: &mut String, (_, name, heading, caption): &Entry, pictures: &[(String, String)]) {
+    let svg = pictures
+        .iter()
+        .find(|(of, _)| of == name)
+        .map_or("", |(_, svg)| svg);
+    // The height follows the width of the page.
+    let svg = svg.replacen(
+        "<svg ",
+        &format!("<svg role=\"img\" aria-label=\"{heading}\" "),
+        1,
+    );
+    let _ = write!(
+        out,
+        "<h3 id=\"{name}\">{heading}</h3>\n<figure>\n{}\n<figcaption>{caption} <a href=\"plots/{name}.svg\">SVG</a>, \
+         <a href=\"plots/{name}.png\">PNG</a>.</figcaption>\n</figure>\n",
+        svg.trim()
+    );
+}
+
+fn badge(agreement: &str) -> String {
+    let class = match agreement {
+        word if word.starts_with("agrees") => "ok",
+        word if word.starts_with("within") => "near",
+        _ => "off",
+    };
+    format!("<span class=\"{class}\">{agreement}</span>")
+}
+
+/// Four digits: what a reader takes in.
+pub(super) fn shown(value: f64) -> String {
+    significant(value, 4).replace('-', "\u{2212}")
+}
+
+fn optional(value: Option<f64>) -> String {
+    value.map_or_else(|| "\u{2013}".to_owned(), shown)
+}
+
+/// The tables that belong to a figure.
+fn after(out: &mut String, entry: &Entry, compared: &[Compared], found: &Findings) {
+    let (number, name, ..) = *entry;
+    let own = |c: &&Compared| {
+        !number.is_empty() && c.figure.trim_end_matches(char::is_alphabetic) == number
+    };
+    let rows: Vec<&Compared> = compared.iter().filter(own).collect();
+    if !rows.is_empty() {
+        table_of(out, &rows);
+    }
+    match name {
+        "figure-17" => verification(out, found),
+        "figure-17-drift" => drift(out, found),
+        "figure-19" => runs(out, found, 0),
+        "figure-22" => runs(out, found, 1),
+        "figure-20" => branches(out, found, 0),
+        "figure-23" => branches(out, found, 1),
+        "probe" => probe(out, found),
+        _ => {}
+    }
+}
+
+fn open(out: &mut String, heads: &[(&str, bool)]) {
+    out.push_str("<div class=\"scroll\"><table>\n<thead><tr>");
+    for (head, number) in heads {
+        let class = if *number { " class=\"n\"" } else { "" };
+        let _ = write!(out, "<th{class}>{head}</th>");
+    }
+    out.push_str("</tr></thead>\n<tbody>\n");
+}
+
+const CLOSE: &str = "</tbody></table></div>\n";
+
+fn number(text: &str) -> String {
+    format!("<td class=\"n\">{text}</td>")
+}
+
+fn table_of(out: &mut String, rows: &[&Compared]) {
+    open(
+        out,
+        &[
+            ("Figure", false),
+            ("Clearance", true),
+            ("Friction", true),
+            ("Quantity", false),
+            ("Paper", true),
+            ("Here", true),
+            ("Here at 1 ms", true),
+            ("Here / paper", true),
+            ("At 1 ms / paper", true),
+            ("Verdict", false),
+        ],
+    );
+    for c in rows {
+        let unit = format!("{} ({})", c.what, c.unit);
+        let _ = writeln!(
+            out,
+            "<tr><td>{}</td>{}{}<td>{unit}</td>{}{}{}{}{}<td class=\"verdict\">{}</td></tr>",
+            c.figure,
+            number(&format!("{} mm", c.case.clearance)),
+            number(&c.case.friction.to_string()),
+            number(&shown(c.paper)),
+            number(&shown(c.full)),
+            number(&optional(c.sampled)),
+            number(&significant(c.full / c.paper, 3)),
+            number(
+                &c.sampled
+                    .map_or_else(|| "\u{2013}".to_owned(), |s| significant(s / c.paper, 3))
+            ),
+            badge(c.agreement)
+        );
+    }
+    out.push_str(CLOSE);
+}
+
+fn verification(out: &mut String, found: &Findings) {
+    out.push_str("<p>The paper does not name the run of this figure. Its peaks, beside those of both formulations at 0.3 mm and friction 0.2:</p>\n");
+    open(
+        out,
+        &[
+            ("Figure", false),
+            ("Quantity", false),
+            ("Paper, own", true),
+            ("Paper, commercial", true),
+            ("Tree", true),
+            ("Tree at 1 ms", true),
+            ("Lagrange", true),
+            ("Lagrange at 1 ms", true),
+        ],
+    );
+    let two = |q: Quantity, run: &crate::analysis::response::Response| {
+        let (full, sampled) = q.of(run);
+        format!("{}{}", number(&shown(full)), number(&optional(sampled)))
+    };
+    for (figure, quantity, own, other) in VERIFICATION {
+        let (what, unit) = quantity.label();
+        let _ = writeln!(
+            out,
+            "<tr><td>{figure}</td><td>{what} ({unit})</td>{}{}{}{}</tr>",
+            number(&shown(own)),
+            number(&shown(other)),
+            two(quantity, &found.runs[0].response),
+            two(quantity, &found.lagrange.response)
+        );
+    }
+    for joint in 0..3 {
+        let (what, unit) = Quantity::Normal(joint).label();
+        let none = number("\u{2013}");
+        let _ = writeln!(
+            out,
+            "<tr><td></td><td>{what} ({unit})</td>{none}{none}{}{}</tr>",
+            two(Quantity::Normal(joint), &found.runs[0].response),
+            two(Quantity::Normal(joint), &found.lagrange.response)
+        );
+    }
+    out.push_str(CLOSE);
+}
+
+fn drift(out: &mut String, found: &Findings) {
+    let [x, beta] = found.formulations_apart();
+    let _ = writeln!(
+        out,
+        "<p>The formulations differ by at most {} µm in x and {} µrad in β. The largest violation of a constraint of the lagrange form is {} µm \
+         (µrad for directions); the tree form has none by construction, but for its loops, which are closed at every step.</p>",
+        shown(x * 1e6),
+        shown(beta * 1e6),
+        shown(found.lagrange.response.constraint_drift * 1e6)
+    );
+}
+
+fn runs(out: &mut String, found: &Findings, which: usize) {
+    let chaos = found.chaos();
+    open(
+        out,
+        &[
+            (["Clearance (mm)", "Friction"][which], true),
+            ("Regime", false),
+            ("Exponent (1/s)", true),
+            ("x (mm)", true),
+            ("Spread of x (µm)", true),
+            ("β (mrad)", true),
+            ("Spread of β (µrad)", true),
+        ],
+    );
+    for run in &chaos.runs[which] {
+        let _ = writeln!(
+            out,
+            "<tr>{}<td>{}</td>{}{}{}{}{}</tr>",
+            number(&shown(run.value)),
+            word(run),
+            number(&format!(
+                "{} ± {}",
+                shown(run.exponent.0),
+                significant(run.exponent.1, 2)
+            )),
+            number(&significant(run.latest(0) * 1e3, 6)),
+            number(&significant(run.spread(0) * 1e6, 2)),
+            number(&significant(run.latest(1) * 1e3, 6).replace('-', "\u{2212}")),
+            number(&significant(run.spread(1) * 1e6, 2))
+        );
+    }
+    out.push_str(CLOSE);
+}
+
+fn branches(out: &mut String, found: &Findings, which: usize) {
+    let names = [
+        ["clearance_cold", "clearance_up", "clearance_down"],
+        ["friction_cold", "friction_up", "friction_down"],
+    ][which];
+    let all = names.map(|name| found.swathe(name).swept(1.0));
+    let most = |other: usize, c: usize| {
+        let pairs = all[0].iter().zip(&all[other]);
+        pairs
+            .map(|(a, b)| (a.latest(c) - b.latest(c)).abs() * 1e6)
+            .fold(0.0, f64::max)
+    };
+    let (up, down) = ([most(1, 0), most(1, 1)], [most(2, 0), most(2, 1)]);
+    let within = (0..2).all(|c| up[c].max(down[c]) <= found.resolution[c] * 1e6);
+    let _ = writeln!(
+        out,
+        "<p>{} values. Followed upward, the last section differs from that of a cold start by at most {} µm in x and {} µrad in β; downward, by {} µm \
+         and {} µrad. The resolution is {} µm and {} µrad: {}</p>",
+        all[0].len(),
+        shown(up[0]),
+        shown(up[1]),
+        shown(down[0]),
+        shown(down[1]),
+        shown(found.resolution[0] * 1e6),
+        shown(found.resolution[1] * 1e6),
+        if within {
+            "there is no hysteresis."
+        } else {
+            "the branches are apart somewhere, by hysteresis or because a transient has not ended; the lower diagrams show where."
+        }
+    );
+}
+
+fn probe(out: &mut String, found: &Findings) {
+    let swathe = found.swathe("clearance_cold");
+    let (largest, rms) = (
+        swathe.values("probe_error_max_um"),
+        swathe.values("probe_error_rms_um"),
+    );
+    let points = swathe.swept(1e3);
+    open(
+        out,
+        &[
+            ("Clearance (mm)", true),
+            ("Largest error (µm)", true),
+            ("Root mean square (µm)", true),
+            ("Largest error / clearance", true),
+        ],
+    );
+    let rows = 10.min(points.len());
+    for n in 0..rows {
+        let k = n * (points.len() - 1) / (rows - 1).max(1);
+        let _ = writeln!(
+            out,
+            "<tr>{}{}{}{}</tr>",
+            number(&shown(points[k].value)),
+            number(&shown(largest[k])),
+            number(&shown(rms[k])),
+            number(&significant(largest[k] / (points[k].value * 1e3), 3))
+        );
+    }
+    out.push_str(CLOSE);
+}
+
+fn statement_table(out: &mut String, statements: &[Statement]) {
+    out.push_str("<h2 id=\"statements\">Statements, one by one</h2>\n<p>What the paper says in words, with the criterion that it is held against here and the numbers behind the verdict.</p>\n");
+    open(
+        out,
+        &[
+            ("Place", false),
+            ("Statement and criterion", false),
+            ("Verdict", false),
+        ],
+    );
+    for s in statements {
+        let class = if s.verdict == Verdict::Confirmed {
+            "ok"
+        } else {
+            "off"
+        };
+        let _ = writeln!(
+            out,
+            "<tr><td>{}</td><td><b>{}.</b> Criterion: {}.<br><span class=\"evidence\">{}</span></td><td class=\"verdict\"><span class=\"{class}\">{}</span></td></tr>",
+            escape(&s.place),
+            escape(&capital(&s.says)),
+            escape(&s.criterion),
+            escape(&s.evidence),
+            text::verdict(s.verdict)
+        );
+    }
+    out.push_str(CLOSE);
+}
+
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    // Names of coordinates stay as they are.
+    match letters.next() {
+        Some(first) if !text.starts_with("x ") => first.to_uppercase().chain(letters).collect(),
+        _ => text.to_owned(),
+    }
+}
+
+fn provenance(out: &mut String, found: &Findings) -> Result<(), Failure> {
+    let meta = meta(found)?;
+    let value = |key: &str| {
+        let value = meta.get(key).cloned().unwrap_or_default();
+        value
+            .as_str()
+            .map_or_else(|| value.to_string(), str::to_owned)
+    };
+    let e = &found.extent;
+    let _ = write!(
+        out,
+        "<h2 id=\"provenance\">How this was made</h2>\n<pre>{}</pre>\n\
+         <p>Jointplay {}, scene <code>{}</code>, {} formulation but where another is named, method {} at a tolerance of {}. {} simulated seconds \
+         altogether: the paper's runs over {} s; settled curves after {} periods; {} periods of each run of Figures 19 and 22, {} of them discarded; {} \
+         clearances and {} frictions in three ways, {} periods each, {} discarded; a map of {} by {} points, {} periods each, {} discarded. A period takes {} s.</p>\n\
+         <p>The same program gives the same bytes on any number of threads. All numbers of this page are in <code>data/</code>: \
+         <a href=\"data/numbers.csv\">the comparison</a>, <a href=\"data/statements.csv\">the statements</a>, the runs (every 1 ms as CSV, at every \
+         instant that was looked at as NumPy archives), and the sweeps with all sections, in the form that <code>jointplay sweep</code> writes.</p>\n\
+         <p>The paper: Y. Sheng and X. Chen on the dynamics and chaos of a spatial parallel coordinate measuring mechanism with several spherical \
+         clearance joints. Captions and statements are in words of our own.</p>\n",
+        command(found),
+        value("version"),
+        value("scene"),
+        value("formulation"),
+        value("method"),
+        value("tolerance"),
+        text::simulated(found),
+        crate::analysis::paper::DURATION,
+        e.settle,
+        e.runs.0,
+        e.runs.1,
+        e.values[0],
+        e.values[1],
+        e.sweep.0,
+        e.sweep.1,
+        e.map[0],
+        e.map[1],
+        e.map_periods.0,
+        e.map_periods.1,
+        PERIOD
+    );
+    Ok(())
+}
