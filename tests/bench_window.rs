@@ -305,3 +305,26 @@ fn pictures() {
     harness.snapshot("bench_sweep");
     results.extend_harness(&mut harness);
 }
+
+#[test]
+fn every_control_of_the_bench_has_a_name() {
+    let mut harness = window("spcmm", &[FAST]);
+    harness.run();
+    let mut controls = 0;
+    for node in harness.root().children_recursive() {
+        let node = node.accesskit_node();
+        let is_control = matches!(
+            node.role(),
+            Role::Button
+                | Role::Slider
+                | Role::TextInput
+                | Role::ComboBox
+                | Role::CheckBox
+                | Role::SpinButton
+        );
+        controls += usize::from(is_control);
+        let named = node.label().is_some_and(|label| !label.trim().is_empty());
+        assert!(!is_control || named, "{:?}", node.role());
+    }
+    assert!(controls > 30, "{controls}");
+}

@@ -15,7 +15,7 @@ const STEPS: u32 = 400;
 /// Coordinates of the output body: x, y, z in m, alpha, beta, gamma in rad.
 pub const COORDINATES: usize = 6;
 /// Most kept sections of all points together: what a window holds and draws.
-const MOST_SECTIONS: usize = 200_000;
+const MOST_SECTIONS: usize = 50_000;
 
 /// What a sweep is asked for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

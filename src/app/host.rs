@@ -109,8 +109,8 @@ mod desktop {
 
     use eframe::egui;
 
-    use super::super::background::Thread;
     use super::{Host, Job, OpenedFile, Running, SaveFile};
+    use crate::app::background::Thread;
 
     /// Files of the desktop.
     #[derive(Debug, Default)]

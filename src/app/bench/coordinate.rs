@@ -2,8 +2,8 @@
 
 use eframe::egui::{ComboBox, Ui};
 
-use super::super::watch::Observed;
 use super::plane::Axis;
+use crate::app::watch::Observed;
 use crate::simulate::Quantity;
 
 /// One of x, y, z, alpha, beta, gamma, by its place in a section.

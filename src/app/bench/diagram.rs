@@ -3,12 +3,12 @@
 use eframe::egui::{ComboBox, Pos2, RichText, Sense, Ui};
 use egui_plot::{HLine, LineStyle, PlotPoint, PlotPoints, PlotTransform, Points, VLine};
 
-use super::super::theme;
 use super::coordinate::Coordinate;
 use super::plane::{Axis, plane};
 use super::portrait::title;
 use super::sweep::Swept;
 use crate::analysis::swept::SweptPoint;
+use crate::app::theme;
 use crate::scene::{table, to_display};
 
 const HEIGHT: f32 = 230.0;

@@ -3,10 +3,10 @@
 use eframe::egui::{Checkbox, RichText, Ui};
 use egui_plot::{GridMark, Line, LineStyle, PlotPoints};
 
-use super::super::player::Player;
-use super::super::{plots, theme, value};
 use super::plane::{Axis, plane};
 use super::portrait::title;
+use crate::app::player::Player;
+use crate::app::{plots, theme, value};
 
 const HEIGHT: f32 = 170.0;
 

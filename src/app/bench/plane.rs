@@ -3,8 +3,8 @@
 use eframe::egui::{self, Rangef, Sense, Ui, Vec2b};
 use egui_plot::{AxisHints, HoverPosition, Plot};
 
-use super::super::plots::{marks, tick};
-use super::super::value;
+use crate::app::plots::{marks, tick};
+use crate::app::value;
 
 /// Name and unit of an axis.
 #[derive(Clone, Debug, PartialEq)]

@@ -3,11 +3,11 @@
 use eframe::egui::{RichText, Slider, SliderClamping, Ui};
 use egui_plot::{Line, PlotPoint, PlotPoints, Points};
 
-use super::super::player::Player;
-use super::super::theme;
-use super::super::watch::Observed;
 use super::coordinate::Coordinate;
 use super::plane::{Axis, plane};
+use crate::app::player::Player;
+use crate::app::theme;
+use crate::app::watch::Observed;
 use crate::scene::format_quantity_digits;
 
 /// Height of each plot, points.

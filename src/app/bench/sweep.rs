@@ -2,16 +2,16 @@
 
 use eframe::egui::{ComboBox, DragValue, ProgressBar, RichText, TextEdit, Ui};
 
-use super::super::host::{Host, Running};
-use super::super::load::Load;
-use super::super::player::Player;
-use super::super::value;
 use super::coordinate::Coordinate;
 use super::diagram::Diagram;
 use crate::analysis::grid::Start;
 use crate::analysis::point::LOOSEST_FOR_EXPONENT;
 use crate::analysis::swept::{Range, SweepTask, SweptPoint};
 use crate::analysis::task::{Job, Message, SceneSource};
+use crate::app::host::{Host, Running};
+use crate::app::load::Load;
+use crate::app::player::Player;
+use crate::app::value;
 use crate::scene::{Kind, Parameter, Value};
 
 /// Parameter that is varied at first, and its range.
