@@ -4,6 +4,8 @@ use std::sync::Arc;
 
 use eframe::egui;
 
+#[cfg(not(target_arch = "wasm32"))]
+use super::background::Thread;
 use crate::analysis::task::{Job, Message};
 
 /// A computation beside the interface.
@@ -109,8 +111,7 @@ mod desktop {
 
     use eframe::egui;
 
-    use super::super::background::Thread;
-    use super::{Host, Job, OpenedFile, Running, SaveFile};
+    use super::{Host, Job, OpenedFile, Running, SaveFile, Thread};
 
     /// Files of the desktop.
     #[derive(Debug, Default)]
