@@ -173,8 +173,10 @@ test('a preset is measured in a worker: it says how far it is, can be cancelled,
 
     await lab.page.evaluate(() => (location.hash = '#scene=pendulum&c=0.2mm&play=0'));
     const error = async () => {
-        const widgets = await lab.widgets();
-        return widgets[widgets.findIndex(({ label }) => label === 'Peak force error') + 1]?.label;
+        // What stands on its right.
+        const labels = (await lab.widgets()).filter(({ role }) => role === 'Label');
+        const name = labels.find(({ label }) => label === 'Peak force error');
+        return labels.find(({ rect }) => Math.abs(rect[1] - name.rect[1]) < 4 && rect[0] > name.rect[2])?.label;
     };
     await lab.until(async () => (await error()) === 'not measured', 'a changed scene was measured already');
     await lab.click('Button', 'Measure preset');
