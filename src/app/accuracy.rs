@@ -132,7 +132,8 @@ impl Accuracy {
                     ProgressBar::new(self.progress as f32)
                         .show_percentage()
                         .desired_width(ui.available_width()),
-                );
+                )
+                .accessible_name("Measured so far");
             });
         } else if ui
             .button("Measure preset")

@@ -153,7 +153,8 @@ impl App {
                 ui.horizontal_wrapped(|ui| {
                     let percent = (fraction * 100.0).floor();
                     ui.label(format!("Reproducing the state of the link… {percent} %"));
-                    ui.add(egui::ProgressBar::new(fraction).desired_width(120.0));
+                    ui.add(egui::ProgressBar::new(fraction).desired_width(120.0))
+                        .accessible_name("Run so far");
                     cancelled = ui
                         .button("Stop here")
                         .on_hover_text("Stay at the time that the run has reached (Esc)")
@@ -170,7 +171,8 @@ impl App {
                 ui.horizontal_wrapped(|ui| {
                     let percent = (fraction * 100.0).floor();
                     ui.label(format!("Running to the chosen section… {percent} %"));
-                    ui.add(egui::ProgressBar::new(fraction).desired_width(120.0));
+                    ui.add(egui::ProgressBar::new(fraction).desired_width(120.0))
+                        .accessible_name("Run so far");
                     cancelled = ui
                         .button("Stop here")
                         .on_hover_text("Stay at the time that the run has reached (Esc)")

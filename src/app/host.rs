@@ -4,6 +4,8 @@ use std::sync::Arc;
 
 use eframe::egui;
 
+#[cfg(not(target_arch = "wasm32"))]
+use super::background::Thread;
 use crate::analysis::task::{Job, Message};
 
 /// A computation beside the interface.
@@ -109,8 +111,12 @@ mod desktop {
 
     use eframe::egui;
 
+<<<<<<< HEAD
     use super::{Host, Job, OpenedFile, Running, SaveFile};
     use crate::app::background::Thread;
+=======
+    use super::{Host, Job, OpenedFile, Running, SaveFile, Thread};
+>>>>>>> web2
 
     /// Files of the desktop.
     #[derive(Debug, Default)]

@@ -32,7 +32,7 @@ async function natively(scene, changes) {
 test('the page is of the version of the native program', async () => {
     assert.match(await native('--version'), new RegExp(`\\b${wasm.version().replaceAll('.', '\\.')}\\b`));
     assert.equal(scenes.length, 5);
-    assert.equal(methods.length, 6);
+    assert.equal(methods.length, 7);
 });
 
 for (const scene of scenes) {

@@ -246,7 +246,8 @@ impl Sweep {
                     (self.running, self.asked) = (None, None);
                 }
                 let bar = ProgressBar::new(self.progress as f32).show_percentage();
-                ui.add(bar.desired_width(ui.available_width()));
+                ui.add(bar.desired_width(ui.available_width()))
+                    .accessible_name("Swept so far");
             });
             return;
         }
