@@ -67,7 +67,7 @@ pub fn measured(scene: &str, preset: Preset) -> Option<Measured> {
 pub fn limit(preset: Preset) -> f64 {
     match preset {
         Preset::Preview => 0.05,
-        Preset::RealTime => 0.01,
+        Preset::RealTime => 1e-3,
         Preset::Accurate => 1e-4,
         Preset::Reference => 1e-7,
     }

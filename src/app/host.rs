@@ -111,12 +111,8 @@ mod desktop {
 
     use eframe::egui;
 
-<<<<<<< HEAD
     use super::{Host, Job, OpenedFile, Running, SaveFile};
     use crate::app::background::Thread;
-=======
-    use super::{Host, Job, OpenedFile, Running, SaveFile, Thread};
->>>>>>> web2
 
     /// Files of the desktop.
     #[derive(Debug, Default)]
