@@ -21,13 +21,14 @@ fn series(label: &str, points: Vec<(f64, f64)>, n: usize) -> Series {
         Marker::Cross,
         Marker::Plus,
         Marker::Ring,
+        Marker::Point,
         Marker::Dot,
     ];
     Series {
         label: label.to_owned(),
         points,
         colour: PALETTE[n % PALETTE.len()],
-        line: n != 8,
+        line: n < 8,
         marker: Some(markers[n]),
     }
 }
@@ -41,7 +42,7 @@ fn sheet(size: (u32, u32)) -> Sheet {
         title: "Phase portrait".to_owned(),
         x: axis("Eccentricity", "mm", Scale::Linear),
         y: axis("Speed", "m/s", Scale::Linear),
-        series: (0..9)
+        series: (0..10)
             .map(|n| series(&format!("a < b & {n}"), line(n), n))
             .collect(),
         labels: vec![Label {
