@@ -149,7 +149,7 @@ fn a_map_has_a_cell_for_each_value_and_a_scale() {
     // Lowest and highest value have the ends of the scale's colours, what is not known is grey, and every kind its own.
     for (colour, least) in [
         ("#440154", 1),
-        ("#FDE725", 1),
+        ("#FEE825", 1),
         ("#E1E1E1", 1),
         ("#0072B2", 6),
         ("#D55E00", 6),
