@@ -310,7 +310,7 @@ fn portraits(found: &Findings, cases: [Case; 3], which: usize) -> Sheet {
         })
     };
     let first = |c: usize| {
-        chart(c, "First period, from rest in the socket's centre", &|n| {
+        chart(c, "First period, with its impacts", &|n| {
             let rows = found
                 .run(cases[n])
                 .map(|run| &run.rows[..])

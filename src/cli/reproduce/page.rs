@@ -139,7 +139,7 @@ const SECTIONS: [(&str, &str, &[Entry]); 5] = [
                 "20",
                 "figure-20",
                 "Figure 20: bifurcation over clearance",
-                "Above, all kept sections at each clearance, from a cold start at every value and following the motion upward and downward. Below, how much the sections of one point spread, and how far the followed branches are from the cold start: hysteresis would stand above the resolution.",
+                "Above, all kept sections at each clearance, from a cold start at every value and following the motion upward and downward (every 25th value starts cold there, too, and so does the first). Below, how much the sections of one point spread, and how far the followed branches are from the cold start: hysteresis would stand above the resolution.",
             ),
             (
                 "21",
