@@ -21,13 +21,14 @@ fn series(label: &str, points: Vec<(f64, f64)>, n: usize) -> Series {
         Marker::Cross,
         Marker::Plus,
         Marker::Ring,
+        Marker::Point,
         Marker::Dot,
     ];
     Series {
         label: label.to_owned(),
         points,
         colour: PALETTE[n % PALETTE.len()],
-        line: n != 8,
+        line: n < 8,
         marker: Some(markers[n]),
     }
 }
@@ -41,7 +42,7 @@ fn sheet(size: (u32, u32)) -> Sheet {
         title: "Phase portrait".to_owned(),
         x: axis("Eccentricity", "mm", Scale::Linear),
         y: axis("Speed", "m/s", Scale::Linear),
-        series: (0..9)
+        series: (0..10)
             .map(|n| series(&format!("a < b & {n}"), line(n), n))
             .collect(),
         labels: vec![Label {
@@ -148,7 +149,7 @@ fn a_map_has_a_cell_for_each_value_and_a_scale() {
     // Lowest and highest value have the ends of the scale's colours, what is not known is grey, and every kind its own.
     for (colour, least) in [
         ("#440154", 1),
-        ("#FDE725", 1),
+        ("#FEE825", 1),
         ("#E1E1E1", 1),
         ("#0072B2", 6),
         ("#D55E00", 6),

@@ -279,7 +279,7 @@ fn grows(
     let listed: Vec<String> = names
         .iter()
         .zip(values)
-        .map(|(name, value)| format!("{name}: {value:.4} {unit}"))
+        .map(|(name, value)| format!("{name}: {} {unit}", words::digits(value, 6)))
         .collect();
     Some(Statement {
         place: place.into(),

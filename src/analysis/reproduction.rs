@@ -185,16 +185,36 @@ pub fn regime_word(code: i64) -> &'static str {
 
 /// Why there is no report.
 #[derive(Clone, Debug, thiserror::Error)]
-#[allow(missing_docs)]
 pub enum ReproductionError {
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    #[error(transparent)]
-    Range(#[from] RangeError),
-    #[error(transparent)]
-    Sweep(#[from] SweepError),
+    /// An extent that no sweep can have.
+    #[error("{0}")]
+    Extent(String),
+    /// A run that did not come to its end.
     #[error("{name}: {error}")]
-    Run { name: String, error: ResponseError },
+    Run {
+        /// Its name in files.
+        name: String,
+        /// Why.
+        error: Box<ResponseError>,
+    },
+}
+
+impl From<SceneError> for ReproductionError {
+    fn from(error: SceneError) -> Self {
+        Self::Extent(error.to_string())
+    }
+}
+
+impl From<RangeError> for ReproductionError {
+    fn from(error: RangeError) -> Self {
+        Self::Extent(error.to_string())
+    }
+}
+
+impl From<SweepError> for ReproductionError {
+    fn from(error: SweepError) -> Self {
+        Self::Extent(error.to_string())
+    }
 }
 
 /// What there is to do.
@@ -417,7 +437,7 @@ impl Work {
     ) -> Result<Outcome, ReproductionError> {
         let failed = |name: &str, error| ReproductionError::Run {
             name: name.to_owned(),
-            error,
+            error: Box::new(error),
         };
         match self.jobs[job] {
             Job::Run(n) => {

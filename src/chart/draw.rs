@@ -318,7 +318,7 @@ fn draw_chart(root: &Canvas, area: &Canvas, chart: &Chart) -> Result<(), SheetEr
     for series in &chart.series {
         let all = series.points.iter().filter_map(inside);
         let mut all: Vec<_> = all.map(|place| plot.backend_coord(&place)).collect();
-        if series.marker == Some(Marker::Dot) {
+        if !series.line {
             all = thin::cloud(all.into_iter(), fine(1.0));
         }
         for at in all {
@@ -381,16 +381,20 @@ fn draw_levels(
             let style = rgb(FAINT).stroke_width(FINE);
             root.draw(&PathElement::new(ends, style)).map_err(failed)?;
         }
-        let style = style(TEXT - 1.0, FAINT, HPos::Left, VPos::Bottom);
-        let text = Text::new(
-            level.text.clone(),
-            (left + fine(6.0), at - fine(3.0)),
-            style,
-        );
+        // Over the line, but under it where the chart ends there.
+        let (_, top) = plot.backend_coord(&(x.from, y.to));
+        let below = at - top < fine(TEXT + 4.0);
+        let (vertical, gap) = if below {
+            (VPos::Top, fine(3.0))
+        } else {
+            (VPos::Bottom, -fine(3.0))
+        };
+        let style = style(TEXT - 1.0, FAINT, HPos::Left, vertical);
+        let text = Text::new(level.text.clone(), (left + fine(6.0), at + gap), style);
         root.draw(&text).map_err(failed)?;
         taken.push(Area {
             x: f64::from(left),
-            y: f64::from(at - fine(TEXT + 3.0)),
+            y: f64::from(if below { at } else { at - fine(TEXT + 3.0) }),
             width: f64::from(fine(6.0 + text_width(&level.text, TEXT))),
             height: f64::from(fine(TEXT + 4.0)),
         });
@@ -476,6 +480,7 @@ fn draw_marker(
     match marker {
         Marker::Disc => root.draw(&Circle::new((x, y), r, filled)),
         Marker::Dot => root.draw(&Circle::new((x, y), fine(1.25), filled)),
+        Marker::Point => root.draw(&Circle::new((x, y), fine(2.5), filled)),
         Marker::Ring => root.draw(&Circle::new((x, y), fine(MARKER + 3.0), stroke(colour))),
         Marker::Square => {
             let s = fine(0.88 * MARKER);

@@ -58,7 +58,7 @@ impl Legend {
     }
 }
 
-/// The edges of cells around `centres`: half way between, and as far beyond the ends.
+/// The edges of cells around `centres`: half way between them; the outermost cells end at their values.
 fn edges(centres: &[f64]) -> Vec<f64> {
     let Some((&first, &last)) = centres.first().zip(centres.last()) else {
         return Vec::new();
@@ -68,10 +68,7 @@ fn edges(centres: &[f64]) -> Vec<f64> {
         return vec![first - half, first + half];
     }
     let middles: Vec<f64> = centres.windows(2).map(|w| 0.5 * (w[0] + w[1])).collect();
-    let mut all = vec![2.0 * first - middles[0]];
-    all.extend(&middles);
-    all.push(2.0 * last - middles[middles.len() - 1]);
-    all
+    [&[first], &middles[..], &[last]].concat()
 }
 
 /// Ends of the cells along both axes, for the axes to reach.
@@ -104,6 +101,9 @@ pub(super) fn cells(
             let a = plot.backend_coord(&(x.place(columns[0]), y.place(rows[0])));
             let b = plot.backend_coord(&(x.place(columns[1]), y.place(rows[1])));
             let filled = rgb(legend.colour(map, value)).filled();
+            // A little into the next cells, which are drawn over it: no seams.
+            let more = |edge: usize, cells: usize| if edge + 1 < cells { 2 } else { 0 };
+            let b = (b.0 + more(i, map.xs.len()), b.1 - more(j, map.ys.len()));
             root.draw(&Rectangle::new([a, b], filled)).map_err(failed)?;
         }
     }
@@ -143,7 +143,7 @@ pub(super) fn scale(
         );
         let place = ruler.from + (ruler.to - ruler.from) * 0.5 * (a + b);
         let RGBColor(r, g, bl) = ViridisRGB.get_color_normalized(place, ruler.from, ruler.to);
-        patch(at(b), at(a), (r, g, bl))?;
+        patch((at(b) - 0.5).max(top), at(a), (r, g, bl))?;
     }
     for tick in &ruler.ticks {
         let y = at((tick - ruler.from) / (ruler.to - ruler.from));
@@ -165,7 +165,7 @@ mod tests {
 
     #[test]
     fn cells_lie_around_their_values() {
-        assert_eq!(edges(&[1.0, 2.0, 4.0]), [0.5, 1.5, 3.0, 5.0]);
+        assert_eq!(edges(&[1.0, 2.0, 4.0]), [1.0, 1.5, 3.0, 4.0]);
         assert_eq!(edges(&[2.0]), [1.0, 3.0]);
         assert!(edges(&[]).is_empty());
     }

@@ -69,6 +69,8 @@ pub enum Marker {
     Plus,
     /// Ring around other markers, to single them out.
     Ring,
+    /// Small disc.
+    Point,
     /// Smallest dot, for clouds of many points.
     Dot,
 }

@@ -369,7 +369,7 @@ pub struct ReproduceArguments {
     /// Folder to write: `index.html`, `data/` and `plots/`.
     #[arg(long, value_name = "FOLDER")]
     pub out: PathBuf,
-    /// Few points and few periods, within half a minute instead of a quarter of an hour on two cores.
+    /// Few points and few periods, within half a minute instead of some six minutes on two cores.
     #[arg(long)]
     pub quick: bool,
     /// Threads; default: one a core. The files are the same for any number.

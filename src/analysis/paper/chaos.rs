@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::words::digits;
 use super::{Case, Statement, Verdict, verdict};
 
 /// Amplitudes of x (m) and of beta (rad) in trajectory (59).
@@ -99,7 +100,7 @@ fn apart(loops: &[Loop], coordinate: usize) -> f64 {
 
 fn size(value: f64, coordinate: usize) -> String {
     let (unit, one) = UNITS[coordinate];
-    format!("{:.3e} {unit}", value / one)
+    format!("{} {unit}", digits(value / one, 2))
 }
 
 fn regimes(points: &[Swept]) -> String {

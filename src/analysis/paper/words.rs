@@ -60,9 +60,9 @@ impl Comparison {
         self.sampled.map(|value| value / self.published.value)
     }
 
-    /// Of what is most alike: the sampled number where there is one.
+    /// In continuous time: impacts are so short that samples see their peaks by chance.
     pub fn agreement(&self) -> Agreement {
-        Agreement::of(self.sampled_ratio().unwrap_or(self.ratio()))
+        Agreement::of(self.ratio())
     }
 }
 
@@ -77,6 +77,19 @@ pub fn compare(runs: &Runs) -> Vec<Comparison> {
         })
     };
     PUBLISHED.iter().filter_map(of).collect()
+}
+
+/// `value` with `n` significant digits.
+pub(super) fn digits(value: f64, n: usize) -> String {
+    let size = value.abs();
+    if size == 0.0 {
+        "0".to_owned()
+    } else if (1e-3..1e6).contains(&size) {
+        let whole = libm::floor(libm::log10(size)) as i32;
+        format!("{value:.*}", (n as i32 - 1 - whole).max(0) as usize)
+    } else {
+        format!("{value:.*e}", n - 1)
+    }
 }
 
 fn response(runs: &Runs, case: Case) -> Option<&Response> {
@@ -196,6 +209,19 @@ mod tests {
     use super::*;
     use crate::analysis::response::respond;
     use crate::scene::Scene;
+
+    #[test]
+    fn numbers_have_as_many_digits_as_asked() {
+        for (value, text) in [
+            (0.154_943_9, "0.154944"),
+            (827.324_51, "827.325"),
+            (-1.0, "-1.00000"),
+            (3e-9, "3.00000e-9"),
+        ] {
+            assert_eq!(digits(value, 6), text);
+        }
+        assert_eq!(digits(1.0, 1), "1");
+    }
 
     #[test]
     fn ratios_have_their_words() {

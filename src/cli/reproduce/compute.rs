@@ -56,14 +56,9 @@ pub(super) fn compute(work: Work, threads: usize, bar: &ProgressBar) -> Result<F
         .into_inner()
         .unwrap_or_else(std::sync::PoisonError::into_inner);
     done.sort_by_key(|(job, _)| *job);
-    let is_cancelled = |error: &ReproductionError| {
-        matches!(
-            error,
-            ReproductionError::Run {
-                error: ResponseError::Cancelled,
-                ..
-            }
-        )
+    let is_cancelled = |error: &ReproductionError| match error {
+        ReproductionError::Run { error, .. } => matches!(**error, ResponseError::Cancelled),
+        ReproductionError::Extent(_) => false,
     };
     let mut outcomes = Vec::with_capacity(done.len());
     for (_, outcome) in done {

@@ -310,7 +310,7 @@ fn portraits(found: &Findings, cases: [Case; 3], which: usize) -> Sheet {
         })
     };
     let first = |c: usize| {
-        chart(c, "First period, from rest in the socket's centre", &|n| {
+        chart(c, "First period, with its impacts", &|n| {
             let rows = found
                 .run(cases[n])
                 .map(|run| &run.rows[..])
@@ -384,14 +384,13 @@ fn bifurcation(found: &Findings, which: usize) -> Sheet {
     let all = swept(found, which);
     let starts = ["cold start", "followed upward", "followed downward"];
     let diagram = |c: usize| {
-        let looks = [(0, Marker::Disc), (5, Marker::Dot), (6, Marker::Dot)];
+        // Each start on top of the one before, and smaller: all of them show.
+        let looks = [(0, Marker::Disc), (5, Marker::Point), (6, Marker::Dot)];
         let series = all.iter().enumerate().map(|(n, points)| {
             let points = points
                 .iter()
                 .flat_map(|p| p.sections[c].iter().map(|s| (p.value, s * 1e3)));
             let (colour, marker) = looks[n];
-            // Each start on top of the one before, and smaller: all of them show.
-            let marker = if n == 0 { Marker::Dot } else { marker };
             dots(starts[n], points.collect(), PALETTE[colour], marker)
         });
         Chart {
@@ -439,6 +438,9 @@ fn bifurcation(found: &Findings, which: usize) -> Sheet {
     )
 }
 
+/// Lower exponents are left out of the picture: the smallest clearances would press all others against 0, 1/s.
+const LEAST_EXPONENT: f64 = -10.0;
+
 fn exponent(found: &Findings, which: usize) -> Sheet {
     let swathe = found.swathe(["clearance_cold", "friction_cold"][which]);
     let points = swathe.swept([1e3, 1.0][which]);
@@ -448,9 +450,12 @@ fn exponent(found: &Findings, which: usize) -> Sheet {
         swathe.values("exponent_running_per_s"),
     );
     let discard = swathe.sweep.plan().discard;
-    let chosen = 5.min(points.len());
+    let legible: Vec<usize> = (0..points.len())
+        .filter(|&k| points[k].exponent.0 > LEAST_EXPONENT)
+        .collect();
+    let chosen = 5.min(legible.len());
     let convergence = (0..chosen).map(|n| {
-        let k = n * (points.len() - 1) / (chosen - 1).max(1);
+        let k = legible[n * (legible.len() - 1) / (chosen - 1).max(1)];
         let values = running[k * kept..(k + 1) * kept].iter();
         let values = values
             .enumerate()
@@ -469,7 +474,11 @@ fn exponent(found: &Findings, which: usize) -> Sheet {
         y: 0.0,
         text: "chaos lies above".to_owned(),
     }];
-    let y = axis("Largest Lyapunov exponent", "1/s");
+    let most = points.iter().map(|p| p.exponent.0).fold(0.0, f64::max);
+    let y = Axis {
+        range: Some((LEAST_EXPONENT, 1.1 * most + 1.0)),
+        ..axis("Largest Lyapunov exponent", "1/s")
+    };
     let along = Chart {
         title: "Along the sweep".to_owned(),
         x: parameter(which),
@@ -526,6 +535,15 @@ fn map(found: &Findings) -> Sheet {
         .map(|j| swathe.values(&format!("{j}_peak_N")))
         .collect();
     let hardest = (0..regimes.len()).map(|k| peaks.iter().map(|p| p[k]).fold(f64::NAN, f64::max));
+    let exponents = swathe.values("exponent_per_s").into_iter();
+    // Grey where a disturbance grows.
+    let memory = exponents
+        .map(|e| if e < 0.0 { -1.0 / e } else { f64::NAN })
+        .collect();
+    let logarithmic = Axis {
+        scale: Scale::Logarithmic,
+        ..axis("", "s")
+    };
     let charts = vec![
         chart("Regime", regimes.clone(), Axis::default(), names),
         chart(
@@ -541,9 +559,9 @@ fn map(found: &Findings) -> Sheet {
             Vec::new(),
         ),
         chart(
-            "Largest Lyapunov exponent",
-            swathe.values("exponent_per_s"),
-            axis("", "1/s"),
+            "Time in which a disturbance falls to 1/e",
+            memory,
+            logarithmic,
             Vec::new(),
         ),
     ];

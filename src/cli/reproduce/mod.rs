@@ -4,6 +4,7 @@ mod compute;
 mod data;
 mod figures;
 mod page;
+mod sections;
 mod text;
 
 use std::path::Path;

@@ -2,196 +2,16 @@
 
 use std::fmt::Write as _;
 
+use super::sections::{Entry, SECTIONS};
 use super::text::{self, Compared};
 use super::{command, meta};
 use crate::analysis::paper::chaos::word;
-use crate::analysis::paper::{Quantity, Statement, VERIFICATION, Verdict};
+use crate::analysis::paper::{Agreement, Quantity, Statement, VERIFICATION, Verdict};
 use crate::analysis::reproduction::{Findings, PERIOD};
 use crate::cli::Failure;
 use crate::cli::output::significant;
 
 const STYLE: &str = include_str!("page.css");
-
-/// A figure: its number in the paper ("" beyond it), name of its picture, heading, caption.
-type Entry = (&'static str, &'static str, &'static str, &'static str);
-
-/// Sections of the page with their figures.
-const SECTIONS: [(&str, &str, &[Entry]); 5] = [
-    (
-        "clearance",
-        "Response to clearance",
-        &[
-            (
-                "5",
-                "figure-05",
-                "Figure 5: displacement",
-                "Position x and angle β of the platform at friction 0.2. Above, the whole period: the curves of the three clearances lie on each other. Below, their distance from the motion with ideal joints while the balls bounce.",
-            ),
-            (
-                "6",
-                "figure-06",
-                "Figure 6: velocity",
-                "Every impact is a step in velocity. After the last one the curves follow the drive.",
-            ),
-            (
-                "7",
-                "figure-07",
-                "Figure 7: acceleration",
-                "Accelerations peak inside impacts that last about a millisecond; samples 1 ms apart see a peak only by chance.",
-            ),
-            (
-                "8",
-                "figure-08",
-                "Figure 8: contact forces at 0.3 mm",
-                "Each spike is one impact of a ball on its socket.",
-            ),
-            (
-                "9",
-                "figure-09",
-                "Figure 9: contact forces at 0.5 mm",
-                "A wider gap gives the ball a longer fall and a harder landing.",
-            ),
-            (
-                "10",
-                "figure-10",
-                "Figure 10: contact forces at 0.7 mm",
-                "The hardest and the longest bouncing of the three.",
-            ),
-        ],
-    ),
-    (
-        "friction",
-        "Response to friction",
-        &[
-            (
-                "11",
-                "figure-11",
-                "Figure 11: displacement",
-                "As Figure 5, at 0.3 mm and three friction coefficients.",
-            ),
-            (
-                "12",
-                "figure-12",
-                "Figure 12: velocity",
-                "Friction acts on sliding balls only; the first landings are the same whatever it is.",
-            ),
-            (
-                "13",
-                "figure-13",
-                "Figure 13: acceleration",
-                "The paper's numbers for x fall as friction grows, while its text says that they rise.",
-            ),
-            (
-                "14",
-                "figure-14",
-                "Figure 14: contact forces at friction 0.15",
-                "0.3 mm of clearance, as in the two figures that follow.",
-            ),
-            (
-                "15",
-                "figure-15",
-                "Figure 15: contact forces at friction 0.20",
-                "The same run as Figure 8. The paper prints other peaks for it here than there.",
-            ),
-            (
-                "16",
-                "figure-16",
-                "Figure 16: contact forces at friction 0.25",
-                "The largest friction of the three.",
-            ),
-        ],
-    ),
-    (
-        "verification",
-        "Verification",
-        &[
-            (
-                "17",
-                "figure-17",
-                "Figure 17: two formulations and the ideal motion",
-                "The paper compares its own program with a commercial one; here two formulations that share no equations of motion stand for them: a spanning forest with independent coordinates, and all bodies with multipliers and Baumgarte stabilisation, the paper's own. Clearance 0.3 mm, friction 0.2.",
-            ),
-            (
-                "",
-                "figure-17-drift",
-                "Drift of the Baumgarte form",
-                "Left, how far the formulations are apart at equal times. Right, the largest violation of a constraint of the lagrange form so far: stabilisation bounds it and does not remove it.",
-            ),
-        ],
-    ),
-    (
-        "chaos",
-        "Phase portraits, sections and bifurcations",
-        &[
-            (
-                "18",
-                "figure-18",
-                "Figure 18: phase portraits by clearance",
-                "Above, one period of settled motion; below, the first period with its impacts.",
-            ),
-            (
-                "19",
-                "figure-19",
-                "Figure 19: Poincaré sections by clearance",
-                "One point a drive period, at the phase of the start, transient discarded. Sections that coincide in the picture are drawn once.",
-            ),
-            (
-                "20",
-                "figure-20",
-                "Figure 20: bifurcation over clearance",
-                "Above, all kept sections at each clearance, from a cold start at every value and following the motion upward and downward. Below, how much the sections of one point spread, and how far the followed branches are from the cold start: hysteresis would stand above the resolution.",
-            ),
-            (
-                "21",
-                "figure-21",
-                "Figure 21: phase portraits by friction",
-                "As Figure 18, at 0.3 mm.",
-            ),
-            (
-                "22",
-                "figure-22",
-                "Figure 22: Poincaré sections by friction",
-                "As Figure 19, at 0.3 mm.",
-            ),
-            (
-                "23",
-                "figure-23",
-                "Figure 23: bifurcation over friction",
-                "As Figure 20, at 0.3 mm.",
-            ),
-        ],
-    ),
-    (
-        "beyond",
-        "Beyond the paper",
-        &[
-            (
-                "",
-                "exponent-clearance",
-                "Largest Lyapunov exponent over clearance",
-                "From two nearby runs. Below 0, neighbouring motions meet; above it they part exponentially, which is what chaos means. Right, how the estimate settles as the run gets longer, for clearances spread over the range.",
-            ),
-            (
-                "",
-                "exponent-friction",
-                "Largest Lyapunov exponent over friction",
-                "The same at 0.3 mm.",
-            ),
-            (
-                "",
-                "map",
-                "Clearance and friction together",
-                "Every cell is one run from a cold start: its regime, the largest contact force (in the first impacts), the probe's error in settled motion, and the exponent.",
-            ),
-            (
-                "",
-                "probe",
-                "What clearance does to the instrument",
-                "Distance of the probe tip from where an ideal machine would have it, which is what a coordinate measuring machine would report wrongly. Left, in settled motion; right, with the first period's impacts.",
-            ),
-        ],
-    ),
-];
 
 fn escape(text: &str) -> String {
     text.replace('&', "&amp;")
@@ -287,9 +107,10 @@ fn caveats(out: &mut String) {
          6 and 12 for that run. Where the paper has two values no program can match both; both are compared.</li>\n\
          <li>For Figure 13a the text says that peaks rise with friction; the numbers beside it fall.</li>\n\
          <li>The text about Figures 19 and 22 calls the same motions quasi-periodic that it calls periodic at Figures 18, 20 and 23.</li>\n\
-         <li>Its runs are reported every 1 ms, about as long as an impact lasts. Peaks are therefore given twice: in continuous time, and sampled at \
-         1 ms as the paper samples. The verdict goes by the sampled value where there is one: <span class=\"ok\">agrees within 10 %</span>, \
-         <span class=\"near\">within a factor of 2</span>, <span class=\"off\">differs</span>.</li>\n\
+         <li>Its runs are reported every 1 ms; an impact is much shorter. Peaks are therefore given twice: in continuous time, and at whole \
+         milliseconds alone, as a solver with that output step would report them. Accelerations and forces of the second kind are a matter of chance, so \
+         verdicts go by continuous time: <span class=\"ok\">agrees within 10 %</span>, <span class=\"near\">within a factor of 2</span>, \
+         <span class=\"off\">differs</span>.</li>\n\
          </ul>\n",
     );
 }
@@ -327,8 +148,20 @@ pub(super) fn shown(value: f64) -> String {
     significant(value, 4).replace('-', "\u{2212}")
 }
 
+/// Stands where there is no number.
+const NONE: &str = "\u{2013}";
+
+/// Two decimals, and two digits of what is small.
+fn ratio(value: f64) -> String {
+    if value < 0.1 {
+        significant(value, 2)
+    } else {
+        format!("{value:.2}")
+    }
+}
+
 fn optional(value: Option<f64>) -> String {
-    value.map_or_else(|| "\u{2013}".to_owned(), shown)
+    value.map_or_else(|| NONE.to_owned(), shown)
 }
 
 /// The tables that belong to a figure.
@@ -348,6 +181,8 @@ fn after(out: &mut String, entry: &Entry, compared: &[Compared], found: &Finding
         "figure-22" => runs(out, found, 1),
         "figure-20" => branches(out, found, 0),
         "figure-23" => branches(out, found, 1),
+        "figure-10" => strongest(out, compared, &["8", "9", "10"]),
+        "figure-16" => strongest(out, compared, &["14", "15", "16"]),
         "probe" => probe(out, found),
         _ => {}
     }
@@ -373,34 +208,71 @@ fn table_of(out: &mut String, rows: &[&Compared]) {
         out,
         &[
             ("Figure", false),
-            ("Clearance", true),
-            ("Friction", true),
+            ("Run", false),
             ("Quantity", false),
             ("Paper", true),
             ("Here", true),
-            ("Here at 1 ms", true),
-            ("Here / paper", true),
-            ("At 1 ms / paper", true),
+            ("Ratio", true),
+            ("At 1 ms", true),
+            ("Ratio", true),
             ("Verdict", false),
         ],
     );
     for c in rows {
         let unit = format!("{} ({})", c.what, c.unit);
+        let run = format!("{} mm, {}", c.case.clearance, c.case.friction);
+        let sampled_ratio = c
+            .sampled
+            .map_or_else(|| NONE.to_owned(), |s| ratio(s / c.paper));
         let _ = writeln!(
             out,
-            "<tr><td>{}</td>{}{}<td>{unit}</td>{}{}{}{}{}<td class=\"verdict\">{}</td></tr>",
+            "<tr><td>{}</td><td class=\"run\">{run}</td><td>{unit}</td>{}{}{}{}{}<td class=\"verdict\">{}</td></tr>",
             c.figure,
-            number(&format!("{} mm", c.case.clearance)),
-            number(&c.case.friction.to_string()),
             number(&shown(c.paper)),
             number(&shown(c.full)),
+            number(&ratio(c.full / c.paper)),
             number(&optional(c.sampled)),
-            number(&significant(c.full / c.paper, 3)),
-            number(
-                &c.sampled
-                    .map_or_else(|| "\u{2013}".to_owned(), |s| significant(s / c.paper, 3))
-            ),
+            number(&sampled_ratio),
             badge(c.agreement)
+        );
+    }
+    out.push_str(CLOSE);
+}
+
+/// The largest force of any joint, which depends less on which joint happens to be hit first.
+fn strongest(out: &mut String, compared: &[Compared], figures: &[&str]) {
+    out.push_str("<p>The largest contact force of any joint, whichever it is:</p>\n");
+    open(
+        out,
+        &[
+            ("Figure", false),
+            ("Run", false),
+            ("Paper (N)", true),
+            ("Here (N)", true),
+            ("Ratio", true),
+            ("Verdict", false),
+        ],
+    );
+    for figure in figures {
+        let own = || {
+            compared
+                .iter()
+                .filter(|c| c.figure == *figure && c.unit == "N")
+        };
+        let Some(first) = own().next() else {
+            continue;
+        };
+        let paper = own().map(|c| c.paper).fold(0.0, f64::max);
+        let here = own().map(|c| c.full).fold(0.0, f64::max);
+        let _ = writeln!(
+            out,
+            "<tr><td>{figure}</td><td class=\"run\">{} mm, {}</td>{}{}{}<td class=\"verdict\">{}</td></tr>",
+            first.case.clearance,
+            first.case.friction,
+            number(&shown(paper)),
+            number(&shown(here)),
+            number(&ratio(here / paper)),
+            badge(Agreement::of(here / paper).word())
         );
     }
     out.push_str(CLOSE);
@@ -438,7 +310,7 @@ fn verification(out: &mut String, found: &Findings) {
     }
     for joint in 0..3 {
         let (what, unit) = Quantity::Normal(joint).label();
-        let none = number("\u{2013}");
+        let none = number(NONE);
         let _ = writeln!(
             out,
             "<tr><td></td><td>{what} ({unit})</td>{none}{none}{}{}</tr>",
