@@ -46,10 +46,10 @@ impl App {
         self.touched |= ui.input(|input| input.has_touch_screen());
         let fingers = compact || self.touched;
         if self.fingers != Some(fingers) {
-            // Of the next pass: all of one pass has one size.
             theme::apply_size(ui.ctx(), fingers);
             self.fingers = Some(fingers);
-            ui.ctx().request_discard("controls of another size");
+            // This pass has it already: the picture is framed in the place that it keeps.
+            ui.set_style(ui.ctx().global_style());
         }
         self.summary(ui);
         let margin = if arrangement == Arrangement::Lying {

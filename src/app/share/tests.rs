@@ -1,0 +1,261 @@
+use super::*;
+use crate::app::log::Event;
+
+/// Numbers that look random and are the same each time (splitmix64).
+struct Chance(u64);
+
+impl Chance {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    fn below(&mut self, end: u64) -> u64 {
+        self.next() % end
+    }
+
+    fn maybe<T>(&mut self, make: impl FnOnce(&mut Self) -> T) -> Option<T> {
+        (self.below(3) > 0).then(|| make(self))
+    }
+
+    fn unit(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn text(&mut self, most: u64) -> String {
+        const LETTERS: [char; 14] = [
+            'a', 'Z', '0', ' ', '&', '=', '#', '?', '+', '%', '"', 'µ', '\n', '🦀',
+        ];
+        let length = 1 + self.below(most);
+        (0..length)
+            .map(|_| LETTERS[self.below(LETTERS.len() as u64) as usize])
+            .collect()
+    }
+
+    fn link(&mut self) -> Link {
+        let mut log = Log::default();
+        for index in 0..self.below(4) {
+            let value = format!("x{}x", self.text(9)).replace('\n', " ");
+            log.base.push((format!("contact.k{index}"), value));
+        }
+        let mut steps = 0;
+        for _ in 0..self.below(6) {
+            steps += self.below(1 << 40);
+            if self.below(2) == 0 {
+                log.set(steps, "joint.S1.friction", &self.text(9));
+            } else {
+                let key = "solver.preset".to_owned();
+                log.push(steps, Event::Original { key });
+            }
+        }
+        Link {
+            scene: if self.below(2) == 0 {
+                SceneText::BuiltIn("pendulum".to_owned())
+            } else {
+                SceneText::File {
+                    name: format!("a{}.toml", self.text(6)).replace(['\n', '/'], "_"),
+                    text: self.text(300),
+                }
+            },
+            log,
+            steps: Some(steps + self.below(100)),
+            time: self.maybe(|c| c.unit() * 1e3),
+            hash: self.maybe(Self::next),
+            time_scale: self.maybe(|c| 1e-4 + 0.9 * c.unit()),
+            camera: self.maybe(|c| CameraPose {
+                yaw: c.unit() as f32,
+                pitch: 1.5 - 3.0 * c.unit() as f32,
+                distance: 0.1 + c.unit() as f32,
+                target: [0; 3].map(|_| c.unit() as f32 - 0.5),
+            }),
+            magnification: self.maybe(|c| 1.0 + 99.0 * c.unit() as f32),
+            playing: self.maybe(|c| c.below(2) == 0),
+            theme: self.maybe(|c| THEMES[c.below(3) as usize].1),
+            version: self.maybe(|_| "0.1.0".to_owned()),
+        }
+    }
+}
+
+#[test]
+fn every_link_reads_back_to_the_same_bits() {
+    let mut chance = Chance(1);
+    for _ in 0..500 {
+        let link = chance.link();
+        let text = link.format();
+        for form in [
+            text.clone(),
+            format!("?{text}"),
+            format!("#{text}"),
+            format!("https://example.org/lab/index.html?c=1mm&renderer=webgl#{text}"),
+        ] {
+            let read = Link::parse(&form).unwrap_or_else(|error| panic!("{error}\n{form}"));
+            assert_eq!(read, link, "{form}");
+            assert_eq!(
+                read.time.map(f64::to_bits),
+                link.time.map(f64::to_bits),
+                "{form}"
+            );
+        }
+        assert!(
+            text.is_ascii() && !text.contains(['#', '?', ' ', '"']),
+            "{text}"
+        );
+    }
+}
+
+#[test]
+fn no_text_whatever_makes_it_panic() {
+    let mut chance = Chance(2);
+    let mut read = 0;
+    for _ in 0..3000 {
+        let mut bytes = chance.link().format().into_bytes();
+        for _ in 0..=chance.below(4) {
+            let at = chance.below(bytes.len() as u64) as usize;
+            match chance.below(3) {
+                0 => bytes[at] = chance.below(256) as u8,
+                1 => bytes.truncate(at.max(1)),
+                _ => bytes.insert(at, b"&=%#?-+0"[chance.below(8) as usize]),
+            }
+        }
+        if let Ok(link) = Link::parse(&String::from_utf8_lossy(&bytes)) {
+            read += 1;
+            // A scene of nonsense is refused in words.
+            assert!(link.load().is_err() || link.log.base.is_empty());
+        }
+        // Nor does anything else.
+        let _ = Link::parse(&chance.text(200));
+    }
+    assert!(read > 100, "{read} were links still");
+}
+
+#[test]
+fn a_link_by_hand_takes_short_names_and_full_keys() {
+    let link =
+        Link::parse("?scene=pendulum&c=0.5mm&cf=0.2&ce=0.8&method=rk4&t=20ms&scale=1:50")
+            .expect("a link");
+    let scene = link.load().expect("the scene has these");
+    assert_eq!(scene.name, "pendulum");
+    assert_eq!(scene.contact.clearance, 0.5e-3);
+    assert_eq!(
+        (scene.contact.friction, scene.contact.restitution),
+        (0.2, 0.8)
+    );
+    assert_eq!(link.time, Some(0.02));
+    assert_eq!(link.time_scale, Some(0.02));
+    assert!(link.has_instant());
+
+    let link = Link::parse("joint.S1.clearance=0.5+mm&view.down=%2Bx").expect("a link");
+    assert_eq!(link.scene, SceneText::BuiltIn(DEFAULT_SCENE.to_owned()));
+    let scene = link.load().expect("the scene has these");
+    assert_eq!(scene.ball_joints[0].contact.clearance, 0.5e-3);
+    assert!(!link.has_instant());
+
+    // The fragment wins, and alone counts where it names a scene.
+    let both = |text: &str| Link::parse(text).expect("a link").log.base;
+    let clearance = |value: &str| vec![("contact.clearance".to_owned(), value.to_owned())];
+    assert_eq!(both("/?c=1mm#c=2mm"), clearance("2mm"));
+    assert_eq!(both("/?c=1mm#scene=pendulum"), Vec::new());
+    assert_eq!(both("http://localhost:1/a?c=1mm"), clearance("1mm"));
+    assert_eq!(both("http://localhost:1/a"), Vec::new());
+    assert_eq!(both(""), Vec::new());
+}
+
+#[test]
+fn what_is_wrong_in_a_link_is_said() {
+    for (text, words) in [
+        (
+            "clearance=0.5mm",
+            "link: clearance: unknown word; did you mean `contact.clearance`?",
+        ),
+        ("scale=2", "link: scale = 2: allowed 0.0001 to 1"),
+        ("t=5", "link: t = 5: needs a unit"),
+        ("t=-5ms", "must not be before the start"),
+        ("steps=many", "is no number of steps"),
+        ("hash=12", "is no state hash"),
+        ("camera=1,2,3", "is no camera"),
+        ("camera=0,0,nan,0,0,0", "is no camera"),
+        ("magnification=1000", "allowed 1 to 100"),
+        ("play=yes", "allowed 0 (paused) and 1 (playing)"),
+        ("text=%%%", "does not unpack"),
+        ("log=AAAA", "does not unpack"),
+        ("scene=/etc/passwd", "a link names a built-in scene"),
+        ("scene=../mine.toml", "a link names a built-in scene"),
+    ] {
+        let error = Link::parse(text).expect_err(text).to_string();
+        assert!(error.contains(words), "{text}: {error}");
+    }
+    for (text, words) in [
+        ("scene=pendulun", "did you mean `pendulum`?"),
+        ("c=0.5", "contact.clearance = 0.5: needs a unit"),
+        ("c=-1mm", "out of range"),
+        (
+            "scene=pendulum&spcmm.frequency=1Hz",
+            "the scene `pendulum` has no such key",
+        ),
+        ("contact.clearence=1mm", "did you mean `contact.clearance`?"),
+    ] {
+        let error = Link::parse(text).expect("well formed").load();
+        let error = error.expect_err(text).to_string();
+        assert!(error.contains(words), "{text}: {error}");
+    }
+}
+
+#[test]
+fn a_small_bomb_does_not_unpack() {
+    let zeros = "0".repeat(LARGEST_UNPACKED + 1);
+    let packed = pack(&zeros);
+    assert!(packed.len() < 10_000);
+    let error = Link::parse(&format!("text={packed}")).expect_err("too large");
+    assert!(error.to_string().contains("does not unpack"));
+    let long = "x".repeat(LONGEST_READ + 1);
+    assert!(Link::parse(&long).is_err());
+}
+
+#[test]
+fn a_link_that_would_be_too_long_leaves_the_run_out_or_says_so() {
+    let mut chance = Chance(3);
+    let scene = Scene::load("pendulum", &[("contact.friction".into(), "0.3".into())])
+        .expect("built in");
+    let mut link = Link {
+        scene: SceneText::of(&scene),
+        steps: Some(1 << 40),
+        hash: Some(7),
+        ..Link::default()
+    };
+    for index in 0..8000 {
+        let value = format!("{} mm", chance.unit());
+        link.log.set(index, "contact.clearance", &value);
+    }
+    assert!(link.format().len() > LONGEST_LINK);
+    let (short, note) = link.format_short(&scene).expect("the start fits");
+    assert!(short.len() <= LONGEST_LINK && note.is_some());
+    let start = Link::parse(&short).expect("a link");
+    assert_eq!(start.log.base, scene.changes);
+    assert!(!start.has_instant() && start.hash.is_none());
+
+    let noise: String = (0..40_000)
+        .map(|_| char::from(b'a' + chance.below(26) as u8))
+        .collect();
+    link.scene = SceneText::File {
+        name: "mine.toml".to_owned(),
+        text: noise,
+    };
+    let error = link.format_short(&scene).expect_err("does not fit");
+    assert!(error.contains("too large for a link"), "{error}");
+}
+
+#[test]
+fn a_built_in_scene_is_named_and_any_other_travels() {
+    let scene = Scene::load("chain", &[]).expect("built in");
+    assert_eq!(
+        SceneText::of(&scene),
+        SceneText::BuiltIn("chain".to_owned())
+    );
+    let text = format!("{}\n# mine\n", scene.source.text);
+    let mine = Scene::parse(&text, Some("/home/me/chain.toml"), &[]).expect("reads");
+    let name = "chain.toml".to_owned();
+    assert_eq!(SceneText::of(&mine), SceneText::File { name, text });
+}
