@@ -4,8 +4,6 @@ use std::sync::Arc;
 
 use eframe::egui;
 
-#[cfg(not(target_arch = "wasm32"))]
-use super::background::Thread;
 use crate::analysis::task::{Job, Message};
 
 /// A computation beside the interface.

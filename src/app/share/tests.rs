@@ -1,3 +1,5 @@
+//! Links there and back, by hand, and damaged.
+
 use super::*;
 use crate::app::log::Event;
 
@@ -133,9 +135,8 @@ fn no_text_whatever_makes_it_panic() {
 
 #[test]
 fn a_link_by_hand_takes_short_names_and_full_keys() {
-    let link =
-        Link::parse("?scene=pendulum&c=0.5mm&cf=0.2&ce=0.8&method=rk4&t=20ms&scale=1:50")
-            .expect("a link");
+    let link = Link::parse("?scene=pendulum&c=0.5mm&cf=0.2&ce=0.8&method=rk4&t=20ms&scale=1:50")
+        .expect("a link");
     let scene = link.load().expect("the scene has these");
     assert_eq!(scene.name, "pendulum");
     assert_eq!(scene.contact.clearance, 0.5e-3);
@@ -217,8 +218,8 @@ fn a_small_bomb_does_not_unpack() {
 #[test]
 fn a_link_that_would_be_too_long_leaves_the_run_out_or_says_so() {
     let mut chance = Chance(3);
-    let scene = Scene::load("pendulum", &[("contact.friction".into(), "0.3".into())])
-        .expect("built in");
+    let scene =
+        Scene::load("pendulum", &[("contact.friction".into(), "0.3".into())]).expect("built in");
     let mut link = Link {
         scene: SceneText::of(&scene),
         steps: Some(1 << 40),
