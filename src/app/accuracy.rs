@@ -207,7 +207,7 @@ impl Accuracy {
 }
 
 /// The preset whose method and tolerance are in force, chosen by its name or not.
-fn preset_of(player: &Player) -> Option<Preset> {
+pub fn preset_of(player: &Player) -> Option<Preset> {
     let solver = &player.wanted().solver;
     let is = |preset: &Preset| {
         let (method, step, tolerance) = preset.point();

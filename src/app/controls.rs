@@ -8,7 +8,7 @@ use eframe::egui::{
     TextEdit, Tooltip, Ui,
 };
 
-use super::accuracy::Accuracy;
+use super::accuracy::{self, Accuracy};
 use super::icons::{Icon, icon_button};
 use super::player::Player;
 use super::{theme, value};
@@ -265,14 +265,20 @@ impl Controls {
             this.default_button(ui, player, parameter, key, name, now);
             let mut chosen = None;
             let width = ui.available_width().min(170.0);
+            // Method and tolerance may be a preset's without its name, and may leave it.
+            let (now, text) = match (key, accuracy::preset_of(player)) {
+                (PRESET, Some(preset)) => (Value::Choice(preset.word()), preset.word().to_owned()),
+                (PRESET, None) => (Value::Unset, "own choice".to_owned()),
+                _ => (now.clone(), value::shown(now, &parameter.kind)),
+            };
             let response = ComboBox::from_id_salt("choice")
                 .width(width)
                 .truncate()
-                .selected_text(value::shown(now, &parameter.kind))
+                .selected_text(text)
                 .show_ui(ui, |ui| {
                     for word in words {
                         if ui
-                            .selectable_label(*now == Value::Choice(word), *word)
+                            .selectable_label(now == Value::Choice(word), *word)
                             .clicked()
                         {
                             chosen = Some(*word);
