@@ -624,6 +624,12 @@ fn the_accuracy_of_the_running_scene_stands_beside_the_controls() {
     let mut harness = window("spcmm");
     harness.get_by_label("Accuracy");
     harness.get_by_label("not measured yet");
+    // What runs has its name, chosen by it or not.
+    let preset = |harness: &Harness<'_, App>| {
+        let choice = harness.get_by_role_and_label(Role::ComboBox, "Preset");
+        choice.value().map(|name| name.to_string())
+    };
+    assert_eq!(preset(&harness).as_deref(), Some("real-time"));
     // Nothing has been hit yet, and nothing is said about impacts.
     assert!(harness.query_by_label("Steps in last impact").is_none());
     harness.state_mut().player_mut().run_to(9e-3);
@@ -646,6 +652,7 @@ fn the_accuracy_of_the_running_scene_stands_beside_the_controls() {
     assert!(impact.steps < 10, "{impact:?}");
     player.set_playing(true);
     harness.run_steps(20);
+    assert_eq!(preset(&harness).as_deref(), Some("own choice"));
     assert!(harness.query_by_label("not measured yet").is_none());
 }
 
