@@ -242,8 +242,8 @@ test('graphics that do not come back: the page offers to reload into the same st
     } });
     await lab.until(async () => (await lab.state()).time_s > 1e-3, 'time does not pass');
     const before = await pause(lab);
-    await lab.page.evaluate(LOSE.webgl);
-    await lab.page.evaluate(() => (globalThis.refused = true));
+    // In one turn: the page asks for new graphics as soon as it is told.
+    await lab.page.evaluate(`(${LOSE.webgl})(); globalThis.refused = true;`);
     const again = lab.page.locator('#again');
     await again.waitFor();
     assert.match(await lab.page.locator('#trouble').innerText(), /The graphics were lost/);
