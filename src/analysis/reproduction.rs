@@ -184,73 +184,25 @@ impl Work {
             vec!["contact.friction=0.15..0.25:3".to_owned()],
         ];
         let (up, down, cold) = (Start::FollowUp, Start::FollowDown, Start::Cold);
-        let swathes = vec![
-            swathe(
-                "runs_by_clearance",
-                nominal,
-                &cases[0],
-                cold,
-                extent.runs,
-                true,
-            )?,
-            swathe(
-                "runs_by_friction",
-                nominal,
-                &cases[1],
-                cold,
-                extent.runs,
-                true,
-            )?,
-            swathe(
-                "clearance_up",
-                nominal,
-                &clearance(c),
-                up,
-                extent.sweep,
-                false,
-            )?,
-            swathe(
-                "clearance_down",
-                nominal,
-                &clearance(c),
-                down,
-                extent.sweep,
-                false,
-            )?,
-            swathe(
-                "friction_up",
-                nominal,
-                &friction(f),
-                up,
-                extent.sweep,
-                false,
-            )?,
-            swathe(
-                "friction_down",
-                nominal,
-                &friction(f),
-                down,
-                extent.sweep,
-                false,
-            )?,
-            swathe(
-                "clearance_cold",
-                nominal,
-                &clearance(c),
-                cold,
-                extent.sweep,
-                true,
-            )?,
-            swathe(
-                "friction_cold",
-                nominal,
-                &friction(f),
-                cold,
-                extent.sweep,
-                true,
-            )?,
-            swathe("map", nominal, &map, cold, extent.map_periods, true)?,
+        let (c, f) = (clearance(c), friction(f));
+        let (runs_of, sweep_of) = (extent.runs, extent.sweep);
+        let swathes = [
+            ("runs_by_clearance", &cases[0], cold, runs_of, true),
+            ("runs_by_friction", &cases[1], cold, runs_of, true),
+            ("clearance_up", &c, up, sweep_of, false),
+            ("clearance_down", &c, down, sweep_of, false),
+            ("friction_up", &f, up, sweep_of, false),
+            ("friction_down", &f, down, sweep_of, false),
+            ("clearance_cold", &c, cold, sweep_of, true),
+            ("friction_cold", &f, cold, sweep_of, true),
+            ("map", &map, cold, extent.map_periods, true),
         ];
+        let swathes = swathes
+            .into_iter()
+            .map(|(name, vary, start, periods, exponent)| {
+                swathe(name, nominal, vary, start, periods, exponent)
+            })
+            .collect::<Result<Vec<_>, _>>()?;
         // Blocks that take longest come first, so that no thread is left with one at the end.
         let mut jobs: Vec<Job> = Vec::new();
         for (s, swathe) in swathes.iter().enumerate() {

@@ -3,6 +3,7 @@
 use super::record::{Row, Swathe, Traced};
 use super::{Extent, PICKED};
 use crate::analysis::paper::chaos::{Found, Loop};
+use crate::analysis::paper::curves::{Curves, Instant};
 use crate::analysis::paper::{self, BY_CLEARANCE, BY_FRICTION, Case, Statement};
 use crate::analysis::response::Response;
 
@@ -68,6 +69,26 @@ impl Findings {
         }
     }
 
+    /// Runs at the paper's output step, as statements about whole curves take them.
+    fn curves_sampled(&self) -> Curves {
+        let samples = |run: &Traced| -> Vec<Instant> {
+            let rows = run.rows.iter().filter(|row| row[14] == 1.0);
+            rows.map(|row| std::array::from_fn(|k| row[k])).collect()
+        };
+        let of = |cases: [Case; 3]| {
+            cases
+                .iter()
+                .filter_map(|&case| self.run(case).map(samples))
+                .collect()
+        };
+        Curves {
+            by_clearance: of(BY_CLEARANCE),
+            by_friction: of(BY_FRICTION),
+            verified: vec![samples(&self.runs[0]), samples(&self.lagrange)],
+            ideal: samples(&self.ideal),
+        }
+    }
+
     /// Largest distance of the two formulations in x (m) and beta (rad) at the paper's output step.
     pub fn formulations_apart(&self) -> [f64; 2] {
         let samples = |run: &Traced| -> Vec<Row> {
@@ -86,7 +107,7 @@ impl Findings {
         let (apart, tree) = (self.formulations_apart(), &self.runs[0].response.full);
         let shares = [0, 1].map(|k| apart[k] / tree.deviation[PICKED[k]]);
         let verified = Statement {
-            place: "4.2.3 and first conclusion".into(),
+            place: "4.2.3, first conclusion".into(),
             says: "an independent formulation of the same mechanism moves alike".to_owned(),
             criterion: "x and beta of the tree and the lagrange formulation stay within 5 % of their largest deviation from \
                         the ideal motion"
@@ -106,15 +127,10 @@ impl Findings {
         };
         let conclusion = paper::chaos::second_conclusion(&all);
         all.push(verified);
+        all.extend(paper::curves::statements(&self.curves_sampled()));
         all.extend(paper::chaos::statements(&self.chaos()));
-        // The conclusions stand together at the end.
-        let at = all
-            .iter()
-            .position(|s| s.place.starts_with("5,"))
-            .unwrap_or(all.len());
-        all.splice(at..at, conclusion);
-        let (section, conclusions): (Vec<_>, Vec<_>) =
-            all.into_iter().partition(|s| !s.place.starts_with("5,"));
-        [section, conclusions].concat()
+        all.extend(conclusion);
+        paper::in_order(&mut all);
+        all
     }
 }
