@@ -47,9 +47,11 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     out
 }
 
-/// As the page writes a number.
+/// As the page writes a number that needs no power of ten.
 fn shown(value: f64) -> String {
-    significant(value, 4).replace('-', "\u{2212}")
+    let text = significant(value, 4);
+    assert!(!text.contains('e'), "{text}");
+    text
 }
 
 /// Cells of every row of every table of the page, tags removed.
@@ -157,7 +159,7 @@ fn a_quick_report_is_whole_and_its_page_says_what_its_data_say() {
             "{} mm, {}",
             published.case.clearance, published.case.friction
         );
-        let what = format!("{} ({})", line[3], line[4]);
+        let what = format!("{} ({})", line[3].replace("beta", "β"), line[4]);
         let row = table
             .iter()
             .find(|row| row.len() == 9 && row[0] == line[0] && row[1] == run && row[2] == what);
@@ -209,6 +211,18 @@ fn a_quick_report_is_whole_and_its_page_says_what_its_data_say() {
         not
     );
     assert!(page.contains(&format!("<b>{confirmed} of {}</b>", confirmed + not)));
+
+    // A quick report says that it is one; numbers and names are set as in print.
+    assert!(page.contains("This is a quick report"), "no notice");
+    assert!(!page.contains("beta"), "β has one name on the page");
+    let power =
+        |c: &[char]| c[0].is_ascii_digit() && c[1] == 'e' && (c[2] == '-' || c[2].is_ascii_digit());
+    for row in &table {
+        for cell in row {
+            let letters: Vec<char> = cell.chars().collect();
+            assert!(!letters.windows(3).any(power), "{cell}");
+        }
+    }
 
     // It is not written over, and --force replaces it only as what it is.
     let again = jointplay(folder.path(), "reproduce --out report --quick --quiet");
