@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 use jointplay::analysis::paper::PUBLISHED;
 use jointplay::analysis::reproduction::Extent;
@@ -256,6 +256,97 @@ fn bad_input_is_refused_before_anything_runs() {
         1,
         "nothing is left"
     );
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_leaves_nothing_half_written_and_the_same_command_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let entries = || files(folder.path());
+    let child = Command::new(env!("CARGO_BIN_EXE_jointplay"))
+        .args("reproduce --out report/ --quick --threads 1".split(' '))
+        .current_dir(folder.path())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // Once some blocks are in.
+    let length = || -> usize {
+        let part = |name: &str| {
+            fs::read(folder.path().join("report.partial").join(name)).map_or(0, |b| b.len())
+        };
+        part("runs_by_clearance.partial") + part("runs_by_friction.partial")
+    };
+    let mut grown = Vec::new();
+    while grown.len() < 5 {
+        let now = length();
+        if grown.last() != Some(&now) {
+            grown.push(now);
+        }
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    let kill = Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status();
+    assert!(kill.unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(130), "{stderr}");
+    assert!(
+        stderr.contains("no report was written") && stderr.contains("goes on from report.partial"),
+        "{stderr}"
+    );
+    assert!(output.stdout.is_empty());
+    let left = entries();
+    assert!(
+        left.keys().all(|name| name.starts_with("report.partial/")),
+        "{:?}",
+        left.keys()
+    );
+
+    // Damage, and what was begun otherwise, is refused by name and left alone.
+    let first = folder
+        .path()
+        .join("report.partial/runs_by_clearance.partial");
+    let whole = fs::read(&first).unwrap();
+    fs::write(&first, &whole[..whole.len() - 1]).unwrap();
+    let damaged = jointplay(folder.path(), "reproduce --out report --quick");
+    assert_eq!(damaged.code, Some(1), "{}", damaged.stderr);
+    assert!(
+        damaged
+            .stderr
+            .contains("report.partial/runs_by_clearance.partial is damaged"),
+        "{}",
+        damaged.stderr
+    );
+    fs::write(&first, &whole).unwrap();
+    let other = jointplay(folder.path(), "reproduce --out report");
+    assert_eq!(other.code, Some(2), "{}", other.stderr);
+    assert!(
+        other.stderr.contains("begun with other settings"),
+        "{}",
+        other.stderr
+    );
+    assert!(entries() == left, "left as it was");
+
+    // It goes on to the very report that comes without an interruption.
+    let resumed = jointplay(folder.path(), "reproduce --out report --quick --threads 2");
+    assert_eq!(resumed.code, Some(0), "{}", resumed.stderr);
+    assert!(
+        resumed
+            .stderr
+            .contains("going on where report.partial stopped"),
+        "{}",
+        resumed.stderr
+    );
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    let straight = folder.path().join("straight");
+    into_folder(&straight, Extent::QUICK, 2).unwrap();
+    let (one, other) = (files(&folder.path().join("report")), files(&straight));
+    assert!(one.keys().eq(other.keys()));
+    for (name, content) in &one {
+        assert!(*content == other[name], "{name} differs");
+    }
 }
 
 #[test]

@@ -224,6 +224,19 @@ impl Work {
         self.jobs.len()
     }
 
+    /// Its sweeps, without records.
+    pub fn swathes(&self) -> &[Swathe] {
+        &self.swathes
+    }
+
+    /// Number of the sweep and of its block that job `job` computes, if it does.
+    pub fn block(&self, job: usize) -> Option<(usize, usize)> {
+        match self.jobs[job] {
+            Job::Block(s, b) => Some((s, b)),
+            _ => None,
+        }
+    }
+
     /// Simulated time of a job, s; a twin run counts as another.
     pub fn length(&self, job: usize) -> f64 {
         match self.jobs[job] {

@@ -7,6 +7,7 @@ mod partial;
 
 pub(super) use archive::{Archive, Source};
 pub use merge::merge;
+pub(super) use partial::Partial;
 
 use std::collections::HashSet;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -18,7 +19,6 @@ use indicatif::ProgressBar;
 use serde_json::{Map, Value as Json, json};
 
 use self::options::Shard;
-use self::partial::Partial;
 use super::args::{SummaryForm, SweepArguments};
 use super::check::near_singular;
 use super::output::Target;
