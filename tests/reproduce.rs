@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
+use std::sync::OnceLock;
 
 use jointplay::analysis::paper::PUBLISHED;
 use jointplay::analysis::reproduction::Extent;
@@ -81,10 +82,19 @@ fn rows(page: &str) -> Vec<Vec<String>> {
         .collect()
 }
 
+/// The quick report, in `report/` of the folder, made once and left as it is.
+fn quick() -> &'static (tempfile::TempDir, Outcome) {
+    static REPORT: OnceLock<(tempfile::TempDir, Outcome)> = OnceLock::new();
+    REPORT.get_or_init(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let run = jointplay(folder.path(), "reproduce --out report --quick --quiet");
+        (folder, run)
+    })
+}
+
 #[test]
 fn a_quick_report_is_whole_and_its_page_says_what_its_data_say() {
-    let folder = tempfile::tempdir().unwrap();
-    let run = jointplay(folder.path(), "reproduce --out report --quick --quiet");
+    let (folder, run) = quick();
     assert_eq!(run.code, Some(0), "{}{}", run.stdout, run.stderr);
     assert!(run.stdout.contains("Statements") && run.stdout.contains("report/index.html"));
     let all = files(&folder.path().join("report"));
@@ -340,8 +350,7 @@ fn ctrl_c_leaves_nothing_half_written_and_the_same_command_goes_on() {
         resumed.stderr
     );
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
-    let straight = folder.path().join("straight");
-    into_folder(&straight, Extent::QUICK, 2).unwrap();
+    let straight = quick().0.path().join("report");
     let (one, other) = (files(&folder.path().join("report")), files(&straight));
     assert!(one.keys().eq(other.keys()));
     for (name, content) in &one {
