@@ -6,19 +6,19 @@ use super::chaos::{AMPLITUDES, LITTLE};
 use super::{Statement, verdict};
 
 /// One instant of a run: time (s), x, its velocity and acceleration, beta, its rate and acceleration (SI units).
-pub type Instant = [f64; 7];
+pub type Sample = [f64; 7];
 
 /// Runs at the same instants, the paper's output step apart.
 #[derive(Clone, Debug, Default)]
 pub struct Curves {
     /// Clearance ascending, at the same friction.
-    pub by_clearance: Vec<Vec<Instant>>,
+    pub by_clearance: Vec<Vec<Sample>>,
     /// Friction ascending, at the same clearance.
-    pub by_friction: Vec<Vec<Instant>>,
+    pub by_friction: Vec<Vec<Sample>>,
     /// The same run by two formulations that share no equations of motion, and with ideal joints.
-    pub verified: Vec<Vec<Instant>>,
+    pub verified: Vec<Vec<Sample>>,
     /// With ideal joints.
-    pub ideal: Vec<Instant>,
+    pub ideal: Vec<Sample>,
 }
 
 const NAMES: [&str; 7] = [
@@ -38,7 +38,7 @@ fn amplitude(column: usize) -> f64 {
 }
 
 /// Largest distance of any two of `curves` at an instant from `from` (s) on, over the amplitude.
-fn apart(curves: &[&[Instant]], column: usize, from: f64) -> f64 {
+fn apart(curves: &[&[Sample]], column: usize, from: f64) -> f64 {
     let instants = curves.iter().map(|c| c.len()).min().unwrap_or(0);
     let at = |k: usize| {
         let (least, most) = super::chaos::range(curves.iter().map(|c| c[k][column]));
@@ -51,7 +51,7 @@ fn apart(curves: &[&[Instant]], column: usize, from: f64) -> f64 {
 fn coincide(
     place: &'static str,
     says: &str,
-    curves: &[&[Instant]],
+    curves: &[&[Sample]],
     columns: &[usize],
     from: f64,
 ) -> Option<Statement> {
@@ -80,7 +80,7 @@ fn coincide(
     })
 }
 
-fn slices(runs: &[Vec<Instant>]) -> Vec<&[Instant]> {
+fn slices(runs: &[Vec<Sample>]) -> Vec<&[Sample]> {
     runs.iter().map(Vec::as_slice).collect()
 }
 
@@ -92,7 +92,7 @@ pub fn statements(curves: &Curves) -> Vec<Statement> {
     let (c, f) = (slices(&curves.by_clearance), slices(&curves.by_friction));
     let two = slices(&curves.verified);
     let mut out = Vec::new();
-    let mut say = |place, says, curves: &[&[Instant]], columns: &[usize], from| {
+    let mut say = |place, says, curves: &[&[Sample]], columns: &[usize], from| {
         out.extend(coincide(place, says, curves, columns, from));
     };
     say(
@@ -167,7 +167,7 @@ mod tests {
     use crate::analysis::paper::Verdict::{self, Confirmed, NotConfirmed};
 
     /// A curve that is `early` off until 0.35 s and `late` off afterwards, in every column.
-    fn curve(early: f64, late: f64) -> Vec<Instant> {
+    fn curve(early: f64, late: f64) -> Vec<Sample> {
         let instants = (0..=20).map(|k| f64::from(k) * 0.1);
         instants
             .map(|t| {

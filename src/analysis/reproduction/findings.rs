@@ -3,7 +3,7 @@
 use super::record::{Row, Swathe, Traced};
 use super::{Extent, PICKED};
 use crate::analysis::paper::chaos::{Found, Loop};
-use crate::analysis::paper::curves::{Curves, Instant};
+use crate::analysis::paper::curves::{Curves, Sample};
 use crate::analysis::paper::{self, BY_CLEARANCE, BY_FRICTION, Case, Statement};
 use crate::analysis::response::Response;
 
@@ -71,7 +71,7 @@ impl Findings {
 
     /// Runs at the paper's output step, as statements about whole curves take them.
     fn curves_sampled(&self) -> Curves {
-        let samples = |run: &Traced| -> Vec<Instant> {
+        let samples = |run: &Traced| -> Vec<Sample> {
             let rows = run.rows.iter().filter(|row| row[14] == 1.0);
             rows.map(|row| std::array::from_fn(|k| row[k])).collect()
         };
