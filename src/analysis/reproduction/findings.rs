@@ -128,8 +128,8 @@ impl Findings {
         let conclusion = paper::chaos::second_conclusion(&all);
         all.push(verified);
         all.extend(paper::curves::statements(&self.curves_sampled()));
-        all.extend(paper::chaos::statements(&self.chaos()));
         all.extend(conclusion);
+        all.extend(paper::chaos::statements(&self.chaos()));
         paper::in_order(&mut all);
         all
     }
