@@ -34,8 +34,8 @@ pub(super) fn compute(
         .collect();
     let next = AtomicUsize::new(0);
     let stop = AtomicBool::new(false);
-    let done: Mutex<(&mut Kept, Vec<(usize, Result<Outcome, Failure>)>)> =
-        Mutex::new((kept, Vec::new()));
+    let mut done: Vec<(usize, Result<Outcome, Failure>)> = Vec::new();
+    let shared = Mutex::new((kept, &mut done));
     let worker = || {
         while !stop.load(Ordering::Relaxed) {
             let Some(&job) = left.get(next.fetch_add(1, Ordering::Relaxed)) else {
@@ -51,16 +51,17 @@ pub(super) fn compute(
             });
             bar.inc((work.length(job) - told).max(0.0).round() as u64);
             // A thread that panicked has been told of already.
-            let mut done = done.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut shared = shared.lock().unwrap_or_else(PoisonError::into_inner);
+            let (kept, done) = &mut *shared;
             let outcome = match outcome {
-                Ok(outcome) => done.0.keep(&work, job, &outcome).map(|()| outcome),
+                Ok(outcome) => kept.keep(&work, job, &outcome).map(|()| outcome),
                 Err(error) if is_cancelled(&error) => return,
                 Err(error) => Err(Failure::new(Failure::DIVERGED, error.to_string())),
             };
             if outcome.is_err() {
                 stop.store(true, Ordering::Relaxed);
             }
-            done.1.push((job, outcome));
+            done.push((job, outcome));
         }
     };
     thread::scope(|scope| {
@@ -68,7 +69,7 @@ pub(super) fn compute(
             scope.spawn(worker);
         }
     });
-    let (kept, mut done) = done.into_inner().unwrap_or_else(PoisonError::into_inner);
+    let (kept, _) = shared.into_inner().unwrap_or_else(PoisonError::into_inner);
     done.sort_by_key(|(job, _)| *job);
     for (job, outcome) in done {
         outcomes[job] = Some(outcome?);
