@@ -105,6 +105,8 @@ fn a_sweep_fills_the_diagram_and_a_click_loads_the_section() {
     assert_eq!(come(harness.state()), 3);
     harness.run_steps(3);
     harness.get_by_label("3 of 3 values");
+    // Four periods tell no regime. The number stands first: "periodic 3" would be a period of three.
+    harness.get_by_label("3 unclear");
 
     let bench = harness.state().bench();
     let point = bench.swept().expect("swept").points[2].clone();

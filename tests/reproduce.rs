@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Stdio};
+use std::sync::OnceLock;
 
 use jointplay::analysis::paper::PUBLISHED;
 use jointplay::analysis::reproduction::Extent;
@@ -47,9 +48,11 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     out
 }
 
-/// As the page writes a number.
+/// As the page writes a number that needs no power of ten.
 fn shown(value: f64) -> String {
-    significant(value, 4).replace('-', "\u{2212}")
+    let text = significant(value, 4);
+    assert!(!text.contains('e'), "{text}");
+    text
 }
 
 /// Cells of every row of every table of the page, tags removed.
@@ -79,10 +82,19 @@ fn rows(page: &str) -> Vec<Vec<String>> {
         .collect()
 }
 
+/// The quick report, in `report/` of the folder, made once and left as it is.
+fn quick() -> &'static (tempfile::TempDir, Outcome) {
+    static REPORT: OnceLock<(tempfile::TempDir, Outcome)> = OnceLock::new();
+    REPORT.get_or_init(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let run = jointplay(folder.path(), "reproduce --out report --quick --quiet");
+        (folder, run)
+    })
+}
+
 #[test]
 fn a_quick_report_is_whole_and_its_page_says_what_its_data_say() {
-    let folder = tempfile::tempdir().unwrap();
-    let run = jointplay(folder.path(), "reproduce --out report --quick --quiet");
+    let (folder, run) = quick();
     assert_eq!(run.code, Some(0), "{}{}", run.stdout, run.stderr);
     assert!(run.stdout.contains("Statements") && run.stdout.contains("report/index.html"));
     let all = files(&folder.path().join("report"));
@@ -157,7 +169,7 @@ fn a_quick_report_is_whole_and_its_page_says_what_its_data_say() {
             "{} mm, {}",
             published.case.clearance, published.case.friction
         );
-        let what = format!("{} ({})", line[3], line[4]);
+        let what = format!("{} ({})", line[3].replace("beta", "β"), line[4]);
         let row = table
             .iter()
             .find(|row| row.len() == 9 && row[0] == line[0] && row[1] == run && row[2] == what);
@@ -210,6 +222,18 @@ fn a_quick_report_is_whole_and_its_page_says_what_its_data_say() {
     );
     assert!(page.contains(&format!("<b>{confirmed} of {}</b>", confirmed + not)));
 
+    // A quick report says that it is one; numbers and names are set as in print.
+    assert!(page.contains("This is a quick report"), "no notice");
+    assert!(!page.contains("beta"), "β has one name on the page");
+    let power =
+        |c: &[char]| c[0].is_ascii_digit() && c[1] == 'e' && (c[2] == '-' || c[2].is_ascii_digit());
+    for row in &table {
+        for cell in row {
+            let letters: Vec<char> = cell.chars().collect();
+            assert!(!letters.windows(3).any(power), "{cell}");
+        }
+    }
+
     // It is not written over, and --force replaces it only as what it is.
     let again = jointplay(folder.path(), "reproduce --out report --quick --quiet");
     assert_eq!(again.code, Some(1), "{}", again.stderr);
@@ -242,6 +266,96 @@ fn bad_input_is_refused_before_anything_runs() {
         1,
         "nothing is left"
     );
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_leaves_nothing_half_written_and_the_same_command_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let entries = || files(folder.path());
+    let child = Command::new(env!("CARGO_BIN_EXE_jointplay"))
+        .args("reproduce --out report/ --quick --threads 1".split(' '))
+        .current_dir(folder.path())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // Once some blocks are in.
+    let length = || -> usize {
+        let part = |name: &str| {
+            fs::read(folder.path().join("report.partial").join(name)).map_or(0, |b| b.len())
+        };
+        part("runs_by_clearance.partial") + part("runs_by_friction.partial")
+    };
+    let mut grown = Vec::new();
+    while grown.len() < 5 {
+        let now = length();
+        if grown.last() != Some(&now) {
+            grown.push(now);
+        }
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    let kill = Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status();
+    assert!(kill.unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(130), "{stderr}");
+    assert!(
+        stderr.contains("no report was written") && stderr.contains("goes on from report.partial"),
+        "{stderr}"
+    );
+    assert!(output.stdout.is_empty());
+    let left = entries();
+    assert!(
+        left.keys().all(|name| name.starts_with("report.partial/")),
+        "{:?}",
+        left.keys()
+    );
+
+    // Damage, and what was begun otherwise, is refused by name and left alone.
+    let first = folder
+        .path()
+        .join("report.partial/runs_by_clearance.partial");
+    let whole = fs::read(&first).unwrap();
+    fs::write(&first, &whole[..whole.len() - 1]).unwrap();
+    let damaged = jointplay(folder.path(), "reproduce --out report --quick");
+    assert_eq!(damaged.code, Some(1), "{}", damaged.stderr);
+    assert!(
+        damaged
+            .stderr
+            .contains("report.partial/runs_by_clearance.partial is damaged"),
+        "{}",
+        damaged.stderr
+    );
+    fs::write(&first, &whole).unwrap();
+    let other = jointplay(folder.path(), "reproduce --out report");
+    assert_eq!(other.code, Some(2), "{}", other.stderr);
+    assert!(
+        other.stderr.contains("begun with other settings"),
+        "{}",
+        other.stderr
+    );
+    assert!(entries() == left, "left as it was");
+
+    // It goes on to the very report that comes without an interruption.
+    let resumed = jointplay(folder.path(), "reproduce --out report --quick --threads 2");
+    assert_eq!(resumed.code, Some(0), "{}", resumed.stderr);
+    assert!(
+        resumed
+            .stderr
+            .contains("going on where report.partial stopped"),
+        "{}",
+        resumed.stderr
+    );
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    let straight = quick().0.path().join("report");
+    let (one, other) = (files(&folder.path().join("report")), files(&straight));
+    assert!(one.keys().eq(other.keys()));
+    for (name, content) in &one {
+        assert!(*content == other[name], "{name} differs");
+    }
 }
 
 #[test]

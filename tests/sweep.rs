@@ -179,6 +179,8 @@ fn neither_threads_nor_shards_change_a_bit() {
     merge("nowhere.npz --out bad.npz").expect(1);
     merge("s1.npz s2.npz s3.npz --out merged.npz").expect(1);
     merge("s1.npz s2.npz s3.npz --out merged.csv").expect(2);
+    let over = merge("s1.npz s2.npz s3.npz --out ./s2.npz --force").expect(2);
+    assert!(over.stderr.contains("one of the shards"), "{}", over.stderr);
     fs::remove_file(folder.path().join("text.npz")).unwrap();
     assert_eq!(names(folder.path()), before);
 
@@ -309,6 +311,34 @@ fn a_point_that_diverges_is_recorded_and_the_rest_goes_on() {
     assert!(arrays["section_x_m"][[0, 0]].is_finite());
     assert!(arrays["section_x_m"][[1, 0]].is_nan());
     assert!(arrays["S1_peak_N"][1].is_nan());
+}
+
+#[test]
+fn warnings_come_from_within_the_ranges_and_each_kind_once() {
+    let folder = folder();
+    // Singular poses lie in the middle of this range and at neither end.
+    let line = "sweep spcmm --vary contact.clearance=0.01mm..0.2mm:2 --vary spcmm.slider_plane=20mm..300mm:15 --periods 1 \
+                --discard 0 --shard 30/30 --no-exponent --out a.npz";
+    let outcome = jointplay(folder.path(), line).expect(0);
+    let warnings: Vec<&str> = outcome
+        .stderr
+        .lines()
+        .filter(|l| l.contains("warning:"))
+        .collect();
+    assert_eq!(warnings.len(), 3, "{}", outcome.stderr);
+    assert!(warnings[0].contains("contact.clearance = 0.01 mm") && warnings[0].contains("Hertz"));
+    for kind in ["comes near a singular pose", "has a singular pose"] {
+        assert!(
+            outcome.stderr.matches(kind).count() == 1,
+            "{}",
+            outcome.stderr
+        );
+    }
+    assert!(
+        outcome.stderr.contains("spcmm.slider_plane = 140 mm"),
+        "{}",
+        outcome.stderr
+    );
 }
 
 #[test]

@@ -2,6 +2,7 @@
 //! program gets for the same. Nothing is tuned to match; the paper leaves one dimension out and contradicts itself in places.
 
 pub mod chaos;
+pub mod curves;
 mod words;
 
 pub use words::{Agreement, Comparison, compare};
@@ -401,6 +402,24 @@ pub fn response_statements(runs: &Runs) -> Vec<Statement> {
     out
 }
 
+/// Puts statements in the paper's order: by section, then by the figure that they begin with; a section's last words stand
+/// after its figures.
+pub fn in_order(statements: &mut [Statement]) {
+    statements.sort_by_cached_key(|statement| {
+        let (section, rest) = statement
+            .place
+            .split_once(',')
+            .unwrap_or((&statement.place, "Figure 0"));
+        let figure = rest.split_once("Figure").map(|(_, number)| {
+            let digits = number.chars().skip_while(|c| !c.is_ascii_digit());
+            digits
+                .map_while(|c| c.to_digit(10))
+                .fold(0, |n, digit| n * 10 + digit)
+        });
+        (section.to_owned(), figure.unwrap_or(u32::MAX))
+    });
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -414,6 +433,45 @@ mod tests {
             assert!(published.value > 0.0);
         }
         assert!(PUBLISHED.len() > 40);
+    }
+
+    #[test]
+    fn statements_stand_in_the_order_of_the_paper() {
+        let places = [
+            "5, second conclusion",
+            "4.2.2, Figure 16",
+            "4.2.1, Figures 8 to 10",
+            "4.2.1, Figure 10",
+            "4.3, Figure 18a",
+            "5, third conclusion",
+            "4.2.1, Figure 8",
+            "4.2.3, first conclusion",
+            "4.2.3, Figure 17a and b",
+            "4.2.2",
+        ];
+        let mut statements = places.map(|place| Statement {
+            place: place.into(),
+            says: String::new(),
+            criterion: String::new(),
+            verdict: Verdict::Confirmed,
+            evidence: String::new(),
+        });
+        in_order(&mut statements);
+        assert_eq!(
+            statements.map(|s| s.place.into_owned()),
+            [
+                "4.2.1, Figures 8 to 10",
+                "4.2.1, Figure 8",
+                "4.2.1, Figure 10",
+                "4.2.2",
+                "4.2.2, Figure 16",
+                "4.2.3, Figure 17a and b",
+                "4.2.3, first conclusion",
+                "4.3, Figure 18a",
+                "5, second conclusion",
+                "5, third conclusion",
+            ]
+        );
     }
 
     #[test]

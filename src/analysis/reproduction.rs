@@ -1,10 +1,16 @@
 //! Everything that section 4 of the paper needs, as jobs that any number of threads may do in any order, and what comes out of them.
 
+mod findings;
+mod record;
+
+pub use findings::Findings;
+use record::row;
+pub use record::{COLUMNS, Row, Swathe, Traced, regime_word};
+
 use super::grid::{Axis, Grid, RangeError, Start};
-use super::paper::chaos::{Found, Loop, Swept};
-use super::paper::{self, BY_CLEARANCE, BY_FRICTION, CASES, Case, DURATION, SAMPLING, Statement};
+use super::paper::chaos::Loop;
+use super::paper::{CASES, Case, DURATION, SAMPLING};
 use super::point::{Plan, resolution};
-use super::regime::Regime;
 use super::response::{COORDINATES, Look, Response, ResponseError, respond_seen};
 use super::sweep::{Sweep, SweepError};
 use crate::scene::{Scene, SceneError};
@@ -53,134 +59,6 @@ impl Extent {
         map: [3, 4],
         map_periods: (12, 4),
     };
-}
-
-/// Columns of a [`Row`].
-pub const COLUMNS: [&str; 15] = [
-    "t_s",
-    "x_m",
-    "vx_m_s",
-    "ax_m_s2",
-    "beta_rad",
-    "beta_rate_rad_s",
-    "beta_accel_rad_s2",
-    "S1_normal_N",
-    "S2_normal_N",
-    "S3_normal_N",
-    "x_deviation_m",
-    "beta_deviation_rad",
-    "probe_error_m",
-    "constraint_drift",
-    "sample",
-];
-
-/// One instant of a run, in the order of [`COLUMNS`]; `sample` is 1 at whole multiples of the paper's output step.
-pub type Row = [f64; COLUMNS.len()];
-
-fn row(look: &Look) -> Row {
-    let [c, r, a] = look.derivatives();
-    let deviation = look.deviation();
-    let force = |j: usize| {
-        look.frame
-            .joints
-            .get(j)
-            .map_or(f64::NAN, |j| j.normal_force.norm())
-    };
-    let (x, beta) = (PICKED[0], PICKED[1]);
-    [
-        look.time,
-        c[x],
-        r[x],
-        a[x],
-        c[beta],
-        r[beta],
-        a[beta],
-        force(0),
-        force(1),
-        force(2),
-        deviation[x],
-        deviation[beta],
-        look.frame.probe_error.map_or(f64::NAN, |e| e.norm()),
-        look.constraint_drift,
-        f64::from(u8::from(look.sample)),
-    ]
-}
-
-/// A run of section 4.2 with everything that its figures show.
-#[derive(Clone, Debug)]
-pub struct Traced {
-    /// Name in files.
-    pub name: String,
-    /// Clearance and friction.
-    pub case: Case,
-    /// Peaks and separations.
-    pub response: Response,
-    /// All instants, in order of time.
-    pub rows: Vec<Row>,
-}
-
-/// A sweep with the records of all its points.
-#[derive(Clone, Debug)]
-pub struct Swathe {
-    /// Name in files.
-    pub name: &'static str,
-    /// What was swept.
-    pub sweep: Sweep,
-    /// A record a point, one after the other; empty until its blocks are put in.
-    pub records: Vec<f64>,
-}
-
-impl Swathe {
-    /// Values of the array called `name`, those of a point together; empty if there is none.
-    pub fn values(&self, name: &str) -> Vec<f64> {
-        let layout = self.sweep.layout();
-        let Some(at) = layout.columns().iter().position(|c| c.name == name) else {
-            return Vec::new();
-        };
-        let (offset, length) = (layout.offset(at), layout.values_in(&layout.columns()[at]));
-        let records = self.records.chunks_exact(layout.record_length());
-        records
-            .flat_map(|r| r[offset..offset + length].to_vec())
-            .collect()
-    }
-
-    /// The points along its last axis, whose values are multiplied by `factor`.
-    pub fn swept(&self, factor: f64) -> Vec<Swept> {
-        let Some(axis) = self.sweep.grid().axes().last() else {
-            return Vec::new();
-        };
-        let kept = self.sweep.layout().kept();
-        let column = |name: &str| self.values(name);
-        let (regimes, periods) = (column("regime"), column("period"));
-        let exponents = column("exponent_per_s");
-        let errors = column("exponent_standard_error_per_s");
-        let (x, beta) = (column("section_x_m"), column("section_beta_rad"));
-        let part = |all: &[f64], k: usize| all[k * kept..(k + 1) * kept].to_vec();
-        axis.values()
-            .enumerate()
-            .map(|(k, value)| Swept {
-                value: value * factor,
-                regime: regime_word(regimes[k] as i64),
-                period: periods[k] as usize,
-                exponent: (exponents[k], errors[k]),
-                sections: [part(&x, k), part(&beta, k)],
-            })
-            .collect()
-    }
-}
-
-/// The word of a regime's number in files.
-pub fn regime_word(code: i64) -> &'static str {
-    let all = [
-        Regime::Unclear,
-        Regime::Periodic(1),
-        Regime::QuasiPeriodic,
-        Regime::Chaotic,
-        Regime::NotSettled,
-    ];
-    all.into_iter()
-        .find(|r| r.code() == code)
-        .map_or("none", Regime::word)
 }
 
 /// Why there is no report.
@@ -242,24 +120,6 @@ pub enum Outcome {
     Curve(Loop),
     /// Records of a block.
     Block(Vec<f64>),
-}
-
-/// Everything that was found.
-pub struct Findings {
-    /// How much was computed.
-    pub extent: Extent,
-    /// The paper's runs, in the order of [`CASES`].
-    pub runs: Vec<Traced>,
-    /// The first of them with all bodies and multipliers, and with ideal joints.
-    pub lagrange: Traced,
-    /// Ideal joints.
-    pub ideal: Traced,
-    /// Settled curves, in the order of [`CASES`].
-    pub curves: Vec<Loop>,
-    /// Sweeps: [`Findings::swathe`] finds one by name.
-    pub swathes: Vec<Swathe>,
-    /// What two sections must differ by in x (m) and beta (rad) to be different.
-    pub resolution: [f64; 2],
 }
 
 const SCENE: &str = "spcmm";
@@ -324,73 +184,25 @@ impl Work {
             vec!["contact.friction=0.15..0.25:3".to_owned()],
         ];
         let (up, down, cold) = (Start::FollowUp, Start::FollowDown, Start::Cold);
-        let swathes = vec![
-            swathe(
-                "runs_by_clearance",
-                nominal,
-                &cases[0],
-                cold,
-                extent.runs,
-                true,
-            )?,
-            swathe(
-                "runs_by_friction",
-                nominal,
-                &cases[1],
-                cold,
-                extent.runs,
-                true,
-            )?,
-            swathe(
-                "clearance_up",
-                nominal,
-                &clearance(c),
-                up,
-                extent.sweep,
-                false,
-            )?,
-            swathe(
-                "clearance_down",
-                nominal,
-                &clearance(c),
-                down,
-                extent.sweep,
-                false,
-            )?,
-            swathe(
-                "friction_up",
-                nominal,
-                &friction(f),
-                up,
-                extent.sweep,
-                false,
-            )?,
-            swathe(
-                "friction_down",
-                nominal,
-                &friction(f),
-                down,
-                extent.sweep,
-                false,
-            )?,
-            swathe(
-                "clearance_cold",
-                nominal,
-                &clearance(c),
-                cold,
-                extent.sweep,
-                true,
-            )?,
-            swathe(
-                "friction_cold",
-                nominal,
-                &friction(f),
-                cold,
-                extent.sweep,
-                true,
-            )?,
-            swathe("map", nominal, &map, cold, extent.map_periods, true)?,
+        let (c, f) = (clearance(c), friction(f));
+        let (runs_of, sweep_of) = (extent.runs, extent.sweep);
+        let swathes = [
+            ("runs_by_clearance", &cases[0], cold, runs_of, true),
+            ("runs_by_friction", &cases[1], cold, runs_of, true),
+            ("clearance_up", &c, up, sweep_of, false),
+            ("clearance_down", &c, down, sweep_of, false),
+            ("friction_up", &f, up, sweep_of, false),
+            ("friction_down", &f, down, sweep_of, false),
+            ("clearance_cold", &c, cold, sweep_of, true),
+            ("friction_cold", &f, cold, sweep_of, true),
+            ("map", &map, cold, extent.map_periods, true),
         ];
+        let swathes = swathes
+            .into_iter()
+            .map(|(name, vary, start, periods, exponent)| {
+                swathe(name, nominal, vary, start, periods, exponent)
+            })
+            .collect::<Result<Vec<_>, _>>()?;
         // Blocks that take longest come first, so that no thread is left with one at the end.
         let mut jobs: Vec<Job> = Vec::new();
         for (s, swathe) in swathes.iter().enumerate() {
@@ -410,6 +222,19 @@ impl Work {
     /// Number of jobs.
     pub fn jobs(&self) -> usize {
         self.jobs.len()
+    }
+
+    /// Its sweeps, without records.
+    pub fn swathes(&self) -> &[Swathe] {
+        &self.swathes
+    }
+
+    /// Number of the sweep and of its block that job `job` computes, if it does.
+    pub fn block(&self, job: usize) -> Option<(usize, usize)> {
+        match self.jobs[job] {
+            Job::Block(s, b) => Some((s, b)),
+            _ => None,
+        }
     }
 
     /// Simulated time of a job, s; a twin run counts as another.
@@ -570,99 +395,4 @@ fn curve(
         }
     }
     Ok(found)
-}
-
-impl Findings {
-    /// The sweep called `name`.
-    ///
-    /// # Panics
-    /// If there is none.
-    pub fn swathe(&self, name: &str) -> &Swathe {
-        let found = self.swathes.iter().find(|s| s.name == name);
-        found.expect("named as in Work::new")
-    }
-
-    /// Runs as [`paper`] takes them.
-    pub fn responses(&self) -> Vec<(Case, Response)> {
-        self.runs
-            .iter()
-            .map(|r| (r.case, r.response.clone()))
-            .collect()
-    }
-
-    /// The run of `case`.
-    pub fn run(&self, case: Case) -> Option<&Traced> {
-        self.runs.iter().find(|run| run.case == case)
-    }
-
-    /// Settled curves of three runs.
-    pub fn loops(&self, cases: [Case; 3]) -> Vec<Loop> {
-        let of = |case: Case| self.curves.iter().find(|l| l.case == case).cloned();
-        cases.into_iter().filter_map(of).collect()
-    }
-
-    /// What the statements of section 4.3 rest on.
-    pub fn chaos(&self) -> Found {
-        let mm = 1e3;
-        let swept = |name, factor| self.swathe(name).swept(factor);
-        Found {
-            loops: [self.loops(BY_CLEARANCE), self.loops(BY_FRICTION)],
-            runs: [
-                swept("runs_by_clearance", mm),
-                swept("runs_by_friction", 1.0),
-            ],
-            sweeps: [swept("clearance_cold", mm), swept("friction_cold", 1.0)],
-            resolution: self.resolution,
-        }
-    }
-
-    /// Largest distance of the two formulations in x (m) and beta (rad) at the paper's output step.
-    pub fn formulations_apart(&self) -> [f64; 2] {
-        let samples = |run: &Traced| -> Vec<Row> {
-            run.rows.iter().filter(|r| r[14] == 1.0).copied().collect()
-        };
-        let (tree, lagrange) = (samples(&self.runs[0]), samples(&self.lagrange));
-        [1, 4].map(|i| {
-            let pairs = tree.iter().zip(&lagrange);
-            pairs.map(|(a, b)| (a[i] - b[i]).abs()).fold(0.0, f64::max)
-        })
-    }
-
-    /// Every qualitative statement of section 4 and of the conclusions.
-    pub fn statements(&self) -> Vec<Statement> {
-        let mut all = paper::response_statements(&self.responses());
-        let (apart, tree) = (self.formulations_apart(), &self.runs[0].response.full);
-        let shares = [0, 1].map(|k| apart[k] / tree.deviation[PICKED[k]]);
-        let verified = Statement {
-            place: "4.2.3 and first conclusion".into(),
-            says: "an independent formulation of the same mechanism moves alike".to_owned(),
-            criterion: "x and beta of the tree and the lagrange formulation stay within 5 % of their largest deviation from \
-                        the ideal motion"
-                .to_owned(),
-            verdict: if shares.iter().all(|s| *s < 0.05) {
-                paper::Verdict::Confirmed
-            } else {
-                paper::Verdict::NotConfirmed
-            },
-            evidence: format!(
-                "x: {:.3e} mm, {:.2} %; beta: {:.3e} mrad, {:.2} %",
-                apart[0] * 1e3,
-                shares[0] * 100.0,
-                apart[1] * 1e3,
-                shares[1] * 100.0
-            ),
-        };
-        let conclusion = paper::chaos::second_conclusion(&all);
-        all.push(verified);
-        all.extend(paper::chaos::statements(&self.chaos()));
-        // The conclusions stand together at the end.
-        let at = all
-            .iter()
-            .position(|s| s.place.starts_with("5,"))
-            .unwrap_or(all.len());
-        all.splice(at..at, conclusion);
-        let (section, conclusions): (Vec<_>, Vec<_>) =
-            all.into_iter().partition(|s| !s.place.starts_with("5,"));
-        [section, conclusions].concat()
-    }
 }

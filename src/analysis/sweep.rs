@@ -2,7 +2,7 @@
 //! caller: a block's record depends on nothing but the sweep and the block's number.
 
 use super::drive::{Machine, NoPeriod, drive_period};
-use super::grid::{Grid, Start};
+use super::grid::{Axis, Grid, Start};
 use super::layout::Layout;
 use super::point::{Plan, PointResult, PointRun};
 use crate::scene::{Scene, SceneError, Value};
@@ -10,6 +10,9 @@ use crate::simulate::Simulation;
 
 /// Most kept sections of all points together: an array of them takes 512 MiB.
 const MOST_SECTIONS: usize = 1 << 26;
+
+/// Most values along each range of a map at which the inside of it is tried before anything runs.
+const MOST_WITHIN: usize = 64;
 
 /// Why a sweep cannot be.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -60,7 +63,8 @@ pub struct Sweep {
 }
 
 impl Sweep {
-    /// A sweep of `scene`. Every value of each range is tried, with the other range at its ends.
+    /// A sweep of `scene`. Every value of each range is tried with the other range at its ends, and values within a map, all of
+    /// them where they are not too many.
     ///
     /// # Errors
     /// Nothing to keep, no drive phase, a value at which the scene cannot start.
@@ -86,7 +90,7 @@ impl Sweep {
             plan,
             layout,
         };
-        for point in sweep.border() {
+        for point in sweep.tried() {
             let scene = sweep.grid.scene(&sweep.scene, point);
             let started = scene.and_then(|scene| {
                 Simulation::new(&scene).map_err(|error| error.located(&scene))?;
@@ -105,17 +109,18 @@ impl Sweep {
         Ok(sweep)
     }
 
-    /// Points at which one range is anywhere and the other at an end.
-    fn border(&self) -> Vec<usize> {
-        let on_border = |point: &usize| {
+    /// Points that are tried before anything runs: every value of each range with the other at its ends, and a lattice
+    /// within, which is every point of a small map.
+    fn tried(&self) -> Vec<usize> {
+        let tried = |point: &usize| {
             let indices = self.grid.indices(*point);
-            let ends = self.grid.axes().iter().zip(&indices);
-            ends.filter(|(axis, i)| **i == 0 || **i + 1 == axis.count())
-                .count()
-                + 1
-                >= indices.len()
+            let along = || self.grid.axes().iter().zip(&indices);
+            let is_end = |(axis, i): (&Axis, &usize)| *i == 0 || *i + 1 == axis.count();
+            let ends = along().filter(|&of| is_end(of)).count();
+            ends + 1 >= indices.len()
+                || along().all(|(axis, i)| i % axis.count().div_ceil(MOST_WITHIN) == 0)
         };
-        (0..self.grid.points()).filter(on_border).collect()
+        (0..self.grid.points()).filter(tried).collect()
     }
 
     /// Parameters of a point as people write them.
@@ -243,5 +248,50 @@ impl BlockRun<'_> {
             self.sweep.layout.append(result.as_ref(), &mut records);
         }
         records
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn maps_are_tried_within() {
+        let scene = Scene::load("spcmm", &[]).expect("built in");
+        let tried = |rows: usize, columns: usize| {
+            let ranges = [
+                format!("contact.clearance=0.2mm..0.5mm:{rows}"),
+                format!("contact.friction=0.1..0.2:{columns}"),
+            ];
+            let axes = ranges.map(|text| Axis::parse(&scene, &text).expect("a range"));
+            let grid = Grid::new(&scene, axes.to_vec(), Start::Cold).expect("a map");
+            let plan = Plan {
+                periods: 2,
+                discard: 1,
+                phase: 0.0,
+                exponent: false,
+            };
+            let layout = Layout::new(&scene, &plan);
+            let sweep = Sweep {
+                scene: scene.clone(),
+                grid,
+                plan,
+                layout,
+            };
+            sweep.tried()
+        };
+        assert_eq!(tried(3, 5), (0..15).collect::<Vec<_>>());
+        // The border, and every second value of the first and every third of the second range.
+        let large = tried(128, 130);
+        for (i, j, is) in [
+            (0, 1, true),
+            (127, 7, true),
+            (5, 129, true),
+            (2, 3, true),
+            (2, 4, false),
+            (3, 3, false),
+        ] {
+            assert_eq!(large.contains(&(i * 130 + j)), is, "{i} {j}");
+        }
     }
 }

@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 
 use eframe::egui::{
-    self, ComboBox, DragValue, Rect, RectAlign, Response, RichText, Slider, SliderClamping,
+    self, ComboBox, DragValue, FontId, Rect, RectAlign, Response, RichText, Slider, SliderClamping,
     TextEdit, Tooltip, Ui,
 };
 
@@ -29,6 +29,9 @@ const FIRST: [&str; 3] = [
 
 /// Side of the button that takes a change back, points.
 const UNDO: f32 = 22.0;
+/// Width of a typed entry, and the margin at either side in it, points.
+const ENTRY: f32 = 84.0;
+const MARGIN: i8 = 6;
 
 /// State of the controls that is not the simulation's: half-typed values and what was wrong with them.
 #[derive(Default)]
@@ -374,13 +377,15 @@ impl Controls {
             .drafts
             .get(key)
             .map_or_else(|| shown.clone(), |draft| draft.text.clone());
+        let font = fitting(ui, &text, ENTRY - 2.0 * f32::from(MARGIN));
         let response = ui.add(
             TextEdit::singleline(&mut text)
-                .desired_width(84.0)
+                .font(font)
+                .desired_width(ENTRY)
                 .min_size(egui::vec2(0.0, ui.spacing().interact_size.y))
                 .align(egui::Align2::RIGHT_CENTER)
                 .background_color(ui.visuals().faint_bg_color)
-                .margin(egui::Margin::symmetric(6, 3)),
+                .margin(egui::Margin::symmetric(MARGIN, 3)),
         );
         if response.changed() {
             self.drafts.insert(
@@ -454,6 +459,20 @@ impl Controls {
     }
 }
 
+/// The font of the text, smaller where it does not fit into `room` (points): a unit that is cut off is another unit.
+fn fitting(ui: &Ui, text: &str, room: f32) -> FontId {
+    let body = egui::TextStyle::Body.resolve(ui.style());
+    let colour = ui.visuals().text_color();
+    let width = ui
+        .painter()
+        .layout_no_wrap(text.to_owned(), body.clone(), colour)
+        .size()
+        .x;
+    // Rounded down to half a point, so that glyphs of few sizes are kept.
+    let size = (2.0 * body.size * (room / width).clamp(0.7, 1.0)).floor() / 2.0;
+    FontId::new(size, body.family)
+}
+
 /// What a control is about, beside its panel: the control in use stays in sight.
 fn tooltip(ui: &Ui, response: &Response, player: &Player, parameter: &Parameter, key: &str) {
     let row = Rect::from_x_y_ranges(ui.clip_rect().x_range(), response.rect.y_range());
@@ -483,4 +502,35 @@ fn tooltip(ui: &Ui, response: &Response, player: &Player, parameter: &Parameter,
             ui.label(RichText::new("Applies at the next reset").small());
         }
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_value_fits_into_its_entry() {
+        let ctx = egui::Context::default();
+        theme::apply(&ctx);
+        let mut output = ctx.run_ui(egui::RawInput::default(), |ui| {
+            let room = ENTRY - 2.0 * f32::from(MARGIN);
+            let width = |text: &str| {
+                let font = fitting(ui, text, room);
+                let galley = ui.painter().layout_no_wrap(
+                    text.to_owned(),
+                    font.clone(),
+                    egui::Color32::BLACK,
+                );
+                (font.size, galley.size().x)
+            };
+            assert_eq!(width("0.3 mm").0, 14.0);
+            let (size, across) = width("0.568462 mm");
+            assert!(
+                (10.0..14.0).contains(&size) && across <= room,
+                "{size} {across}"
+            );
+        });
+        // Nothing is drawn.
+        output.textures_delta.clear();
+    }
 }

@@ -254,7 +254,7 @@ const SLOW: f64 = 0.5;
 const MOST_WEIGHTS: f64 = 5.0;
 
 /// Rods that reach do not make a good mechanism yet: near a singular pose the reactions of the ideal joints explode.
-fn near_singular(scene: &Scene) -> Option<String> {
+pub(super) fn near_singular(scene: &Scene) -> Option<String> {
     let mut rigid = scene.clone();
     rigid.formulation = Formulation::Tree;
     let drive = rigid.spcmm.as_mut()?;

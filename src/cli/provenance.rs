@@ -5,13 +5,16 @@ use serde_json::{Map, Value as Json, json};
 use super::Failure;
 use crate::scene::{Scene, Value};
 
+/// What every output calls the program that made it.
+pub const PROGRAM: &str = "jointplay";
+
 /// The common part of every output's `meta`.
 ///
 /// # Errors
 /// Usage: a scene without the keys that every scene has.
 pub fn meta(scene: &Scene) -> Result<Map<String, Json>, Failure> {
     let mut meta = Map::new();
-    meta.insert("program".into(), json!("jointplay"));
+    meta.insert("program".into(), json!(PROGRAM));
     meta.insert("version".into(), json!(crate::VERSION));
     meta.insert("scene".into(), json!(scene.name));
     meta.insert("scene_file".into(), json!(scene.source.file));

@@ -71,7 +71,7 @@ pub struct Found {
     pub resolution: [f64; 2],
 }
 
-fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
+pub(super) fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
     values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
         (a.min(v), b.max(v))
     })
@@ -258,6 +258,9 @@ fn sections(found: &Found, which: usize, figure: &str, out: &mut Vec<Statement>)
         quasi,
         told.join("; "),
     ));
+    if which == 1 {
+        out.push(centre(runs, found.resolution));
+    }
     let spreads: Vec<f64> = runs.iter().map(|r| r.spread(1)).collect();
     let listed: Vec<String> = spreads.iter().map(|s| size(*s, 1)).collect();
     if which == 0 {
@@ -291,6 +294,47 @@ fn sections(found: &Found, which: usize, figure: &str, out: &mut Vec<Statement>)
             ),
         ));
     }
+}
+
+/// Whether sections crowd around a centre, which needs sections that can be told apart.
+fn centre(runs: &[Swept], resolution: [f64; 2]) -> Statement {
+    let mut listed = Vec::new();
+    let dense = |run: &Swept| {
+        let middle = [0, 1].map(|c| {
+            let all = &run.sections[c];
+            all.iter().sum::<f64>() / all.len() as f64
+        });
+        let pairs = run.sections[0].iter().zip(&run.sections[1]);
+        let distances: Vec<f64> = pairs
+            .map(|(x, beta)| {
+                let [x, beta] = [
+                    (x - middle[0]) / resolution[0],
+                    (beta - middle[1]) / resolution[1],
+                ];
+                (x * x + beta * beta).sqrt()
+            })
+            .collect();
+        let furthest = distances.iter().copied().fold(0.0, f64::max);
+        let within = distances.iter().filter(|d| **d < furthest / 2.0).count();
+        let share = within as f64 / distances.len() as f64;
+        let told = furthest > 0.5;
+        listed.push(if told {
+            format!("{}: {:.0} %", run.value, share * 100.0)
+        } else {
+            format!("{}: all within the resolution", run.value)
+        });
+        told && share > 0.5
+    };
+    let held = runs.iter().map(dense).filter(|dense| *dense).count();
+    statement(
+        place("Figure 22", ""),
+        "the sections lie denser the nearer to their centre",
+        "at all three frictions they can be told apart, and more than half of them lie within half of the largest distance from \
+         their mean, in units of the resolution"
+            .to_owned(),
+        held == runs.len(),
+        listed.join("; "),
+    )
 }
 
 /// Points whose exponent is above its uncertainty, or whose regime is chaotic.
@@ -509,6 +553,18 @@ mod tests {
             Some(NotConfirmed)
         );
         assert_eq!(find(&out, "20a", "periodic"), Some(NotConfirmed));
+    }
+
+    #[test]
+    fn sections_crowd_around_a_centre_only_where_they_can_be_told_apart() {
+        let resolution = [1e-7, 1e-6];
+        let near = [0.0, 1.0, -1.0, 0.0, 1.0, -1.0, 0.0, 9.0, -9.0];
+        let with = |size: f64| point(0.2, "chaotic", 0.2, &near.map(|v| v * size));
+        let crowd = |runs: &[Swept]| centre(runs, resolution).verdict;
+        assert_eq!(crowd(&[with(1e-5), with(1e-4)]), Verdict::Confirmed);
+        assert_eq!(crowd(&[with(1e-5), with(1e-9)]), Verdict::NotConfirmed);
+        let ring = point(0.2, "chaotic", 0.2, &[1e-4, -1e-4, 1e-4, -1e-4]);
+        assert_eq!(crowd(&[ring]), Verdict::NotConfirmed);
     }
 
     #[test]

@@ -133,6 +133,10 @@ pub(super) fn further_statements(runs: &Runs) -> Vec<Statement> {
             &responses,
         ));
         out.push(no_rule(&responses));
+        out.push(more_sensitive(&responses));
+        if let Some(by_clearance) = all(BY_CLEARANCE) {
+            out.push(main_influence(&by_clearance, &responses));
+        }
     }
     out
 }
@@ -204,6 +208,45 @@ fn no_rule(responses: &[&Response; 3]) -> Statement {
     }
 }
 
+/// Largest less smallest.
+fn extent(values: [f64; 3]) -> f64 {
+    let (least, most) = super::chaos::range(values.into_iter());
+    most - least
+}
+
+fn more_sensitive(responses: &[&Response; 3]) -> Statement {
+    let share = |coordinate: usize| {
+        let peaks = responses.map(|r| r.full.acceleration[coordinate]);
+        extent(peaks) / (peaks.iter().sum::<f64>() / 3.0)
+    };
+    let (x, beta) = (share(0), share(4));
+    Statement {
+        place: "4.2.2, Figure 13".into(),
+        says: "friction changes the acceleration of beta more than that in x".to_owned(),
+        criterion: "the three peaks of beta differ by a larger share of their mean than those of x"
+            .to_owned(),
+        verdict: verdict(beta > x),
+        evidence: format!("beta: {:.1} %, x: {:.1} %", beta * 100.0, x * 100.0),
+    }
+}
+
+fn main_influence(by_clearance: &[&Response; 3], by_friction: &[&Response; 3]) -> Statement {
+    let strongest = |r: &Response| r.full.normal.iter().copied().fold(0.0, f64::max);
+    let clearance = extent(by_clearance.map(strongest));
+    let friction = extent(by_friction.map(strongest));
+    Statement {
+        place: "4.2.2".into(),
+        says: "friction is the main influence on the contact force".to_owned(),
+        criterion:
+            "the largest force of any joint changes more over the three frictions than over the three clearances"
+                .to_owned(),
+        verdict: verdict(friction > clearance),
+        evidence: format!(
+            "by {friction:.0} N over the frictions, by {clearance:.0} N over the clearances"
+        ),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -268,6 +311,30 @@ mod tests {
         assert_eq!(confirmed("Figure 7", "larger"), Some(false));
         assert_eq!(confirmed("Figures 6", "steady"), Some(false));
         assert_eq!(confirmed("Figure 14", "S2"), None);
+        // Nothing is said about friction before all three frictions are there.
+        assert_eq!(confirmed("Figure 13", "changes the acceleration"), None);
+        assert_eq!(confirmed("4.2.2", "main influence"), None);
+        let mut more = runs.to_vec();
+        // Over the frictions x stays and beta goes from 1 to 3; the forces from 3 N to 5 N, as much as over the clearances.
+        more.push((CASES[3], with([2.0, 1.0, 1.0], 0.1, [1.0, 1.0])));
+        more.push((CASES[4], with([5.0, 1.0, 1.0], 0.1, [1.0, 3.0])));
+        let further = further_statements(&more);
+        let confirmed = |says: &str| {
+            let s = further.iter().find(|s| s.says.contains(says));
+            s.map(|s| s.verdict == verdict(true))
+        };
+        assert_eq!(confirmed("changes the acceleration"), Some(true));
+        assert_eq!(confirmed("main influence"), Some(true));
+        more[1].1.full.normal[0] = 9.0;
+        more[4].1.full.acceleration[0] = 9.0;
+        let further = further_statements(&more);
+        for says in ["changes the acceleration", "main influence"] {
+            let s = further
+                .iter()
+                .find(|s| s.says.contains(says))
+                .expect("said");
+            assert_eq!(s.verdict, verdict(false), "{says}");
+        }
         assert_eq!(
             compare(&runs).len(),
             PUBLISHED.iter().filter(|p| p.case.friction == 0.2).count()

@@ -198,13 +198,13 @@ impl Diagram {
                 let points = swept.points.iter().flatten();
                 let count = points.filter(|point| point.regime_code == code).count();
                 if count > 0 {
-                    let text = RichText::new(format!("{word} {count}")).small().strong();
+                    let text = RichText::new(format!("{count} {word}")).small().strong();
                     ui.label(text.color(theme::series(colour, dark)))
                         .on_hover_text("Kind of motion, and at how many values it was found");
                 }
             }
             if !self.diverged.is_empty() {
-                let words = format!("diverged {}", self.diverged.len());
+                let words = format!("{} diverged", self.diverged.len());
                 ui.label(
                     RichText::new(words)
                         .small()

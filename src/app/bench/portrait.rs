@@ -91,7 +91,8 @@ impl Portrait {
             .small()
             .weak(),
         )
-        .on_hover_text("Sections of the running scene since its start or its latest change, and the period of its drive");
+        .on_hover_text("Sections of the running scene since its start or its latest change, and the period of its drive in simulated time: \
+             a larger time scale brings them sooner");
     }
 
     fn read(&mut self, player: &Player, coordinate: Coordinate) {

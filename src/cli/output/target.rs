@@ -99,10 +99,11 @@ impl Folder {
                 path.display()
             )));
         }
-        if force && has_content(path) && !path.join(MANIFEST).is_file() {
+        if force && has_content(path) && !is_own(path) {
             // --force replaces what an earlier run wrote, never a folder of something else.
             return Err(Failure::io(format!(
-                "{} holds something other than earlier results (no {MANIFEST} in it); it is left alone, choose another folder",
+                "{} holds something other than earlier results (no {MANIFEST} of this program in it); it is left alone, choose \
+                 another folder",
                 path.display()
             )));
         }
@@ -158,6 +159,13 @@ impl Folder {
 
 /// The file that says what a folder of results holds.
 pub const MANIFEST: &str = "manifest.json";
+
+/// Whether this program filled the folder: other programs write files of that name, too.
+fn is_own(folder: &Path) -> bool {
+    let manifest = fs::read(folder.join(MANIFEST)).unwrap_or_default();
+    let manifest: Option<serde_json::Value> = serde_json::from_slice(&manifest).ok();
+    manifest.is_some_and(|manifest| manifest["program"] == super::super::provenance::PROGRAM)
+}
 
 fn exists(path: &Path) -> bool {
     // Not `exists()`: a dangling link is something, too.
@@ -268,16 +276,23 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("frames");
         let first = Folder::claim(&path, false).unwrap();
-        fs::write(first.scratch().join(MANIFEST), "1").unwrap();
+        let manifest = |n: u8| format!("{{\"program\": \"jointplay\", \"n\": {n}}}");
+        fs::write(first.scratch().join(MANIFEST), manifest(1)).unwrap();
         assert!(!path.exists());
         first.finish().unwrap();
-        assert_eq!(fs::read(path.join(MANIFEST)).unwrap(), b"1");
+        assert_eq!(
+            fs::read_to_string(path.join(MANIFEST)).unwrap(),
+            manifest(1)
+        );
 
         assert!(Folder::claim(&path, false).is_err());
         let second = Folder::claim(&path, true).unwrap();
-        fs::write(second.scratch().join(MANIFEST), "2").unwrap();
+        fs::write(second.scratch().join(MANIFEST), manifest(2)).unwrap();
         second.finish().unwrap();
-        assert_eq!(fs::read(path.join(MANIFEST)).unwrap(), b"2");
+        assert_eq!(
+            fs::read_to_string(path.join(MANIFEST)).unwrap(),
+            manifest(2)
+        );
         assert_eq!(
             fs::read_dir(folder.path()).unwrap().count(),
             1,
@@ -287,7 +302,11 @@ mod tests {
         let other = folder.path().join("photos");
         fs::create_dir(&other).unwrap();
         fs::write(other.join("holiday.png"), "x").unwrap();
+        for foreign in ["{}", "{\"name\": \"a web application\"}", "no JSON"] {
+            assert!(Folder::claim(&other, true).is_err());
+            assert!(other.join("holiday.png").exists());
+            fs::write(other.join(MANIFEST), foreign).unwrap();
+        }
         assert!(Folder::claim(&other, true).is_err());
-        assert!(other.join("holiday.png").exists());
     }
 }

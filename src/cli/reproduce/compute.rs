@@ -1,30 +1,46 @@
 //! All jobs of a report, on some threads.
 
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::thread;
 
 use indicatif::ProgressBar;
 
 use super::interrupted;
+use super::kept::Kept;
 use crate::analysis::reproduction::{Findings, Outcome, ReproductionError, Work};
 use crate::analysis::response::ResponseError;
 use crate::cli::{Failure, interrupt};
 
-/// Does all of `work`; what comes out does not depend on the number of threads.
+/// Does what `kept` lacks of `work`, and keeps it there; what comes out depends neither on the number of threads nor on
+/// interruptions.
 ///
 /// # Errors
-/// Ctrl-C; a run that cannot be done, the first in order of the jobs that was begun.
-pub(super) fn compute(work: Work, threads: usize, bar: &ProgressBar) -> Result<Findings, Failure> {
+/// Ctrl-C; the file system; a run that cannot be done, the first in order of the jobs that was begun.
+pub(super) fn compute(
+    work: Work,
+    kept: &mut Kept,
+    threads: usize,
+    bar: &ProgressBar,
+) -> Result<Findings, Failure> {
+    let mut outcomes: Vec<Option<Outcome>> = (0..work.jobs()).map(|_| None).collect();
+    for (job, outcome) in kept.found(&work)? {
+        outcomes[job] = Some(outcome);
+        bar.inc(work.length(job).round() as u64);
+    }
+    bar.reset_eta();
+    let left: Vec<usize> = (0..work.jobs())
+        .filter(|&job| outcomes[job].is_none())
+        .collect();
     let next = AtomicUsize::new(0);
     let stop = AtomicBool::new(false);
-    let done: Mutex<Vec<(usize, Result<Outcome, ReproductionError>)>> = Mutex::new(Vec::new());
+    let mut done: Vec<(usize, Result<Outcome, Failure>)> = Vec::new();
+    let shared = Mutex::new((kept, &mut done));
     let worker = || {
-        loop {
-            let job = next.fetch_add(1, Ordering::Relaxed);
-            if job >= work.jobs() || stop.load(Ordering::Relaxed) {
+        while !stop.load(Ordering::Relaxed) {
+            let Some(&job) = left.get(next.fetch_add(1, Ordering::Relaxed)) else {
                 return;
-            }
+            };
             let mut told = 0.0;
             let outcome = work.run(job, |now| {
                 if now - told >= 1.0 {
@@ -34,13 +50,17 @@ pub(super) fn compute(work: Work, threads: usize, bar: &ProgressBar) -> Result<F
                 !(stop.load(Ordering::Relaxed) || interrupt::asked())
             });
             bar.inc((work.length(job) - told).max(0.0).round() as u64);
+            // A thread that panicked has been told of already.
+            let mut shared = shared.lock().unwrap_or_else(PoisonError::into_inner);
+            let (kept, done) = &mut *shared;
+            let outcome = match outcome {
+                Ok(outcome) => kept.keep(&work, job, &outcome).map(|()| outcome),
+                Err(error) if is_cancelled(&error) => return,
+                Err(error) => Err(Failure::new(Failure::DIVERGED, error.to_string())),
+            };
             if outcome.is_err() {
                 stop.store(true, Ordering::Relaxed);
             }
-            // A thread that panicked has been told of already.
-            let mut done = done
-                .lock()
-                .unwrap_or_else(std::sync::PoisonError::into_inner);
             done.push((job, outcome));
         }
     };
@@ -49,24 +69,21 @@ pub(super) fn compute(work: Work, threads: usize, bar: &ProgressBar) -> Result<F
             scope.spawn(worker);
         }
     });
-    if interrupt::asked() {
-        return Err(interrupted());
-    }
-    let mut done = done
-        .into_inner()
-        .unwrap_or_else(std::sync::PoisonError::into_inner);
+    let (kept, _) = shared.into_inner().unwrap_or_else(PoisonError::into_inner);
     done.sort_by_key(|(job, _)| *job);
-    let is_cancelled = |error: &ReproductionError| match error {
+    for (job, outcome) in done {
+        outcomes[job] = Some(outcome?);
+    }
+    let all: Option<Vec<Outcome>> = outcomes.into_iter().collect();
+    match all {
+        Some(outcomes) => Ok(work.gather(outcomes)),
+        None => Err(interrupted(kept)),
+    }
+}
+
+fn is_cancelled(error: &ReproductionError) -> bool {
+    match error {
         ReproductionError::Run { error, .. } => matches!(**error, ResponseError::Cancelled),
         ReproductionError::Extent(_) => false,
-    };
-    let mut outcomes = Vec::with_capacity(done.len());
-    for (_, outcome) in done {
-        match outcome {
-            Ok(outcome) => outcomes.push(outcome),
-            Err(error) if is_cancelled(&error) => {}
-            Err(error) => return Err(Failure::new(Failure::DIVERGED, error.to_string())),
-        }
     }
-    Ok(work.gather(outcomes))
 }

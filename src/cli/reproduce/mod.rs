@@ -3,6 +3,7 @@
 mod compute;
 mod data;
 mod figures;
+mod kept;
 mod page;
 mod sections;
 mod text;
@@ -13,9 +14,10 @@ use std::time::Instant;
 
 use serde_json::{Value as Json, json};
 
+use self::kept::Kept;
 use super::args::ReproduceArguments;
 use super::output::{Folder, MANIFEST};
-use super::{Failure, interrupt, print, progress};
+use super::{Failure, interrupt, print, progress, warn};
 use crate::analysis::paper::{Agreement, Verdict};
 use crate::analysis::reproduction::{Extent, Findings, Work};
 
@@ -35,13 +37,21 @@ pub fn reproduce(arguments: &ReproduceArguments) -> Result<(), Failure> {
     let threads = arguments.threads.map_or_else(cores, usize::from);
     let started = Instant::now();
     let work = Work::new(extent).map_err(|error| Failure::usage(error.to_string()))?;
+    let mut kept = Kept::open(&arguments.out, &work)?;
+    if kept.is_begun() && !arguments.quiet {
+        warn(&format!(
+            "going on where {} stopped",
+            kept.folder().display()
+        ));
+    }
     let length = (0..work.jobs()).map(|job| work.length(job)).sum::<f64>();
     let bar = progress::bar(!arguments.quiet, length.ceil() as u64);
-    let found = compute::compute(work, threads, &bar);
+    let found = compute::compute(work, &mut kept, threads, &bar);
     bar.finish_and_clear();
     let found = found?;
-    fill(folder.scratch(), &found)?;
+    fill(folder.scratch(), &found, &kept)?;
     folder.finish()?;
+    kept.remove()?;
     print(&summary(
         &found,
         &arguments.out,
@@ -56,13 +66,15 @@ pub fn reproduce(arguments: &ReproduceArguments) -> Result<(), Failure> {
 pub fn into_folder(out: &Path, extent: Extent, threads: usize) -> Result<(), Failure> {
     let folder = Folder::claim(out, false)?;
     let work = Work::new(extent).map_err(|error| Failure::usage(error.to_string()))?;
-    let found = compute::compute(work, threads, &progress::bar(false, 1))?;
-    fill(folder.scratch(), &found)?;
-    folder.finish()
+    let mut kept = Kept::open(out, &work)?;
+    let found = compute::compute(work, &mut kept, threads, &progress::bar(false, 1))?;
+    fill(folder.scratch(), &found, &kept)?;
+    folder.finish()?;
+    kept.remove()
 }
 
 /// Writes all files into `folder`.
-fn fill(folder: &Path, found: &Findings) -> Result<(), Failure> {
+fn fill(folder: &Path, found: &Findings, kept: &Kept) -> Result<(), Failure> {
     let mut files = data::write(&folder.join("data"), found)?;
     let drawn = figures::all(found);
     let plots = folder.join("plots");
@@ -70,7 +82,7 @@ fn fill(folder: &Path, found: &Findings) -> Result<(), Failure> {
     let mut pictures = Vec::new();
     for (name, sheet) in &drawn {
         if interrupt::asked() {
-            return Err(interrupted());
+            return Err(interrupted(kept));
         }
         let drawing = |error: crate::chart::SheetError| Failure::io(format!("{name}: {error}"));
         let svg = sheet.svg().map_err(drawing)?;
@@ -119,8 +131,14 @@ fn save(path: &Path, content: &[u8]) -> Result<(), Failure> {
         .map_err(|e| Failure::io(format!("cannot write {}: {e}", path.display())))
 }
 
-fn interrupted() -> Failure {
-    Failure::new(Failure::INTERRUPTED, "interrupted; nothing was written")
+fn interrupted(kept: &Kept) -> Failure {
+    Failure::new(
+        Failure::INTERRUPTED,
+        format!(
+            "interrupted; no report was written, and the same command goes on from {}",
+            kept.folder().display()
+        ),
+    )
 }
 
 /// What was found, in a few lines.

@@ -3,11 +3,11 @@
 use std::fmt::Write as _;
 
 use super::sections::{Entry, SECTIONS};
-use super::text::{self, Compared};
+use super::text::{self, Compared, typeset};
 use super::{command, meta};
 use crate::analysis::paper::chaos::word;
 use crate::analysis::paper::{Agreement, Quantity, Statement, VERIFICATION, Verdict};
-use crate::analysis::reproduction::{Findings, PERIOD};
+use crate::analysis::reproduction::{Extent, Findings, PERIOD};
 use crate::cli::Failure;
 use crate::cli::output::significant;
 
@@ -18,6 +18,11 @@ fn escape(text: &str) -> String {
         .replace('<', "&lt;")
         .replace('>', "&gt;")
 }
+
+/// Stands above a report that is not the whole one.
+const SHORTENED: &str = "<p class=\"notice\">This is a quick report: few values and few periods, which shows that everything works. \
+    Transients have not ended everywhere, so regimes, sections and diagrams may differ from those of the whole report, which \
+    <code>jointplay reproduce --out report/</code> computes.</p>\n";
 
 /// The whole page.
 ///
@@ -35,6 +40,9 @@ pub(super) fn page(found: &Findings, pictures: &[(String, String)]) -> Result<St
     );
     header(&mut out, &compared, &statements);
     out.push_str("<main>\n");
+    if found.extent != Extent::FULL {
+        out.push_str(SHORTENED);
+    }
     contents(&mut out);
     caveats(&mut out);
     for (id, title, entries) in SECTIONS {
@@ -128,7 +136,7 @@ fn figure(out: &mut String, (_, name, heading, caption): &Entry, pictures: &[(St
     );
     let _ = write!(
         out,
-        "<h3 id=\"{name}\">{heading}</h3>\n<figure>\n{}\n<figcaption>{caption} <a href=\"plots/{name}.svg\">SVG</a>, \
+        "<h3 id=\"{name}\">{heading}</h3>\n<figure>\n<div class=\"plot\">{}</div>\n<figcaption>{caption} <a href=\"plots/{name}.svg\">SVG</a>, \
          <a href=\"plots/{name}.png\">PNG</a>.</figcaption>\n</figure>\n",
         svg.trim()
     );
@@ -145,7 +153,7 @@ fn badge(agreement: &str) -> String {
 
 /// Four digits: what a reader takes in.
 pub(super) fn shown(value: f64) -> String {
-    significant(value, 4).replace('-', "\u{2212}")
+    typeset(&significant(value, 4))
 }
 
 /// Stands where there is no number.
@@ -154,7 +162,7 @@ const NONE: &str = "\u{2013}";
 /// Two decimals, and two digits of what is small.
 fn ratio(value: f64) -> String {
     if value < 0.1 {
-        significant(value, 2)
+        typeset(&significant(value, 2))
     } else {
         format!("{value:.2}")
     }
@@ -208,7 +216,7 @@ fn table_of(out: &mut String, rows: &[&Compared]) {
         out,
         &[
             ("Figure", false),
-            ("Run", false),
+            ("Clearance, friction", false),
             ("Quantity", false),
             ("Paper", true),
             ("Here", true),
@@ -226,8 +234,9 @@ fn table_of(out: &mut String, rows: &[&Compared]) {
             .map_or_else(|| NONE.to_owned(), |s| ratio(s / c.paper));
         let _ = writeln!(
             out,
-            "<tr><td>{}</td><td class=\"run\">{run}</td><td>{unit}</td>{}{}{}{}{}<td class=\"verdict\">{}</td></tr>",
+            "<tr><td>{}</td><td class=\"run\">{run}</td><td class=\"what\">{}</td>{}{}{}{}{}<td class=\"verdict\">{}</td></tr>",
             c.figure,
+            typeset(&unit),
             number(&shown(c.paper)),
             number(&shown(c.full)),
             number(&ratio(c.full / c.paper)),
@@ -246,7 +255,7 @@ fn strongest(out: &mut String, compared: &[Compared], figures: &[&str]) {
         out,
         &[
             ("Figure", false),
-            ("Run", false),
+            ("Clearance, friction", false),
             ("Paper (N)", true),
             ("Here (N)", true),
             ("Ratio", true),
@@ -301,7 +310,8 @@ fn verification(out: &mut String, found: &Findings) {
         let (what, unit) = quantity.label();
         let _ = writeln!(
             out,
-            "<tr><td>{figure}</td><td>{what} ({unit})</td>{}{}{}{}</tr>",
+            "<tr><td>{figure}</td><td class=\"what\">{} ({unit})</td>{}{}{}{}</tr>",
+            typeset(&what),
             number(&shown(own)),
             number(&shown(other)),
             two(quantity, &found.runs[0].response),
@@ -313,7 +323,7 @@ fn verification(out: &mut String, found: &Findings) {
         let none = number(NONE);
         let _ = writeln!(
             out,
-            "<tr><td></td><td>{what} ({unit})</td>{none}{none}{}{}</tr>",
+            "<tr><td></td><td class=\"what\">{what} ({unit})</td>{none}{none}{}{}</tr>",
             two(Quantity::Normal(joint), &found.runs[0].response),
             two(Quantity::Normal(joint), &found.lagrange.response)
         );
@@ -356,12 +366,12 @@ fn runs(out: &mut String, found: &Findings, which: usize) {
             number(&format!(
                 "{} ± {}",
                 shown(run.exponent.0),
-                significant(run.exponent.1, 2)
+                typeset(&significant(run.exponent.1, 2))
             )),
-            number(&significant(run.latest(0) * 1e3, 6)),
-            number(&significant(run.spread(0) * 1e6, 2)),
-            number(&significant(run.latest(1) * 1e3, 6).replace('-', "\u{2212}")),
-            number(&significant(run.spread(1) * 1e6, 2))
+            number(&format!("{:.4}", run.latest(0) * 1e3)),
+            number(&typeset(&significant(run.spread(0) * 1e6, 2))),
+            number(&typeset(&format!("{:.4}", run.latest(1) * 1e3))),
+            number(&typeset(&significant(run.spread(1) * 1e6, 2)))
         );
     }
     out.push_str(CLOSE);
@@ -451,9 +461,9 @@ fn statement_table(out: &mut String, statements: &[Statement]) {
             out,
             "<tr><td>{}</td><td><b>{}.</b> Criterion: {}.<br><span class=\"evidence\">{}</span></td><td class=\"verdict\"><span class=\"{class}\">{}</span></td></tr>",
             escape(&s.place),
-            escape(&capital(&s.says)),
-            escape(&s.criterion),
-            escape(&s.evidence),
+            escape(&typeset(&capital(&s.says))),
+            escape(&typeset(&s.criterion)),
+            escape(&typeset(&s.evidence)),
             text::verdict(s.verdict)
         );
     }
@@ -464,7 +474,9 @@ fn capital(text: &str) -> String {
     let mut letters = text.chars();
     // Names of coordinates stay as they are.
     match letters.next() {
-        Some(first) if !text.starts_with("x ") => first.to_uppercase().chain(letters).collect(),
+        Some(first) if !text.starts_with("x ") && !text.starts_with("beta ") => {
+            first.to_uppercase().chain(letters).collect()
+        }
         _ => text.to_owned(),
     }
 }

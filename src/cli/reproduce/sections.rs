@@ -61,7 +61,7 @@ pub(super) const SECTIONS: [(&str, &str, &[Entry]); 5] = [
                 "12",
                 "figure-12",
                 "Figure 12: velocity",
-                "Friction acts on sliding balls only; the first landings are the same whatever it is.",
+                "Until the first landing nothing touches, so that the fall and its largest velocity in x are the same whatever the friction.",
             ),
             (
                 "13",
@@ -97,7 +97,7 @@ pub(super) const SECTIONS: [(&str, &str, &[Entry]); 5] = [
                 "17",
                 "figure-17",
                 "Figure 17: two formulations and the ideal motion",
-                "The paper compares its own program with a commercial one; here two formulations that share no equations of motion stand for them: a spanning forest with independent coordinates, and all bodies with multipliers and Baumgarte stabilisation, the paper's own. Clearance 0.3 mm, friction 0.2.",
+                "The paper compares its own program with a commercial one; here two formulations that share no equations of motion stand for them: a spanning forest with independent coordinates, and all bodies with multipliers and Baumgarte stabilisation, the paper's own. Clearance 0.3 mm, friction 0.2. Where only one of the two shows, it covers the other.",
             ),
             (
                 "",

@@ -33,6 +33,56 @@ pub(super) fn compared(found: &Findings) -> Vec<Compared> {
     all.collect()
 }
 
+/// As the page shows it: beta by its letter, powers of ten raised, minus signs.
+pub(super) fn typeset(text: &str) -> String {
+    let all: Vec<char> = text.chars().collect();
+    let is = |at: usize, test: fn(char) -> bool| all.get(at).is_some_and(|&c| test(c));
+    let after = |at: usize, test: fn(char) -> bool| at > 0 && is(at - 1, test);
+    let digits = |from: usize| {
+        (from..)
+            .take_while(|&k| is(k, |c| c.is_ascii_digit()))
+            .count()
+    };
+    let mut out = String::with_capacity(text.len());
+    let mut at = 0;
+    while let Some(&c) = all.get(at) {
+        let sign = usize::from(is(at + 1, |c| c == '-' || c == '+'));
+        let length = digits(at + 1 + sign);
+        let end = at + 1 + sign + length;
+        if c == 'e'
+            && length > 0
+            && after(at, |c| c.is_ascii_digit())
+            && !is(end, char::is_alphanumeric)
+        {
+            out.push_str("·10");
+            if sign == 1 && all[at + 1] == '-' {
+                out.push('⁻');
+            }
+            let power = all[at + 1 + sign..end].iter().collect::<String>();
+            let raised = |c: char| {
+                c.to_digit(10)
+                    .map(|d| ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'][d as usize])
+            };
+            out.extend(power.trim_start_matches('0').chars().filter_map(raised));
+            at = end;
+            continue;
+        }
+        if all[at..].starts_with(&['b', 'e', 't', 'a'])
+            && !after(at, char::is_alphanumeric)
+            && !is(at + 4, char::is_alphanumeric)
+        {
+            out.push('β');
+            at += 4;
+            continue;
+        }
+        let minus =
+            c == '-' && is(at + 1, |c| c.is_ascii_digit()) && !after(at, |c| c != ' ' && c != '(');
+        out.push(if minus { '\u{2212}' } else { c });
+        at += 1;
+    }
+    out
+}
+
 /// In a word or two.
 pub(super) fn verdict(verdict: Verdict) -> &'static str {
     match verdict {
@@ -50,4 +100,29 @@ pub(super) fn simulated(found: &Findings) -> f64 {
         .iter()
         .map(|swathe| PERIOD * (swathe.sweep.plan().periods * swathe.sweep.grid().points()) as f64);
     runs + curves + sweeps.sum::<f64>()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::typeset;
+
+    #[test]
+    fn numbers_and_names_are_set_as_in_print() {
+        for (text, set) in [
+            ("9.06117e-4 rad", "9.06117·10⁻⁴ rad"),
+            (
+                "-1.305e-05 and -18.26 to -0.89 1/s",
+                "−1.305·10⁻⁵ and −18.26 to −0.89 1/s",
+            ),
+            ("2e+12, 3e7", "2·10¹², 3·10⁷"),
+            ("rate of beta, beta", "rate of β, β"),
+            (
+                "betas, alphabeta, 0-1 test, 12 edges, 4e",
+                "betas, alphabeta, 0-1 test, 12 edges, 4e",
+            ),
+            ("", ""),
+        ] {
+            assert_eq!(typeset(text), set);
+        }
+    }
 }

@@ -30,6 +30,18 @@ struct Part {
 /// Files that are no shards, or not all shards of one sweep; the file system.
 pub fn merge(arguments: &MergeArguments) -> Result<(), Failure> {
     archive::check_ending(&arguments.out)?;
+    let own = |path: &Path| path.canonicalize().ok();
+    if let Some(out) = own(&arguments.out)
+        && arguments
+            .shards
+            .iter()
+            .any(|shard| own(shard).as_ref() == Some(&out))
+    {
+        return Err(Failure::usage(format!(
+            "--out {} is one of the shards; choose another name",
+            arguments.out.display()
+        )));
+    }
     let target = Target::claim(&arguments.out, arguments.force)?;
     let mut parts = Vec::new();
     for path in &arguments.shards {

@@ -7,7 +7,9 @@ mod partial;
 
 pub(super) use archive::{Archive, Source};
 pub use merge::merge;
+pub(super) use partial::Partial;
 
+use std::collections::HashSet;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc;
 use std::thread;
@@ -17,8 +19,8 @@ use indicatif::ProgressBar;
 use serde_json::{Map, Value as Json, json};
 
 use self::options::Shard;
-use self::partial::Partial;
 use super::args::{SummaryForm, SweepArguments};
+use super::check::near_singular;
 use super::output::Target;
 use super::summary::count;
 use super::{Failure, interrupt, load, print, progress, warn};
@@ -173,16 +175,24 @@ pub(super) fn meta(sweep: &Sweep) -> Result<Map<String, Json>, Failure> {
     Ok(meta)
 }
 
-/// Warnings of the scene at both ends of the ranges, each once, and of the sweep itself.
+/// Most points whose warnings are asked for, spread over the ranges: it must not take long.
+const MOST_WARNED: usize = 64;
+
+/// Warnings of the scene along the ranges, each kind with the first point that has it, and of the sweep itself.
 fn warnings(sweep: &Sweep) -> Vec<String> {
     let mut all = Vec::new();
-    for point in [0, sweep.grid().points() - 1] {
+    let mut kinds = HashSet::new();
+    let last = sweep.grid().points() - 1;
+    let step = sweep.grid().points().div_ceil(MOST_WARNED);
+    for point in (0..last).step_by(step).chain([last]) {
         let Ok(scene) = sweep.grid().scene(sweep.scene(), point) else {
             continue;
         };
-        for warning in scene.warnings() {
-            if !all.contains(&warning) {
-                all.push(warning);
+        for warning in scene.warnings().into_iter().chain(near_singular(&scene)) {
+            // The same sentence with other numbers says nothing new.
+            let words: String = warning.chars().filter(|c| c.is_alphabetic()).collect();
+            if kinds.insert(words) {
+                all.push(format!("at {}: {warning}", sweep.describe(point)));
             }
         }
     }

@@ -5,6 +5,7 @@
 //! its number, the number of its values, the values (float64, little-endian), and the CRC-32 of all these. A block is
 //! appended by one write. What does not check is refused as a whole: a half-read result would look like a whole one.
 
+use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -112,6 +113,34 @@ impl Partial {
         self.done[b]
     }
 
+    /// Whether any block is done.
+    pub fn is_begun(&self) -> bool {
+        self.done.contains(&true)
+    }
+
+    /// Records of every block that is done, by its number.
+    ///
+    /// # Errors
+    /// Input/output.
+    pub fn blocks(&self) -> Result<BTreeMap<usize, Vec<f64>>, Failure> {
+        let mut reader = self.reader()?;
+        let mut all = BTreeMap::new();
+        for _ in 0..self.done.iter().filter(|done| **done).count() {
+            let mut records = Vec::new();
+            let b = self.read_block(&mut reader, &mut records)?;
+            all.insert(b, records);
+        }
+        Ok(all)
+    }
+
+    /// From the first block on.
+    fn reader(&self) -> Result<impl Read, Failure> {
+        let mut file = &self.file;
+        file.seek(SeekFrom::Start(self.start))
+            .map_err(self.failed())?;
+        Ok(BufReader::new(file.take(self.end - self.start)))
+    }
+
     /// Puts in the records of block `b`.
     ///
     /// # Errors
@@ -156,7 +185,7 @@ impl Partial {
 
     fn damaged(&self, what: &str) -> Failure {
         Failure::io(format!(
-            "{} is damaged ({what}) and not used; delete it to start the sweep again",
+            "{} is damaged ({what}) and not used; delete it to start again",
             self.path.display()
         ))
     }
@@ -260,10 +289,7 @@ impl Partial {
 
 impl Source for Partial {
     fn gather(&mut self, offset: usize, length: usize, out: &mut [f64]) -> Result<(), Failure> {
-        let mut file = &self.file;
-        file.seek(SeekFrom::Start(self.start))
-            .map_err(self.failed())?;
-        let mut reader = BufReader::new(file.take(self.end - self.start));
+        let mut reader = self.reader()?;
         let mut records = Vec::new();
         for _ in 0..self.done.iter().filter(|done| **done).count() {
             let b = self.read_block(&mut reader, &mut records)?;

@@ -1,0 +1,90 @@
+//! Finished blocks of the sweeps, kept beside the report until that is written, so that an interrupted one goes on where it
+//! stopped. Everything else takes seconds and is computed again.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::make;
+use crate::analysis::reproduction::{Outcome, Work};
+use crate::cli::Failure;
+use crate::cli::sweep::{Partial, meta};
+
+/// One file a sweep, in a folder of their own.
+pub(super) struct Kept {
+    folder: PathBuf,
+    parts: Vec<Partial>,
+}
+
+impl Kept {
+    /// Opens the folder beside `out`, or makes it.
+    ///
+    /// # Errors
+    /// As [`Partial::open`].
+    pub(super) fn open(out: &Path, work: &Work) -> Result<Self, Failure> {
+        // Through its parts, so that a slash at the end is none.
+        let mut name = out.components().as_path().as_os_str().to_owned();
+        name.push(".partial");
+        let folder = PathBuf::from(name);
+        make(&folder)?;
+        let part = |swathe: &crate::analysis::reproduction::Swathe| {
+            let blocks: Vec<usize> = (0..swathe.sweep.grid().blocks()).collect();
+            let settings = meta(&swathe.sweep)?;
+            Partial::open(&folder.join(swathe.name), &settings, &swathe.sweep, &blocks)
+        };
+        let parts = work.swathes().iter().map(part);
+        let parts = parts.collect::<Result<_, Failure>>()?;
+        Ok(Self { folder, parts })
+    }
+
+    /// Its folder.
+    pub(super) fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Whether an earlier run left something.
+    pub(super) fn is_begun(&self) -> bool {
+        self.parts.iter().any(Partial::is_begun)
+    }
+
+    /// What earlier runs finished, by job.
+    ///
+    /// # Errors
+    /// The file system.
+    pub(super) fn found(&self, work: &Work) -> Result<Vec<(usize, Outcome)>, Failure> {
+        let mut parts = Vec::new();
+        for part in &self.parts {
+            parts.push(part.blocks()?);
+        }
+        let of = |job: usize| {
+            let (s, b) = work.block(job)?;
+            Some((job, Outcome::Block(parts[s].remove(&b)?)))
+        };
+        Ok((0..work.jobs()).filter_map(of).collect())
+    }
+
+    /// Keeps the outcome of a job if it is a block.
+    ///
+    /// # Errors
+    /// The file system.
+    pub(super) fn keep(
+        &mut self,
+        work: &Work,
+        job: usize,
+        outcome: &Outcome,
+    ) -> Result<(), Failure> {
+        match (work.block(job), outcome) {
+            (Some((s, b)), Outcome::Block(records)) => self.parts[s].append(b, records),
+            _ => Ok(()),
+        }
+    }
+
+    /// Takes it away: its content is in the report.
+    ///
+    /// # Errors
+    /// The file system.
+    pub(super) fn remove(self) -> Result<(), Failure> {
+        self.parts.into_iter().try_for_each(Partial::remove)?;
+        fs::remove_dir(&self.folder)
+            .map_err(|e| Failure::io(format!("cannot remove {}: {e}", self.folder.display())))
+    }
+}
