@@ -18,7 +18,7 @@ use egui_kittest::{
     kittest::{NodeT as _, Queryable as _},
 };
 use jointplay::app::{
-    App, AppOptions, CameraPose, DesktopHost, Host, Link, OpenedFile, SaveFile, Verdict,
+    App, AppOptions, CameraPose, DesktopHost, Host, Link, OpenedFile, SaveFile, Verdict, Window,
 };
 use jointplay::cli::output::Table;
 use jointplay::scene::{DEFAULT_SCENE, Scene};
@@ -125,6 +125,8 @@ fn label(harness: &Harness<'_, App>, words: &str) -> bool {
 const LARGE: [f32; 2] = [1280.0, 800.0];
 const UPRIGHT: [f32; 2] = [390.0, 844.0];
 const LYING: [f32; 2] = [844.0, 390.0];
+/// A small phone of ten years ago, or a laptop at four times the size.
+const TINY: [f32; 2] = [320.0, 480.0];
 
 fn click(harness: &mut Harness<'_, App>, label: &str) {
     harness.get_by_label(label).click();
@@ -246,6 +248,7 @@ fn a_bad_link_is_explained_and_the_default_scene_runs() {
         ("?scene=spcmm&spcmm.amplitude_x=500mm", "amplitude_x"),
         ("#scene=pendulum&log=AAAA", "cut short or damaged"),
         ("?speed=3", "unknown word"),
+        ("?follow=joint.S9", "no such part; allowed: joint.S1,"),
     ] {
         assert!(AppOptions::from_link(link).is_err(), "{link}");
         let (mut harness, _) = open(AppOptions::from_link_or_default(link), LARGE);
@@ -258,7 +261,8 @@ fn a_bad_link_is_explained_and_the_default_scene_runs() {
         let player = harness.state().player();
         assert_eq!(player.scene().name, DEFAULT_SCENE);
         assert!(player.is_playing());
-        assert!(harness.state_mut().open_link("?c=2").is_err());
+        let ctx = harness.ctx.clone();
+        assert!(harness.state_mut().open_link(&ctx, "?c=2").is_err());
     }
     let options = AppOptions::from_link_or_default("?scene=pendulum&c=0.5mm&scale=1:10");
     assert_eq!(
@@ -394,8 +398,30 @@ fn a_double_tap_follows_what_it_hits() {
         harness.step();
     }
     harness.run_steps(3);
-    click(&mut harness, "View options");
-    harness.get_by_label("Stop following");
+    // The link follows it, too, from where the camera is.
+    harness
+        .state_mut()
+        .plots_mut()
+        .chosen
+        .push(Quantity::Energy);
+    harness.state_mut().plots_mut().window = Window::Last(0.01);
+    harness.state_mut().player_mut().run_to(5e-3);
+    harness.run_steps(3);
+    let link = harness.state().share_state();
+    let (mut copy, _) = open(AppOptions::from_link(&link).expect("a link"), LARGE);
+    assert_eq!(verdict(&mut copy), Verdict::Agrees(hash(&harness)));
+    copy.run_steps(3);
+    assert_eq!(copy.state().share_state(), link);
+    copy.get_by_label_contains("Energy, mJ");
+    for mut harness in [harness, copy] {
+        click(&mut harness, "View options");
+        harness.get_by_label("Stop following");
+    }
+    assert!(
+        link.contains("&follow=body.platform&")
+            && link.contains("&plots=normal-force+eccentricity+energy&window=0.01s&"),
+        "{link}"
+    );
 }
 
 #[test]
@@ -478,6 +504,101 @@ fn small_screens_have_controls_for_fingers_and_a_sheet_that_folds() {
         ] {
             harness.get_by_label(name);
         }
+    }
+}
+
+#[test]
+fn dialogs_and_menus_stay_on_a_small_screen() {
+    let outside = |harness: &Harness<'_, App>, role: Role, size: [f32; 2]| -> Vec<String> {
+        let across = 0.0..=size[0];
+        harness
+            .query_all_by_role(role)
+            .filter(|node| {
+                let rect = node.rect();
+                !(across.contains(&rect.left()) && across.contains(&rect.right()))
+            })
+            .map(|node| format!("{:?} {:?}", node.accesskit_node().label(), node.rect()))
+            .collect()
+    };
+    for size in [UPRIGHT, LYING, TINY] {
+        let (mut harness, _) = window("spcmm", size);
+        harness.run();
+        let step = harness.get_by_role_and_label(Role::Button, "Step").rect();
+        let scale = harness.get_by_role_and_label(Role::ComboBox, "Time scale preset");
+        let scale = scale.rect();
+        assert!(
+            scale.left() >= step.right() && scale.right() <= size[0],
+            "{size:?}: {scale:?}"
+        );
+        harness.key_press(Key::Questionmark);
+        harness.run();
+        let words = harness.get_by_label("Turn the view").rect();
+        assert!(words.width() > 20.0 && words.left() > 0.0, "{words:?}");
+        let none: [String; 0] = [];
+        assert_eq!(outside(&harness, Role::Label, size), none, "{size:?}");
+        let close = harness.get_by_role_and_label(Role::Button, "Close").rect();
+        assert!(close.bottom() <= size[1], "{size:?}: {close:?}");
+        harness.key_press(Key::Escape);
+        harness.run();
+
+        // What is too far down in a menu is reached by the wheel.
+        click(&mut harness, "Menu");
+        harness.run();
+        let first = harness.get_by_label("Open…").rect();
+        assert!(first.top() >= 0.0 && first.right() <= size[0], "{first:?}");
+        harness.hover_at(harness.get_by_label("Picture…").rect().center());
+        for _ in 0..4 {
+            harness.event(Event::MouseWheel {
+                unit: egui::MouseWheelUnit::Line,
+                source: egui::MouseWheelSource::Wheel,
+                delta: vec2(0.0, -10.0),
+                phase: TouchPhase::Move,
+                modifiers: Modifiers::NONE,
+            });
+            harness.run_steps(20);
+        }
+        let about = harness.get_by_label("About").rect();
+        assert!(about.bottom() <= size[1], "{size:?}: {about:?}");
+        click(&mut harness, "About");
+        harness.get_by_label(&format!("{:016x}", hash(&harness)));
+        assert_eq!(outside(&harness, Role::Label, size), none, "{size:?}");
+    }
+}
+
+#[test]
+fn a_file_held_over_the_window_and_a_large_one_are_told() {
+    let (mut harness, calls) = window("pendulum", LARGE);
+    let picture = harness.render().expect("a picture");
+    harness
+        .input_mut()
+        .hovered_files
+        .push(egui::HoveredFile::default());
+    harness.step();
+    assert_ne!(harness.render().expect("a picture"), picture);
+    let before = hash(&harness);
+    calls.borrow_mut().to_open.push_back(OpenedFile {
+        name: "film.mp4".to_owned(),
+        content: Err(jointplay::scene::too_large()),
+    });
+    harness.step();
+    harness.run_steps(3);
+    assert!(label(&harness, "film.mp4: too large for a scene file"));
+    assert_eq!(hash(&harness), before);
+}
+
+#[test]
+fn a_link_in_an_open_window_brings_its_theme() {
+    let (mut harness, _) = window("spcmm", LARGE);
+    let ctx = harness.ctx.clone();
+    for (link, theme) in [
+        ("#scene=pendulum&theme=dark", egui::Theme::Dark),
+        // Says nothing: it stays.
+        ("#scene=pendulum", egui::Theme::Dark),
+        ("#scene=pendulum&theme=light", egui::Theme::Light),
+    ] {
+        harness.state_mut().open_link(&ctx, link).expect("a link");
+        harness.run_steps(3);
+        assert_eq!(ctx.theme(), theme, "{link}");
     }
 }
 

@@ -39,9 +39,9 @@ export function makeHost(laboratory, lost) {
     picker.accept = '.toml';
     picker.id = 'picker';
     picker.hidden = true;
-    picker.addEventListener('change', async () => {
+    picker.addEventListener('change', () => {
         const [file] = picker.files;
-        if (file) laboratory.page.openFile(file.name, new Uint8Array(await file.arrayBuffer()));
+        if (file) laboratory.page.openFile(file);
         // The same file, changed meanwhile, can be chosen again.
         picker.value = '';
         $('laboratory').focus();

@@ -20,7 +20,12 @@ const LEFT_OUT = {
     graphics:
         'The laboratory draws with WebGPU or WebGL2, and this browser offers neither. They may be switched off in its ' +
         'settings, or the graphics driver is not supported. A current Firefox, Chrome, Edge or Safari has at least WebGL2.',
+    webgpu: 'The address asks for WebGPU, which this browser does not offer.',
+    webgl: 'The address asks for WebGL2, which this browser does not offer.',
 };
+
+/** The way to draw that the address asks for, if any. */
+const asked = () => new URLSearchParams(location.hash.slice(1)).get('renderer') ?? query.get('renderer');
 
 /**
  * Replaces whatever is on the page by a message; `report` is a text that the user can copy, `link` the fragment that leads
@@ -67,7 +72,9 @@ $('reload').addEventListener('click', () => reload(location.search, laboratory.t
 $('again').addEventListener('click', () => reload(location.search, laboratory.trouble.link));
 $('plainer').addEventListener('click', () => {
     query.set('renderer', 'webgl');
-    reload(`?${query}`, laboratory.trouble.link ?? location.hash.slice(1));
+    const fragment = new URLSearchParams(laboratory.trouble.link ?? location.hash.slice(1));
+    fragment.delete('renderer');
+    reload(`?${query}`, String(fragment));
 });
 $('copy').addEventListener('click', async () => {
     const report = $('report');
@@ -79,6 +86,8 @@ $('copy').addEventListener('click', async () => {
         $('copy').textContent = 'Selected: press Ctrl+C';
     }
 });
+// A file that misses the laboratory, or comes before it is there, must not take its place in the browser.
+for (const kind of ['dragover', 'drop']) addEventListener(kind, (event) => event.preventDefault());
 // What no panic hook sees: a trap in the compiled code, and anything that keeps the laboratory from starting.
 function uncaught(error) {
     const fatal = !laboratory.ready || error instanceof WebAssembly.RuntimeError;
@@ -114,10 +123,10 @@ async function download(address, bytes) {
 
 /** Backends to try, best first. */
 async function backends() {
-    const asked = query.get('renderer');
+    const wanted = asked();
     const webgl = Boolean(document.createElement('canvas').getContext('webgl2'));
     let webgpu = false;
-    if (asked !== 'webgl') {
+    if (wanted !== 'webgl') {
         try {
             webgpu = Boolean(await navigator.gpu?.requestAdapter());
         } catch {
@@ -126,7 +135,7 @@ async function backends() {
     }
     const found = [];
     if (webgpu) found.push('webgpu');
-    if (webgl && asked !== 'webgpu') found.push('webgl');
+    if (webgl && wanted !== 'webgpu') found.push('webgl');
     return found;
 }
 
@@ -210,13 +219,20 @@ async function main() {
     $('loading').hidden = false;
     stage('Loading', 0);
     const found = await backends();
-    if (found.length === 0) return showTrouble('Something is missing', LEFT_OUT.graphics);
+    if (found.length === 0) {
+        showTrouble('Something is missing', LEFT_OUT[asked()] ?? LEFT_OUT.graphics);
+        // There may be the other way to draw.
+        $('plainer').hidden = asked() !== 'webgpu';
+        return;
+    }
     let bindings;
     try {
         const code = download(`jointplay_bg.wasm${build}`, Number(script.dataset.wasmBytes));
         // Should it fail while the script is still on its way: it is reported where it is waited for.
         code.catch(() => {});
         const { makeHost } = await import(`./host.js${build}`);
+        const { CanvasObserver } = await import(`./canvas.js${build}`);
+        globalThis.ResizeObserver = CanvasObserver;
         globalThis.jointplayHost = makeHost(laboratory, lost);
         bindings = await import(`./jointplay.js${build}`);
         laboratory.code = await code;
@@ -229,7 +245,11 @@ async function main() {
     const failure = await begin(found);
     if (failure) return showTrouble('The laboratory could not start', failure);
     // Another link pasted into the address bar of the open page.
-    addEventListener('hashchange', () => laboratory.page.openLink(location.search + location.hash));
+    addEventListener('hashchange', () => {
+        // Another way to draw needs another start.
+        if (['webgl', 'webgpu'].includes(asked()) && asked() !== laboratory.backend) location.reload();
+        else laboratory.page.openLink(location.search + location.hash);
+    });
     await firstPicture();
 }
 

@@ -1,10 +1,13 @@
 //! The list of keys, the about box and the field that opens a file.
 
-use eframe::egui::{self, Id, Modal, RichText, TextEdit, Ui};
+use eframe::egui::{self, Grid, Id, Modal, RichText, ScrollArea, TextEdit, Ui};
 
 use super::host::SaveFile;
 use super::keys::{BINDINGS, POINTER};
 use super::player::Player;
+
+/// Below this width keys and what they do stand below each other, points.
+const NARROW: f32 = 480.0;
 
 /// Which dialog is open.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -64,14 +67,17 @@ pub fn ui(
             };
             ui.heading(title);
             ui.add_space(6.0);
-            match dialog {
+            // Title, button and frame stay in sight on a low screen.
+            let most = ctx.content_rect().height() - 140.0;
+            let scrolled = ScrollArea::vertical().max_height(most.max(80.0));
+            scrolled.show(ui, |ui| match dialog {
                 Dialog::Help => help(ui),
                 Dialog::About => about(ui, player, renderer),
                 Dialog::Open { path, error } => answer = open(ui, path, error.as_deref()),
                 Dialog::Save { path, files, error } => {
                     answer = save(ui, path, files, error.as_deref());
                 }
-            }
+            });
             ui.add_space(8.0);
             if ui.button("Close").clicked() {
                 answer = Some(Answer::Close);
@@ -90,20 +96,24 @@ fn help(ui: &mut Ui) {
         .filter(|b| !b.written.is_empty())
         .map(|b| (b.written, b.help))
         .chain(POINTER);
-    egui::ScrollArea::vertical()
-        .max_height(ui.ctx().content_rect().height() * 0.7)
+    if ui.available_width() < NARROW {
+        // Below each other, else the longer half of each line would be outside.
+        for (key, help) in rows {
+            ui.label(RichText::new(key).strong());
+            ui.indent(key, |ui| ui.label(help));
+        }
+        return;
+    }
+    Grid::new("keys")
+        .num_columns(2)
+        .spacing([18.0, 5.0])
+        .striped(true)
         .show(ui, |ui| {
-            egui::Grid::new("keys")
-                .num_columns(2)
-                .spacing([18.0, 5.0])
-                .striped(true)
-                .show(ui, |ui| {
-                    for (key, help) in rows {
-                        ui.label(RichText::new(key).strong());
-                        ui.label(help);
-                        ui.end_row();
-                    }
-                });
+            for (key, help) in rows {
+                ui.label(RichText::new(key).strong());
+                ui.label(help);
+                ui.end_row();
+            }
         });
 }
 

@@ -10,7 +10,7 @@ use super::dialogs::Dialog;
 use super::host::{Host, SaveFile};
 use super::player::Player;
 use super::replay::Verdict;
-use super::share::{Link, SceneText};
+use super::share::{Link, SceneText, shown};
 use super::{App, Notice};
 use crate::render::Image;
 use crate::scene::{Scene, Value};
@@ -39,6 +39,8 @@ impl App {
             return replay.link().clone();
         }
         let player = &self.player;
+        let (plots, window) = shown::changed(&self.plots);
+        let followed = self.viewport.followed();
         Link {
             scene: SceneText::of(player.wanted()),
             log: player.log().clone(),
@@ -48,6 +50,9 @@ impl App {
             time_scale: Some(player.pacer.scale()),
             camera: self.viewport.pose(),
             magnification: Some(self.viewport.options.magnification),
+            follow: followed.and_then(|part| shown::name_followed(player.scene(), part)),
+            plots,
+            window,
             playing: Some(player.is_playing()),
             theme: None,
             version: Some(crate::VERSION.to_owned()),

@@ -5,6 +5,7 @@ use eframe::egui::{self, ComboBox, Frame, Panel, RichText, ThemePreference, Ui};
 use super::App;
 use super::dialogs::Dialog;
 use super::files::verdict_words;
+use super::layout;
 use super::replay::Verdict;
 use crate::scene::BUILT_IN;
 
@@ -18,7 +19,7 @@ impl App {
             self.scene_box(ui, compact);
             if compact {
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                    ui.menu_button("Menu", |ui| self.menu(ui))
+                    ui.menu_button("Menu", |ui| layout::entries(ui, |ui| self.menu(ui)))
                         .response
                         .on_hover_text("Open, save, share, theme, keys");
                 });

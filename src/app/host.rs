@@ -111,6 +111,7 @@ mod desktop {
 
     use super::{Host, Job, OpenedFile, Running, SaveFile};
     use crate::app::background::Thread;
+    use crate::scene::{LARGEST_FILE, too_large};
 
     /// Files of the desktop.
     #[derive(Debug, Default)]
@@ -144,9 +145,17 @@ mod desktop {
         }
 
         fn read_dropped(&mut self, file: Arc<dyn egui::DroppedFile + Send + Sync>) {
+            let large = file
+                .path()
+                .metadata()
+                .is_ok_and(|file| file.len() > LARGEST_FILE);
             self.opened.push_back(OpenedFile {
                 name: file.path().display().to_string(),
-                content: file.bytes(),
+                content: if large {
+                    Err(too_large())
+                } else {
+                    file.bytes()
+                },
             });
         }
 

@@ -30,6 +30,35 @@ pub enum Sheet {
     Bench,
 }
 
+/// The entries of a menu; on a low screen they scroll.
+pub(super) fn entries(ui: &mut Ui, add: impl FnOnce(&mut Ui)) {
+    // Its frame, and a strip of what lies under it.
+    let most = ui.ctx().content_rect().height() - 48.0;
+    ScrollArea::vertical().max_height(most).show(ui, add);
+}
+
+/// Over the picture, while a file is held above the window.
+fn drop_hint(ui: &Ui, area: egui::Rect) {
+    if ui.input(|input| input.raw.hovered_files.is_empty()) {
+        return;
+    }
+    let colour = ui.visuals().selection.stroke.color;
+    let fill = ui.visuals().window_fill.gamma_multiply(0.85);
+    let painter = ui.painter_at(area);
+    painter.rect_filled(area, 0.0, fill);
+    let edge = egui::Stroke::new(2.0, colour);
+    painter.rect_stroke(area.shrink(8.0), 8.0, edge, egui::StrokeKind::Inside);
+    let font = egui::TextStyle::Heading.resolve(ui.style());
+    let place = egui::Align2::CENTER_CENTER;
+    painter.text(
+        area.center(),
+        place,
+        "Drop a scene file to open it",
+        font,
+        colour,
+    );
+}
+
 impl App {
     /// Everything, in whatever space there is.
     pub fn show(&mut self, ui: &mut Ui) {
@@ -282,18 +311,21 @@ impl App {
             .layout(backwards);
         ui.scope_builder(buttons, |ui| {
             ui.menu_button("View options", |ui| {
-                ui.set_min_width(230.0);
-                if narrow {
-                    ui.horizontal_wrapped(|ui| self.viewport.camera_buttons(ui, false));
-                    ui.separator();
-                }
-                self.viewport.options_ui(ui);
+                entries(ui, |ui| {
+                    ui.set_min_width(230.0);
+                    if narrow {
+                        ui.horizontal_wrapped(|ui| self.viewport.camera_buttons(ui, false));
+                        ui.separator();
+                    }
+                    self.viewport.options_ui(ui);
+                });
             });
             if !narrow {
                 ui.with_layout(backwards, |ui| self.viewport.camera_buttons(ui, true));
             }
         });
         self.settled_hint(ui, inner);
+        drop_hint(ui, area);
         self.notice_plate(ui, inner);
         let middle = egui::UiBuilder::new().max_rect(inner.shrink2(egui::vec2(0.0, 44.0)));
         ui.scope_builder(middle, |ui| transport::banner(ui, &self.player))

@@ -116,6 +116,7 @@ impl AppOptions {
         let link = Link::parse(text).map_err(|error| error.to_string())?;
         let scene = link.load().map_err(|error| format!("link: {error}"))?;
         Simulation::new(&scene).map_err(|error| format!("link: {}", error.located(&scene)))?;
+        link.followed(&scene).map_err(|error| error.to_string())?;
         let mut options = Self::new(scene);
         options.playing = link.playing.unwrap_or(!link.has_instant());
         if let Some(scale) = link.time_scale {
@@ -140,6 +141,21 @@ impl AppOptions {
                 ..Self::new(scene)
             }
         })
+    }
+}
+
+/// Camera, followed part and plots as `link` has them; what it says nothing about stays.
+fn show_link(link: &Link, player: &Player, viewport: &mut Viewport, plots: &mut Plots) {
+    if let Some(pose) = link.camera {
+        viewport.set_pose(pose);
+    }
+    // That there is such a part was found out when the link was read.
+    viewport.follow(link.followed(player.scene()).ok().flatten());
+    if let Some(chosen) = &link.plots {
+        plots.chosen.clone_from(chosen);
+    }
+    if let Some(window) = link.window {
+        plots.window = window;
     }
 }
 
@@ -221,8 +237,9 @@ impl App {
         player.pacer.set_scale(options.time_scale);
         player.set_playing(options.playing);
         let mut viewport = Viewport::new(&player, options.view);
-        if let Some(pose) = options.link.as_ref().and_then(|link| link.camera) {
-            viewport.set_pose(pose);
+        let mut plots = Plots::default();
+        if let Some(link) = &options.link {
+            show_link(link, &player, &mut viewport, &mut plots);
         }
         let replay = options.link.and_then(Replay::new);
         if replay.is_some() {
@@ -232,7 +249,7 @@ impl App {
             viewport,
             controls: Controls::default(),
             accuracy: Accuracy::default(),
-            plots: Plots::default(),
+            plots,
             bench: Bench::default(),
             dialog: None,
             problem: options.problem,
@@ -406,16 +423,17 @@ impl App {
     ///
     /// # Errors
     /// As [`AppOptions::from_link`].
-    pub fn open_link(&mut self, text: &str) -> Result<(), String> {
+    pub fn open_link(&mut self, ctx: &egui::Context, text: &str) -> Result<(), String> {
         let opened = AppOptions::from_link(text).and_then(|options| {
             self.show_scene(&options.scene)?;
             self.player.pacer.set_scale(options.time_scale);
             self.player.set_playing(options.playing);
             self.viewport.options.magnification = options.view.magnification;
             if let Some(link) = options.link {
-                if let Some(pose) = link.camera {
-                    self.viewport.set_pose(pose);
+                if let Some(theme) = link.theme {
+                    ctx.set_theme(theme);
                 }
+                show_link(&link, &self.player, &mut self.viewport, &mut self.plots);
                 self.replay = Replay::new(link);
             }
             if self.replay.is_some() {

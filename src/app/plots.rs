@@ -6,6 +6,7 @@ use egui_plot::{
     PlotPoint, PlotPoints,
 };
 
+use super::layout;
 use super::player::Player;
 use super::stack::{middles, stack};
 use super::{theme, value};
@@ -62,7 +63,7 @@ impl Plots {
                 .close_behavior(egui::PopupCloseBehavior::CloseOnClickOutside);
             egui::containers::menu::MenuButton::new("Choose plots")
                 .config(menu)
-                .ui(ui, |ui| self.menu(ui, player));
+                .ui(ui, |ui| layout::entries(ui, |ui| self.menu(ui, player)));
             ui.label("Window");
             ComboBox::from_id_salt("window")
                 .width(110.0)

@@ -12,8 +12,10 @@ use base64::engine::general_purpose::URL_SAFE_NO_PAD as BASE64;
 use eframe::egui::ThemePreference;
 
 use super::log::Log;
+use super::plots::Window;
 use crate::scene::{DEFAULT_SCENE, Dimension, Scene, SceneError, built_in_text, parse_quantity};
-use crate::simulate::SCALE_RANGE;
+use crate::simulate::{Quantity, SCALE_RANGE};
+use crate::view::Picked;
 
 /// Longest link that is given out, characters: what mail, chats and every browser still pass on.
 pub const LONGEST_LINK: usize = 32_000;
@@ -31,7 +33,7 @@ pub const ALIASES: [(&str, &str); 4] = [
 ];
 
 /// Words of a link that are no parameters.
-const WORDS: [&str; 14] = [
+const WORDS: [&str; 17] = [
     "scene",
     "file",
     "text",
@@ -42,6 +44,9 @@ const WORDS: [&str; 14] = [
     "scale",
     "camera",
     "magnification",
+    "follow",
+    "plots",
+    "window",
     "play",
     "version",
     "renderer",
@@ -123,6 +128,12 @@ pub struct Link {
     pub camera: Option<CameraPose>,
     /// Magnification of the play.
     pub magnification: Option<f32>,
+    /// Part that the view follows, `joint.NAME` or `body.NAME`.
+    pub follow: Option<String>,
+    /// Plots on show.
+    pub plots: Option<Vec<Quantity>>,
+    /// Time that they show.
+    pub window: Option<Window>,
     /// Whether time passes once the state is there; where it is left out, only if the link names no instant.
     pub playing: Option<bool>,
     /// Light, dark, or as the system asks.
@@ -142,6 +153,9 @@ impl Default for Link {
             time_scale: None,
             camera: None,
             magnification: None,
+            follow: None,
+            plots: None,
+            window: None,
             playing: None,
             theme: None,
             version: None,
@@ -229,6 +243,9 @@ impl Link {
                     let fine = factor.filter(|factor| (1.0..=100.0).contains(factor));
                     link.magnification = Some(fine.ok_or_else(|| wrong("allowed 1 to 100"))?);
                 }
+                "follow" => link.follow = Some(value.to_owned()),
+                "plots" => link.plots = Some(shown::read_plots(value).map_err(|m| wrong(&m))?),
+                "window" => link.window = Some(shown::read_window(value).map_err(|m| wrong(&m))?),
                 "play" => {
                     link.playing = Some(match value {
                         "1" => true,
@@ -315,6 +332,9 @@ impl Link {
             "magnification",
             self.magnification.map(|factor| factor.to_string()),
         );
+        add("follow", self.follow.clone());
+        add("plots", self.plots.as_deref().map(shown::write_plots));
+        add("window", self.window.map(shown::write_window));
         add(
             "play",
             self.playing.map(|playing| u8::from(playing).to_string()),
@@ -374,6 +394,17 @@ impl Link {
             SceneText::BuiltIn(name) => Scene::load(name, &self.log.base),
             SceneText::File { name, text } => Scene::parse(text, Some(name), &self.log.base),
         }
+    }
+
+    /// The part of `scene` that the view is to follow, if any.
+    ///
+    /// # Errors
+    /// There is no such part.
+    pub fn followed(&self, scene: &Scene) -> Result<Option<Picked>, LinkError> {
+        self.follow
+            .as_ref()
+            .map(|name| shown::find_followed(scene, name).map_err(|why| fault("follow", name, why)))
+            .transpose()
     }
 
     /// Whether the link names an instant to go to.
@@ -497,5 +528,6 @@ fn unpack(key: &str, packed: &str) -> Result<String, LinkError> {
     String::from_utf8(text).map_err(|_| damaged())
 }
 
+pub mod shown;
 #[cfg(test)]
 mod tests;

@@ -46,6 +46,7 @@ pub fn ui(ui: &mut Ui, player: &mut Player) -> Option<Asked> {
     let asked = ui
         .allocate_ui_with_layout(size, row, |ui| {
             let asked = buttons(ui, player);
+            time(ui, player);
             if !narrow {
                 ui.add_space(6.0);
                 speed(ui, player, narrow);
@@ -63,6 +64,10 @@ pub fn ui(ui: &mut Ui, player: &mut Player) -> Option<Asked> {
 pub fn row(ui: &mut Ui, player: &mut Player) -> Option<Asked> {
     ui.horizontal(|ui| {
         let asked = buttons(ui, player);
+        // Else the time scale would stick out; the time stands over the picture, too.
+        if ui.available_width() > 172.0 {
+            time(ui, player);
+        }
         scales(ui, player);
         if ui.available_width() > 120.0 {
             reached(ui, player);
@@ -72,7 +77,7 @@ pub fn row(ui: &mut Ui, player: &mut Player) -> Option<Asked> {
     .inner
 }
 
-/// Reset, play, step, and the time.
+/// Reset, play and step.
 fn buttons(ui: &mut Ui, player: &mut Player) -> Option<Asked> {
     let mut asked = None;
     let (small, large) = (theme::side(ui, 30.0), theme::side(ui, PLAY));
@@ -100,13 +105,13 @@ fn buttons(ui: &mut Ui, player: &mut Player) -> Option<Asked> {
         }
     });
     ui.add_space(6.0);
-    ui.label(
-        RichText::new(value::time(player.pacer.shown()))
-            .monospace()
-            .strong(),
-    )
-    .on_hover_text("Simulated time");
     asked
+}
+
+fn time(ui: &mut Ui, player: &Player) {
+    let time = value::time(player.pacer.shown());
+    ui.label(RichText::new(time).monospace().strong())
+        .on_hover_text("Simulated time");
 }
 
 fn speed(ui: &mut Ui, player: &mut Player, narrow: bool) {

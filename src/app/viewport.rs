@@ -84,10 +84,10 @@ impl Viewport {
         }
     }
 
-    /// Where the camera stands or is going; `None` where it shows everything as at the start.
+    /// Where the camera stands or is going; `None` where it shows everything as at the start and follows nothing.
     pub fn pose(&self) -> Option<CameraPose> {
         let camera = self.goal.unwrap_or(self.camera);
-        self.moved.then(|| CameraPose {
+        (self.moved || self.followed.is_some()).then(|| CameraPose {
             yaw: camera.yaw,
             pitch: camera.pitch,
             distance: camera.distance,
@@ -192,6 +192,11 @@ impl Viewport {
     pub fn follow(&mut self, picked: Option<Picked>) {
         self.followed = picked;
         self.camera.follow(None);
+    }
+
+    /// What [`Self::follow`] was given.
+    pub fn followed(&self) -> Option<Picked> {
+        self.followed
     }
 
     /// The next factor of a short list for the magnification of the play.

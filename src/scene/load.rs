@@ -17,7 +17,15 @@ pub const BUILT_IN: [&str; 5] = [
 pub const DEFAULT_SCENE: &str = BUILT_IN[0];
 
 /// The largest file that is read, bytes: a scene is a few kilobytes.
-const MAX_BYTES: u64 = 4 << 20;
+pub const LARGEST_FILE: u64 = 4 << 20;
+
+/// Why a larger one is not.
+pub fn too_large() -> String {
+    format!(
+        "too large for a scene file: more than {} MiB",
+        LARGEST_FILE >> 20
+    )
+}
 
 /// TOML text of a built-in scene.
 pub fn built_in_text(name: &str) -> Option<&'static str> {
@@ -76,15 +84,12 @@ fn read_file(name: &str) -> Result<String, SceneError> {
     let mut bytes = Vec::new();
     // One byte more than allowed: a pipe or a device does not tell its size.
     std::fs::File::open(name)
-        .and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes))
+        .and_then(|file| file.take(LARGEST_FILE + 1).read_to_end(&mut bytes))
         .map_err(|cause| error(format!("cannot read this file: {cause}")))?;
-    if bytes.len() as u64 > MAX_BYTES {
+    if bytes.len() as u64 > LARGEST_FILE {
         return Err(SceneError {
             unreadable: false,
-            ..error(format!(
-                "too large for a scene file: more than {} MiB",
-                MAX_BYTES >> 20
-            ))
+            ..error(too_large())
         });
     }
     String::from_utf8(bytes).map_err(|cause| {

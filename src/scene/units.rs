@@ -18,6 +18,9 @@ pub enum QuantityError {
     /// A bare number other than 0 for a quantity that has a dimension.
     #[error("needs a unit{}", example(*.0))]
     MissingUnit(Dimension),
+    /// A comma where the point belongs.
+    #[error("has a decimal comma; write a point, as in 0.5")]
+    Comma,
     /// A unit of another dimension, or none known.
     #[error("wrong unit `{unit}`{}{}", foreign(unit), example(*.dimension))]
     WrongUnit {
@@ -180,6 +183,11 @@ pub fn parse_quantity(text: &str, dimension: Dimension) -> Result<f64, QuantityE
     let bare: f64 = number
         .parse()
         .map_err(|_| QuantityError::NotANumber(dimension))?;
+    if let Some(rest) = unit.strip_prefix(',')
+        && rest.starts_with(|c: char| c.is_ascii_digit())
+    {
+        return Err(QuantityError::Comma);
+    }
     let value = if unit.is_empty() {
         if dimension != Dimension::None && bare != 0.0 {
             return Err(QuantityError::MissingUnit(dimension));

@@ -6,11 +6,13 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use eframe::egui;
+use eframe::web_sys::{File, js_sys::Uint8Array};
 use wasm_bindgen::prelude::*;
 
 use super::work::Worker;
 use crate::analysis::task::Job;
 use crate::app::{Host, OpenedFile, Running, SaveFile};
+use crate::scene::{LARGEST_FILE, too_large};
 
 #[wasm_bindgen]
 extern "C" {
@@ -55,6 +57,22 @@ impl Inbox {
         self.files.borrow_mut().push_back(file);
         self.ctx().request_repaint();
     }
+
+    /// Reads a file of the browser's and puts it in; a large one is not even read: a page has little memory.
+    pub fn take(self: Rc<Self>, file: File) {
+        wasm_bindgen_futures::spawn_local(async move {
+            let content = if file.size() > LARGEST_FILE as f64 {
+                Err(too_large())
+            } else {
+                match file.array_buffer().await {
+                    Ok(bytes) => Ok(Uint8Array::new(&bytes).to_vec()),
+                    Err(_) => Err("cannot be read; it may be a folder".to_owned()),
+                }
+            };
+            let name = file.name();
+            self.put(OpenedFile { name, content });
+        });
+    }
 }
 
 /// The page around the application.
@@ -87,14 +105,9 @@ impl Host for WebHost {
     }
 
     fn read_dropped(&mut self, file: Arc<dyn egui::DroppedFile + Send + Sync>) {
-        let inbox = self.inbox.clone();
-        wasm_bindgen_futures::spawn_local(async move {
-            let content = file.bytes_async().await;
-            inbox.put(OpenedFile {
-                name: file.path().display().to_string(),
-                content,
-            });
-        });
+        if let Some(file) = file.web_file() {
+            self.inbox.clone().take(file.clone());
+        }
     }
 
     fn opened(&mut self) -> Option<OpenedFile> {

@@ -23,7 +23,8 @@ impl egui::Plugin for Mirror {
         let Some(tree) = &output.platform_output.accesskit_update else {
             return;
         };
-        let scale = f64::from(ctx.zoom_factor() / ctx.pixels_per_point());
+        // Places are told in points.
+        let scale = f64::from(ctx.zoom_factor());
         let widgets = tree.nodes.iter().filter_map(|(_, node)| {
             let bounds = node.bounds()?;
             let rect = [bounds.x0, bounds.y0, bounds.x1, bounds.y1];

@@ -6,14 +6,14 @@ use std::sync::Arc;
 
 use eframe::egui;
 use eframe::egui_wgpu::{RenderState, WgpuConfiguration, WgpuSetupCreateNew};
-use eframe::web_sys::HtmlCanvasElement;
+use eframe::web_sys::{File, HtmlCanvasElement};
 use serde_json::json;
 use wasm_bindgen::prelude::*;
 
 use super::crash;
 use super::host::{Inbox, WebHost, are_graphics_lost, graphics_lost};
 use super::mirror::Mirror;
-use crate::app::{App, AppOptions, OpenedFile};
+use crate::app::{App, AppOptions};
 use crate::render::wgpu::Backends;
 
 /// Time between two notes of what is running, s: what a crash report and a new start go back to.
@@ -124,16 +124,15 @@ impl Page {
     pub fn open_link(&self, link: &str) {
         self.with(|laboratory| {
             // The reason is shown.
-            let _ = laboratory.app.open_link(link);
+            let _ = laboratory.app.open_link(&laboratory.ctx, link);
             laboratory.ctx.request_repaint();
         });
     }
 
     /// Opens a file that was chosen.
     #[wasm_bindgen(js_name = openFile)]
-    pub fn open_file(&self, name: String, bytes: Vec<u8>) {
-        let content = Ok(bytes);
-        self.inbox.put(OpenedFile { name, content });
+    pub fn open_file(&self, file: File) {
+        self.inbox.clone().take(file);
     }
 
     /// Tells the user something, for a few seconds.
@@ -201,7 +200,11 @@ fn describe(cc: &eframe::CreationContext<'_>) -> String {
         || "none".to_owned(),
         |state| {
             let info = state.adapter.get_info();
-            format!("{} ({})", info.backend, info.name)
+            // A browser may keep the name of the adapter to itself.
+            match info.name.as_str() {
+                "" => info.backend.to_string(),
+                name => format!("{} ({name})", info.backend),
+            }
         },
     )
 }

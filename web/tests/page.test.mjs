@@ -137,6 +137,51 @@ test('an address by hand sets scene and parameters; a bad one says what is wrong
     await bad.close();
 });
 
+test('moved to a screen with other pixels, the picture has those', async () => {
+    const [width, height] = [400, 560];
+    const lab = await open('play=0', { backend: 'webgl', size: { width, height } });
+    const cdp = await lab.context.newCDPSession(lab.page);
+    // Not back to 1, which the emulation does without telling the page.
+    for (const ratio of [2, 1.5, 3]) {
+        await cdp.send('Emulation.setDeviceMetricsOverride', { width, height, deviceScaleFactor: ratio, mobile: false });
+        await lab.until(async () => {
+            // The browser tells the page with the next frame that somebody sees.
+            await cdp.send('Page.captureScreenshot');
+            const canvas = await lab.page.evaluate(() => [document.getElementById('laboratory').width, document.getElementById('laboratory').height]);
+            return canvas[0] === ratio * width && canvas[1] === ratio * height;
+        }, `the canvas does not follow to ${ratio}`);
+    }
+    await lab.close();
+});
+
+test('theme and way to draw are taken from a link in the address bar of the open page, too', async () => {
+    const lab = await open('scene=pendulum&play=0&theme=light', { backend: 'webgl' });
+    const brightness = async () => {
+        const { data } = await lab.pixels({ x: 4, y: 4, width: 4, height: 4 });
+        return data[0];
+    };
+    const light = await brightness();
+    await lab.page.evaluate(() => (location.hash = '#scene=pendulum&play=0&theme=dark'));
+    await lab.until(async () => (await brightness()) < light / 2, 'the theme has no effect');
+    await lab.page.evaluate(() => (location.hash = '#scene=pendulum&c=0.2mm&play=0&renderer=webgpu'));
+    await lab.page.waitForFunction(() => globalThis.jointplay?.ready && globalThis.jointplay.backend === 'webgpu');
+    const state = await lab.state();
+    assert.match(state.renderer, /^webgpu/i);
+    assert.ok(!state.renderer.includes('()'), state.renderer);
+    assert.deepEqual(Object.keys(state.changed_parameters), ['contact.clearance']);
+    await lab.close();
+});
+
+test('where the address asks for WebGPU and there is none, the other way is a click away', async () => {
+    const without = () => Object.defineProperty(Navigator.prototype, 'gpu', { get: () => undefined });
+    const lab = await open('renderer=webgpu', { expectTrouble: true, before: without });
+    assert.match(await lab.page.locator('#trouble').innerText(), /asks for WebGPU, which this browser does not offer/);
+    await Promise.all([lab.page.waitForEvent('load'), lab.page.locator('#plainer').click()]);
+    await lab.started();
+    assert.match((await lab.state()).renderer, /^gl /);
+    await lab.close();
+});
+
 test('without WebGPU and WebGL2 a plain page says what is missing', async () => {
     const lab = await open('', {
         expectTrouble: true,

@@ -80,6 +80,13 @@ test('a bad scene file that is dropped says what is wrong and leaves the running
     await lab.says('no-text.toml');
     assert.equal((await lab.state()).state_hash, before.state_hash);
 
+    await lab.drop('film.mp4', '#'.repeat(5 << 20));
+    await lab.says('film.mp4: too large for a scene file');
+    assert.equal((await lab.state()).state_hash, before.state_hash);
+    // One that misses the laboratory does not take its place in the browser.
+    const kept = await lab.page.evaluate(() => !document.body.dispatchEvent(new DragEvent('drop', { bubbles: true, cancelable: true })));
+    assert.ok(kept, 'the browser would open the file');
+
     const text = fs.readFileSync(path.join(ROOT, 'assets/scenes/pendulum.toml'), 'utf8');
     const mine = text.replace(/^name = .*$/m, 'name = "mine"').replace(/^title = .*$/m, 'title = "My own pendulum"');
     assert.notEqual(mine, text);
@@ -185,15 +192,35 @@ test('a preset is measured in a worker: it says how far it is, can be cancelled,
     await lab.close();
 });
 
-test('a sweep runs in a worker and draws its points as they come', async () => {
-    const lab = await open('spcmm.frequency=5Hz&play=0', { backend, size: { width: 1100, height: 900 } });
+test('a sweep runs in a worker and draws its points as they come; a click on one runs the scene to it', async () => {
+    const lab = await open('spcmm.frequency=5Hz&play=0&theme=light', { backend, size: { width: 1100, height: 900 } });
     await lab.key('b');
+    // Out of the way, so that the diagram is in sight.
+    await lab.click('DisclosureTriangle', 'Portrait and section');
+    await lab.click('DisclosureTriangle', 'Neighbouring motion');
     await lab.click('Button', 'Start sweep');
     await lab.until(async () => (await lab.widgets()).some(({ label }) => /^[1-9]\d* of \d+ values/.test(label)), 'no point comes', 120_000);
     assert.equal(lab.page.workers().length, 1);
     await lab.click('Button', 'Cancel sweep');
     await lab.find('Button', 'Start sweep');
     await lab.until(() => lab.page.workers().length === 0, 'the worker goes on');
+
+    const { rect: [left, , , title] } = await lab.find('Label', 'x, mm over clearance, mm');
+    const picture = await lab.pixels({ x: left, y: title, width: 1090 - left, height: 230 });
+    const points = [];
+    for (let at = 0; at < picture.data.length; at += 4) {
+        const [red, , blue] = picture.data.subarray(at, at + 3);
+        if (blue - red > 120) points.push([(at / 4) % picture.width, Math.floor(at / 4 / picture.width)]);
+    }
+    assert.ok(points.length >= 4, 'no point is drawn');
+    const [x, y] = points[Math.floor(points.length / 2)];
+    await lab.page.mouse.click(left + x, title + y, { delay: 60 });
+    const loaded = await lab.until(async () => {
+        const state = await lab.state();
+        return state.changed_parameters['contact.clearance'] && state.playing && state;
+    }, 'a click on a point has no effect');
+    // After the ten periods of 0.2 s that are left out.
+    assert.ok(loaded.time_s >= 2, `${loaded.time_s} s`);
     await lab.close();
 });
 

@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { after, test } from 'node:test';
 
-import { colours, crop, difference, open, quit } from './harness.mjs';
+import { colours, crop, difference, middle, open, quit } from './harness.mjs';
 
 after(quit);
 
@@ -43,6 +43,36 @@ test('one finger orbits, two pan and pinch', async () => {
     assert.ok(way > 0.02 * near.distance_m, `the target moved ${way} m`);
     assert.ok(Math.abs(moved.distance_m / near.distance_m - 1) < 0.05);
     assert.ok(Math.abs(moved.yaw_rad - near.yaw_rad) < 0.02, 'two fingers do not orbit');
+    await lab.close();
+});
+
+test('on a screen with finer pixels the canvas has them all, and a finger hits what it shows', async () => {
+    const size = { width: 390, height: 600 };
+    const lab = await open('play=0&theme=light', { backend, size, context: { hasTouch: true, isMobile: true, deviceScaleFactor: 2 } });
+    const canvas = await lab.page.evaluate(() => [document.getElementById('laboratory').width, document.getElementById('laboratory').height]);
+    assert.deepEqual(canvas, [2 * size.width, 2 * size.height]);
+    const shown = await lab.pixels();
+    assert.deepEqual([shown.width, shown.height], canvas);
+    for (const label of ['Menu', 'Step']) {
+        const { rect: [, , x1, y1] } = await lab.find('Button', label);
+        assert.ok(x1 > 0.3 * size.width && x1 <= size.width && y1 <= size.height, `${label} ends at ${x1}, ${y1}`);
+    }
+    await lab.tap('Button', 'Step');
+    await lab.until(async () => (await lab.state()).steps === 1, 'the finger misses');
+    await lab.close();
+});
+
+test('a menu that is longer than the screen scrolls under a finger', async () => {
+    const size = { width: 844, height: 390 };
+    const lab = await open('play=0', { backend, size, context: { hasTouch: true } });
+    await lab.tap('Button', 'Menu');
+    const [x, y] = middle(await lab.find('Button', 'Record…'));
+    await lab.fingers([0, 40, 90, 140, 190].map((up) => [x, y - up]));
+    const reached = async () => (await lab.find('Button', 'About')).rect[3] <= size.height;
+    await lab.until(reached, 'the end of the menu stays outside');
+    await lab.still();
+    await lab.tap('Button', 'About');
+    await lab.says('State hash');
     await lab.close();
 });
 

@@ -74,6 +74,19 @@ impl Chance {
                 target: [0; 3].map(|_| c.unit() as f32 - 0.5),
             }),
             magnification: self.maybe(|c| 1.0 + 99.0 * c.unit() as f32),
+            follow: self.maybe(|c| format!("joint.x{}x", c.text(6)).replace('\n', " ")),
+            plots: self.maybe(|c| {
+                let one = Quantity::ALL[c.below(15) as usize];
+                Quantity::ALL
+                    .into_iter()
+                    .filter(|q| c.below(3) == 0 || *q == one && c.below(2) == 0)
+                    .collect()
+            }),
+            window: self.maybe(|c| match c.below(3) {
+                0 => Window::Automatic,
+                1 => Window::Everything,
+                _ => Window::Last(1e-6 + c.unit()),
+            }),
             playing: self.maybe(|c| c.below(2) == 0),
             theme: self.maybe(|c| THEMES[c.below(3) as usize].1),
             version: self.maybe(|_| "0.1.0".to_owned()),
@@ -179,6 +192,16 @@ fn what_is_wrong_in_a_link_is_said() {
         ("camera=1,2,3", "is no camera"),
         ("camera=0,0,nan,0,0,0", "is no camera"),
         ("magnification=1000", "allowed 1 to 100"),
+        (
+            "plots=speed",
+            "no plot `speed`; allowed, separated by commas: normal-force,",
+        ),
+        ("window=5", "link: window = 5: needs a unit"),
+        (
+            "window=0",
+            "allowed automatic, everything, and 1 us to 10000 s",
+        ),
+        ("c=0,5mm&window=0,5s", "has a decimal comma; write a point"),
         ("play=yes", "allowed 0 (paused) and 1 (playing)"),
         ("text=%%%", "does not unpack"),
         ("log=AAAA", "does not unpack"),

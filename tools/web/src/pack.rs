@@ -11,9 +11,10 @@ const NAME: &str = "jointplay";
 /// The page's own files, from the root of the project.
 const PAGE: &str = "index.html";
 /// Scripts and styles beside it, copied as they are.
-const PARTS: [&str; 4] = [
+const PARTS: [&str; 5] = [
     "web/main.js",
     "web/host.js",
+    "web/canvas.js",
     "web/worker.js",
     "web/page.css",
 ];
