@@ -92,9 +92,8 @@ pub struct Contacts {
     pub evaluations: u64,
     any_ramp: bool,
     any_contact: bool,
-    /// Forces are those where present rates and bias accelerations carry the contacts within this time, s; 0 elsewhere than in
-    /// [`crate::integrate::ContactSystem::derivative_ahead`].
-    pub ahead: f64,
+    /// Contacts carry no force: for [`crate::integrate::ContactSystem::derivative_apart`].
+    pub apart: bool,
     /// A sliding speed was beyond its piece of the friction law since this was last cleared.
     pub strayed: bool,
     /// Of the latest evaluation, s.
@@ -126,7 +125,7 @@ impl Contacts {
             switching: Switching::Located,
             evaluations: 0,
             any_ramp: false,
-            ahead: 0.0,
+            apart: false,
             strayed: false,
             time: 0.0,
         }
@@ -222,7 +221,7 @@ impl Contacts {
 
     /// Gaps and forces at `t`; forces are added to `wrench` (about each body's centroid).
     pub fn evaluate(&mut self, t: f64, motion: &[Kinematics], wrench: &mut [Wrench]) {
-        if !self.any_contact {
+        if !self.any_contact || self.apart {
             return;
         }
         self.update_ramps(t);
@@ -240,16 +239,9 @@ impl Contacts {
             let (ball, socket) = (&motion[joint.ball.body], &motion[joint.socket.body]);
             let arm_ball = ball.rotation * joint.ball.offset;
             let arm_socket = socket.rotation * joint.socket.offset;
-            let mut centre_velocity = (ball.velocity + ball.angular_velocity.cross(&arm_ball))
+            let centre_velocity = (ball.velocity + ball.angular_velocity.cross(&arm_ball))
                 - (socket.velocity + socket.angular_velocity.cross(&arm_socket));
-            let mut e = (ball.position + arm_ball) - (socket.position + arm_socket);
-            if self.ahead > 0.0 {
-                // What the coordinates' rates do not tell: centripetal and prescribed accelerations.
-                let bias =
-                    ball.point_acceleration(&arm_ball) - socket.point_acceleration(&arm_socket);
-                e += (centre_velocity + bias * (0.5 * self.ahead)) * self.ahead;
-                centre_velocity += bias * self.ahead;
-            }
+            let e = (ball.position + arm_ball) - (socket.position + arm_socket);
             let gap = &mut self.gaps[i];
             gap.eccentricity = e;
             gap.eccentricity_rate = centre_velocity;
@@ -319,6 +311,7 @@ impl Contacts {
     /// Gap geometry alone (no force) at `t`: eccentricity, its rate, normal, penetration and its rate.
     pub fn measure(&mut self, t: f64, motion: &[Kinematics]) {
         self.update_ramps(t);
+        self.time = t;
         for i in 0..self.joints.len() {
             let joint = &self.joints[i].joint;
             let (ball, socket) = (&motion[joint.ball.body], &motion[joint.socket.body]);
