@@ -90,6 +90,8 @@ pub struct Contacts {
     pub switching: Switching,
     /// Contact evaluations so far: a scene without clearance makes none.
     pub evaluations: u64,
+    /// Evaluations of friction so far, for whatever purpose: a scene without friction makes none.
+    pub friction_evaluations: u64,
     any_ramp: bool,
     any_contact: bool,
     /// Contacts carry no force: for [`crate::integrate::ContactSystem::derivative_apart`].
@@ -124,6 +126,7 @@ impl Contacts {
             gaps: vec![Gap::default(); n],
             switching: Switching::Located,
             evaluations: 0,
+            friction_evaluations: 0,
             any_ramp: false,
             apart: false,
             strayed: false,
@@ -280,6 +283,7 @@ impl Contacts {
             let to_surface = n * coefficients.ball_radius;
             let socket_radius = coefficients.ball_radius + clearance;
             if coefficients.friction > 0.0 {
+                self.friction_evaluations += 1;
                 let relative = if coefficients.surface {
                     centre_velocity + ball.angular_velocity.cross(&to_surface)
                         - socket.angular_velocity.cross(&(n * socket_radius))

@@ -14,8 +14,10 @@ use crate::contact::{Coefficients, Slip};
 use crate::scene::{Mat3, Vec3};
 
 /// Most Newton iterations, and the change of a force against the largest at which they end.
-const ITERATIONS: usize = 12;
+const ITERATIONS: usize = 24;
 const CONVERGED: f64 = 1e-3;
+/// How often in a row an iteration is taken half-way back.
+const HALVINGS: u32 = 3;
 /// Part of its clearance within which a ball is too far from the wall to reach it unasked.
 const NEAR: f64 = 0.5;
 /// A normal that turns by more (rad) takes its arms along.
@@ -74,17 +76,26 @@ impl Touch {
         let by_rate = stiffness * penetration * c.damping / self.approach;
         let tangent = Mat3::identity() - n * n.transpose();
         let turning = tangent * (h / distance);
-        let relative = self.relative + self.slipping;
-        let sliding = tangent * relative;
-        // Friction by its secant: it brings sliding to rest within a step and cannot reverse it.
-        let per_speed = c.friction_per_speed(self.slip, sliding.norm());
-        let along = -n - sliding * per_speed;
-        self.force = along * normal_force;
         let rising = n * (h * by_penetration + by_rate) + turning * rate * by_rate;
-        let resisting = per_speed * normal_force;
-        self.impedance = along * rising.transpose() - turning * normal_force
-            + (turning * n.dot(&relative) + n * (turning * relative).transpose()) * resisting;
-        self.resistance = tangent * -resisting;
+        self.force = n * -normal_force;
+        self.impedance = -n * rising.transpose() - turning * normal_force;
+        if c.friction > 0.0 {
+            let relative = self.relative + self.slipping;
+            let sliding = tangent * relative;
+            let speed = sliding.norm();
+            let per_speed = c.friction_per_speed(self.slip, speed);
+            let resisting = per_speed * normal_force;
+            self.force -= sliding * resisting;
+            let turned = turning * n.dot(&relative) + n * (turning * relative).transpose();
+            self.impedance += turned * resisting - sliding * (rising * per_speed).transpose();
+            self.resistance = tangent * -resisting;
+            // Full friction by its secant, which brings sliding to rest within a step and cannot reverse it; the ramp by its
+            // slope.
+            if speed > 0.0 && speed < c.slip_high {
+                let slope = c.friction_per_speed_slope(self.slip, speed) / speed;
+                self.resistance -= sliding * sliding.transpose() * (slope * normal_force);
+            }
+        }
     }
 }
 
@@ -102,6 +113,7 @@ pub struct ImplicitContacts {
     /// Block band matrix and its right side.
     blocks: Vec<Mat3>,
     right: Vec<Vec3>,
+    before: Vec<Vec3>,
     /// W M^-1 S^T in the same band, W for the centres and for what friction reads.
     mobility: Vec<[Mat3; 2]>,
     scratch: Vec<f64>,
@@ -153,7 +165,8 @@ impl ImplicitContacts {
                 .collect(),
             weighted: ranges.iter().map(|r| vec![0.0; 3 * width(r)]).collect(),
             blocks: vec![Mat3::zeros(); joints * (2 * reach + 1)],
-            right: vec![Vec3::zeros(); joints],
+            right: Vec::with_capacity(joints),
+            before: Vec::with_capacity(joints),
             mobility: vec![[Mat3::zeros(); 2]; joints * (2 * reach + 1)],
             scratch: vec![0.0; n],
             ranges,
@@ -164,6 +177,7 @@ impl ImplicitContacts {
     /// there are any.
     pub fn gather(&mut self, model: &Model, contacts: &Contacts) -> bool {
         self.touches.clear();
+        self.right.clear();
         let mut near = false;
         for (j, joint) in model.joints.iter().enumerate() {
             let gap = &contacts.gaps()[j];
@@ -214,7 +228,7 @@ impl ImplicitContacts {
             let (j, n) = (touch.joint, touch.normal);
             let joint = &model.joints[j];
             touch.arm = n;
-            if touch.law.surface {
+            if touch.law.surface && touch.law.friction > 0.0 {
                 let (ball, socket) = (&motion[joint.ball.body], &motion[joint.socket.body]);
                 let radius = touch.law.ball_radius;
                 touch.relative = touch.rate + ball.angular_velocity.cross(&(n * radius))
@@ -228,11 +242,7 @@ impl ImplicitContacts {
 
     /// Finds the forces at the end of a step of size `h`. `mobilise(range, x)` maps generalised forces within a range of
     /// coordinates to accelerations, in place. Whether a normal turned so much that its arms must follow.
-    pub fn solve(
-        &mut self,
-        h: f64,
-        mut mobilise: impl FnMut((usize, usize), &mut [f64]),
-    ) -> bool {
+    pub fn solve(&mut self, h: f64, mut mobilise: impl FnMut((usize, usize), &mut [f64])) -> bool {
         for touch in &self.touches {
             let j = touch.joint;
             let (first, end) = self.ranges[j];
@@ -248,25 +258,34 @@ impl ImplicitContacts {
             }
         }
         self.couple();
+        // From the forces found for the arms before, if any.
+        self.right.resize(self.touches.len(), Vec3::zeros());
+        let (mut worst, mut halvings) = (f64::INFINITY, 0);
         for _ in 0..ITERATIONS {
-            for touch in &mut self.touches {
-                touch.evaluate(h);
-            }
-            self.eliminate(h);
-            let (mut change, mut largest) = (0.0_f64, 0.0_f64);
+            let (mut off, mut largest) = (0.0_f64, 0.0_f64);
             for i in 0..self.touches.len() {
                 let [added, slipping] = self.driven_by(i, h);
                 let touch = &mut self.touches[i];
-                let after = self.right[i];
-                change = change.max((after - touch.force).norm());
-                largest = largest.max(after.norm());
                 (touch.added, touch.slipping) = (added, slipping);
+                touch.evaluate(h);
+                off = off.max((touch.force - self.right[i]).norm());
+                largest = largest.max(self.right[i].norm());
             }
-            if change <= CONVERGED * largest {
+            if off <= CONVERGED * largest {
                 break;
             }
+            if off < worst || halvings == HALVINGS {
+                (worst, halvings) = (off, 0);
+                self.before.clone_from(&self.right);
+                self.eliminate(h);
+            } else {
+                // Too far: damping and the cut at 0 bend the force law both ways.
+                halvings += 1;
+                for (force, before) in self.right.iter_mut().zip(&self.before) {
+                    *force = (*force + before) * 0.5;
+                }
+            }
         }
-        if std::env::var("DBG").is_ok() { let mut c=0.0f64; let mut l=0.0f64; for (i,t) in self.touches.iter_mut().enumerate() { t.evaluate(h); c=c.max((t.force-self.right[i]).norm()); l=l.max(t.force.norm()); } if c > 0.01*l { eprintln!("UNCONVERGED {c:e} {l:e}"); } else { eprintln!("CONV"); } }
         let mut turned = false;
         for (touch, force) in self.touches.iter().zip(&mut self.right) {
             // What the last iteration leaves must not pull.
@@ -295,7 +314,7 @@ impl ImplicitContacts {
         for i in 0..m {
             let touch = &self.touches[i];
             let columns = &self.columns[touch.joint];
-            let surface = touch.law.surface;
+            let surface = touch.law.surface && touch.law.friction > 0.0;
             for j in i.saturating_sub(self.reach)..=(i + self.reach).min(m - 1) {
                 let other = self.touches[j].joint;
                 let (first, end) = self.ranges[other];
@@ -352,9 +371,8 @@ impl ImplicitContacts {
                 self.blocks[at(i, j)] =
                     unit - (touch.impedance * centre + touch.resistance * felt) * h;
             }
-            self.right[i] = touch.force
-                - touch.impedance * touch.added
-                - touch.resistance * touch.slipping;
+            self.right[i] =
+                touch.force - touch.impedance * touch.added - touch.resistance * touch.slipping;
         }
         for k in 0..m {
             let last = (k + reach).min(m - 1);
