@@ -6,10 +6,10 @@
 //! instead of a row for every coordinate. Newton's method needs the mass matrix once. The arms of the contact points are
 //! those of a normal that is found anew where it turns much.
 
-use super::contacts::Contacts;
+use super::contact_stiffness::{Column, collect_columns};
+use super::contacts::{Contacts, Switching};
 use super::kinematics::Kinematics;
 use super::model::Model;
-use super::stiff::{Column, collect_columns};
 use crate::contact::{Coefficients, Slip};
 use crate::scene::{Mat3, Vec3};
 
@@ -187,6 +187,9 @@ impl ImplicitContacts {
                 continue;
             }
             let memory = contacts.memory()[j];
+            if contacts.switching == Switching::Located && !memory.active {
+                continue;
+            }
             near |= gap.penetration > 0.0;
             let law = *contacts.coefficients(j);
             self.touches.push(Touch {

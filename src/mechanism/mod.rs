@@ -4,12 +4,14 @@
 //! three constraint rows (ideal) or one contact force (clearance). A scene pays only for what it has.
 
 mod constraints;
+mod contact_stiffness;
 mod contacts;
 mod factor;
 mod implicit;
 mod jet;
 mod kinematics;
 mod lagrange;
+mod lu;
 mod model;
 mod power;
 mod spcmm;
