@@ -158,6 +158,9 @@ fn minutes_of_changes_with_every_frame_in_real_time() {
     }
 }
 
+/// Largest residual of the energy balance with `preview` and with `real-time`, of the energy exchanged.
+const RESIDUAL: [f64; 2] = [2e-3, 1e-4];
+
 /// What a long run showed at the same phase of every period, against the third period.
 #[derive(Debug, Default)]
 struct Drift {
@@ -174,6 +177,8 @@ struct Drift {
     energy: f64,
     /// Change of a normal force, of the largest.
     force: f64,
+    /// Residual of the energy balance at the end, of the energy exchanged.
+    residual: f64,
 }
 
 /// A long run: scene, changes, period (s), and what may come and go in it.
@@ -304,6 +309,7 @@ fn long_run(of: &Long, preset: usize, duration: f64) -> Drift {
     drift.contacts = contacts(&simulation) - begun;
     drift.steps = simulation.statistics().steps;
     drift.time = simulation.time();
+    drift.residual = simulation.ledger().unwrap().relative_residual().abs();
     println!("{} {changes:?}: {drift:?}", of.scene);
     drift
 }
@@ -315,6 +321,11 @@ fn holds(of: &Long, preset: usize, drift: &Drift) {
         drift.skew < 1e-12,
         "{what}: orientation off by {:e}",
         drift.skew
+    );
+    assert!(
+        drift.residual < RESIDUAL[preset],
+        "{what}: residual {:e}",
+        drift.residual
     );
     if let Some(limit) = of.limits[preset] {
         assert!(drift.energy < limit, "{what}: energy {:e}", drift.energy);
@@ -341,10 +352,11 @@ fn write_a_thousand_seconds_of_every_kind() {
     let mut page = String::from(
         "\n## 1000 simulated seconds\n\n\
          Written by `cargo test --test endurance -- --ignored write`. Largest changes from the end of the third period to the end\n\
-         of any later one: energy as part of the largest kinetic energy, normal force as part of the largest. The free mechanisms\n\
-         have no period: their energy is taken every second. The pendulum swings down.\n\n\
-         | Scene | Preset | Steps | Contacts begun later | Ideal joints open by, m | Orientations off by | Energy | Normal force |\n\
-         |---|---|---|---|---|---|---|---|\n",
+         of any later one: energy as part of the largest kinetic energy, normal force as part of the largest. The energy residual is that of\n\
+         the balance over the whole run, of the energy exchanged. The free mechanisms have no period: their energy is taken every\n\
+         second. The pendulum swings down.\n\n\
+         | Scene | Preset | Steps | Contacts begun later | Ideal joints open by, m | Orientations off by | Energy | Energy residual | Normal force |\n\
+         |---|---|---|---|---|---|---|---|---|\n",
     );
     for of in long_list() {
         for preset in 0..FAST.len() {
@@ -355,8 +367,16 @@ fn write_a_thousand_seconds_of_every_kind() {
             };
             let _ = writeln!(
                 page,
-                "| {}, {} | {} | {} | {} | {:.1e} | {:.1e} | {:.1e} | {force} |",
-                of.scene, of.what, FAST[preset], d.steps, d.contacts, d.open, d.skew, d.energy
+                "| {}, {} | {} | {} | {} | {:.1e} | {:.1e} | {:.1e} | {:.1e} | {force} |",
+                of.scene,
+                of.what,
+                FAST[preset],
+                d.steps,
+                d.contacts,
+                d.open,
+                d.skew,
+                d.energy,
+                d.residual
             );
             holds(&of, preset, &d);
         }

@@ -213,3 +213,24 @@ fn loops_that_pass_a_singular_pose_say_so() {
     assert!(simulation.step().is_err());
     assert_eq!(simulation.state_hash(), hash);
 }
+
+#[test]
+fn the_other_form_stops_before_a_singular_pose_too() {
+    let changes = [
+        ("formulation", "lagrange"),
+        ("contact.clearance", "0"),
+        ("spcmm.slider_plane", "162 mm"),
+        ("spcmm.frequency", "5 Hz"),
+    ];
+    let mut simulation = simulation("spcmm", &changes);
+    let stopped = run_to_stop(&mut simulation);
+    println!("{stopped}");
+    assert!(stopped.what.contains("singular pose"), "{stopped}");
+    assert!(stopped.advice.contains("clearance"), "{stopped}");
+    // Where the tree form stops, and not by creeping closer until no number is left.
+    assert!((stopped.time - 1.066e-3).abs() < 2e-6, "{stopped}");
+    assert!(simulation.statistics().steps < 1000);
+    assert!(simulation.ledger().unwrap().drive_work.is_finite());
+    let text = format!("{:?}", frame_now(&mut simulation));
+    assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
+}

@@ -22,34 +22,53 @@ fn mean_forces(simulation: &mut Simulation, from: f64, to: f64) -> Vec<f64> {
 }
 
 #[test]
-fn settled_forces_are_right_within_a_per_cent_at_a_tenth_of_a_millisecond() {
-    for (formulation, changes) in [
-        ("tree", &[][..]),
-        ("lagrange", &[]),
-        ("tree", &[("joint.S1.clearance", "0")]),
-        ("tree", &[("contact.friction_velocity", "surface")]),
+fn settled_forces_are_right_within_a_per_cent_at_steps_far_beyond_the_contacts_period() {
+    let ideal = [("joint.S1.clearance", "0")];
+    let surface = [("contact.friction_velocity", "surface")];
+    for (name, formulation, step, changes) in [
+        ("spcmm", "tree", "500 us", &[][..]),
+        ("spcmm", "lagrange", "100 us", &[]),
+        ("spcmm", "tree", "500 us", &ideal),
+        ("spcmm", "tree", "500 us", &surface),
+        ("chain", "tree", "1 ms", &[]),
+        ("slider-crank", "tree", "200 us", &[]),
+        ("slider-crank-driven", "tree", "500 us", &[]),
     ] {
         let base = [&[("formulation", formulation)], changes].concat();
-        let fixed = [("solver.method", "imex-euler"), ("solver.step", "100 us")];
-        let expected = mean_forces(&mut simulation("spcmm", &base), 0.5, 0.7);
-        let got = mean_forces(
-            &mut simulation("spcmm", &[&base[..], &fixed].concat()),
-            0.5,
-            0.7,
-        );
+        let close = [&base[..], &[("solver.tolerance", "1e-8")]].concat();
+        let mut exact = simulation(name, &close);
+        common::run_until(&mut exact, 0.3);
+        let start = exact.snapshot();
+        let expected = mean_forces(&mut exact, 0.3, 0.5);
+        let mut fixed = simulation(name, &base);
+        fixed.restore(&start).unwrap();
+        fixed.set("solver.method", "imex-euler").unwrap();
+        fixed.set("solver.step", step).unwrap();
+        let got = mean_forces(&mut fixed, 0.3, 0.5);
         for (j, (got, expected)) in got.iter().zip(&expected).enumerate() {
-            if *expected > 0.0 {
-                let ratio = got / expected;
-                println!("{base:?}, joint {j}: {ratio:.5}");
-                assert!((ratio - 1.0).abs() < 0.01, "{base:?}, joint {j}: {ratio}");
-            }
+            let ratio = got / expected;
+            println!("{name}, {base:?}, {step}, joint {j}: {ratio:.5}");
+            assert!((ratio - 1.0).abs() < 0.01, "{name}, {base:?}, joint {j}");
         }
     }
 }
 
 #[test]
+fn a_step_costs_one_evaluation() {
+    for name in common::SCENES {
+        let mut simulation = simulation(
+            name,
+            &[("solver.method", "imex-euler"), ("solver.step", "200 us")],
+        );
+        simulation.advance_to(0.05).unwrap();
+        let statistics = simulation.statistics();
+        assert_eq!(statistics.evaluations, statistics.steps, "{name}");
+    }
+}
+
+#[test]
 fn no_step_creates_energy() {
-    for step in ["1 us", "10 us", "50 us", "200 us"] {
+    for step in ["1 us", "10 us", "50 us", "200 us", "1 ms"] {
         for (name, friction) in [
             ("pendulum", "0"),
             ("pendulum", "0.15"),
@@ -57,6 +76,10 @@ fn no_step_creates_energy() {
             ("chain", "0.15"),
             ("slider-crank", "0.15"),
         ] {
+            if friction == "10" && step == "1 ms" {
+                // Friction and normal force of such a step need not have a common solution.
+                continue;
+            }
             let mut simulation = simulation(
                 name,
                 &[

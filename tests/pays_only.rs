@@ -78,10 +78,25 @@ fn fully_driven_ideal_scenes_solve_no_differential_equation() {
 }
 
 #[test]
-fn frictionless_scenes_have_no_friction() {
+fn frictionless_scenes_evaluate_no_friction() {
+    let run = |changes: &[(&str, &str)]| {
+        let mut simulation = simulation("spcmm", changes);
+        while simulation.time() < 0.011 {
+            simulation.step().unwrap();
+        }
+        let contacts = &simulation.mechanism().contacts;
+        assert!(contacts.evaluations > 0, "{changes:?}");
+        contacts.friction_evaluations
+    };
     for change in [("contact.friction_law", "none"), ("contact.friction", "0")] {
         let summary = summary("spcmm", &[change]);
         assert_eq!((summary.contacts, summary.frictional_contacts), (3, 0));
+        for method in common::METHODS {
+            let method = ("solver.method", method);
+            assert_eq!(run(&[change, method]), 0, "{change:?}, {method:?}");
+            // With friction there are evaluations to count.
+            assert!(run(&[method]) > 0, "{method:?}");
+        }
         let mut simulation = simulation("spcmm", &[change]);
         while simulation.time() < 0.011 {
             simulation.step().unwrap();

@@ -84,6 +84,14 @@ fn the_command_writes_all_files_or_none() {
     }
     let error: f64 = rows[1][column("peak_error")].parse().unwrap();
     assert!(error >= 0.0);
+    for row in rows.iter().skip(1) {
+        let count = |name: &str| row[column(name)].parse::<f64>().unwrap_or(0.0);
+        for phase in ["impacts", "settled"] {
+            let of = |name: &str| count(&format!("{phase}_{name}"));
+            assert!(of("steps") > 0.0 && of("simulated_s") > 0.0, "{row:?}");
+            assert!(of("evaluations") >= of("steps"), "{row:?}");
+        }
+    }
 
     let text = fs::read_to_string(found.join("tradeoff.json")).unwrap();
     let json: Json = serde_json::from_str(&text).unwrap();

@@ -40,10 +40,11 @@ impl Stepper for SemiImplicitEuler {
     }
 }
 
-/// Implicit-explicit Euler: [`SemiImplicitEuler`] but with the contact forces at the end of the step; order 1, L-stable in the contacts as the
-/// implicit Euler method is, so that steps need not resolve how a settled contact rings.
+/// Implicit-explicit Euler: [`SemiImplicitEuler`] but with the contact forces at the end of the step; order 1, L-stable in
+/// the contacts as the implicit Euler method is, so that steps need not resolve how a settled contact rings.
 pub struct ImexEuler {
     rate: Vec<f64>,
+    push: Vec<f64>,
 }
 
 impl ImexEuler {
@@ -51,6 +52,7 @@ impl ImexEuler {
     pub fn new(dimension: usize) -> Self {
         Self {
             rate: vec![0.0; dimension],
+            push: vec![0.0; dimension],
         }
     }
 
@@ -64,14 +66,26 @@ impl ImexEuler {
         y_end: &mut [f64],
     ) -> f64 {
         let positions = system.positions();
-        system.derivative_ahead(t, h, y, &mut self.rate);
+        let Self { rate, push } = self;
+        system.derivative_apart(t, y, rate);
         y_end[..positions].copy_from_slice(&y[..positions]);
         for i in positions..y.len() {
-            y_end[i] = y[i] + h * self.rate[i];
+            y_end[i] = y[i] + h * rate[i];
         }
-        system.position_rate(t, y_end, &mut self.rate);
+        system.position_rate(t, y_end, rate);
         for i in 0..positions {
-            y_end[i] += h * self.rate[i];
+            y_end[i] += h * rate[i];
+        }
+        if system.contact_push(t + h, h, y_end, push) {
+            // The positions' rate that goes with the added velocities alone.
+            push[..positions].copy_from_slice(&y_end[..positions]);
+            system.position_rate(t + h, push, rate);
+            for i in 0..positions {
+                y_end[i] += h * rate[i];
+            }
+            for i in positions..y.len() {
+                y_end[i] += push[i];
+            }
         }
         0.0
     }

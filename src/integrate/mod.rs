@@ -84,9 +84,11 @@ pub trait StiffSystem: System {
 
 /// A system whose contacts can be stepped implicitly by themselves.
 pub trait ContactSystem: System {
-    /// f(t, y) into `dy`, but with the contact forces at the end of a step of size `h`: the velocities there
-    /// are those at (t, y) plus `h` times these rates.
-    fn derivative_ahead(&mut self, t: f64, h: f64, y: &[f64], dy: &mut [f64]);
+    /// f(t, y) into `dy` as if no contact carried a force.
+    fn derivative_apart(&mut self, t: f64, y: &[f64], dy: &mut [f64]);
+    /// With `y` where a step of size `h` without contact forces ends, at `t`: puts it onto the constraints, and the change of
+    /// its velocities by the contact forces at the step's end into `dv` (zero for positions). False where there are none.
+    fn contact_push(&mut self, t: f64, h: f64, y: &mut [f64], dv: &mut [f64]) -> bool;
 }
 
 /// One-step method.

@@ -90,11 +90,12 @@ pub struct Contacts {
     pub switching: Switching,
     /// Contact evaluations so far: a scene without clearance makes none.
     pub evaluations: u64,
+    /// Evaluations of friction so far, for whatever purpose: a scene without friction makes none.
+    pub friction_evaluations: u64,
     any_ramp: bool,
     any_contact: bool,
-    /// Forces are those where present rates and bias accelerations carry the contacts within this time, s; 0 elsewhere than in
-    /// [`crate::integrate::ContactSystem::derivative_ahead`].
-    pub ahead: f64,
+    /// Contacts carry no force: for [`crate::integrate::ContactSystem::derivative_apart`].
+    pub apart: bool,
     /// A sliding speed was beyond its piece of the friction law since this was last cleared.
     pub strayed: bool,
     /// Of the latest evaluation, s.
@@ -125,8 +126,9 @@ impl Contacts {
             gaps: vec![Gap::default(); n],
             switching: Switching::Located,
             evaluations: 0,
+            friction_evaluations: 0,
             any_ramp: false,
-            ahead: 0.0,
+            apart: false,
             strayed: false,
             time: 0.0,
         }
@@ -222,7 +224,7 @@ impl Contacts {
 
     /// Gaps and forces at `t`; forces are added to `wrench` (about each body's centroid).
     pub fn evaluate(&mut self, t: f64, motion: &[Kinematics], wrench: &mut [Wrench]) {
-        if !self.any_contact {
+        if !self.any_contact || self.apart {
             return;
         }
         self.update_ramps(t);
@@ -240,16 +242,9 @@ impl Contacts {
             let (ball, socket) = (&motion[joint.ball.body], &motion[joint.socket.body]);
             let arm_ball = ball.rotation * joint.ball.offset;
             let arm_socket = socket.rotation * joint.socket.offset;
-            let mut centre_velocity = (ball.velocity + ball.angular_velocity.cross(&arm_ball))
+            let centre_velocity = (ball.velocity + ball.angular_velocity.cross(&arm_ball))
                 - (socket.velocity + socket.angular_velocity.cross(&arm_socket));
-            let mut e = (ball.position + arm_ball) - (socket.position + arm_socket);
-            if self.ahead > 0.0 {
-                // What the coordinates' rates do not tell: centripetal and prescribed accelerations.
-                let bias =
-                    ball.point_acceleration(&arm_ball) - socket.point_acceleration(&arm_socket);
-                e += (centre_velocity + bias * (0.5 * self.ahead)) * self.ahead;
-                centre_velocity += bias * self.ahead;
-            }
+            let e = (ball.position + arm_ball) - (socket.position + arm_socket);
             let gap = &mut self.gaps[i];
             gap.eccentricity = e;
             gap.eccentricity_rate = centre_velocity;
@@ -288,6 +283,7 @@ impl Contacts {
             let to_surface = n * coefficients.ball_radius;
             let socket_radius = coefficients.ball_radius + clearance;
             if coefficients.friction > 0.0 {
+                self.friction_evaluations += 1;
                 let relative = if coefficients.surface {
                     centre_velocity + ball.angular_velocity.cross(&to_surface)
                         - socket.angular_velocity.cross(&(n * socket_radius))
@@ -319,6 +315,7 @@ impl Contacts {
     /// Gap geometry alone (no force) at `t`: eccentricity, its rate, normal, penetration and its rate.
     pub fn measure(&mut self, t: f64, motion: &[Kinematics]) {
         self.update_ramps(t);
+        self.time = t;
         for i in 0..self.joints.len() {
             let joint = &self.joints[i].joint;
             let (ball, socket) = (&motion[joint.ball.body], &motion[joint.socket.body]);

@@ -1,68 +1,100 @@
 //! Contact forces at the end of a step: the implicit part of a semi-implicit step.
 //!
-//! Each touching joint couples with the coordinates through three directions alone. With the accelerations a for forces
-//! f_0 where the present velocity carries the contacts, W the relative velocity at a contact per coordinate, S its contact
-//! point's, and w the change of that velocity over the step, the forces at its end solve
-//! w = h W a + h W M^-1 S^T (f(w) - f_0): three rows a joint instead of a row for every coordinate
-//! (Sherman-Morrison-Woodbury). Newton's method needs the mass matrix once. What is not stiff at such steps is left as it is
-//! at the start: the turning of the normal and of arms.
+//! The step is first taken as if no contact carried a force. Each joint that then touches couples with the coordinates
+//! through three directions alone: with W the relative velocity at a contact per coordinate and S its contact point's, the
+//! velocities w that the contacts add and their forces f at the step's end solve w = h W M^-1 S^T f(w): three rows a joint
+//! instead of a row for every coordinate. Newton's method needs the mass matrix once. The arms of the contact points are
+//! those of a normal that is found anew where it turns much.
 
+use super::contact_stiffness::{Column, collect_columns};
 use super::contacts::{Contacts, Switching};
 use super::kinematics::Kinematics;
 use super::model::Model;
-use super::stiff::{Column, collect_columns};
 use crate::contact::{Coefficients, Slip};
 use crate::scene::{Mat3, Vec3};
 
-/// Most Newton iterations, and the change of a normal force against the largest at which they end.
-const ITERATIONS: usize = 8;
+/// Most Newton iterations, and the change of a force against the largest at which they end.
+const ITERATIONS: usize = 24;
 const CONVERGED: f64 = 1e-3;
+/// How often in a row an iteration is taken half-way back.
+const HALVINGS: u32 = 3;
 /// Part of its clearance within which a ball is too far from the wall to reach it unasked.
 const NEAR: f64 = 0.5;
+/// A normal that turns by more (rad) takes its arms along.
+const TURNED: f64 = 0.03;
+/// How often at most.
+pub const TURNS: usize = 4;
 
-/// One joint that touches, or will within the step.
+/// One joint that touches at the end of the step, or may be pushed there by others.
 struct Touch {
     joint: usize,
     law: Coefficients,
     slip: Slip,
     approach: f64,
-    normal: Vec3,
-    /// Where the present velocity carries the contact: penetration (m), its rate (m/s), sliding velocity (m/s), force (N).
-    penetration: f64,
-    rate: f64,
-    sliding: Vec3,
-    start: Vec3,
-    /// Velocity that the step adds, m/s.
+    clearance: f64,
+    clearance_rate: f64,
+    /// Without contact forces: eccentricity (m), its rate and the velocity that friction reads (m/s).
+    eccentricity: Vec3,
+    rate: Vec3,
+    relative: Vec3,
+    /// Velocities that the contacts add: of the centres, and of what friction reads, m/s.
     added: Vec3,
-    /// Force there, N, and its derivative by the added velocity, N s/m.
+    slipping: Vec3,
+    /// Normal of the arms, and the latest.
+    arm: Vec3,
+    normal: Vec3,
+    /// Force, N, and its derivatives by the added velocities, N s/m.
     force: Vec3,
     impedance: Mat3,
+    resistance: Mat3,
 }
 
 impl Touch {
-    /// Force and impedance for the velocity now in `added`, over a step of size `h`.
+    /// Force and its derivatives for the velocities now added, over a step of size `h`.
     fn evaluate(&mut self, h: f64) {
-        let n = self.normal;
-        let along_normal = n.dot(&self.added);
-        let penetration = self.penetration + h * along_normal;
-        let rate = self.rate + along_normal;
-        let c = &self.law;
-        let normal_force = c.normal_force(penetration, rate, self.approach);
+        let eccentricity = self.eccentricity + self.added * h;
+        let rate = self.rate + self.added;
+        let distance = eccentricity.norm();
         self.force = Vec3::zeros();
         self.impedance = Mat3::zeros();
-        if normal_force > 0.0 {
-            let root = penetration.sqrt();
-            let stiffness = c.stiffness * root;
-            let by_penetration = 1.5 * stiffness * (1.0 + c.damping * rate / self.approach);
-            let by_rate = stiffness * penetration * c.damping / self.approach;
-            let tangent = Mat3::identity() - n * n.transpose();
-            let sliding = self.sliding + tangent * self.added;
-            // Friction by its secant: it brings sliding to rest within a step and cannot reverse it.
-            let per_speed = c.friction_per_speed(self.slip, sliding.norm());
-            let along = -n - sliding * per_speed;
-            self.force = along * normal_force;
-            self.impedance = along * n.transpose() * (h * by_penetration + by_rate)
-                - tangent * (per_speed * normal_force);
+        self.resistance = Mat3::zeros();
+        let penetration = distance - self.clearance;
+        if penetration <= 0.0 {
+            return;
+        }
+        let n = eccentricity / distance;
+        self.normal = n;
+        let deepening = n.dot(&rate) - self.clearance_rate;
+        let c = &self.law;
+        let normal_force = c.normal_force(penetration, deepening, self.approach);
+        if normal_force <= 0.0 {
+            return;
+        }
+        let root = penetration.sqrt();
+        let stiffness = c.stiffness * root;
+        let by_penetration = 1.5 * stiffness * (1.0 + c.damping * deepening / self.approach);
+        let by_rate = stiffness * penetration * c.damping / self.approach;
+        let tangent = Mat3::identity() - n * n.transpose();
+        let turning = tangent * (h / distance);
+        let rising = n * (h * by_penetration + by_rate) + turning * rate * by_rate;
+        self.force = n * -normal_force;
+        self.impedance = -n * rising.transpose() - turning * normal_force;
+        if c.friction > 0.0 {
+            let relative = self.relative + self.slipping;
+            let sliding = tangent * relative;
+            let speed = sliding.norm();
+            let per_speed = c.friction_per_speed(self.slip, speed);
+            let resisting = per_speed * normal_force;
+            self.force -= sliding * resisting;
+            let turned = turning * n.dot(&relative) + n * (turning * relative).transpose();
+            self.impedance += turned * resisting - sliding * (rising * per_speed).transpose();
+            self.resistance = tangent * -resisting;
+            // Full friction by its secant, which brings sliding to rest within a step and cannot reverse it; the ramp by its
+            // slope.
+            if speed > 0.0 && speed < c.slip_high {
+                let slope = c.friction_per_speed_slope(self.slip, speed) / speed;
+                self.resistance -= sliding * sliding.transpose() * (slope * normal_force);
+            }
         }
     }
 }
@@ -81,9 +113,9 @@ pub struct ImplicitContacts {
     /// Block band matrix and its right side.
     blocks: Vec<Mat3>,
     right: Vec<Vec3>,
-    /// W M^-1 S^T in the same band, and h W a.
-    mobility: Vec<Mat3>,
-    free: Vec<Vec3>,
+    before: Vec<Vec3>,
+    /// W M^-1 S^T in the same band, W for the centres and for what friction reads.
+    mobility: Vec<[Mat3; 2]>,
     scratch: Vec<f64>,
 }
 
@@ -133,53 +165,33 @@ impl ImplicitContacts {
                 .collect(),
             weighted: ranges.iter().map(|r| vec![0.0; 3 * width(r)]).collect(),
             blocks: vec![Mat3::zeros(); joints * (2 * reach + 1)],
-            right: vec![Vec3::zeros(); joints],
-            mobility: vec![Mat3::zeros(); joints * (2 * reach + 1)],
-            free: vec![Vec3::zeros(); joints],
+            right: Vec::with_capacity(joints),
+            before: Vec::with_capacity(joints),
+            mobility: vec![[Mat3::zeros(); 2]; joints * (2 * reach + 1)],
             scratch: vec![0.0; n],
             ranges,
         }
     }
 
-    /// Takes the contacts of the evaluation just made, where the present velocity carries them within the step.
-    /// `visit(body, point, f)` as in [`super::stiff::Stiff::gather`].
-    pub fn gather(
-        &mut self,
-        model: &Model,
-        contacts: &Contacts,
-        motion: &[Kinematics],
-        visit: impl Fn(usize, &Vec3, &mut dyn FnMut(usize, Vec3, Vec3)),
-    ) {
+    /// Takes the joints that touch, from the gaps just measured where the step ends without contact forces; whether
+    /// there are any.
+    pub fn gather(&mut self, model: &Model, contacts: &Contacts) -> bool {
         self.touches.clear();
+        self.right.clear();
         let mut near = false;
         for (j, joint) in model.joints.iter().enumerate() {
             let gap = &contacts.gaps()[j];
-            if joint.ideal.is_some() {
+            // Others may push a ball that is still free into its wall.
+            let distance = gap.eccentricity.norm();
+            if joint.ideal.is_some() || distance < NEAR * contacts.clearance(j) {
                 continue;
             }
             let memory = contacts.memory()[j];
             if contacts.switching == Switching::Located && !memory.active {
                 continue;
             }
-            let distance = gap.eccentricity.norm();
-            let penetration = distance - contacts.clearance(j);
-            // Others may push a ball that is still free into its wall.
-            if distance < NEAR * contacts.clearance(j) {
-                continue;
-            }
-            near |= penetration > 0.0 || memory.active;
+            near |= gap.penetration > 0.0;
             let law = *contacts.coefficients(j);
-            let normal = gap.eccentricity / distance;
-            let rate = normal.dot(&gap.eccentricity_rate) - contacts.clearance_rate(j);
-            let mut relative = gap.eccentricity_rate;
-            if law.surface {
-                let (ball, socket) = (&motion[joint.ball.body], &motion[joint.socket.body]);
-                let radius = law.ball_radius;
-                relative += ball.angular_velocity.cross(&(normal * radius))
-                    - socket
-                        .angular_velocity
-                        .cross(&(normal * (radius + contacts.clearance(j))));
-            }
             self.touches.push(Touch {
                 joint: j,
                 law,
@@ -187,40 +199,53 @@ impl ImplicitContacts {
                 approach: if memory.active {
                     memory.approach_speed
                 } else {
-                    rate.max(law.speed_floor)
+                    gap.rate.max(law.speed_floor)
                 },
-                normal,
-                penetration,
-                rate,
-                sliding: relative - normal * normal.dot(&relative),
-                start: gap.friction - normal * gap.normal_force,
+                clearance: contacts.clearance(j),
+                clearance_rate: contacts.clearance_rate(j),
+                eccentricity: gap.eccentricity,
+                rate: gap.eccentricity_rate,
+                relative: gap.eccentricity_rate,
                 added: Vec3::zeros(),
+                slipping: Vec3::zeros(),
+                arm: gap.normal,
+                normal: gap.normal,
                 force: Vec3::zeros(),
                 impedance: Mat3::zeros(),
+                resistance: Mat3::zeros(),
             });
-            collect_columns(
-                &mut self.columns[j],
-                contacts,
-                motion,
-                joint,
-                j,
-                &normal,
-                &visit,
-            );
         }
-        if !near {
-            self.touches.clear();
+        near
+    }
+
+    /// Lays out how the coordinates move the contacts, and what slides there, for the normals found last.
+    /// `visit(body, point, f)` as in [`super::stiff::Stiff::gather`].
+    pub fn arrange(
+        &mut self,
+        model: &Model,
+        contacts: &Contacts,
+        motion: &[Kinematics],
+        visit: impl Fn(usize, &Vec3, &mut dyn FnMut(usize, Vec3, Vec3)),
+    ) {
+        for touch in &mut self.touches {
+            let (j, n) = (touch.joint, touch.normal);
+            let joint = &model.joints[j];
+            touch.arm = n;
+            if touch.law.surface && touch.law.friction > 0.0 {
+                let (ball, socket) = (&motion[joint.ball.body], &motion[joint.socket.body]);
+                let radius = touch.law.ball_radius;
+                touch.relative = touch.rate + ball.angular_velocity.cross(&(n * radius))
+                    - socket
+                        .angular_velocity
+                        .cross(&(n * (radius + touch.clearance)));
+            }
+            collect_columns(&mut self.columns[j], contacts, motion, joint, j, &n, &visit);
         }
     }
 
-    /// Turns the accelerations `a` at the start of a step of size `h` into its mean accelerations. `mobilise(range, x)`
-    /// maps generalised forces within a range of coordinates to accelerations, in place.
-    pub fn correct(
-        &mut self,
-        h: f64,
-        a: &mut [f64],
-        mut mobilise: impl FnMut((usize, usize), &mut [f64]),
-    ) {
+    /// Finds the forces at the end of a step of size `h`. `mobilise(range, x)` maps generalised forces within a range of
+    /// coordinates to accelerations, in place. Whether a normal turned so much that its arms must follow.
+    pub fn solve(&mut self, h: f64, mut mobilise: impl FnMut((usize, usize), &mut [f64])) -> bool {
         for touch in &self.touches {
             let j = touch.joint;
             let (first, end) = self.ranges[j];
@@ -235,70 +260,84 @@ impl ImplicitContacts {
                 }
             }
         }
-        self.couple(h, a);
+        self.couple();
+        // From the forces found for the arms before, if any.
+        self.right.resize(self.touches.len(), Vec3::zeros());
+        let (mut worst, mut halvings) = (f64::INFINITY, 0);
         for _ in 0..ITERATIONS {
-            for touch in &mut self.touches {
-                touch.evaluate(h);
-            }
-            self.solve(h);
-            let (mut change, mut largest) = (0.0_f64, 0.0_f64);
+            let (mut off, mut largest) = (0.0_f64, 0.0_f64);
             for i in 0..self.touches.len() {
-                let added = self.free[i] + self.driven_by(i, h);
+                let [added, slipping] = self.driven_by(i, h);
                 let touch = &mut self.touches[i];
-                let before = touch.force.dot(&touch.normal);
-                let after = (touch.start + self.right[i]).dot(&touch.normal);
-                change = change.max((after - before).abs());
-                largest = largest.max(after.abs());
-                touch.added = added;
+                (touch.added, touch.slipping) = (added, slipping);
+                touch.evaluate(h);
+                off = off.max((touch.force - self.right[i]).norm());
+                largest = largest.max(self.right[i].norm());
             }
-            if change <= CONVERGED * largest {
+            if off <= CONVERGED * largest {
                 break;
             }
-        }
-        // What the last iteration leaves must not pull.
-        for (touch, p) in self.touches.iter().zip(&mut self.right) {
-            if touch.normal.dot(&(touch.start + *p)) > 0.0 {
-                *p = -touch.start;
+            if off < worst || halvings == HALVINGS {
+                (worst, halvings) = (off, 0);
+                self.before.clone_from(&self.right);
+                self.eliminate(h);
+            } else {
+                // Too far: damping and the cut at 0 bend the force law both ways.
+                halvings += 1;
+                for (force, before) in self.right.iter_mut().zip(&self.before) {
+                    *force = (*force + before) * 0.5;
+                }
             }
         }
-        for (touch, p) in self.touches.iter().zip(&self.right) {
+        let mut turned = false;
+        for (touch, force) in self.touches.iter().zip(&mut self.right) {
+            // What the last iteration leaves must not pull.
+            if touch.normal.dot(force) > 0.0 {
+                *force = Vec3::zeros();
+            }
+            turned |= (touch.normal - touch.arm).norm() > TURNED && *force != Vec3::zeros();
+        }
+        turned
+    }
+
+    /// Adds to `v` what the forces found last do over a step of size `h`.
+    pub fn push(&self, h: f64, v: &mut [f64]) {
+        for (touch, force) in self.touches.iter().zip(&self.right) {
             let (first, end) = self.ranges[touch.joint];
             let weighted = self.weighted[touch.joint].chunks_exact(3);
-            for (a, w) in a[first..end].iter_mut().zip(weighted) {
-                *a += w[0] * p[0] + w[1] * p[1] + w[2] * p[2];
+            for (v, w) in v[first..end].iter_mut().zip(weighted) {
+                *v += h * (w[0] * force[0] + w[1] * force[1] + w[2] * force[2]);
             }
         }
     }
 
-    /// How the contacts move each other, and what the accelerations `a` add to their velocities.
-    fn couple(&mut self, h: f64, a: &[f64]) {
+    /// How the contacts move each other.
+    fn couple(&mut self) {
         let m = self.touches.len();
         for i in 0..m {
             let touch = &self.touches[i];
             let columns = &self.columns[touch.joint];
-            let w = |c: &Column| {
-                if touch.law.surface {
-                    c.surface
-                } else {
-                    c.centre
-                }
-            };
+            let surface = touch.law.surface && touch.law.friction > 0.0;
             for j in i.saturating_sub(self.reach)..=(i + self.reach).min(m - 1) {
                 let other = self.touches[j].joint;
                 let (first, end) = self.ranges[other];
-                let mut mobility = Mat3::zeros();
+                let mut mobility = [Mat3::zeros(); 2];
                 for c in columns {
                     if (first..end).contains(&c.coordinate) {
                         let x = &self.weighted[other][3 * (c.coordinate - first)..][..3];
-                        mobility += w(c) * Vec3::new(x[0], x[1], x[2]).transpose();
+                        let x = Vec3::new(x[0], x[1], x[2]).transpose();
+                        mobility[0] += c.centre * x;
+                        if surface {
+                            mobility[1] += c.surface * x;
+                        }
                     }
+                }
+                if !surface {
+                    mobility[1] = mobility[0];
                 }
                 let at = self.at(i, j);
                 self.mobility[at] = mobility;
             }
-            self.free[i] = columns
-                .iter()
-                .fold(Vec3::zeros(), |sum, c| sum + w(c) * (h * a[c.coordinate]));
         }
     }
 
@@ -307,16 +346,21 @@ impl ImplicitContacts {
         i * (2 * self.reach + 1) + j + self.reach - i
     }
 
-    /// Velocity that the changes of force in `right` add at touch `i`.
-    fn driven_by(&self, i: usize, h: f64) -> Vec3 {
+    /// Velocities that the forces in `right` add at touch `i`.
+    fn driven_by(&self, i: usize, h: f64) -> [Vec3; 2] {
         let last = (i + self.reach).min(self.touches.len() - 1);
-        (i.saturating_sub(self.reach)..=last).fold(Vec3::zeros(), |sum, j| {
-            sum + self.mobility[self.at(i, j)] * self.right[j] * h
-        })
+        let mut sum = [Vec3::zeros(); 2];
+        for j in i.saturating_sub(self.reach)..=last {
+            let mobility = &self.mobility[self.at(i, j)];
+            let impulse = self.right[j] * h;
+            sum[0] += mobility[0] * impulse;
+            sum[1] += mobility[1] * impulse;
+        }
+        sum
     }
 
-    /// Changes of the contact forces into `right`, by block elimination within the band.
-    fn solve(&mut self, h: f64) {
+    /// Contact forces of the next iteration into `right`, by block elimination within the band.
+    fn eliminate(&mut self, h: f64) {
         let (m, reach) = (self.touches.len(), self.reach);
         let at = |i: usize, j: usize| i * (2 * reach + 1) + j + reach - i;
         for (i, touch) in self.touches.iter().enumerate() {
@@ -326,10 +370,12 @@ impl ImplicitContacts {
                 } else {
                     Mat3::zeros()
                 };
-                self.blocks[at(i, j)] = unit - touch.impedance * self.mobility[at(i, j)] * h;
+                let [centre, felt] = &self.mobility[at(i, j)];
+                self.blocks[at(i, j)] =
+                    unit - (touch.impedance * centre + touch.resistance * felt) * h;
             }
             self.right[i] =
-                touch.force - touch.start + touch.impedance * (self.free[i] - touch.added);
+                touch.force - touch.impedance * touch.added - touch.resistance * touch.slipping;
         }
         for k in 0..m {
             let last = (k + reach).min(m - 1);

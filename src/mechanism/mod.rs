@@ -4,17 +4,20 @@
 //! three constraint rows (ideal) or one contact force (clearance). A scene pays only for what it has.
 
 mod constraints;
+mod contact_stiffness;
 mod contacts;
 mod factor;
 mod implicit;
 mod jet;
 mod kinematics;
 mod lagrange;
+mod lu;
 mod model;
 mod power;
 mod spcmm;
 mod stiff;
 mod summary;
+mod systems;
 mod tree;
 
 pub use contacts::{Contacts, Gap, Memory, Ramp, Switching};
@@ -24,7 +27,7 @@ pub use power::Powers;
 pub use spcmm::{Ideal, Trajectory, Unreachable};
 pub use summary::Summary;
 
-use crate::integrate::{ContactSystem, StiffSystem, System};
+use crate::integrate::System;
 use crate::scene::{Formulation, Scene, StartRule, Vec3};
 use constraints::Constraints;
 use lagrange::Lagrange;
@@ -550,223 +553,5 @@ fn load_reactions(model: &Model, tree: &mut Tree, constraints: &Constraints) {
         let force = constraints.reaction(k);
         load(&model.joints[j].ball, force);
         load(&model.joints[j].socket, -force);
-    }
-}
-
-impl System for Mechanism {
-    fn dimension(&self) -> usize {
-        match &self.form {
-            Form::Tree { .. } => self.model.nq + self.model.nv,
-            Form::Lagrange(_) => 13 * self.model.bodies.len(),
-        }
-    }
-
-    fn positions(&self) -> usize {
-        match &self.form {
-            Form::Tree { .. } => self.model.nq,
-            Form::Lagrange(_) => 7 * self.model.bodies.len(),
-        }
-    }
-
-    fn derivative(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
-        self.evaluations += 1;
-        self.evaluated = t;
-        let Self {
-            model,
-            form,
-            contacts,
-            gravity,
-            ..
-        } = self;
-        match form {
-            Form::Tree { tree, constraints } => {
-                tree.forward(model, t, y);
-                tree.load(t, contacts);
-                let (dq, dv) = dy.split_at_mut(model.nq);
-                Tree::position_rate(model, y, dq);
-                tree.assemble(model, gravity, dv);
-                tree.solve(model, dv);
-                if let Some(constraints) = constraints {
-                    constraints.correct(model, tree, t, &y[..model.nq], dv);
-                }
-            }
-            Form::Lagrange(lagrange) => {
-                let n = model.bodies.len();
-                lagrange.forward(model, t, y);
-                let (dq, dv) = dy.split_at_mut(7 * n);
-                Lagrange::position_rate(n, y, dq);
-                lagrange.accelerations(model, contacts, gravity, t, dv);
-            }
-        }
-    }
-
-    fn position_rate(&mut self, _t: f64, y: &[f64], dy: &mut [f64]) {
-        match &self.form {
-            Form::Tree { .. } => Tree::position_rate(&self.model, y, dy),
-            Form::Lagrange(_) => Lagrange::position_rate(self.model.bodies.len(), y, dy),
-        }
-    }
-
-    fn scale(&self) -> &[f64] {
-        match &self.form {
-            Form::Tree { .. } => &self.model.scale,
-            Form::Lagrange(lagrange) => lagrange.scale(),
-        }
-    }
-}
-
-impl StiffSystem for Mechanism {
-    fn linearise(&mut self, t: f64, y: &[f64]) {
-        let positions = self.positions();
-        self.prepare_linearisation();
-        let Some(mut stiff) = self.stiff.take() else {
-            return;
-        };
-        // Prescribed motion is what moves contacts by time alone; bodies that are states stand still in that sense.
-        if let Form::Tree { tree, .. } = &mut self.form {
-            let mut at_rest = std::mem::take(&mut stiff.derivative);
-            at_rest[..positions].copy_from_slice(&y[..positions]);
-            at_rest[positions..].fill(0.0);
-            tree.forward(&self.model, t, &at_rest);
-            stiff.observe_drift(&self.model, &tree.motion);
-            stiff.derivative = at_rest;
-        }
-        let mut now = std::mem::take(&mut stiff.derivative);
-        self.derivative(t, y, &mut now);
-        stiff.derivative = now;
-        let Self {
-            model,
-            form,
-            contacts,
-            ..
-        } = self;
-        match form {
-            Form::Tree { tree, constraints } => {
-                let motion = &tree.motion;
-                stiff.gather(model, contacts, motion, y, |body, point, visit| {
-                    if body < model.bodies.len() && !model.bodies[body].driven_only {
-                        let first = model.blocks[model.block_of[body]].v;
-                        tree::visit_columns(model, motion, body, point, |c, v, w| {
-                            visit(first + c, v, w)
-                        });
-                    }
-                });
-                stiff.mobilise(|x| {
-                    tree.solve(model, x);
-                    if let Some(constraints) = constraints {
-                        constraints.restrain(model, x);
-                    }
-                });
-            }
-            Form::Lagrange(lagrange) => {
-                let motion = &lagrange.motion;
-                stiff.gather(model, contacts, motion, y, |body, point, mut visit| {
-                    if body < model.bodies.len() {
-                        tree::visit_free(6 * body, &(point - motion[body].position), &mut visit);
-                    }
-                });
-                stiff.mobilise(|x| lagrange.mobilise(model, x));
-            }
-        }
-        self.stiff = Some(stiff);
-    }
-
-    fn factor_shifted(&mut self, shift: f64) {
-        if let Some(stiff) = &mut self.stiff {
-            stiff.factor(shift);
-        }
-    }
-
-    fn solve_shifted(&mut self, b: &mut [f64]) {
-        let Self {
-            model, form, stiff, ..
-        } = self;
-        let Some(stiff) = stiff else { return };
-        match form {
-            Form::Tree { .. } => stiff.solve(b, &stiff::TreeMap(model)),
-            Form::Lagrange(_) => stiff.solve(b, &stiff::BodyMap(model.bodies.len())),
-        }
-    }
-
-    fn factor_shifted_pair(&mut self, real: f64, imaginary: f64) {
-        if let Some(stiff) = &mut self.stiff {
-            stiff.factor_pair(nalgebra::Complex::new(real, imaginary));
-        }
-    }
-
-    fn solve_shifted_pair(&mut self, b_real: &mut [f64], b_imaginary: &mut [f64]) {
-        let Self {
-            model, form, stiff, ..
-        } = self;
-        let Some(stiff) = stiff else { return };
-        match form {
-            Form::Tree { .. } => stiff.solve_pair(b_real, b_imaginary, &stiff::TreeMap(model)),
-            Form::Lagrange(_) => {
-                stiff.solve_pair(b_real, b_imaginary, &stiff::BodyMap(model.bodies.len()));
-            }
-        }
-    }
-
-    fn time_derivative(&self) -> &[f64] {
-        self.stiff
-            .as_ref()
-            .map_or(&[], |stiff| &stiff.time_derivative)
-    }
-}
-
-impl ContactSystem for Mechanism {
-    fn derivative_ahead(&mut self, t: f64, h: f64, y: &[f64], dy: &mut [f64]) {
-        self.prepare_implicit_contacts();
-        if let Form::Lagrange(lagrange) = &mut self.form {
-            // Every body is free here: its accelerations are none of its bias.
-            for m in &mut lagrange.motion[..self.model.bodies.len()] {
-                m.acceleration = Vec3::zeros();
-                m.angular_acceleration = Vec3::zeros();
-            }
-        }
-        self.contacts.ahead = h;
-        self.derivative(t, y, dy);
-        self.contacts.ahead = 0.0;
-        let Some(mut implicit) = self.implicit.take() else {
-            return;
-        };
-        let dv = &mut dy[self.positions()..];
-        let Self {
-            model,
-            form,
-            contacts,
-            ..
-        } = self;
-        match form {
-            Form::Tree { tree, constraints } => {
-                let motion = &tree.motion;
-                implicit.gather(model, contacts, motion, |body, point, visit| {
-                    if body < model.bodies.len() && !model.bodies[body].driven_only {
-                        let first = model.blocks[model.block_of[body]].v;
-                        tree::visit_columns(model, motion, body, point, |c, v, w| {
-                            visit(first + c, v, w)
-                        });
-                    }
-                });
-                implicit.correct(h, dv, |(first, end), x| {
-                    if let Some(constraints) = constraints {
-                        tree.solve(model, x);
-                        constraints.restrain(model, x);
-                    } else {
-                        tree.solve_within(model, first, end, x);
-                    }
-                });
-            }
-            Form::Lagrange(lagrange) => {
-                let motion = &lagrange.motion;
-                implicit.gather(model, contacts, motion, |body, point, mut visit| {
-                    if body < model.bodies.len() {
-                        tree::visit_free(6 * body, &(point - motion[body].position), &mut visit);
-                    }
-                });
-                implicit.correct(h, dv, |_, x| lagrange.mobilise(model, x));
-            }
-        }
-        self.implicit = Some(implicit);
     }
 }

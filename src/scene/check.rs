@@ -129,7 +129,7 @@ impl Scene {
                 joint.name
             )
         };
-        let stays = if self.solver.method == Method::ImexEuler {
+        let stays = if self.solver.method == Method::ImexEuler && friction <= 1.0 {
             " (imex-euler stays stable, but its peak forces and rebounds are too low)"
         } else {
             ""

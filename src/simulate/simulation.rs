@@ -388,7 +388,15 @@ impl Simulation {
             ..
         } = self;
         let open = mechanism.project(t_end, y_end);
-        if !stepper.ends_with_derivative() || mechanism.projects() {
+        if stepper.differs_rates() {
+            // Forces at its end are those of a contact that may be long over by the next: the step's own mean tells more.
+            mechanism.measure(t_end, y_end);
+            mechanism.position_rate(t_end, y_end, k_end);
+            for i in mechanism.positions()..y_end.len() {
+                k_end[i] = (y_end[i] - state.y[i]) / h;
+            }
+            store_gaps(mechanism, gaps_end);
+        } else if !stepper.ends_with_derivative() || mechanism.projects() {
             mechanism.derivative(t_end, y_end, k_end);
             mechanism.contacts.finish(t_end);
             store_gaps(mechanism, gaps_end);
@@ -446,7 +454,10 @@ impl Simulation {
         self.track_peaks(h);
         self.book_step(h, switched);
         self.pass_corner();
-        if switched && self.mechanism.contacts.switching == Switching::Immediate {
+        if switched
+            && self.mechanism.contacts.switching == Switching::Immediate
+            && !self.stepper.differs_rates()
+        {
             // The force now divides by the approach speed just found.
             let Self {
                 mechanism, state, ..

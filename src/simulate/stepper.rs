@@ -139,6 +139,11 @@ impl AnyStepper {
         )
     }
 
+    /// Whether rates are differences of the states at both ends of a step: no step needs a derivative at its end.
+    pub(super) fn differs_rates(&self) -> bool {
+        matches!(self, Self::ImexEuler(_))
+    }
+
     pub(super) fn interpolate(
         &self,
         theta: f64,

@@ -16,7 +16,7 @@ use crate::scene::Scene;
 const PNG_SCALE: f32 = 2.0;
 
 /// Columns of the CSV file.
-const COLUMNS: [&str; 21] = [
+const COLUMNS: [&str; 24] = [
     "method",
     "step_s",
     "tolerance",
@@ -33,9 +33,12 @@ const COLUMNS: [&str; 21] = [
     "position_error_m",
     "energy_error",
     "settled_end",
+    "settled_simulated_s",
     "settled_wall_s",
     "settled_ratio",
     "settled_steps",
+    "settled_evaluations",
+    "settled_rejected",
     "settled_front",
     "settled_error",
 ];
@@ -153,9 +156,12 @@ fn csv(found: &WorkPrecision) -> String {
             number(errors.position_m),
             number(errors.energy),
             settled.map_or("", end).to_owned(),
+            number(settled.map(|phase| phase.simulated_s)),
             number(settled.and_then(|phase| phase.wall_s)),
             number(settled.and_then(|phase| phase.ratio)),
             settled.map_or_else(String::new, |phase| phase.steps.to_string()),
+            settled.map_or_else(String::new, |phase| phase.evaluations.to_string()),
+            settled.map_or_else(String::new, |phase| phase.rejected.to_string()),
             settled.map_or_else(String::new, |phase| u8::from(phase.front).to_string()),
             number(errors.settled),
         ];

@@ -1,6 +1,7 @@
 //! The divergence guard: what no accepted step may show.
 
 use super::{OPEN_LOOP, Simulation};
+use crate::scene::Formulation;
 
 /// Speed beyond which a state is absurd, m/s and rad/s.
 const ABSURD_SPEED: f64 = 1e6;
@@ -10,6 +11,8 @@ const LEFT_SOCKET: f64 = 0.1;
 const MOST_OVERSHOOT: f64 = 4.0;
 /// Constraints that are only stabilised and off by more than this hold nothing together, m.
 const MOST_DRIFT: f64 = 1e-3;
+/// Smallest pivot ratio of the constraints of the `lagrange` form: below, they fix the motion to less than four digits.
+const LEAST_PIVOT: f64 = 1e-12;
 
 impl Simulation {
     /// What is wrong with the step of size `h` just attempted, if anything.
@@ -24,6 +27,11 @@ impl Simulation {
             return Some(format!(
                 "the constraints of the lagrange form are off by {drift:.1e} m"
             ));
+        }
+        if self.running.formulation == Formulation::Lagrange
+            && !(self.mechanism.least_pivot() >= LEAST_PIVOT)
+        {
+            return Some("the constraints pass a singular pose".to_owned());
         }
         for j in 0..self.gaps_end.len() {
             if !self.mechanism.contacts.has_clearance(j) {
