@@ -184,6 +184,18 @@ fn neither_threads_nor_shards_change_a_bit() {
     fs::remove_file(folder.path().join("text.npz")).unwrap();
     assert_eq!(names(folder.path()), before);
 
+    // More shards than points: an empty one is a shard, too.
+    let empty = run("--shard 5/5 --out e5.npz").stdout;
+    assert!(
+        empty.contains("Points            0") && empty.contains("Regimes           none"),
+        "{empty}"
+    );
+    for k in 1..5 {
+        run(&format!("--shard {k}/5 --out e{k}.npz"));
+    }
+    merge("e1.npz e2.npz e3.npz e4.npz e5.npz --out five.npz").expect(0);
+    assert!(read("one.npz") == read("five.npz"));
+
     jointplay(
         folder.path(),
         "sweep spcmm --vary contact.clearance=0.2mm..0.5mm:4 --periods 3 --discard 2 --shard 2/3 --out other.npz",

@@ -366,7 +366,7 @@ pub struct TradeoffArguments {
 /// `reproduce`.
 #[derive(Debug, Args)]
 pub struct ReproduceArguments {
-    /// Folder to write: `index.html`, `data/` and `plots/`.
+    /// Folder to write: `index.html`, `data/` and `plots/`; what is done until then is kept in `FOLDER.partial`.
     #[arg(long, value_name = "FOLDER")]
     pub out: PathBuf,
     /// Few points and few periods, within half a minute instead of some six minutes on two cores.

@@ -305,11 +305,15 @@ fn report(
         }
     }
     let regimes = summary.get("regimes").and_then(Json::as_object);
-    let regimes: Vec<String> = regimes
+    let mut regimes: Vec<String> = regimes
         .into_iter()
         .flatten()
         .map(|(word, number)| format!("{number} {word}"))
         .collect();
+    if regimes.is_empty() {
+        // A shard of a sweep with fewer points than shards.
+        regimes.push("none".to_owned());
+    }
     let wall = summary.get("wall_s").and_then(Json::as_f64);
     let wall = wall.map_or_else(String::new, |wall| {
         format!("\nWall time         {wall:.1} s")
