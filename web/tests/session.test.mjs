@@ -269,11 +269,8 @@ test('graphics that do not come back: the page offers to reload into the same st
     } });
     await lab.until(async () => (await lab.state()).time_s > 1e-3, 'time does not pass');
     const before = await pause(lab);
-    // At once: the page starts them again without a pause.
-    await lab.page.evaluate(() => {
-        document.getElementById('laboratory').getContext('webgl2').getExtension('WEBGL_lose_context').loseContext();
-        globalThis.refused = true;
-    });
+    // In one turn: the page asks for new graphics as soon as it is told.
+    await lab.page.evaluate(`(${LOSE.webgl})(); globalThis.refused = true;`);
     const again = lab.page.locator('#again');
     await again.waitFor();
     assert.match(await lab.page.locator('#trouble').innerText(), /The graphics were lost/);
