@@ -1,18 +1,23 @@
 //! A row of equal links from one template.
 
-use super::document::Node;
+use std::collections::BTreeMap;
+
+use super::document::{Node, Section};
 use super::read_bodies::{BODY_KEYS, read_rigid_body};
-use super::read_joints::read_rotation;
+use super::read_joints::{contact_parts, read_own_contact, read_rotation};
 use super::*;
 
 /// Adds the bodies, free joints and ball joints of the `[chain]` in `node`: link 1 hangs from a fixed socket at
 /// `hang`, every other from the socket at the lower end of the one before; all start straight, at rest, turned by
-/// `rotation`.
+/// `rotation`. A `[[chain.joint]]` gives one of the ball joints contact parameters of its own; where these stand is returned.
 ///
 /// # Errors
-/// Anything wrong in the section, or a name that the file has already taken.
-pub(super) fn expand(node: &Node<'_>, scene: &mut Scene) -> Result<(), SceneError> {
-    let section = node.section(&["links", "hang", "rotation", "link"])?;
+/// Anything wrong in the section, a name that the file has already taken, or a joint that the chain has not.
+pub(super) fn expand<'d>(
+    node: &Node<'d>,
+    scene: &mut Scene,
+) -> Result<BTreeMap<String, Node<'d>>, SceneError> {
+    let section = node.section(&["links", "hang", "rotation", "link", "joint"])?;
     let hang = section
         .get("hang")
         .map_or(Ok(Vec3::zeros()), |node| node.vector(Dimension::Length))?;
@@ -110,5 +115,34 @@ pub(super) fn expand(node: &Node<'_>, scene: &mut Scene) -> Result<(), SceneErro
         scene.joints.push(joint);
         scene.ball_joints.push(ball_joint);
     }
-    Ok(())
+    read_own(&section, scene, links)
+}
+
+/// Reads the `[[chain.joint]]` of a chain of `links` links, the last ball joints of `scene`.
+fn read_own<'d>(
+    section: &Section<'d>,
+    scene: &mut Scene,
+    links: usize,
+) -> Result<BTreeMap<String, Node<'d>>, SceneError> {
+    let mut places = BTreeMap::new();
+    let first = scene.ball_joints.len() - links;
+    let known: Vec<&str> = ["name"].into_iter().chain(contact_parts()).collect();
+    let list = section.get("joint").map(|node| node.elements());
+    for node in list.transpose()?.unwrap_or_default() {
+        let own = node.section_as(node.title("chain.joint"), &known)?;
+        let name = own.require("name", "\"J1\"")?.name()?;
+        let joints = &mut scene.ball_joints[first..];
+        let Some(joint) = joints.iter_mut().find(|joint| joint.name == name) else {
+            let message = format!(
+                "the chain has no ball joint `{name}`; it has {links} links: J1 to J{links}"
+            );
+            return Err(own.error("name", message));
+        };
+        if !joint.overrides.is_empty() {
+            let message = format!("the ball joint `{name}` stands here twice");
+            return Err(own.error("name", message));
+        }
+        places.extend(read_own_contact(&own, joint)?);
+    }
+    Ok(places)
 }

@@ -236,7 +236,7 @@ fn read_parameters<'d>(top: &Section<'d>, scene: &mut Scene) -> Result<Places<'d
         ("contact", &[]),
         ("solver", &[]),
         ("spcmm", &SPCMM_DIMENSIONS),
-        ("chain", &["hang", "rotation", "link"]),
+        ("chain", &["hang", "rotation", "link", "joint"]),
         ("view", &VIEW_SETTINGS),
     ] {
         if let Some(node) = top.get(name) {
@@ -351,7 +351,7 @@ fn read_mechanism<'d>(
         scene.fixed_shapes.push(shape);
     }
     if let Some(node) = top.get("chain") {
-        super::chain::expand(&node, scene)?;
+        places.extend(super::chain::expand(&node, scene)?);
         for joint in &scene.ball_joints {
             let title = format!("joint.{}", joint.name);
             scene.source.places.entry(title).or_insert(node.place());

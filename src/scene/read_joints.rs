@@ -453,10 +453,9 @@ pub(super) fn read_ball_joint<'d>(
     scene: &Scene,
     bodies: &BTreeMap<String, usize>,
 ) -> Result<BallJointText<'d>, SceneError> {
-    let parts: Vec<&'static str> = table().iter().filter_map(contact_part).collect();
     let known: Vec<&str> = ["name", "socket", "ball", "opening"]
         .into_iter()
-        .chain(parts.iter().copied())
+        .chain(contact_parts())
         .collect();
     let section = node.section_as(node.title("joint"), &known)?;
     let name = section.require("name", "\"S1\"")?.name()?.to_owned();
@@ -492,30 +491,43 @@ pub(super) fn read_ball_joint<'d>(
     let opening = section
         .get("opening")
         .map_or(Ok(scene.view.down.unit()), |node| node.direction())?;
-    let mut contact = scene.contact;
-    let mut overrides = Vec::new();
-    let mut places = BTreeMap::new();
-    for part in parts {
-        if let Some(node) = section.get(part) {
-            set_contact_value(
-                &mut contact,
-                part,
-                &node.parameter(&format!("contact.{part}"))?,
-            );
-            overrides.push(part);
-            places.insert(format!("joint.{name}.{part}"), node);
-        }
-    }
+    let mut joint = BallJoint {
+        name,
+        socket,
+        ball,
+        opening,
+        contact: scene.contact,
+        overrides: Vec::new(),
+    };
+    let places = read_own_contact(&section, &mut joint)?;
     Ok(BallJointText {
-        joint: BallJoint {
-            name,
-            socket,
-            ball,
-            opening,
-            contact,
-            overrides,
-        },
+        joint,
         section,
         places,
     })
+}
+
+/// Keys of `[contact]`, which a joint may have for itself.
+pub(super) fn contact_parts() -> impl Iterator<Item = &'static str> {
+    table().iter().filter_map(contact_part)
+}
+
+/// Gives `joint` what `section` says of its contact alone; where that stands, by parameter.
+///
+/// # Errors
+/// A value that is none, or outside of its range.
+pub(super) fn read_own_contact<'d>(
+    section: &Section<'d>,
+    joint: &mut BallJoint,
+) -> Result<BTreeMap<String, Node<'d>>, SceneError> {
+    let mut places = BTreeMap::new();
+    for part in contact_parts() {
+        if let Some(node) = section.get(part) {
+            let value = node.parameter(&format!("contact.{part}"))?;
+            set_contact_value(&mut joint.contact, part, &value);
+            joint.overrides.push(part);
+            places.insert(format!("joint.{}.{part}", joint.name), node);
+        }
+    }
+    Ok(places)
 }

@@ -1,6 +1,8 @@
 //! A scene back to TOML: the text it was read from, with the changed values in their places; comments and order stay.
 
-use toml_edit::{DocumentMut, Item, Table, Value as Toml, value};
+use toml_edit::{
+    Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value as Toml, value,
+};
 
 use super::{Kind, Scene, SceneError, Value};
 
@@ -8,7 +10,7 @@ impl Scene {
     /// The text of a scene file that reads to this scene, its changes included.
     ///
     /// # Errors
-    /// A change that the format has no place for: that of one joint of a chain.
+    /// A change that the format has no place for.
     pub fn to_toml(&self) -> Result<String, SceneError> {
         let lost = |key: &str, message: String| SceneError {
             key: Some(key.to_owned()),
@@ -41,30 +43,11 @@ impl Scene {
             .strip_prefix("joint.")
             .and_then(|rest| rest.rsplit_once('.'))
         {
-            let joints = document.get_mut("ball_joint");
-            let placed = match joints {
-                Some(Item::ArrayOfTables(tables)) => {
-                    let own = |table: &&mut Table| text_of(table.get("name")) == Some(name);
-                    tables
-                        .iter_mut()
-                        .find(own)
-                        .map(|table| put(table, part, item))
-                }
-                Some(Item::Value(Toml::Array(array))) => array
-                    .iter_mut()
-                    .filter_map(Toml::as_inline_table_mut)
-                    .find(|table| table.get("name").and_then(Toml::as_str) == Some(name))
-                    .map(|table| {
-                        if let Item::Value(item) = item {
-                            table.insert(part, item);
-                        }
-                    }),
-                _ => None,
-            };
-            return placed.ok_or_else(|| SceneError {
+            let placed = put_joint(document.get_mut("ball_joint"), name, part, &item)
+                || put_chain_joint(document.get_mut("chain"), name, part, item);
+            return placed.then_some(()).ok_or_else(|| SceneError {
                 key: Some(key.to_owned()),
-                message: "a scene file has no place for a value of one joint of a chain; reset it, or set it for all joints"
-                    .to_owned(),
+                message: "cannot be written to a scene file".to_owned(),
                 ..SceneError::default()
             });
         }
@@ -99,6 +82,68 @@ impl Scene {
             (Value::Number(_) | Value::Count(_), Ok(number)) if bare => value(number),
             _ => value(text),
         })
+    }
+}
+
+/// Puts `item` into the entry called `name` of a list of joints, if there is one.
+fn put_joint(joints: Option<&mut Item>, name: &str, part: &str, item: &Item) -> bool {
+    match joints {
+        Some(Item::ArrayOfTables(tables)) => tables
+            .iter_mut()
+            .find(|table| text_of(table.get("name")) == Some(name))
+            .map(|table| put(table, part, item.clone())),
+        Some(Item::Value(Toml::Array(array))) => array
+            .iter_mut()
+            .filter_map(Toml::as_inline_table_mut)
+            .find(|table| table.get("name").and_then(Toml::as_str) == Some(name))
+            .zip(item.as_value())
+            .map(|(table, item)| drop(table.insert(part, item.clone()))),
+        _ => None,
+    }
+    .is_some()
+}
+
+/// Puts `item` into the `[[chain.joint]]` called `name`, a new one if need be; whether there is a chain.
+fn put_chain_joint(chain: Option<&mut Item>, name: &str, part: &str, item: Item) -> bool {
+    match chain {
+        Some(Item::Table(chain)) => {
+            if put_joint(chain.get_mut("joint"), name, part, &item) {
+                return true;
+            }
+            let mut own = Table::new();
+            own.insert("name", value(name));
+            own.insert(part, item);
+            match chain
+                .entry("joint")
+                .or_insert_with(|| Item::ArrayOfTables(ArrayOfTables::new()))
+            {
+                Item::ArrayOfTables(tables) => tables.push(own),
+                Item::Value(Toml::Array(array)) => array.push(own.into_inline_table()),
+                _ => return false,
+            }
+            true
+        }
+        Some(Item::Value(Toml::InlineTable(chain))) => {
+            let joints = chain.entry("joint").or_insert_with(|| Array::new().into());
+            let (Some(joints), Item::Value(item)) = (joints.as_array_mut(), item) else {
+                return false;
+            };
+            let at = joints.iter().position(|joint| {
+                let own = joint.as_inline_table().and_then(|own| own.get("name"));
+                own.and_then(Toml::as_str) == Some(name)
+            });
+            let there = at.and_then(|at| joints.get_mut(at));
+            if let Some(own) = there.and_then(Toml::as_inline_table_mut) {
+                own.insert(part, item);
+            } else {
+                let mut own = InlineTable::new();
+                own.insert("name", name.into());
+                own.insert(part, item);
+                joints.push(own);
+            }
+            true
+        }
+        _ => false,
     }
 }
 
@@ -174,9 +219,7 @@ mod tests {
                     Kind::Choice(words) => Value::Choice(words[words.len() - 1]),
                 };
                 let mut keys = vec![parameter.key.to_owned()];
-                if let Some(part) = contact_part(parameter)
-                    && plain.chain.is_none()
-                {
+                if let Some(part) = contact_part(parameter) {
                     keys.push(format!("joint.{}.{part}", plain.ball_joints[0].name));
                 }
                 for key in keys {
@@ -250,9 +293,66 @@ mod tests {
     }
 
     #[test]
-    fn one_joint_of_a_chain_has_no_place_and_that_is_said() {
-        let changed = scene("chain", &[("joint.J2.clearance", "0.5 mm")]);
-        let error = changed.to_toml().expect_err("no place").to_string();
-        assert!(error.starts_with("joint.J2.clearance: "), "{error}");
+    fn joints_of_a_chain_have_values_of_their_own_in_every_form_of_the_file() {
+        let changes = [
+            ("joint.J2.clearance", "0.5 mm"),
+            ("joint.J8.friction", "0.4"),
+            ("joint.J2.friction", "0.1"),
+        ];
+        let plain = scene("chain", &[]).source.text;
+        let inline = plain.replacen("[chain]\n", "[chain]\njoint = [{ name = \"J3\" }]\n", 1);
+        let there =
+            format!("{plain}\n[[chain.joint]]\nname = \"J2\" # the second\nrestitution = 0.7\n");
+        for text in [plain, inline, there] {
+            let mut changed = Scene::parse(&text, None, &[]).expect("reads");
+            for (key, value) in changes {
+                changed.set(key, value).expect("in range");
+            }
+            let written = changed.to_toml().expect("has its places");
+            let read = Scene::parse(&written, None, &[]).expect("reads");
+            assert_eq!(bits(&read), bits(&changed), "{written}");
+            assert_eq!(read.ball_joints[1].contact.clearance, 0.5e-3);
+            assert_eq!(
+                written.contains("# the second"),
+                text.contains("# the second")
+            );
+            // A second time: the entries are there now.
+            let mut again = read;
+            again.set("joint.J8.friction", "0.3").expect("in range");
+            let written = again.to_toml().expect("has its places");
+            assert_eq!(written.matches("\"J8\"").count(), 1, "{written}");
+        }
+        let bad = format!(
+            "{}\n[[chain.joint]]\nname = \"J9\"\n",
+            scene("chain", &[]).source.text
+        );
+        let error = Scene::parse(&bad, None, &[])
+            .expect_err("eight links")
+            .to_string();
+        assert!(
+            error.contains("no ball joint `J9`; it has 8 links: J1 to J8"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn an_inline_chain_keeps_its_form() {
+        let text = "chain = { links = 3, link = { mass = \"0.4 kg\", inertia = \"1e-3 1e-3 1e-5 kg m^2\", ball = \"0 0 50 mm\", socket = \"0 0 -50 mm\" } }\n";
+        let mut changed = Scene::parse(text, None, &[]).expect("reads");
+        changed
+            .set("joint.J3.clearance", "0.2 mm")
+            .expect("in range");
+        changed.set("joint.J3.friction", "0.2").expect("in range");
+        changed.set("joint.J1.friction", "0.1").expect("in range");
+        let written = changed.to_toml().expect("written");
+        let read = Scene::parse(&written, None, &[]).expect("reads");
+        assert_eq!(bits(&read), bits(&changed), "{written}");
+        assert_eq!(
+            written
+                .lines()
+                .filter(|line| line.starts_with("chain = {"))
+                .count(),
+            1
+        );
     }
 }

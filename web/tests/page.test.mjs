@@ -4,6 +4,7 @@ import assert from 'node:assert/strict';
 import fs from 'node:fs';
 import path from 'node:path';
 import { after, test } from 'node:test';
+import { pathToFileURL } from 'node:url';
 
 import { colours, crop, difference, nativeWindow, open, PAGE, quit, sleep } from './harness.mjs';
 
@@ -23,7 +24,7 @@ for (const backend of ['webgl', 'webgpu']) {
         const frames = Promise.all([nativeWindow('spcmm', INSTANT), nativeWindow('spcmm', 0.3)]);
         const lab = await open('play=0&theme=light', { backend });
         const { renderer } = await lab.state();
-        assert.match(renderer, backend === 'webgl' ? /^gl / : /^webgpu /i);
+        assert.match(renderer, backend === 'webgl' ? /^gl / : /^webgpu\b/i);
         await lab.runTo(INSTANT);
         await lab.still();
         assert.equal((await lab.state()).shown_s, INSTANT);
@@ -224,6 +225,19 @@ test('a failed download is told, and can be tried again', async () => {
     assert.match(text, /503/);
     assert.ok(await lab.page.locator('#reload').isVisible());
     await lab.close();
+});
+
+test('a page whose program does not come at all says so, and why where it was opened as a file', async () => {
+    const lab = await open('play=0', { backend: 'webgl' });
+    const said = () => lab.page.locator('#stuck').isVisible();
+    assert.equal(await said(), false);
+    await lab.page.route('**/main.js*', (route) => route.abort());
+    await lab.page.reload();
+    await lab.until(said, 'nothing is said');
+    await lab.page.goto(pathToFileURL(path.join(PAGE, 'index.html')).href);
+    await lab.until(said, 'nothing is said');
+    assert.match(await lab.page.locator('#stuck').innerText(), /has to be served/);
+    await lab.close({ errors: true });
 });
 
 test('loading shows its progress', async () => {
