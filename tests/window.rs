@@ -624,6 +624,12 @@ fn the_accuracy_of_the_running_scene_stands_beside_the_controls() {
     let mut harness = window("spcmm");
     harness.get_by_label("Accuracy");
     harness.get_by_label("not measured yet");
+    // The preset that the scene runs with is named without having been chosen.
+    let preset = |harness: &Harness<'_, App>| {
+        let list = harness.get_by_role_and_label(Role::ComboBox, "Preset");
+        list.accesskit_node().value()
+    };
+    assert_eq!(preset(&harness).as_deref(), Some("real-time"));
     // Nothing has been hit yet, and nothing is said about impacts.
     assert!(harness.query_by_label("Steps in last impact").is_none());
     harness.state_mut().player_mut().run_to(9e-3);
@@ -647,6 +653,7 @@ fn the_accuracy_of_the_running_scene_stands_beside_the_controls() {
     player.set_playing(true);
     harness.run_steps(20);
     assert!(harness.query_by_label("not measured yet").is_none());
+    assert_eq!(preset(&harness).as_deref(), Some("own choice"));
 }
 
 #[test]
