@@ -155,7 +155,10 @@ fn every_impact_has_its_row() {
         assert!(entry["median_excess"].as_f64().unwrap().abs() < 0.2);
     }
 
-    let words = done(folder.path(), "run spcmm --duration 30ms");
+    let words = done(
+        folder.path(),
+        "run spcmm --duration 30ms --impacts words.csv",
+    );
     let said: Vec<&str> = words.lines().filter(|l| l.contains("than asked")).collect();
     assert!(!said.is_empty(), "{words}");
     for line in said {
