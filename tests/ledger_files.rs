@@ -155,6 +155,16 @@ fn every_impact_has_its_row() {
         assert!(entry["median_excess"].as_f64().unwrap().abs() < 0.2);
     }
 
+    let words = done(
+        folder.path(),
+        "run spcmm --duration 30ms --impacts words.csv",
+    );
+    let said: Vec<&str> = words.lines().filter(|l| l.contains("than asked")).collect();
+    assert!(!said.is_empty(), "{words}");
+    for line in said {
+        assert!(!line.contains(" -"), "a sign and a word: {line}");
+    }
+
     // As with rows: by the ending, whole, and over nothing that is there.
     done(folder.path(), &format!("{run} --impacts hits.csv"));
     let text = fs::read_to_string(folder.path().join("hits.csv")).unwrap();

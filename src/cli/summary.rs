@@ -160,8 +160,9 @@ pub fn text(
             let undisturbed = count(check.undisturbed as u64, "undisturbed impact");
             let story = match check.median_excess {
                 Some(excess) => format!(
-                    "{} more than asked for, median of {undisturbed}",
-                    significant(excess, 3)
+                    "{} {} than asked for, median of {undisturbed}",
+                    significant(excess.abs(), 3),
+                    if excess < 0.0 { "less" } else { "more" }
                 ),
                 None => undisturbed,
             };
