@@ -465,7 +465,7 @@ impl Mechanism {
         self.model.bodies[b].origin
     }
 
-    /// Allocates what [`StiffSystem::linearise`] needs, so that no step does.
+    /// Allocates what [`linearise`](crate::integrate::StiffSystem::linearise) needs, so that no step does.
     pub fn prepare_linearisation(&mut self) {
         if self.stiff.is_none() {
             let (dimension, positions) = (self.dimension(), self.positions());
@@ -478,7 +478,7 @@ impl Mechanism {
         }
     }
 
-    /// Allocates what [`ContactSystem`] needs, so that no step does.
+    /// Allocates what [`ContactSystem`](crate::integrate::ContactSystem) needs, so that no step does.
     pub fn prepare_implicit_contacts(&mut self) {
         if self.implicit.is_none() {
             let velocities = self.dimension() - self.positions();

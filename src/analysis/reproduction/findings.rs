@@ -11,13 +11,13 @@ use crate::analysis::response::Response;
 pub struct Findings {
     /// How much was computed.
     pub extent: Extent,
-    /// The paper's runs, in the order of [`CASES`].
+    /// The paper's runs, in the order of [`paper::CASES`].
     pub runs: Vec<Traced>,
     /// The first of them with all bodies and multipliers, and with ideal joints.
     pub lagrange: Traced,
     /// Ideal joints.
     pub ideal: Traced,
-    /// Settled curves, in the order of [`CASES`].
+    /// Settled curves, in the order of [`paper::CASES`].
     pub curves: Vec<Loop>,
     /// Sweeps: [`Findings::swathe`] finds one by name.
     pub swathes: Vec<Swathe>,

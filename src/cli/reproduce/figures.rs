@@ -583,7 +583,7 @@ fn probe(found: &Findings) -> Sheet {
         x: parameter(0),
         y: axis(PROBE.1, PROBE.2),
         series: vec![
-            line("largest", along("probe_error_max_um"), PALETTE[2]),
+            line("largest", along("probe_error_max_um"), PALETTE[4]),
             line("root mean square", along("probe_error_rms_um"), PALETTE[0]),
         ],
         ..Chart::default()
