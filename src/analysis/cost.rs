@@ -140,6 +140,8 @@ fn evaluation(
     let (t, y) = (simulation.time(), simulation.state());
     let mut mechanism =
         Mechanism::new(simulation.running_scene()).map_err(crate::simulate::StartError)?;
+    // Its rank is known from its start.
+    mechanism.start().map_err(crate::simulate::StartError)?;
     for j in 0..mechanism.contacts.len() {
         mechanism.contacts.memory_mut()[j] = simulation.contact_memory(j);
     }

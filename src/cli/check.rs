@@ -3,11 +3,12 @@
 use std::fmt::Write;
 
 use super::args::SceneArguments;
+use super::assembly::Start;
 use super::output::significant;
 use super::summary::count;
 use super::{Failure, load, print, provenance, start};
 use crate::contact::FrictionLaw;
-use crate::mechanism::{Mechanism, Summary};
+use crate::mechanism::Summary;
 use crate::scene::{BallJoint, Formulation, JointKind, Scene};
 use crate::simulate::{Frame, Simulation};
 
@@ -19,19 +20,23 @@ pub fn check(arguments: &SceneArguments) -> Result<(), Failure> {
     let scene = load(arguments)?;
     // Starting it finds what reading it cannot: joints that do not close, rods that do not reach.
     let mut simulation = start(&scene)?;
+    let begun = Start::of(&mut simulation);
     let mut frame = Frame::default();
     simulation.sample(0.0, &mut frame);
-    let contents = Mechanism::new(&scene)
-        .map_err(|error| Failure::usage(error.to_string()))?
-        .summary();
-    print(&report(&scene, &contents, &frame)?)
+    let contents = simulation.mechanism().summary();
+    print(&report(&scene, &contents, &begun, &frame)?)
 }
 
 fn is_ideal(joint: &BallJoint) -> bool {
     joint.contact.clearance == 0.0
 }
 
-fn report(scene: &Scene, contents: &Summary, start: &Frame) -> Result<String, Failure> {
+fn report(
+    scene: &Scene,
+    contents: &Summary,
+    begun: &Start,
+    start: &Frame,
+) -> Result<String, Failure> {
     let mut out = String::new();
     // Writing to a String cannot fail.
     let _ = writeln!(out, "{}: {}", scene.name, scene.title);
@@ -60,11 +65,24 @@ fn report(scene: &Scene, contents: &Summary, start: &Frame) -> Result<String, Fa
     for (joint, report) in scene.ball_joints.iter().zip(&start.joints) {
         line(
             &format!("  {}", joint.name),
-            &ball_joint(scene, joint, report.normal_force.norm())?,
+            &ball_joint(
+                scene,
+                joint,
+                report.normal_force.norm(),
+                !begun.reactions.contains(&joint.name),
+            )?,
         );
     }
+    begun
+        .lines
+        .iter()
+        .for_each(|(label, words)| line(label, words));
     line("Degrees of freedom", &freedoms(contents));
-    line("Constraint rows", &contents.constraint_rows.to_string());
+    line("Constraint rows", &rows(contents));
+    begun
+        .not_unique()
+        .iter()
+        .for_each(|words| line("Not unique", words));
     line(
         "Equations",
         &format!(
@@ -82,6 +100,7 @@ fn report(scene: &Scene, contents: &Summary, start: &Frame) -> Result<String, Fa
         .warnings()
         .iter()
         .chain(&near_singular(scene))
+        .chain(&begun.warnings)
         .for_each(|warning| line("Warning", warning));
     Ok(out)
 }
@@ -123,12 +142,18 @@ fn tree_joints(scene: &Scene) -> String {
     parts.join(", ")
 }
 
-fn ball_joint(scene: &Scene, joint: &BallJoint, force: f64) -> Result<String, Failure> {
+fn ball_joint(
+    scene: &Scene,
+    joint: &BallJoint,
+    force: f64,
+    unique: bool,
+) -> Result<String, Failure> {
     let contact = &joint.contact;
     if is_ideal(joint) {
         return Ok(format!(
-            "ideal; reaction at the start {} N",
-            significant(force, 6)
+            "ideal; reaction at the start {} N{}",
+            significant(force, 6),
+            if unique { "" } else { " (not unique)" }
         ));
     }
     let key = |key: &str| format!("joint.{}.{key}", joint.name);
@@ -154,10 +179,29 @@ fn freedoms(contents: &Summary) -> String {
     if rows == 0 {
         return free.to_string();
     }
+    let independent = match contents.dependent_rows {
+        0 => "",
+        _ => " independent",
+    };
     format!(
-        "{free} ({} velocity coordinates less {rows} constraint rows)",
-        contents.velocity_coordinates
+        "{free} ({} velocity coordinates less {}{independent} constraint rows)",
+        contents.velocity_coordinates,
+        rows - contents.dependent_rows,
     )
+}
+
+fn rows(contents: &Summary) -> String {
+    match contents.dependent_rows {
+        0 => contents.constraint_rows.to_string(),
+        1 => format!(
+            "{}, one of which the others imply",
+            contents.constraint_rows
+        ),
+        more => format!(
+            "{}, {more} of which the others imply",
+            contents.constraint_rows
+        ),
+    }
 }
 
 fn method(scene: &Scene) -> Result<String, Failure> {
@@ -194,10 +238,14 @@ fn work(scene: &Scene, contents: &Summary) -> (Vec<String>, Vec<String>) {
     };
     sort(
         contents.solves_differential_equation,
-        format!(
-            "differential equations of {} of freedom",
-            count(contents.degrees_of_freedom as u64, "degree")
-        ),
+        match contents.degrees_of_freedom as u64 {
+            // Whoever is a function of time alone, but not by as many rows as coordinates.
+            0 => "the motion that the drives prescribe, step by step, closed after each".to_owned(),
+            free => format!(
+                "differential equations of {} of freedom",
+                count(free, "degree")
+            ),
+        },
         "differential equations: nothing is free, the drives prescribe the motion",
     );
     sort(

@@ -1,6 +1,7 @@
 //! Command line: what is written there, what comes out, and with which exit code.
 
 mod args;
+mod assembly;
 mod bench;
 mod check;
 mod failure;

@@ -6,6 +6,7 @@ use indicatif::ProgressBar;
 use serde_json::{Value as Json, json};
 
 use super::args::{RunArguments, SummaryForm};
+use super::assembly::Start;
 use super::impacts::ImpactsFile;
 use super::output::{RowsFile, Table, check_size};
 use super::summary::{self, Status};
@@ -89,6 +90,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     };
     let scene = load(&arguments.scene)?;
     let mut simulation = start(&scene)?;
+    let begun = Start::of(&mut simulation);
     let mut frame = Frame::default();
     simulation.sample(0.0, &mut frame);
     let mut table = Table::new(&scene, &frame);
@@ -99,7 +101,9 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         if times.is_some_and(|times| !times.reach_the_end()) {
             warn("the duration is no whole number of intervals: the last row lies before the end");
         }
-        scene.warnings().iter().for_each(|warning| warn(warning));
+        let warnings = scene.warnings();
+        let all = warnings.iter().chain(&begun.warnings);
+        all.for_each(|warning| warn(warning));
     }
 
     interrupt::listen();
@@ -121,6 +125,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let found = impacts.as_ref().map(ImpactsFile::impacts);
     let mut facts = summary::json(&simulation, end.status, wall, found)?;
     let mut text = summary::text(&simulation, end.status, wall, found)?;
+    begun.describe(&mut facts, &mut text);
     facts.insert("rows".into(), json!(table.len()));
     let mut meta = facts.clone();
     // Files of the same run are the same, byte for byte: the machine's speed stays out of them.

@@ -1,9 +1,9 @@
 //! Ideal ball joints in tree coordinates: three rows each, (45), solved for their multipliers, and the projection that
 //! keeps closed loops closed.
 
-use super::factor::Skyline;
 use super::kinematics::Kinematics;
 use super::model::{BallJoint, BodyIndex, Model};
+use super::rows::RowSystem;
 use super::tree::{Tree, visit_columns};
 use crate::scene::Vec3;
 
@@ -22,7 +22,7 @@ pub struct Constraints {
     pairs: Vec<(usize, usize, usize, usize)>,
     jacobian: Vec<f64>,
     weighted: Vec<f64>,
-    matrix: Skyline,
+    matrix: RowSystem,
     /// Multipliers of the latest solve: force on the ball, N, three per joint.
     multipliers: Vec<f64>,
     scratch: Vec<f64>,
@@ -87,7 +87,7 @@ impl Constraints {
             pairs,
             jacobian: vec![0.0; total],
             weighted: vec![0.0; total],
-            matrix: Skyline::new(rows),
+            matrix: RowSystem::new(rows),
             multipliers: vec![0.0; 3 * joints.len()],
             scratch: vec![0.0; 3 * joints.len()],
             step: vec![0.0; model.nv],
@@ -105,6 +105,15 @@ impl Constraints {
     /// Whether the determinant of the Jacobian of the latest factorisation is positive, where it is square: its sign
     /// changes where the loops pass a singular pose.
     pub fn is_right_handed(&mut self, model: &Model) -> bool {
+        self.is_minor_positive(model, Some)
+    }
+
+    /// The same for as many rows as there are coordinates: `place` says where in the square a row goes.
+    pub fn is_minor_positive(
+        &mut self,
+        model: &Model,
+        place: impl Fn(usize) -> Option<usize>,
+    ) -> bool {
         let n = model.nv;
         let a = &mut self.square;
         a.resize(n * n, 0.0);
@@ -113,15 +122,47 @@ impl Constraints {
             for side in sides {
                 let first = model.blocks[side.block].v;
                 for i in 0..3 {
+                    let Some(at) = place(3 * k + i) else { continue };
                     let row = &self.jacobian[side.offset + i * side.n..][..side.n];
-                    let at = (3 * k + i) * n + first;
-                    for (a, j) in a[at..].iter_mut().zip(row) {
+                    for (a, j) in a[at * n + first..].iter_mut().zip(row) {
                         *a += j;
                     }
                 }
             }
         }
         super::factor::is_determinant_positive(a, n)
+    }
+
+    /// Treats rows as dependent from now on: at most `rank` of them count.
+    pub fn reveal(&mut self, rank: usize) {
+        let group = (0..self.rows()).map(|i| i - i % 3).collect();
+        self.matrix.reveal(rank, 0, group);
+        self.time = f64::NAN;
+    }
+
+    /// Whether rows are treated as dependent.
+    pub fn is_dependent(&self) -> bool {
+        self.matrix.is_dependent()
+    }
+
+    /// Number of independent rows: of the latest factorisation where rows are treated as dependent, else all.
+    pub fn rank(&self) -> usize {
+        self.matrix.rank()
+    }
+
+    /// Whether the reaction of the `k`-th joint is unique at the latest factorisation.
+    pub fn is_unique(&self, k: usize) -> bool {
+        self.matrix.is_unique(3 * k, 3)
+    }
+
+    /// The coupled rows.
+    pub fn system(&self) -> &RowSystem {
+        &self.matrix
+    }
+
+    /// Ball joints by their index in the scene.
+    pub fn joints(&self) -> &[usize] {
+        &self.joints
     }
 
     /// Number of rows.
@@ -273,7 +314,10 @@ impl Constraints {
                 }
             }
             // Newton converges quadratically: stop where another step only stirs rounding.
-            if largest <= 1e-15 || (largest < 1e-13 && largest >= 0.5 * error) || largest.is_nan() {
+            // Rows that depend on others leave what the parts' dimensions are off by.
+            let stirred = if self.is_dependent() { 1e-8 } else { 1e-13 };
+            if largest <= 1e-15 || (largest < stirred && largest >= 0.5 * error) || largest.is_nan()
+            {
                 error = largest;
                 break;
             }
@@ -291,7 +335,7 @@ impl Constraints {
         }
         self.prepare(model, tree, t, &y[..model.nq], &gravity);
         for (k, &j) in self.joints.iter().enumerate() {
-            let rate = relative(&model.joints[j], &tree.motion, Kinematics::point_velocity);
+            let rate = opening_rate(&model.joints[j], &tree.motion);
             for i in 0..3 {
                 self.multipliers[3 * k + i] = -rate[i];
             }
@@ -307,7 +351,8 @@ impl Constraints {
         error
     }
 
-    fn prepare(&mut self, model: &Model, tree: &mut Tree, t: f64, q: &[f64], gravity: &Vec3) {
+    /// Jacobians and J M^-1 J^T, factored, for a tree that has been moved forward to (t, q).
+    pub fn prepare(&mut self, model: &Model, tree: &mut Tree, t: f64, q: &[f64], gravity: &Vec3) {
         if self.is_factored(t, q) {
             return;
         }
@@ -323,6 +368,11 @@ pub fn eccentricity(joint: &BallJoint, motion: &[Kinematics]) -> Vec3 {
     let at =
         |a: &super::model::Anchor| motion[a.body].position + motion[a.body].rotation * a.offset;
     at(&joint.ball) - at(&joint.socket)
+}
+
+/// d(Z_j - Z_i)/dt, m/s.
+pub fn opening_rate(joint: &BallJoint, motion: &[Kinematics]) -> Vec3 {
+    relative(joint, motion, Kinematics::point_velocity)
 }
 
 /// Ball's minus socket's `rate` at the centres.

@@ -231,6 +231,22 @@ impl Skyline {
         self.values[self.offset[i] + j - self.first[i]] += value;
     }
 
+    /// Entry (i, j), j <= i, before [`Self::factor`]; 0 outside the envelope.
+    pub fn get(&self, i: usize, j: usize) -> f64 {
+        if j < self.first[i] {
+            0.0
+        } else {
+            self.values[self.offset[i] + j - self.first[i]]
+        }
+    }
+
+    /// Diagonal entry i as it was, and its pivot, after [`Self::factor`].
+    pub fn diagonal_and_pivot(&self, i: usize) -> (f64, f64) {
+        let row = &self.values[self.offset[i]..][..=i - self.first[i]];
+        let pivot = self.get(i, i) * self.get(i, i);
+        (row.iter().map(|l| l * l).sum(), pivot)
+    }
+
     /// Factors in place. Returns the smallest ratio of a pivot to its diagonal entry: at rounding level or below, rows
     /// depend on one another.
     pub fn factor(&mut self) -> f64 {

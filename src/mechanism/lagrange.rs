@@ -4,9 +4,9 @@
 //! The KKT system (55) is solved by its Schur complement J M^-1 J^T. Allocates nothing after `new`.
 
 use super::contacts::Contacts;
-use super::factor::Skyline;
 use super::kinematics::{self, Driven, Kinematics, Wrench};
 use super::model::{BodyIndex, Model, Motion};
+use super::rows::RowSystem;
 use crate::scene::{JointKind, Mat3, Scene, Vec3};
 
 /// Baumgarte parameters of the paper: Phi'' + 2 alpha Phi' + beta^2 Phi = 0, 1/s.
@@ -77,7 +77,7 @@ pub struct Lagrange {
     group_of: Vec<usize>,
     /// Rows that share a body with a row, at or before it.
     pairs: Vec<(usize, usize)>,
-    matrix: Skyline,
+    matrix: RowSystem,
     multipliers: Vec<f64>,
     residual: Vec<f64>,
     inverse_inertia: Vec<Mat3>,
@@ -224,7 +224,7 @@ impl Lagrange {
             rows: vec![empty; rows],
             group_of,
             pairs,
-            matrix: Skyline::new(first),
+            matrix: RowSystem::new(first),
             multipliers: vec![0.0; rows],
             residual: vec![0.0; rows],
             inverse_inertia: vec![Mat3::zeros(); n],
@@ -237,6 +237,29 @@ impl Lagrange {
     /// Constraint rows.
     pub fn row_count(&self) -> usize {
         self.rows.len()
+    }
+
+    /// Treats rows as dependent from now on, where of those of the ideal ball joints only `rank` count.
+    pub fn reveal(&mut self, rank: usize) {
+        let balls = self.ideal_row.first().copied().unwrap_or(self.rows.len());
+        let group = |&g: &usize| self.groups[g].first;
+        let group = self.group_of.iter().map(group).collect();
+        self.matrix.reveal(balls + rank, balls, group);
+    }
+
+    /// Independent rows.
+    pub fn rank(&self) -> usize {
+        self.matrix.rank()
+    }
+
+    /// Whether the reaction of the `k`-th ideal joint is unique at the latest evaluation.
+    pub fn is_reaction_unique(&self, k: usize) -> bool {
+        self.matrix.is_unique(self.ideal_row[k], 3)
+    }
+
+    /// Whether the actuator force of a driven coordinate is.
+    pub fn is_actuator_unique(&self, drive: usize) -> bool {
+        self.matrix.is_unique(self.driver_row[drive], 1)
     }
 
     /// Absolute scale of each component of (positions, velocities).

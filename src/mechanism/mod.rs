@@ -14,7 +14,9 @@ mod lagrange;
 mod lu;
 mod model;
 mod power;
+mod rows;
 mod spcmm;
+mod start;
 mod stiff;
 mod summary;
 mod systems;
@@ -25,17 +27,15 @@ pub use jet::Jet;
 pub use kinematics::{Kinematics, Wrench};
 pub use power::Powers;
 pub use spcmm::{Ideal, Trajectory, Unreachable};
+pub use start::{Assembly, Placement};
 pub use summary::Summary;
 
 use crate::integrate::System;
-use crate::scene::{Formulation, Scene, StartRule, Vec3};
+use crate::scene::{Formulation, Scene, Vec3, format_quantity_digits};
 use constraints::Constraints;
 use lagrange::Lagrange;
-use model::{Model, Motion};
+use model::Model;
 use tree::Tree;
-
-/// Smallest pivot ratio at which a start still has its velocities to three digits.
-const DEPENDENT_ROWS: f64 = 1e-13;
 
 /// Why a scene's equations cannot be set up.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -43,20 +43,49 @@ pub enum MechanismError {
     /// A rod cannot reach its slider somewhere along the trajectory.
     #[error("{0}")]
     Unreachable(#[from] Unreachable),
-    /// An ideal ball joint, or one that is to start concentric, is open at the start.
+    /// An ideal ball joint that the scene's values leave open, where they are to stand as given.
     #[error(
-        "ball joint {joint}: ball and socket centres are {distance:.3e} m apart at the start and cannot be closed"
+        "ball joint {joint}: ball and socket centres are {} apart as given, and an ideal joint may be open by at most {}: \
+         correct the start values, or let start = \"ideal\" close it",
+        length(*.given), length(OPEN_AS_GIVEN)
     )]
     Open {
         /// Name of the joint.
         joint: String,
-        /// |Z_j - Z_i|, m.
-        distance: f64,
+        /// |Z_j - Z_i| as the scene gives it, m.
+        given: f64,
+    },
+    /// Loops that no pose near the guess closes.
+    #[error(
+        "ball joint {joint}: ball and socket centres are {} apart as given and cannot be closed{}",
+        length(*.given), unclosed(.stays)
+    )]
+    NoClosure {
+        /// Name of the joint that is widest open as given.
+        joint: String,
+        /// |Z_j - Z_i| as the scene gives it, m.
+        given: f64,
+        /// Where assembling came to rest with joints open: their names and Z_j - Z_i, m, world axes. No motion that the
+        /// mechanism has makes these smaller. Empty where it came to no rest.
+        stays: Vec<(String, Vec3)>,
+    },
+    /// Loops that close, but whose drives tear them apart at once.
+    #[error(
+        "ball joint {joint}: the drives ask for speeds at which it opens at {} along {}; no motion that the mechanism has \
+         follows both",
+        speed(.rate.norm()), axes(.rate)
+    )]
+    Torn {
+        /// Name of the joint.
+        joint: String,
+        /// d(Z_j - Z_i)/dt, m/s, world axes.
+        rate: Vec3,
     },
     /// A ball that starts deeper in its socket wall than a contact can mean.
     #[error(
-        "ball joint {joint}: ball and socket centres are {distance:.3e} m apart at the start, \
-         deeper in the wall than the clearance {clearance:.3e} m and a hundredth of the ball radius allow"
+        "ball joint {joint}: ball and socket centres are {} apart as given, \
+         deeper in the wall than the clearance {} and a hundredth of the ball radius allow",
+        length(*.distance), length(*.clearance)
     )]
     OutsideSocket {
         /// Name of the joint.
@@ -88,9 +117,51 @@ pub enum MechanismError {
         /// Most that are taken.
         most: usize,
     },
-    /// Ideal joints whose rows depend on one another.
-    #[error("the ideal ball joints over-constrain the mechanism: give one of them a clearance")]
-    Redundant,
+    /// A start pose in which constraints lose their independence that have it in every pose around.
+    #[error(
+        "the mechanism starts in a singular pose: at {joints} directions that the ideal joints hold elsewhere coincide here, \
+         and the motion could go on in more than one way; start it beside that pose"
+    )]
+    Branching {
+        /// Names of the joints.
+        joints: String,
+    },
+}
+
+/// An ideal joint may be open by this much where values stand as given, m.
+const OPEN_AS_GIVEN: f64 = 1e-5;
+
+fn length(si: f64) -> String {
+    format_quantity_digits(si, if si < 1.0 { "mm" } else { "m" }, 4)
+}
+
+fn speed(si: f64) -> String {
+    format_quantity_digits(si, "m/s", 4)
+}
+
+/// World axes that a vector has a part along: `x and z`.
+fn axes(vector: &Vec3) -> String {
+    let largest = vector.amax();
+    let named = ["x", "y", "z"].into_iter().zip(vector.iter());
+    let named = named.filter(|(_, part)| part.abs() > 0.05 * largest);
+    named
+        .map(|(axis, _)| axis)
+        .collect::<Vec<_>>()
+        .join(" and ")
+}
+
+fn unclosed(stays: &[(String, Vec3)]) -> String {
+    if stays.is_empty() {
+        return ": the parts do not reach, or the guess is too far off".to_owned();
+    }
+    let each = |(joint, gap): &(String, Vec3)| {
+        format!("{joint} by {} along {}", length(gap.norm()), axes(gap))
+    };
+    let each: Vec<String> = stays.iter().map(each).collect();
+    format!(
+        ": what stays open is {}, where no joint of the mechanism moves",
+        each.join(", ")
+    )
 }
 
 enum Form {
@@ -117,6 +188,7 @@ pub struct Mechanism {
     evaluated: f64,
     /// Made where contacts alone are stepped implicitly.
     implicit: Option<Box<implicit::ImplicitContacts>>,
+    assembly: Assembly,
     /// Evaluations of the equations of motion so far.
     pub evaluations: u64,
 }
@@ -150,88 +222,9 @@ impl Mechanism {
             joint_names: scene.ball_joints.iter().map(|j| j.name.clone()).collect(),
             stiff: None,
             implicit: None,
+            assembly: Assembly::default(),
             evaluations: 0,
         })
-    }
-
-    /// State at t = 0: positions, then velocities.
-    ///
-    /// # Errors
-    /// Ball joints that do not close.
-    pub fn start(&mut self) -> Result<Vec<f64>, MechanismError> {
-        const T: f64 = 0.0;
-        let model = &self.model;
-        let mut tree = Tree::new(model);
-        let mut y = model.start_state.clone();
-        if model.start == StartRule::Ideal
-            && let Some(trajectory) = &model.trajectory
-        {
-            place_output_body(model, trajectory, &mut y);
-            tree.forward(model, T, &y);
-            turn_hinges(model, &tree.motion, &mut y);
-        }
-        let all: Vec<usize> = match model.start {
-            StartRule::Ideal => (0..model.joints.len()).collect(),
-            StartRule::AsGiven => model.ideal_joints.clone(),
-        };
-        tree.forward(model, T, &y);
-        let distance = |tree: &Tree, j: usize| {
-            constraints::eccentricity(&model.joints[j], &tree.motion).norm()
-        };
-        for j in 0..model.joints.len() {
-            let d = distance(&tree, j);
-            let coefficients = self.contacts.coefficients(j);
-            let clearance = self.contacts.clearance(j);
-            if all.contains(&j) {
-                // Newton starts from the scene's guess: anything like closed will do for an assembled start.
-                let limit = if model.start == StartRule::Ideal {
-                    f64::INFINITY
-                } else {
-                    1e-5
-                };
-                if d > limit {
-                    return Err(MechanismError::Open {
-                        joint: self.joint_names[j].clone(),
-                        distance: d,
-                    });
-                }
-            } else if d > clearance + 0.01 * coefficients.ball_radius {
-                return Err(MechanismError::OutsideSocket {
-                    joint: self.joint_names[j].clone(),
-                    distance: d,
-                    clearance,
-                });
-            }
-        }
-        if !all.is_empty() {
-            let mut constraints = Constraints::new(model, &all);
-            let error = constraints.project(model, &mut tree, T, &mut y);
-            tree.forward(model, T, &y);
-            if !(error <= 1e-9) {
-                let worst = all
-                    .iter()
-                    .copied()
-                    .max_by(|&a, &b| distance(&tree, a).total_cmp(&distance(&tree, b)));
-                let joint = worst.unwrap_or(0);
-                let distance = distance(&tree, joint);
-                return Err(MechanismError::Open {
-                    joint: self.joint_names[joint].clone(),
-                    distance,
-                });
-            }
-            if constraints.least_pivot < DEPENDENT_ROWS {
-                return Err(match model.start {
-                    StartRule::AsGiven => MechanismError::Redundant,
-                    StartRule::Ideal => MechanismError::Singular,
-                });
-            }
-        }
-        Tree::normalise(model, &mut y);
-        if let Form::Lagrange(_) = self.form {
-            tree.forward(model, T, &y);
-            y = Lagrange::state_of(&tree.motion, model.bodies.len());
-        }
-        Ok(y)
     }
 
     /// Whether positions and velocities are projected back onto constraints after a step.
@@ -249,7 +242,8 @@ impl Mechanism {
     pub fn is_kinematic(&self) -> bool {
         match &self.form {
             Form::Tree { constraints, .. } => {
-                self.model.nv == constraints.as_ref().map_or(0, |c| c.rows())
+                let rows = constraints.as_ref().filter(|c| !c.is_dependent());
+                self.model.nv == rows.map_or(0, |c| c.rows())
             }
             Form::Lagrange(_) => false,
         }
@@ -389,6 +383,23 @@ impl Mechanism {
         }
     }
 
+    /// Whether the reaction of joint `j` is the only one that fits the motion, at the latest evaluation. Where ideal joints
+    /// hold a direction that others hold already, [`Self::reaction`] is the one of least squares over all ideal joints.
+    pub fn is_reaction_unique(&self, j: usize) -> bool {
+        self.model.joints[j].ideal.is_none_or(|k| match &self.form {
+            Form::Tree { constraints, .. } => constraints.as_ref().is_none_or(|c| c.is_unique(k)),
+            Form::Lagrange(lagrange) => lagrange.is_reaction_unique(k),
+        })
+    }
+
+    /// Independent rows among those of the ideal joints' constraints (in `lagrange`, of all joints').
+    pub fn rank(&self) -> usize {
+        match &self.form {
+            Form::Tree { constraints, .. } => constraints.as_ref().map_or(0, |c| c.rank()),
+            Form::Lagrange(lagrange) => lagrange.rank(),
+        }
+    }
+
     /// Largest constraint violation at the latest evaluation of the `lagrange` form, m or rad; 0 in the `tree` form.
     pub fn constraint_drift(&self) -> f64 {
         match &self.form {
@@ -434,7 +445,7 @@ impl Mechanism {
             }
             Form::Tree { tree, constraints } => {
                 if let Some(constraints) = constraints {
-                    load_reactions(model, tree, constraints);
+                    load_reactions(model, tree, |k| constraints.reaction(k));
                 }
                 let Tree { motion, wrench, .. } = &mut **tree;
                 power::inverse_dynamics(
@@ -503,46 +514,8 @@ impl Mechanism {
     }
 }
 
-/// Puts the free output body where the ideal mechanism has it at t = 0, so that assembling has little left to do.
-fn place_output_body(model: &Model, trajectory: &Trajectory, y: &mut [f64]) {
-    let ideal = trajectory.at(0.0);
-    let body = &model.bodies[model.output_body];
-    if let Motion::Free { q, v } = body.motion {
-        let to_centroid = -(ideal.rotation * body.origin);
-        let position = Vec3::from_fn(|i, _| ideal.position[i].value) + to_centroid;
-        let rotation = kinematics::quaternion_of(&ideal.rotation);
-        y[q..q + 3].copy_from_slice(position.as_slice());
-        y[q + 3..q + 7].copy_from_slice(&[rotation.w, rotation.i, rotation.j, rotation.k]);
-        let velocity = Vec3::from_fn(|i, _| ideal.position[i].rate)
-            + ideal.angular_velocity.cross(&to_centroid);
-        let v = model.nq + v;
-        y[v..v + 3].copy_from_slice(velocity.as_slice());
-        y[v + 3..v + 6].copy_from_slice(ideal.angular_velocity.as_slice());
-    }
-}
-
-/// Turns every hinged body that carries a ball until the ball comes closest to its socket, so that loops close on the
-/// branch that the closed form means.
-fn turn_hinges(model: &Model, motion: &[Kinematics], y: &mut [f64]) {
-    for joint in &model.joints {
-        let motion_of = |b: usize| model.bodies.get(b).map(|body| body.motion);
-        let Some(Motion::Revolute { q, .. }) = motion_of(joint.ball.body) else {
-            continue;
-        };
-        let body = &motion[joint.ball.body];
-        let hinge = body.position - body.arm;
-        let centre = |a: &model::Anchor| {
-            motion[a.body].position + motion[a.body].rotation * a.offset - hinge
-        };
-        let (ball, socket, axis) = (centre(&joint.ball), centre(&joint.socket), body.axis);
-        let sine = axis.dot(&ball.cross(&socket));
-        let cosine = ball.dot(&socket) - axis.dot(&ball) * axis.dot(&socket);
-        y[q] += libm::atan2(sine, cosine);
-    }
-}
-
-/// Adds the reactions of the ideal joints to the loads on the bodies.
-fn load_reactions(model: &Model, tree: &mut Tree, constraints: &Constraints) {
+/// Adds reactions of the ideal joints, by their order, to the loads on the bodies.
+fn load_reactions(model: &Model, tree: &mut Tree, reaction: impl Fn(usize) -> Vec3) {
     let mut load = |anchor: &model::Anchor, force: Vec3| {
         let arm = tree.motion[anchor.body].rotation * anchor.offset;
         let w = &mut tree.wrench[anchor.body];
@@ -550,7 +523,7 @@ fn load_reactions(model: &Model, tree: &mut Tree, constraints: &Constraints) {
         w.torque += arm.cross(&force);
     };
     for (k, &j) in model.ideal_joints.iter().enumerate() {
-        let force = constraints.reaction(k);
+        let force = reaction(k);
         load(&model.joints[j].ball, force);
         load(&model.joints[j].socket, -force);
     }

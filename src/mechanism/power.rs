@@ -181,7 +181,7 @@ impl Mechanism {
                 if all {
                     tree.accelerate(model, y, &dy[model.nq..]);
                     if let Some(constraints) = constraints {
-                        load_reactions(model, tree, constraints);
+                        load_reactions(model, tree, |k| constraints.reaction(k));
                     }
                 }
                 let rates = &tree.driven.coordinates;

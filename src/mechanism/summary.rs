@@ -17,6 +17,8 @@ pub struct Summary {
     pub position_coordinates: usize,
     /// Constraint rows of the formulation.
     pub constraint_rows: usize,
+    /// Of these, rows that others imply; known once the mechanism was assembled.
+    pub dependent_rows: usize,
     /// Degrees of freedom left.
     pub degrees_of_freedom: usize,
     /// Ideal ball joints.
@@ -56,7 +58,8 @@ impl Summary {
             velocity_coordinates,
             position_coordinates,
             constraint_rows,
-            degrees_of_freedom: velocity_coordinates.saturating_sub(constraint_rows),
+            dependent_rows: constraint_rows - mechanism.rank(),
+            degrees_of_freedom: velocity_coordinates.saturating_sub(mechanism.rank()),
             ideal_joints: model.ideal_joints.len(),
             frictional_contacts: contacts
                 .iter()

@@ -22,7 +22,7 @@ pub use pace::{LARGEST_BUDGET, LONGEST_FRAME, Pacer, SCALE_RANGE};
 pub use simulation::{CLEARANCE_SPEED, Simulation};
 
 use crate::mechanism::MechanismError;
-use crate::scene::{BallJoint, Scene, SceneError};
+use crate::scene::{Scene, SceneError};
 
 /// Why a simulation could not start.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -44,7 +44,9 @@ impl StartError {
             MechanismError::Unreachable(_)
             | MechanismError::OtherBranch
             | MechanismError::Singular => ("spcmm".to_owned(), vec!["spcmm.".to_owned()]),
-            MechanismError::Open { joint, .. } => one(joint, &["clearance"]),
+            MechanismError::Open { joint, .. }
+            | MechanismError::NoClosure { joint, .. }
+            | MechanismError::Torn { joint, .. } => one(joint, &["clearance"]),
             MechanismError::OutsideSocket { joint, .. } => {
                 one(joint, &["clearance", "ball_radius"])
             }
@@ -52,10 +54,8 @@ impl StartError {
                 let keys = ["solver.method", "chain.links", "formulation"];
                 (keys[0].to_owned(), keys.map(str::to_owned).to_vec())
             }
-            MechanismError::Redundant => {
-                let ideal = |joint: &&BallJoint| joint.contact.clearance == 0.0;
-                let last = scene.ball_joints.iter().rfind(ideal);
-                one(last.map_or("", |joint| &joint.name), &["clearance"])
+            MechanismError::Branching { joints } => {
+                one(joints.split(", ").next().unwrap_or(""), &["clearance"])
             }
         };
         scene.start_error(&title, &keys, self.to_string())
@@ -81,6 +81,16 @@ pub enum Effect {
     Now,
     /// At the next reset.
     AtReset,
+}
+
+/// Forces that the motion does not fix, because ideal joints hold a direction that others hold already: those reported are
+/// the reactions with the least sum of squares, and what follows from them.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct NotUnique {
+    /// Ball joints, by index.
+    pub reactions: Vec<usize>,
+    /// Actuators, by index among the driven joints.
+    pub actuators: Vec<usize>,
 }
 
 /// Counters since the last reset.

@@ -15,7 +15,7 @@ use super::impacts::{Impact, Impacts};
 use super::ledger::Account;
 use super::peaks::{Approach, Recent};
 use super::stepper::AnyStepper;
-use super::{Frame, Peak, StartError, Statistics, Stopped, report};
+use super::{Frame, NotUnique, Peak, StartError, Statistics, Stopped, report};
 use crate::contact::Slip;
 use crate::integrate::{Controller, System, hermite};
 use crate::mechanism::{Mechanism, MechanismError, Memory, Ramp, Switching};
@@ -523,6 +523,22 @@ impl Simulation {
         report::fill(mechanism, &self.running, time, out);
         (mechanism.evaluations, mechanism.contacts.evaluations) = counts;
         out.ledger = self.ledger_of(out);
+    }
+
+    /// Forces at the latest state that the motion does not fix.
+    pub fn not_unique(&mut self) -> NotUnique {
+        self.sample(self.state.t, &mut Frame::default());
+        let Self {
+            mechanism, state, ..
+        } = self;
+        NotUnique {
+            reactions: (0..state.gaps.len())
+                .filter(|&j| !mechanism.is_reaction_unique(j))
+                .collect(),
+            actuators: (0..mechanism.drives())
+                .filter(|&i| !mechanism.is_actuator_unique(i))
+                .collect(),
+        }
     }
 
     /// State at the part `theta` of the latest step, of size `h`, into the scratch state, as the method interpolates it.

@@ -1,0 +1,199 @@
+//! What assembling the start made of a scene's values, and which forces are not unique: in words and as JSON.
+
+use std::fmt::Write;
+
+use serde_json::{Map, Value as Json, json};
+
+use super::output::significant;
+use crate::mechanism::Placement;
+use crate::scene::format_quantity_digits;
+use crate::simulate::Simulation;
+
+/// Moved or turned by more than this, a body is not where its scene says: m, rad.
+const FAR: Placement = Placement {
+    moved: 5e-3,
+    turned: 5.0 * DEGREE,
+};
+
+/// Moved and turned by less than this a body counts as not moved: m, rad.
+const NEAR: Placement = Placement {
+    moved: 1e-6,
+    turned: 1e-3 * DEGREE,
+};
+
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
+
+fn exceeds(a: &Placement, b: &Placement) -> bool {
+    a.moved > b.moved || a.turned > b.turned
+}
+
+fn words(placement: &Placement) -> String {
+    format!(
+        "moved {} mm, turned {}°",
+        significant(placement.moved * 1e3, 4),
+        significant(placement.turned / DEGREE, 4)
+    )
+}
+
+/// Label and text of each line about the assembly.
+fn lines(simulation: &Simulation) -> Vec<(String, String)> {
+    let scene = simulation.scene();
+    let assembly = simulation.mechanism().assembly();
+    let Some((joint, gap)) = assembly.widest else {
+        return vec![(
+            "Assembly".to_owned(),
+            "none: no joint starts closed".to_owned(),
+        )];
+    };
+    let guess = if assembly.closed_form {
+        "in the drives' closed form"
+    } else {
+        "as given"
+    };
+    let mode = if assembly.other_mode {
+        "; another assembly mode than the guess's"
+    } else {
+        ""
+    };
+    let gap = if gap > NEAR.moved {
+        let joint = &scene.ball_joints[joint].name;
+        format!(
+            "largest gap {guess} {} at {joint}",
+            format_quantity_digits(gap, "mm", 4)
+        )
+    } else {
+        format!("no gap {guess}")
+    };
+    let mut lines = vec![("Assembly".to_owned(), gap + mode)];
+    let bodies = || scene.bodies.iter().zip(&assembly.bodies);
+    for (body, placement) in bodies().filter(|(_, p)| exceeds(p, &NEAR)) {
+        lines.push((format!("  {}", body.name), words(placement)));
+    }
+    let still = bodies().filter(|(_, p)| !exceeds(p, &NEAR)).count();
+    if still > 0 {
+        let who = if still == scene.bodies.len() {
+            "  every body"
+        } else {
+            "  every other body"
+        };
+        let text = "moved less than 0.001 mm, turned less than 0.001°";
+        lines.push((who.to_owned(), text.to_owned()));
+    }
+    lines
+}
+
+/// What of the assembly is hardly what the scene means.
+fn warnings(simulation: &Simulation) -> Vec<String> {
+    let scene = simulation.scene();
+    let assembly = simulation.mechanism().assembly();
+    let far = scene.bodies.iter().zip(&assembly.bodies);
+    let far = far.filter(|(_, placement)| exceeds(placement, &FAR));
+    let far: Vec<String> = far
+        .map(|(body, placement)| format!("{} {}", body.name, words(placement)))
+        .collect();
+    let mut warnings = Vec::new();
+    if !far.is_empty() {
+        let gap = assembly.widest.map_or_else(String::new, |(joint, gap)| {
+            format!(
+                " {} was {} open.",
+                scene.ball_joints[joint].name,
+                format_quantity_digits(gap, "mm", 4)
+            )
+        });
+        warnings.push(format!(
+            "assembling the start took bodies far from where the scene has them: {}.{gap} Look for a wrong axis, point or \
+             start value.",
+            far.join("; ")
+        ));
+    }
+    if assembly.other_mode {
+        warnings.push(
+            "the loops closed in another assembly mode than that of the start values: a singular pose lies between them."
+                .to_owned(),
+        );
+    }
+    warnings
+}
+
+/// What is known at the start about a scene that is about to run.
+pub struct Start {
+    /// Label and text of each line about the assembly.
+    pub lines: Vec<(String, String)>,
+    /// What of the assembly is hardly what the scene means.
+    pub warnings: Vec<String>,
+    /// Ideal ball joints whose reactions are not unique.
+    pub reactions: Vec<String>,
+    /// Driven joints whose actuator forces are not unique.
+    pub actuators: Vec<String>,
+    assembly: Json,
+}
+
+impl Start {
+    /// Of a simulation at its start.
+    pub fn of(simulation: &mut Simulation) -> Self {
+        let loose = simulation.not_unique();
+        let scene = simulation.scene();
+        let driven = scene.joints.iter().filter(|joint| joint.drive.is_some());
+        let driven: Vec<&String> = driven.map(|joint| &joint.name).collect();
+        let reactions = loose.reactions.iter();
+        Self {
+            lines: lines(simulation),
+            warnings: warnings(simulation),
+            reactions: reactions
+                .map(|&j| scene.ball_joints[j].name.clone())
+                .collect(),
+            actuators: loose.actuators.iter().map(|&i| driven[i].clone()).collect(),
+            assembly: json(simulation),
+        }
+    }
+
+    /// That forces are not unique, where some are not.
+    pub fn not_unique(&self) -> Option<String> {
+        if self.reactions.is_empty() {
+            return None;
+        }
+        let actuators = if self.actuators.is_empty() {
+            String::new()
+        } else {
+            format!(", and of the actuators at {}", self.actuators.join(", "))
+        };
+        Some(format!(
+            "forces at {}{actuators}: joints hold the same direction more than once; given are the reactions of least squares",
+            self.reactions.join(", ")
+        ))
+    }
+
+    /// Adds all of it to the summary of a run.
+    pub fn describe(&self, facts: &mut Map<String, Json>, text: &mut String) {
+        facts.insert("assembly".into(), self.assembly.clone());
+        let loose = json!({"reactions": self.reactions, "actuators": self.actuators});
+        facts.insert("not_unique".into(), loose);
+        let loose = self
+            .not_unique()
+            .map(|words| ("Not unique".to_owned(), words));
+        for (label, words) in self.lines.iter().chain(&loose) {
+            // Writing to a String cannot fail.
+            let _ = writeln!(text, "{label:<18}{words}");
+        }
+    }
+}
+
+/// The assembly for a script: m and rad.
+fn json(simulation: &Simulation) -> Json {
+    let scene = simulation.scene();
+    let assembly = simulation.mechanism().assembly();
+    let bodies = scene.bodies.iter().zip(&assembly.bodies);
+    let bodies: Map<String, Json> = bodies
+        .map(|(body, p)| {
+            let placement = json!({"moved_m": p.moved, "turned_rad": p.turned});
+            (body.name.clone(), placement)
+        })
+        .collect();
+    let widest = assembly.widest;
+    json!({
+        "largest_gap_joint": widest.map(|(joint, _)| &scene.ball_joints[joint].name),
+        "largest_gap_m": widest.map(|(_, gap)| gap),
+        "other_mode": assembly.other_mode,
+        "bodies": bodies,
+    })
+}

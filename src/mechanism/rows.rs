@@ -1,0 +1,393 @@
+//! The symmetric system J M^-1 J^T of constraint rows. Plain Cholesky where the rows are independent; where they are not
+//! (a planar loop closed by a ball joint, two ball joints that make a hinge), Cholesky with pivoting up to the rank.
+
+use super::factor::Skyline;
+
+/// Scaled pivots at or below this are rounding.
+const ROUNDING: f64 = 1e-12;
+/// Part of a null vector's largest component below which a row has no part in it.
+const NO_PART: f64 = 1e-7;
+
+/// Constraint rows, coupled.
+pub struct RowSystem {
+    skyline: Skyline,
+    dependent: Option<Box<Dependent>>,
+}
+
+impl RowSystem {
+    /// For rows that begin at columns `first`.
+    pub fn new(first: Vec<usize>) -> Self {
+        Self {
+            skyline: Skyline::new(first),
+            dependent: None,
+        }
+    }
+
+    /// Treats the rows as dependent from now on: at most `rank` of them count. Of the multipliers that fit, those from
+    /// `counted` on are the smallest in the sum of squares. Rows from `group[i]` on have the same unit as row i.
+    pub fn reveal(&mut self, rank: usize, counted: usize, group: Vec<usize>) {
+        self.dependent = Some(Box::new(Dependent::new(rank, counted, group)));
+    }
+
+    /// Number of independent rows: as found at the latest factorisation where they are treated as dependent, else all.
+    pub fn rank(&self) -> usize {
+        let all = self.skyline.len();
+        self.dependent.as_ref().map_or(all, |rows| rows.rank)
+    }
+
+    /// Whether rows are treated as dependent.
+    pub fn is_dependent(&self) -> bool {
+        self.dependent.is_some()
+    }
+
+    /// Independent rows of the latest factorisation, in ascending order.
+    pub fn independent(&self) -> Vec<usize> {
+        match &self.dependent {
+            None => (0..self.skyline.len()).collect(),
+            Some(rows) => {
+                let mut kept = rows.order[..rows.rank].to_vec();
+                kept.sort_unstable();
+                kept
+            }
+        }
+    }
+
+    /// Multipliers, one set for each dropped row, that load nothing: any amount of them may be added to a solution.
+    pub fn idle_multipliers(&self) -> impl Iterator<Item = &[f64]> {
+        let rows = self.dependent.iter();
+        rows.flat_map(|rows| rows.null.chunks_exact(rows.n).take(rows.n - rows.rank))
+    }
+
+    /// Whether the multipliers of rows `first..first + count` are unique.
+    pub fn is_unique(&self, first: usize, count: usize) -> bool {
+        self.idle_multipliers().all(|null| {
+            let largest = null.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+            let own = null[first..first + count].iter();
+            own.fold(0.0_f64, |most, x| most.max(x.abs())) <= NO_PART * largest
+        })
+    }
+
+    /// Forgets all values.
+    #[inline]
+    pub fn clear(&mut self) {
+        self.skyline.clear();
+    }
+
+    /// Adds to entry (i, j), j <= i.
+    #[inline]
+    pub fn add(&mut self, i: usize, j: usize, value: f64) {
+        self.skyline.add(i, j, value);
+    }
+
+    /// Factors in place. Returns the smallest pivot ratio, without the rows that are known to depend on others: near
+    /// rounding level, more of them do.
+    #[inline]
+    pub fn factor(&mut self) -> f64 {
+        match &mut self.dependent {
+            None => self.skyline.factor(),
+            Some(rows) => rows.factor(&self.skyline),
+        }
+    }
+
+    /// After a plain factorisation: the smallest ratio of a pivot to the largest diagonal entry of `count` rows that
+    /// belong together. A row that is zero but for rounding has a ratio of its own that says nothing.
+    pub fn least_joint_pivot(&self, count: usize) -> f64 {
+        let mut least = f64::INFINITY;
+        for first in (0..self.skyline.len()).step_by(count) {
+            let rows = || (first..first + count).map(|i| self.skyline.diagonal_and_pivot(i));
+            let largest = rows().map(|(diagonal, _)| diagonal).fold(0.0, f64::max);
+            for (_, pivot) in rows() {
+                let ratio = pivot / largest;
+                if !(ratio >= least) {
+                    least = if ratio.is_nan() { 0.0 } else { ratio };
+                }
+            }
+        }
+        least
+    }
+
+    /// Solves A x = b in place.
+    #[inline]
+    pub fn solve(&mut self, x: &mut [f64]) {
+        match &mut self.dependent {
+            None => self.skyline.solve(x),
+            Some(rows) => rows.solve(x),
+        }
+    }
+}
+
+/// Rows of which some depend on others. With S A S scaled to diagonal entries of 1 at most and P its pivot order,
+/// P^T S A S P = L L^T over the first `rank` columns; the rows left over give the null vectors of A.
+struct Dependent {
+    n: usize,
+    /// Most rows that may count: near the constraints, but not on them, more seem to be independent.
+    most: usize,
+    counted: usize,
+    group: Vec<usize>,
+    rank: usize,
+    order: Vec<usize>,
+    scale: Vec<f64>,
+    /// Lower triangle, rows in pivot order.
+    factor: Vec<f64>,
+    /// Null vectors of A, one after the other.
+    null: Vec<f64>,
+    /// Cholesky factor of their Gram matrix over the counted rows.
+    gram: Vec<f64>,
+    work: Vec<f64>,
+}
+
+impl Dependent {
+    fn new(most: usize, counted: usize, group: Vec<usize>) -> Self {
+        let n = group.len();
+        Self {
+            n,
+            most: most.min(n),
+            counted,
+            group,
+            rank: 0,
+            order: (0..n).collect(),
+            scale: vec![1.0; n],
+            factor: vec![0.0; n * n],
+            null: vec![0.0; n * n],
+            gram: vec![0.0; n * n],
+            work: vec![0.0; n],
+        }
+    }
+
+    fn factor(&mut self, entries: &Skyline) -> f64 {
+        let n = self.n;
+        self.scale.fill(0.0);
+        for i in 0..n {
+            let largest = &mut self.scale[self.group[i]];
+            *largest = largest.max(entries.get(i, i));
+        }
+        // A group that nothing moves has no scale; all its entries are 0.
+        for i in (0..n).rev() {
+            let largest = self.scale[self.group[i]];
+            self.scale[i] = if largest > 0.0 {
+                1.0 / largest.sqrt()
+            } else {
+                1.0
+            };
+        }
+        for (i, place) in self.order.iter_mut().enumerate() {
+            *place = i;
+        }
+        for i in 0..n {
+            for j in 0..=i {
+                let value = entries.get(i, j) * self.scale[i] * self.scale[j];
+                self.factor[i * n + j] = value;
+                self.factor[j * n + i] = value;
+            }
+        }
+        let least = self.eliminate();
+        self.find_null_vectors();
+        least
+    }
+
+    /// Right-looking Cholesky with diagonal pivoting; returns the smallest pivot, 0 where fewer rows than asked for are
+    /// independent.
+    fn eliminate(&mut self) -> f64 {
+        let (n, a) = (self.n, &mut self.factor);
+        let mut least = f64::INFINITY;
+        self.rank = self.most;
+        for k in 0..self.most {
+            let mut best = k;
+            for i in k + 1..n {
+                if a[i * n + i] > a[best * n + best] {
+                    best = i;
+                }
+            }
+            let pivot = a[best * n + best];
+            if !(pivot > ROUNDING) {
+                self.rank = k;
+                return 0.0;
+            }
+            least = least.min(pivot);
+            if best != k {
+                self.order.swap(k, best);
+                for j in 0..n {
+                    a.swap(k * n + j, best * n + j);
+                }
+                for i in 0..n {
+                    a.swap(i * n + k, i * n + best);
+                }
+            }
+            let root = pivot.sqrt();
+            a[k * n + k] = root;
+            for i in k + 1..n {
+                a[i * n + k] /= root;
+            }
+            for i in k + 1..n {
+                for j in k + 1..=i {
+                    let less = a[i * n + k] * a[j * n + k];
+                    a[i * n + j] -= less;
+                    a[j * n + i] = a[i * n + j];
+                }
+            }
+        }
+        least
+    }
+
+    fn find_null_vectors(&mut self) {
+        let (n, rank) = (self.n, self.rank);
+        let l = &self.factor;
+        for (dropped, null) in (rank..n).zip(self.null.chunks_exact_mut(n)) {
+            null.fill(0.0);
+            // L1^T x = -(row of L2), then back to file order and units.
+            for k in (0..rank).rev() {
+                let mut x = -l[dropped * n + k];
+                for i in k + 1..rank {
+                    x -= l[i * n + k] * self.work[i];
+                }
+                self.work[k] = x / l[k * n + k];
+                null[self.order[k]] = self.work[k] * self.scale[self.order[k]];
+            }
+            null[self.order[dropped]] = self.scale[self.order[dropped]];
+        }
+        let free = n - rank;
+        for i in 0..free {
+            for j in 0..=i {
+                let (a, b) = (&self.null[i * n..][..n], &self.null[j * n..][..n]);
+                let pairs = a[self.counted..].iter().zip(&b[self.counted..]);
+                let mut sum: f64 = pairs.map(|(x, y)| x * y).sum();
+                for k in 0..j {
+                    sum -= self.gram[i * n + k] * self.gram[j * n + k];
+                }
+                self.gram[i * n + j] = if i == j {
+                    sum.max(f64::MIN_POSITIVE).sqrt()
+                } else {
+                    sum / self.gram[j * n + j]
+                };
+            }
+        }
+    }
+
+    fn solve(&mut self, x: &mut [f64]) {
+        let (n, rank) = (self.n, self.rank);
+        let (l, work) = (&self.factor, &mut self.work);
+        for k in 0..rank {
+            let at = self.order[k];
+            let mut sum = x[at] * self.scale[at];
+            for j in 0..k {
+                sum -= l[k * n + j] * work[j];
+            }
+            work[k] = sum / l[k * n + k];
+        }
+        x.fill(0.0);
+        for k in (0..rank).rev() {
+            let mut sum = work[k];
+            for i in k + 1..rank {
+                sum -= l[i * n + k] * work[i];
+            }
+            work[k] = sum / l[k * n + k];
+            x[self.order[k]] = work[k] * self.scale[self.order[k]];
+        }
+        // Less what loads nothing, so that the counted ones are as small as they can be.
+        let free = n - rank;
+        for i in 0..free {
+            let null = &self.null[i * n..][..n];
+            let pairs = null[self.counted..].iter().zip(&x[self.counted..]);
+            let mut sum: f64 = pairs.map(|(a, b)| a * b).sum();
+            for k in 0..i {
+                sum -= self.gram[i * n + k] * work[k];
+            }
+            work[i] = sum / self.gram[i * n + i];
+        }
+        for i in (0..free).rev() {
+            let mut sum = work[i];
+            for k in i + 1..free {
+                sum -= self.gram[k * n + i] * work[k];
+            }
+            work[i] = sum / self.gram[i * n + i];
+        }
+        for i in 0..free {
+            let null = &self.null[i * n..][..n];
+            for (x, a) in x.iter_mut().zip(null) {
+                *x -= work[i] * a;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{DMatrix, DVector};
+
+    /// Row i of B, the last two of which depend on the first three.
+    fn rows() -> DMatrix<f64> {
+        let mut b = DMatrix::from_fn(5, 7, |i, j| libm::sin((3 * i + 5 * j + 1) as f64));
+        let (first, second) = (b.row(0) * 2.0 - b.row(2), b.row(1) * 0.5);
+        b.set_row(3, &first);
+        b.set_row(4, &second);
+        b
+    }
+
+    fn system(a: &DMatrix<f64>) -> RowSystem {
+        let n = a.nrows();
+        let mut system = RowSystem::new(vec![0; n]);
+        for i in 0..n {
+            for j in 0..=i {
+                system.add(i, j, a[(i, j)]);
+            }
+        }
+        system
+    }
+
+    #[test]
+    fn dependent_rows_get_the_least_multipliers() {
+        let b = rows();
+        let a = &b * b.transpose();
+        let right = &a * DVector::from_fn(5, |i, _| 1.0 + i as f64);
+        let mut plain = system(&a);
+        assert!(plain.factor() < 1e-12 || plain.least_joint_pivot(5) < 1e-12);
+        for most in [3, 5] {
+            let mut system = system(&a);
+            system.reveal(most, 0, vec![0; 5]);
+            system.factor();
+            assert_eq!(system.rank(), 3);
+            let mut x = right.clone();
+            system.solve(x.as_mut_slice());
+            let pseudo = a.clone().pseudo_inverse(1e-10).unwrap() * &right;
+            assert!((x - pseudo).norm() < 1e-9);
+        }
+        // Only the last four count: no idle set can make them smaller.
+        let mut system = system(&a);
+        system.reveal(3, 1, vec![0, 1, 2, 3, 4]);
+        system.factor();
+        let mut x = right.clone();
+        system.solve(x.as_mut_slice());
+        assert!((&a * &x - &right).norm() < 1e-9 * right.norm());
+        for null in system.idle_multipliers() {
+            let null = DVector::from_row_slice(null);
+            assert!((&a * &null).norm() < 1e-12 * null.norm());
+            let (own, idle) = (x.rows(1, 4), null.rows(1, 4));
+            assert!(own.dot(&idle).abs() < 1e-9 * own.norm() * idle.norm());
+        }
+    }
+
+    #[test]
+    fn a_row_that_is_zero_drops_out_and_is_the_only_one_not_unique() {
+        let a = DMatrix::from_row_slice(3, 3, &[2.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 3.0]);
+        let mut system = system(&a);
+        assert_eq!(
+            {
+                system.factor();
+                system.least_joint_pivot(3)
+            },
+            0.0
+        );
+        system.clear();
+        for (i, j) in [(0, 0), (2, 0), (2, 2)] {
+            system.add(i, j, a[(i, j)]);
+        }
+        system.reveal(3, 0, vec![0; 3]);
+        system.factor();
+        assert_eq!((system.rank(), system.independent()), (2, vec![0, 2]));
+        let mut x = [3.0, 0.0, 4.0];
+        system.solve(&mut x);
+        assert!((x[0] - 1.0).abs() < 1e-15 && x[1] == 0.0 && (x[2] - 1.0).abs() < 1e-15);
+        assert!(system.is_unique(0, 1) && !system.is_unique(1, 1) && system.is_unique(2, 1));
+    }
+}

@@ -1,0 +1,423 @@
+//! How a mechanism starts: assembled from the scene's values, with what that moved, and the rank of its constraints.
+
+use super::constraints::{Constraints, eccentricity, opening_rate};
+use super::kinematics::{self, Kinematics};
+use super::lagrange::Lagrange;
+use super::model::{self, Model, Motion};
+use super::spcmm::Trajectory;
+use super::tree::Tree;
+use super::{Form, Mechanism, MechanismError, OPEN_AS_GIVEN, load_reactions, power};
+use crate::scene::{StartRule, Vec3};
+
+/// Smallest pivot ratio at which a start still has its velocities to three digits.
+const DEPENDENT_ROWS: f64 = 1e-13;
+/// Loops are closed at the start where they are open by no more than this, m.
+const CLOSED: f64 = 1e-9;
+/// Where rows depend on others, joints may open at this speed at the start, m/s: rounding of the drives.
+const HELD: f64 = 1e-8;
+/// Poses around the start at which the rank is looked at lie this long away at the scales' speeds, s: a tenth of the
+/// length scale, 0.01 rad.
+const BESIDE: f64 = 0.01;
+/// Closing moves nothing any more below this part of the scales.
+const AT_REST: f64 = 1e-9;
+
+/// What assembling the start made of the scene's values. In a scene with the paper's inverse kinematics the guess is that of
+/// their closed form.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Assembly {
+    /// How far each body was moved from the guess.
+    pub bodies: Vec<Placement>,
+    /// Of the joints that start closed the one that the guess leaves widest open, and |Z_j - Z_i| there, m.
+    pub widest: Option<(usize, f64)>,
+    /// Whether the loops closed in another assembly mode than that of the guess. Known only where closed joints and drives
+    /// leave nothing free: a singular pose then lies between the two.
+    pub other_mode: bool,
+    /// Whether the guess is the closed form's.
+    pub closed_form: bool,
+}
+
+/// How far assembling moved a body.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Placement {
+    /// Distance of its frame's origin from where the guess has it, m.
+    pub moved: f64,
+    /// Angle from its orientation in the guess, rad.
+    pub turned: f64,
+}
+
+impl Mechanism {
+    /// What [`Self::start`] made of the scene's values.
+    pub fn assembly(&self) -> &Assembly {
+        &self.assembly
+    }
+
+    /// State at t = 0: positions, then velocities.
+    ///
+    /// # Errors
+    /// Ball joints that do not close.
+    pub fn start(&mut self) -> Result<Vec<f64>, MechanismError> {
+        const T: f64 = 0.0;
+        let model = &self.model;
+        let mut tree = Tree::new(model);
+        let mut y = model.start_state.clone();
+        let assembled = model.start == StartRule::Ideal;
+        let closed_form = model.trajectory.as_ref().filter(|_| assembled);
+        if let Some(trajectory) = closed_form {
+            place_output_body(model, trajectory, &mut y);
+            tree.forward(model, T, &y);
+            turn_hinges(model, &tree.motion, &mut y);
+        }
+        let all: Vec<usize> = if assembled {
+            (0..model.joints.len()).collect()
+        } else {
+            model.ideal_joints.clone()
+        };
+        tree.forward(model, T, &y);
+        let guess = tree.motion.clone();
+        let distance = |j: usize| eccentricity(&model.joints[j], &guess).norm();
+        for j in 0..model.joints.len() {
+            let d = distance(j);
+            let joint = || self.joint_names[j].clone();
+            let clearance = self.contacts.clearance(j);
+            if all.contains(&j) {
+                // Newton starts from the scene's guess: anything like closed will do for an assembled start.
+                if d > OPEN_AS_GIVEN && !assembled {
+                    return Err(MechanismError::Open {
+                        joint: joint(),
+                        given: d,
+                    });
+                }
+            } else if d > clearance + 0.01 * self.contacts.coefficients(j).ball_radius {
+                return Err(MechanismError::OutsideSocket {
+                    joint: joint(),
+                    distance: d,
+                    clearance,
+                });
+            }
+        }
+        let widest = all.iter().map(|&j| (j, distance(j)));
+        let mut assembly = Assembly {
+            widest: widest.max_by(|a, b| a.1.total_cmp(&b.1)),
+            closed_form: closed_form.is_some(),
+            ..Assembly::default()
+        };
+        if !all.is_empty() {
+            let mut constraints = Constraints::new(model, &all);
+            let guessed = y.clone();
+            self.assemble(&mut constraints, &mut tree, &mut y)?;
+            assembly.other_mode = is_other_mode(model, &mut constraints, &mut tree, &guessed, &y);
+        }
+        Tree::normalise(model, &mut y);
+        tree.forward(model, T, &y);
+        let bodies = model.bodies.iter().zip(guess.iter().zip(&tree.motion));
+        assembly.bodies = bodies.map(|(body, (a, b))| placement(body, a, b)).collect();
+        let rank = self.rank_of_ideal_joints(&mut tree, &y)?;
+        if rank.is_some() {
+            self.check_speeds(&mut tree, &y)?;
+        }
+        self.assembly = assembly;
+        match &mut self.form {
+            Form::Tree { constraints, .. } => {
+                if let (Some(constraints), Some(rank)) = (constraints, rank) {
+                    constraints.reveal(rank);
+                }
+            }
+            Form::Lagrange(lagrange) => {
+                if let Some(rank) = rank {
+                    lagrange.reveal(rank);
+                }
+                y = Lagrange::state_of(&tree.motion, self.model.bodies.len());
+            }
+        }
+        Ok(y)
+    }
+
+    /// Closes the joints of `constraints` from the guess in `y`.
+    fn assemble(
+        &self,
+        constraints: &mut Constraints,
+        tree: &mut Tree,
+        y: &mut Vec<f64>,
+    ) -> Result<(), MechanismError> {
+        const T: f64 = 0.0;
+        let model = &self.model;
+        let guess = y.clone();
+        let error = constraints.project(model, tree, T, y);
+        tree.forward(model, T, y);
+        if error <= CLOSED && constraints.system().least_joint_pivot(3) >= DEPENDENT_ROWS {
+            return Ok(());
+        }
+        // Rows depend on one another here, or on the way here: once more, by those that do not.
+        constraints.reveal(constraints.rows());
+        y.clone_from(&guess);
+        let error = constraints.project(model, tree, T, y);
+        tree.forward(model, T, y);
+        if !(error <= CLOSED) {
+            return Err(self.no_closure(constraints, tree, &guess, y));
+        }
+        // A singular pose of the paper's mechanism does not let its drives fix its velocities, with clearance or without.
+        if model.trajectory.is_some() && rank_around(model, constraints, tree, y).is_none() {
+            return Err(MechanismError::Singular);
+        }
+        Ok(())
+    }
+
+    /// That no ideal joint opens in the velocities of `y`: directions held more than once, by drives say, may contradict
+    /// one another.
+    fn check_speeds(&self, tree: &mut Tree, y: &[f64]) -> Result<(), MechanismError> {
+        tree.forward(&self.model, 0.0, y);
+        for &j in &self.model.ideal_joints {
+            let rate = opening_rate(&self.model.joints[j], &tree.motion);
+            if !(rate.norm() <= HELD) {
+                let joint = self.joint_names[j].clone();
+                return Err(MechanismError::Torn { joint, rate });
+            }
+        }
+        Ok(())
+    }
+
+    /// The error for loops that are still open at `y`.
+    fn no_closure(
+        &self,
+        constraints: &mut Constraints,
+        tree: &mut Tree,
+        guess: &[f64],
+        y: &[f64],
+    ) -> MechanismError {
+        const T: f64 = 0.0;
+        let model = &self.model;
+        let mut again = y.to_vec();
+        constraints.project(model, tree, T, &mut again);
+        let steps = again.iter().zip(y).zip(&model.scale).take(model.nq);
+        let at_rest = steps
+            .map(|((a, b), scale)| (a - b).abs() / scale)
+            .all(|moved| moved <= AT_REST);
+        let joints = constraints.joints().to_vec();
+        let name = |j: usize| self.joint_names[j].clone();
+        tree.forward(model, T, &again);
+        let open = |&j: &usize| {
+            let gap = eccentricity(&model.joints[j], &tree.motion);
+            (gap.norm() > CLOSED).then(|| (name(j), gap))
+        };
+        let stays = if at_rest {
+            joints.iter().filter_map(open).collect()
+        } else {
+            Vec::new()
+        };
+        tree.forward(model, T, guess);
+        let given = |j: usize| eccentricity(&model.joints[j], &tree.motion).norm();
+        let given = joints.iter().map(|&j| (j, given(j)));
+        let (joint, given) = given.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default();
+        MechanismError::NoClosure {
+            joint: name(joint),
+            given,
+            stays,
+        }
+    }
+
+    /// Rank of the rows of the ideal joints in the assembled pose `y` and around it; `None` where all are independent.
+    fn rank_of_ideal_joints(
+        &self,
+        tree: &mut Tree,
+        y: &[f64],
+    ) -> Result<Option<usize>, MechanismError> {
+        const T: f64 = 0.0;
+        let model = &self.model;
+        if model.ideal_joints.is_empty() {
+            return Ok(None);
+        }
+        let mut constraints = Constraints::new(model, &model.ideal_joints);
+        factor_at(model, &mut constraints, tree, T, y);
+        if constraints.system().least_joint_pivot(3) >= DEPENDENT_ROWS {
+            return Ok(None);
+        }
+        constraints.reveal(constraints.rows());
+        let rank = rank_around(model, &mut constraints, tree, y);
+        rank.map(Some).ok_or_else(|| {
+            if model.trajectory.is_some() {
+                return MechanismError::Singular;
+            }
+            factor_at(model, &mut constraints, tree, T, y);
+            let names = model.ideal_joints.iter().enumerate();
+            let shared = names.filter(|&(k, _)| !constraints.is_unique(k));
+            let names: Vec<&str> = shared.map(|(_, &j)| &*self.joint_names[j]).collect();
+            MechanismError::Branching {
+                joints: names.join(", "),
+            }
+        })
+    }
+
+    /// Whether the force of actuator `i` is the only one that fits the motion, at the latest evaluation.
+    pub fn is_actuator_unique(&mut self, i: usize) -> bool {
+        let Self {
+            model,
+            form,
+            gravity,
+            ..
+        } = self;
+        match form {
+            Form::Lagrange(lagrange) => lagrange.is_actuator_unique(i),
+            Form::Tree { tree, constraints } => {
+                let Some(constraints) = constraints else {
+                    return true;
+                };
+                let mut force_under = |multipliers: Option<&[f64]>| {
+                    tree.wrench.fill(kinematics::Wrench::zero());
+                    if let Some(multipliers) = multipliers {
+                        load_reactions(model, tree, |k| {
+                            Vec3::from_column_slice(&multipliers[3 * k..3 * k + 3])
+                        });
+                    }
+                    let mut force = 0.0;
+                    let Tree { motion, wrench, .. } = &mut **tree;
+                    let found = |drive, value| {
+                        if drive == i {
+                            force = value;
+                        }
+                    };
+                    power::inverse_dynamics(model, motion, wrench, gravity, |_| true, found);
+                    force
+                };
+                let without = force_under(None);
+                constraints.system().idle_multipliers().all(|null| {
+                    let largest = null.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+                    // Of a lever arm of a metre a millionth of it is rounding.
+                    (force_under(Some(null)) - without).abs() <= 1e-6 * largest
+                })
+            }
+        }
+    }
+}
+
+/// Rank of revealed `constraints` at the assembled state `y`, where it is the same in the poses around; `None` where it is
+/// larger there: the pose is singular.
+fn rank_around(
+    model: &Model,
+    constraints: &mut Constraints,
+    tree: &mut Tree,
+    y: &[f64],
+) -> Option<usize> {
+    const T: f64 = 0.0;
+    factor_at(model, constraints, tree, T, y);
+    let rank = constraints.rank();
+    if rank == model.nv {
+        return Some(rank);
+    }
+    // Nothing but a narrow miss made the rows look dependent.
+    if rank == constraints.rows() {
+        return None;
+    }
+    let period = (0.002 * model.shortest_period()).min(1e-3);
+    let mut beside = Vec::new();
+    for sign in [1.0, -1.0] {
+        if !model.drives.is_empty() {
+            beside.push((
+                sign * period,
+                y[model.nq..].iter().map(|v| v * sign * period).collect(),
+            ));
+        }
+        for direction in 1..=2 {
+            factor_at(model, constraints, tree, T, y);
+            let mut free: Vec<f64> = (0..model.nv)
+                .map(|i| model.scale[model.nq + i] * libm::sin((direction * (2 * i + 1)) as f64))
+                .collect();
+            constraints.restrain(model, &mut free);
+            let sizes = free.iter().zip(&model.scale[model.nq..]);
+            let largest = sizes.fold(0.0_f64, |most, (v, scale)| most.max(v.abs() / scale));
+            let step: Vec<f64> = free.iter().map(|v| sign * BESIDE * v / largest).collect();
+            beside.push((0.0, step));
+        }
+    }
+    let grows = beside.iter().any(|(t, step): &(f64, Vec<f64>)| {
+        let mut near = y.to_vec();
+        Tree::displace(model, &mut near, step);
+        let error = constraints.project(model, tree, T + t, &mut near);
+        factor_at(model, constraints, tree, T + t, &near);
+        !(error <= CLOSED) || constraints.rank() > rank
+    });
+    (!grows).then_some(rank)
+}
+
+/// Jacobians and J M^-1 J^T at (t, y).
+fn factor_at(model: &Model, constraints: &mut Constraints, tree: &mut Tree, t: f64, y: &[f64]) {
+    tree.forward(model, t, y);
+    constraints.prepare(model, tree, t, &y[..model.nq], &Vec3::zeros());
+}
+
+/// Whether closed joints leave nothing free and a singular pose lies between the guess and the assembled state `y`: a
+/// determinant of as many independent rows as coordinates has another sign at each.
+fn is_other_mode(
+    model: &Model,
+    constraints: &mut Constraints,
+    tree: &mut Tree,
+    guess: &[f64],
+    y: &[f64],
+) -> bool {
+    let mut sign_at = |y: &[f64], places: Option<&[usize]>| {
+        factor_at(model, constraints, tree, 0.0, y);
+        let rows = places.map_or_else(|| constraints.system().independent(), <[usize]>::to_vec);
+        if rows.len() != model.nv {
+            return None;
+        }
+        let place = |row: usize| rows.iter().position(|&kept| kept == row);
+        let sign = constraints.is_minor_positive(model, place);
+        Some((sign, rows))
+    };
+    let Some((end, rows)) = sign_at(y, None) else {
+        return false;
+    };
+    sign_at(guess, Some(&rows)).is_some_and(|(sign, _)| sign != end)
+}
+
+fn placement(body: &model::Body, from: &Kinematics, to: &Kinematics) -> Placement {
+    let origin = |m: &Kinematics| m.position + m.rotation * body.origin;
+    let turn = from.rotation.tr_mul(&to.rotation);
+    // Sine and cosine of the angle: a cosine alone has no small angles.
+    let sine = Vec3::new(
+        turn[(2, 1)] - turn[(1, 2)],
+        turn[(0, 2)] - turn[(2, 0)],
+        turn[(1, 0)] - turn[(0, 1)],
+    );
+    Placement {
+        moved: (origin(to) - origin(from)).norm(),
+        turned: libm::atan2(sine.norm(), turn.trace() - 1.0),
+    }
+}
+
+/// Puts the free output body where the ideal mechanism has it at t = 0, so that assembling has little left to do.
+fn place_output_body(model: &Model, trajectory: &Trajectory, y: &mut [f64]) {
+    let ideal = trajectory.at(0.0);
+    let body = &model.bodies[model.output_body];
+    if let Motion::Free { q, v } = body.motion {
+        let to_centroid = -(ideal.rotation * body.origin);
+        let position = Vec3::from_fn(|i, _| ideal.position[i].value) + to_centroid;
+        let rotation = kinematics::quaternion_of(&ideal.rotation);
+        y[q..q + 3].copy_from_slice(position.as_slice());
+        y[q + 3..q + 7].copy_from_slice(&[rotation.w, rotation.i, rotation.j, rotation.k]);
+        let velocity = Vec3::from_fn(|i, _| ideal.position[i].rate)
+            + ideal.angular_velocity.cross(&to_centroid);
+        let v = model.nq + v;
+        y[v..v + 3].copy_from_slice(velocity.as_slice());
+        y[v + 3..v + 6].copy_from_slice(ideal.angular_velocity.as_slice());
+    }
+}
+
+/// Turns every hinged body that carries a ball until the ball comes closest to its socket, so that loops close on the
+/// branch that the closed form means.
+fn turn_hinges(model: &Model, motion: &[Kinematics], y: &mut [f64]) {
+    for joint in &model.joints {
+        let motion_of = |b: usize| model.bodies.get(b).map(|body| body.motion);
+        let Some(Motion::Revolute { q, .. }) = motion_of(joint.ball.body) else {
+            continue;
+        };
+        let body = &motion[joint.ball.body];
+        let hinge = body.position - body.arm;
+        let centre = |a: &model::Anchor| {
+            motion[a.body].position + motion[a.body].rotation * a.offset - hinge
+        };
+        let (ball, socket, axis) = (centre(&joint.ball), centre(&joint.socket), body.axis);
+        let sine = axis.dot(&ball.cross(&socket));
+        let cosine = ball.dot(&socket) - axis.dot(&ball) * axis.dot(&socket);
+        y[q] += libm::atan2(sine, cosine);
+    }
+}
