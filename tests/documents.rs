@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use jointplay::scene::{Scene, reference_page};
-use jointplay::simulate::Simulation;
+use jointplay::scene::{Scene, Vec3, reference_page, unit_table};
+use jointplay::simulate::{Frame, Simulation};
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
@@ -23,14 +23,57 @@ fn the_page_of_parameters_is_what_the_program_prints() {
     );
 }
 
+/// The `number`-th block of TOML of the page about scenes.
+fn example(number: usize) -> String {
+    let page = read("docs/scene-format.md");
+    let block = page
+        .split("```toml\n")
+        .nth(number)
+        .and_then(|rest| rest.split("```").next());
+    block.expect("a block of TOML").to_owned()
+}
+
+#[test]
+fn the_page_of_scenes_lists_the_units_that_are_read() {
+    let page = read("docs/scene-format.md");
+    assert!(page.contains(&unit_table()), "{}", unit_table());
+    for unit in ["µm", "kg·m²", "60 rpm", "15°"] {
+        assert!(page.contains(unit), "{unit}");
+    }
+}
+
+#[test]
+fn hinges_that_are_not_parallel_stand_where_the_page_says() {
+    let scene = Scene::parse(&example(1), None, &[]).expect("the example loads");
+    let mut simulation = Simulation::new(&scene).expect("the example starts");
+    let mut frame = Frame::default();
+    simulation.sample(0.0, &mut frame);
+    let arm = &frame.bodies[scene
+        .bodies
+        .iter()
+        .position(|body| body.name == "arm")
+        .unwrap()];
+    let tip = arm.position + arm.rotation * Vec3::new(0.0, 0.0, 0.1);
+    let millimetres = |v: Vec3| {
+        let part = |x: f64| format!("{}", (x * 1e4).round() / 10.0 + 0.0);
+        format!("({}, {}, {}) mm", part(v.x), part(v.y), part(v.z))
+    };
+    let page = read("docs/scene-format.md");
+    for point in [arm.position, tip] {
+        assert!(page.contains(&millimetres(point)), "{}", millimetres(point));
+    }
+    // The arm's hinge, y of the table and of the arm alike, along the world's -x.
+    assert!((arm.rotation * Vec3::y() + Vec3::x()).norm() < 1e-12);
+    let lifting = 5f64.to_radians() * std::f64::consts::TAU;
+    let turning = 10.0 * std::f64::consts::TAU / 60.0;
+    let spin = Vec3::new(-lifting, 0.0, turning);
+    assert!((arm.angular_velocity - spin).norm() < 1e-12);
+    simulation.advance_to(0.02).expect("the example runs");
+}
+
 #[test]
 fn the_example_of_the_scene_format_runs() {
-    let page = read("docs/scene-format.md");
-    let example = page
-        .split("```toml\n")
-        .nth(1)
-        .and_then(|rest| rest.split("```").next())
-        .expect("a block of TOML");
+    let example = &example(2);
     let scene = Scene::parse(example, None, &[]).expect("the example loads");
     let mut simulation = Simulation::new(&scene).expect("the example starts");
     simulation.advance_to(0.02).expect("the example runs");

@@ -81,7 +81,7 @@ impl Layout {
                 add(&format!("{}_{quantity}", joint.name), whole, false);
             }
         }
-        let probe = scene.output.probe.is_some() && scene.spcmm.is_some();
+        let probe = scene.output.probe.is_some();
         if probe {
             add("probe_error_max_um", false, false);
             add("probe_error_rms_um", false, false);

@@ -241,7 +241,8 @@ impl PointRun {
                 }
             })
             .collect();
-        let probe = self.means.probe_now.map(|_| {
+        let known = self.means.probe_now.filter(|_| !self.means.probe_lost);
+        let probe = known.map(|_| {
             (
                 self.means.probe_largest,
                 (self.means.probe_square / span).sqrt(),
@@ -315,6 +316,7 @@ struct Means {
     probe_square: f64,
     probe_now: Option<f64>,
     probe_largest: f64,
+    probe_lost: bool,
 }
 
 impl Means {
@@ -328,6 +330,7 @@ impl Means {
             probe_square: 0.0,
             probe_now: None,
             probe_largest: 0.0,
+            probe_lost: false,
         }
     }
 
@@ -354,7 +357,9 @@ impl Means {
             *sum += 0.5 * h * (*now + force);
             *now = force;
         }
-        if let Some(error) = frame.probe_error {
+        // An ideal motion that ends on the way leaves no mean over all of it.
+        self.probe_lost |= frame.probe_error.is_none();
+        if let Some(error) = frame.probe_error.filter(|_| !self.probe_lost) {
             let size = error.norm();
             let before = self.probe_now.unwrap_or(size);
             self.probe_square += 0.5 * h * (before * before + size * size);

@@ -74,7 +74,7 @@ pub struct Evidence {
 }
 
 /// Fewer sections than this tell nothing.
-const FEWEST: usize = 8;
+pub const FEWEST: usize = 8;
 /// So many sections are looked at where there are so many.
 const LOOKED_AT: usize = 32;
 /// A period must be seen so many times.

@@ -5,8 +5,6 @@
 //! person can read and write it, and it outlives the program's inner layout. The price is the stepping from t = 0, which
 //! takes no longer than the run itself did. The state hash proves the result.
 
-use std::fmt::Write as _;
-
 use base64::Engine as _;
 use base64::engine::general_purpose::URL_SAFE_NO_PAD as BASE64;
 use eframe::egui::ThemePreference;
@@ -450,20 +448,11 @@ fn fault(key: &str, value: &str, message: impl Into<String>) -> LinkError {
 fn unknown(key: &str) -> String {
     let short = ALIASES.iter().map(|(short, _)| *short);
     let known: Vec<&str> = WORDS.into_iter().chain(short).collect();
-    let mut message = "unknown word".to_owned();
-    let parameter = crate::scene::table()
-        .iter()
-        .find(|parameter| parameter.key.rsplit('.').next() == Some(key));
-    if let Some(parameter) = parameter {
-        // Writing to a String cannot fail.
-        let _ = write!(message, "; did you mean `{}`?", parameter.key);
-    }
-    let _ = write!(
-        message,
-        "; allowed: {}, and every parameter by its key, for example contact.clearance",
+    format!(
+        "unknown word{}; allowed: {}, and every parameter by its key, for example contact.clearance",
+        crate::scene::suggest_parameter(key, &known),
         known.join(", ")
-    );
-    message
+    )
 }
 
 fn read_scale(text: &str) -> Result<f64, String> {

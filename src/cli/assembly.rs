@@ -1,10 +1,9 @@
 //! What assembling the start made of a scene's values, and which forces are not unique: in words and as JSON.
 
-use std::fmt::Write;
-
 use serde_json::{Map, Value as Json, json};
 
 use super::output::significant;
+use super::summary;
 use crate::mechanism::Placement;
 use crate::scene::format_quantity_digits;
 use crate::simulate::Simulation;
@@ -172,8 +171,7 @@ impl Start {
             .not_unique()
             .map(|words| ("Not unique".to_owned(), words));
         for (label, words) in self.lines.iter().chain(&loose) {
-            // Writing to a String cannot fail.
-            let _ = writeln!(text, "{label:<18}{words}");
+            summary::line(text, label, words);
         }
     }
 }

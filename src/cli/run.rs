@@ -126,6 +126,15 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let mut facts = summary::json(&simulation, end.status, wall, found)?;
     let mut text = summary::text(&simulation, end.status, wall, found)?;
     begun.describe(&mut facts, &mut text);
+    let fault = simulation.probe_fault();
+    if let Some(fault) = &fault {
+        summary::line(
+            &mut text,
+            "No probe error",
+            &format!("the ideal mechanism {fault}"),
+        );
+    }
+    facts.insert("probe_fault".into(), json!(fault));
     facts.insert("rows".into(), json!(table.len()));
     let mut meta = facts.clone();
     // Files of the same run are the same, byte for byte: the machine's speed stays out of them.
@@ -133,6 +142,8 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     meta.shift_remove("ratio");
     meta.shift_remove("slower_than_asked");
     meta.insert("duration_s".into(), json!(duration));
+    // With the changed parameters it makes the same run again, wherever the file went.
+    meta.insert("scene_text".into(), json!(scene.source.text));
     if let (Some(file), Some(times)) = (file, times) {
         let path = file.path().to_owned();
         let mut meta = meta.clone();

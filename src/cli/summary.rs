@@ -207,11 +207,16 @@ pub fn text(
     Ok(out)
 }
 
+/// Adds a line to a summary.
+pub fn line(text: &mut String, label: &str, words: &str) {
+    // Writing to a String cannot fail.
+    let _ = writeln!(text, "{label:<18}{words}");
+}
+
 /// Adds to a summary that a file was written.
 pub fn written(text: &mut String, rows: usize, what: &str, path: &Path) {
     let rows = count(rows as u64, what);
-    // Writing to a String cannot fail.
-    let _ = writeln!(text, "{:<18}{rows} to {}", "Written", path.display());
+    line(text, "Written", &format!("{rows} to {}", path.display()));
 }
 
 /// A number of things: `1 row`, `2 rows`.

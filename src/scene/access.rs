@@ -1,6 +1,6 @@
 //! Parameters of a scene by key: reading and changing.
 
-use super::error::nearest;
+use super::error::{nearest, nearest_parameter};
 use super::read::{SPCMM_DIMENSIONS, VIEW_SETTINGS};
 use super::table::{self, contact_part, find};
 use super::*;
@@ -173,12 +173,9 @@ impl Scene {
                     "only in the scene file: it cannot be changed from outside it",
                 )),
                 None => {
-                    // Keys without their section are a common slip: compare both forms.
                     let here = self.parameters();
-                    let near = match here.iter().find(|p| p.key.rsplit('.').next() == Some(key)) {
-                        Some(parameter) => format!("; did you mean `{}`?", parameter.key),
-                        None => nearest(key, here.iter().map(|parameter| parameter.key)),
-                    };
+                    let near =
+                        nearest_parameter(key, here.iter().map(|parameter| parameter.key), &[]);
                     Err(SceneError::about(key, None, format!("unknown key{near}")))
                 }
             };
@@ -189,17 +186,25 @@ impl Scene {
                 .iter()
                 .map(|joint| joint.name.as_str())
                 .collect();
-            let near = nearest(name, names.iter().copied());
             let listed = if names.len() > 12 {
                 format!("{}, …", names[..12].join(", "))
             } else {
                 names.join(", ")
             };
-            return Err(SceneError::about(
-                key,
-                None,
-                format!("no ball joint `{name}`{near}; ball joints: {listed}"),
-            ));
+            let first = name.split('.').next().unwrap_or(name);
+            let hinge = self.joints.iter().any(|joint| joint.name == first);
+            let message = if hinge {
+                let parts: Vec<&str> = table().iter().filter_map(contact_part).collect();
+                format!(
+                    "`{first}` is no ball joint: its drive, start, axis and points stand in the scene file alone. Such keys \
+                     are joint.<ball joint>.<key>; ball joints: {listed}; keys: {}",
+                    parts.join(", ")
+                )
+            } else {
+                let near = nearest(name, names.iter().copied());
+                format!("no ball joint `{name}`{near}; ball joints: {listed}")
+            };
+            return Err(SceneError::about(key, None, message));
         };
         match find(&format!("contact.{part}")) {
             Some(parameter) => Ok(Resolved {

@@ -341,6 +341,21 @@ impl<'d> Node<'d> {
         Section::new(self.document, path, table, self.value.span(), known)
     }
 
+    /// Checks the choice that the key `name` of a table makes, if it is there: it decides which other keys there may be, so
+    /// a wrong word is to be named before any of these.
+    pub fn check_choice(&self, path: &str, name: &str, words: &[&str]) -> Result<(), SceneError> {
+        let table = self.value.get_ref().as_table();
+        let Some(value) = table.and_then(|table| table.get(name)) else {
+            return Ok(());
+        };
+        let node = Node {
+            document: self.document,
+            key: format!("{path}.{name}"),
+            value,
+        };
+        node.choice(words).map(|_| ())
+    }
+
     /// Text of the `name` key of a table, for the paths of its keys; the array index where there is none yet.
     pub fn title(&self, prefix: &str) -> String {
         let name = self

@@ -103,3 +103,22 @@ pub(super) fn nearest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>)
             format!(" (did you mean `{name}`?)")
         })
 }
+
+/// The parameter whose key, or the last part of whose key, is nearest to `wrong`, or one of some other `words`, in brackets;
+/// "" if none is near.
+pub(super) fn nearest_parameter<'a>(
+    wrong: &str,
+    keys: impl Iterator<Item = &'a str> + Clone,
+    words: &[&'a str],
+) -> String {
+    let last = |key: &'a str| key.rsplit('.').next().unwrap_or(key);
+    // Keys without their section are a common slip: compare both forms.
+    let forms = keys.clone().map(last).chain(keys.clone());
+    let near = nearest(wrong, words.iter().copied().chain(forms));
+    let name = near.split('`').nth(1).unwrap_or("");
+    let full = keys.clone().find(|key| *key == name || last(key) == name);
+    match full.filter(|_| !words.contains(&name)) {
+        Some(key) => format!(" (did you mean `{key}`?)"),
+        None => near,
+    }
+}

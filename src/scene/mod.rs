@@ -27,3 +27,10 @@ pub use table::table;
 pub use units::*;
 
 use table::find;
+
+/// The parameter of any scene, by its key or the last part of it, or the one of some other `words` that is nearest to
+/// `wrong`, as errors say it: in brackets, or nothing.
+pub fn suggest_parameter(wrong: &str, words: &[&'static str]) -> String {
+    let keys = table().iter().map(|parameter| parameter.key);
+    error::nearest_parameter(wrong, keys, words)
+}

@@ -126,6 +126,8 @@ pub(super) fn read_shape(node: &Node<'_>, spcmm: Option<&Spcmm>) -> Result<Shape
         "thickness",
     ];
     known.extend(spcmm.map(|_| "at_slider_plane"));
+    node.check_choice(&node.key, "role", &ROLE_WORDS)?;
+    node.check_choice(&node.key, "form", &FORMS)?;
     let section = node.section(&known)?;
     let role_node = section.require("role", "\"frame\"")?;
     let role = ROLES[role_node.choice(&ROLE_WORDS)?];

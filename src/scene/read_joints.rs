@@ -8,6 +8,7 @@ use super::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 
+const LAWS: [&str; 3] = ["spcmm", "constant", "harmonic"];
 const KINDS: [&str; 4] = ["fixed", "prismatic", "revolute", "free"];
 
 /// Highest frequency of a harmonic drive, Hz.
@@ -46,7 +47,9 @@ pub(super) fn read_joint<'d>(
         "drive",
         "start",
     ];
-    let section = node.section_as(node.title("joint"), &known)?;
+    let title = node.title("joint");
+    node.check_choice(&title, "kind", &KINDS)?;
+    let section = node.section_as(title, &known)?;
     let name = section.require("name", "\"P1\"")?.name()?.to_owned();
     let kind = match KINDS[section.require("kind", "\"revolute\"")?.choice(&KINDS)?] {
         "fixed" => JointKind::Fixed,
@@ -196,8 +199,9 @@ fn read_drive(
         "frequency",
         "phase",
     ];
+    node.check_choice(&node.key, "law", &LAWS)?;
     let law = node.section(&all)?.require("law", "\"constant\"")?;
-    Ok(match law.choice(&["spcmm", "constant", "harmonic"])? {
+    Ok(match law.choice(&LAWS)? {
         0 => {
             let section = node.section(&["law", "slider"])?;
             if kind != JointKind::Prismatic {

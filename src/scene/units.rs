@@ -160,6 +160,19 @@ pub fn unit_names(dimension: Dimension) -> Vec<&'static str> {
     units(dimension).iter().map(|(name, _)| *name).collect()
 }
 
+/// All units as the table of a Markdown page.
+pub fn unit_table() -> String {
+    let row = |&(_, name, units): &(Dimension, &str, &[Unit])| {
+        let names: Vec<String> = units.iter().map(|(name, _)| format!("`{name}`")).collect();
+        match names.is_empty() {
+            true => format!("| {name} | none |\n"),
+            false => format!("| {name} | {} |\n", names.join(", ")),
+        }
+    };
+    let rows: String = UNITS.iter().map(row).collect();
+    format!("| quantity | units |\n|---|---|\n{rows}")
+}
+
 /// SI unit of a dimension; "" for a pure number.
 pub fn si_unit(dimension: Dimension) -> &'static str {
     units(dimension).first().map_or("", |(name, _)| *name)

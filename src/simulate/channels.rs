@@ -232,7 +232,7 @@ impl Channels {
                 add(Quantity::EnergyBalance, member);
             }
         }
-        let probe = scene.spcmm.is_some() && scene.output.probe.is_some();
+        let probe = scene.output.probe.is_some();
         if probe {
             for member in ["x", "y", "z"] {
                 add(Quantity::ProbeError, member);
@@ -306,7 +306,7 @@ impl Channels {
             ]);
         }
         if self.probe {
-            out.extend(frame.probe_error.unwrap_or_else(Vec3::zeros).iter());
+            out.extend(frame.probe_error.unwrap_or(Vec3::repeat(f64::NAN)).iter());
         }
         debug_assert_eq!(out.len(), self.list.len());
     }

@@ -22,7 +22,8 @@ pub struct Frame {
     pub potential: f64,
     /// The elastic part of `potential`: energy stored in the contacts, J.
     pub elastic: f64,
-    /// Probe tip minus the tip of the ideal mechanism at the same time, m; `None` where the scene has no such reference.
+    /// Probe tip minus the tip of the ideal mechanism at the same time, m; `None` where the scene has no
+    /// probe, or the ideal mechanism does not get here.
     pub probe_error: Option<Vec3>,
     /// Energy moved since the start; `None` where `solver.energy_ledger` is off.
     pub ledger: Option<Ledger>,

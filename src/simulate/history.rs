@@ -122,6 +122,9 @@ impl History {
             let Some((least, greatest)) = self.range(level, index, channel) else {
                 continue;
             };
+            if least.is_nan() {
+                continue;
+            }
             let time = ((index as f64 + 0.5) * width).clamp(start, end);
             if least == greatest {
                 out.push([time, f64::from(least)]);

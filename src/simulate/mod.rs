@@ -4,6 +4,7 @@ mod angles;
 mod channels;
 mod frame;
 mod history;
+mod ideal;
 mod impacts;
 mod ledger;
 mod pace;
@@ -144,6 +145,7 @@ pub struct Snapshot {
     running: Scene,
     state: simulation::State,
     polynomial: Option<crate::integrate::Polynomial>,
+    ideal: Option<Box<ideal::Kept>>,
 }
 
 impl Snapshot {

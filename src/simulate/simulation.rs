@@ -11,6 +11,7 @@ mod guard;
 mod live;
 mod snapshot;
 
+use super::ideal::Reference;
 use super::impacts::{Impact, Impacts};
 use super::ledger::Account;
 use super::peaks::{Approach, Recent};
@@ -66,6 +67,8 @@ pub struct Simulation {
     /// The step being taken was begun again on another piece.
     turned: bool,
     scratch_memory: Vec<Memory>,
+    /// What the probe is compared with.
+    pub(super) reference: Reference,
 }
 
 /// What a snapshot copies.
@@ -178,6 +181,7 @@ impl Simulation {
             corner: None,
             turned: false,
             scratch_memory: vec![Memory::default(); joints],
+            reference: Reference::of(scene),
             mechanism,
         };
         simulation.mechanism.contacts.switching = switching_of(scene);
@@ -523,6 +527,15 @@ impl Simulation {
         report::fill(mechanism, &self.running, time, out);
         (mechanism.evaluations, mechanism.contacts.evaluations) = counts;
         out.ledger = self.ledger_of(out);
+        if !matches!(self.reference, Reference::Elsewhere) {
+            out.probe_error = self.reference.error(out);
+        }
+    }
+
+    /// Why there is nothing, or nothing any more, that the probe could be compared with: the ideal mechanism does not start,
+    /// or came to where it cannot go on.
+    pub fn probe_fault(&self) -> Option<String> {
+        self.reference.fault()
     }
 
     /// Forces at the latest state that the motion does not fix.

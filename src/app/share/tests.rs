@@ -182,8 +182,10 @@ fn what_is_wrong_in_a_link_is_said() {
     for (text, words) in [
         (
             "clearance=0.5mm",
-            "link: clearance: unknown word; did you mean `contact.clearance`?",
+            "link: clearance: unknown word (did you mean `contact.clearance`?); allowed:",
         ),
+        ("clearence=0.5mm", "(did you mean `contact.clearance`?)"),
+        ("scael=0.5", "(did you mean `scale`?)"),
         ("scale=2", "link: scale = 2: allowed 0.0001 to 1"),
         ("t=5", "link: t = 5: needs a unit"),
         ("t=-5ms", "must not be before the start"),

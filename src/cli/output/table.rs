@@ -1,6 +1,6 @@
 //! The rows of a run: which columns a scene has, and one row for each sampled instant. SI units, world axes.
 
-use crate::scene::{JointKind, Scene};
+use crate::scene::{JointKind, Scene, Vec3};
 use crate::simulate::{ContactState, Frame};
 
 /// Rows of one run, row after row.
@@ -150,7 +150,7 @@ impl Table {
     /// Appends the row of `frame`.
     ///
     /// # Errors
-    /// A value that is not finite; the table is then unchanged.
+    /// A value that is not finite, but for those of a probe error that is not known; the table is then unchanged.
     pub fn push(&mut self, frame: &Frame) -> Result<(), NotFinite> {
         let start = self.values.len();
         self.append(frame);
@@ -159,9 +159,14 @@ impl Table {
             self.names.len(),
             "one value for each column"
         );
-        if let Some(column) = self.values[start..]
-            .iter()
-            .position(|value| !value.is_finite())
+        let known = frame.probe_error.is_some();
+        if let Some(column) =
+            self.values[start..]
+                .iter()
+                .zip(&self.names)
+                .position(|(value, name)| {
+                    !value.is_finite() && (known || !PROBE.contains(&name.as_str()))
+                })
         {
             let value = self.values[start + column];
             self.values.truncate(start);
@@ -197,7 +202,9 @@ impl Table {
         values.extend([frame.kinetic, frame.potential, frame.elastic]);
         values.extend(pose.angle_accelerations.iter());
         if self.probe {
-            values.extend(frame.probe_error.unwrap_or_default().iter());
+            // Where the ideal mechanism came to its end there is nothing to compare with.
+            let unknown = Vec3::repeat(f64::NAN);
+            values.extend(frame.probe_error.unwrap_or(unknown).iter());
         }
         if self.ledger {
             let ledger = frame.ledger.unwrap_or_default();

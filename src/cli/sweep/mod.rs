@@ -28,7 +28,7 @@ use crate::analysis::drive::drive_period;
 use crate::analysis::grid::{Axis, FOLLOW_BLOCK, Grid};
 use crate::analysis::layout::Status;
 use crate::analysis::point::{LOOSEST_FOR_EXPONENT, Plan};
-use crate::analysis::regime::Regime;
+use crate::analysis::regime::{FEWEST, Regime};
 use crate::analysis::sweep::Sweep;
 
 /// Steps between two looks for Ctrl-C.
@@ -195,6 +195,15 @@ fn warnings(sweep: &Sweep) -> Vec<String> {
                 all.push(format!("at {}: {warning}", sweep.describe(point)));
             }
         }
+    }
+    let plan = sweep.plan();
+    let kept = plan.periods.saturating_sub(plan.discard);
+    if kept < FEWEST {
+        all.push(format!(
+            "{} of each point: with fewer than {FEWEST} no regime is told, they all come out unclear; raise --periods or \
+             lower --discard.",
+            count(kept as u64, "section")
+        ));
     }
     let solver = &sweep.scene().solver;
     let loose =

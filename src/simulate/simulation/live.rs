@@ -68,6 +68,10 @@ impl Simulation {
         self.scene = next;
         let before = std::mem::replace(&mut self.running, running);
         self.mechanism.gravity = self.running.gravity;
+        if self.running.gravity != before.gravity {
+            let gravity = self.running.gravity;
+            self.reference.set_gravity(self.state.t, gravity);
+        }
         for j in 0..self.running.ball_joints.len() {
             let contact = self.running.ball_joints[j].contact;
             if contact != before.ball_joints[j].contact {
@@ -88,6 +92,27 @@ impl Simulation {
         self.refresh();
         self.book_change();
         Ok(Effect::Now)
+    }
+
+    /// Gravity from now on, of a simulation that no change of a scene goes through.
+    pub(in crate::simulate) fn set_gravity(&mut self, gravity: crate::scene::Vec3) {
+        self.running.gravity = gravity;
+        self.scene.gravity = gravity;
+        self.mechanism.gravity = gravity;
+        self.refresh();
+    }
+
+    /// Back to `time` within the latest step, on its interpolant; of a simulation without contacts.
+    pub(in crate::simulate) fn go_back_to(&mut self, time: f64) {
+        let h = self.state.t - self.state.t0;
+        if !(time < self.state.t && time >= self.state.t0) {
+            return;
+        }
+        self.interpolate((time - self.state.t0) / h, h);
+        self.state.t = time;
+        self.state.y.copy_from_slice(&self.scratch_y);
+        self.mechanism.project(time, &mut self.state.y);
+        self.refresh();
     }
 
     /// New contact parameters at this instant; a clearance that would put the ball inside the wall starts to move.

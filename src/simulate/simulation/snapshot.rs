@@ -11,6 +11,7 @@ impl Simulation {
             running: self.running.clone(),
             state: self.state.clone(),
             polynomial: self.stepper.polynomial().cloned(),
+            ideal: self.reference.kept(),
         }
     }
 
@@ -41,6 +42,9 @@ impl Simulation {
         state.memory0.copy_from_slice(&state.memory);
         if let Some(polynomial) = &snapshot.polynomial {
             fresh.stepper.set_polynomial(polynomial);
+        }
+        if let Some(ideal) = &snapshot.ideal {
+            fresh.reference.restore(ideal)?;
         }
         *self = fresh;
         Ok(())

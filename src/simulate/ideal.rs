@@ -1,0 +1,284 @@
+//! The ideal motion that a probe is compared with: where the scene has no closed form of it, a simulation of the same scene
+//! with every ball joint closed, alongside.
+
+use super::{Frame, Simulation, Snapshot, StartError};
+use crate::integrate::Method;
+use crate::scene::{Formulation, Scene, StartRule, Vec3};
+
+/// Tolerance of the ideal motion: it has no impacts, so that accuracy is cheap.
+const TOLERANCE: f64 = 1e-10;
+/// First step, s.
+const FIRST_STEP: f64 = 1e-4;
+/// Latest step ends that are kept. Both motions step 10 ms at most, so that samples within a step lie among them.
+const MARKS: usize = 64;
+
+/// Where the ideal tip is known from.
+pub(super) enum Reference {
+    /// There is no probe, or the drives' closed form tells.
+    Elsewhere,
+    /// Every ball joint is ideal: the motion is its own reference.
+    Itself,
+    /// A second simulation.
+    Alongside(Box<IdealMotion>),
+    /// The ideal mechanism cannot start.
+    None(StartError),
+}
+
+/// Tip at the end of a step: position, velocity and acceleration.
+#[derive(Clone, Copy, Debug, Default)]
+struct Mark {
+    time: f64,
+    tip: [Vec3; 3],
+}
+
+/// The ideal scene in motion, and where its tip was.
+pub(super) struct IdealMotion {
+    simulation: Simulation,
+    body: usize,
+    probe: Vec3,
+    frame: Frame,
+    marks: Marks,
+}
+
+/// The latest step ends, and whether there will be more.
+#[derive(Clone, Debug)]
+struct Marks {
+    ring: [Mark; MARKS],
+    count: usize,
+    /// Why it stopped.
+    stopped: Option<String>,
+}
+
+/// What a snapshot keeps of it.
+#[derive(Clone, Debug)]
+pub(super) struct Kept {
+    snapshot: Snapshot,
+    marks: Marks,
+}
+
+impl Reference {
+    /// For `scene`.
+    pub(super) fn of(scene: &Scene) -> Self {
+        let Some(probe) = scene.output.probe.filter(|_| scene.spcmm.is_none()) else {
+            return Self::Elsewhere;
+        };
+        if scene.ball_joints.iter().all(|j| j.contact.clearance == 0.0) {
+            return Self::Itself;
+        }
+        match IdealMotion::new(scene, probe) {
+            Ok(motion) => Self::Alongside(Box::new(motion)),
+            Err(error) => Self::None(error),
+        }
+    }
+
+    /// Tip in `frame` less the ideal tip at its time.
+    pub(super) fn error(&mut self, frame: &Frame) -> Option<Vec3> {
+        match self {
+            Self::Elsewhere | Self::None(_) => None,
+            Self::Itself => Some(Vec3::zeros()),
+            Self::Alongside(motion) => {
+                let body = &frame.bodies[motion.body];
+                let tip = body.position + body.rotation * motion.probe;
+                Some(tip - motion.tip(frame.time)?)
+            }
+        }
+    }
+
+    /// Why there is no ideal motion, or none any more.
+    pub(super) fn fault(&self) -> Option<String> {
+        match self {
+            Self::Elsewhere | Self::Itself => None,
+            Self::None(error) => Some(format!("cannot start: {error}")),
+            Self::Alongside(motion) => motion.marks.stopped.clone(),
+        }
+    }
+
+    /// Gravity from `time` on.
+    pub(super) fn set_gravity(&mut self, time: f64, gravity: Vec3) {
+        if let Self::Alongside(motion) = self {
+            motion.set_gravity(time, gravity);
+        }
+    }
+
+    pub(super) fn kept(&self) -> Option<Box<Kept>> {
+        match self {
+            Self::Alongside(motion) => Some(Box::new(Kept {
+                snapshot: motion.simulation.snapshot(),
+                marks: motion.marks.clone(),
+            })),
+            _ => None,
+        }
+    }
+
+    /// # Errors
+    /// As [`Simulation::restore`].
+    pub(super) fn restore(&mut self, kept: &Kept) -> Result<(), StartError> {
+        if let Self::Alongside(motion) = self {
+            motion.simulation.restore(&kept.snapshot)?;
+            motion.marks = kept.marks.clone();
+        }
+        Ok(())
+    }
+}
+
+impl IdealMotion {
+    fn new(scene: &Scene, probe: Vec3) -> Result<Self, StartError> {
+        let mut ideal = scene.clone();
+        for joint in &mut ideal.ball_joints {
+            joint.contact.clearance = 0.0;
+        }
+        // Balls may start off-centre in their play.
+        ideal.start = StartRule::Ideal;
+        ideal.formulation = Formulation::Tree;
+        ideal.output.probe = None;
+        ideal.solver.preset = None;
+        ideal.solver.method = Method::DormandPrince5;
+        ideal.solver.tolerance = TOLERANCE;
+        ideal.solver.step = FIRST_STEP;
+        ideal.solver.energy_ledger = false;
+        let mut motion = Self {
+            simulation: Simulation::new(&ideal)?,
+            body: scene.output.body,
+            probe,
+            frame: Frame::default(),
+            marks: Marks {
+                ring: [Mark::default(); MARKS],
+                count: 0,
+                stopped: None,
+            },
+        };
+        motion.mark();
+        Ok(motion)
+    }
+
+    /// Puts down where the tip is now.
+    fn mark(&mut self) {
+        self.simulation
+            .sample(self.simulation.time(), &mut self.frame);
+        let body = &self.frame.bodies[self.body];
+        let (arm, w) = (body.rotation * self.probe, body.angular_velocity);
+        let acceleration =
+            body.acceleration + body.angular_acceleration.cross(&arm) + w.cross(&w.cross(&arm));
+        let velocity = body.velocity + w.cross(&arm);
+        self.marks.ring[self.marks.count % MARKS] = Mark {
+            time: self.frame.time,
+            tip: [body.position + arm, velocity, acceleration],
+        };
+        self.marks.count += 1;
+    }
+
+    /// The tip at `time`, m; `None` before the oldest mark, and after the motion stopped.
+    fn tip(&mut self, time: f64) -> Option<Vec3> {
+        while self.simulation.time() < time && self.marks.stopped.is_none() {
+            match self.simulation.step() {
+                Ok(()) => self.mark(),
+                Err(stopped) => self.marks.stopped = Some(stopped.to_string()),
+            }
+        }
+        self.marks.tip(time)
+    }
+
+    fn set_gravity(&mut self, time: f64, gravity: Vec3) {
+        self.tip(time);
+        self.simulation.go_back_to(time);
+        self.simulation.set_gravity(gravity);
+        // What lay ahead of `time` is not so any more.
+        self.marks.forget_after(time);
+        self.mark();
+    }
+}
+
+impl Marks {
+    fn tip(&self, time: f64) -> Option<Vec3> {
+        let oldest = self.count.saturating_sub(MARKS);
+        let at = |k: usize| &self.ring[k % MARKS];
+        let newest = at(self.count.checked_sub(1)?);
+        if time >= newest.time {
+            return (time == newest.time).then_some(newest.tip[0]);
+        }
+        let before = (oldest..self.count).rev().find(|&k| at(k).time <= time)?;
+        Some(quintic(at(before), at(before + 1), time))
+    }
+
+    fn forget_after(&mut self, time: f64) {
+        while self.count > 1 && self.ring[(self.count - 1) % MARKS].time > time {
+            self.count -= 1;
+        }
+    }
+}
+
+/// The polynomial of order 5 through positions, velocities and accelerations at both ends.
+fn quintic(a: &Mark, b: &Mark, time: f64) -> Vec3 {
+    let h = b.time - a.time;
+    let s = (time - a.time) / h;
+    let ([x0, v0, a0], [x1, v1, a1]) = (a.tip, b.tip);
+    let (v0, v1, a0, a1) = (v0 * h, v1 * h, a0 * (h * h), a1 * (h * h));
+    // What the end has more than a parabola from the start.
+    let (x, v, c) = (x1 - x0 - v0 - a0 * 0.5, v1 - v0 - a0, a1 - a0);
+    let (c3, c4, c5) = (
+        x * 10.0 - v * 4.0 + c * 0.5,
+        x * -15.0 + v * 7.0 - c,
+        x * 6.0 - v * 3.0 + c * 0.5,
+    );
+    x0 + (v0 + (a0 * 0.5 + (c3 + (c4 + c5 * s) * s) * s) * s) * s
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scene(name: &str, changes: &[(&str, &str)]) -> Scene {
+        let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
+        let changes: Vec<(String, String)> = changes.iter().map(own).collect();
+        Scene::load(name, &changes).expect("loads")
+    }
+
+    #[test]
+    fn the_motion_alongside_is_the_closed_form_of_the_paper() {
+        let scene = scene("spcmm", &[]);
+        let probe = scene.output.probe.expect("has a probe");
+        let mut alongside = IdealMotion::new(&scene, probe).expect("starts");
+        let mut simulation = Simulation::new(&scene).expect("starts");
+        let mut frame = Frame::default();
+        for k in 0..40 {
+            // Between step ends of either motion, and not always forward.
+            let time = 0.0137 * f64::from(k) - 0.001 * f64::from(k % 3);
+            simulation.advance_to(time).expect("runs");
+            simulation.sample(time, &mut frame);
+            let body = &frame.bodies[scene.output.body];
+            let tip = body.position + body.rotation * probe;
+            let closed = tip - frame.probe_error.expect("has a closed form");
+            let off = (alongside.tip(frame.time).expect("goes on") - closed).norm();
+            assert!(off < 1e-10, "{off:e} at {time}");
+        }
+    }
+
+    #[test]
+    fn a_change_of_gravity_holds_from_its_instant_on() {
+        let mut scene = scene("pendulum", &[]);
+        scene.output.probe = Some(Vec3::new(0.0, 0.0, -0.1));
+        let mut simulation = Simulation::new(&scene).expect("starts");
+        let mut frame = Frame::default();
+        simulation.advance_to(0.05).expect("runs");
+        simulation.sample(0.05, &mut frame);
+        let change = simulation.time();
+        simulation.set("gravity.z", "0").expect("sets");
+        simulation.set("gravity.x", "0").expect("sets");
+        simulation.sample(change, &mut frame);
+        assert!(frame.probe_error.expect("goes on").norm() < 2e-3);
+        // Without gravity a rod in an ideal joint turns evenly: its tip stays on its circle, at the speed that it has.
+        let Reference::Alongside(motion) = &mut simulation.reference else {
+            panic!("nothing alongside");
+        };
+        let times = [0.0, 0.01, 0.02].map(|ahead| change + ahead);
+        let tips = times.map(|time| motion.tip(time).expect("goes on"));
+        let angle = |a: Vec3, b: Vec3| libm::atan2(a.cross(&b).norm(), a.dot(&b));
+        let (first, second) = (angle(tips[0], tips[1]), angle(tips[1], tips[2]));
+        assert!(
+            first > 0.01 && (first - second).abs() < 1e-9,
+            "{first} {second}"
+        );
+        let before = motion.tip(change - 0.005).expect("goes on");
+        assert!((angle(before, tips[0]) - 0.5 * first).abs() > 1e-6);
+    }
+}
