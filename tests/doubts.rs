@@ -5,6 +5,11 @@ mod common;
 use common::{Changes, run_until, simulation};
 use jointplay::simulate::Simulation;
 
+fn words(simulation: &Simulation) -> Vec<String> {
+    let doubts = simulation.doubts();
+    doubts.iter().map(ToString::to_string).collect()
+}
+
 fn ran(scene: &str, changes: &Changes, duration: f64) -> Simulation {
     let mut simulation = simulation(scene, changes);
     run_until(&mut simulation, duration);
@@ -17,7 +22,7 @@ fn nothing_speaks_against_the_built_in_scenes_with_any_preset() {
         for preset in ["preview", "real-time", "accurate"] {
             let simulation = ran(scene, &[("solver.preset", preset)], 0.03);
             let none: [String; 0] = [];
-            assert_eq!(simulation.doubts(), none, "{scene}, {preset}");
+            assert_eq!(words(&simulation), none, "{scene}, {preset}");
         }
     }
     let rk4 = ran("spcmm", &[("solver.method", "rk4")], 0.03);
@@ -64,7 +69,7 @@ fn each_doubt_is_told_once_and_names_its_joint() {
         ),
     ];
     for (scene, changes, expected) in cases {
-        let doubts = ran(scene, changes, 0.03).doubts();
+        let doubts = words(&ran(scene, changes, 0.03));
         let said = doubts.iter().filter(|doubt| doubt.contains(expected));
         assert_eq!(said.count(), 1, "{scene} {changes:?}: {doubts:#?}");
     }

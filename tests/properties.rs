@@ -154,7 +154,7 @@ proptest! {
                 break;
             }
         }
-        let words = simulation.doubts();
+        let words: Vec<String> = simulation.doubts().iter().map(ToString::to_string).collect();
         prop_assert!(words.iter().all(|doubt| doubt.ends_with('.') && !doubt.contains("NaN")), "{words:?}");
     }
 

@@ -112,6 +112,7 @@ impl Accuracy {
         // What a control says already is not said again.
         let said = player.warnings();
         let doubts = player.simulation().doubts().into_iter();
+        let doubts = doubts.map(|doubt| doubt.to_string());
         for doubt in doubts.filter(|doubt| !said.contains(doubt)) {
             let words = RichText::new(doubt).small();
             ui.label(words.color(ui.visuals().warn_fg_color));

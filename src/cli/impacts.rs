@@ -9,7 +9,7 @@ use super::output::{RowsFile, Table};
 use crate::scene::Scene;
 use crate::simulate::{Impact, Simulation};
 
-const COLUMNS: [&str; 13] = [
+const COLUMNS: [&str; 14] = [
     "joint",
     "start_s",
     "end_s",
@@ -23,6 +23,7 @@ const COLUMNS: [&str; 13] = [
     "steps",
     "deepest_m",
     "peak_N",
+    "damping_over_elastic",
 ];
 
 /// Collects the impacts of a run for a file.
@@ -78,6 +79,7 @@ impl ImpactsFile {
                 impact.steps as f64,
                 impact.deepest,
                 impact.peak,
+                impact.damping,
             ]
         });
         let table = Table::of_rows(COLUMNS, rows);

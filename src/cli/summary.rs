@@ -66,7 +66,7 @@ pub fn json(
         "peak_normal_N": by_joint(&|i| json!(statistics.peak_normal[i])),
         "peak_time_s": by_joint(&|i| json!(statistics.peak_time[i])),
         "constraint_drift_m": statistics.constraint_drift,
-        "doubts": simulation.doubts(),
+        "doubts": simulation.doubts().iter().map(ToString::to_string).collect::<Vec<_>>(),
         "wall_s": wall,
         "ratio": ratio(time, wall),
         "slower_than_asked": slower_than_asked(scene, ratio(time, wall)),
@@ -191,7 +191,7 @@ pub fn text(
         );
     }
     for doubt in simulation.doubts() {
-        line("Not trusted", doubt);
+        line("Not trusted", doubt.to_string());
     }
     let ratio = ratio(time, wall);
     let mut speed = format!("{wall:.3} s of stepping");

@@ -3,7 +3,7 @@
 //! Every law here has the form F_N = K delta^1.5 (1 + chi delta_dot / delta_dot0), cut at 0 from below: they differ
 //! in the damping factor chi(ce) alone, so the force itself is one kernel.
 
-use super::{FrictionLaw, FrictionVelocity, NormalLaw, Parameters};
+use super::{ApproachSpeed, FrictionLaw, FrictionVelocity, NormalLaw, Parameters};
 
 /// Hertz stiffness K of a ball of radius `r` in a socket of radius `r + c`, N/m^1.5 (19):
 /// K = 4 / (3 (s_i + s_j)) sqrt(R r / (R - r)), s = (1 - nu^2) / E.
@@ -106,6 +106,8 @@ pub struct Coefficients {
     pub ball_radius: f64,
     /// Friction reads the surfaces' relative velocity, not the centres'.
     pub surface: bool,
+    /// The damping term divides by the largest rate of the contact so far, not by the one at its start.
+    pub largest: bool,
 }
 
 impl Coefficients {
@@ -123,6 +125,7 @@ impl Coefficients {
             speed_floor: parameters.impact_speed_floor,
             ball_radius: parameters.ball_radius,
             surface: parameters.friction_velocity == FrictionVelocity::Surface,
+            largest: parameters.approach_speed == ApproachSpeed::Largest,
         }
     }
 

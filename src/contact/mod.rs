@@ -1,8 +1,10 @@
 //! Contact of a ball in its socket: pure functions of gap, rates and parameters. SI units, f64.
 
+mod approach;
 mod law;
 mod slip;
 
+pub use approach::Pace;
 pub use law::{
     Coefficients, damping_factor, hertz_stiffness, impact_duration, restitution_given,
     settled_penetration,
@@ -42,6 +44,15 @@ pub enum FrictionVelocity {
     Surface,
 }
 
+/// Which speed the damping term of the normal force divides by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ApproachSpeed {
+    /// The penetration rate at which the contact began, paper eq. (19).
+    Start,
+    /// The largest penetration rate of the contact so far.
+    Largest,
+}
+
 /// What a ball joint's contact is made of. SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameters {
@@ -65,6 +76,8 @@ pub struct Parameters {
     pub slip_speed_high: f64,
     /// Least approach speed that the damping term divides by, m/s.
     pub impact_speed_floor: f64,
+    /// Which speed the damping term divides by.
+    pub approach_speed: ApproachSpeed,
     /// Normal-force law.
     pub normal_law: NormalLaw,
     /// Friction law.
@@ -85,6 +98,7 @@ impl Default for Parameters {
             slip_speed_low: 1e-6,
             slip_speed_high: 1e-4,
             impact_speed_floor: 1e-3,
+            approach_speed: ApproachSpeed::Start,
             normal_law: NormalLaw::LankaraniNikravesh,
             friction_law: FrictionLaw::ModifiedCoulomb,
         }

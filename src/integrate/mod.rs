@@ -6,6 +6,8 @@
 mod controller;
 mod dormand_prince;
 mod fixed;
+#[cfg(test)]
+mod order_conditions;
 mod radau;
 mod root;
 mod rosenbrock;

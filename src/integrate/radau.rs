@@ -7,7 +7,7 @@
 use super::StiffSystem;
 
 const SQRT6: f64 = 2.449_489_742_783_178;
-const C: [f64; 3] = [(4.0 - SQRT6) / 10.0, (4.0 + SQRT6) / 10.0, 1.0];
+pub(super) const C: [f64; 3] = [(4.0 - SQRT6) / 10.0, (4.0 + SQRT6) / 10.0, 1.0];
 /// Weights of the stages in the embedded error estimate.
 const ERROR: [f64; 3] = [
     -(13.0 + 7.0 * SQRT6) / 3.0,
@@ -354,6 +354,40 @@ fn polynomial(z: &[f64; 3], s: f64) -> f64 {
     let a2 = (slope - a1) / c1m1;
     let a3 = a2 - a3;
     z[2] + s * (a1 + (s - c2m1) * (a2 + (s - c1m1) * a3))
+}
+
+/// Coefficient matrix that the transformation stands for, and the weights of the embedded method with that of the derivative at
+/// the start first.
+#[cfg(test)]
+pub(super) fn tableau() -> ([Vec<f64>; 3], [f64; 4]) {
+    use nalgebra::Matrix3;
+    let matrix = |m: &[[f64; 3]; 3]| Matrix3::from_fn(|i, j| m[i][j]);
+    let (alpha, beta) = PAIR;
+    let values = Matrix3::new(REAL, 0.0, 0.0, 0.0, alpha, -beta, 0.0, beta, alpha);
+    let inverse = matrix(&T) * values * matrix(&T_INVERSE);
+    let a = inverse.try_inverse().expect("Radau's matrix is regular");
+    let rows = std::array::from_fn(|i| a.row(i).iter().copied().collect::<Vec<f64>>());
+    // The estimate is (f(y) + sum ERROR_i z_i / h) h / REAL, with z = h A f.
+    let mut embedded = [1.0 / REAL, 0.0, 0.0, 0.0];
+    for j in 0..3 {
+        let shift: f64 = (0..3).map(|i| ERROR[i] * a[(i, j)]).sum();
+        embedded[j + 1] = a[(2, j)] + shift / REAL;
+    }
+    (rows, embedded)
+}
+
+/// Weights of the stages' derivatives in the collocation polynomial at the part `theta` of a step.
+#[cfg(test)]
+pub(super) fn weights_within(theta: f64, a: &[Vec<f64>; 3]) -> Vec<f64> {
+    let unit = |i: usize| std::array::from_fn(|j| f64::from(u8::from(i == j)));
+    let mut weights = vec![0.0; 3];
+    for (i, row) in a.iter().enumerate() {
+        let part = polynomial(&unit(i), theta - 1.0);
+        for (weight, a) in weights.iter_mut().zip(row) {
+            *weight += part * a;
+        }
+    }
+    weights
 }
 
 #[cfg(test)]

@@ -9,13 +9,13 @@ use super::StiffSystem;
 
 const STAGES: usize = 4;
 const GAMMA: f64 = 0.435_866_521_508_459;
-const ALPHA_IJ: [[f64; STAGES]; STAGES] = [
+pub(super) const ALPHA_IJ: [[f64; STAGES]; STAGES] = [
     [0.0; 4],
     [0.871_733_043_016_918, 0.0, 0.0, 0.0],
     [0.844_570_600_153_694_2, -0.112_990_642_364_841_85, 0.0, 0.0],
     [0.0, 0.0, 1.0, 0.0],
 ];
-const GAMMA_IJ: [[f64; STAGES]; STAGES] = [
+pub(super) const GAMMA_IJ: [[f64; STAGES]; STAGES] = [
     [GAMMA, 0.0, 0.0, 0.0],
     [-0.871_733_043_016_918, GAMMA, 0.0, 0.0],
     [
@@ -31,17 +31,17 @@ const GAMMA_IJ: [[f64; STAGES]; STAGES] = [
         GAMMA,
     ],
 ];
-const WEIGHTS: [f64; STAGES] = [
+pub(super) const WEIGHTS: [f64; STAGES] = [
     0.242_123_807_060_953_46,
     -1.223_250_583_904_514_7,
     1.545_260_255_335_102,
     GAMMA,
 ];
-const EMBEDDED: [f64; STAGES] = [
+pub(super) const EMBEDDED: [f64; STAGES] = [
     0.378_109_031_458_193_7,
     -0.096_042_292_212_423_18,
     0.5,
-    0.217_932_607_542_295,
+    0.5 * GAMMA,
 ];
 
 /// Coefficients in the variables U.

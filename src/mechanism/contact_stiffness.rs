@@ -53,11 +53,8 @@ pub fn linearise_contact(
     let rate = n.dot(&gap.eccentricity_rate) - contacts.clearance_rate(j);
     let penetration = distance - contacts.clearance(j);
     let memory = &contacts.memory()[j];
-    let approach = if memory.active {
-        memory.approach_speed
-    } else {
-        rate.max(c.speed_floor)
-    };
+    let approach = memory.approach(c, rate);
+    let follows = memory.active && c.approach_follows(memory.pace, memory.approach_speed, rate);
     let identity = Mat3::identity();
     let tangent = identity - n * n.transpose();
     let normal = tangent / distance;
@@ -65,7 +62,11 @@ pub fn linearise_contact(
     let elastic = c.stiffness * penetration * root;
     let factor = 1.0 + c.damping * rate / approach;
     let by_penetration = 1.5 * c.stiffness * root * factor;
-    let by_rate = elastic * c.damping / approach;
+    let by_rate = if follows {
+        0.0
+    } else {
+        elastic * c.damping / approach
+    };
     let force_n = gap.normal_force;
 
     // F = -F_N n - mu F_N t, with t along the sliding velocity.

@@ -2,7 +2,7 @@
 
 use super::kinematics::{Kinematics, Wrench};
 use super::model::{BallJoint, Model};
-use crate::contact::{Coefficients, Parameters, Slip};
+use crate::contact::{Coefficients, Pace, Parameters, Slip};
 use crate::scene::{Scene, Vec3};
 
 /// What a contact remembers between steps: part of the state.
@@ -10,12 +10,28 @@ use crate::scene::{Scene, Vec3};
 pub struct Memory {
     /// In contact.
     pub active: bool,
-    /// delta_dot0 of this contact, not below the scene's floor, m/s; 0 while free.
+    /// What the damping term divides by: delta_dot0 of this contact, or its largest rate so far, not below the scene's floor,
+    /// m/s; 0 while free.
     pub approach_speed: f64,
     /// The floor was used: this contact rebounds higher than asked.
     pub floored: bool,
     /// Piece of the friction law in force.
     pub slip: Slip,
+    /// Piece of the rule for the approach speed in force.
+    pub pace: Pace,
+}
+
+impl Memory {
+    /// What the damping term divides by where the penetration grows at `rate`, m/s. Until a contact has a memory it is the
+    /// rate itself.
+    #[inline]
+    pub fn approach(&self, c: &Coefficients, rate: f64) -> f64 {
+        if self.active {
+            c.approach(self.pace, self.approach_speed, rate)
+        } else {
+            rate.max(c.speed_floor)
+        }
+    }
 }
 
 /// A clearance on its way to a new value.
@@ -96,7 +112,7 @@ pub struct Contacts {
     any_contact: bool,
     /// Contacts carry no force: for [`crate::integrate::ContactSystem::derivative_apart`].
     pub apart: bool,
-    /// A sliding speed was beyond its piece of the friction law since this was last cleared.
+    /// A sliding speed or a penetration rate may have been beyond its piece of the law since this was last cleared.
     pub strayed: bool,
     /// Of the latest evaluation, s.
     time: f64,
@@ -269,11 +285,13 @@ impl Contacts {
                     0.0
                 };
             let penetration = distance - clearance;
-            let approach = if memory.active {
-                memory.approach_speed
-            } else {
-                rate.max(coefficients.speed_floor)
-            };
+            let approach = memory.approach(coefficients, rate);
+            // A rising rate may pass its largest value in any step.
+            if memory.pace == Pace::Rising
+                || (memory.pace == Pace::Held && rate > memory.approach_speed)
+            {
+                self.strayed = true;
+            }
             let normal_force = coefficients.normal_force(penetration, rate, approach);
             gap.normal_force = normal_force;
             if normal_force == 0.0 {

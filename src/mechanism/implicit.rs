@@ -31,6 +31,8 @@ struct Touch {
     law: Coefficients,
     slip: Slip,
     approach: f64,
+    /// A larger rate takes the place of `approach`.
+    follows: bool,
     clearance: f64,
     clearance_rate: f64,
     /// Without contact forces: eccentricity (m), its rate and the velocity that friction reads (m/s).
@@ -66,19 +68,25 @@ impl Touch {
         self.normal = n;
         let deepening = n.dot(&rate) - self.clearance_rate;
         let c = &self.law;
-        let normal_force = c.normal_force(penetration, deepening, self.approach);
+        let rising = self.follows && deepening > self.approach;
+        let approach = if rising { deepening } else { self.approach };
+        let normal_force = c.normal_force(penetration, deepening, approach);
         if normal_force <= 0.0 {
             return;
         }
         let root = penetration.sqrt();
         let stiffness = c.stiffness * root;
-        let by_penetration = 1.5 * stiffness * (1.0 + c.damping * deepening / self.approach);
-        let by_rate = stiffness * penetration * c.damping / self.approach;
+        let by_penetration = 1.5 * stiffness * (1.0 + c.damping * deepening / approach);
+        let by_rate = if rising {
+            0.0
+        } else {
+            stiffness * penetration * c.damping / approach
+        };
         let tangent = Mat3::identity() - n * n.transpose();
         let turning = tangent * (h / distance);
-        let rising = n * (h * by_penetration + by_rate) + turning * rate * by_rate;
+        let rise = n * (h * by_penetration + by_rate) + turning * rate * by_rate;
         self.force = n * -normal_force;
-        self.impedance = -n * rising.transpose() - turning * normal_force;
+        self.impedance = -n * rise.transpose() - turning * normal_force;
         if c.friction > 0.0 {
             let relative = self.relative + self.slipping;
             let sliding = tangent * relative;
@@ -87,7 +95,7 @@ impl Touch {
             let resisting = per_speed * normal_force;
             self.force -= sliding * resisting;
             let turned = turning * n.dot(&relative) + n * (turning * relative).transpose();
-            self.impedance += turned * resisting - sliding * (rising * per_speed).transpose();
+            self.impedance += turned * resisting - sliding * (rise * per_speed).transpose();
             self.resistance = tangent * -resisting;
             // Full friction by its secant, which brings sliding to rest within a step and cannot reverse it; the ramp by its
             // slope.
@@ -201,6 +209,7 @@ impl ImplicitContacts {
                 } else {
                     gap.rate.max(law.speed_floor)
                 },
+                follows: law.largest && memory.active,
                 clearance: contacts.clearance(j),
                 clearance_rate: contacts.clearance_rate(j),
                 eccentricity: gap.eccentricity,

@@ -400,6 +400,11 @@ impl Mechanism {
         }
     }
 
+    /// Whether a ball joint is ideal: [`Self::reaction`] is then another at every evaluation.
+    pub fn has_reactions(&self) -> bool {
+        !self.model.ideal_joints.is_empty()
+    }
+
     /// Largest constraint violation at the latest evaluation of the `lagrange` form, m or rad; 0 in the `tree` form.
     pub fn constraint_drift(&self) -> f64 {
         match &self.form {

@@ -327,7 +327,6 @@ fn spin_of(q: &[f64], d: &[f64]) -> [f64; 3] {
 
 #[cfg(test)]
 mod tests {
-    use crate::contact::Slip;
     use crate::integrate::{StiffSystem, System};
     use crate::mechanism::{Mechanism, Memory};
     use crate::scene::Scene;
@@ -352,7 +351,7 @@ mod tests {
                 active: true,
                 approach_speed: 1e-3,
                 floored: true,
-                slip: Slip::Whole,
+                ..Memory::default()
             };
         }
         (mechanism, y)

@@ -4,10 +4,11 @@ use super::error::{nearest, nearest_parameter};
 use super::read::{SPCMM_DIMENSIONS, VIEW_SETTINGS};
 use super::table::{self, contact_part, find};
 use super::*;
-use crate::contact::{self, FrictionLaw, FrictionVelocity, NormalLaw};
+use crate::contact::{self, ApproachSpeed, FrictionLaw, FrictionVelocity, NormalLaw};
 use crate::integrate::Method;
 
 const VELOCITIES: [FrictionVelocity; 2] = [FrictionVelocity::Centres, FrictionVelocity::Surface];
+const APPROACHES: [ApproachSpeed; 2] = [ApproachSpeed::Start, ApproachSpeed::Largest];
 const NORMALS: [NormalLaw; 5] = [
     NormalLaw::LankaraniNikravesh,
     NormalLaw::Hertz,
@@ -48,6 +49,12 @@ fn word<T: PartialEq, const N: usize>(
     Value::Choice(words[at])
 }
 
+/// The word of a normal-force law.
+pub(super) fn normal_law_word(law: NormalLaw) -> &'static str {
+    let at = NORMALS.iter().position(|other| *other == law);
+    at.map_or("", |at| table::NORMAL_LAWS[at])
+}
+
 /// The item of a word.
 fn item<T: Copy, const N: usize>(words: &[&str; N], items: &[T; N], value: &Value) -> T {
     let at = words
@@ -82,6 +89,13 @@ pub(super) fn contact_value(contact: &contact::Parameters, part: &str) -> Value 
                 &contact.friction_velocity,
             );
         }
+        "approach_speed" => {
+            return word(
+                &table::APPROACH_SPEEDS,
+                &APPROACHES,
+                &contact.approach_speed,
+            );
+        }
         "normal_law" => return word(&table::NORMAL_LAWS, &NORMALS, &contact.normal_law),
         "friction_law" => return word(&table::FRICTION_LAWS, &FRICTIONS, &contact.friction_law),
         _ => unreachable!("{part} is no contact key"),
@@ -102,6 +116,9 @@ pub(super) fn set_contact_value(contact: &mut contact::Parameters, part: &str, v
         "impact_speed_floor" => contact.impact_speed_floor = number(value),
         "friction_velocity" => {
             contact.friction_velocity = item(&table::FRICTION_VELOCITIES, &VELOCITIES, value)
+        }
+        "approach_speed" => {
+            contact.approach_speed = item(&table::APPROACH_SPEEDS, &APPROACHES, value)
         }
         "normal_law" => contact.normal_law = item(&table::NORMAL_LAWS, &NORMALS, value),
         "friction_law" => contact.friction_law = item(&table::FRICTION_LAWS, &FRICTIONS, value),

@@ -6,8 +6,10 @@ use super::*;
 use crate::contact::{self, FrictionLaw, NormalLaw};
 use crate::integrate::Method;
 
-/// Fewer fixed steps than this do not resolve an impact; ten do.
+/// Fewer fixed steps than this do not resolve an impact; twice as many do.
 const LEAST_STEPS: f64 = 5.0;
+/// The same for the implicit Euler method in the contacts, whose own damping takes as much of an impact as a step is of it.
+const LEAST_IMPLICIT_STEPS: f64 = 40.0;
 
 /// Loosest tolerance at which impacts keep their energy to a few per cent.
 const LOOSEST: f64 = 1e-3;
@@ -33,7 +35,8 @@ impl Scene {
     /// Choices that are allowed but may not mean what the user expects, one sentence each: [`Self::doubts`], and what
     /// makes a run slow.
     pub fn warnings(&self) -> Vec<String> {
-        let mut warnings = self.doubts();
+        let doubts = self.doubts().into_iter();
+        let mut warnings: Vec<String> = doubts.map(|doubt| doubt.to_string()).collect();
         for (joints, contact) in self.contact_groups() {
             if contact.clearance > 0.0
                 && contact.slip_speed_high < 1e-6
@@ -48,35 +51,25 @@ impl Scene {
         warnings
     }
 
-    /// Why a result of this scene is not to be trusted, whatever the run meets, one sentence each.
-    pub fn doubts(&self) -> Vec<String> {
+    /// Why a result of this scene is not to be trusted, whatever the run meets.
+    pub fn doubts(&self) -> Vec<Doubt> {
         let mut doubts = Vec::new();
         for (joints, contact) in self.contact_groups() {
-            let law = match contact.normal_law {
-                NormalLaw::LankaraniNikravesh => Some("lankarani-nikravesh"),
-                NormalLaw::HuntCrossley => Some("hunt-crossley"),
-                NormalLaw::Hertz => Some("hertz"),
-                NormalLaw::Flores | NormalLaw::Gonthier => None,
-            };
+            let suits = matches!(contact.normal_law, NormalLaw::Flores | NormalLaw::Gonthier);
             let near_one = contact.restitution >= 0.8 || contact.clearance == 0.0;
-            if let Some(law) = law
-                && !near_one
-            {
-                let damping = contact::damping_factor(contact.normal_law, 0.0);
-                doubts.push(format!(
-                    "{joints}: restitution {} with {law}, which is right only near 1 (asked for 0, it gives \
-                     about {:.2}); flores or gonthier suit low restitution.",
-                    contact.restitution,
-                    contact::restitution_given(damping)
-                ));
+            if !suits && !near_one {
+                doubts.push(Doubt::Restitution {
+                    joints: joints.clone(),
+                    law: contact.normal_law,
+                    restitution: contact.restitution,
+                });
             }
             if contact.clearance > 0.0 && contact.clearance <= 1e-5 {
-                doubts.push(format!(
-                    "{joints}: clearance {} is so small that the contact patch is no longer small against the ball \
-                     (radius {}), which Hertz's theory assumes.",
-                    format_quantity(contact.clearance, "mm"),
-                    format_quantity(contact.ball_radius, "mm")
-                ));
+                doubts.push(Doubt::Clearance {
+                    joints,
+                    clearance: contact.clearance,
+                    ball_radius: contact.ball_radius,
+                });
             }
         }
         doubts.extend(self.step_warning());
@@ -85,19 +78,17 @@ impl Scene {
     }
 
     /// That a tolerance is too loose for impacts.
-    fn tolerance_warning(&self) -> Option<String> {
+    fn tolerance_warning(&self) -> Option<Doubt> {
         let rattles = self.ball_joints.iter().any(|j| j.contact.clearance > 0.0);
         let loose = self.solver.method.is_adaptive() && self.solver.tolerance > LOOSEST;
-        (rattles && loose).then(|| {
-            format!(
-                "solver.tolerance {:e}: impacts may gain or lose much of their energy; use {LOOSEST:e} or less.",
-                self.solver.tolerance
-            )
+        (rattles && loose).then_some(Doubt::Tolerance {
+            tolerance: self.solver.tolerance,
+            loosest: LOOSEST,
         })
     }
 
     /// That a fixed step is too long for the shortest impact to be expected, with one that is not.
-    fn step_warning(&self) -> Option<String> {
+    fn step_warning(&self) -> Option<Doubt> {
         if self.solver.method.is_adaptive() {
             return None;
         }
@@ -110,37 +101,26 @@ impl Scene {
             .min_by(|a, b| (a.1.0 / a.1.1).total_cmp(&(b.1.0 / b.1.1)))?;
         let (impact, friction) = duration;
         let duration = impact / friction;
-        if self.solver.step <= duration / LEAST_STEPS {
+        let steps = match self.solver.method {
+            Method::ImexEuler => LEAST_IMPLICIT_STEPS,
+            _ => LEAST_STEPS,
+        };
+        if self.solver.step <= duration / steps {
             return None;
         }
-        // One, two or five of a decade: at least ten steps in the impact.
-        let most = duration / 10.0;
+        // One, two or five of a decade.
+        let most = duration / (2.0 * steps);
         let decade = libm::pow(10.0, libm::floor(libm::log10(most)));
         let digit = [5.0, 2.0, 1.0].into_iter().find(|d| d * decade <= most);
         let recommended = digit.unwrap_or(1.0) * decade;
-        let why = if friction > 1.0 {
-            format!(
-                "friction at ball joint {} is estimated to reverse the sliding in",
-                joint.name
-            )
-        } else {
-            format!(
-                "an impact at ball joint {} is estimated to last",
-                joint.name
-            )
-        };
-        let stays = if self.solver.method == Method::ImexEuler && friction <= 1.0 {
-            " (imex-euler stays stable, but its peak forces and rebounds are too low)"
-        } else {
-            ""
-        };
-        Some(format!(
-            "solver.step {}: {why} {}, which a fixed step this long does not resolve{stays}; use {} or less, or \
-             solver.method = automatic.",
-            format_quantity(self.solver.step, "us"),
-            format_quantity(libm::round(duration * 1e8) * 1e-8, "us"),
-            format_quantity(recommended, "us")
-        ))
+        Some(Doubt::Step {
+            joint: joint.name.clone(),
+            step: self.solver.step,
+            duration,
+            sliding: friction > 1.0,
+            stable: self.solver.method == Method::ImexEuler && friction <= 1.0,
+            recommended,
+        })
     }
 
     /// Estimated duration of the first impact of a joint with clearance, s, whose bodies fall freely through the gap; and

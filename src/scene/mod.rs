@@ -6,6 +6,7 @@ mod access;
 mod chain;
 mod check;
 mod document;
+mod doubt;
 mod error;
 mod load;
 mod model;
@@ -19,6 +20,7 @@ mod tests;
 mod units;
 mod write;
 
+pub use doubt::Doubt;
 pub use error::SceneError;
 pub use load::*;
 pub use model::*;

@@ -10,6 +10,7 @@ pub fn table() -> &'static [Parameter] {
 
 /// Words of `contact.friction_velocity`, `contact.normal_law`, … in the order of the menus.
 pub(super) const FRICTION_VELOCITIES: [&str; 2] = ["centres", "surface"];
+pub(super) const APPROACH_SPEEDS: [&str; 2] = ["start", "largest"];
 pub(super) const NORMAL_LAWS: [&str; 5] = [
     "lankarani-nikravesh",
     "hertz",
@@ -154,7 +155,7 @@ const fn gravity(
     )
 }
 
-static TABLE: [Parameter; 27] = [
+static TABLE: [Parameter; 28] = [
     contact(
         "contact.clearance",
         "Clearance",
@@ -246,6 +247,17 @@ static TABLE: [Parameter; 27] = [
         Value::Number(1e-3),
         "Least approach speed that the damping term divides by. Without a floor the last, softest touches would be \
          infinitely stiff. A contact that begins more slowly than this rebounds higher than asked.",
+        "Paper eq. (19), the speed at the start of contact",
+    ),
+    contact(
+        "contact.approach_speed",
+        "Approach speed",
+        Kind::Choice(&APPROACH_SPEEDS),
+        Value::Choice("start"),
+        "Which speed the damping term divides by. start is the paper's: the penetration rate at which the contact began. A \
+         joint that touches softly and is then hit by its neighbour is damped many times too strongly by it. largest is \
+         the largest rate of the contact so far, which keeps damping within what the law gives an undisturbed impact; \
+         such an impact is the same with both.",
         "Paper eq. (19), the speed at the start of contact",
     ),
     contact(

@@ -34,6 +34,9 @@ pub struct Impact {
     pub deepest: f64,
     /// Largest normal force in continuous time, N.
     pub peak: f64,
+    /// Largest ratio of damping to elastic force: the damping factor at its start, unless it is hit again or began slower than
+    /// the floor.
+    pub damping: f64,
 }
 
 impl Impact {
@@ -101,12 +104,20 @@ impl Impacts {
         });
     }
 
-    /// A step in which the contact of `joint` was on, or came on: the course of its penetration.
-    pub(super) fn follow(&mut self, joint: usize, course: &Course, coefficients: &Coefficients) {
+    /// A step in which the contact of `joint`, whose memory held `remembered` (m/s), was on, or came on: the course of its
+    /// penetration, and the largest ratio of damping to elastic force in it.
+    pub(super) fn follow(
+        &mut self,
+        joint: usize,
+        course: &Course,
+        coefficients: &Coefficients,
+        remembered: f64,
+        damping: f64,
+    ) {
         if let Some(impact) = &mut self.under_way[joint] {
-            let floor = coefficients.speed_floor;
-            let (force, _) = course.strongest(coefficients, impact.approach_speed.max(floor));
+            let (force, _) = course.strongest(coefficients, remembered);
             impact.steps += 1;
+            impact.damping = impact.damping.max(damping);
             impact.deepest = impact.deepest.max(course.deepest());
             impact.peak = impact.peak.max(force);
         }

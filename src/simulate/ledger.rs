@@ -199,6 +199,16 @@ impl Account {
         self.past.clear();
     }
 
+    /// Sum of the sizes of the energies at the end of the latest step, J.
+    pub(super) fn energy(&self) -> f64 {
+        let Energies {
+            kinetic,
+            gravitational,
+            elastic,
+        } = self.now.1;
+        kinetic + gravitational.abs() + elastic
+    }
+
     /// At the end of the latest step.
     pub(super) fn ledger(&self) -> &Ledger {
         &self.now.0

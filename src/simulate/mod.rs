@@ -2,6 +2,7 @@
 
 mod angles;
 mod channels;
+mod doubt;
 mod frame;
 mod history;
 mod ideal;
@@ -15,6 +16,7 @@ mod stepper;
 
 pub use angles::angles_of;
 pub use channels::*;
+pub use doubt::{Doubt, Joints, Work};
 pub use frame::*;
 pub use history::History;
 pub use impacts::Impact;
@@ -118,6 +120,12 @@ pub struct Statistics {
     pub peak_time: Vec<f64>,
     /// Time of the last separation, per ball joint, s; NaN if none.
     pub last_separation: Vec<f64>,
+    /// Time that an explicit adaptive method spent in steps held by stability, s.
+    pub held_time: f64,
+    /// Largest ratio of damping to elastic force in any contact, per ball joint.
+    pub damping: Vec<f64>,
+    /// When it occurred, per ball joint, s.
+    pub damping_time: Vec<f64>,
     /// Largest constraint violation of the `lagrange` form so far, m (rad for orientation rows).
     pub constraint_drift: f64,
 }
@@ -134,6 +142,9 @@ impl PartialEq for Statistics {
             && bits(&self.peak_normal) == bits(&other.peak_normal)
             && bits(&self.peak_time) == bits(&other.peak_time)
             && bits(&self.last_separation) == bits(&other.last_separation)
+            && bits(&self.damping) == bits(&other.damping)
+            && bits(&self.damping_time) == bits(&other.damping_time)
+            && self.held_time.to_bits() == other.held_time.to_bits()
             && self.constraint_drift.to_bits() == other.constraint_drift.to_bits()
     }
 }
@@ -146,6 +157,8 @@ pub struct Snapshot {
     state: simulation::State,
     polynomial: Option<crate::integrate::Polynomial>,
     ideal: Option<Box<ideal::Kept>>,
+    peaks: Vec<Peak>,
+    right_handed: bool,
 }
 
 impl Snapshot {

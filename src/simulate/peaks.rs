@@ -1,6 +1,6 @@
 //! Peaks in continuous time: the largest force between two steps, from the cubic through penetration and rate at both ends.
 
-use crate::contact::Coefficients;
+use crate::contact::{Coefficients, Pace};
 
 /// Penetration and its rate at one instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -99,16 +99,48 @@ impl Course {
         self.at(0.5 * (low + high)).0.max(ends)
     }
 
-    /// Largest normal force over the step and where: (N, theta).
+    /// Largest penetration rate from `from` to the end of the step and where: (m/s, theta).
+    pub(super) fn fastest(&self, from: f64) -> (f64, f64) {
+        let start = if from > 0.0 {
+            self.at(from).1
+        } else {
+            self.start.rate
+        };
+        let ends = if self.end.rate > start {
+            (self.end.rate, 1.0)
+        } else {
+            (start, from)
+        };
+        let d = self.end.penetration - self.start.penetration;
+        let (m0, m1) = (self.h * self.start.rate, self.h * self.end.rate);
+        let (a, b) = (3.0 * d - 2.0 * m0 - m1, m0 + m1 - 2.0 * d);
+        let vertex = -a / (3.0 * b);
+        if b < 0.0 && vertex > from && vertex < 1.0 {
+            let inside = self.at(vertex).1;
+            if inside > ends.0 {
+                return (inside, vertex);
+            }
+        }
+        ends
+    }
+
+    /// Largest ratio of the damping to the elastic force from `from` to the end of the step, and where. It grows with the rate.
+    pub(super) fn most_damped(&self, c: &Coefficients, remembered: f64, from: f64) -> (f64, f64) {
+        let (rate, theta) = self.fastest(from);
+        let approach = c.approach(Pace::Whole, remembered, rate);
+        (c.damping * rate / approach, theta)
+    }
+
+    /// Largest normal force over the step and where: (N, theta). The contact's memory holds `approach_speed`.
     pub(super) fn strongest(&self, c: &Coefficients, approach_speed: f64) -> (f64, f64) {
         let force = |theta: f64| {
             let (p, v, _) = self.at(theta);
-            c.normal_force(p, v, approach_speed)
+            c.normal_force(p, v, c.approach(Pace::Whole, approach_speed, v))
         };
-        // Sign of dF/dt, F = K p^1.5 (1 + chi v / v0): 1.5 v (1 + chi v / v0) + p chi a / v0.
+        // Sign of dF/dt, F = K p^1.5 (1 + chi v / v0): 1.5 v (1 + chi v / v0) + p chi a / v0; where v0 is v, that of v.
         let slope = |theta: f64| {
             let (p, v, a) = self.at(theta);
-            if p <= 0.0 {
+            if p <= 0.0 || c.approach_follows(Pace::Whole, approach_speed, v) {
                 return v;
             }
             let chi = c.damping / approach_speed;

@@ -9,6 +9,7 @@ mod doubts;
 mod energy;
 mod guard;
 mod live;
+mod sample;
 mod snapshot;
 
 use super::ideal::Reference;
@@ -16,12 +17,12 @@ use super::impacts::{Impact, Impacts};
 use super::ledger::Account;
 use super::peaks::{Approach, Recent};
 use super::stepper::AnyStepper;
-use super::{Frame, NotUnique, Peak, StartError, Statistics, Stopped, report};
-use crate::contact::Slip;
-use crate::integrate::{Controller, System, hermite};
+use super::{NotUnique, Frame, Peak, StartError, Statistics, Stopped};
+use crate::integrate::{Controller, System};
 use crate::mechanism::{Mechanism, MechanismError, Memory, Ramp, Switching};
 use crate::scene::Scene;
 use automatic::{Choice, controller_of, prepare_implicit};
+use corners::Piece;
 
 /// Speed at which the clearance closes when a jump would put a ball inside its socket wall, m/s: an impact at this speed
 /// is of the order of the settled forces.
@@ -62,8 +63,8 @@ pub struct Simulation {
     right_handed: bool,
     /// Joint whose contact starts or ends at the end of the step being taken.
     located: Option<usize>,
-    /// Joint that slides onto another piece of the friction law there.
-    corner: Option<(usize, Slip)>,
+    /// Joint that goes onto another piece of a law there.
+    corner: Option<(usize, Piece)>,
     /// The step being taken was begun again on another piece.
     turned: bool,
     scratch_memory: Vec<Memory>,
@@ -116,6 +117,54 @@ pub(super) struct State {
     statistics: Statistics,
 }
 
+impl State {
+    /// At t = 0 with the coordinates and velocities `y`.
+    fn new(scene: &Scene, mechanism: &Mechanism, y: Vec<f64>) -> Self {
+        let (n, joints) = (y.len(), mechanism.contacts.len());
+        Self {
+            t0: 0.0,
+            y0: y.clone(),
+            k0: vec![0.0; n],
+            gaps0: vec![Approach::default(); joints],
+            memory0: vec![Memory::default(); joints],
+            t: 0.0,
+            y,
+            k: vec![0.0; n],
+            gaps: vec![Approach::default(); joints],
+            memory: vec![Memory::default(); joints],
+            contact_steps: vec![0; joints],
+            ramps: vec![None; joints],
+            clearances: (0..joints)
+                .map(|j| mechanism.contacts.clearance(j))
+                .collect(),
+            reactions: vec![Recent::default(); joints],
+            h_next: scene.solver.step.min(LONGEST_STEP),
+            h_contact: FIRST_CONTACT_STEP,
+            contact_began: false,
+            chatter: 0,
+            chatters: false,
+            implicit: false,
+            choice: Choice::default(),
+            controller: controller_of(scene.solver.method, false),
+            grid_origin: 0.0,
+            grid_count: 0,
+            account: Account::default(),
+            impacts: Impacts::new(joints),
+            statistics: Statistics {
+                impacts: vec![0; joints],
+                floored: vec![0; joints],
+                coarse: vec![0; joints],
+                peak_normal: vec![0.0; joints],
+                peak_time: vec![0.0; joints],
+                last_separation: vec![f64::NAN; joints],
+                damping: vec![0.0; joints],
+                damping_time: vec![0.0; joints],
+                ..Statistics::default()
+            },
+        }
+    }
+}
+
 impl Simulation {
     /// Starts `scene` at t = 0.
     ///
@@ -124,52 +173,30 @@ impl Simulation {
     pub fn new(scene: &Scene) -> Result<Self, StartError> {
         let mut mechanism = Mechanism::new(scene)?;
         let y = mechanism.start()?;
-        let n = y.len();
         prepare_implicit(&mut mechanism, scene.solver.method)?;
-        let joints = mechanism.contacts.len();
-        let mut simulation = Self {
+        let state = State::new(scene, &mechanism, y);
+        let mut simulation = Self::assembled(scene, mechanism, state);
+        simulation.begin_contacts_at_start();
+        simulation.refresh();
+        simulation.right_handed = simulation.mechanism.is_right_handed();
+        if simulation.mechanism.distance_from_ideal() > OTHER_BRANCH {
+            return Err(MechanismError::OtherBranch.into());
+        }
+        simulation.track_peaks(0.0);
+        simulation.track_reactions();
+        simulation.open_account();
+        Ok(simulation)
+    }
+
+    /// With the equations of `scene` set up and `state` taken as it is.
+    fn assembled(scene: &Scene, mut mechanism: Mechanism, state: State) -> Self {
+        let (n, joints) = (state.y.len(), state.gaps.len());
+        mechanism.contacts.switching = switching_of(scene);
+        Self {
             scene: scene.clone(),
             running: scene.clone(),
             stepper: AnyStepper::new(scene.solver.method, n),
-            state: State {
-                t0: 0.0,
-                y0: y.clone(),
-                k0: vec![0.0; n],
-                gaps0: vec![Approach::default(); joints],
-                memory0: vec![Memory::default(); joints],
-                t: 0.0,
-                y,
-                k: vec![0.0; n],
-                gaps: vec![Approach::default(); joints],
-                memory: vec![Memory::default(); joints],
-                contact_steps: vec![0; joints],
-                ramps: vec![None; joints],
-                clearances: (0..joints)
-                    .map(|j| mechanism.contacts.clearance(j))
-                    .collect(),
-                reactions: vec![Recent::default(); joints],
-                h_next: scene.solver.step.min(LONGEST_STEP),
-                h_contact: FIRST_CONTACT_STEP,
-                contact_began: false,
-                chatter: 0,
-                chatters: false,
-                implicit: false,
-                choice: Choice::default(),
-                controller: controller_of(scene.solver.method, false),
-                grid_origin: 0.0,
-                grid_count: 0,
-                account: Account::default(),
-                impacts: Impacts::new(joints),
-                statistics: Statistics {
-                    impacts: vec![0; joints],
-                    floored: vec![0; joints],
-                    coarse: vec![0; joints],
-                    peak_normal: vec![0.0; joints],
-                    peak_time: vec![0.0; joints],
-                    last_separation: vec![f64::NAN; joints],
-                    ..Statistics::default()
-                },
-            },
+            state,
             peaks: vec![Peak::default(); joints],
             y_end: vec![0.0; n],
             k_end: vec![0.0; n],
@@ -183,17 +210,7 @@ impl Simulation {
             scratch_memory: vec![Memory::default(); joints],
             reference: Reference::of(scene),
             mechanism,
-        };
-        simulation.mechanism.contacts.switching = switching_of(scene);
-        simulation.begin_contacts_at_start();
-        simulation.refresh();
-        simulation.right_handed = simulation.mechanism.is_right_handed();
-        if simulation.mechanism.distance_from_ideal() > OTHER_BRANCH {
-            return Err(MechanismError::OtherBranch.into());
         }
-        simulation.track_peaks(0.0);
-        simulation.open_account();
-        Ok(simulation)
     }
 
     /// Contacts that exist at the start take the floor as their approach speed: nothing tells how they began.
@@ -208,7 +225,7 @@ impl Simulation {
                     active: true,
                     approach_speed,
                     floored: true,
-                    slip: Slip::Whole,
+                    ..Memory::default()
                 };
                 self.state.statistics.impacts[j] += 1;
                 self.state.statistics.floored[j] += 1;
@@ -218,7 +235,7 @@ impl Simulation {
 
     /// Recomputes derivative and gaps of the current state after anything but a step changed it; forgets the step before.
     fn refresh(&mut self) {
-        self.hold_slip(true);
+        self.hold_pieces(true);
         let Self {
             mechanism, state, ..
         } = self;
@@ -456,22 +473,32 @@ impl Simulation {
             .max(mechanism.constraint_drift());
         let switched = self.switch_contacts(h);
         self.track_peaks(h);
-        self.book_step(h, switched);
+        let differs = self.stepper.differs_rates();
+        if !differs {
+            self.track_reactions();
+        }
+        self.book_step(h, switched.contacts || switched.forces);
         self.pass_corner();
-        if switched
-            && self.mechanism.contacts.switching == Switching::Immediate
-            && !self.stepper.differs_rates()
-        {
-            // The force now divides by the approach speed just found.
-            let Self {
-                mechanism, state, ..
-            } = self;
+        let Self {
+            mechanism,
+            state,
+            scratch_k,
+            ..
+        } = self;
+        let rate = if differs { scratch_k } else { &mut state.k };
+        // The force now divides by the approach speed just found. Where no step needs the derivative at its end, the reactions of
+        // ideal joints do.
+        if (differs && mechanism.has_reactions()) || (!differs && switched.forces) {
             mechanism
                 .contacts
                 .memory_mut()
                 .copy_from_slice(&state.memory);
-            mechanism.derivative(state.t, &state.y, &mut state.k);
+            mechanism.derivative(state.t, &state.y, rate);
+            mechanism.forget_evaluation();
             state.statistics.evaluations += 1;
+            if differs {
+                self.track_reactions();
+            }
         }
         Ok(())
     }
@@ -486,49 +513,6 @@ impl Simulation {
             time: self.state.t,
             what: what.to_owned(),
             advice,
-        }
-    }
-
-    /// Everything at `time`, interpolated within the latest step; forces come from the interpolated state.
-    /// Allocates only while `out` is too small.
-    pub fn sample(&mut self, time: f64, out: &mut Frame) {
-        let h = self.state.t - self.state.t0;
-        let time = time.clamp(self.state.t0, self.state.t);
-        let inside = h > 0.0 && time < self.state.t;
-        if inside {
-            let theta = (time - self.state.t0) / h;
-            self.interpolate(theta, h);
-        } else {
-            self.scratch_y.copy_from_slice(&self.state.y);
-        }
-        let Self {
-            mechanism,
-            state,
-            scratch_y,
-            scratch_k,
-            scratch_memory,
-            ..
-        } = self;
-        let counts = (mechanism.evaluations, mechanism.contacts.evaluations);
-        if inside {
-            mechanism.project(time, scratch_y);
-        }
-        let memory = if inside {
-            &state.memory0
-        } else {
-            &state.memory
-        };
-        scratch_memory.copy_from_slice(memory);
-        mechanism
-            .contacts
-            .memory_mut()
-            .copy_from_slice(scratch_memory);
-        mechanism.evaluate_fully(time, scratch_y, scratch_k);
-        report::fill(mechanism, &self.running, time, out);
-        (mechanism.evaluations, mechanism.contacts.evaluations) = counts;
-        out.ledger = self.ledger_of(out);
-        if !matches!(self.reference, Reference::Elsewhere) {
-            out.probe_error = self.reference.error(out);
         }
     }
 
@@ -551,23 +535,6 @@ impl Simulation {
             actuators: (0..mechanism.drives())
                 .filter(|&i| !mechanism.is_actuator_unique(i))
                 .collect(),
-        }
-    }
-
-    /// State at the part `theta` of the latest step, of size `h`, into the scratch state, as the method interpolates it.
-    fn interpolate(&mut self, theta: f64, h: f64) {
-        let Self {
-            mechanism,
-            stepper,
-            state,
-            scratch_y,
-            ..
-        } = self;
-        let (y0, k0, y, k) = (&state.y0, &state.k0, &state.y, &state.k);
-        if mechanism.is_kinematic() {
-            hermite(theta, h, y0, k0, y, k, scratch_y);
-        } else {
-            stepper.interpolate(theta, h, y0, k0, y, k, scratch_y);
         }
     }
 

@@ -71,7 +71,8 @@ impl AnyStepper {
     /// Step size times the largest eigenvalue felt in the step just attempted by an explicit adaptive method.
     pub(super) fn stiffness(&self, h: f64, y_end: &[f64], k_end: &[f64]) -> f64 {
         match self {
-            Self::Pair {
+            Self::DormandPrince(explicit)
+            | Self::Pair {
                 explicit,
                 implicit: false,
                 ..

@@ -144,7 +144,8 @@ pub fn run(row: &Row, form: &str, column: &str) -> Outcome {
         said_slow |= pacer.is_behind();
         frames += 1.0;
     }
-    let mut doubts = simulation.doubts();
+    let doubts = simulation.doubts();
+    let mut doubts: Vec<String> = doubts.iter().map(ToString::to_string).collect();
     let euler = scene.solver.method == jointplay::integrate::Method::SemiImplicitEuler;
     if row.passive && balance.gain() > CREATED[usize::from(!euler)] {
         let what = format!("{:.3} of the energy created", balance.gain());

@@ -1,5 +1,7 @@
 //! Steps whose size follows the error estimate, cut at the first contact start or end inside them.
 
+use super::automatic::HELD_BY_STABILITY;
+use super::corners::Piece;
 use super::{LONGEST_STEP, Simulation, store_gaps};
 use crate::integrate::{Method, find_root};
 use crate::simulate::Stopped;
@@ -48,6 +50,9 @@ impl Simulation {
         let stiffness = self.stepper.stiffness(h, &self.y_end, &self.k_end);
         let evaluations = self.mechanism.evaluations - before;
         self.accept(t_end, h, before)?;
+        if stiffness > HELD_BY_STABILITY {
+            self.state.statistics.held_time += h;
+        }
         if self.running.solver.method == Method::Automatic {
             self.vote(h, stiffness, evaluations);
         }
@@ -87,8 +92,10 @@ impl Simulation {
         {
             // One more try on the other piece; it may well lead back here, and then this one is as good.
             self.turned = true;
-            self.state.memory[corner.joint].slip = corner.next;
-            self.mechanism.contacts.memory_mut()[corner.joint].slip = corner.next;
+            corner.next.put(&mut self.state.memory[corner.joint]);
+            corner
+                .next
+                .put(&mut self.mechanism.contacts.memory_mut()[corner.joint]);
             self.stepper.invalidate();
             self.state.h_next = asked;
             self.state.contact_began = contact_began;
@@ -96,6 +103,10 @@ impl Simulation {
         }
         let corner = corner.filter(|corner| !corner.is_at_start());
         if let Some(corner) = corner {
+            // The whole step worked; where the rate stops rising, soon after a beginning contact, says nothing against it.
+            if contact_began && matches!(corner.next, Piece::Pace(_)) {
+                self.state.h_contact = h.max(1e-9);
+            }
             self.located = None;
             self.corner = Some((corner.joint, corner.next));
             t_end = t + corner.theta * h;

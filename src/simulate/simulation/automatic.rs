@@ -5,7 +5,7 @@ use crate::integrate::{Controller, Method, System};
 use crate::mechanism::{Mechanism, MechanismError};
 
 /// h |lambda| beyond which an explicit step is held by stability.
-const HELD_BY_STABILITY: f64 = 3.0;
+pub(super) const HELD_BY_STABILITY: f64 = 3.0;
 /// Steps that must be held by stability, or taken since the latest contact began, before the implicit method is tried.
 const HELD_STEPS: u32 = 8;
 const SETTLED_STEPS: u32 = 60;

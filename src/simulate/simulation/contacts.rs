@@ -1,14 +1,48 @@
 //! Contact memory and continuous-time peaks of the step just accepted.
 
-use super::Simulation;
-use super::doubts::LEAST_STEPS;
-use crate::contact::Slip;
+use super::{Simulation, State};
+use crate::contact::{Coefficients, Pace};
+use crate::integrate::Method;
 use crate::mechanism::{Memory, Switching};
 use crate::simulate::peaks::Course;
 
+/// Fewer fixed steps than this do not resolve an impact.
+const LEAST_STEPS: u64 = 5;
+/// The same for the implicit Euler method in the contacts, whose own damping takes as much of an impact as a step is of it.
+const LEAST_IMPLICIT_STEPS: u64 = 40;
+
+/// Fewer fixed steps than this lose much of an impact.
+pub(super) fn least_steps(method: Method) -> u64 {
+    match method {
+        Method::ImexEuler => LEAST_IMPLICIT_STEPS,
+        _ => LEAST_STEPS,
+    }
+}
+
+/// What the end of a step changed in the contacts' memory.
+#[derive(Clone, Copy)]
+pub(super) struct Switched {
+    /// A contact began or ended.
+    pub contacts: bool,
+    /// The force at the step's end is another with the approach speed just found.
+    pub forces: bool,
+}
+
+impl State {
+    /// Puts down a step of contact `j`, from its part `from` on, while its memory held `remembered` (m/s).
+    fn follow(&mut self, j: usize, course: &Course, c: &Coefficients, remembered: f64, from: f64) {
+        let (damping, theta) = course.most_damped(c, remembered, from);
+        self.impacts.follow(j, course, c, remembered, damping);
+        if damping > self.statistics.damping[j] {
+            self.statistics.damping[j] = damping;
+            self.statistics.damping_time[j] = self.t0 + theta * (self.t - self.t0);
+        }
+    }
+}
+
 impl Simulation {
     /// Starts and ends contacts whose penetration changed sign over the step just accepted.
-    pub(super) fn switch_contacts(&mut self, h: f64) -> bool {
+    pub(super) fn switch_contacts(&mut self, h: f64) -> Switched {
         let located = self.located.take();
         let fixed = !self.running.solver.method.is_adaptive();
         let Self {
@@ -18,7 +52,12 @@ impl Simulation {
             peaks,
             ..
         } = self;
-        let mut switched = false;
+        let least = least_steps(running.solver.method);
+        let immediate = mechanism.contacts.switching == Switching::Immediate;
+        let mut switched = Switched {
+            contacts: false,
+            forces: false,
+        };
         for j in 0..state.gaps.len() {
             if !mechanism.contacts.has_clearance(j) {
                 continue;
@@ -27,7 +66,8 @@ impl Simulation {
             let coefficients = mechanism.contacts.coefficients(j);
             if state.memory[j].active {
                 let course = Course::new(start, end, h);
-                state.impacts.follow(j, &course, coefficients);
+                let remembered = state.memory[j].approach_speed;
+                state.follow(j, &course, coefficients, remembered, 0.0);
             }
             // A located switch ends within rounding of the wall, on either side; but the step taken again may show that a
             // ball that was about to separate turned around before.
@@ -39,9 +79,21 @@ impl Simulation {
             };
             state.contact_steps[j] += 1;
             if touching == state.memory[j].active {
+                if touching && coefficients.largest {
+                    let whole = state.memory[j].pace == Pace::Whole;
+                    let fastest = if whole {
+                        Course::new(start, end, h).fastest(0.0).0
+                    } else {
+                        end.rate
+                    };
+                    let memory = &mut state.memory[j];
+                    switched.forces |= whole && fastest > memory.approach_speed.max(end.rate);
+                    memory.approach_speed = memory.approach_speed.max(fastest);
+                }
                 continue;
             }
-            switched = true;
+            switched.contacts = true;
+            switched.forces |= immediate;
             let steps = std::mem::replace(&mut state.contact_steps[j], 0);
             if touching {
                 let course = Course::new(start, end, h);
@@ -59,15 +111,19 @@ impl Simulation {
                 state
                     .impacts
                     .begin(j, time, rate, asked, coefficients, among_others);
+                let mut approach_speed = rate.max(floor);
                 // A located one begins where the step ends.
-                if mechanism.contacts.switching == Switching::Immediate {
-                    state.impacts.follow(j, &course, coefficients);
+                if immediate {
+                    state.follow(j, &course, coefficients, approach_speed, theta);
+                    if coefficients.largest {
+                        approach_speed = approach_speed.max(course.fastest(theta).0);
+                    }
                 }
                 state.memory[j] = Memory {
                     active: true,
-                    approach_speed: rate.max(floor),
+                    approach_speed,
                     floored: rate < floor,
-                    slip: Slip::Whole,
+                    ..Memory::default()
                 };
                 state.statistics.impacts[j] += 1;
                 state.statistics.floored[j] += u64::from(rate < floor);
@@ -85,7 +141,7 @@ impl Simulation {
                     (state.t, end.rate)
                 };
                 state.impacts.end(j, time, rate);
-                let coarse = fixed && steps < LEAST_STEPS;
+                let coarse = fixed && steps < least;
                 state.statistics.coarse[j] += u64::from(coarse);
                 state.memory[j] = Memory::default();
                 state.statistics.last_separation[j] = state.t;
@@ -94,8 +150,8 @@ impl Simulation {
         switched
     }
 
-    /// Largest forces of the step just accepted, in continuous time.
-    pub(super) fn track_peaks(&mut self, h: f64) {
+    /// Largest reactions of ideal joints at the end of the step just accepted, of which everything was just evaluated.
+    pub(super) fn track_reactions(&mut self) {
         let Self {
             mechanism,
             state,
@@ -103,34 +159,51 @@ impl Simulation {
             ..
         } = self;
         for j in 0..state.gaps.len() {
+            let Some(reaction) = mechanism.reaction(j) else {
+                continue;
+            };
+            let force = state.reactions[j].rise(state.t, reaction.norm());
+            if force > state.statistics.peak_normal[j] {
+                state.statistics.peak_normal[j] = force;
+                state.statistics.peak_time[j] = state.t;
+            }
+            if force > peaks[j].normal {
+                peaks[j].normal = force;
+                peaks[j].time = state.t;
+                peaks[j].normal_force = reaction;
+            }
+        }
+    }
+
+    /// Largest contact forces of the step just accepted, in continuous time.
+    pub(super) fn track_peaks(&mut self, h: f64) {
+        let Self {
+            mechanism,
+            state,
+            peaks,
+            ..
+        } = self;
+        let immediate = mechanism.contacts.switching == Switching::Immediate;
+        for j in 0..state.gaps.len() {
             if !mechanism.contacts.has_clearance(j) {
-                if let Some(reaction) = mechanism.reaction(j) {
-                    let force = state.reactions[j].rise(state.t, reaction.norm());
-                    if force > state.statistics.peak_normal[j] {
-                        state.statistics.peak_normal[j] = force;
-                        state.statistics.peak_time[j] = state.t;
-                    }
-                    if force > peaks[j].normal {
-                        peaks[j].normal = force;
-                        peaks[j].time = state.t;
-                        peaks[j].normal_force = reaction;
-                    }
-                }
                 continue;
             }
             let (start, end) = (state.gaps0[j], state.gaps[j]);
-            if start.penetration <= 0.0 && end.penetration <= 0.0 {
+            let grazes = immediate && start.rate > 0.0 && end.rate < 0.0;
+            if start.penetration <= 0.0 && end.penetration <= 0.0 && !grazes {
                 continue;
             }
-            let coefficients = mechanism.contacts.coefficients(j);
+            let mut coefficients = *mechanism.contacts.coefficients(j);
             let approach = if state.memory0[j].active {
                 state.memory0[j].approach_speed
             } else if state.memory[j].active {
                 state.memory[j].approach_speed
             } else {
-                start.rate.max(end.rate).max(coefficients.speed_floor)
+                // It came and went within the step, without a memory: its approach speed was the rate at each instant.
+                coefficients.largest = true;
+                coefficients.speed_floor
             };
-            let (force, theta) = Course::new(start, end, h).strongest(coefficients, approach);
+            let (force, theta) = Course::new(start, end, h).strongest(&coefficients, approach);
             let time = state.t0 + theta * h;
             if force > state.statistics.peak_normal[j] {
                 state.statistics.peak_normal[j] = force;

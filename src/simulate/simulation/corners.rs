@@ -1,14 +1,21 @@
-//! Corners of the friction law as events: each touching joint holds one piece of the law over a whole step, and the step
-//! ends where its sliding speed leaves that piece.
+//! Corners of the contact laws as events: each touching joint holds one piece of the friction law over a whole step, and one
+//! of the rule for its approach speed, and the step ends where its sliding speed or its penetration rate leaves that piece.
 
 use super::Simulation;
-use crate::contact::Slip;
+use crate::contact::{Pace, Slip};
 use crate::integrate::{Method, System, find_root};
+use crate::mechanism::Memory;
 
 /// Parts of a step at whose ends the sliding speed is looked at.
 const PARTS: u32 = 4;
 /// A corner earlier than this fraction of the step was passed at its start: the step is taken again on the next piece.
 const AT_START: f64 = 1e-9;
+/// The same where a rate stops rising: it is level there, and the force to second order the same on both pieces.
+const LEVEL_AT_START: f64 = 1e-3;
+/// A rate beyond the largest so far by less than this part of it is that.
+const NO_FASTER: f64 = 1e-6;
+/// Golden sections of two quarters of a step in which a rate is largest: to 2e-4 of the step.
+const SECTIONS: u32 = 16;
 /// What a step that ends at a corner adds to the chatter; any other takes one off.
 const CORNER: u32 = 3;
 /// Chatter from which corners are no longer located, until it has died down.
@@ -19,8 +26,26 @@ pub(super) struct Corner {
     /// Fraction of the step.
     pub theta: f64,
     pub joint: usize,
-    /// Piece beyond it.
-    pub next: Slip,
+    pub next: Piece,
+}
+
+/// Piece beyond a corner.
+#[derive(Clone, Copy)]
+pub(super) enum Piece {
+    /// Of the friction law.
+    Slip(Slip),
+    /// Of the rule for the approach speed.
+    Pace(Pace),
+}
+
+impl Piece {
+    /// Puts a contact onto it.
+    pub(super) fn put(self, memory: &mut Memory) {
+        match self {
+            Self::Slip(slip) => memory.slip = slip,
+            Self::Pace(pace) => memory.pace = pace,
+        }
+    }
 }
 
 impl Corner {
@@ -38,60 +63,155 @@ impl Simulation {
         method.is_adaptive() && method != Method::Rosenbrock
     }
 
-    /// Puts every touching joint on the piece of the friction law on which it slides now; those that hold one already keep
-    /// it unless `anew`. Where corners are not located, all follow the whole law.
-    pub(super) fn hold_slip(&mut self, anew: bool) {
+    /// Puts every touching joint on the pieces of the laws on which it is now; those that hold some already keep
+    /// them unless `anew`. Where corners are not located, all follow the whole laws.
+    pub(super) fn hold_pieces(&mut self, anew: bool) {
         let holds = self.locates_corners() && !self.state.chatters;
         let keeps = |slip: Slip| slip != Slip::Whole && !anew;
         if !holds {
             for memory in &mut self.state.memory {
-                memory.slip = Slip::Whole;
+                (memory.slip, memory.pace) = (Slip::Whole, Pace::Whole);
             }
-            return;
-        }
-        if self.state.memory.iter().all(|m| !m.active || keeps(m.slip)) {
             return;
         }
         let Self {
             mechanism, state, ..
         } = self;
+        // A rate that was held below the largest so far has passed it only at a corner; one that rose may have stopped.
+        for (j, memory) in state.memory.iter_mut().enumerate() {
+            let c = mechanism.contacts.coefficients(j);
+            if memory.pace == Pace::Rising && state.gaps[j].rate < memory.approach_speed {
+                memory.pace = Pace::Held;
+            } else if memory.active && c.largest && memory.pace == Pace::Whole && !anew {
+                memory.pace = c.pace_at(memory.approach_speed, state.gaps[j].rate);
+            }
+        }
+        if state.memory.iter().all(|m| !m.active || keeps(m.slip)) {
+            return;
+        }
         mechanism.measure(state.t, &state.y);
         for (j, memory) in state.memory.iter_mut().enumerate() {
+            let c = mechanism.contacts.coefficients(j);
             if !memory.active {
                 memory.slip = Slip::Whole;
             } else if !keeps(memory.slip) {
                 let speed = mechanism.slip_speed(j);
-                memory.slip = mechanism.contacts.coefficients(j).slip_at(speed);
+                memory.slip = c.slip_at(speed);
+                if anew {
+                    let rate = mechanism.contacts.gaps()[j].rate;
+                    memory.pace = c.pace_at(memory.approach_speed, rate);
+                }
             }
         }
     }
 
-    /// First corner of the friction law inside the step just attempted.
+    /// First corner of the laws inside the step just attempted.
     pub(super) fn first_corner(&mut self, h: f64) -> Option<Corner> {
         if !std::mem::take(&mut self.mechanism.contacts.strayed) {
             return None;
         }
         let mut first: Option<Corner> = None;
         for j in 0..self.state.memory.len() {
-            if self.state.memory[j].slip == Slip::Whole {
-                continue;
-            }
-            let Some((theta, next)) = self.corner_of(j, h) else {
-                continue;
+            let memory = self.state.memory[j];
+            let mut take = |corner: Option<(f64, Piece)>| {
+                let earliest = first.as_ref().map_or(f64::INFINITY, |corner| corner.theta);
+                if let Some((theta, next)) = corner.filter(|(theta, _)| *theta < earliest) {
+                    first = Some(Corner {
+                        theta,
+                        joint: j,
+                        next,
+                    });
+                }
             };
-            if first.as_ref().is_none_or(|earliest| theta < earliest.theta) {
-                first = Some(Corner {
-                    theta,
-                    joint: j,
-                    next,
-                });
+            if memory.slip != Slip::Whole {
+                take(self.corner_of(j, h));
+            }
+            match memory.pace {
+                Pace::Whole => {}
+                Pace::Held => take(self.overtaking(j, h)),
+                Pace::Rising => take(self.level(j, h)),
             }
         }
         first
     }
 
+    /// Where the penetration rate of joint `j` passes the largest so far.
+    fn overtaking(&mut self, j: usize, h: f64) -> Option<(f64, Piece)> {
+        let most = self.state.memory[j].approach_speed * (1.0 + NO_FASTER);
+        let mut left = (0.0, self.state.gaps[j].rate - most);
+        for n in 1..=PARTS {
+            let theta = f64::from(n) / f64::from(PARTS);
+            let right = (theta, self.rate_at(j, theta, h) - most);
+            if right.1 > 0.0 {
+                let at = if left.1 < 0.0 {
+                    let (width, small) = ((1e-15 / h).max(1e-12), 1e-9 * most);
+                    let beyond = |theta: f64| self.rate_at(j, theta, h) - most;
+                    find_root(left.0, left.1, right.0, right.1, width, small, beyond)
+                } else {
+                    left.0
+                };
+                return Some((at, Piece::Pace(Pace::Rising)));
+            }
+            left = right;
+        }
+        None
+    }
+
+    /// Where the penetration rate of joint `j`, the largest so far, stops rising.
+    fn level(&mut self, j: usize, h: f64) -> Option<(f64, Piece)> {
+        const GOLDEN: f64 = 0.618_033_988_749_894_9;
+        let mut before = self.state.gaps[j].rate;
+        for n in 1..=PARTS {
+            let end = f64::from(n) / f64::from(PARTS);
+            let rate = self.rate_at(j, end, h);
+            if rate >= before {
+                before = rate;
+                continue;
+            }
+            let (mut a, mut b) = ((end - 2.0 / f64::from(PARTS)).max(0.0), end);
+            let (mut c, mut d) = (b - GOLDEN * (b - a), a + GOLDEN * (b - a));
+            let (mut at_c, mut at_d) = (self.rate_at(j, c, h), self.rate_at(j, d, h));
+            for _ in 0..SECTIONS {
+                if at_c > at_d {
+                    (b, d, at_d) = (d, c, at_c);
+                    c = b - GOLDEN * (b - a);
+                    at_c = self.rate_at(j, c, h);
+                } else {
+                    (a, c, at_c) = (c, d, at_d);
+                    d = a + GOLDEN * (b - a);
+                    at_d = self.rate_at(j, d, h);
+                }
+            }
+            let at = 0.5 * (a + b);
+            let at = if at < LEVEL_AT_START { 0.0 } else { at };
+            return Some((at, Piece::Pace(Pace::Held)));
+        }
+        None
+    }
+
+    /// Penetration rate of joint `j` on the interpolant of the attempted step, m/s.
+    fn rate_at(&mut self, j: usize, theta: f64, h: f64) -> f64 {
+        self.measure_at(theta, h);
+        self.mechanism.contacts.gaps()[j].rate
+    }
+
+    /// Measures the interpolant of the attempted step.
+    fn measure_at(&mut self, theta: f64, h: f64) {
+        let Self {
+            mechanism,
+            stepper,
+            state,
+            y_end,
+            k_end,
+            scratch_y,
+            ..
+        } = self;
+        stepper.interpolate(theta, h, &state.y, &state.k, y_end, k_end, scratch_y);
+        mechanism.measure(state.t + theta * h, scratch_y);
+    }
+
     /// Where the sliding speed of joint `j` leaves its piece, as a fraction of the step just attempted, and for which piece.
-    fn corner_of(&mut self, j: usize, h: f64) -> Option<(f64, Slip)> {
+    fn corner_of(&mut self, j: usize, h: f64) -> Option<(f64, Piece)> {
         let mut left = (0.0, self.beyond(j, 0.0, h).0);
         for n in 1..=PARTS {
             let theta = f64::from(n) / f64::from(PARTS);
@@ -112,7 +232,7 @@ impl Simulation {
                     Slip::Ramp => Slip::Creep,
                     _ => Slip::Ramp,
                 };
-                return Some((at, next));
+                return Some((at, Piece::Slip(next)));
             }
             left = right;
         }
@@ -140,21 +260,11 @@ impl Simulation {
 
     /// How far joint `j` slides beyond its piece on the interpolant of the attempted step, and its sliding speed, m/s.
     fn beyond(&mut self, j: usize, theta: f64, h: f64) -> (f64, f64) {
-        let Self {
-            mechanism,
-            stepper,
-            state,
-            y_end,
-            k_end,
-            scratch_y,
-            ..
-        } = self;
-        stepper.interpolate(theta, h, &state.y, &state.k, y_end, k_end, scratch_y);
-        mechanism.measure(state.t + theta * h, scratch_y);
-        let speed = mechanism.slip_speed(j);
-        let slip = state.memory[j].slip;
-        let beyond = mechanism.contacts.coefficients(j).beyond(slip, speed);
-        (beyond, speed)
+        self.measure_at(theta, h);
+        let speed = self.mechanism.slip_speed(j);
+        let slip = self.state.memory[j].slip;
+        let c = self.mechanism.contacts.coefficients(j);
+        (c.beyond(slip, speed), speed)
     }
 
     /// After an accepted step: goes on to the piece behind the corner that it ended at, and stops locating for a while
@@ -163,7 +273,7 @@ impl Simulation {
         let state = &mut self.state;
         if let Some((j, next)) = self.corner.take() {
             if state.memory[j].active {
-                state.memory[j].slip = next;
+                next.put(&mut state.memory[j]);
             }
             state.statistics.corners += 1;
             state.chatter += CORNER;
@@ -172,6 +282,6 @@ impl Simulation {
             state.chatter = state.chatter.saturating_sub(1);
             state.chatters &= state.chatter > 0;
         }
-        self.hold_slip(false);
+        self.hold_pieces(false);
     }
 }

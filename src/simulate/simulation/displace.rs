@@ -1,7 +1,7 @@
 //! A state moved by hand: what a twin run and its renormalisation need.
 
 use super::Simulation;
-use crate::contact::Slip;
+use crate::contact::{Pace, Slip};
 use crate::integrate::System;
 use crate::mechanism::Memory;
 
@@ -24,8 +24,8 @@ impl Simulation {
             if !mechanism.contacts.has_clearance(j) {
                 continue;
             }
-            // The offset may lie beyond a corner of the friction law.
-            state.memory[j].slip = Slip::Whole;
+            // The offset may lie beyond a corner of the laws.
+            (state.memory[j].slip, state.memory[j].pace) = (Slip::Whole, Pace::Whole);
             let gap = mechanism.contacts.gaps()[j];
             let touching = gap.penetration > 0.0;
             if touching == state.memory[j].active {

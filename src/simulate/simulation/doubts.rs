@@ -1,10 +1,11 @@
 //! What speaks against a result: what the scene asks for, and what the run met.
 
 use super::Simulation;
+use super::contacts::least_steps;
 use crate::contact::settled_penetration;
+use crate::integrate::Method;
+use crate::simulate::{Doubt, Joints, Ledger, Work};
 
-/// Fewer fixed steps than this do not resolve an impact.
-pub(super) const LEAST_STEPS: u64 = 5;
 /// Part of a joint's contacts that may be slower than the floor.
 const MOST_FLOORED: f64 = 0.5;
 /// Contact patch over ball radius beyond which Hertz's theory, which takes the ball for a half-space, is far off.
@@ -13,54 +14,125 @@ const LARGEST_PATCH: f64 = 1.0 / 3.0;
 const DRIFT_OF_CLEARANCE: f64 = 0.1;
 /// The same where every ball joint is ideal, m.
 const DRIFT: f64 = 1e-4;
+/// Damping over elastic force, less what an undisturbed impact has of it, beyond which a force is an artefact of the law.
+const MOST_DAMPING: f64 = 1.0;
+/// Part of the energy exchanged that may be unaccounted for.
+const RESIDUAL: f64 = 5e-3;
+/// Part of each work that may be, where it is at least so much of the energy exchanged: a loss by restitution may be tiny
+/// against what else goes on, and right although the residual is as large.
+const RESIDUAL_OF_WORK: f64 = 0.1;
+const NOTEWORTHY: f64 = 1e-3;
+/// Part of the energies there are below which a residual is rounding.
+const ROUNDING: f64 = 1e-9;
+/// Part of the time in which stability may hold an explicit method's steps, and the loosest tolerance with which they keep the
+/// energy.
+const MOST_HELD: f64 = 0.1;
+const LOOSEST_HELD: f64 = 3e-5;
 
 impl Simulation {
-    /// Why what was computed since the last reset is not to be trusted, a sentence each; empty where nothing speaks
+    /// Why what was computed since the last reset is not to be trusted; empty where nothing speaks
     /// against it. Begins with [`crate::scene::Scene::doubts`] of the scene as it runs.
-    pub fn doubts(&self) -> Vec<String> {
-        let mut doubts = self.running.doubts();
+    pub fn doubts(&self) -> Vec<Doubt> {
+        let scene = self.running.doubts().into_iter().map(Doubt::Scene);
+        let mut doubts: Vec<Doubt> = scene.collect();
         let statistics = self.statistics();
         let part = |part: &[u64], j: usize| part[j] as f64 / statistics.impacts[j].max(1) as f64;
-        doubts.extend(self.worst(0.0, |j| part(&statistics.coarse, j)).map(|(joints, j)| {
-            format!(
-                "{joints}: {} of {} contacts lasted fewer than {LEAST_STEPS} steps: their forces are not resolved.",
-                statistics.coarse[j], statistics.impacts[j]
-            )
+        let unresolved = self.worst(0.0, |j| part(&statistics.coarse, j));
+        doubts.extend(unresolved.map(|(joints, j)| Doubt::Unresolved {
+            joints,
+            short: statistics.coarse[j],
+            contacts: statistics.impacts[j],
+            steps: least_steps(self.running.solver.method),
         }));
-        doubts.extend(self.worst(MOST_FLOORED, |j| part(&statistics.floored, j)).map(|(joints, j)| {
-            format!(
-                "{joints}: {} of {} contacts began slower than impact_speed_floor or existed at the start: they rebound \
-                 higher than asked.",
-                statistics.floored[j], statistics.impacts[j]
-            )
+        let floored = self.worst(MOST_FLOORED, |j| part(&statistics.floored, j));
+        doubts.extend(floored.map(|(joints, j)| Doubt::Floored {
+            joints,
+            slow: statistics.floored[j],
+            contacts: statistics.impacts[j],
         }));
-        doubts.extend(self.worst(LARGEST_PATCH, |j| self.largest_patch(j)).map(|(joints, j)| {
-            format!(
-                "{joints}: the contact patch reached {:.2} ball radii: Hertz's theory wants it small.",
-                self.largest_patch(j)
-            )
+        let patch = self.worst(LARGEST_PATCH, |j| self.largest_patch(j));
+        doubts.extend(patch.map(|(joints, j)| Doubt::Patch {
+            joints,
+            radii: self.largest_patch(j),
+        }));
+        let usual = |j: usize| self.mechanism.contacts.coefficients(j).damping;
+        let damping = self.worst(MOST_DAMPING, |j| statistics.damping[j] - usual(j));
+        doubts.extend(damping.map(|(joints, j)| Doubt::Damping {
+            joints,
+            time: statistics.damping_time[j],
+            ratio: statistics.damping[j],
+            usual: usual(j),
         }));
         let clearances = self.running.ball_joints.iter().map(|j| j.contact.clearance);
         let least = clearances.filter(|c| *c > 0.0).reduce(f64::min);
-        let drift = statistics.constraint_drift;
-        if drift > least.map_or(DRIFT, |c| DRIFT.min(DRIFT_OF_CLEARANCE * c)) {
-            doubts.push(format!(
-                "formulation lagrange: its constraints were off by {drift:.1e} m; formulation = tree keeps them."
-            ));
+        let distance = statistics.constraint_drift;
+        if distance > least.map_or(DRIFT, |c| DRIFT.min(DRIFT_OF_CLEARANCE * c)) {
+            doubts.push(Doubt::Drift { distance });
         }
+        if let Some(ledger) = self.ledger() {
+            doubts.extend(self.energy_doubt(ledger));
+        }
+        doubts.extend(self.stability_doubt());
         doubts
     }
 
-    /// The joint of which `measure` is largest and beyond `limit`, and words for all that are beyond it.
-    fn worst(&self, limit: f64, measure: impl Fn(usize) -> f64) -> Option<(String, usize)> {
+    /// Energy that nothing accounts for: against all that was exchanged or, where that is large, each work.
+    fn energy_doubt(&self, ledger: &Ledger) -> Option<Doubt> {
+        let residual = ledger.residual();
+        if !(residual.abs() > ROUNDING * self.state.account.energy()) {
+            return None;
+        }
+        let share = residual.abs() / ledger.exchanged;
+        if share > RESIDUAL {
+            return Some(Doubt::Energy { residual, share });
+        }
+        let works = [
+            (Work::Drives, ledger.drive_work),
+            (Work::Gravity, ledger.gravity_work),
+            (Work::Restitution, ledger.restitution_loss),
+            (Work::Friction, ledger.friction_loss),
+            (Work::Clearance, ledger.clearance_work),
+            (Work::Changes, ledger.change_work),
+        ];
+        let least = works
+            .into_iter()
+            .filter(|(_, value)| *value != 0.0)
+            .min_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+        let beyond = |value: f64| {
+            residual.abs() > RESIDUAL_OF_WORK * value.abs() && share > NOTEWORTHY
+        };
+        least
+            .filter(|(_, value)| beyond(*value))
+            .map(|(work, value)| Doubt::Work {
+                work,
+                value,
+                residual,
+            })
+    }
+
+    /// An explicit method at a loose tolerance that stability held and not its error: the estimate then says little of how much
+    /// energy settled contacts lose.
+    fn stability_doubt(&self) -> Option<Doubt> {
+        let solver = &self.running.solver;
+        let share = self.statistics().held_time / self.state.t;
+        let loose = solver.method == Method::DormandPrince5 && solver.tolerance > LOOSEST_HELD;
+        (loose && share > MOST_HELD).then_some(Doubt::Held {
+            share,
+            tolerance: solver.tolerance,
+            loosest: LOOSEST_HELD,
+        })
+    }
+
+    /// The joint of which `measure` is largest and beyond `limit`, and how many others are beyond it.
+    fn worst(&self, limit: f64, measure: impl Fn(usize) -> f64) -> Option<(Joints, usize)> {
         let joints = &self.running.ball_joints;
         let beyond = || (0..joints.len()).filter(|&j| measure(j) > limit);
         let worst = beyond().max_by(|&a, &b| measure(a).total_cmp(&measure(b)))?;
-        let words = match beyond().count() {
-            1 => joints[worst].name.clone(),
-            more => format!("{} (and {} more)", joints[worst].name, more - 1),
+        let joints = Joints {
+            worst: joints[worst].name.clone(),
+            others: beyond().count() - 1,
         };
-        Some((words, worst))
+        Some((joints, worst))
     }
 
     /// Radius of the contact patch at the largest force so far, in ball radii; 0 for an ideal joint.

@@ -1,6 +1,9 @@
 //! The whole state: copied, put back, hashed.
 
 use super::Simulation;
+use super::automatic::prepare_implicit;
+use crate::integrate::System;
+use crate::mechanism::Mechanism;
 use crate::simulate::{Snapshot, StartError};
 
 impl Simulation {
@@ -12,17 +15,23 @@ impl Simulation {
             state: self.state.clone(),
             polynomial: self.stepper.polynomial().cloned(),
             ideal: self.reference.kept(),
+            peaks: self.peaks.clone(),
+            right_handed: self.right_handed,
         }
     }
 
-    /// Goes back to a state that this simulation, or another of the same scene, was in. Resuming gives the same bits.
+    /// Goes back to a state that this simulation, or another of the same scene, was in, with the peaks and counters that it had.
+    /// Nothing is assembled: a live change may have led where no start would be accepted. Resuming gives the same bits.
     ///
     /// # Errors
     /// A snapshot of a scene whose equations cannot be set up.
     pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), StartError> {
-        let mut fresh = Self::new(&snapshot.running)?;
+        let mut mechanism = Mechanism::new(&snapshot.running)?;
+        prepare_implicit(&mut mechanism, snapshot.running.solver.method)?;
+        let mut fresh = Self::assembled(&snapshot.running, mechanism, snapshot.state.clone());
         fresh.scene = snapshot.scene.clone();
-        fresh.state = snapshot.state.clone();
+        fresh.peaks.clone_from(&snapshot.peaks);
+        fresh.right_handed = snapshot.right_handed;
         for j in 0..fresh.state.ramps.len() {
             fresh.mechanism.contacts.set_ramp(j, fresh.state.ramps[j]);
             let contact = fresh.running.ball_joints[j].contact;
@@ -46,6 +55,19 @@ impl Simulation {
         if let Some(ideal) = &snapshot.ideal {
             fresh.reference.restore(ideal)?;
         }
+        // What is read off the mechanism between steps: motion, reactions, clearances on their way.
+        let Self {
+            mechanism,
+            state,
+            scratch_k,
+            ..
+        } = &mut fresh;
+        mechanism
+            .contacts
+            .memory_mut()
+            .copy_from_slice(&state.memory);
+        mechanism.derivative(state.t, &state.y, scratch_k);
+        mechanism.forget_evaluation();
         *self = fresh;
         Ok(())
     }

@@ -1,0 +1,80 @@
+//! The speed that the damping term divides by, as a function of what the contact remembers and of the rate just now.
+//!
+//! With `approach_speed = "largest"` it is the running maximum of the penetration rate. While the rate is the largest so far the
+//! damping term is chi itself; once it falls, the maximum stands. A step across such an instant has no more than order 1
+//! where the rate passes the maximum, so that a stepper that locates corners holds one piece over a whole step.
+
+use super::Coefficients;
+
+/// Piece of that rule that is in force.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Pace {
+    /// The rule as it stands: for the approach speed at the start, and for steppers that locate no corners.
+    #[default]
+    Whole,
+    /// The rate is below the largest so far, which the term divides by.
+    Held,
+    /// The rate is the largest so far: the term is chi.
+    Rising,
+}
+
+impl Coefficients {
+    /// What the damping term divides by, m/s, for a contact whose memory holds `remembered` (m/s) and whose penetration grows
+    /// at `rate` (m/s).
+    #[inline]
+    pub fn approach(&self, pace: Pace, remembered: f64, rate: f64) -> f64 {
+        match pace {
+            Pace::Whole if self.largest => remembered.max(rate),
+            Pace::Whole | Pace::Held => remembered,
+            Pace::Rising => rate.max(self.speed_floor),
+        }
+    }
+
+    /// Whether that is the rate itself, so that the damping term does not answer to it.
+    pub fn approach_follows(&self, pace: Pace, remembered: f64, rate: f64) -> bool {
+        match pace {
+            Pace::Whole => self.largest && rate > remembered,
+            Pace::Held => false,
+            Pace::Rising => rate > self.speed_floor,
+        }
+    }
+
+    /// The piece on which a contact is whose memory holds `remembered`.
+    pub fn pace_at(&self, remembered: f64, rate: f64) -> Pace {
+        if !self.largest {
+            Pace::Whole
+        } else if rate >= remembered {
+            Pace::Rising
+        } else {
+            Pace::Held
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::{ApproachSpeed, Parameters};
+
+    #[test]
+    fn pieces_are_the_rule_and_damping_stays_below_chi() {
+        let parameters = Parameters {
+            approach_speed: ApproachSpeed::Largest,
+            ..Parameters::default()
+        };
+        let c = Coefficients::new(&parameters, 3e-4);
+        let remembered = 0.05;
+        for rate in [-0.2, 0.0, 0.01, 0.05, 0.0501, 0.4] {
+            let whole = c.approach(Pace::Whole, remembered, rate);
+            let piece = c.pace_at(remembered, rate);
+            assert_eq!(c.approach(piece, remembered, rate), whole, "{rate}");
+            assert!(c.damping * rate / whole <= c.damping * (1.0 + 1e-15));
+            let elastic = c.stiffness * 1e-6_f64.powf(1.5);
+            let force = c.normal_force(1e-6, rate, whole);
+            assert!(force <= elastic * (1.0 + c.damping) * (1.0 + 1e-12));
+        }
+        let start = Coefficients::new(&Parameters::default(), 3e-4);
+        assert_eq!(start.pace_at(remembered, 0.4), Pace::Whole);
+        assert_eq!(start.approach(Pace::Whole, remembered, 0.4), remembered);
+    }
+}

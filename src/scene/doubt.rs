@@ -1,0 +1,112 @@
+//! What a scene asks for that speaks against any result of it: numbers, and words for them.
+
+use std::fmt;
+
+use super::access::normal_law_word;
+use super::format_quantity;
+use crate::contact::{self, NormalLaw};
+
+/// Why a result of a scene is not to be trusted, whatever the run meets. Its `Display` is a sentence for a person.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Doubt {
+    /// A restitution for which the normal-force law was not derived.
+    Restitution {
+        /// Names of the joints.
+        joints: String,
+        /// Their law.
+        law: NormalLaw,
+        /// What it is asked for.
+        restitution: f64,
+    },
+    /// A clearance so small that the contact patch is not small against the ball.
+    Clearance {
+        /// Names of the joints.
+        joints: String,
+        /// m.
+        clearance: f64,
+        /// m.
+        ball_radius: f64,
+    },
+    /// A fixed step too long for the shortest impact to be expected.
+    Step {
+        /// Joint with that impact.
+        joint: String,
+        /// `solver.step`, s.
+        step: f64,
+        /// How long the impact lasts, or the sliding in it until friction reverses it, s.
+        duration: f64,
+        /// The latter.
+        sliding: bool,
+        /// The method stays stable, and loses the impact.
+        stable: bool,
+        /// A step that will do, s.
+        recommended: f64,
+    },
+    /// A tolerance too loose for impacts.
+    Tolerance {
+        /// `solver.tolerance`.
+        tolerance: f64,
+        /// The loosest that will do.
+        loosest: f64,
+    },
+}
+
+impl fmt::Display for Doubt {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Restitution {
+                joints,
+                law,
+                restitution,
+            } => write!(
+                f,
+                "{joints}: restitution {restitution} with {}, which is right only near 1 (asked for 0, it gives about \
+                 {:.2}); flores or gonthier suit low restitution.",
+                normal_law_word(*law),
+                contact::restitution_given(contact::damping_factor(*law, 0.0))
+            ),
+            Self::Clearance {
+                joints,
+                clearance,
+                ball_radius,
+            } => write!(
+                f,
+                "{joints}: clearance {} is so small that the contact patch is no longer small against the ball \
+                 (radius {}), which Hertz's theory assumes.",
+                format_quantity(*clearance, "mm"),
+                format_quantity(*ball_radius, "mm")
+            ),
+            Self::Step {
+                joint,
+                step,
+                duration,
+                sliding,
+                stable,
+                recommended,
+            } => {
+                let why = if *sliding {
+                    format!("friction at ball joint {joint} is estimated to reverse the sliding in")
+                } else {
+                    format!("an impact at ball joint {joint} is estimated to last")
+                };
+                let stays = if *stable {
+                    " (imex-euler stays stable, but its peak forces and rebounds are too low)"
+                } else {
+                    ""
+                };
+                write!(
+                    f,
+                    "solver.step {}: {why} {}, which a fixed step this long does not resolve{stays}; use {} or less, or \
+                     solver.method = automatic.",
+                    format_quantity(*step, "us"),
+                    format_quantity(libm::round(duration * 1e8) * 1e-8, "us"),
+                    format_quantity(*recommended, "us")
+                )
+            }
+            Self::Tolerance { tolerance, loosest } => write!(
+                f,
+                "solver.tolerance {tolerance:e}: impacts may gain or lose much of their energy; use {loosest:e} or less."
+            ),
+        }
+    }
+}
