@@ -1,7 +1,7 @@
 //! Jointplay: a 3D laboratory that shows what play in a ball joint does to a machine.
 //!
 //! Floors from the ground up; a module uses only what stands below it (`ARCHITECTURE.md`):
-//! [`contact`] and [`integrate`], [`scene`], [`mechanism`], [`simulate`], [`analysis`], [`chart`] and [`view`], [`render`], [`app`],
+//! [`contact`], [`files`] and [`integrate`], [`scene`], [`mechanism`], [`simulate`], [`analysis`], [`chart`] and [`view`], [`render`], [`app`],
 //! and the entries [`cli`], `main.rs` and [`web`].
 
 /// The version that every output file names.
@@ -16,6 +16,8 @@ pub mod chart;
 #[cfg(not(target_arch = "wasm32"))]
 pub mod cli;
 pub mod contact;
+#[cfg(not(target_arch = "wasm32"))]
+pub mod files;
 pub mod integrate;
 pub mod mechanism;
 #[cfg(feature = "gui")]

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 /// Floors from the ground up; modules of one floor know nothing of each other.
 const FLOORS: [&[&str]; 9] = [
-    &["contact", "integrate"],
+    &["contact", "files", "integrate"],
     &["scene"],
     &["mechanism"],
     &["simulate"],

@@ -6,7 +6,7 @@ use super::grid::{Axis, Grid, Start};
 use super::layout::Layout;
 use super::point::{Plan, PointResult, PointRun};
 use crate::scene::{Scene, SceneError, Value};
-use crate::simulate::Simulation;
+use crate::simulate::{LONGEST_RUN, Simulation};
 
 /// Most kept sections of all points together: an array of them takes 512 MiB.
 const MOST_SECTIONS: usize = 1 << 26;
@@ -38,6 +38,20 @@ pub enum SweepError {
         /// Kept sections of a point.
         kept: usize,
         /// Most sections.
+        most: usize,
+    },
+    /// Longer than a run may be.
+    #[error(
+        "--periods {periods}: at {point} the longest run, {LONGEST_RUN:e} s, has {most} periods of {period} s"
+    )]
+    TooLong {
+        /// Periods.
+        periods: usize,
+        /// Parameters of the point.
+        point: String,
+        /// Its drive period, s.
+        period: f64,
+        /// Most periods.
         most: usize,
     },
     /// No drive phase.
@@ -97,7 +111,18 @@ impl Sweep {
                 Ok(scene)
             });
             match started {
-                Ok(scene) => drive_period(&scene).map(|_| ())?,
+                Ok(scene) => {
+                    let period = drive_period(&scene)?;
+                    let most = (LONGEST_RUN / period) as usize;
+                    if plan.periods > most {
+                        return Err(SweepError::TooLong {
+                            periods: plan.periods,
+                            point: sweep.describe(point),
+                            period,
+                            most,
+                        });
+                    }
+                }
                 Err(error) => {
                     return Err(SweepError::Infeasible {
                         point: sweep.describe(point),

@@ -111,6 +111,7 @@ mod desktop {
 
     use super::{Host, Job, OpenedFile, Running, SaveFile};
     use crate::app::background::Thread;
+    use crate::files::{FileError, Target, appear};
     use crate::scene::{LARGEST_FILE, too_large};
 
     /// Files of the desktop.
@@ -125,21 +126,23 @@ mod desktop {
         }
 
         fn save(&mut self, files: &[SaveFile]) -> Result<String, String> {
+            let cannot = |error: FileError| match error {
+                FileError::Exists(path) | FileError::NotEmpty(path) => format!(
+                    "cannot write {}: it is already there; choose another name",
+                    path.display()
+                ),
+                error @ FileError::Cannot { .. } => error.to_string(),
+            };
+            let mut filled = Vec::new();
             for file in files {
-                let path = Path::new(&file.name);
-                let cannot = |why: String| format!("cannot write {}: {why}", path.display());
-                if path.file_name().is_none() || path.is_dir() {
-                    return Err(cannot("it names a folder".to_owned()));
-                }
-                if path.symlink_metadata().is_ok() {
-                    return Err(cannot(
-                        "it is already there; choose another name".to_owned(),
-                    ));
-                }
+                let target = Target::claim(Path::new(&file.name), false).map_err(cannot)?;
+                filled.push(
+                    target
+                        .fill(|out| out.write_all(&file.bytes))
+                        .map_err(cannot)?,
+                );
             }
-            for file in files {
-                write_whole(Path::new(&file.name), &file.bytes)?;
-            }
+            appear(filled).map_err(cannot)?;
             let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
             Ok(format!("Saved {}", names.join(" and ")))
         }
@@ -166,34 +169,5 @@ mod desktop {
         fn start(&mut self, job: Job) -> Option<Box<dyn Running>> {
             Some(Box::new(Thread::start(job)?))
         }
-    }
-
-    /// Writes beside the final name, then renames: the file appears whole or not at all.
-    fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), String> {
-        let cannot = |error: &std::io::Error| {
-            // tempfile adds the name of its own scratch file, which helps nobody.
-            let text = error.to_string();
-            let cause = text.split(" at path ").next().unwrap_or(&text).to_owned();
-            format!("cannot write {}: {cause}", path.display())
-        };
-        let folder = match path.parent() {
-            Some(folder) if !folder.as_os_str().is_empty() => folder,
-            _ => Path::new("."),
-        };
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".jointplay-");
-        // Temporary files are private by default; an output file follows the user's umask as any other.
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt;
-            builder.permissions(std::fs::Permissions::from_mode(0o666));
-        }
-        let mut scratch = builder.tempfile_in(folder).map_err(|e| cannot(&e))?;
-        scratch.write_all(bytes).map_err(|e| cannot(&e))?;
-        scratch.as_file().sync_all().map_err(|e| cannot(&e))?;
-        scratch
-            .persist_noclobber(path)
-            .map_err(|e| cannot(&e.error))?;
-        Ok(())
     }
 }

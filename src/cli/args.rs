@@ -1,5 +1,6 @@
 //! What may be written on the command line.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -46,7 +47,7 @@ pub enum Command {
 #[derive(Debug, Args)]
 pub struct SceneArguments {
     /// Name of a built-in scene, or a file (contains `/` or ends in `.toml`).
-    pub scene: String,
+    pub scene: OsString,
     /// Change a parameter, e.g. `contact.clearance=0.5mm`; may be repeated, the last wins.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = change)]
     pub changes: Vec<(String, String)>,
@@ -57,7 +58,7 @@ pub struct SceneArguments {
 pub struct ViewArguments {
     /// Name of a built-in scene, or a file (contains `/` or ends in `.toml`).
     #[arg(default_value = super::DEFAULT_SCENE)]
-    pub scene: String,
+    pub scene: OsString,
     /// Change a parameter, e.g. `contact.clearance=0.5mm`; may be repeated, the last wins.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = change)]
     pub changes: Vec<(String, String)>,
@@ -111,10 +112,10 @@ pub struct SweepArguments {
     #[arg(long, value_name = "KEY=A..B:N", required = true)]
     pub vary: Vec<String>,
     /// Drive periods that each point runs, those discarded included.
-    #[arg(long, value_name = "P")]
+    #[arg(long, value_name = "P", value_parser = periods)]
     pub periods: usize,
     /// Of these, periods at the beginning that are a transient.
-    #[arg(long, value_name = "D")]
+    #[arg(long, value_name = "D", value_parser = periods)]
     pub discard: usize,
     /// Where the sections are taken.
     #[arg(long, value_enum, value_name = "WHERE", default_value = "phase")]
@@ -339,7 +340,7 @@ pub struct RenderArguments {
 #[command(group = clap::ArgGroup::new("what").required(true).args(["scene", "all"]))]
 pub struct TradeoffArguments {
     /// Name of a built-in scene, or a file (contains `/` or ends in `.toml`).
-    pub scene: Option<String>,
+    pub scene: Option<OsString>,
     /// Change a parameter, e.g. `contact.clearance=0.5mm`; may be repeated, the last wins.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = change, conflicts_with = "all")]
     pub changes: Vec<(String, String)>,
@@ -464,6 +465,13 @@ fn change(text: &str) -> Result<(String, String), String> {
     }
 }
 
+/// A whole number, also one like `1e3`; what is too many is said where the period is known.
+fn periods(text: &str) -> Result<usize, String> {
+    let number = text.parse::<f64>().ok().filter(|n| *n >= 0.0 && n.fract() == 0.0);
+    let whole = text.parse().ok().or(number.map(|n| n as usize));
+    whole.ok_or_else(|| "expected a whole number, e.g. 100".to_owned())
+}
+
 /// Largest edge of a frame that every adapter can draw, pixels.
 const LARGEST_EDGE: u32 = 8192;
 
@@ -488,6 +496,17 @@ mod tests {
     #[test]
     fn the_declarations_hold_together() {
         super::Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn periods_are_whole_numbers() {
+        for (text, number) in [("0", 0), ("100", 100), ("1e3", 1000)] {
+            assert_eq!(super::periods(text), Ok(number));
+        }
+        assert_eq!(super::periods("9e18"), Ok(9_000_000_000_000_000_000));
+        for bad in ["-1", "1.5", "nan", "inf", "", "x"] {
+            assert!(super::periods(bad).is_err(), "{bad}");
+        }
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Why a command ended early, and the exit code that says so to a script.
 
+use crate::files::FileError;
 use crate::scene::SceneError;
 
 /// A message for a person and a code for a script.
@@ -51,5 +52,16 @@ impl From<SceneError> for Failure {
             Self::USAGE
         };
         Self::new(code, error.to_string())
+    }
+}
+
+impl From<FileError> for Failure {
+    fn from(error: FileError) -> Self {
+        let advice = match error {
+            FileError::Exists(_) => "; add --force to replace it, or choose another name",
+            FileError::NotEmpty(_) => "; add --force to replace it, or choose another folder",
+            FileError::Cannot { .. } => "",
+        };
+        Self::io(format!("{error}{advice}"))
     }
 }

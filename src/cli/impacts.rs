@@ -6,6 +6,7 @@ use serde_json::{Map, Value as Json, json};
 
 use super::Failure;
 use super::output::{RowsFile, Table};
+use crate::files::Filled;
 use crate::scene::Scene;
 use crate::simulate::{Impact, Simulation};
 
@@ -54,11 +55,15 @@ impl ImpactsFile {
         &self.impacts
     }
 
-    /// Writes them with `meta`, which says what made them. Returns the number of rows.
+    /// Writes them with `meta`, which says what made them; nothing has its final name yet. Returns the number of rows, too.
     ///
     /// # Errors
-    /// As [`RowsFile::write`].
-    pub fn write(self, scene: &Scene, mut meta: Map<String, Json>) -> Result<usize, Failure> {
+    /// As [`RowsFile::fill`].
+    pub fn fill(
+        self,
+        scene: &Scene,
+        mut meta: Map<String, Json>,
+    ) -> Result<(usize, Vec<Filled>), Failure> {
         let names: Vec<&str> = scene.ball_joints.iter().map(|j| j.name.as_str()).collect();
         meta.insert("rows".into(), json!(self.impacts.len()));
         // Numbers in the column `joint`, from 0.
@@ -83,8 +88,8 @@ impl ImpactsFile {
             ]
         });
         let table = Table::of_rows(COLUMNS, rows);
-        self.file.write(&table, &Json::Object(meta))?;
-        Ok(self.impacts.len())
+        let files = self.file.fill(&table, meta)?;
+        Ok((self.impacts.len(), files))
     }
 }
 

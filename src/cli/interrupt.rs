@@ -1,18 +1,28 @@
-//! Ctrl-C ends a run in good order; a second one ends it at once.
+//! Ctrl-C ends a run in good order, and so do SIGTERM and SIGHUP; who insists ends it at once.
 
 use std::sync::Once;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 use super::Failure;
+
+/// `timeout` signals its child and then the child's group: what follows this soon is the same wish.
+const ONE_WISH: Duration = Duration::from_secs(1);
 
 static ASKED: AtomicBool = AtomicBool::new(false);
 static LISTEN: Once = Once::new();
 
-/// From now on Ctrl-C is noted instead of ending the process.
+/// From now on these signals are noted instead of ending the process.
 pub fn listen() {
+    // A test that runs a command within itself is still to be ended by Ctrl-C.
+    if cfg!(test) {
+        return;
+    }
     LISTEN.call_once(|| {
-        let outcome = ctrlc::set_handler(|| {
-            if ASKED.swap(true, Ordering::Relaxed) {
+        let mut wishes = Wishes::default();
+        let outcome = catch(move || {
+            ASKED.store(true, Ordering::Relaxed);
+            if wishes.insist(Instant::now()) {
                 std::process::exit(i32::from(Failure::INTERRUPTED));
             }
         });
@@ -22,7 +32,75 @@ pub fn listen() {
     });
 }
 
-/// Whether Ctrl-C was pressed.
+/// Whether a run is to end.
 pub fn asked() -> bool {
     ASKED.load(Ordering::Relaxed)
+}
+
+/// The signals so far.
+#[derive(Default)]
+struct Wishes {
+    count: u32,
+    first: Option<Instant>,
+}
+
+impl Wishes {
+    /// Notes one; whether it means at once: the third, and the second if it is no echo of the first.
+    fn insist(&mut self, now: Instant) -> bool {
+        self.count += 1;
+        let first = *self.first.get_or_insert(now);
+        self.count > 2 || now.duration_since(first) > ONE_WISH
+    }
+}
+
+#[cfg(unix)]
+fn catch(mut told: impl FnMut() + Send + 'static) -> std::io::Result<()> {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    let mut signals = signal_hook::iterator::Signals::new([SIGINT, SIGTERM])?;
+    if !outlives_its_terminal() {
+        signals.add_signal(SIGHUP)?;
+    }
+    std::thread::Builder::new()
+        .name("signals".to_owned())
+        .spawn(move || signals.forever().for_each(|_| told()))?;
+    Ok(())
+}
+
+/// Whether `nohup` started the program: it goes on when its terminal is closed.
+#[cfg(unix)]
+fn outlives_its_terminal() -> bool {
+    use std::io::IsTerminal;
+    match std::fs::read_to_string("/proc/self/status") {
+        Ok(status) => {
+            let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+            let ignored = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+            ignored.is_some_and(|mask| mask & 1 != 0)
+        }
+        // Elsewhere than on Linux: `nohup` leaves no output on a terminal.
+        Err(_) => !std::io::stderr().is_terminal(),
+    }
+}
+
+#[cfg(windows)]
+fn catch(told: impl FnMut() + Send + 'static) -> Result<(), ctrlc::Error> {
+    ctrlc::set_handler(told)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_echo_is_no_second_wish_and_a_third_is_final() {
+        let start = Instant::now();
+        let insisted = |after: &[u64]| {
+            let mut wishes = Wishes::default();
+            let mut each = after.iter().map(|ms| start + Duration::from_millis(*ms));
+            each.position(|now| wishes.insist(now))
+        };
+        assert_eq!(insisted(&[0, 20]), None);
+        assert_eq!(insisted(&[0, 0, 40]), Some(2));
+        assert_eq!(insisted(&[0, 20, 5000]), Some(2));
+        assert_eq!(insisted(&[0, 1500]), Some(1));
+    }
 }

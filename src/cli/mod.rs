@@ -21,6 +21,7 @@ mod summary;
 mod sweep;
 pub mod tradeoff;
 
+use std::ffi::OsStr;
 use std::fmt::Write as _;
 use std::io::{self, Write as _};
 
@@ -47,7 +48,7 @@ pub fn main() -> u8 {
 
 fn dispatch(arguments: Arguments) -> Result<(), Failure> {
     match arguments.command {
-        None => view(DEFAULT_SCENE, &[], None),
+        None => view(DEFAULT_SCENE.as_ref(), &[], None),
         Some(Command::View(arguments)) => view(
             &arguments.scene,
             &arguments.changes,
@@ -70,7 +71,7 @@ fn dispatch(arguments: Arguments) -> Result<(), Failure> {
 }
 
 #[cfg(feature = "gui")]
-fn view(scene: &str, changes: &[(String, String)], link: Option<&str>) -> Result<(), Failure> {
+fn view(scene: &OsStr, changes: &[(String, String)], link: Option<&str>) -> Result<(), Failure> {
     use crate::app::{AppOptions, WindowError, run_native};
     let options = match link {
         Some(link) => AppOptions::from_link(link).map_err(Failure::usage)?,
@@ -100,7 +101,7 @@ fn no_display() -> bool {
 }
 
 #[cfg(not(feature = "gui"))]
-fn view(_scene: &str, _changes: &[(String, String)], _link: Option<&str>) -> Result<(), Failure> {
+fn view(_scene: &OsStr, _changes: &[(String, String)], _link: Option<&str>) -> Result<(), Failure> {
     Err(no_graphics())
 }
 
@@ -131,6 +132,18 @@ fn start(scene: &Scene) -> Result<Simulation, Failure> {
 
 /// Results go to standard output; a reader that has seen enough (`| head`) is no error.
 fn print(text: &str) -> Result<(), Failure> {
+    // What a test prints is caught.
+    #[cfg(test)]
+    return {
+        print!("{text}");
+        Ok(())
+    };
+    #[cfg(not(test))]
+    print_out(text)
+}
+
+#[cfg(not(test))]
+fn print_out(text: &str) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(Failure::io(format!(

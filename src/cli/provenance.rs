@@ -3,10 +3,8 @@
 use serde_json::{Map, Value as Json, json};
 
 use super::Failure;
+use crate::files::PROGRAM;
 use crate::scene::{Scene, Value};
-
-/// What every output calls the program that made it.
-pub const PROGRAM: &str = "jointplay";
 
 /// The common part of every output's `meta`.
 ///

@@ -2,17 +2,23 @@
 
 use super::Failure;
 use crate::scene::{Dimension, parse_quantity};
+use crate::simulate::LONGEST_RUN;
 
-/// A time that is not negative, s.
+/// A time of a run, s: not negative, and not beyond the longest.
 ///
 /// # Errors
-/// Usage: no time, no unit, or negative.
+/// Usage: no time, no unit, negative, or too long.
 pub fn duration(option: &str, text: &str) -> Result<f64, Failure> {
     let seconds = parse_quantity(text, Dimension::Time)
         .map_err(|error| Failure::usage(format!("{option} {text}: {error}")))?;
     if seconds < 0.0 {
         return Err(Failure::usage(format!(
             "{option} {text}: a time here is 0 or greater"
+        )));
+    }
+    if seconds > LONGEST_RUN {
+        return Err(Failure::usage(format!(
+            "{option} {text}: the longest time here is {LONGEST_RUN:e} s"
         )));
     }
     Ok(seconds)
@@ -71,7 +77,18 @@ mod tests {
     fn times_need_a_unit_and_no_sign() {
         assert_eq!(duration("--duration", "20ms"), Ok(0.02));
         assert_eq!(duration("--at", "0"), Ok(0.0));
-        for bad in ["20", "-1ms", "20mm", "soon", "", "inf s", "nan"] {
+        assert_eq!(duration("--duration", "1e6s"), Ok(1e6));
+        for bad in [
+            "20",
+            "-1ms",
+            "20mm",
+            "soon",
+            "",
+            "inf s",
+            "nan",
+            "1e300s",
+            "1000001s",
+        ] {
             let failure = duration("--duration", bad).unwrap_err();
             assert_eq!(failure.code, crate::cli::Failure::USAGE, "{bad}");
             assert!(

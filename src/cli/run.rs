@@ -1,5 +1,7 @@
 //! `run`: simulate without a window and write rows at equal intervals.
 
+use std::io;
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use indicatif::ProgressBar;
@@ -8,9 +10,10 @@ use serde_json::{Value as Json, json};
 use super::args::{RunArguments, SummaryForm};
 use super::assembly::Start;
 use super::impacts::ImpactsFile;
-use super::output::{RowsFile, Table, check_size};
+use super::output::{NoRow, RowsFile, Table, check_distinct, check_size};
 use super::summary::{self, Status};
 use super::{Failure, interrupt, load, print, progress, quantity, start, warn};
+use crate::files::{FileError, appear};
 use crate::simulate::{Frame, Simulation};
 
 /// Steps between two looks at the clock, the progress bar and Ctrl-C.
@@ -75,16 +78,16 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         Some(every) => Some(Times::new(duration, quantity::duration("--every", every)?)?),
         None => None,
     };
+    let mut names = vec![("the scene".to_owned(), PathBuf::from(&arguments.scene.scene))];
+    for (option, path) in [("--out", &arguments.out), ("--impacts", &arguments.impacts)] {
+        names.extend(path.iter().flat_map(|path| RowsFile::names(option, path)));
+    }
+    check_distinct(&names)?;
     let file = match &arguments.out {
         Some(path) => Some(RowsFile::claim(path, arguments.force)?),
         None => None,
     };
     let mut impacts = match &arguments.impacts {
-        Some(path) if arguments.out.as_ref() == Some(path) => {
-            return Err(Failure::usage(
-                "--impacts and --out name the same file: give each its own",
-            ));
-        }
         Some(path) => Some(ImpactsFile::claim(path, arguments.force)?),
         None => None,
     };
@@ -94,8 +97,9 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let mut frame = Frame::default();
     simulation.sample(0.0, &mut frame);
     let mut table = Table::new(&scene, &frame);
-    if let Some(times) = &times {
+    if let (Some(times), Some(file)) = (&times, &file) {
         check_size(times.last.saturating_add(1), table.names().len())?;
+        table.spool_beside(file.target())?;
     }
     if !arguments.quiet {
         if times.is_some_and(|times| !times.reach_the_end()) {
@@ -120,6 +124,11 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         &progress,
     );
     progress.finish_and_clear();
+    let end = match (end, &file) {
+        (Ok(end), _) => end,
+        (Err(error), Some(file)) => return Err(FileError::cannot(file.target().path(), error).into()),
+        (Err(error), None) => return Err(Failure::io(error.to_string())),
+    };
     let wall = stopwatch.as_secs_f64();
 
     let found = impacts.as_ref().map(ImpactsFile::impacts);
@@ -144,23 +153,26 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     meta.insert("duration_s".into(), json!(duration));
     // With the changed parameters it makes the same run again, wherever the file went.
     meta.insert("scene_text".into(), json!(scene.source.text));
+    let mut files = Vec::new();
     if let (Some(file), Some(times)) = (file, times) {
-        let path = file.path().to_owned();
+        let path = file.target().path().to_owned();
         let mut meta = meta.clone();
         meta.insert("every_s".into(), json!(times.every));
         meta.insert(
             "contact_states".into(),
             json!({"0": "free", "1": "stick", "2": "slip", "3": "ideal"}),
         );
-        file.write(&table, &Json::Object(meta))?;
+        files.extend(file.fill(&table, meta)?);
         facts.insert("out".into(), json!(path.display().to_string()));
         summary::written(&mut text, table.len(), "row", &path);
     }
     if let (Some(impacts), Some(path)) = (impacts, &arguments.impacts) {
-        let rows = impacts.write(&scene, meta)?;
+        let (rows, filled) = impacts.fill(&scene, meta)?;
+        files.extend(filled);
         facts.insert("impacts_out".into(), json!(path.display().to_string()));
         summary::written(&mut text, rows, "impact", path);
     }
+    appear(files)?;
     match arguments.summary {
         SummaryForm::Text => print(&text)?,
         SummaryForm::Json => print(&format!("{:#}\n", Json::Object(facts)))?,
@@ -169,6 +181,9 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
 }
 
 /// Steps to `duration` and fills `table`; `stopwatch` runs while the simulation steps and at no other time.
+///
+/// # Errors
+/// The disk that takes the rows.
 fn simulate(
     simulation: &mut Simulation,
     duration: f64,
@@ -178,36 +193,40 @@ fn simulate(
     frame: &mut Frame,
     stopwatch: &mut Duration,
     progress: &ProgressBar,
-) -> End {
+) -> io::Result<End> {
     let mut next = 0;
     loop {
         // Rows that lie in the step just taken (at first: the row at 0).
         if let Some(times) = times {
             while next <= times.last && times.at(next) <= simulation.time() {
                 simulation.sample(times.at(next), frame);
-                if let Err(error) = table.push(frame) {
-                    return End {
-                        status: Status::Diverged,
-                        failure: Some(Failure::new(
-                            Failure::DIVERGED,
-                            format!(
-                                "stopped: {error}; try a smaller solver.step or solver.tolerance"
-                            ),
-                        )),
-                    };
+                match table.push(frame) {
+                    Ok(()) => {}
+                    Err(NoRow::Disk(error)) => return Err(error),
+                    Err(error @ NoRow::NotFinite { .. }) => {
+                        return Ok(End {
+                            status: Status::Diverged,
+                            failure: Some(Failure::new(
+                                Failure::DIVERGED,
+                                format!(
+                                    "stopped: {error}; try a smaller solver.step or solver.tolerance"
+                                ),
+                            )),
+                        });
+                    }
                 }
                 next += 1;
             }
         }
         if simulation.time() >= duration {
-            return End {
+            return Ok(End {
                 status: Status::Done,
                 failure: None,
-            };
+            });
         }
         progress.set_position(position(simulation.time()));
         if interrupt::asked() {
-            return End {
+            return Ok(End {
                 status: Status::Interrupted,
                 failure: Some(Failure::new(
                     Failure::INTERRUPTED,
@@ -216,7 +235,7 @@ fn simulate(
                         simulation.time()
                     ),
                 )),
-            };
+            });
         }
         let row = times
             .filter(|times| next <= times.last)
@@ -225,10 +244,10 @@ fn simulate(
         let outcome = step_some(simulation, row, duration, impacts.as_deref_mut());
         *stopwatch += started.elapsed();
         if let Err(stopped) = outcome {
-            return End {
+            return Ok(End {
                 status: Status::Diverged,
                 failure: Some(Failure::new(Failure::DIVERGED, stopped.to_string())),
-            };
+            });
         }
     }
 }

@@ -2,7 +2,9 @@
 
 use super::error::{line_and_column, nearest};
 use super::{Scene, SceneError};
+use std::ffi::OsStr;
 use std::io::Read;
+use std::path::Path;
 
 /// Names of the built-in scenes.
 pub const BUILT_IN: [&str; 5] = [
@@ -45,9 +47,16 @@ impl Scene {
     ///
     /// # Errors
     /// Unreadable file, anything wrong in it, or a bad change.
-    pub fn load(argument: &str, changes: &[(String, String)]) -> Result<Self, SceneError> {
+    pub fn load(
+        argument: impl AsRef<OsStr>,
+        changes: &[(String, String)],
+    ) -> Result<Self, SceneError> {
+        let path = argument.as_ref();
+        // A file's name need be no text; what is said of it is.
+        let argument = &*path.to_string_lossy();
         if argument.contains('/') || argument.ends_with(".toml") {
-            return Self::parse(&read_file(argument)?, Some(argument), changes);
+            let text = read_file(Path::new(path), argument)?;
+            return Self::parse(&text, Some(argument), changes);
         }
         match built_in_text(argument) {
             Some(text) => Self::parse(text, None, changes),
@@ -66,14 +75,14 @@ impl Scene {
     }
 }
 
-fn read_file(name: &str) -> Result<String, SceneError> {
+fn read_file(path: &Path, name: &str) -> Result<String, SceneError> {
     let error = |message: String| SceneError {
         file: Some(name.to_owned()),
         message,
         unreadable: true,
         ..SceneError::default()
     };
-    let metadata = std::fs::metadata(name).map_err(|cause| {
+    let metadata = std::fs::metadata(path).map_err(|cause| {
         let stem = name.rsplit('/').next().unwrap_or(name).trim_end_matches(".toml");
         let near = nearest(stem, BUILT_IN);
         error(format!("cannot read this file: {cause}; built-in scenes, named without `/` and `.toml`: {}{near}", BUILT_IN.join(", ")))
@@ -83,7 +92,7 @@ fn read_file(name: &str) -> Result<String, SceneError> {
     }
     let mut bytes = Vec::new();
     // One byte more than allowed: a pipe or a device does not tell its size.
-    std::fs::File::open(name)
+    std::fs::File::open(path)
         .and_then(|file| file.take(LARGEST_FILE + 1).read_to_end(&mut bytes))
         .map_err(|cause| error(format!("cannot read this file: {cause}")))?;
     if bytes.len() as u64 > LARGEST_FILE {

@@ -27,6 +27,9 @@ pub use simulation::{CLEARANCE_SPEED, Simulation};
 use crate::mechanism::MechanismError;
 use crate::scene::{Scene, SceneError};
 
+/// The longest run, s: at its end a double still tells instants 0.1 ns apart.
+pub const LONGEST_RUN: f64 = 1e6;
+
 /// Why a simulation could not start.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{0}")]

@@ -8,7 +8,7 @@ use super::Table;
 pub(super) fn write(out: &mut impl Write, table: &Table) -> io::Result<()> {
     writeln!(out, "{}", table.names().join(","))?;
     let mut line = String::new();
-    for row in table.rows() {
+    table.rows(|row| {
         line.clear();
         for (i, value) in row.iter().enumerate() {
             if i > 0 {
@@ -17,9 +17,39 @@ pub(super) fn write(out: &mut impl Write, table: &Table) -> io::Result<()> {
             line.push_str(&significant(*value, 12));
         }
         line.push('\n');
-        out.write_all(line.as_bytes())?;
+        out.write_all(line.as_bytes())
+    })
+}
+
+/// Passes bytes on and reckons their CRC-32, by which a reader tells whether rows and the account of them belong together.
+pub(super) struct Checked<W> {
+    inner: W,
+    checksum: crc32fast::Hasher,
+}
+
+impl<W: Write> Checked<W> {
+    /// Nothing passed yet.
+    pub fn new(inner: W) -> Self {
+        let checksum = crc32fast::Hasher::new();
+        Self { inner, checksum }
     }
-    Ok(())
+
+    /// Eight hexadecimal digits.
+    pub fn checksum(self) -> String {
+        format!("{:08x}", self.checksum.finalize())
+    }
+}
+
+impl<W: Write> Write for Checked<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = self.inner.write(bytes)?;
+        self.checksum.update(&bytes[..written]);
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.inner.flush()
+    }
 }
 
 /// `value` with `digits` significant digits, trailing zeros dropped, as C's `%.<digits>g` writes it (but 0 for -0).

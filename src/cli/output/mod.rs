@@ -3,20 +3,20 @@
 mod csv;
 mod json;
 mod npz;
+mod rows;
 mod table;
-mod target;
 
 pub use csv::significant;
-pub use table::{NotFinite, Table};
-pub use target::{Folder, MANIFEST, Target};
+pub use table::{NoRow, Table};
 
 use std::path::{Path, PathBuf};
 
-use serde_json::Value as Json;
+use serde_json::{Map, Value as Json};
 
 use super::failure::Failure;
+use crate::files::{Filled, Target, same_file};
 
-/// Largest number of values a run may hold in memory: 4 GiB.
+/// Largest number of values in a file of rows: 4 GiB.
 const MOST_VALUES: u64 = 1 << 29;
 
 /// File format of a run's rows.
@@ -70,7 +70,12 @@ impl RowsFile {
         // The name that the user gave first: an error is to name that one.
         let rows = Target::claim(path, force)?;
         let beside = match format {
-            Format::Csv => Some(Target::claim(&Self::meta_path(path), force)?),
+            Format::Csv => {
+                let meta = Self::meta_path(path);
+                // What is left of a pair whose run was killed between its two names says nothing and stands in no way.
+                let alone = !path.exists() && is_account(&meta);
+                Some(Target::claim(&meta, force || alone)?)
+            }
             Format::Json | Format::Npz => None,
         };
         Ok(Self {
@@ -81,36 +86,81 @@ impl RowsFile {
     }
 
     /// The file beside a CSV file that says what made it: `run.csv` has `run.csv.meta.json`.
-    pub fn meta_path(path: &Path) -> PathBuf {
+    fn meta_path(path: &Path) -> PathBuf {
         let mut name = path.as_os_str().to_owned();
         name.push(".meta.json");
         PathBuf::from(name)
     }
 
-    /// The rows' final name.
-    pub fn path(&self) -> &Path {
-        self.rows.path()
+    /// What `option` with `path` writes, for [`check_distinct`].
+    pub fn names(option: &str, path: &Path) -> Vec<(String, PathBuf)> {
+        let mut names = vec![(option.to_owned(), path.to_owned())];
+        if Format::of(path) == Ok(Format::Csv) {
+            names.push((format!("the .meta.json of {option}"), Self::meta_path(path)));
+        }
+        names
     }
 
-    /// Writes everything under the final names.
+    /// The rows' file.
+    pub fn target(&self) -> &Target {
+        &self.rows
+    }
+
+    /// Writes everything; nothing has its final name yet.
     ///
     /// # Errors
-    /// Whatever the file system says; the final names are then as they were.
-    pub fn write(self, table: &Table, meta: &Json) -> Result<(), Failure> {
-        match self.format {
+    /// Whatever the file system says.
+    pub fn fill(self, table: &Table, mut meta: Map<String, Json>) -> Result<Vec<Filled>, Failure> {
+        let mut checksum = String::new();
+        let rows = self.rows.fill(|file| match self.format {
             Format::Csv => {
-                if let Some(beside) = self.beside {
-                    beside.write(|file| json::write_meta(file, meta))?;
-                }
-                self.rows.write(|file| csv::write(file, table))
+                let mut file = csv::Checked::new(file);
+                csv::write(&mut file, table)?;
+                checksum = file.checksum();
+                Ok(())
             }
-            Format::Json => self.rows.write(|file| json::write(file, table, meta)),
-            Format::Npz => self.rows.write(|file| npz::write(file, table, meta)),
-        }
+            Format::Json => json::write(file, table, &meta),
+            Format::Npz => npz::write(file, table, &meta),
+        })?;
+        let Some(beside) = self.beside else {
+            return Ok(vec![rows]);
+        };
+        meta.insert(ROWS_CHECKSUM.into(), checksum.into());
+        let account = beside.fill(|file| json::write_meta(file, &meta))?;
+        // In this order a kill between the two leaves no rows without their account.
+        Ok(vec![account, rows])
     }
 }
 
-/// Refuses a run whose rows would not fit in memory.
+/// Key of a CSV file's CRC-32 in what stands beside it.
+const ROWS_CHECKSUM: &str = "rows_crc32";
+
+/// Whether the file is one that [`RowsFile`] writes beside rows.
+fn is_account(path: &Path) -> bool {
+    let meta = std::fs::read(path).unwrap_or_default();
+    let meta: Json = serde_json::from_slice(&meta).unwrap_or_default();
+    meta["program"] == crate::files::PROGRAM && meta[ROWS_CHECKSUM].is_string()
+}
+
+/// Refuses outputs of one command that would be one file, or the command's own input; each with what it is.
+///
+/// # Errors
+/// Usage, with the two.
+pub fn check_distinct(named: &[(String, PathBuf)]) -> Result<(), Failure> {
+    for (i, (what, path)) in named.iter().enumerate() {
+        let others: Vec<&Path> = named[..i].iter().map(|(_, path)| path.as_path()).collect();
+        if let Some(j) = same_file(path, &others) {
+            return Err(Failure::usage(format!(
+                "{what} and {} name the same file, {}: give each its own",
+                named[j].0,
+                path.display()
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a run whose rows would fill a disk.
 ///
 /// # Errors
 /// Usage, with the numbers.
@@ -120,7 +170,7 @@ pub fn check_size(rows: u64, columns: usize) -> Result<(), Failure> {
         return Ok(());
     }
     Err(Failure::usage(format!(
-        "{rows} rows of {columns} columns would take {:.0} GiB of memory, more than the limit of {} GiB; \
+        "{rows} rows of {columns} columns are {:.0} GiB of numbers, more than the limit of {} GiB; \
          choose a longer --every or a shorter --duration (at most {} rows)",
         values as f64 * 8.0 / f64::from(1u32 << 30),
         MOST_VALUES * 8 / (1 << 30),

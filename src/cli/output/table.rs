@@ -1,27 +1,39 @@
 //! The rows of a run: which columns a scene has, and one row for each sampled instant. SI units, world axes.
 
+use std::io;
+
+use super::rows::Rows;
+use crate::files::Target;
 use crate::scene::{JointKind, Scene, Vec3};
 use crate::simulate::{ContactState, Frame};
 
 /// Rows of one run, row after row.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Table {
     names: Vec<String>,
+    rows: Rows,
+    /// The row that is being made.
     values: Vec<f64>,
     probe: bool,
     ledger: bool,
 }
 
-/// A value that is not a number and so is not written.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{column} is {value} at t = {time:.6e} s")]
-pub struct NotFinite {
-    /// Column.
-    pub column: String,
-    /// Value.
-    pub value: f64,
-    /// Time of the row, s.
-    pub time: f64,
+/// Why a row is not in the table.
+#[derive(Debug, thiserror::Error)]
+pub enum NoRow {
+    /// A value that is not a number.
+    #[error("{column} is {value} at t = {time:.6e} s")]
+    NotFinite {
+        /// Column.
+        column: String,
+        /// Value.
+        value: f64,
+        /// Time of the row, s.
+        time: f64,
+    },
+    /// The disk.
+    #[error(transparent)]
+    Disk(#[from] io::Error),
 }
 
 const POSE: [&str; 10] = [
@@ -105,6 +117,7 @@ impl Table {
             names.extend(fixed(&LEDGER));
         }
         Self {
+            rows: Rows::new(names.len()),
             names,
             values: Vec::new(),
             probe,
@@ -114,12 +127,27 @@ impl Table {
 
     /// A table of other rows than those of a run.
     pub fn of_rows<const N: usize>(names: [&str; N], rows: impl Iterator<Item = [f64; N]>) -> Self {
-        Self {
+        let mut table = Self {
             names: names.map(str::to_owned).to_vec(),
-            values: rows.flatten().collect(),
+            rows: Rows::new(N),
+            values: Vec::new(),
             probe: false,
             ledger: false,
+        };
+        for row in rows {
+            // In memory nothing can fail.
+            let _ = table.rows.push(&row);
         }
+        table
+    }
+
+    /// Keeps in memory but the latest rows, and the others beside `target`.
+    ///
+    /// # Errors
+    /// Input/output.
+    pub fn spool_beside(&mut self, target: &Target) -> Result<(), crate::files::FileError> {
+        self.rows.spool_to(target.spool()?);
+        Ok(())
     }
 
     /// Column names, in order.
@@ -129,54 +157,57 @@ impl Table {
 
     /// Number of rows.
     pub fn len(&self) -> usize {
-        self.values.len() / self.names.len()
+        self.rows.len()
     }
 
     /// Whether there is no row yet.
     pub fn is_empty(&self) -> bool {
-        self.values.is_empty()
+        self.len() == 0
     }
 
-    /// Rows in order, each as long as [`Self::names`].
-    pub fn rows(&self) -> impl Iterator<Item = &[f64]> {
-        self.values.chunks_exact(self.names.len())
+    /// Calls `each` with every row in order, each as long as [`Self::names`].
+    ///
+    /// # Errors
+    /// The disk; that of `each`.
+    pub fn rows(&self, each: impl FnMut(&[f64]) -> io::Result<()>) -> io::Result<()> {
+        self.rows.each(each)
     }
 
-    /// Values of one column, in order of time.
-    pub fn column(&self, column: usize) -> impl Iterator<Item = f64> + '_ {
-        self.rows().map(move |row| row[column])
+    /// Calls `each` with every value of one column, in order of time.
+    ///
+    /// # Errors
+    /// The disk; that of `each`.
+    pub fn column(
+        &self,
+        column: usize,
+        each: impl FnMut(f64) -> io::Result<()>,
+    ) -> io::Result<()> {
+        self.rows.column(column, each)
     }
 
     /// Appends the row of `frame`.
     ///
     /// # Errors
-    /// A value that is not finite, but for those of a probe error that is not known; the table is then unchanged.
-    pub fn push(&mut self, frame: &Frame) -> Result<(), NotFinite> {
-        let start = self.values.len();
+    /// A value that is not finite, but for those of a probe error that is not known; a full disk. The table is then unchanged.
+    pub fn push(&mut self, frame: &Frame) -> Result<(), NoRow> {
+        self.values.clear();
         self.append(frame);
-        debug_assert_eq!(
-            self.values.len() - start,
-            self.names.len(),
-            "one value for each column"
-        );
         let known = frame.probe_error.is_some();
-        if let Some(column) =
-            self.values[start..]
-                .iter()
-                .zip(&self.names)
-                .position(|(value, name)| {
-                    !value.is_finite() && (known || !PROBE.contains(&name.as_str()))
-                })
+        if let Some(column) = self
+            .values
+            .iter()
+            .zip(&self.names)
+            .position(|(value, name)| {
+                !value.is_finite() && (known || !PROBE.contains(&name.as_str()))
+            })
         {
-            let value = self.values[start + column];
-            self.values.truncate(start);
-            return Err(NotFinite {
+            return Err(NoRow::NotFinite {
                 column: self.names[column].clone(),
-                value,
+                value: self.values[column],
                 time: frame.time,
             });
         }
-        Ok(())
+        Ok(self.rows.push(&self.values)?)
     }
 
     /// In the order of the names made in [`Self::new`].

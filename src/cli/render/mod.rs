@@ -3,15 +3,13 @@
 mod options;
 mod studio;
 
-use std::fs;
-
 use serde_json::{Map, Value as Json, json};
 
 use self::studio::{ApplicationStudio, SceneStudio, Studio};
 use super::args::RenderArguments;
-use super::output::{Folder, MANIFEST};
 use super::summary::{Status, count as count_of, hash_text};
 use super::{Failure, interrupt, load, print, progress, provenance, quantity, start, warn};
+use crate::files::{Folder, MANIFEST};
 use crate::scene::Scene;
 use crate::simulate::{Frame, Peak};
 use crate::view::{ArrowMemory, ViewOptions};
@@ -83,17 +81,28 @@ pub fn render(arguments: &RenderArguments) -> Result<(), Failure> {
     } else {
         Box::new(SceneStudio::new(&scene, view.clone(), arguments)?)
     };
+    // From here on there is a scratch folder, which a run that is told to end takes away.
+    interrupt::listen();
     let folder = Folder::claim(&arguments.out, arguments.force)?;
     if !arguments.quiet {
         scene.warnings().iter().for_each(|warning| warn(warning));
     }
-
-    let meta = provenance::meta(&scene)?;
-    interrupt::listen();
-    let bar = progress::bar(!arguments.quiet, times.instants.len() as u64);
     if let Some(reference) = common_reference(&scene, &times, &view, arguments)? {
         studio.fix_arrow_scale(reference);
     }
+    fill(folder, &mut *studio, &scene, &times, arguments)
+}
+
+/// Draws all frames and gives the folder its name.
+fn fill(
+    folder: Folder,
+    studio: &mut dyn Studio,
+    scene: &Scene,
+    times: &Times,
+    arguments: &RenderArguments,
+) -> Result<(), Failure> {
+    let meta = provenance::meta(scene)?;
+    let bar = progress::bar(!arguments.quiet, times.instants.len() as u64);
     let labels = labels(&meta);
     let labels: Vec<(&str, &str)> = labels
         .iter()
@@ -118,13 +127,7 @@ pub fn render(arguments: &RenderArguments) -> Result<(), Failure> {
             .png(&labels)
             .map_err(|error| Failure::io(error.to_string()))?;
         let file = format!("frame_{number:05}.png");
-        let path = folder.scratch().join(&file);
-        fs::write(&path, png).map_err(|error| {
-            Failure::io(format!(
-                "cannot write {file} for {}: {error}",
-                arguments.out.display()
-            ))
-        })?;
+        folder.write(&file, &png)?;
         frames[number] = json!({
             "file": file,
             "time_s": instant,
@@ -138,22 +141,12 @@ pub fn render(arguments: &RenderArguments) -> Result<(), Failure> {
     frames.retain(|frame| !frame.is_null());
     let written = count_of(frames.len() as u64, "frame");
     let mut manifest = meta;
-    manifest.insert("parameters".into(), provenance::parameters(&scene)?);
+    manifest.insert("parameters".into(), provenance::parameters(scene)?);
     manifest.insert("status".into(), json!(status.word()));
     manifest.insert("size".into(), json!([arguments.size.0, arguments.size.1]));
     manifest.insert("adapter".into(), json!(studio.adapter()));
     manifest.insert("frames".into(), Json::Array(frames));
-    fs::write(
-        folder.scratch().join(MANIFEST),
-        format!("{:#}\n", Json::Object(manifest)),
-    )
-    .map_err(|error| {
-        Failure::io(format!(
-            "cannot write {MANIFEST} for {}: {error}",
-            arguments.out.display()
-        ))
-    })?;
-    folder.finish()?;
+    folder.finish(manifest)?;
     print(&format!(
         "{} and {MANIFEST} in {}\n",
         written,

@@ -1,32 +1,25 @@
 //! The numbers behind the page: runs and settled curves as NumPy archives and CSV, sweeps as NumPy archives, comparisons as CSV.
 
 use std::fmt::Write as _;
-use std::path::Path;
 
 use ndarray::Array1;
 use ndarray_npy::NpzWriter;
 use serde_json::{Map, Value as Json, json};
 
 use super::text::{self, Compared};
-use super::{make, save};
 use crate::analysis::paper::Case;
 use crate::analysis::reproduction::{COLUMNS, Findings, Swathe, Traced};
 use crate::cli::Failure;
-use crate::cli::output::{Target, significant};
+use crate::cli::output::significant;
 use crate::cli::sweep::{Archive, Source, meta};
+use crate::files::Folder;
 
-/// Writes all data files into `folder`; their names, beside that of the folder.
+/// Writes all data files into `folder`.
 ///
 /// # Errors
 /// The file system.
-pub(super) fn write(folder: &Path, found: &Findings) -> Result<Vec<String>, Failure> {
-    make(folder)?;
-    let mut names = Vec::new();
-    let mut put = |name: String, content: &[u8]| {
-        save(&folder.join(&name), content)?;
-        names.push(format!("data/{name}"));
-        Ok::<(), Failure>(())
-    };
+pub(super) fn write(folder: &Folder, found: &Findings) -> Result<(), Failure> {
+    let put = |name: String, content: &[u8]| folder.write(&format!("data/{name}"), content);
     put("numbers.csv".to_owned(), numbers(found).as_bytes())?;
     put("statements.csv".to_owned(), statements(found).as_bytes())?;
     for run in found.runs.iter().chain([&found.lagrange, &found.ideal]) {
@@ -35,14 +28,10 @@ pub(super) fn write(folder: &Path, found: &Findings) -> Result<Vec<String>, Fail
     }
     put("settled_curves.csv".to_owned(), curves(found).as_bytes())?;
     for swathe in &found.swathes {
-        let name = format!("{}.npz", swathe.name);
-        archive(&folder.join(&name), swathe)?;
-        names.push(format!("data/{name}"));
-        let name = format!("{}.csv", swathe.name);
-        save(&folder.join(&name), points(swathe).as_bytes())?;
-        names.push(format!("data/{name}"));
+        archive(folder, swathe)?;
+        put(format!("{}.csv", swathe.name), points(swathe).as_bytes())?;
     }
-    Ok(names)
+    Ok(())
 }
 
 /// A field of a CSV file.
@@ -213,11 +202,12 @@ impl Source for Records<'_> {
 }
 
 /// A sweep in the form that `sweep` writes.
-fn archive(path: &Path, swathe: &Swathe) -> Result<(), Failure> {
+fn archive(folder: &Folder, swathe: &Swathe) -> Result<(), Failure> {
     let meta: Map<String, Json> = meta(&swathe.sweep)?;
     let mut source = Records {
         records: &swathe.records,
         length: swathe.sweep.layout().record_length(),
     };
-    Archive::of_sweep(meta, &swathe.sweep, None).write(Target::claim(path, false)?, &mut source)
+    let target = folder.file(&format!("data/{}.npz", swathe.name))?;
+    Archive::of_sweep(meta, &swathe.sweep, None).write(target, &mut source)
 }

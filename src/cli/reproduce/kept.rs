@@ -1,13 +1,13 @@
 //! Finished blocks of the sweeps, kept beside the report until that is written, so that an interrupted one goes on where it
 //! stopped. Everything else takes seconds and is computed again.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::make;
 use crate::analysis::reproduction::{Outcome, Work};
 use crate::cli::Failure;
 use crate::cli::sweep::{Partial, meta};
+use crate::cli::warn;
+use crate::files::{create_folders, remove_empty_folder};
 
 /// One file a sweep, in a folder of their own.
 pub(super) struct Kept {
@@ -25,7 +25,8 @@ impl Kept {
         let mut name = out.components().as_path().as_os_str().to_owned();
         name.push(".partial");
         let folder = PathBuf::from(name);
-        make(&folder)?;
+        create_folders(&folder)
+            .map_err(|e| Failure::io(format!("cannot write {}: {e}", folder.display())))?;
         let part = |swathe: &crate::analysis::reproduction::Swathe| {
             let blocks: Vec<usize> = (0..swathe.sweep.grid().blocks()).collect();
             let settings = meta(&swathe.sweep)?;
@@ -79,12 +80,13 @@ impl Kept {
     }
 
     /// Takes it away: its content is in the report.
-    ///
-    /// # Errors
-    /// The file system.
-    pub(super) fn remove(self) -> Result<(), Failure> {
-        self.parts.into_iter().try_for_each(Partial::remove)?;
-        fs::remove_dir(&self.folder)
-            .map_err(|e| Failure::io(format!("cannot remove {}: {e}", self.folder.display())))
+    pub(super) fn remove(self) {
+        self.parts.into_iter().for_each(Partial::remove);
+        if let Err(error) = remove_empty_folder(&self.folder) {
+            warn(&format!(
+                "{} is not needed any more and could not be removed: {error}",
+                self.folder.display()
+            ));
+        }
     }
 }

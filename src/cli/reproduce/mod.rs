@@ -16,23 +16,24 @@ use serde_json::{Value as Json, json};
 
 use self::kept::Kept;
 use super::args::ReproduceArguments;
-use super::output::{Folder, MANIFEST};
 use super::{Failure, interrupt, print, progress, warn};
 use crate::analysis::paper::{Agreement, Verdict};
 use crate::analysis::reproduction::{Extent, Findings, Work};
+use crate::files::Folder;
 
 /// Does what `reproduce` asks.
 ///
 /// # Errors
 /// A folder that cannot be written, before anything is computed; Ctrl-C, the file system.
 pub fn reproduce(arguments: &ReproduceArguments) -> Result<(), Failure> {
+    // From here on there is a scratch folder, which a run that is told to end takes away.
+    interrupt::listen();
     let folder = Folder::claim(&arguments.out, arguments.force)?;
     let extent = if arguments.quick {
         Extent::QUICK
     } else {
         Extent::FULL
     };
-    interrupt::listen();
     let cores = || thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
     let threads = arguments.threads.map_or_else(cores, usize::from);
     let started = Instant::now();
@@ -49,9 +50,9 @@ pub fn reproduce(arguments: &ReproduceArguments) -> Result<(), Failure> {
     let found = compute::compute(work, &mut kept, threads, &bar);
     bar.finish_and_clear();
     let found = found?;
-    fill(folder.scratch(), &found, &kept)?;
-    folder.finish()?;
-    kept.remove()?;
+    let manifest = fill(&folder, &found, &kept)?;
+    folder.finish(manifest)?;
+    kept.remove();
     print(&summary(
         &found,
         &arguments.out,
@@ -68,17 +69,20 @@ pub fn into_folder(out: &Path, extent: Extent, threads: usize) -> Result<(), Fai
     let work = Work::new(extent).map_err(|error| Failure::usage(error.to_string()))?;
     let mut kept = Kept::open(out, &work)?;
     let found = compute::compute(work, &mut kept, threads, &progress::bar(false, 1))?;
-    fill(folder.scratch(), &found, &kept)?;
-    folder.finish()?;
-    kept.remove()
+    let manifest = fill(&folder, &found, &kept)?;
+    folder.finish(manifest)?;
+    kept.remove();
+    Ok(())
 }
 
-/// Writes all files into `folder`.
-fn fill(folder: &Path, found: &Findings, kept: &Kept) -> Result<(), Failure> {
-    let mut files = data::write(&folder.join("data"), found)?;
+/// Writes all files into `folder`; what made them.
+fn fill(
+    folder: &Folder,
+    found: &Findings,
+    kept: &Kept,
+) -> Result<serde_json::Map<String, Json>, Failure> {
+    data::write(folder, found)?;
     let drawn = figures::all(found);
-    let plots = folder.join("plots");
-    make(&plots)?;
     let mut pictures = Vec::new();
     for (name, sheet) in &drawn {
         if interrupt::asked() {
@@ -86,22 +90,14 @@ fn fill(folder: &Path, found: &Findings, kept: &Kept) -> Result<(), Failure> {
         }
         let drawing = |error: crate::chart::SheetError| Failure::io(format!("{name}: {error}"));
         let svg = sheet.svg().map_err(drawing)?;
-        save(&plots.join(format!("{name}.svg")), svg.as_bytes())?;
-        save(
-            &plots.join(format!("{name}.png")),
-            &sheet.png(1.5).map_err(drawing)?,
-        )?;
-        files.extend(["svg", "png"].map(|ending| format!("plots/{name}.{ending}")));
+        folder.write(&format!("plots/{name}.svg"), svg.as_bytes())?;
+        let png = sheet.png(1.5).map_err(drawing)?;
+        folder.write(&format!("plots/{name}.png"), &png)?;
         pictures.push(((*name).to_owned(), svg));
     }
     let page = page::page(found, &pictures)?;
-    save(&folder.join("index.html"), page.as_bytes())?;
-    files.push("index.html".to_owned());
-    files.sort();
-    let mut meta = meta(found)?;
-    meta.insert("files".into(), json!(files));
-    let text = format!("{:#}\n", Json::Object(meta));
-    save(&folder.join(MANIFEST), text.as_bytes())
+    folder.write("index.html", page.as_bytes())?;
+    meta(found)
 }
 
 /// What made the report.
@@ -119,16 +115,6 @@ fn command(found: &Findings) -> &'static str {
     } else {
         "jointplay reproduce --out report/ --quick"
     }
-}
-
-fn make(folder: &Path) -> Result<(), Failure> {
-    std::fs::create_dir_all(folder)
-        .map_err(|e| Failure::io(format!("cannot write {}: {e}", folder.display())))
-}
-
-fn save(path: &Path, content: &[u8]) -> Result<(), Failure> {
-    std::fs::write(path, content)
-        .map_err(|e| Failure::io(format!("cannot write {}: {e}", path.display())))
 }
 
 fn interrupted(kept: &Kept) -> Failure {

@@ -11,7 +11,7 @@ use super::options::Shard;
 use crate::analysis::layout::Column;
 use crate::analysis::sweep::Sweep;
 use crate::cli::Failure;
-use crate::cli::output::Target;
+use crate::files::Target;
 
 /// Where the numbers of an archive come from.
 pub trait Source {
@@ -184,7 +184,7 @@ impl Archive {
         });
         match failure {
             Some(failure) => Err(failure),
-            None => written,
+            None => Ok(written?),
         }
     }
 }

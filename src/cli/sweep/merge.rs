@@ -12,7 +12,7 @@ use super::archive::{self, Archive, SHARD, Source};
 use super::options;
 use crate::cli::Failure;
 use crate::cli::args::MergeArguments;
-use crate::cli::output::Target;
+use crate::files::{Target, same_file};
 
 /// An open shard.
 struct Part {
@@ -30,13 +30,8 @@ struct Part {
 /// Files that are no shards, or not all shards of one sweep; the file system.
 pub fn merge(arguments: &MergeArguments) -> Result<(), Failure> {
     archive::check_ending(&arguments.out)?;
-    let own = |path: &Path| path.canonicalize().ok();
-    if let Some(out) = own(&arguments.out)
-        && arguments
-            .shards
-            .iter()
-            .any(|shard| own(shard).as_ref() == Some(&out))
-    {
+    let shards: Vec<&Path> = arguments.shards.iter().map(PathBuf::as_path).collect();
+    if same_file(&arguments.out, &shards).is_some() {
         return Err(Failure::usage(format!(
             "--out {} is one of the shards; choose another name",
             arguments.out.display()

@@ -21,7 +21,6 @@ use serde_json::{Map, Value as Json, json};
 use self::options::Shard;
 use super::args::{SummaryForm, SweepArguments};
 use super::check::near_singular;
-use super::output::Target;
 use super::summary::count;
 use super::{Failure, interrupt, load, print, progress, warn};
 use crate::analysis::drive::drive_period;
@@ -30,6 +29,7 @@ use crate::analysis::layout::Status;
 use crate::analysis::point::{LOOSEST_FOR_EXPONENT, Plan};
 use crate::analysis::regime::{FEWEST, Regime};
 use crate::analysis::sweep::Sweep;
+use crate::files::Target;
 
 /// Steps between two looks for Ctrl-C.
 const STEPS_BETWEEN_LOOKS: u32 = 4096;
@@ -101,7 +101,7 @@ pub fn sweep(arguments: &SweepArguments) -> Result<(), Failure> {
     let mut summary = summarise(&archive, &mut partial)?;
     summary.insert("wall_s".into(), json!(wall));
     archive.write(target, &mut partial)?;
-    partial.remove()?;
+    partial.remove();
     report(&archive, &summary, &arguments.out, arguments.summary)
 }
 

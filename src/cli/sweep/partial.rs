@@ -3,10 +3,11 @@
 //!
 //! Magic number with the format's version; the settings as JSON behind their length, and their CRC-32; then for each block
 //! its number, the number of its values, the values (float64, little-endian), and the CRC-32 of all these. A block is
-//! appended by one write. What does not check is refused as a whole: a half-read result would look like a whole one.
+//! appended by one write: where that was cut short, the block is lost and nothing else. Anything else that does not check is
+//! refused as a whole: a half-read result would look like a whole one.
 
 use std::collections::BTreeMap;
-use std::fs::{File, OpenOptions, TryLockError};
+use std::fs::TryLockError;
 use std::io::{BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
@@ -14,7 +15,8 @@ use serde_json::{Map, Value as Json};
 
 use super::archive::Source;
 use crate::analysis::sweep::Sweep;
-use crate::cli::Failure;
+use crate::cli::{Failure, warn};
+use crate::files::{File, open_or_create, remove_file};
 
 /// Magic number, the last character being the format's version.
 const MAGIC: &[u8; 8] = b"JPSWEEP1";
@@ -57,13 +59,8 @@ impl Partial {
         let path = Self::path_of(out);
         let failed =
             |error: std::io::Error| Failure::io(format!("cannot use {}: {error}", path.display()));
-        let file = OpenOptions::new()
-            .read(true)
-            .write(true)
-            .create(true)
-            .truncate(false)
-            .open(&path)
-            .map_err(failed)?;
+        let settings = Json::Object(settings.clone());
+        let file = open_or_create(&path, &beginning(&settings)).map_err(failed)?;
         match file.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => {
@@ -94,12 +91,7 @@ impl Partial {
             place,
             path,
         };
-        let settings = Json::Object(settings.clone());
-        if partial.length()? == 0 {
-            partial.begin(&settings)?;
-        } else {
-            partial.read(&settings)?;
-        }
+        partial.read(&settings)?;
         Ok(partial)
     }
 
@@ -153,16 +145,13 @@ impl Partial {
             .iter()
             .for_each(|value| bytes.extend(value.to_le_bytes()));
         bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
-        self.file
-            .seek(SeekFrom::Start(self.end))
+        let mut file = &self.file;
+        file.seek(SeekFrom::Start(self.end))
             .map_err(self.failed())?;
-        let written = self
-            .file
-            .write_all(&bytes)
-            .and_then(|()| self.file.sync_data());
+        let written = file.write_all(&bytes).and_then(|()| file.sync());
         if let Err(error) = written {
-            // Best effort: half a block would make the file worthless.
-            let _ = self.file.set_len(self.end);
+            // Best effort: half a block is told from a whole one.
+            let _ = self.file.set_length(self.end);
             return Err(self.failed()(error));
         }
         self.end += bytes.len() as u64;
@@ -171,11 +160,13 @@ impl Partial {
     }
 
     /// Takes the file away: its content is in the output.
-    ///
-    /// # Errors
-    /// Whatever the file system says.
-    pub fn remove(self) -> Result<(), Failure> {
-        std::fs::remove_file(&self.path).map_err(self.failed())
+    pub fn remove(self) {
+        if let Err(error) = remove_file(&self.path) {
+            warn(&format!(
+                "{} is not needed any more and could not be removed: {error}",
+                self.path.display()
+            ));
+        }
     }
 
     fn failed(&self) -> impl Fn(std::io::Error) -> Failure + use<> {
@@ -191,19 +182,7 @@ impl Partial {
     }
 
     fn length(&self) -> Result<u64, Failure> {
-        Ok(self.file.metadata().map_err(self.failed())?.len())
-    }
-
-    fn begin(&mut self, settings: &Json) -> Result<(), Failure> {
-        let text = settings.to_string();
-        let mut bytes = MAGIC.to_vec();
-        bytes.extend((text.len() as u64).to_le_bytes());
-        bytes.extend(text.as_bytes());
-        bytes.extend(crc32fast::hash(text.as_bytes()).to_le_bytes());
-        self.file.write_all(&bytes).map_err(self.failed())?;
-        self.file.sync_data().map_err(self.failed())?;
-        (self.start, self.end) = (bytes.len() as u64, bytes.len() as u64);
-        Ok(())
+        self.file.length().map_err(self.failed())
     }
 
     /// Checks the whole file.
@@ -243,48 +222,91 @@ impl Partial {
         let mut end = start;
         let mut done = vec![false; self.done.len()];
         let mut records = Vec::new();
-        while end < length {
-            let b = self.read_block(&mut reader, &mut records)?;
-            if std::mem::replace(&mut done[b], true) {
-                return Err(self.damaged("a block is in it twice"));
+        let mut cut = false;
+        while end < length && !cut {
+            match self.next_block(&mut reader, &mut records)? {
+                Some(b) if std::mem::replace(&mut done[b], true) => {
+                    return Err(self.damaged("a block is in it twice"));
+                }
+                Some(_) => end += 20 + 8 * records.len() as u64,
+                None => cut = true,
             }
-            end += 20 + 8 * records.len() as u64;
+        }
+        if cut {
+            // What is left of it would stand before the next one.
+            self.file.set_length(end).map_err(self.failed())?;
         }
         (self.start, self.end, self.done) = (start, end, done);
         Ok(())
     }
 
-    /// Number and records of the next block.
+    /// Number and records of the next block, which is whole.
     fn read_block(&self, reader: &mut impl Read, records: &mut Vec<f64>) -> Result<usize, Failure> {
-        let cut = |_| self.damaged("it is cut short");
-        let mut head = [0; 16];
-        reader.read_exact(&mut head).map_err(cut)?;
-        let number = |at: usize| {
-            let bytes: [u8; 8] = std::array::from_fn(|i| head[at + i]);
-            u64::from_le_bytes(bytes)
+        let b = self.next_block(reader, records)?;
+        b.ok_or_else(|| self.damaged("it is cut short"))
+    }
+
+    /// Number and records of the next block; `None` where the file ends before it does.
+    fn next_block(
+        &self,
+        reader: &mut impl Read,
+        records: &mut Vec<f64>,
+    ) -> Result<Option<usize>, Failure> {
+        let foreign = || self.damaged("a block does not belong to this sweep");
+        // As much as is there of each number must be right: what is no block is not taken for half a one.
+        let Some(b) = self.number(reader)? else {
+            return Ok(None);
         };
-        let (b, values) = (number(0), number(8));
         let expected = usize::try_from(b)
             .ok()
             .filter(|&b| b < self.points.len())
             .filter(|&b| self.place[self.points[b].start] != usize::MAX)
             .map(|b| (b, self.points[b].len() * self.record));
-        let Some((b, expected)) = expected.filter(|(_, n)| *n as u64 == values) else {
-            return Err(self.damaged("a block does not belong to this sweep"));
+        let (block, expected) = expected.ok_or_else(foreign)?;
+        let Some(values) = self.number(reader)? else {
+            return Ok(None);
         };
-        let mut bytes = vec![0; 8 * expected];
-        reader.read_exact(&mut bytes).map_err(cut)?;
+        if values != expected as u64 {
+            return Err(foreign());
+        }
+        let mut bytes = Vec::with_capacity(8 * expected + 4);
+        let length = 8 * expected as u64 + 4;
+        let read = reader.take(length).read_to_end(&mut bytes);
+        if (read.map_err(self.failed())? as u64) < length {
+            return Ok(None);
+        }
+        let (bytes, written) = bytes.split_at(8 * expected);
         let mut checksum = crc32fast::Hasher::new();
-        checksum.update(&head);
-        checksum.update(&bytes);
-        if read_u32(reader).map_err(cut)? != checksum.finalize() {
+        checksum.update(&b.to_le_bytes());
+        checksum.update(&values.to_le_bytes());
+        checksum.update(bytes);
+        if *written != checksum.finalize().to_le_bytes() {
             return Err(self.damaged("a block does not match its checksum"));
         }
         records.clear();
-        let words = bytes.chunks_exact(8);
-        records.extend(words.map(|word| f64::from_le_bytes(std::array::from_fn(|i| word[i]))));
-        Ok(b)
+        let words = bytes.as_chunks().0.iter();
+        records.extend(words.map(|word| f64::from_le_bytes(*word)));
+        Ok(Some(block))
     }
+
+    /// The next whole number; `None` where the file ends before it does.
+    fn number(&self, reader: &mut impl Read) -> Result<Option<u64>, Failure> {
+        match read_u64(reader) {
+            Ok(number) => Ok(Some(number)),
+            Err(error) if error.kind() == std::io::ErrorKind::UnexpectedEof => Ok(None),
+            Err(error) => Err(self.failed()(error)),
+        }
+    }
+}
+
+/// What a file without blocks holds.
+fn beginning(settings: &Json) -> Vec<u8> {
+    let text = settings.to_string();
+    let mut bytes = MAGIC.to_vec();
+    bytes.extend((text.len() as u64).to_le_bytes());
+    bytes.extend(text.as_bytes());
+    bytes.extend(crc32fast::hash(text.as_bytes()).to_le_bytes());
+    bytes
 }
 
 impl Source for Partial {

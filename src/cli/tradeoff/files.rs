@@ -1,15 +1,14 @@
 //! Results of one scene as a folder: points as CSV and JSON, diagrams as SVG and PNG, and what made them.
 
 use std::fmt::Write as _;
-use std::fs;
-use std::path::Path;
 
-use serde_json::{Value as Json, json};
+use serde_json::{Map, Value as Json, json};
 
 use super::picture::picture;
 use crate::analysis::{End, Phase, WorkPrecision};
-use crate::cli::output::{MANIFEST, significant};
+use crate::cli::output::significant;
 use crate::cli::{Failure, machine, provenance};
+use crate::files::Folder;
 use crate::scene::Scene;
 
 /// Pixels of the PNG for one of the diagram.
@@ -43,8 +42,12 @@ const COLUMNS: [&str; 24] = [
     "settled_error",
 ];
 
-/// Writes all files into `folder`.
-pub(super) fn fill(folder: &Path, found: &WorkPrecision, scene: &Scene) -> Result<(), Failure> {
+/// Writes all files into `folder`; what made them.
+pub(super) fn fill(
+    folder: &Folder,
+    found: &WorkPrecision,
+    scene: &Scene,
+) -> Result<Map<String, Json>, Failure> {
     let sheet = picture(found, false, &machine::name());
     let drawing = |error: crate::chart::SheetError| Failure::io(error.to_string());
     let mut meta = provenance::meta(scene)?;
@@ -59,27 +62,16 @@ pub(super) fn fill(folder: &Path, found: &WorkPrecision, scene: &Scene) -> Resul
         "reference": reference(found)?,
         "points": points,
     });
-    meta.insert(
-        "files".into(),
-        json!([
-            "tradeoff.csv",
-            "tradeoff.json",
-            "tradeoff.svg",
-            "tradeoff.png"
-        ]),
-    );
-    let files: [(&str, Vec<u8>); 5] = [
+    let files: [(&str, Vec<u8>); 4] = [
         ("tradeoff.csv", csv(found).into_bytes()),
         ("tradeoff.json", format!("{whole:#}\n").into_bytes()),
         ("tradeoff.svg", sheet.svg().map_err(drawing)?.into_bytes()),
         ("tradeoff.png", sheet.png(PNG_SCALE).map_err(drawing)?),
-        (MANIFEST, format!("{:#}\n", Json::Object(meta)).into_bytes()),
     ];
     for (name, content) in files {
-        fs::write(folder.join(name), content)
-            .map_err(|error| Failure::io(format!("cannot write {name}: {error}")))?;
+        folder.write(name, &content)?;
     }
-    Ok(())
+    Ok(meta)
 }
 
 /// What the points are measured against.

@@ -8,13 +8,14 @@ mod words;
 pub use page::{RATIO_NOTE, headings};
 pub use words::{grid, percent, times, value};
 
+use std::ffi::OsStr;
 use std::path::Path;
 
 use super::args::TradeoffArguments;
-use super::{Failure, load, measuring, print, warn};
+use super::{Failure, interrupt, load, measuring, print, warn};
 use crate::analysis::{Effort, WorkPrecision, model_costs, work_precision};
 use crate::cli::args::SceneArguments;
-use crate::cli::output::Folder;
+use crate::files::Folder;
 use crate::scene::{BUILT_IN, Scene};
 
 /// Does what `tradeoff` asks.
@@ -36,11 +37,13 @@ pub fn tradeoff(arguments: &TradeoffArguments) -> Result<(), Failure> {
     }
 }
 
-fn one(name: &str, arguments: &TradeoffArguments, effort: &Effort) -> Result<(), Failure> {
+fn one(name: &OsStr, arguments: &TradeoffArguments, effort: &Effort) -> Result<(), Failure> {
     let scene = load(&SceneArguments {
         scene: name.to_owned(),
         changes: arguments.changes.clone(),
     })?;
+    // From here on there is a scratch folder, which a run that is told to end takes away.
+    interrupt::listen();
     let folder = match &arguments.out {
         Some(path) => Some((path, Folder::claim(path, arguments.force)?)),
         None => None,
@@ -57,8 +60,8 @@ fn one(name: &str, arguments: &TradeoffArguments, effort: &Effort) -> Result<(),
     let found = measure(&scene, effort, arguments.quiet)?;
     print(&words::text(&found))?;
     if let Some((path, folder)) = folder {
-        files::fill(folder.scratch(), &found, &scene)?;
-        folder.finish()?;
+        let manifest = files::fill(&folder, &found, &scene)?;
+        folder.finish(manifest)?;
         print(&format!("Written           {}\n", path.display()))?;
     }
     Ok(())

@@ -1,14 +1,15 @@
 //! The page of the documents, its diagrams and the record of the presets, measured on the built-in scenes.
 
 use std::collections::BTreeMap;
+use std::io::Write as _;
 use std::path::Path;
 
 use super::picture::{is_yardstick, picture};
 use super::words::{cost_ratios, end, error, standard, times, value};
 use crate::analysis::presets::{Measured, Record, choose, limit};
 use crate::analysis::{PartCost, Point, Setting, WorkPrecision};
-use crate::cli::output::Target;
 use crate::cli::{Failure, machine};
+use crate::files::{Target, appear};
 use crate::scene::{BUILT_IN, Preset};
 
 /// Where its parts lie under the source folder.
@@ -55,7 +56,7 @@ impl Targets {
     /// # Errors
     /// A folder that is not the program's source, or cannot be written.
     pub(super) fn claim(root: &Path) -> Result<Self, Failure> {
-        let claim = |name: &str| Target::claim(&root.join(name), true);
+        let claim = |name: &str| Ok::<_, Failure>(Target::claim(&root.join(name), true)?);
         let diagrams = BUILT_IN
             .iter()
             .map(|name| claim(&format!("docs/{}", diagram(name))));
@@ -77,13 +78,14 @@ impl Targets {
             let svg = picture(found, true, &machine).svg();
             drawn.push(svg.map_err(|error| Failure::io(error.to_string()))?);
         }
-        for (target, svg) in self.diagrams.into_iter().zip(&drawn) {
-            target.write(|file| std::io::Write::write_all(file, svg.as_bytes()))?;
-        }
-        self.page
-            .write(|file| std::io::Write::write_all(file, page.as_bytes()))?;
-        self.record
-            .write(|file| std::io::Write::write_all(file, format!("{record}\n").as_bytes()))
+        let put = |target: Target, text: &str| target.fill(|file| file.write_all(text.as_bytes()));
+        let diagrams = self.diagrams.into_iter().zip(&drawn);
+        let mut files = diagrams
+            .map(|(target, svg)| put(target, svg))
+            .collect::<Result<Vec<_>, _>>()?;
+        files.push(put(self.page, &page)?);
+        files.push(put(self.record, &format!("{record}\n"))?);
+        Ok(appear(files)?)
     }
 }
 

@@ -1,0 +1,285 @@
+//! The calls to the file system by which outputs are made. Each goes through one gate, so that a test can have the n-th of a
+//! kind fail, or the program end there.
+
+use std::fs::{self, OpenOptions, TryLockError};
+use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::path::Path;
+
+#[cfg(test)]
+pub use super::faults::Gate;
+
+/// Kinds of calls.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Call {
+    /// Makes or opens a file for writing.
+    Open,
+    /// Makes a folder.
+    Folder,
+    /// Takes a lock.
+    Lock,
+    /// Writes bytes.
+    Write,
+    /// Changes the length of a file.
+    Truncate,
+    /// Waits until bytes are on the disk.
+    Sync,
+    /// Gives another name.
+    Rename,
+    /// Swaps two names.
+    Exchange,
+    /// Takes a file or an empty folder away.
+    Remove,
+}
+
+/// Lets everything through; tests have another.
+#[cfg(not(test))]
+#[derive(Clone, Copy, Debug)]
+pub struct Gate;
+
+#[cfg(not(test))]
+impl Gate {
+    /// The gate of this thread.
+    pub fn here() -> Self {
+        Self
+    }
+
+    /// Lets a call through, or has it fail.
+    ///
+    /// # Errors
+    /// What the call is to return.
+    pub fn pass(&self, _call: Call) -> io::Result<()> {
+        Ok(())
+    }
+
+    /// How much of `bytes` a failing write still writes.
+    fn torn<'a>(&self, _bytes: &'a [u8]) -> &'a [u8] {
+        &[]
+    }
+
+    /// Whether `path` is there under another spelling of its name.
+    fn folded(&self, _path: &Path) -> bool {
+        false
+    }
+}
+
+/// A file that is written, and read back.
+#[derive(Debug)]
+pub struct File {
+    file: fs::File,
+    /// That of the thread which opened it: others may write it.
+    gate: Gate,
+}
+
+impl File {
+    /// Makes a file that is not there yet.
+    ///
+    /// # Errors
+    /// As the file system says.
+    pub fn create_new(path: &Path) -> io::Result<Self> {
+        Self::with(path, OpenOptions::new().create_new(true))
+    }
+
+    /// Opens one that is there.
+    ///
+    /// # Errors
+    /// As the file system says.
+    pub fn open(path: &Path) -> io::Result<Self> {
+        Self::with(path, &mut OpenOptions::new())
+    }
+
+    fn with(path: &Path, options: &mut OpenOptions) -> io::Result<Self> {
+        let gate = Gate::here();
+        gate.pass(Call::Open)?;
+        let file = options.read(true).write(true).open(path)?;
+        Ok(Self { file, gate })
+    }
+
+    /// Waits until nobody else has it locked, and locks it until it is closed.
+    ///
+    /// # Errors
+    /// A file system without locks.
+    pub fn lock(&self) -> io::Result<()> {
+        self.gate.pass(Call::Lock)?;
+        self.file.lock()
+    }
+
+    /// Locks it until it is closed, if nobody else has.
+    ///
+    /// # Errors
+    /// Locked by another; a file system without locks.
+    pub fn try_lock(&self) -> Result<(), TryLockError> {
+        self.gate.pass(Call::Lock).map_err(TryLockError::Error)?;
+        self.file.try_lock()
+    }
+
+    /// Its length, bytes.
+    ///
+    /// # Errors
+    /// As the file system says.
+    pub fn length(&self) -> io::Result<u64> {
+        Ok(self.file.metadata()?.len())
+    }
+
+    /// Cuts it to `length` bytes.
+    ///
+    /// # Errors
+    /// As the file system says.
+    pub fn set_length(&self, length: u64) -> io::Result<()> {
+        self.gate.pass(Call::Truncate)?;
+        self.file.set_len(length)
+    }
+
+    /// Waits until its content is on the disk.
+    ///
+    /// # Errors
+    /// As the file system says.
+    pub fn sync(&self) -> io::Result<()> {
+        self.gate.pass(Call::Sync)?;
+        self.file.sync_all()
+    }
+}
+
+impl Write for &File {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if let Err(error) = self.gate.pass(Call::Write) {
+            // A full disk and a kill leave the beginning.
+            (&self.file).write_all(self.gate.torn(bytes))?;
+            return Err(error);
+        }
+        (&self.file).write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Read for &File {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        (&self.file).read(bytes)
+    }
+}
+
+impl Seek for &File {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        (&self.file).seek(to)
+    }
+}
+
+/// A folder that no other run changes the names in while this is held; none where there are no such locks.
+pub struct FolderLock(#[expect(dead_code, reason = "held until dropped")] Option<fs::File>);
+
+/// Waits for the names in `folder`.
+pub fn lock_folder(folder: &Path) -> FolderLock {
+    let lock = || {
+        Gate::here().pass(Call::Lock)?;
+        // Elsewhere than on Unix a folder cannot be opened, and two runs of one output are the user's to avoid.
+        let file = fs::File::open(folder)?;
+        file.lock()?;
+        io::Result::Ok(file)
+    };
+    FolderLock(lock().inspect_err(|e| log::debug!("no lock: {e}")).ok())
+}
+
+/// Makes a folder that is not there yet.
+///
+/// # Errors
+/// As the file system says.
+pub fn create_folder(path: &Path) -> io::Result<()> {
+    Gate::here().pass(Call::Folder)?;
+    fs::create_dir(path)
+}
+
+/// Makes a folder and those it lies in, as far as they are missing.
+///
+/// # Errors
+/// As the file system says.
+pub fn create_folders(path: &Path) -> io::Result<()> {
+    Gate::here().pass(Call::Folder)?;
+    fs::create_dir_all(path)
+}
+
+/// Whether something has this name: a dangling link is something, too.
+pub fn exists(path: &Path) -> bool {
+    fs::symlink_metadata(path).is_ok() || Gate::here().folded(path)
+}
+
+/// Gives a file another name, replacing what has it.
+///
+/// # Errors
+/// As the file system says.
+pub fn rename(from: &Path, to: &Path) -> io::Result<()> {
+    Gate::here().pass(Call::Rename)?;
+    fs::rename(from, to)
+}
+
+/// Gives a file a name that nothing has.
+///
+/// # Errors
+/// `AlreadyExists`; as the file system says.
+pub fn rename_new(from: &Path, to: &Path) -> io::Result<()> {
+    Gate::here().pass(Call::Rename)?;
+    #[cfg(any(target_os = "linux", target_os = "macos"))]
+    {
+        use rustix::fs::{CWD, RenameFlags, renameat_with};
+        use rustix::io::Errno;
+        match renameat_with(CWD, from, CWD, to, RenameFlags::NOREPLACE) {
+            Err(Errno::INVAL | Errno::NOSYS | Errno::NOTSUP) => {}
+            other => return other.map_err(io::Error::from),
+        }
+    }
+    // Only a program that is none of this one can come between.
+    if fs::symlink_metadata(to).is_ok() {
+        return Err(io::ErrorKind::AlreadyExists.into());
+    }
+    fs::rename(from, to)
+}
+
+/// Swaps two names in one step.
+///
+/// # Errors
+/// A system or file system that has no such step; as the file system says.
+pub fn exchange(a: &Path, b: &Path) -> io::Result<()> {
+    Gate::here().pass(Call::Exchange)?;
+    #[cfg(any(target_os = "linux", target_os = "macos"))]
+    {
+        use rustix::fs::{CWD, RenameFlags, renameat_with};
+        Ok(renameat_with(CWD, a, CWD, b, RenameFlags::EXCHANGE)?)
+    }
+    #[cfg(not(any(target_os = "linux", target_os = "macos")))]
+    {
+        let _ = (a, b);
+        Err(io::ErrorKind::Unsupported.into())
+    }
+}
+
+/// Takes a file away.
+///
+/// # Errors
+/// As the file system says.
+pub fn remove_file(path: &Path) -> io::Result<()> {
+    Gate::here().pass(Call::Remove)?;
+    fs::remove_file(path)
+}
+
+/// Takes an empty folder away.
+///
+/// # Errors
+/// As the file system says.
+pub fn remove_folder(path: &Path) -> io::Result<()> {
+    Gate::here().pass(Call::Remove)?;
+    fs::remove_dir(path)
+}
+
+/// Takes a folder away with all that is in it; goes on past what cannot be removed.
+pub fn remove_tree(path: &Path) {
+    for entry in fs::read_dir(path).into_iter().flatten().flatten() {
+        // A link to a folder is a file here.
+        if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+            remove_tree(&entry.path());
+        } else {
+            let _ = remove_file(&entry.path());
+        }
+    }
+    let _ = remove_folder(path);
+}
