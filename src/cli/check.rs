@@ -7,8 +7,8 @@ use super::output::significant;
 use super::summary::count;
 use super::{Failure, load, print, provenance, start};
 use crate::contact::FrictionLaw;
-use crate::mechanism::{Mechanism, Summary};
-use crate::scene::{BallJoint, Formulation, JointKind, Scene};
+use crate::mechanism::Summary;
+use crate::scene::{BallJoint, Formulation, JointKind, Scene, Value};
 use crate::simulate::{Frame, Simulation};
 
 /// Does what `check` asks.
@@ -21,9 +21,7 @@ pub fn check(arguments: &SceneArguments) -> Result<(), Failure> {
     let mut simulation = start(&scene)?;
     let mut frame = Frame::default();
     simulation.sample(0.0, &mut frame);
-    let contents = Mechanism::new(&scene)
-        .map_err(|error| Failure::usage(error.to_string()))?
-        .summary();
+    let contents = simulation.mechanism().summary();
     print(&report(&scene, &contents, &frame)?)
 }
 
@@ -60,7 +58,7 @@ fn report(scene: &Scene, contents: &Summary, start: &Frame) -> Result<String, Fa
     for (joint, report) in scene.ball_joints.iter().zip(&start.joints) {
         line(
             &format!("  {}", joint.name),
-            &ball_joint(scene, joint, report.normal_force.norm())?,
+            &ball_joint(joint, report.normal_force.norm()),
         );
     }
     line("Degrees of freedom", &freedoms(contents));
@@ -123,30 +121,31 @@ fn tree_joints(scene: &Scene) -> String {
     parts.join(", ")
 }
 
-fn ball_joint(scene: &Scene, joint: &BallJoint, force: f64) -> Result<String, Failure> {
+fn ball_joint(joint: &BallJoint, force: f64) -> String {
     let contact = &joint.contact;
     if is_ideal(joint) {
-        return Ok(format!(
-            "ideal; reaction at the start {} N",
-            significant(force, 6)
-        ));
+        return format!("ideal; reaction at the start {} N", significant(force, 6));
     }
-    let key = |key: &str| format!("joint.{}.{key}", joint.name);
-    let friction = match provenance::choice(scene, &key("friction_law"))? {
+    // Not by the joint's key: finding it among thousands each time would take their square.
+    let word = |part: &str| match joint.value(part) {
+        Some(Value::Choice(word)) => word,
+        _ => "-",
+    };
+    let friction = match word("friction_law") {
         "none" => "no friction".to_owned(),
         law => format!(
             "friction {} ({law}, {})",
             contact.friction,
-            provenance::choice(scene, &key("friction_velocity"))?
+            word("friction_velocity")
         ),
     };
-    Ok(format!(
+    format!(
         "clearance {} mm, ball radius {} mm, {}, restitution {}, {friction}",
         significant(contact.clearance * 1e3, 6),
         significant(contact.ball_radius * 1e3, 6),
-        provenance::choice(scene, &key("normal_law"))?,
+        word("normal_law"),
         contact.restitution,
-    ))
+    )
 }
 
 fn freedoms(contents: &Summary) -> String {
@@ -268,6 +267,10 @@ pub(super) fn near_singular(scene: &Scene) -> Option<String> {
     }
     let limit = MOST_WEIGHTS * 9.81 * rigid.bodies.iter().map(|body| body.mass).sum::<f64>();
     let mut simulation = Simulation::new(&rigid).ok()?;
+    // What else moves would take a simulation of any length.
+    if !simulation.mechanism().is_kinematic() {
+        return None;
+    }
     let mut frame = Frame::default();
     let (mut largest, mut when) = (0.0, 0.0);
     for k in 0..=instants {

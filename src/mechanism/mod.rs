@@ -3,6 +3,7 @@
 //! Ball joints are always the cut joints. Cut them and every scene is a forest of trees; each ball joint is then either
 //! three constraint rows (ideal) or one contact force (clearance). A scene pays only for what it has.
 
+mod bounds;
 mod constraints;
 mod contact_stiffness;
 mod contacts;
@@ -88,6 +89,20 @@ pub enum MechanismError {
         /// Most that are taken.
         most: usize,
     },
+    /// Equations that would take more memory or time than is allowed.
+    #[error("too large for {form}: {needed} {what}; allowed at most {most}: {advice}")]
+    TooCostly {
+        /// What would take it.
+        form: &'static str,
+        /// What it would take.
+        what: &'static str,
+        /// How much of it.
+        needed: u64,
+        /// Most that is taken.
+        most: u64,
+        /// What to do instead.
+        advice: &'static str,
+    },
     /// Ideal joints whose rows depend on one another.
     #[error("the ideal ball joints over-constrain the mechanism: give one of them a clearance")]
     Redundant,
@@ -125,12 +140,13 @@ impl Mechanism {
     /// Sets up the equations of `scene`.
     ///
     /// # Errors
-    /// A trajectory that the rods cannot reach.
+    /// A trajectory that the rods cannot reach; equations that would take too much.
     pub fn new(scene: &Scene) -> Result<Self, MechanismError> {
         let model = Model::new(scene);
         if let Some(trajectory) = &model.trajectory {
             trajectory.check()?;
         }
+        bounds::check(scene, &model)?;
         let contacts = Contacts::new(scene, &model);
         let form = match scene.formulation {
             Formulation::Tree => Form::Tree {
@@ -161,7 +177,16 @@ impl Mechanism {
     pub fn start(&mut self) -> Result<Vec<f64>, MechanismError> {
         const T: f64 = 0.0;
         let model = &self.model;
-        let mut tree = Tree::new(model);
+        let all: Vec<usize> = match model.start {
+            StartRule::Ideal => (0..model.joints.len()).collect(),
+            StartRule::AsGiven => model.ideal_joints.clone(),
+        };
+        // Poses alone need no mass matrix.
+        let mut tree = if all.is_empty() {
+            Tree::without_masses(model)
+        } else {
+            Tree::new(model)
+        };
         let mut y = model.start_state.clone();
         if model.start == StartRule::Ideal
             && let Some(trajectory) = &model.trajectory
@@ -170,10 +195,6 @@ impl Mechanism {
             tree.forward(model, T, &y);
             turn_hinges(model, &tree.motion, &mut y);
         }
-        let all: Vec<usize> = match model.start {
-            StartRule::Ideal => (0..model.joints.len()).collect(),
-            StartRule::AsGiven => model.ideal_joints.clone(),
-        };
         tree.forward(model, T, &y);
         let distance = |tree: &Tree, j: usize| {
             constraints::eccentricity(&model.joints[j], &tree.motion).norm()
@@ -479,7 +500,10 @@ impl Mechanism {
     }
 
     /// Allocates what [`ContactSystem`](crate::integrate::ContactSystem) needs, so that no step does.
-    pub fn prepare_implicit_contacts(&mut self) {
+    ///
+    /// # Errors
+    /// Contacts that couple too widely for it.
+    pub fn prepare_implicit_contacts(&mut self) -> Result<(), MechanismError> {
         if self.implicit.is_none() {
             let velocities = self.dimension() - self.positions();
             let blocks = matches!(
@@ -489,12 +513,10 @@ impl Mechanism {
                     ..
                 }
             );
-            self.implicit = Some(Box::new(implicit::ImplicitContacts::new(
-                &self.model,
-                velocities,
-                blocks,
-            )));
+            let contacts = implicit::ImplicitContacts::new(&self.model, velocities, blocks)?;
+            self.implicit = Some(Box::new(contacts));
         }
+        Ok(())
     }
 
     /// What the scene contains, what will be computed and what not.

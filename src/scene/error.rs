@@ -76,6 +76,20 @@ pub(super) fn line_and_column(before: &str) -> (u32, u32) {
     )
 }
 
+/// Line and column, from 1, of the byte `at` of `text`.
+pub(super) fn place_of(text: &str, at: usize) -> (u32, u32) {
+    line_and_column(&text[..text.floor_char_boundary(at)])
+}
+
+/// The first line of what someone wrote, cut to what an error can quote.
+pub(super) fn brief(text: &str) -> String {
+    let mut short: String = text.lines().next().unwrap_or("").chars().take(60).collect();
+    if short.len() < text.len() {
+        short.push('…');
+    }
+    short
+}
+
 /// Line number `line`, from 1, of a text; `None` for one too long for a terminal, or with control characters in it.
 pub(super) fn line_text(text: &str, line: u32) -> Option<Box<str>> {
     let line = text
@@ -86,8 +100,14 @@ pub(super) fn line_text(text: &str, line: u32) -> Option<Box<str>> {
     fit.then(|| line.replace('\t', " ").into())
 }
 
+/// A text longer than this, bytes, is no slip of a name; comparing it would take its square.
+const LONGEST_SLIP: usize = 100;
+
 /// The nearest of `names` to `wrong`, in brackets; "" if none is near.
 pub(super) fn nearest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> String {
+    if wrong.len() > LONGEST_SLIP {
+        return String::new();
+    }
     let wrong_lower = wrong.to_lowercase();
     names
         .into_iter()

@@ -19,6 +19,17 @@ pub const DEFAULT_SCENE: &str = BUILT_IN[0];
 /// The largest file that is read, bytes: a scene is a few kilobytes.
 pub const LARGEST_FILE: u64 = 4 << 20;
 
+/// Most bodies of a scene, a chain's links included.
+pub const MOST_BODIES: usize = 10_000;
+/// Most ball joints of a scene, a chain's included.
+pub const MOST_BALL_JOINTS: usize = 10_000;
+/// Most shapes of a scene, those of its bodies and the fixed ones.
+pub const MOST_SHAPES: usize = 50_000;
+/// Most corners of a plate.
+pub const MOST_CORNERS: usize = 100;
+/// Most changes of a scene.
+pub const MOST_CHANGES: usize = 4096;
+
 /// Why a larger one is not.
 pub fn too_large() -> String {
     format!(

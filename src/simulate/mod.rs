@@ -48,9 +48,11 @@ impl StartError {
             MechanismError::OutsideSocket { joint, .. } => {
                 one(joint, &["clearance", "ball_radius"])
             }
-            MechanismError::TooLarge { .. } => {
+            MechanismError::TooLarge { .. } | MechanismError::TooCostly { .. } => {
                 let keys = ["solver.method", "chain.links", "formulation"];
-                (keys[0].to_owned(), keys.map(str::to_owned).to_vec())
+                let of_form = matches!(self.0, MechanismError::TooCostly { form, .. } if form.starts_with(keys[2]));
+                let title = if of_form { keys[2] } else { keys[0] };
+                (title.to_owned(), keys.map(str::to_owned).to_vec())
             }
             MechanismError::Redundant => {
                 let ideal = |joint: &&BallJoint| joint.contact.clearance == 0.0;

@@ -122,7 +122,7 @@ pub(super) fn prepare_implicit(
         return Ok(());
     }
     if method == Method::ImexEuler {
-        mechanism.prepare_implicit_contacts();
+        mechanism.prepare_implicit_contacts()?;
     }
     if method.is_implicit() && velocities > LARGEST_DENSE {
         return Err(MechanismError::TooLarge {
