@@ -7,9 +7,10 @@ use super::output::significant;
 use super::summary::count;
 use super::{Failure, load, print, provenance, start};
 use crate::contact::FrictionLaw;
+use crate::integrate::Method;
 use crate::mechanism::Summary;
 use crate::scene::{BallJoint, Formulation, JointKind, Scene, Value};
-use crate::simulate::{Frame, Simulation};
+use crate::simulate::{Frame, LARGEST_IMPLICIT, Simulation};
 
 /// Does what `check` asks.
 ///
@@ -72,7 +73,7 @@ fn report(scene: &Scene, contents: &Summary, start: &Frame) -> Result<String, Fa
             contents.constraint_rows
         ),
     );
-    line("Method", &method(scene)?);
+    line("Method", &method(scene, contents)?);
     let (computed, left_out) = work(scene, contents);
     computed.iter().for_each(|item| line("Computed", item));
     left_out.iter().for_each(|item| line("Not computed", item));
@@ -159,12 +160,22 @@ fn freedoms(contents: &Summary) -> String {
     )
 }
 
-fn method(scene: &Scene) -> Result<String, Failure> {
+fn method(scene: &Scene, contents: &Summary) -> Result<String, Failure> {
     let word = provenance::choice(scene, "solver.method")?;
     let step = significant(scene.solver.step * 1e6, 6);
+    let explicit = scene.solver.method == Method::Automatic
+        && contents.solves_differential_equation
+        && contents.velocity_coordinates > LARGEST_IMPLICIT;
     Ok(if scene.solver.method.is_adaptive() {
+        let alone = if explicit {
+            format!(
+                "; explicit steps alone: the implicit ones take at most {LARGEST_IMPLICIT} velocity coordinates"
+            )
+        } else {
+            String::new()
+        };
         format!(
-            "{word}, relative tolerance {}, first step {step} us",
+            "{word}, relative tolerance {}, first step {step} us{alone}",
             significant(scene.solver.tolerance, 3)
         )
     } else {

@@ -1,5 +1,6 @@
 //! Errors in scenes and parameters: file, line, column, key, value, range, unit.
 
+use super::words::{visible, visible_line};
 use std::fmt;
 
 /// What is wrong with a scene or a parameter value, in a form a person can act on.
@@ -40,17 +41,21 @@ impl SceneError {
 impl fmt::Display for SceneError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (&self.file, self.position) {
-            (Some(file), Some((line, column))) => write!(f, "{file}:{line}:{column}: ")?,
-            (Some(file), None) => write!(f, "{file}: ")?,
+            (Some(file), Some((line, column))) => {
+                write!(f, "{}:{line}:{column}: ", visible_line(file))?;
+            }
+            (Some(file), None) => write!(f, "{}: ", visible_line(file))?,
             (None, Some((line, column))) => write!(f, "line {line}, column {column}: ")?,
             (None, None) => {}
         }
         match (&self.key, &self.value) {
-            (Some(key), Some(value)) => write!(f, "{key} = {value}: ")?,
-            (Some(key), None) => write!(f, "{key}: ")?,
+            (Some(key), Some(value)) => {
+                write!(f, "{} = {}: ", visible_line(key), visible_line(value))?;
+            }
+            (Some(key), None) => write!(f, "{}: ", visible_line(key))?,
             _ => {}
         }
-        f.write_str(&self.message)?;
+        f.write_str(&visible(&self.message))?;
         if let (Some(text), Some((line, column))) = (&self.line_text, self.position) {
             let number = line.to_string();
             let mark = column.saturating_sub(1) as usize;
@@ -96,8 +101,9 @@ pub(super) fn line_text(text: &str, line: u32) -> Option<Box<str>> {
         .lines()
         .nth(line.saturating_sub(1) as usize)
         .unwrap_or("");
-    let fit = line.len() <= 160 && !line.chars().any(|c| c.is_control() && c != '\t');
-    fit.then(|| line.replace('\t', " ").into())
+    let line = line.replace('\t', " ");
+    let fit = line.len() <= 160 && visible_line(&line) == line;
+    fit.then(|| line.into())
 }
 
 /// A text longer than this, bytes, is no slip of a name; comparing it would take its square.

@@ -1,7 +1,7 @@
 //! Where scenes come from: the built-in ones, and files.
 
-use super::error::{line_and_column, nearest};
-use super::{Scene, SceneError};
+use super::error::{brief, line_and_column, nearest};
+use super::{Scene, SceneError, visible_line};
 use std::io::Read;
 
 /// Names of the built-in scenes.
@@ -65,7 +65,8 @@ impl Scene {
             None => {
                 let near = nearest(argument, BUILT_IN);
                 let message = format!(
-                    "no built-in scene `{argument}`{near}; built in: {}; the name of a file contains `/` or ends in `.toml`",
+                    "no built-in scene `{}`{near}; built in: {}; the name of a file contains `/` or ends in `.toml`",
+                    visible_line(&brief(argument)),
                     BUILT_IN.join(", ")
                 );
                 Err(SceneError {

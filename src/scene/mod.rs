@@ -17,6 +17,7 @@ mod table;
 #[cfg(test)]
 mod tests;
 mod units;
+mod words;
 mod write;
 
 pub use error::SceneError;
@@ -25,5 +26,6 @@ pub use model::*;
 pub use parameters::*;
 pub use table::table;
 pub use units::*;
+pub use words::{visible, visible_line};
 
 use table::find;

@@ -126,7 +126,7 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
         .and_then(|stem| stem.to_str());
     let name = match top.get("name") {
         Some(node) => node.name()?.to_owned(),
-        None => stem.unwrap_or("scene").to_owned(),
+        None => visible_line(stem.unwrap_or("scene")).into_owned(),
     };
     let start = match top
         .get("start")
@@ -182,8 +182,8 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
         };
     }
     Ok(Scene {
-        title: text("title")?.unwrap_or(&name).to_owned(),
-        description: text("description")?.unwrap_or("").trim().to_owned(),
+        title: visible_line(text("title")?.unwrap_or(&name)).into_owned(),
+        description: visible(text("description")?.unwrap_or("").trim()).into_owned(),
         name,
         gravity: Vec3::zeros(),
         contact: crate::contact::Parameters::default(),

@@ -19,7 +19,7 @@ pub use history::History;
 pub use impacts::Impact;
 pub use ledger::Ledger;
 pub use pace::{LARGEST_BUDGET, LONGEST_FRAME, Pacer, SCALE_RANGE};
-pub use simulation::{CLEARANCE_SPEED, Simulation};
+pub use simulation::{CLEARANCE_SPEED, LARGEST_DENSE, LARGEST_IMPLICIT, Simulation};
 
 use crate::mechanism::MechanismError;
 use crate::scene::{BallJoint, Scene, SceneError};

@@ -21,6 +21,7 @@ use crate::integrate::{Controller, System, hermite};
 use crate::mechanism::{Mechanism, MechanismError, Memory, Ramp, Switching};
 use crate::scene::Scene;
 use automatic::{Choice, controller_of, prepare_implicit};
+pub use automatic::{LARGEST_DENSE, LARGEST_IMPLICIT};
 
 /// Speed at which the clearance closes when a jump would put a ball inside its socket wall, m/s: an impact at this speed
 /// is of the order of the settled forces.
