@@ -1,9 +1,20 @@
 //! Desktop entry.
 
 #[cfg(not(target_arch = "wasm32"))]
+use jointplay::scene::{visible, visible_line};
+
+#[cfg(not(target_arch = "wasm32"))]
 fn main() -> std::process::ExitCode {
     if std::env::var_os("RUST_LOG").is_some() {
-        env_logger::init();
+        // What is logged may hold words of a scene.
+        env_logger::Builder::from_default_env()
+            .format(|out, record| {
+                use std::io::Write;
+                let words = record.args().to_string();
+                let (level, from) = (record.level(), record.target());
+                writeln!(out, "[{level} {from}] {}", visible(&words))
+            })
+            .init();
     }
     explain_panics();
     // Unwinding first lets scratch files be removed.
@@ -36,7 +47,7 @@ fn explain_panics() {
             "error: jointplay {} failed inside: {}{place}. This is a mistake in the program; please report this line \
              and the command that led to it.",
             jointplay::VERSION,
-            what.replace('\n', " "),
+            visible_line(what),
         );
     }));
 }

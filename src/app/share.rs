@@ -11,16 +11,17 @@ use eframe::egui::ThemePreference;
 
 use super::log::Log;
 use super::plots::Window;
-use crate::scene::{DEFAULT_SCENE, Dimension, Scene, SceneError, built_in_text, parse_quantity};
+use crate::scene::{
+    DEFAULT_SCENE, Dimension, LARGEST_FILE, Scene, SceneError, built_in_text, parse_quantity,
+    visible, visible_line,
+};
 use crate::simulate::{Quantity, SCALE_RANGE};
 use crate::view::Picked;
 
-/// Longest link that is given out, characters: what mail, chats and every browser still pass on.
+/// Longest link that is given out and read, characters: what mail, chats and every browser still pass on.
 pub const LONGEST_LINK: usize = 32_000;
-/// Longest link that is read, characters.
-const LONGEST_READ: usize = 1 << 20;
-/// Most bytes that a packed part of a link may unpack to.
-const LARGEST_UNPACKED: usize = 4 << 20;
+/// Most bytes that a packed part of a link may unpack to: what a scene file may have.
+const LARGEST_UNPACKED: usize = LARGEST_FILE as usize;
 
 /// Short names of parameters.
 pub const ALIASES: [(&str, &str); 4] = [
@@ -62,7 +63,7 @@ const THEMES: [(&str, ThemePreference); 3] = [
 
 /// A link that cannot be read: what is wrong and what is allowed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{}{message}", place(.key, .value))]
+#[error("{}{}", place(.key, .value), visible(.message))]
 pub struct LinkError {
     /// Word or key at fault; empty where it is the whole link.
     pub key: String,
@@ -75,8 +76,8 @@ pub struct LinkError {
 fn place(key: &str, value: &str) -> String {
     match (key, value) {
         ("", _) => "link: ".to_owned(),
-        (key, "") => format!("link: {key}: "),
-        (key, value) => format!("link: {key} = {value}: "),
+        (key, "") => format!("link: {}: ", visible_line(key)),
+        (key, value) => format!("link: {} = {}: ", visible_line(key), visible_line(value)),
     }
 }
 
@@ -170,12 +171,10 @@ impl Link {
     /// allows the values shows only in [`Self::load`].
     pub fn parse(text: &str) -> Result<Self, LinkError> {
         let text = text.trim();
-        if text.len() > LONGEST_READ {
-            return Err(fault(
-                "",
-                "",
-                format!("longer than {LONGEST_READ} characters"),
-            ));
+        let length = text.chars().count();
+        if length > LONGEST_LINK {
+            let message = format!("has {length} characters; allowed at most {LONGEST_LINK}");
+            return Err(fault("", "", message));
         }
         let (before, fragment) = text.split_once('#').unwrap_or((text, ""));
         let query = match before.split_once('?') {
@@ -431,8 +430,7 @@ impl SceneText {
 
 fn fault(key: &str, value: &str, message: impl Into<String>) -> LinkError {
     let short = |text: &str| -> String {
-        let clean = text.chars().map(|c| if c.is_control() { ' ' } else { c });
-        let mut short: String = clean.take(60).collect();
+        let mut short: String = text.chars().take(60).collect();
         if short.len() < text.len() {
             short.push('…');
         }

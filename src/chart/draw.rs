@@ -9,6 +9,7 @@ use super::labels::{Area, arrange};
 use super::ticks::Ruler;
 use super::{Chart, Colour, Marker, Series};
 use super::{heat, thin};
+use crate::scene::visible;
 
 /// Some charts on one page with one legend.
 #[derive(Clone, Debug, PartialEq)]
@@ -121,7 +122,8 @@ impl Sheet {
             format!("width=\"{width}\" height=\"{height}\""),
             format!("width=\"{}\" height=\"{}\"", self.size.0, self.size.1),
         );
-        Ok(text.replacen(&found, &wanted, 1))
+        // XML has no control characters, not even escaped ones.
+        Ok(visible(&text).replacen(&found, &wanted, 1))
     }
 
     fn draw(&self, root: &Canvas) -> Result<(), SheetError> {

@@ -8,9 +8,10 @@ use super::output::significant;
 use super::summary::count;
 use super::{Failure, load, print, provenance, start};
 use crate::contact::FrictionLaw;
+use crate::integrate::Method;
 use crate::mechanism::Summary;
-use crate::scene::{BallJoint, Formulation, JointKind, Scene};
-use crate::simulate::{Frame, Simulation};
+use crate::scene::{BallJoint, Formulation, JointKind, Scene, Value};
+use crate::simulate::{Frame, LARGEST_IMPLICIT, Simulation};
 
 /// Does what `check` asks.
 ///
@@ -66,11 +67,10 @@ fn report(
         line(
             &format!("  {}", joint.name),
             &ball_joint(
-                scene,
                 joint,
                 report.normal_force.norm(),
                 !begun.reactions.contains(&joint.name),
-            )?,
+            ),
         );
     }
     begun
@@ -92,7 +92,7 @@ fn report(
             contents.constraint_rows
         ),
     );
-    line("Method", &method(scene)?);
+    line("Method", &method(scene, contents)?);
     let (computed, left_out) = work(scene, contents);
     computed.iter().for_each(|item| line("Computed", item));
     left_out.iter().for_each(|item| line("Not computed", item));
@@ -142,36 +142,35 @@ fn tree_joints(scene: &Scene) -> String {
     parts.join(", ")
 }
 
-fn ball_joint(
-    scene: &Scene,
-    joint: &BallJoint,
-    force: f64,
-    unique: bool,
-) -> Result<String, Failure> {
+fn ball_joint(joint: &BallJoint, force: f64, unique: bool) -> String {
     let contact = &joint.contact;
     if is_ideal(joint) {
-        return Ok(format!(
+        return format!(
             "ideal; reaction at the start {} N{}",
             significant(force, 6),
             if unique { "" } else { " (not unique)" }
-        ));
+        );
     }
-    let key = |key: &str| format!("joint.{}.{key}", joint.name);
-    let friction = match provenance::choice(scene, &key("friction_law"))? {
+    // Not by the joint's key: finding it among thousands each time would take their square.
+    let word = |part: &str| match joint.value(part) {
+        Some(Value::Choice(word)) => word,
+        _ => "-",
+    };
+    let friction = match word("friction_law") {
         "none" => "no friction".to_owned(),
         law => format!(
             "friction {} ({law}, {})",
             contact.friction,
-            provenance::choice(scene, &key("friction_velocity"))?
+            word("friction_velocity")
         ),
     };
-    Ok(format!(
+    format!(
         "clearance {} mm, ball radius {} mm, {}, restitution {}, {friction}",
         significant(contact.clearance * 1e3, 6),
         significant(contact.ball_radius * 1e3, 6),
-        provenance::choice(scene, &key("normal_law"))?,
+        word("normal_law"),
         contact.restitution,
-    ))
+    )
 }
 
 fn freedoms(contents: &Summary) -> String {
@@ -204,12 +203,22 @@ fn rows(contents: &Summary) -> String {
     }
 }
 
-fn method(scene: &Scene) -> Result<String, Failure> {
+fn method(scene: &Scene, contents: &Summary) -> Result<String, Failure> {
     let word = provenance::choice(scene, "solver.method")?;
     let step = significant(scene.solver.step * 1e6, 6);
+    let explicit = scene.solver.method == Method::Automatic
+        && contents.solves_differential_equation
+        && contents.velocity_coordinates > LARGEST_IMPLICIT;
     Ok(if scene.solver.method.is_adaptive() {
+        let alone = if explicit {
+            format!(
+                "; explicit steps alone: the implicit ones take at most {LARGEST_IMPLICIT} velocity coordinates"
+            )
+        } else {
+            String::new()
+        };
         format!(
-            "{word}, relative tolerance {}, first step {step} us",
+            "{word}, relative tolerance {}, first step {step} us{alone}",
             significant(scene.solver.tolerance, 3)
         )
     } else {
@@ -316,6 +325,10 @@ pub(super) fn near_singular(scene: &Scene) -> Option<String> {
     }
     let limit = MOST_WEIGHTS * 9.81 * rigid.bodies.iter().map(|body| body.mass).sum::<f64>();
     let mut simulation = Simulation::new(&rigid).ok()?;
+    // What else moves would take a simulation of any length.
+    if !simulation.mechanism().is_kinematic() {
+        return None;
+    }
     let mut frame = Frame::default();
     let (mut largest, mut when) = (0.0, 0.0);
     for k in 0..=instants {

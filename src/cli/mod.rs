@@ -30,13 +30,21 @@ use clap::Parser;
 use self::args::{Arguments, Command, SceneArguments};
 pub use self::failure::Failure;
 pub use crate::scene::DEFAULT_SCENE;
-use crate::scene::{BUILT_IN, Scene, reference_page};
+use crate::scene::{BUILT_IN, Scene, reference_page, visible};
 use crate::simulate::Simulation;
 
 /// Does what the command line says; returns the exit code.
 pub fn main() -> u8 {
-    // Prints help, version and usage errors itself; usage errors leave with code 2.
-    let arguments = Arguments::parse();
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) if error.use_stderr() => {
+            // What was typed stands in it.
+            complain(error.render().to_string().trim_end());
+            return Failure::USAGE;
+        }
+        // Help or version.
+        Err(error) => error.exit(),
+    };
     match dispatch(arguments) {
         Ok(()) => 0,
         Err(failure) => {
@@ -130,7 +138,7 @@ fn start(scene: &Scene) -> Result<Simulation, Failure> {
     Simulation::new(scene).map_err(|error| error.located(scene).into())
 }
 
-/// Results go to standard output; a reader that has seen enough (`| head`) is no error.
+/// Results go to standard output, with what others wrote in them made visible; a reader that has seen enough (`| head`) is no error.
 fn print(text: &str) -> Result<(), Failure> {
     // What a test prints is caught.
     #[cfg(test)]
@@ -145,7 +153,10 @@ fn print(text: &str) -> Result<(), Failure> {
 #[cfg(not(test))]
 fn print_out(text: &str) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+    match out
+        .write_all(visible(text).as_bytes())
+        .and_then(|()| out.flush())
+    {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(Failure::io(format!(
             "cannot write to standard output: {error}"
         ))),
@@ -159,5 +170,5 @@ fn warn(text: &str) {
 
 /// Standard error may be closed: then there is nobody to tell.
 fn complain(text: &str) {
-    let _ = writeln!(io::stderr(), "{text}");
+    let _ = writeln!(io::stderr(), "{}", visible(text));
 }

@@ -68,17 +68,16 @@ impl Constraints {
             .collect();
         let mut pairs = Vec::new();
         let mut first: Vec<usize> = (0..joints.len()).collect();
-        for i in 0..joints.len() {
-            for j in 0..=i {
-                for (si, a) in sides[i].iter().enumerate() {
-                    for (sj, b) in sides[j].iter().enumerate() {
-                        if a.block == b.block {
-                            pairs.push((i, j, si, sj));
-                            first[i] = first[i].min(j);
-                        }
-                    }
-                }
+        // Joints, with their sides, that act on each block so far.
+        let mut on_block = vec![Vec::new(); model.blocks.len()];
+        for (i, sides) in sides.iter().enumerate() {
+            let from = pairs.len();
+            for (si, side) in sides.iter().enumerate() {
+                on_block[side.block].push((i, si));
+                pairs.extend(on_block[side.block].iter().map(|&(j, sj)| (i, j, si, sj)));
             }
+            pairs[from..].sort_unstable();
+            first[i] = pairs.get(from).map_or(i, |&(_, j, ..)| j);
         }
         let rows = first.iter().flat_map(|&f| [3 * f; 3]).collect();
         Self {

@@ -6,6 +6,8 @@
 //! instead of a row for every coordinate. Newton's method needs the mass matrix once. The arms of the contact points are
 //! those of a normal that is found anew where it turns much.
 
+use super::MechanismError;
+use super::bounds::Cost;
 use super::contact_stiffness::{Column, collect_columns};
 use super::contacts::{Contacts, Switching};
 use super::kinematics::Kinematics;
@@ -129,7 +131,10 @@ pub struct ImplicitContacts {
 
 impl ImplicitContacts {
     /// For `n` velocity coordinates. With `blocks`, a force accelerates only the trees that it acts on; else all.
-    pub fn new(model: &Model, n: usize, blocks: bool) -> Self {
+    ///
+    /// # Errors
+    /// Contacts that couple too widely.
+    pub fn new(model: &Model, n: usize, blocks: bool) -> Result<Self, MechanismError> {
         let joints = model.joints.len();
         let block_of = |body: usize| {
             (body < model.bodies.len() && !model.bodies[body].driven_only)
@@ -150,20 +155,23 @@ impl ImplicitContacts {
             }
             (range.0.min(range.1), range.1)
         };
-        let couples = |i: usize, j: usize| {
-            !blocks
-                || of_joint(i)
-                    .into_iter()
-                    .flatten()
-                    .any(|b| of_joint(j).contains(&Some(b)))
-        };
-        let reach = (0..joints)
-            .filter_map(|i| (i..joints).rev().find(|&j| couples(i, j)).map(|j| j - i))
-            .max()
-            .unwrap_or(0);
+        // Joints feel each other through a tree that both act on.
+        let mut first_on = vec![usize::MAX; model.blocks.len()];
+        let mut reach = if blocks { 0 } else { joints.saturating_sub(1) };
+        for j in 0..joints {
+            for block in of_joint(j).into_iter().flatten() {
+                first_on[block] = first_on[block].min(j);
+                reach = reach.max(j - first_on[block]);
+            }
+        }
         let ranges: Vec<_> = (0..joints).map(range).collect();
         let width = |&(first, end): &(usize, usize)| end - first;
-        Self {
+        let cost = Cost::of_implicit_contacts(joints, reach, ranges.iter().map(width).sum());
+        cost.check(
+            "solver.method imex-euler",
+            "choose solver.method = automatic",
+        )?;
+        Ok(Self {
             n,
             reach,
             touches: Vec::with_capacity(joints),
@@ -178,7 +186,7 @@ impl ImplicitContacts {
             mobility: vec![[Mat3::zeros(); 2]; joints * (2 * reach + 1)],
             scratch: vec![0.0; n],
             ranges,
-        }
+        })
     }
 
     /// Takes the joints that touch, from the gaps just measured where the step ends without contact forces; whether

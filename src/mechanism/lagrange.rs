@@ -45,11 +45,19 @@ impl Rows {
     }
 }
 
-struct Group {
+/// Rows of one joint, of a child against a parent.
+pub struct Group {
     rows: Rows,
-    child: BodyIndex,
-    parent: BodyIndex,
-    first: usize,
+    pub child: BodyIndex,
+    pub parent: BodyIndex,
+    pub first: usize,
+}
+
+impl Group {
+    /// Its rows among all.
+    pub fn rows(&self) -> std::ops::Range<usize> {
+        self.first..self.first + self.rows.count()
+    }
 }
 
 /// J of one row for its two bodies: (velocity, angular velocity) of the child, then of the parent.
@@ -88,7 +96,17 @@ pub struct Lagrange {
     pub least_pivot: f64,
 }
 
-impl Lagrange {
+/// The constraint rows of a scene.
+pub struct Layout {
+    pub groups: Vec<Group>,
+    /// Number of rows.
+    rows: usize,
+    /// First row of each driven coordinate and of each ideal ball joint.
+    driver_row: Vec<usize>,
+    ideal_row: Vec<usize>,
+}
+
+impl Layout {
     /// For `scene` compiled as `model`.
     pub fn new(scene: &Scene, model: &Model) -> Self {
         let mut groups: Vec<Group> = Vec::new();
@@ -185,26 +203,33 @@ impl Lagrange {
                 add(point, joint.ball.body, joint.socket.body)
             })
             .collect();
+        Self {
+            groups,
+            rows,
+            driver_row,
+            ideal_row,
+        }
+    }
+}
+
+impl Lagrange {
+    /// For `scene` compiled as `model`.
+    pub fn new(scene: &Scene, model: &Model) -> Self {
+        let Layout {
+            groups,
+            rows,
+            driver_row,
+            ideal_row,
+        } = Layout::new(scene, model);
         let group_of: Vec<usize> = groups
             .iter()
             .enumerate()
             .flat_map(|(g, group)| std::iter::repeat_n(g, group.rows.count()))
             .collect();
-        let world = model.world();
-        let shares = |a: &Group, b: &Group| {
-            [a.child, a.parent]
-                .iter()
-                .any(|&x| x != world && (x == b.child || x == b.parent))
-        };
-        let mut pairs = Vec::new();
+        let pairs = pairs_of(&groups, model.world());
         let mut first: Vec<usize> = (0..rows).collect();
-        for i in 0..rows {
-            for j in 0..=i {
-                if shares(&groups[group_of[i]], &groups[group_of[j]]) {
-                    pairs.push((i, j));
-                    first[i] = first[i].min(j);
-                }
-            }
+        for &(i, j) in &pairs {
+            first[i] = first[i].min(j);
         }
         let n = model.bodies.len();
         let empty = Row {
@@ -534,6 +559,30 @@ impl Lagrange {
             }
         }
     }
+}
+
+/// Each row with those at or before it that share a body with it, in order.
+fn pairs_of(groups: &[Group], world: BodyIndex) -> Vec<(usize, usize)> {
+    let mut pairs = Vec::new();
+    // Groups that act on each body so far.
+    let mut on_body = vec![Vec::new(); world];
+    let mut sharing = Vec::new();
+    for (g, group) in groups.iter().enumerate() {
+        sharing.clear();
+        for body in [group.child, group.parent] {
+            if body != world {
+                on_body[body].push(g);
+                sharing.extend_from_slice(&on_body[body]);
+            }
+        }
+        sharing.sort_unstable();
+        sharing.dedup();
+        for i in group.rows() {
+            let before = sharing.iter().flat_map(|&other| groups[other].rows());
+            pairs.extend(before.take_while(|&j| j <= i).map(|j| (i, j)));
+        }
+    }
+    pairs
 }
 
 /// What the constraint acceleration must change by: -(Phi'' + 2 alpha Phi' + beta^2 Phi).

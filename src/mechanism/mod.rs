@@ -3,6 +3,7 @@
 //! Ball joints are always the cut joints. Cut them and every scene is a forest of trees; each ball joint is then either
 //! three constraint rows (ideal) or one contact force (clearance). A scene pays only for what it has.
 
+mod bounds;
 mod constraints;
 mod contact_stiffness;
 mod contacts;
@@ -117,6 +118,20 @@ pub enum MechanismError {
         /// Most that are taken.
         most: usize,
     },
+    /// Equations that would take more memory or time than is allowed.
+    #[error("too large for {form}: {needed} {what}; allowed at most {most}: {advice}")]
+    TooCostly {
+        /// What would take it.
+        form: &'static str,
+        /// What it would take.
+        what: &'static str,
+        /// How much of it.
+        needed: u64,
+        /// Most that is taken.
+        most: u64,
+        /// What to do instead.
+        advice: &'static str,
+    },
     /// A start pose in which constraints lose their independence that have it in every pose around.
     #[error(
         "the mechanism starts in a singular pose: at {joints} directions that the ideal joints hold elsewhere coincide here, \
@@ -197,12 +212,13 @@ impl Mechanism {
     /// Sets up the equations of `scene`.
     ///
     /// # Errors
-    /// A trajectory that the rods cannot reach.
+    /// A trajectory that the rods cannot reach; equations that would take too much.
     pub fn new(scene: &Scene) -> Result<Self, MechanismError> {
         let model = Model::new(scene);
         if let Some(trajectory) = &model.trajectory {
             trajectory.check()?;
         }
+        bounds::check(scene, &model)?;
         let contacts = Contacts::new(scene, &model);
         let form = match scene.formulation {
             Formulation::Tree => Form::Tree {
@@ -495,7 +511,10 @@ impl Mechanism {
     }
 
     /// Allocates what [`ContactSystem`](crate::integrate::ContactSystem) needs, so that no step does.
-    pub fn prepare_implicit_contacts(&mut self) {
+    ///
+    /// # Errors
+    /// Contacts that couple too widely for it.
+    pub fn prepare_implicit_contacts(&mut self) -> Result<(), MechanismError> {
         if self.implicit.is_none() {
             let velocities = self.dimension() - self.positions();
             let blocks = matches!(
@@ -505,12 +524,10 @@ impl Mechanism {
                     ..
                 }
             );
-            self.implicit = Some(Box::new(implicit::ImplicitContacts::new(
-                &self.model,
-                velocities,
-                blocks,
-            )));
+            let contacts = implicit::ImplicitContacts::new(&self.model, velocities, blocks)?;
+            self.implicit = Some(Box::new(contacts));
         }
+        Ok(())
     }
 
     /// What the scene contains, what will be computed and what not.

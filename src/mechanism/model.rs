@@ -262,26 +262,29 @@ impl Model {
         let mut start_v: Vec<f64> = Vec::new();
         let mut scale_q: Vec<f64> = Vec::new();
         let mut scale_v: Vec<f64> = Vec::new();
-        let roots = (0..self.bodies.len()).filter(|&b| root[b] == b);
-        for tree in roots.collect::<Vec<_>>() {
+        let mut trees: Vec<Vec<BodyIndex>> = Vec::new();
+        for (b, &root) in root.iter().enumerate() {
+            if root == b {
+                self.block_of[b] = trees.len();
+                trees.push(vec![b]);
+            } else if root != usize::MAX {
+                self.block_of[b] = self.block_of[root];
+                trees[self.block_of[b]].push(b);
+            }
+        }
+        // Last coordinate, within its tree, on the path to each body.
+        let mut last = vec![NONE; self.bodies.len()];
+        for bodies in trees {
+            let (tree, count) = (bodies[0], bodies.len());
             let first = start_v.len();
             let mut parent_coordinate = Vec::new();
-            // Last coordinate on the path to each body.
-            let mut last = vec![NONE; self.bodies.len()];
-            let mut count = 0;
-            for b in tree..self.bodies.len() {
-                if root[b] != tree {
-                    continue;
-                }
-                self.block_of[b] = self.blocks.len();
-                let parent = self.bodies[b].parent;
-                let above = if b == tree || parent >= last.len() {
+            for b in bodies {
+                let above = if b == tree {
                     NONE
                 } else {
-                    last[parent]
+                    last[self.bodies[b].parent]
                 };
                 last[b] = above;
-                count += 1;
                 let (q, v) = (start_q.len(), start_v.len());
                 let mut one = |length: f64, speed: f64, start: JointStart| {
                     let (position, velocity) = match start {

@@ -58,20 +58,25 @@ impl Mechanism {
     pub fn start(&mut self) -> Result<Vec<f64>, MechanismError> {
         const T: f64 = 0.0;
         let model = &self.model;
-        let mut tree = Tree::new(model);
-        let mut y = model.start_state.clone();
         let assembled = model.start == StartRule::Ideal;
+        let all: Vec<usize> = if assembled {
+            (0..model.joints.len()).collect()
+        } else {
+            model.ideal_joints.clone()
+        };
+        // Poses alone need no mass matrix.
+        let mut tree = if all.is_empty() {
+            Tree::without_masses(model)
+        } else {
+            Tree::new(model)
+        };
+        let mut y = model.start_state.clone();
         let closed_form = model.trajectory.as_ref().filter(|_| assembled);
         if let Some(trajectory) = closed_form {
             place_output_body(model, trajectory, &mut y);
             tree.forward(model, T, &y);
             turn_hinges(model, &tree.motion, &mut y);
         }
-        let all: Vec<usize> = if assembled {
-            (0..model.joints.len()).collect()
-        } else {
-            model.ideal_joints.clone()
-        };
         tree.forward(model, T, &y);
         let guess = tree.motion.clone();
         let distance = |j: usize| eccentricity(&model.joints[j], &guess).norm();

@@ -178,7 +178,8 @@ impl ContactSystem for Mechanism {
         // Ideal joints close first: contacts feel less than these may be open by.
         self.project(t, y);
         self.measure(t, y);
-        self.prepare_implicit_contacts();
+        // Refused, if at all, where the method was chosen.
+        let _ = self.prepare_implicit_contacts();
         let Some(mut implicit) = self.implicit.take() else {
             return false;
         };

@@ -67,25 +67,31 @@ pub struct Tree {
 impl Tree {
     /// For `model`.
     pub fn new(model: &Model) -> Self {
-        let n = model.bodies.len();
-        let mut mass_offset = Vec::new();
+        let mut tree = Self::without_masses(model);
         let mut total = 0;
         for block in &model.blocks {
-            mass_offset.push(total);
+            tree.mass_offset.push(total);
             total += if block.lone.is_some() {
                 0
             } else {
                 block.n * block.n
             };
         }
+        tree.mass = vec![0.0; total];
+        tree
+    }
+
+    /// For `model`, of which nothing is asked but how it moves: [`Self::forward`].
+    pub fn without_masses(model: &Model) -> Self {
+        let n = model.bodies.len();
         Self {
             motion: vec![Kinematics::rest(); n + 1],
             wrench: vec![Wrench::zero(); n + 1],
             driven: Driven::new(model),
             composite: vec![Composite::EMPTY; n],
             dynamic: (0..n).filter(|&b| !model.bodies[b].driven_only).collect(),
-            mass: vec![0.0; total],
-            mass_offset,
+            mass: Vec::new(),
+            mass_offset: Vec::new(),
             inverse_diagonal: vec![0.0; model.nv],
         }
     }

@@ -1,6 +1,6 @@
 //! Parameters of a scene by key: reading and changing.
 
-use super::error::{nearest, nearest_parameter};
+use super::error::{brief, nearest, nearest_parameter};
 use super::read::{SPCMM_DIMENSIONS, VIEW_SETTINGS};
 use super::table::{self, contact_part, find};
 use super::*;
@@ -126,6 +126,14 @@ pub(super) fn set_contact_value(contact: &mut contact::Parameters, part: &str, v
     }
 }
 
+impl BallJoint {
+    /// A contact parameter of this joint by the last part of its key; `None` where there is no such part.
+    pub fn value(&self, part: &str) -> Option<Value> {
+        let known = table().iter().filter_map(contact_part).any(|p| p == part);
+        known.then(|| contact_value(&self.contact, part))
+    }
+}
+
 /// A key resolved against a scene: its row, and the joint it is for.
 struct Resolved {
     parameter: &'static Parameter,
@@ -219,7 +227,7 @@ impl Scene {
                 )
             } else {
                 let near = nearest(name, names.iter().copied());
-                format!("no ball joint `{name}`{near}; ball joints: {listed}")
+                format!("no ball joint `{}`{near}; ball joints: {listed}", brief(name))
             };
             return Err(SceneError::about(key, None, message));
         };
@@ -380,6 +388,11 @@ impl Scene {
             (None, _) => self.write(parameter.key, &value),
         }
         self.changes.retain(|(changed, _)| changed != key);
+        if self.changes.len() >= MOST_CHANGES {
+            let message =
+                format!("too many parameters are changed; allowed at most {MOST_CHANGES}");
+            return Err(SceneError::about(key, Some(text), message));
+        }
         self.changes.push((key.to_owned(), text.to_owned()));
         if parameter.key.starts_with("solver.") {
             self.resolve_preset();

@@ -41,6 +41,22 @@ pub(super) fn expand<'d>(
         .get("opening")
         .map_or(Ok(scene.view.down.unit()), |node| node.direction())?;
     let links = scene.chain.map_or(0, |chain| chain.links);
+    for (so_far, most, what) in [
+        (scene.bodies.len(), MOST_BODIES, "bodies"),
+        (scene.ball_joints.len(), MOST_BALL_JOINTS, "ball joints"),
+    ] {
+        if so_far + links > most {
+            let message = format!(
+                "too many {what} with those of the file: {so_far} and {links}; allowed at most {most}"
+            );
+            return Err(section.error("links", message));
+        }
+    }
+    let shapes = links * template.shapes.len();
+    if shapes > MOST_SHAPES {
+        let message = format!("too many shapes: {shapes}; allowed at most {MOST_SHAPES}");
+        return Err(section.error("links", message));
+    }
 
     let used = |name: &str, prefix: &str| {
         let number = name
@@ -132,7 +148,9 @@ fn read_own<'d>(
         let own = node.section_as(node.title("chain.joint"), &known)?;
         let name = own.require("name", "\"J1\"")?.name()?;
         let joints = &mut scene.ball_joints[first..];
-        let Some(joint) = joints.iter_mut().find(|joint| joint.name == name) else {
+        let number = name.strip_prefix('J').and_then(|n| n.parse::<usize>().ok());
+        let found = number.and_then(|n| joints.get_mut(n.checked_sub(1)?));
+        let Some(joint) = found.filter(|joint| joint.name == name) else {
             let message = format!(
                 "the chain has no ball joint `{name}`; it has {links} links: J1 to J{links}"
             );

@@ -1,10 +1,11 @@
 //! What must hold between the parameters of a scene, and what is allowed but doubtful.
 
 use super::access::contact_value;
-use super::error::line_text;
+use super::error::{line_text, place_of};
 use super::*;
 use crate::contact::{self, FrictionLaw, NormalLaw};
 use crate::integrate::Method;
+use std::collections::BTreeMap;
 
 /// Fewer fixed steps than this do not resolve an impact; twice as many do.
 const LEAST_STEPS: f64 = 5.0;
@@ -131,14 +132,9 @@ impl Scene {
         // Inverse masses felt at the ball's centre and in sliding: a force there also turns the body.
         let (mut normal, mut sliding) = (0.0, 0.0);
         for attachment in [&joint.ball, &joint.socket] {
-            let Some(body) = attachment.body.map(|b| &self.bodies[b]) else {
-                continue;
-            };
-            let driven = self.joints.iter().any(|j| {
-                Some(j.child) == attachment.body
-                    && (j.drive.is_some() || j.kind == JointKind::Fixed)
-            });
-            if driven {
+            let Some(b) = attachment.body else { continue };
+            let (body, hung) = (&self.bodies[b], &self.joints[b]);
+            if hung.drive.is_some() || hung.kind == JointKind::Fixed {
                 continue;
             }
             let arm = (attachment.point - body.centre).norm_squared();
@@ -176,7 +172,8 @@ impl Scene {
                 .any(|key| changed == key || (key.ends_with('.') && changed.starts_with(key)))
         };
         let change = self.changes.iter().rfind(|(changed, _)| concerns(changed));
-        let place = self.source.places.get(title).copied();
+        let at = self.source.places.get(title);
+        let place = at.map(|&at| place_of(&self.source.text, at));
         let mut error = match change {
             Some((key, value)) => SceneError::about(key, Some(value), message),
             None => SceneError::about(title, None, message),
@@ -193,14 +190,13 @@ impl Scene {
     /// Ball joints with equal contact parameters, named together.
     fn contact_groups(&self) -> Vec<(String, contact::Parameters)> {
         let mut groups: Vec<(Vec<&str>, contact::Parameters)> = Vec::new();
+        let mut group_of = BTreeMap::new();
         for joint in &self.ball_joints {
-            match groups
-                .iter_mut()
-                .find(|(_, contact)| *contact == joint.contact)
-            {
-                Some((names, _)) => names.push(&joint.name),
-                None => groups.push((vec![&joint.name], joint.contact)),
+            let group = *group_of.entry(bits(&joint.contact)).or_insert(groups.len());
+            if group == groups.len() {
+                groups.push((Vec::new(), joint.contact));
             }
+            groups[group].0.push(&joint.name);
         }
         let title = |names: &[&str]| match names {
             [first, .., last] if names.len() > 6 => format!("{first} to {last}"),
@@ -211,6 +207,43 @@ impl Scene {
             .map(|(names, contact)| (title(&names), contact))
             .collect()
     }
+}
+
+/// What can be compared and sorted of contact parameters: equal where they are.
+fn bits(contact: &contact::Parameters) -> ([u64; 9], [u8; 3]) {
+    let contact::Parameters {
+        clearance,
+        friction,
+        restitution,
+        youngs_modulus,
+        poisson_ratio,
+        ball_radius,
+        friction_velocity,
+        slip_speed_low,
+        slip_speed_high,
+        impact_speed_floor,
+        normal_law,
+        friction_law,
+    } = *contact;
+    let numbers = [
+        clearance,
+        friction,
+        restitution,
+        youngs_modulus,
+        poisson_ratio,
+        ball_radius,
+        slip_speed_low,
+        slip_speed_high,
+        impact_speed_floor,
+    ];
+    // -0 is 0.
+    let numbers = numbers.map(|number| (number + 0.0).to_bits());
+    let words = [
+        friction_velocity as u8,
+        normal_law as u8,
+        friction_law as u8,
+    ];
+    (numbers, words)
 }
 
 /// Two parameters that do not go together.

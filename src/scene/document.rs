@@ -1,6 +1,6 @@
 //! TOML with places: every value knows its key and its line and column, so that every error can name them.
 
-use super::error::{line_and_column, line_text, nearest};
+use super::error::{brief, line_text, nearest, place_of};
 use super::units::{QuantityError, parse_quantity};
 use super::{Dimension, SceneError, Vec3, find};
 use std::ops::Range;
@@ -43,7 +43,7 @@ impl<'d> Document<'d> {
         value: Option<&str>,
         message: impl Into<String>,
     ) -> SceneError {
-        let (line, column) = self.place(&span);
+        let (line, column) = place_of(self.text, span.start);
         let mut error = SceneError::about(key, value, message);
         if key.is_empty() {
             error.key = None;
@@ -54,19 +54,9 @@ impl<'d> Document<'d> {
         error
     }
 
-    /// Line and column of a place in the text.
-    fn place(&self, span: &Range<usize>) -> (u32, u32) {
-        line_and_column(&self.text[..self.text.floor_char_boundary(span.start)])
-    }
-
     /// The text of a value, cut to what fits in a line.
     pub fn excerpt(&self, span: Range<usize>) -> String {
-        let text = self.text.get(span).unwrap_or("");
-        let mut short: String = text.lines().next().unwrap_or("").chars().take(60).collect();
-        if short.len() < text.len() {
-            short.push('…');
-        }
-        short
+        brief(self.text.get(span).unwrap_or(""))
     }
 }
 
@@ -128,9 +118,9 @@ impl<'d> Section<'d> {
         })
     }
 
-    /// Line and column of this table.
-    pub fn place(&self) -> (u32, u32) {
-        self.document.place(&self.span)
+    /// Where this table begins in the text, bytes.
+    pub fn place(&self) -> usize {
+        self.span.start
     }
 
     /// An error about this table as a whole, or about a key that it lacks.
@@ -152,9 +142,9 @@ impl<'d> Section<'d> {
 }
 
 impl<'d> Node<'d> {
-    /// Line and column of this value.
-    pub fn place(&self) -> (u32, u32) {
-        self.document.place(&self.value.span())
+    /// Where this value begins in the text, bytes.
+    pub fn place(&self) -> usize {
+        self.value.span().start
     }
 
     /// An error about this value.
@@ -258,6 +248,23 @@ impl<'d> Node<'d> {
             return Ok(name);
         }
         Err(self.error("is not a name; allowed 1 to 40 letters (a to z), digits, `_` and `-`"))
+    }
+
+    /// The elements of an array that has at most `most`, which are `what`; as [`Self::elements`].
+    pub fn elements_up_to(&self, most: usize, what: &str) -> Result<Vec<Node<'d>>, SceneError> {
+        let elements = self.elements()?;
+        match elements.get(most) {
+            None => Ok(elements),
+            Some(first) => Err(self.document.error(
+                first.value.span(),
+                &first.key,
+                None,
+                format!(
+                    "too many: {} {what}; allowed at most {most}",
+                    elements.len()
+                ),
+            )),
+        }
     }
 
     /// The elements of an array, keyed `key[0]`, `key[1]`, …

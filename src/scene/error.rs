@@ -1,5 +1,6 @@
 //! Errors in scenes and parameters: file, line, column, key, value, range, unit.
 
+use super::words::{visible, visible_line};
 use std::fmt;
 
 /// What is wrong with a scene or a parameter value, in a form a person can act on.
@@ -40,17 +41,21 @@ impl SceneError {
 impl fmt::Display for SceneError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (&self.file, self.position) {
-            (Some(file), Some((line, column))) => write!(f, "{file}:{line}:{column}: ")?,
-            (Some(file), None) => write!(f, "{file}: ")?,
+            (Some(file), Some((line, column))) => {
+                write!(f, "{}:{line}:{column}: ", visible_line(file))?;
+            }
+            (Some(file), None) => write!(f, "{}: ", visible_line(file))?,
             (None, Some((line, column))) => write!(f, "line {line}, column {column}: ")?,
             (None, None) => {}
         }
         match (&self.key, &self.value) {
-            (Some(key), Some(value)) => write!(f, "{key} = {value}: ")?,
-            (Some(key), None) => write!(f, "{key}: ")?,
+            (Some(key), Some(value)) => {
+                write!(f, "{} = {}: ", visible_line(key), visible_line(value))?;
+            }
+            (Some(key), None) => write!(f, "{}: ", visible_line(key))?,
             _ => {}
         }
-        f.write_str(&self.message)?;
+        f.write_str(&visible(&self.message))?;
         if let (Some(text), Some((line, column))) = (&self.line_text, self.position) {
             let number = line.to_string();
             let mark = column.saturating_sub(1) as usize;
@@ -76,18 +81,39 @@ pub(super) fn line_and_column(before: &str) -> (u32, u32) {
     )
 }
 
+/// Line and column, from 1, of the byte `at` of `text`.
+pub(super) fn place_of(text: &str, at: usize) -> (u32, u32) {
+    line_and_column(&text[..text.floor_char_boundary(at)])
+}
+
+/// The first line of what someone wrote, cut to what an error can quote.
+pub(super) fn brief(text: &str) -> String {
+    let mut short: String = text.lines().next().unwrap_or("").chars().take(60).collect();
+    if short.len() < text.len() {
+        short.push('…');
+    }
+    short
+}
+
 /// Line number `line`, from 1, of a text; `None` for one too long for a terminal, or with control characters in it.
 pub(super) fn line_text(text: &str, line: u32) -> Option<Box<str>> {
     let line = text
         .lines()
         .nth(line.saturating_sub(1) as usize)
         .unwrap_or("");
-    let fit = line.len() <= 160 && !line.chars().any(|c| c.is_control() && c != '\t');
-    fit.then(|| line.replace('\t', " ").into())
+    let line = line.replace('\t', " ");
+    let fit = line.len() <= 160 && visible_line(&line) == line;
+    fit.then(|| line.into())
 }
+
+/// A text longer than this, bytes, is no slip of a name; comparing it would take its square.
+const LONGEST_SLIP: usize = 100;
 
 /// The nearest of `names` to `wrong`, in brackets; "" if none is near.
 pub(super) fn nearest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> String {
+    if wrong.len() > LONGEST_SLIP {
+        return String::new();
+    }
     let wrong_lower = wrong.to_lowercase();
     names
         .into_iter()

@@ -1,7 +1,7 @@
 //! Where scenes come from: the built-in ones, and files.
 
-use super::error::{line_and_column, nearest};
-use super::{Scene, SceneError};
+use super::error::{brief, line_and_column, nearest};
+use super::{Scene, SceneError, visible_line};
 use std::ffi::OsStr;
 use std::io::Read;
 use std::path::Path;
@@ -20,6 +20,17 @@ pub const DEFAULT_SCENE: &str = BUILT_IN[0];
 
 /// The largest file that is read, bytes: a scene is a few kilobytes.
 pub const LARGEST_FILE: u64 = 4 << 20;
+
+/// Most bodies of a scene, a chain's links included.
+pub const MOST_BODIES: usize = 10_000;
+/// Most ball joints of a scene, a chain's included.
+pub const MOST_BALL_JOINTS: usize = 10_000;
+/// Most shapes of a scene, those of its bodies and the fixed ones.
+pub const MOST_SHAPES: usize = 50_000;
+/// Most corners of a plate.
+pub const MOST_CORNERS: usize = 100;
+/// Most changes of a scene.
+pub const MOST_CHANGES: usize = 4096;
 
 /// Why a larger one is not.
 pub fn too_large() -> String {
@@ -63,7 +74,8 @@ impl Scene {
             None => {
                 let near = nearest(argument, BUILT_IN);
                 let message = format!(
-                    "no built-in scene `{argument}`{near}; built in: {}; the name of a file contains `/` or ends in `.toml`",
+                    "no built-in scene `{}`{near}; built in: {}; the name of a file contains `/` or ends in `.toml`",
+                    visible_line(&brief(argument)),
                     BUILT_IN.join(", ")
                 );
                 Err(SceneError {

@@ -18,6 +18,7 @@ mod table;
 #[cfg(test)]
 mod tests;
 mod units;
+mod words;
 mod write;
 
 pub use doubt::Doubt;
@@ -27,6 +28,7 @@ pub use model::*;
 pub use parameters::*;
 pub use table::table;
 pub use units::*;
+pub use words::{visible, visible_line};
 
 use table::find;
 

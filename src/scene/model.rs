@@ -74,9 +74,9 @@ pub struct Source {
     pub file: Option<String>,
     /// The TOML text.
     pub text: String,
-    /// Line and column, from 1, of what errors after reading point to: each parameter that the text gives, by key;
-    /// `spcmm`, its section; `joint.<name>`, each ball joint (a chain's: its section).
-    pub places: BTreeMap<String, (u32, u32)>,
+    /// Where in the text, bytes, that stands which errors after reading point to: each parameter that the text gives, by
+    /// key; `spcmm`, its section; `joint.<name>`, each ball joint (a chain's: its section).
+    pub places: BTreeMap<String, usize>,
 }
 
 /// Form of the equations of motion.

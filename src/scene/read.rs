@@ -1,6 +1,7 @@
 //! A scene from its TOML text: settings first, then bodies, joints and ball joints.
 
 use super::document::{Document, Node, Section};
+use super::error::{brief, nearest, place_of};
 use super::read_bodies::{read_body, read_shape};
 use super::read_joints::{BallJointText, JointText, read_ball_joint, read_joint, sort_forest};
 use super::*;
@@ -125,7 +126,7 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
         .and_then(|stem| stem.to_str());
     let name = match top.get("name") {
         Some(node) => node.name()?.to_owned(),
-        None => stem.unwrap_or("scene").to_owned(),
+        None => visible_line(stem.unwrap_or("scene")).into_owned(),
     };
     let start = match top
         .get("start")
@@ -181,8 +182,8 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
         };
     }
     Ok(Scene {
-        title: text("title")?.unwrap_or(&name).to_owned(),
-        description: text("description")?.unwrap_or("").trim().to_owned(),
+        title: visible_line(text("title")?.unwrap_or(&name)).into_owned(),
+        description: visible(text("description")?.unwrap_or("").trim()).into_owned(),
         name,
         gravity: Vec3::zeros(),
         contact: crate::contact::Parameters::default(),
@@ -297,22 +298,30 @@ fn read_mechanism<'d>(
     scene: &mut Scene,
     places: &mut Places<'d>,
 ) -> Result<(), SceneError> {
-    let list = |name: &str| top.get(name).map_or(Ok(Vec::new()), |node| node.elements());
+    let list = |name: &str, most: usize, what: &str| {
+        top.get(name)
+            .map_or(Ok(Vec::new()), |node| node.elements_up_to(most, what))
+    };
     let mut names = Names::default();
 
     let mut bodies = Vec::new();
     let mut body_sections = Vec::new();
-    for node in list("body")? {
+    for node in list("body", MOST_BODIES, "bodies")? {
         let (body, section) = read_body(&node)?;
         names.add(&section, "body", &body.name)?;
         bodies.push(body);
         body_sections.push(section);
     }
     let file_order: Vec<String> = bodies.iter().map(|body| body.name.clone()).collect();
+    let file_places: BTreeMap<&str, usize> = file_order
+        .iter()
+        .enumerate()
+        .map(|(place, name)| (name.as_str(), place))
+        .collect();
     let mut joint_names = Names::default();
     let mut joints: Vec<JointText<'d>> = Vec::new();
-    for node in list("joint")? {
-        let joint = read_joint(&node, scene, &file_order)?;
+    for node in list("joint", MOST_BODIES, "joints")? {
+        let joint = read_joint(&node, scene, &file_order, &file_places)?;
         joint_names.add(&joint.section, "joint", &joint.name)?;
         if let Some(Drive::Spcmm { slider }) = joint.joint.drive
             && let Some(other) = joints
@@ -334,7 +343,7 @@ fn read_mechanism<'d>(
         .enumerate()
         .map(|(index, body)| (body.name.clone(), index))
         .collect();
-    for node in list("ball_joint")? {
+    for node in list("ball_joint", MOST_BALL_JOINTS, "ball joints")? {
         let BallJointText {
             joint,
             section,
@@ -346,7 +355,7 @@ fn read_mechanism<'d>(
         scene.ball_joints.push(joint);
         places.extend(own);
     }
-    for node in list("fixed_shape")? {
+    for node in list("fixed_shape", MOST_SHAPES, "shapes")? {
         let shape = read_shape(&node, scene.spcmm.as_ref())?;
         scene.fixed_shapes.push(shape);
     }
@@ -356,6 +365,12 @@ fn read_mechanism<'d>(
             let title = format!("joint.{}", joint.name);
             scene.source.places.entry(title).or_insert(node.place());
         }
+    }
+    let of_bodies = scene.bodies.iter().map(|body| body.shapes.len());
+    let shapes = scene.fixed_shapes.len() + of_bodies.sum::<usize>();
+    if shapes > MOST_SHAPES {
+        let message = format!("too many shapes: {shapes}; allowed at most {MOST_SHAPES}");
+        return Err(top.document.error(0..0, "shapes", None, message));
     }
     if scene.bodies.is_empty() {
         return Err(top.document.error(
@@ -406,7 +421,7 @@ fn read_output(
 
 /// "No such body", with the nearest name and all names.
 pub(super) fn no_body<'a>(wanted: &str, names: impl Iterator<Item = &'a str> + Clone) -> String {
-    let near = super::error::nearest(wanted, names.clone());
+    let near = nearest(wanted, names.clone());
     let listed: Vec<&str> = names.clone().take(12).collect();
     let more = if names.count() > listed.len() {
         ", …"
@@ -414,26 +429,29 @@ pub(super) fn no_body<'a>(wanted: &str, names: impl Iterator<Item = &'a str> + C
         ""
     };
     format!(
-        "no body `{wanted}`{near}; bodies: {}{more}",
+        "no body `{}`{near}; bodies: {}{more}",
+        brief(wanted),
         listed.join(", ")
     )
 }
 
-/// Names seen so far, with their lines: no two may be equal.
+/// Names seen so far, with where they stand in the text: no two may be equal.
 #[derive(Default)]
 struct Names {
-    lines: BTreeMap<String, u32>,
+    places: BTreeMap<String, usize>,
 }
 
 impl Names {
     fn add(&mut self, section: &Section<'_>, what: &str, name: &str) -> Result<(), SceneError> {
         let node = section.require("name", "\"rod\"")?;
-        let line = node.error("").position.map_or(0, |(line, _)| line);
-        match self.lines.insert(name.to_owned(), line) {
+        match self.places.insert(name.to_owned(), node.place()) {
             None => Ok(()),
-            Some(first) => Err(node.error(format!(
-                "there is already a {what} of this name, in line {first}; names must differ, for example `{name}2`"
-            ))),
+            Some(first) => {
+                let (line, _) = place_of(node.document.text, first);
+                Err(node.error(format!(
+                    "there is already a {what} of this name, in line {line}; names must differ, for example `{name}2`"
+                )))
+            }
         }
     }
 }

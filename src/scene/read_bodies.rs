@@ -63,7 +63,7 @@ pub(super) fn read_rigid_body(section: &Section<'_>, name: String) -> Result<Bod
     let inertia = read_inertia(section)?;
     let shapes = match section.get("shapes") {
         Some(node) => node
-            .elements()?
+            .elements_up_to(MOST_SHAPES, "shapes")?
             .iter()
             .map(|shape| read_shape(shape, None))
             .collect::<Result<_, _>>()?,
@@ -194,7 +194,7 @@ pub(super) fn read_shape(node: &Node<'_>, spcmm: Option<&Spcmm>) -> Result<Shape
             let node =
                 section.require("corners", "[\"0 0 0 mm\", \"10 0 0 mm\", \"0 10 0 mm\"]")?;
             let corners = node
-                .elements()?
+                .elements_up_to(MOST_CORNERS, "corners")?
                 .iter()
                 .map(|corner| Ok(corner.vector(Dimension::Length)? + shift))
                 .collect::<Result<Vec<_>, SceneError>>()?;

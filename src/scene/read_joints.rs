@@ -29,11 +29,12 @@ pub(super) struct BallJointText<'d> {
     pub places: BTreeMap<String, Node<'d>>,
 }
 
-/// One `[[joint]]`; `bodies` are the names in file order.
+/// One `[[joint]]`; `bodies` are the names in file order, `places` their places in it.
 pub(super) fn read_joint<'d>(
     node: &Node<'d>,
     scene: &Scene,
     bodies: &[String],
+    places: &BTreeMap<&str, usize>,
 ) -> Result<JointText<'d>, SceneError> {
     let known = [
         "name",
@@ -58,9 +59,15 @@ pub(super) fn read_joint<'d>(
         _ => JointKind::Free,
     };
     let child_node = section.require("child", "\"rod\"")?;
-    let child = place_of(&child_node, bodies, None)?;
+    let place = |node: &Node<'_>, also| {
+        let wanted = node.text()?;
+        let names = || Option::into_iter(also).chain(bodies.iter().map(String::as_str));
+        let place = places.get(wanted).copied();
+        place.ok_or_else(|| node.error(no_body(wanted, names())))
+    };
+    let child = place(&child_node, None)?;
     let parent = match section.get("parent") {
-        Some(node) if node.text()? != "world" => Some(place_of(&node, bodies, Some("world"))?),
+        Some(node) if node.text()? != "world" => Some(place(&node, Some("world"))?),
         _ => None,
     };
     let point = |name| {
@@ -99,14 +106,6 @@ pub(super) fn read_joint<'d>(
         section,
         joint,
     })
-}
-
-/// Place of the body that a text names; `also` is a name that would have been allowed as well.
-fn place_of(node: &Node<'_>, bodies: &[String], also: Option<&str>) -> Result<usize, SceneError> {
-    let wanted = node.text()?;
-    let names = also.into_iter().chain(bodies.iter().map(String::as_str));
-    let place = bodies.iter().position(|name| name == wanted);
-    place.ok_or_else(|| node.error(no_body(wanted, names)))
 }
 
 /// A free body: where it starts and how it moves.

@@ -22,7 +22,7 @@ pub use history::History;
 pub use impacts::Impact;
 pub use ledger::Ledger;
 pub use pace::{LARGEST_BUDGET, LONGEST_FRAME, Pacer, SCALE_RANGE};
-pub use simulation::{CLEARANCE_SPEED, Simulation};
+pub use simulation::{CLEARANCE_SPEED, LARGEST_DENSE, LARGEST_IMPLICIT, Simulation};
 
 use crate::mechanism::MechanismError;
 use crate::scene::{Scene, SceneError};
@@ -56,9 +56,11 @@ impl StartError {
             MechanismError::OutsideSocket { joint, .. } => {
                 one(joint, &["clearance", "ball_radius"])
             }
-            MechanismError::TooLarge { .. } => {
+            MechanismError::TooLarge { .. } | MechanismError::TooCostly { .. } => {
                 let keys = ["solver.method", "chain.links", "formulation"];
-                (keys[0].to_owned(), keys.map(str::to_owned).to_vec())
+                let of_form = matches!(self.0, MechanismError::TooCostly { form, .. } if form.starts_with(keys[2]));
+                let title = if of_form { keys[2] } else { keys[0] };
+                (title.to_owned(), keys.map(str::to_owned).to_vec())
             }
             MechanismError::Branching { joints } => {
                 one(joints.split(", ").next().unwrap_or(""), &["clearance"])

@@ -22,6 +22,7 @@ use crate::integrate::{Controller, System};
 use crate::mechanism::{Mechanism, MechanismError, Memory, Ramp, Switching};
 use crate::scene::Scene;
 use automatic::{Choice, controller_of, prepare_implicit};
+pub use automatic::{LARGEST_DENSE, LARGEST_IMPLICIT};
 use corners::Piece;
 
 /// Speed at which the clearance closes when a jump would put a ball inside its socket wall, m/s: an impact at this speed

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 
 use wasm_bindgen::prelude::*;
 
-use crate::scene::Scene;
+use crate::scene::{Scene, visible_line};
 
 thread_local! {
     /// What was running, as the report says it, and the link to it.
@@ -42,6 +42,7 @@ pub fn explain_panics() {
 pub fn note(scene: &Scene, renderer: &str, link: String) {
     let mut text = format!("scene: {}\n", scene.name);
     for (key, value) in &scene.changes {
+        let (key, value) = (visible_line(key), visible_line(value));
         text.push_str(&format!("changed: {key} = {value}\n"));
     }
     text.push_str(&format!("renderer: {renderer}\nstate: #{link}"));

@@ -236,8 +236,13 @@ fn a_small_bomb_does_not_unpack() {
     assert!(packed.len() < 10_000);
     let error = Link::parse(&format!("text={packed}")).expect_err("too large");
     assert!(error.to_string().contains("does not unpack"));
-    let long = "x".repeat(LONGEST_READ + 1);
-    assert!(Link::parse(&long).is_err());
+    let long = |length: usize| format!("?scene={}", "x".repeat(length - "?scene=".len()));
+    assert!(Link::parse(&long(LONGEST_LINK)).is_ok());
+    let error = Link::parse(&long(LONGEST_LINK + 1)).expect_err("too long");
+    assert!(
+        error.to_string().contains("allowed at most 32000"),
+        "{error}"
+    );
 }
 
 #[test]

@@ -21,9 +21,10 @@ const EXPLICIT_EVALUATIONS: f64 = 6.0;
 /// in them and a factorisation cubic; measured on chains of 4 to 16 links.)
 const SQUARE_OF_AN_EVALUATION: f64 = 36.0;
 /// More velocity coordinates than this are refused by the implicit methods, whose matrices are dense.
-const LARGEST_DENSE: usize = 1024;
-/// More velocity coordinates than this make a dense factorisation dearer than many explicit steps.
-const LARGEST_IMPLICIT: usize = 96;
+pub const LARGEST_DENSE: usize = 1024;
+/// More velocity coordinates than this make a dense factorisation dearer than many explicit steps: the automatic pair stays
+/// with those.
+pub const LARGEST_IMPLICIT: usize = 96;
 
 /// Memory of the automatic pair.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -122,7 +123,7 @@ pub(super) fn prepare_implicit(
         return Ok(());
     }
     if method == Method::ImexEuler {
-        mechanism.prepare_implicit_contacts();
+        mechanism.prepare_implicit_contacts()?;
     }
     if method.is_implicit() && velocities > LARGEST_DENSE {
         return Err(MechanismError::TooLarge {

@@ -1,0 +1,397 @@
+//! What the equations of a scene take, counted in time linear in its size and before anything of it is allocated.
+//!
+//! Sparse as they are, the matrices of a body that carries many joints, or of a long row of hinges, fill; there their
+//! memory grows with the square and an evaluation with the cube of the size. `docs/scene-format.md` says what the limits
+//! mean for such scenes.
+
+use super::MechanismError;
+use super::factor::NONE;
+use super::lagrange::Layout;
+use super::model::{BodyIndex, Model, Motion};
+use crate::scene::{Formulation, Scene, StartRule};
+
+/// Most numbers in the matrices of one scene: 32 MiB.
+pub const MOST_ENTRIES: u64 = 1 << 22;
+/// Most multiplications of one evaluation, about: some 40 ms on a processor of 2020.
+pub const MOST_PRODUCTS: u64 = 1 << 25;
+
+/// Multiplications for one ancestor of a body, and for one pair of constraint rows of bodies.
+const OF_AN_ANCESTOR: u64 = 20;
+const OF_A_PAIR: u64 = 25;
+
+/// Upper bounds of what one form of the equations takes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Cost {
+    /// Numbers in matrices.
+    pub entries: u64,
+    /// Multiplications of one evaluation.
+    pub products: u64,
+}
+
+impl Cost {
+    fn add(&mut self, entries: u64, products: u64) {
+        self.entries += entries;
+        self.products += products;
+    }
+
+    /// Adds a matrix stored by its envelope and factored, whose rows begin at these columns.
+    fn add_envelope(&mut self, first: &[u64]) {
+        for (i, f) in (0_u64..).zip(first) {
+            self.entries += i - f + 1;
+        }
+        if self.entries > MOST_ENTRIES {
+            return;
+        }
+        for (i, &f) in (0_u64..).zip(first) {
+            let row = (f..).zip(&first[f as usize..i as usize]);
+            self.products += row.map(|(j, &g)| j - f.max(g) + 1).sum::<u64>();
+        }
+    }
+
+    fn fits(&self) -> bool {
+        self.entries <= MOST_ENTRIES && self.products <= MOST_PRODUCTS
+    }
+
+    /// Of the `tree` form with these joints closed.
+    pub fn of_tree(model: &Model, joints: &[usize]) -> Self {
+        let mut cost = Self::default();
+        // Coordinates that each block's solution passes through.
+        let mut solution = Vec::with_capacity(model.blocks.len());
+        for block in &model.blocks {
+            let n = block.n as u64;
+            if block.lone.is_some() {
+                solution.push(2 * n);
+                continue;
+            }
+            let mut depth: Vec<u64> = Vec::with_capacity(block.n);
+            let (mut sum, mut squares) = (0, 0);
+            for &parent in &block.pattern.parent {
+                let above = if parent == NONE { 0 } else { depth[parent] };
+                depth.push(above + 1);
+                sum += above + 1;
+                squares += (above + 1) * (above + 1);
+            }
+            cost.add(n * n, squares / 2);
+            solution.push(2 * sum);
+        }
+        let mut depth: Vec<u64> = Vec::with_capacity(model.bodies.len());
+        for body in &model.bodies {
+            let above = depth.get(body.parent).copied().unwrap_or(0);
+            depth.push(if body.driven_only { 0 } else { above + 1 });
+            if !matches!(body.motion, Motion::Fixed | Motion::Driven { .. }) {
+                cost.add(0, OF_AN_ANCESTOR * above);
+            }
+        }
+        let block_of = |b: BodyIndex| {
+            let body = model.bodies.get(b)?;
+            (!body.driven_only).then(|| model.block_of[b])
+        };
+        let mut first_on = vec![u64::MAX; model.blocks.len()];
+        let mut sides_on = vec![0_u64; model.blocks.len()];
+        let mut rows = Vec::with_capacity(3 * joints.len());
+        for (i, &j) in (0_u64..).zip(joints) {
+            let joint = &model.joints[j];
+            let mut first = i;
+            let bodies = [joint.ball.body, joint.socket.body];
+            let [ball, socket] = bodies.map(block_of);
+            for block in [ball, socket.filter(|_| socket != ball)]
+                .into_iter()
+                .flatten()
+            {
+                let n = model.blocks[block].n as u64;
+                first_on[block] = first_on[block].min(i);
+                first = first.min(first_on[block]);
+                sides_on[block] += 1;
+                cost.add(6 * n, 3 * solution[block] + sides_on[block] * 9 * n);
+            }
+            for b in bodies {
+                cost.add(0, 3 * OF_AN_ANCESTOR * depth.get(b).copied().unwrap_or(0));
+            }
+            rows.extend([3 * first; 3]);
+        }
+        cost.add_envelope(&rows);
+        let n = model.nv as u64;
+        if n > 0 && 3 * joints.len() as u64 == n {
+            // On which side of a singular pose.
+            cost.add(n * n, n.saturating_pow(3) / 3);
+        }
+        cost
+    }
+
+    /// Of the `lagrange` form.
+    pub fn of_lagrange(layout: &Layout, model: &Model) -> Self {
+        let mut cost = Self::default();
+        let world = model.world();
+        let mut rows_on = vec![0_u64; world];
+        let mut first_on = vec![u64::MAX; world];
+        let mut first_of = Vec::new();
+        for group in &layout.groups {
+            let (at, rows) = (group.first as u64, group.rows().len() as u64);
+            let mut first = at;
+            for body in [group.child, group.parent] {
+                if body != world {
+                    first_on[body] = first_on[body].min(at);
+                    first = first.min(first_on[body]);
+                    rows_on[body] += rows;
+                    // Two numbers for the place of each pair.
+                    let pairs = rows * rows_on[body];
+                    cost.add(2 * pairs, OF_A_PAIR * pairs);
+                }
+            }
+            first_of.extend((0..rows).map(|_| first));
+        }
+        cost.add_envelope(&first_of);
+        cost
+    }
+
+    /// Of contacts that are stepped implicitly: `joints` of which each feels so many before and behind it, with columns
+    /// of `width` numbers altogether.
+    pub fn of_implicit_contacts(joints: usize, reach: usize, width: usize) -> Self {
+        let (joints, reach, width) = (joints as u64, reach as u64, width as u64);
+        let band = joints * (2 * reach + 1);
+        // Three blocks of 3 x 3; three columns, and ten numbers for what a coordinate moves. One elimination, and the blocks.
+        Self {
+            entries: 27 * band + 13 * width,
+            products: 40 * joints * (reach + 1) * (reach + 1) + 250 * band,
+        }
+    }
+
+    /// Refuses what is beyond a limit. `form`: what it is the cost of.
+    ///
+    /// # Errors
+    /// What is needed, and the most that there may be.
+    pub fn check(&self, form: &'static str, advice: &'static str) -> Result<(), MechanismError> {
+        let (what, needed, most) = if self.entries > MOST_ENTRIES {
+            ("numbers in its matrices", self.entries, MOST_ENTRIES)
+        } else if self.products > MOST_PRODUCTS {
+            (
+                "multiplications in one evaluation",
+                self.products,
+                MOST_PRODUCTS,
+            )
+        } else {
+            return Ok(());
+        };
+        Err(MechanismError::TooCostly {
+            form,
+            what,
+            needed,
+            most,
+            advice,
+        })
+    }
+}
+
+/// Refuses a scene whose equations, or whose assembly at the start, take more than the limits.
+///
+/// # Errors
+/// As [`Cost::check`], with the other formulation as advice where it would do.
+pub fn check(scene: &Scene, model: &Model) -> Result<(), MechanismError> {
+    let closed = |start| match start {
+        StartRule::AsGiven => model.ideal_joints.clone(),
+        StartRule::Ideal => (0..model.joints.len()).collect(),
+    };
+    let assembly = closed(model.start);
+    let tree = Cost::of_tree(model, &assembly);
+    let assembles = !assembly.is_empty();
+    let lagrange = Cost::of_lagrange(&Layout::new(scene, model), model);
+    let advice = "choose fewer bodies and joints, or clearances for ideal ball joints on one body";
+    match scene.formulation {
+        Formulation::Tree if !tree.fits() && !assembles && lagrange.fits() => {
+            tree.check("formulation tree", "choose formulation = lagrange")
+        }
+        Formulation::Lagrange if !lagrange.fits() && tree.fits() => {
+            lagrange.check("formulation lagrange", "choose formulation = tree")
+        }
+        Formulation::Tree => tree.check("formulation tree", advice),
+        Formulation::Lagrange => {
+            lagrange.check("formulation lagrange", advice)?;
+            if assembles {
+                tree.check("assembling the start", advice)?;
+            }
+            Ok(())
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mechanism::{Mechanism, MechanismError};
+    use std::fmt::Write as _;
+
+    /// Text of a scene of one kind with `n` parts.
+    fn text(kind: &str, n: usize) -> String {
+        let mut out = "[contact]\nclearance = 0\nball_radius = \"1 mm\"\n".to_owned();
+        let mut body = |name: &str, joint: &str| {
+            let inertia = "\"1e-3 1e-3 1e-3 kg m^2\"";
+            // Writing to a String cannot fail.
+            let _ = writeln!(
+                out,
+                "[[body]]\nname = \"{name}\"\nmass = \"1 kg\"\ninertia = {inertia}\n\
+                 [[joint]]\nname = \"to-{name}\"\nchild = \"{name}\"\n{joint}"
+            );
+        };
+        let free = |i: usize| format!("kind = \"free\"\nstart = {{ position = \"{i} 0 -10 mm\" }}");
+        let hinge = |parent: &str| {
+            format!(
+                "kind = \"revolute\"\naxis = [0, 1, 0]\nparent_point = \"0 0 -1 mm\"\nparent = \"{parent}\""
+            )
+        };
+        let mut balls = Vec::new();
+        if kind.contains("hub") {
+            body("hub", &free(0));
+        }
+        for i in 0..n {
+            let name = format!("b{i}");
+            let before = if i == 0 {
+                "world".to_owned()
+            } else {
+                format!("b{}", i - 1)
+            };
+            match kind {
+                "free" => body(&name, &free(i)),
+                "row of hinges" => body(&name, &hinge(&before)),
+                "hinges on the hub" => body(&name, &hinge("hub")),
+                "balls on the hub" => {
+                    body(&name, &free(i));
+                    balls.push(("hub".to_owned(), name, format!("{i} 0 0 mm")));
+                }
+                "chain" => {
+                    body(
+                        &name,
+                        &format!(
+                            "kind = \"free\"\nstart = {{ position = \"0 0 {} mm\" }}",
+                            -20 * i as i32 - 10
+                        ),
+                    );
+                    let at = if i == 0 { "0 0 0 mm" } else { "0 0 -10 mm" };
+                    balls.push((before, name, at.to_owned()));
+                }
+                "balls on one body" => {
+                    if i == 0 {
+                        body("hub", "kind = \"free\"\nstart = { position = [0, 0, 0] }");
+                    }
+                    balls.push(("world".to_owned(), "hub".to_owned(), format!("{i} 0 0 mm")));
+                }
+                other => panic!("no kind {other}"),
+            }
+        }
+        for (i, (socket, ball, at)) in balls.iter().enumerate() {
+            let own = match kind {
+                "balls on one body" => at,
+                _ => "0 0 10 mm",
+            };
+            let _ = writeln!(
+                out,
+                "[[ball_joint]]\nname = \"S{i}\"\nsocket = {{ body = \"{socket}\", at = \"{at}\" }}\n\
+                 ball = {{ body = \"{ball}\", at = \"{own}\" }}"
+            );
+        }
+        out
+    }
+
+    fn costs(kind: &str, n: usize) -> [Cost; 2] {
+        let scene = Scene::parse(&text(kind, n), None, &[]).expect("a scene");
+        let model = Model::new(&scene);
+        [
+            Cost::of_tree(&model, &model.ideal_joints),
+            Cost::of_lagrange(&Layout::new(&scene, &model), &model),
+        ]
+    }
+
+    #[test]
+    fn sparse_scenes_grow_linearly_and_dense_ones_are_known_to_be_dense() {
+        // Growth of (numbers, multiplications) in the tree and the lagrange form from n to 2n parts: 2 is linear.
+        for (kind, tree, lagrange) in [
+            ("free", [1.0, 1.0], [1.0, 1.0]),
+            ("chain", [2.0, 2.0], [2.0, 2.0]),
+            ("row of hinges", [4.0, 8.0], [2.0, 2.0]),
+            ("hinges on the hub", [4.0, 2.0], [4.0, 8.0]),
+            ("balls on the hub", [4.0, 8.0], [4.0, 8.0]),
+        ] {
+            let (once, twice) = (costs(kind, 200), costs(kind, 400));
+            for (form, growth) in [tree, lagrange].into_iter().enumerate() {
+                let (a, b) = (once[form], twice[form]);
+                let ratio = |a: u64, b: u64| b.max(1) as f64 / a.max(1) as f64;
+                let got = [ratio(a.entries, b.entries), ratio(a.products, b.products)];
+                for (got, at_most) in got.into_iter().zip(growth) {
+                    assert!(
+                        got < 1.1 * at_most,
+                        "{kind}, form {form}: {got} of {at_most}"
+                    );
+                }
+            }
+        }
+    }
+
+    /// Whether `kind` with `n` parts is taken; what it is refused with.
+    fn taken(kind: &str, n: usize, formulation: &str) -> Result<(), String> {
+        let changes = [("formulation".to_owned(), formulation.to_owned())];
+        let scene = Scene::parse(&text(kind, n), None, &changes).expect("a scene");
+        match Mechanism::new(&scene) {
+            Ok(_) => Ok(()),
+            Err(error @ MechanismError::TooCostly { .. }) => Err(error.to_string()),
+            Err(other) => panic!("{other}"),
+        }
+    }
+
+    #[test]
+    fn the_limits_are_those_of_the_documentation() {
+        let mut wrong = Vec::new();
+        let page = include_str!("../../docs/scene-format.md");
+        for (kind, formulation, row) in [
+            ("row of hinges", "tree", "hinges in a row"),
+            ("hinges on the hub", "tree", "hinges on one free body"),
+            ("hinges on the hub", "lagrange", "hinges on one free body"),
+            (
+                "balls on the hub",
+                "tree",
+                "bodies on ideal ball joints of one body",
+            ),
+            (
+                "balls on the hub",
+                "lagrange",
+                "bodies on ideal ball joints of one body",
+            ),
+        ] {
+            let (mut fits, mut beyond) = (1, 3000);
+            while fits + 1 < beyond {
+                let middle = (fits + beyond) / 2;
+                let [tree, lagrange] = costs(kind, middle);
+                let cost = if formulation == "tree" {
+                    tree
+                } else {
+                    lagrange
+                };
+                if cost.fits() {
+                    fits = middle
+                } else {
+                    beyond = middle
+                }
+            }
+            assert_eq!(taken(kind, fits, formulation), Ok(()), "{kind}");
+            let words = taken(kind, beyond, formulation).expect_err("beyond the limit");
+            assert!(words.contains("allowed at most"), "{words}");
+            let column = 1 + usize::from(formulation == "lagrange");
+            let line = page
+                .lines()
+                .find(|line| line.starts_with(&format!("| {row}")));
+            let said = line.expect(row).split('|').nth(column + 1).map(str::trim);
+            if said != Some(fits.to_string().as_str()) {
+                wrong.push(format!("{row}, {formulation}: {fits}"));
+            }
+        }
+        assert!(wrong.is_empty(), "{wrong:#?}");
+    }
+
+    #[test]
+    fn where_the_other_form_would_do_it_is_the_advice() {
+        let words = taken("row of hinges", 5000, "tree").expect_err("too deep");
+        assert!(words.ends_with("choose formulation = lagrange"), "{words}");
+        assert_eq!(taken("row of hinges", 5000, "lagrange"), Ok(()));
+        let words = taken("hinges on the hub", 1000, "lagrange").expect_err("too wide");
+        assert!(words.ends_with("choose formulation = tree"), "{words}");
+        assert_eq!(taken("hinges on the hub", 1000, "tree"), Ok(()));
+    }
+}

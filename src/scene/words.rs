@@ -1,0 +1,65 @@
+//! Texts of others (scene files, links, command lines) made fit to be shown: what would steer a terminal, forge a line or
+//! reorder what stands beside it becomes visible.
+
+use std::borrow::Cow;
+
+/// Whether a terminal or a page would obey `c` instead of showing it: control characters, line and paragraph separators,
+/// and marks that turn the direction of writing.
+fn steers(c: char) -> bool {
+    c.is_control()
+        || matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{206f}')
+}
+
+fn escaped(text: &str, hide: impl Fn(char) -> bool) -> Cow<'_, str> {
+    use std::fmt::Write;
+    if !text.contains(&hide) {
+        return Cow::Borrowed(text);
+    }
+    let mut out = String::with_capacity(text.len() + 16);
+    for c in text.chars() {
+        if hide(c) {
+            // Also what JSON calls it. Writing to a String cannot fail.
+            let _ = write!(out, "\\u{:04x}", u32::from(c));
+        } else {
+            out.push(c);
+        }
+    }
+    Cow::Owned(out)
+}
+
+/// `text` with line breaks and tabs as they are, and every other character that steers as `\u001b`.
+pub fn visible(text: &str) -> Cow<'_, str> {
+    escaped(text, |c| steers(c) && !matches!(c, '\n' | '\t'))
+}
+
+/// As [`visible`], in one line.
+pub fn visible_line(text: &str) -> Cow<'_, str> {
+    escaped(text, steers)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_steers_is_shown_and_the_rest_stays() {
+        let plain = "µ ≤ 3 \"β\" \u{1f600}\n\tα";
+        assert!(matches!(visible(plain), Cow::Borrowed(same) if same == plain));
+        assert_eq!(visible_line("a\nb\tc"), "a\\u000ab\\u0009c");
+        for (c, shown) in [
+            ('\u{1b}', "\\u001b"),
+            ('\r', "\\u000d"),
+            ('\0', "\\u0000"),
+            ('\u{7f}', "\\u007f"),
+            ('\u{9b}', "\\u009b"),
+            ('\u{202e}', "\\u202e"),
+            ('\u{2066}', "\\u2066"),
+            ('\u{2028}', "\\u2028"),
+        ] {
+            let text = visible(&format!("a{c}b")).into_owned();
+            assert_eq!(text, format!("a{shown}b"));
+            // Shown once, it stays as it is.
+            assert_eq!(visible_line(&text), text);
+        }
+    }
+}
