@@ -316,6 +316,18 @@ export class Lab {
         }
     }
 
+    /** Lets what workers say through up to the next message of this kind, and gives that one. Needs `holdWorkers`. */
+    async hear(kind) {
+        const end = Date.now() + PATIENCE;
+        while (Date.now() < end) {
+            const message = await this.page.evaluate((kind) => globalThis.heldPost.pass(kind), kind);
+            if (message) return message;
+            // The worker has the machine for itself meanwhile.
+            await new Promise((done) => setTimeout(done, 100));
+        }
+        return assert.fail(`the worker says no ${kind}`);
+    }
+
     /** What stands on the screen, a pngjs picture. `clip`: {x, y, width, height}. */
     async pixels(clip) {
         return PNG.sync.read(await this.page.screenshot({ clip }));

@@ -63,31 +63,31 @@ export function driveTime() {
 
 /** Keeps what workers say to the page until the test lets it through. */
 export function holdWorkers() {
-    const post = { open: false, waiting: [], flush, pass };
+    const post = { waiting: [], pass };
     globalThis.heldPost = post;
 
-    /** Lets everything through, now and from now on. */
-    function flush() {
-        post.open = true;
-        while (post.waiting.length > 0) post.waiting.shift().tell();
-    }
-
-    /** Lets the next message through; what it says, `undefined` where none has come. */
-    function pass() {
-        const message = post.waiting.shift();
-        message?.tell();
-        return message?.data;
+    /** Lets messages through up to the first of this kind, and gives that one; `undefined` where none has come. */
+    function pass(kind) {
+        while (post.waiting.length > 0) {
+            const { data, tell } = post.waiting.shift();
+            tell();
+            const message = JSON.parse(data);
+            if (message === kind || kind in Object(message)) return message;
+        }
+        return undefined;
     }
 
     const { Worker } = globalThis;
     globalThis.Worker = class extends Worker {
         addEventListener(kind, told, ...rest) {
             if (kind !== 'message') return super.addEventListener(kind, told, ...rest);
-            const hold = (event) => {
-                if (post.open) told(event);
-                else post.waiting.push({ data: event.data, tell: () => told(event) });
-            };
+            const hold = (event) => post.waiting.push({ from: this, data: event.data, tell: () => told(event) });
             return super.addEventListener(kind, hold, ...rest);
+        }
+
+        terminate() {
+            post.waiting = post.waiting.filter(({ from }) => from !== this);
+            super.terminate();
         }
     };
 }

@@ -162,21 +162,13 @@ test('the keyboard works before anything is clicked, and a screen reader is told
     await lab.close();
 });
 
-/** Lets what the worker says through up to the message of this kind whose content is as wanted. */
-function hear(lab, kind, wanted = () => true) {
-    return lab.until(async () => {
-        const message = JSON.parse((await lab.page.evaluate(() => globalThis.heldPost.pass())) ?? '{}');
-        return kind in message && wanted(message[kind]);
-    }, `the worker says no ${kind}`);
-}
-
 test('a preset is measured in a worker: it says how far it is, can be cancelled, and the page goes on meanwhile', async () => {
     const lab = await open('scene=pendulum&c=0.2mm&play=0', { backend, size: { width: 800, height: 1000 }, before: holdWorkers });
     const progress = async () => (await lab.widgets()).find(({ role }) => role === 'ProgressIndicator');
     const workers = () => lab.page.workers().length;
     await lab.click('Button', 'Measure preset');
     // However soon it is done, no more than this is heard of it until further notice.
-    await hear(lab, 'Progress', (part) => part > 0);
+    while ((await lab.hear('Progress')).Progress === 0);
     await lab.until(async () => (await progress())?.value > 0, 'no progress');
     assert.equal(workers(), 1);
     await lab.click('Button', 'Play');
@@ -186,7 +178,6 @@ test('a preset is measured in a worker: it says how far it is, can be cancelled,
     await lab.find('Button', 'Measure preset');
     await lab.until(() => workers() === 0, 'the worker goes on');
 
-    await lab.page.evaluate(() => globalThis.heldPost.flush());
     const error = async () => {
         // What stands on its right.
         const labels = (await lab.widgets()).filter(({ role }) => role === 'Label');
@@ -195,6 +186,7 @@ test('a preset is measured in a worker: it says how far it is, can be cancelled,
     };
     assert.equal(await error(), 'not measured');
     await lab.click('Button', 'Measure preset');
+    await lab.hear('Done');
     await lab.until(async () => /^[\d.e-]+ %$/.test(await error()), 'no number');
     await lab.until(() => workers() === 0, 'the worker stays');
     await lab.close();
@@ -207,7 +199,7 @@ test('a sweep runs in a worker and draws its points as they come; a click on one
     await lab.click('DisclosureTriangle', 'Portrait and section');
     await lab.click('DisclosureTriangle', 'Neighbouring motion');
     await lab.click('Button', 'Start sweep');
-    for (let point = 0; point < 3; point += 1) await hear(lab, 'Point');
+    for (let point = 0; point < 3; point += 1) await lab.hear('Point');
     await lab.until(async () => (await lab.widgets()).some(({ label }) => /^3 of \d+ values/.test(label)), 'no points are shown');
     assert.equal(lab.page.workers().length, 1);
     await lab.click('Button', 'Cancel sweep');
