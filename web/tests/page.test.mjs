@@ -251,6 +251,41 @@ test('a page whose program does not come at all says so, and why where it was op
     await lab.close({ errors: true });
 });
 
+test('the policy of the page lets nothing in that is not its own', async () => {
+    // That the page itself keeps to it, with worker, clipboard and downloads, each test sees: what is refused is an error on the
+    // console.
+    const lab = await open('scene=pendulum&play=0', { backend: 'webgl' });
+    assert.deepEqual(lab.errors, []);
+    const outcome = await lab.page.evaluate(async () => {
+        const refused = new Set();
+        addEventListener('securitypolicyviolation', ({ effectiveDirective }) => refused.add(effectiveDirective));
+        const inline = document.createElement('script');
+        inline.textContent = 'globalThis.foreign = true';
+        const foreign = document.createElement('script');
+        foreign.src = 'https://example.org/script.js';
+        const button = document.createElement('button');
+        button.setAttribute('onclick', 'globalThis.foreign = true');
+        button.setAttribute('style', 'color: red');
+        const picture = document.createElement('img');
+        picture.src = 'data:,';
+        document.body.append(inline, foreign, button, picture);
+        button.click();
+        const failed = await fetch('https://example.org/').then(() => false, () => true);
+        await new Promise((done) => setTimeout(done, 50));
+        return { refused: [...refused].sort(), ran: globalThis.foreign === true, failed };
+    });
+    assert.deepEqual(outcome, {
+        refused: ['connect-src', 'img-src', 'script-src-attr', 'script-src-elem', 'style-src-attr'],
+        ran: false,
+        failed: true,
+    });
+    assert.ok(lab.errors.length >= 5, 'the console says nothing of it');
+    // Nor does the mark-up hold anything that a stricter host would refuse.
+    const page = fs.readFileSync(path.join(PAGE, 'index.html'), 'utf8');
+    assert.doesNotMatch(page, /\son[a-z]+\s*=|\sstyle\s*=|data:|<script(?![^>]*\ssrc=)|<style/i);
+    await lab.close({ errors: true });
+});
+
 test('loading shows its progress', async () => {
     const lab = await open('play=0', {
         backend: 'webgl',
