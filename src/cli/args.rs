@@ -95,7 +95,7 @@ pub struct RunArguments {
     /// Replace existing files.
     #[arg(long)]
     pub force: bool,
-    /// No progress bar and no warnings.
+    /// No progress and no warnings.
     #[arg(long)]
     pub quiet: bool,
 }
@@ -148,7 +148,7 @@ pub struct SweepArguments {
     /// Replace an existing file.
     #[arg(long)]
     pub force: bool,
-    /// No progress bar and no warnings.
+    /// No progress and no warnings.
     #[arg(long)]
     pub quiet: bool,
 }
@@ -329,7 +329,7 @@ pub struct RenderArguments {
     /// Replace a folder of frames.
     #[arg(long)]
     pub force: bool,
-    /// No progress bar and no warnings.
+    /// No progress and no warnings.
     #[arg(long)]
     pub quiet: bool,
 }
@@ -358,7 +358,7 @@ pub struct TradeoffArguments {
     /// Replace a folder of earlier results.
     #[arg(long)]
     pub force: bool,
-    /// No progress bar and no warnings.
+    /// No progress and no warnings.
     #[arg(long)]
     pub quiet: bool,
 }
@@ -378,7 +378,7 @@ pub struct ReproduceArguments {
     /// Replace a folder of earlier results.
     #[arg(long)]
     pub force: bool,
-    /// No progress bar.
+    /// No progress.
     #[arg(long)]
     pub quiet: bool,
 }
@@ -389,7 +389,7 @@ pub struct BenchArguments {
     /// Change a parameter of the default scene, e.g. `contact.friction=0.2`; may be repeated, the last wins.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = change)]
     pub changes: Vec<(String, String)>,
-    /// No progress bar.
+    /// No progress.
     #[arg(long)]
     pub quiet: bool,
 }
