@@ -853,6 +853,33 @@ mod frames {
         assert_eq!(names(folder.path()), [""; 0]);
     }
 
+    /// Mesa's Wayland client complains without one.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn without_a_runtime_folder_standard_error_holds_our_own_words_alone() {
+        let folder = folder();
+        for (line, runtime) in [
+            (
+                "render pendulum --at 0s --size 64x64 --out plain --quiet",
+                None,
+            ),
+            (
+                "render pendulum --at 0s --size 800x500 --ui --out window --quiet",
+                Some("here"),
+            ),
+        ] {
+            let mut command = command(folder.path(), line);
+            command.env_remove("XDG_RUNTIME_DIR");
+            if let Some(runtime) = runtime {
+                command.env("XDG_RUNTIME_DIR", runtime);
+            }
+            let output = command.output().unwrap();
+            assert_eq!(String::from_utf8(output.stderr).unwrap(), "", "{line}");
+            assert_eq!(output.status.code(), Some(0), "{line}");
+        }
+        assert_eq!(names(folder.path()), ["plain", "window"]);
+    }
+
     #[cfg(target_os = "linux")]
     #[test]
     fn a_window_without_a_display_says_what_works_instead() {

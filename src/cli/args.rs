@@ -96,7 +96,7 @@ pub struct RunArguments {
     /// Replace existing files.
     #[arg(long)]
     pub force: bool,
-    /// No progress bar and no warnings.
+    /// No progress and no warnings.
     #[arg(long)]
     pub quiet: bool,
 }
@@ -149,7 +149,7 @@ pub struct SweepArguments {
     /// Replace an existing file.
     #[arg(long)]
     pub force: bool,
-    /// No progress bar and no warnings.
+    /// No progress and no warnings.
     #[arg(long)]
     pub quiet: bool,
 }
@@ -330,7 +330,7 @@ pub struct RenderArguments {
     /// Replace a folder of frames.
     #[arg(long)]
     pub force: bool,
-    /// No progress bar and no warnings.
+    /// No progress and no warnings.
     #[arg(long)]
     pub quiet: bool,
 }
@@ -359,7 +359,7 @@ pub struct TradeoffArguments {
     /// Replace a folder of earlier results.
     #[arg(long)]
     pub force: bool,
-    /// No progress bar and no warnings.
+    /// No progress and no warnings.
     #[arg(long)]
     pub quiet: bool,
 }
@@ -379,7 +379,7 @@ pub struct ReproduceArguments {
     /// Replace a folder of earlier results.
     #[arg(long)]
     pub force: bool,
-    /// No progress bar.
+    /// No progress.
     #[arg(long)]
     pub quiet: bool,
 }
@@ -390,7 +390,7 @@ pub struct BenchArguments {
     /// Change a parameter of the default scene, e.g. `contact.friction=0.2`; may be repeated, the last wins.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = change)]
     pub changes: Vec<(String, String)>,
-    /// No progress bar.
+    /// No progress.
     #[arg(long)]
     pub quiet: bool,
 }

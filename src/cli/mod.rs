@@ -4,6 +4,8 @@ mod args;
 mod assembly;
 mod bench;
 mod check;
+#[cfg(feature = "gui")]
+mod drivers;
 mod failure;
 mod impacts;
 mod interrupt;
@@ -66,7 +68,10 @@ fn dispatch(arguments: Arguments) -> Result<(), Failure> {
         Some(Command::Check(arguments)) => check::check(&arguments),
         Some(Command::Run(arguments)) => run::run(&arguments),
         #[cfg(feature = "gui")]
-        Some(Command::Render(arguments)) => render::render(&arguments),
+        Some(Command::Render(arguments)) => {
+            drivers::quieten();
+            render::render(&arguments)
+        }
         #[cfg(not(feature = "gui"))]
         Some(Command::Render(_)) => Err(no_graphics()),
         Some(Command::Tradeoff(arguments)) => tradeoff::tradeoff(&arguments),
@@ -81,6 +86,7 @@ fn dispatch(arguments: Arguments) -> Result<(), Failure> {
 #[cfg(feature = "gui")]
 fn view(scene: &OsStr, changes: &[(String, String)], link: Option<&str>) -> Result<(), Failure> {
     use crate::app::{AppOptions, WindowError, run_native};
+    drivers::quieten();
     let options = match link {
         Some(link) => AppOptions::from_link(link).map_err(Failure::usage)?,
         None => AppOptions::new(Scene::load(scene, changes)?),

@@ -1,13 +1,31 @@
-//! Progress bar on standard error, where that is a terminal.
+//! How far a long command is, on standard error: a bar on a terminal, elsewhere a line now and then.
 
 use std::io::IsTerminal;
+use std::thread;
+use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle, WeakProgressBar};
 
-/// A bar of `length`, or an invisible one.
+/// Time between two lines.
+const INTERVAL: Duration = Duration::from_secs(10);
+
+/// A bar of `length`, or one that nobody sees.
 pub fn bar(wanted: bool, length: u64) -> ProgressBar {
-    if !wanted || !std::io::stderr().is_terminal() {
+    if !wanted {
         return ProgressBar::hidden();
+    }
+    if !std::io::stderr().is_terminal() {
+        let bar = ProgressBar::with_draw_target(Some(length), ProgressDrawTarget::hidden());
+        let (told, start) = (bar.downgrade(), Instant::now());
+        let wait = move || {
+            thread::sleep(INTERVAL);
+            start.elapsed()
+        };
+        // Without the thread it goes on in silence.
+        let _ = thread::Builder::new()
+            .name("progress".to_owned())
+            .spawn(move || tell(&told, wait, super::complain));
+        return bar;
     }
     let bar = ProgressBar::with_draw_target(Some(length), ProgressDrawTarget::stderr());
     // Without the style the bar has its standard look.
@@ -17,4 +35,76 @@ pub fn bar(wanted: bool, length: u64) -> ProgressBar {
         bar.set_style(style);
     }
     bar
+}
+
+/// Says how far `bar` is whenever `wait` comes back, which gives the time since the start; until the work is over.
+fn tell(bar: &WeakProgressBar, mut wait: impl FnMut() -> Duration, mut say: impl FnMut(&str)) {
+    // What was done before the first look may be from an earlier run, and says nothing about the speed.
+    let mut first = None;
+    loop {
+        let elapsed = wait();
+        let Some(bar) = bar.upgrade().filter(|bar| !bar.is_finished()) else {
+            return;
+        };
+        let (done, all) = (bar.position(), bar.length().unwrap_or(0).max(1));
+        let mut line = format!(
+            "progress: {} %, {} elapsed",
+            (100.0 * done as f64 / all as f64).min(100.0).floor(),
+            HumanDuration(elapsed)
+        );
+        let (since, before) = *first.get_or_insert((elapsed, done));
+        if done > before {
+            let rate = (done - before) as f64 / (elapsed - since).as_secs_f64();
+            let left = all.saturating_sub(done) as f64 / rate;
+            if let Ok(left) = Duration::try_from_secs_f64(left) {
+                line.push_str(&format!(", about {} to go", HumanDuration(left)));
+            }
+        }
+        say(&line);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_says_how_far_it_is_at_each_look_until_the_work_is_over() {
+        let bar = ProgressBar::with_draw_target(Some(1000), ProgressDrawTarget::hidden());
+        let told = bar.downgrade();
+        // Half of it was done by an earlier run.
+        bar.set_position(500);
+        let mut held = Some(bar);
+        let mut now = Duration::ZERO;
+        let wait = || {
+            now += INTERVAL;
+            match now.as_secs() {
+                ..50 => held.as_ref().expect("at work").inc(100),
+                _ => held = None,
+            }
+            now
+        };
+        let mut lines = Vec::new();
+        tell(&told, wait, |line| lines.push(line.to_owned()));
+        assert_eq!(
+            lines,
+            [
+                "progress: 60 %, 10 seconds elapsed",
+                "progress: 70 %, 20 seconds elapsed, about 30 seconds to go",
+                "progress: 80 %, 30 seconds elapsed, about 20 seconds to go",
+                "progress: 90 %, 40 seconds elapsed, about 10 seconds to go",
+            ]
+        );
+    }
+
+    #[test]
+    fn nothing_is_said_of_work_that_is_finished_at_the_first_look() {
+        let bar = ProgressBar::with_draw_target(Some(10), ProgressDrawTarget::hidden());
+        bar.finish_and_clear();
+        tell(
+            &bar.downgrade(),
+            || INTERVAL,
+            |line| panic!("it says {line}"),
+        );
+    }
 }

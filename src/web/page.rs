@@ -164,14 +164,6 @@ impl Page {
         });
     }
 
-    /// Panics in the next frame, so that a test sees what a crash leaves on the page.
-    pub fn crash(&self) {
-        self.with(|laboratory| {
-            laboratory.ctx.add_plugin(Crash);
-            laboratory.ctx.request_repaint();
-        });
-    }
-
     fn with<T>(&self, ask: impl FnOnce(&mut Laboratory) -> T) -> Option<T> {
         // After a panic it stays borrowed.
         self.laboratory.try_borrow_mut().ok()?.as_mut().map(ask)
@@ -295,18 +287,5 @@ impl eframe::App for OnCanvas {
             laboratory.app.ui(ui, frame);
             laboratory.frames = laboratory.frames.wrapping_add(1);
         }
-    }
-}
-
-/// See [`Page::crash`].
-struct Crash;
-
-impl egui::Plugin for Crash {
-    fn debug_name(&self) -> &'static str {
-        "crash"
-    }
-
-    fn on_begin_pass(&mut self, _ui: &mut egui::Ui) {
-        panic!("a crash was asked for");
     }
 }

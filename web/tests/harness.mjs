@@ -5,6 +5,9 @@
 //     assert.equal((await lab.state()).steps, 1);
 //     await lab.close();        // fails the test if the console has errors
 //
+// Time stands still on an open page: it passes by the frames that a gesture or a wait of the test asks for, 50 ms each
+// (inside.mjs). Nothing passes by that a slow machine could miss.
+//
 // `PAGE`: folder of the page; `NATIVE`: the native program; `CHROMIUM`: the browser. ./test sets what it builds.
 
 import assert from 'node:assert/strict';
@@ -18,6 +21,8 @@ import { promisify } from 'node:util';
 import pixelmatch from 'pixelmatch';
 import { chromium } from 'playwright-core';
 import { PNG } from 'pngjs';
+
+import { driveTime } from './inside.mjs';
 
 export const ROOT = fileURLToPath(new URL('../../', import.meta.url));
 export const PAGE = path.resolve(process.env.PAGE ?? path.join(ROOT, 'target/page'));
@@ -43,8 +48,8 @@ const FLAGS = [
 /** Small, because a software adapter draws some hundred thousand pixels a second. */
 export const SIZE = { width: 800, height: 560 };
 
-/** Longest wait for anything, ms: software rendering on a busy machine is slow. */
-const PATIENCE = 60_000;
+/** Longest wait for anything, ms: whatever takes so long will never come. */
+const PATIENCE = 300_000;
 
 let server;
 let browser;
@@ -70,7 +75,7 @@ async function launch() {
     return browser;
 }
 
-/** Ends browser and server; call once after all tests of a file. */
+/** Ends browser and server; after the last test of all files that run together. */
 export async function quit() {
     await browser?.close();
     server?.child.removeAllListeners('exit');
@@ -80,11 +85,12 @@ export async function quit() {
 
 /**
  * Opens the page. `query`: what follows `?`. Options: `backend` 'webgl' or 'webgpu' (appended to the query), `size`
- * {width, height}, `fragment` (what follows `#`), `before` (a function that runs in the page before its scripts),
- * `context` (options of a Playwright context, e.g. {hasTouch: true}), `expectTrouble` (do not wait for a picture).
+ * {width, height}, `fragment` (what follows `#`), `before` (functions that run in the page before its scripts),
+ * `context` (options of a Playwright context, e.g. {hasTouch: true}), `expectTrouble` (do not wait for a picture),
+ * `ownTime` (time passes by the clock on the wall, as for a user).
  */
 export async function open(query = '', options = {}) {
-    const { backend, size = SIZE, fragment = '', before, context = {}, expectTrouble = false } = options;
+    const { backend, size = SIZE, fragment = '', before = [], context = {}, expectTrouble = false, ownTime = false } = options;
     const address = await serve();
     for (const lab of opened) await lab.close({ errors: true });
     const own = await (await launch()).newContext({ viewport: size, ...context });
@@ -92,12 +98,14 @@ export async function open(query = '', options = {}) {
     const lab = new Lab(own, page);
     opened.add(lab);
     page.setDefaultTimeout(PATIENCE);
-    if (before) await page.addInitScript(before);
+    for (const script of ownTime ? [before] : [driveTime, before]) {
+        for (const part of [script].flat()) await page.addInitScript(part);
+    }
     const parts = [query, backend ? `renderer=${backend}` : ''].filter(Boolean).join('&');
     await page.goto(`${address}${parts ? `?${parts}` : ''}${fragment ? `#${fragment}` : ''}`);
     await lab.started();
     if (!expectTrouble) {
-        const trouble = await page.evaluate(() => globalThis.jointplay.trouble);
+        const trouble = await lab.ask(() => globalThis.jointplay.trouble);
         assert.equal(trouble, null, `the page did not start: ${JSON.stringify(trouble)}`);
     }
     return lab;
@@ -122,9 +130,31 @@ export class Lab {
         if (!errors) assert.deepEqual(this.errors, [], 'errors on the console');
     }
 
-    /** Waits until the laboratory, or what keeps it from running, is on show. */
+    /** What a function gives that runs in the page; `undefined` while the page is being replaced by another. */
+    async ask(question, argument) {
+        try {
+            return await this.page.evaluate(question, argument);
+        } catch (error) {
+            if (/context was destroyed|navigation/.test(error.message)) return undefined;
+            throw error;
+        }
+    }
+
+    /** Waits until the laboratory, or what keeps it from running, is on show. Time stands still from there. */
     async started() {
-        await this.page.waitForFunction(() => globalThis.jointplay?.ready || globalThis.jointplay?.trouble);
+        await this.until(async () => {
+            await this.ask(() => globalThis.drivenTime?.free());
+            return this.ask(() => globalThis.jointplay?.ready || globalThis.jointplay?.trouble);
+        }, 'the page does not start');
+        await this.ask(() => globalThis.drivenTime && (globalThis.drivenTime.held = true));
+    }
+
+    /** Draws so many frames, and lets the time pass that they stand for. */
+    async frame(count = 1) {
+        await this.ask(async (count) => {
+            if (globalThis.drivenTime) return globalThis.drivenTime.step(count);
+            for (; count > 0; count -= 1) await new Promise(requestAnimationFrame);
+        }, count);
     }
 
     /** What the laboratory is doing: see `state` in src/web/page.rs. */
@@ -154,12 +184,13 @@ export class Lab {
 
     /** Clicks the middle of a control. */
     async click(role, label) {
-        await this.drawn();
-        const [x, y] = middle(await this.find(role, label));
-        await this.page.mouse.move(x, y);
-        await this.drawn();
-        await this.page.mouse.click(x, y, { delay: 60 });
-        await this.drawn();
+        await this.frame();
+        await this.clickAt(...middle(await this.find(role, label)));
+    }
+
+    /** Clicks a point. */
+    async clickAt(x, y) {
+        await this.drag([[x, y]]);
     }
 
     /** Drags with the left button along `points` [[x, y], …], a frame at least between two of them. */
@@ -167,15 +198,16 @@ export class Lab {
         const [first, ...rest] = points;
         const { mouse } = this.page;
         await mouse.move(...first);
-        await this.drawn();
+        await this.frame();
         await mouse.down();
-        await this.drawn();
+        await this.frame();
         for (const point of rest) {
             await mouse.move(...point);
-            await this.drawn();
+            await this.frame();
         }
         await mouse.up();
-        await this.drawn();
+        // The first shows what the release did at once, the second what follows from it.
+        await this.frame(2);
     }
 
     /** Drags a slider to `part` (0 left, 1 right end) of its travel. */
@@ -194,10 +226,8 @@ export class Lab {
     async fingers(...paths) {
         const cdp = await this.context.newCDPSession(this.page);
         const send = async (type, touchPoints) => {
-            const before = await this.frames();
             await cdp.send('Input.dispatchTouchEvent', { type, touchPoints });
-            // No longer: a finger that rests for 0.8 s is a long press, and turns nothing.
-            await this.drawn({ before, patience: 300 });
+            await this.frame();
         };
         const at = (step, count = paths.length) => paths.slice(0, count).map((path, id) => ({ x: path[step][0], y: path[step][1], id }));
         for (let count = 1; count <= paths.length; count += 1) {
@@ -208,14 +238,13 @@ export class Lab {
         }
         await send('touchEnd', []);
         await cdp.detach();
-        await this.drawn();
+        await this.frame();
     }
 
     /** Taps a control with a finger. */
     async tap(role, label) {
-        await this.drawn();
+        await this.frame();
         await this.fingers([middle(await this.find(role, label))]);
-        await this.drawn();
     }
 
     /** Lets a file fall on the laboratory. */
@@ -228,7 +257,7 @@ export class Lab {
                 canvas.dispatchEvent(new DragEvent(kind, { dataTransfer, bubbles: true, cancelable: true }));
             }
         }, [name, text]);
-        await this.drawn();
+        await this.frame();
     }
 
     /** What a screen reader can read of the machine. */
@@ -247,14 +276,16 @@ export class Lab {
 
     /** Presses a key, as Playwright names it. */
     async key(name) {
-        await this.page.keyboard.press(name, { delay: 60 });
-        await this.drawn();
+        await this.page.keyboard.down(name);
+        await this.frame();
+        await this.page.keyboard.up(name);
+        await this.frame();
     }
 
     /** Pauses and runs on to `seconds`. */
     async runTo(seconds) {
         await this.page.evaluate((time) => globalThis.jointplay.page.runTo(time), seconds);
-        await this.drawn();
+        await this.frame();
     }
 
     /** Frames drawn so far. */
@@ -262,31 +293,39 @@ export class Lab {
         return this.page.evaluate(() => globalThis.jointplay.page.frames());
     }
 
-    /** Waits until the page is drawn anew since it had `before` frames, or for a while, ms, where it has no reason to. */
-    async drawn({ before, patience = 1000 } = {}) {
-        const start = before ?? (await this.frames());
-        const end = Date.now() + patience;
-        while ((await this.frames()) === start && Date.now() < end) await sleep(20);
-    }
-
-    /** Waits until nothing moves on the page any more. */
+    /** Waits until nothing moves on the page any more: until it wants no new picture in three quarters of a second. */
     async still() {
         await this.until(async () => {
             const before = await this.frames();
-            await sleep(700);
+            await this.frame(15);
             return (await this.frames()) === before;
         }, 'the page does not come to rest');
     }
 
-    /** Waits until `test` gives something true, and gives that back. `message`: a text, or a function that makes one. */
-    async until(test, message, patience = PATIENCE) {
-        const end = Date.now() + patience;
+    /**
+     * Waits until `test` gives something true, and gives that back; frames are drawn meanwhile, after each look one.
+     * `message`: a text, or a function that makes one.
+     */
+    async until(test, message) {
+        const end = Date.now() + PATIENCE;
         for (;;) {
             const result = await test();
             if (result) return result;
             if (Date.now() > end) assert.fail(typeof message === 'function' ? message() : message);
-            await sleep(50);
+            await this.frame();
         }
+    }
+
+    /** Lets what workers say through up to the next message of this kind, and gives that one. Needs `holdWorkers`. */
+    async hear(kind) {
+        const end = Date.now() + PATIENCE;
+        while (Date.now() < end) {
+            const message = await this.page.evaluate((kind) => globalThis.heldPost.pass(kind), kind);
+            if (message) return message;
+            // The worker has the machine for itself meanwhile.
+            await new Promise((done) => setTimeout(done, 100));
+        }
+        return assert.fail(`the worker says no ${kind}`);
     }
 
     /** What stands on the screen, a pngjs picture. `clip`: {x, y, width, height}. */
@@ -294,8 +333,6 @@ export class Lab {
         return PNG.sync.read(await this.page.screenshot({ clip }));
     }
 }
-
-export const sleep = (milliseconds) => new Promise((done) => setTimeout(done, milliseconds));
 
 export function middle({ rect: [x0, y0, x1, y1] }) {
     return [(x0 + x1) / 2, (y0 + y1) / 2];

@@ -10,13 +10,15 @@ use wasm_bindgen_cli_support::Bindgen;
 const NAME: &str = "jointplay";
 /// The page's own files, from the root of the project.
 const PAGE: &str = "index.html";
-/// Scripts and styles beside it, copied as they are.
-const PARTS: [&str; 5] = [
+/// Scripts, style and icon beside it, copied as they are.
+const PARTS: [&str; 7] = [
+    "web/stuck.js",
     "web/main.js",
     "web/host.js",
     "web/canvas.js",
     "web/worker.js",
     "web/page.css",
+    "web/icon.svg",
 ];
 
 /// Writes the page into `folder`, which is made anew and replaced only as a whole. `compress`: also each file as
