@@ -29,6 +29,16 @@ pub fn number(value: f64, digits: usize) -> String {
     format_quantity_digits(value, "", digits)
 }
 
+/// Digits that tell values apart which lie as close as a thousandth of `span`, where they are as large as `most`.
+pub fn digits_within(span: f64, most: f64) -> usize {
+    let more = (most / span).log10().ceil();
+    if more.is_finite() {
+        4 + (more.max(0.0) as usize).min(11)
+    } else {
+        4
+    }
+}
+
 /// A small share, as a power of ten where a decimal would hide its size: `2e-6`.
 pub fn power_of_ten(share: f64) -> String {
     if share == 0.0 || (1e-3..1e4).contains(&share.abs()) {

@@ -255,7 +255,10 @@ impl Viewport {
             .and_then(|pixel| self.view.pick(&shot, Vec2::new(pixel.x, pixel.y)));
         // egui has dropped the clone of the frame before: nothing is copied.
         self.view.build(&shot, Arc::make_mut(&mut self.list));
-        if let Some(twin) = player.twin() {
+        // One that starts at the end of the step on show has not started yet.
+        if let Some(twin) = player.twin()
+            && twin.frame().time <= player.frame().time
+        {
             let list = Arc::make_mut(&mut self.list);
             self.view.add_ghost(&shot, twin.frame(), list);
         }

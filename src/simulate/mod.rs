@@ -15,7 +15,7 @@ mod stepper;
 pub use angles::angles_of;
 pub use channels::*;
 pub use frame::*;
-pub use history::History;
+pub use history::{Bin, History, Mark};
 pub use impacts::Impact;
 pub use ledger::Ledger;
 pub use pace::{LARGEST_BUDGET, LONGEST_FRAME, Pacer, SCALE_RANGE};
