@@ -222,6 +222,10 @@ fn spans(
     let mut pen: Option<(f64, f64)> = None;
     let mut extremes: Vec<(f64, f64)> = Vec::new();
     for (index, bin) in bins.iter().enumerate() {
+        if bin.least.is_nan() || bin.greatest.is_nan() {
+            pen = None;
+            continue;
+        }
         let next = bins.get(index + 1).filter(|next| next.from == bin.to);
         let exit = next.map(|next| {
             // The middle of what both have, or of the jump between them.
@@ -470,3 +474,6 @@ fn parts(points: impl Iterator<Item = Pos2>) -> Vec<Vec<Pos2>> {
     parts.retain(|part| part.len() > 1);
     parts
 }
+
+#[cfg(all(test, not(target_arch = "wasm32")))]
+mod tests;

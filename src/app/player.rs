@@ -712,6 +712,122 @@ mod tests {
         }
     }
 
+    /// The instant on show is that of frame, record, peaks and sections, whatever the run itself has computed beyond it.
+    fn one_clock(player: &Player) {
+        let shown = player.pacer.shown();
+        assert_eq!(player.frame().time, shown);
+        let (_, end) = player.history().span().expect("recorded");
+        assert_eq!(end, shown);
+        assert!(player.peaks().iter().all(|peak| peak.time <= shown));
+        assert!(player.watch().orbit().all(|(time, _)| *time <= shown));
+        assert!(player.watch().sections().all(|(time, _)| *time <= shown));
+        assert!(player.simulation().time() >= shown);
+    }
+
+    #[test]
+    fn nothing_tells_of_what_is_still_to_come() {
+        let mut player = player("spcmm");
+        one_clock(&player);
+        player.pacer.set_scale(0.01);
+        player.set_playing(true);
+        let mut within = 0;
+        for frame in 0..150 {
+            player.advance(1.0 / 60.0);
+            one_clock(&player);
+            let far = player.simulation().time() - player.pacer.shown();
+            within += usize::from(far > 1e-4);
+            if frame == 60 {
+                player.set_playing(false);
+                player.advance(1.0 / 60.0);
+                one_clock(&player);
+                player.set_playing(true);
+            }
+        }
+        assert!(within > 20, "in the midst of long steps: {within}");
+        // Strictly after the peak of the second impact: the record has its top, and the last value is that on show.
+        let forces = recorded(&player, Quantity::NormalForce, 1.0);
+        let peak = player.simulation().statistics().peak_normal[0];
+        let top = forces.iter().map(|p| p[1]).fold(0.0, f64::max);
+        assert!((top / peak - 1.0).abs() < 1e-6, "{top} {peak}");
+        for back in 0..6 {
+            player.single_step();
+            one_clock(&player);
+            if back > 2 {
+                player.step_back();
+                one_clock(&player);
+            }
+        }
+        player.run_to(0.2);
+        one_clock(&player);
+        player.reset().expect("starts");
+        one_clock(&player);
+        assert!(player.peaks().iter().all(|peak| *peak == Peak::default()));
+        assert_eq!(player.history().rows(9).len(), 1);
+    }
+
+    #[test]
+    fn after_steps_back_the_record_is_as_before_and_another_future_follows_it() {
+        let mut player = player("spcmm");
+        player.run_to(8.6e-3);
+        player.single_step();
+        let rows = player.history().rows(200);
+        for _ in 0..40 {
+            player.single_step();
+        }
+        assert!(player.history().rows(200) != rows);
+        for _ in 0..40 {
+            player.step_back();
+        }
+        assert!(player.history().rows(200) == rows);
+        // A change takes nothing of the past away.
+        player.set("contact.friction", "0.3").expect("in range");
+        assert!(player.history().rows(200) == rows);
+        player.run_to(12e-3);
+        one_clock(&player);
+        let forces = recorded(&player, Quantity::NormalForce, 8.6e-3);
+        assert!(forces.iter().any(|point| point[1] > 300.0));
+    }
+
+    #[test]
+    fn a_change_in_the_middle_of_a_step_leaves_the_rest_of_it_as_it_was() {
+        let (mut player, mut other) = (player("spcmm"), player("spcmm"));
+        for player in [&mut player, &mut other] {
+            player.pacer.set_scale(0.005);
+            player.set_playing(true);
+            while player.simulation().time() < 2e-3 + player.pacer.shown() {
+                player.advance(1.0 / 60.0);
+            }
+        }
+        let change = player.simulation().time();
+        player.set("contact.clearance", "0.6 mm").expect("in range");
+        one_clock(&player);
+        // The run goes on as if it had been changed there by itself.
+        let mut straight = Simulation::new(other.scene()).expect("starts");
+        straight
+            .restore(&other.simulation().snapshot())
+            .expect("the same scene");
+        straight
+            .set("contact.clearance", "0.6 mm")
+            .expect("in range");
+        assert_eq!(player.simulation().state_hash(), straight.state_hash());
+        let mut frames = 0;
+        loop {
+            player.advance(1.0 / 60.0);
+            other.advance(1.0 / 60.0);
+            one_clock(&player);
+            if player.pacer.shown() >= change {
+                break;
+            }
+            frames += 1;
+            assert_eq!(player.frame().pose, other.frame().pose);
+            assert_eq!(player.frame().joints, other.frame().joints);
+        }
+        assert!(frames > 5, "{frames}");
+        assert_eq!(player.frame().joints[0].clearance, 0.6e-3);
+        let clearances = recorded(&player, Quantity::Clearance, 1.0);
+        assert!(clearances[0][1] < 0.31e-3);
+    }
+
     #[test]
     fn a_window_that_was_hidden_for_minutes_goes_on_and_does_not_catch_up() {
         let mut player = player("spcmm");

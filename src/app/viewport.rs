@@ -11,8 +11,8 @@ use glam::{Vec2, Vec3};
 use super::overlay;
 use super::player::Player;
 use super::share::CameraPose;
+use super::value;
 use crate::render;
-use crate::scene::format_quantity_digits;
 use crate::simulate::ContactState;
 use crate::view::{
     ArrowMemory, Camera, DrawList, Picked, Preset, Scaling, SceneView, Shot, Theme, ViewOptions,
@@ -540,7 +540,7 @@ fn describe(ui: &mut Ui, player: &Player, picked: Picked) {
     // A tooltip is as wide as its longest line, not as the first.
     ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Extend);
     let row = |ui: &mut Ui, name: &str, si: f64, unit: &str| {
-        ui.label(format!("{name}  {}", format_quantity_digits(si, unit, 4)));
+        ui.label(format!("{name}  {}", value::quantity(si, unit, 4)));
     };
     let frame = player.frame();
     let Some(name) = name_of(player, picked) else {

@@ -270,10 +270,10 @@ impl History {
         let whole = |kept: f32| {
             let value = base + f64::from(kept);
             // As far from its base as that is from zero, it has no more digits than this: zero stays zero.
-            if value.abs() > f64::from(f32::EPSILON) * base.abs() {
-                value
-            } else {
+            if value.abs() <= f64::from(f32::EPSILON) * base.abs() {
                 0.0
+            } else {
+                value
             }
         };
         found.map(|(least, greatest)| (whole(least), whole(greatest)))

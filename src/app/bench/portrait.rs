@@ -8,9 +8,8 @@ use super::plane::{Axis, plane};
 use crate::analysis::drive::observed;
 use crate::app::curve::Path;
 use crate::app::player::Player;
-use crate::app::theme;
 use crate::app::watch::Observed;
-use crate::scene::format_quantity_digits;
+use crate::app::{theme, value};
 
 /// Height of each plot, points.
 const HEIGHT: f32 = 190.0;
@@ -87,7 +86,7 @@ impl Portrait {
             RichText::new(format!(
                 "Sections: {}, one every {}",
                 self.sections.len(),
-                format_quantity_digits(period, "s", 5)
+                value::quantity(period, "s", 5)
             ))
             .small()
             .weak(),
