@@ -8,6 +8,11 @@ use egui_kittest::{
 };
 use jointplay::app::{App, AppOptions};
 use jointplay::scene::Scene;
+use jointplay::simulate::Quantity;
+
+#[path = "common/pixels.rs"]
+mod pixels;
+use pixels::Picture;
 
 /// The wide window on `scene` at t = 0, paused.
 fn window(scene: &str) -> Harness<'static, App> {
@@ -660,7 +665,7 @@ fn the_accuracy_of_the_running_scene_stands_beside_the_controls() {
 fn the_energy_balance_is_stacked_from_both_sides() {
     let mut harness = window("spcmm");
     let plots = harness.state_mut().plots_mut();
-    plots.chosen = vec![jointplay::simulate::Quantity::EnergyBalance];
+    plots.chosen = vec![Quantity::EnergyBalance];
     plots.window = jointplay::app::Window::Everything;
     harness.state_mut().player_mut().run_to(0.05);
     harness.run();
@@ -696,4 +701,155 @@ fn a_preset_is_measured_beside_the_running_scene() {
     player.set("contact.friction", "0.3").expect("in range");
     harness.run_steps(2);
     assert_eq!(unknown(&harness), 2);
+}
+
+/// Colours of the first three curves in the light theme.
+const CURVES: [[u8; 3]; 3] = [[0x00, 0x72, 0xB2], [0xD5, 0x5E, 0x00], [0x00, 0x8F, 0x68]];
+
+fn picture(harness: &mut Harness<'_, App>) -> Picture {
+    let image = harness.render().expect("drawn");
+    Picture::new(image.width(), image.into_raw())
+}
+
+/// Pixels around the place of a value in the plot of the normal force, from the top of the plot down to a little above zero.
+fn spike(harness: &mut Harness<'_, App>, time: f64, force: f64) -> ([usize; 4], f64) {
+    let plots = harness.state_mut().plots_mut();
+    let place = |force| {
+        plots
+            .place(Quantity::NormalForce, time, force)
+            .expect("shown")
+    };
+    let (zero, at) = (place(0.0), place(force));
+    let top = place(1000.0).y.max(0.0);
+    let area = [
+        at.x as usize - 3,
+        top as usize,
+        at.x as usize + 4,
+        zero.y as usize - 4,
+    ];
+    (area, f64::from(at.y))
+}
+
+#[test]
+fn plotted_peaks_are_those_of_the_run() {
+    for size in [[1200.0, 740.0], [900.0, 500.0], [1600.0, 1000.0]] {
+        let mut harness = sized("spcmm", size, egui::Theme::Light);
+        // All three strike within a tenth of a millisecond: 621, 561 and 533 N (`tests/reference.rs`).
+        harness.state_mut().player_mut().run_to(9e-3);
+        harness.run();
+        let statistics = harness.state().player().simulation().statistics().clone();
+        let drawn = picture(&mut harness);
+        for (joint, colour) in CURVES.into_iter().enumerate() {
+            let (time, force) = (statistics.peak_time[joint], statistics.peak_normal[joint]);
+            let (area, y) = spike(&mut harness, time, force);
+            let top = drawn.top(area, colour, 110).expect("every joint is seen");
+            assert!(
+                (top as f64 + 0.5 - y).abs() <= 1.0,
+                "{size:?}: {force} N of joint {joint} at row {top}, not {y}"
+            );
+        }
+        // In the midst of an impact: the newest of it is the highest, and nothing is drawn beyond it.
+        let player = harness.state_mut().player_mut();
+        player.run_to(14.9e-3);
+        let (shown, force) = (
+            player.pacer.shown(),
+            player.frame().joints[0].normal_force.norm(),
+        );
+        assert!(force > 300.0, "{force}");
+        harness.run();
+        let drawn = picture(&mut harness);
+        let ([left, top, right, bottom], y) = spike(&mut harness, shown, force);
+        let highest = drawn
+            .top([left, top, right, bottom], CURVES[0], 110)
+            .expect("drawn");
+        assert!(
+            (highest as f64 + 0.5 - y).abs() <= 1.0,
+            "{force} N at row {highest}, not {y}"
+        );
+        let beyond = [left + 5, top, left + 60, bottom + 10];
+        for colour in CURVES {
+            assert_eq!(drawn.coloured(beyond, colour, 110), []);
+        }
+    }
+}
+
+#[test]
+fn a_low_plot_keeps_its_numbers() {
+    for height in [740.0, 470.0, 400.0, 320.0] {
+        let mut harness = sized("spcmm", [1000.0, height], egui::Theme::Light);
+        harness.state_mut().player_mut().run_to(9e-3);
+        harness.run();
+        let plots = harness.state_mut().plots_mut();
+        let row = |force| plots.place(Quantity::NormalForce, 0.0, force);
+        let (zero, above) = (row(0.0).expect("shown"), row(600.0).expect("shown"));
+        let drawn = picture(&mut harness);
+        // Numbers stand to the left of the plot: rows that have ink in them, in how many pieces.
+        let inked = |y: usize| {
+            let left = zero.x as usize;
+            (left - 36..left - 3).any(|x| drawn.at(x, y).into_iter().all(|part| part < 150))
+        };
+        let rows: Vec<bool> = (above.y as usize - 8..(zero.y as usize + 8).min(height as usize))
+            .map(inked)
+            .collect();
+        let pieces = rows.windows(2).filter(|pair| !pair[0] && pair[1]).count();
+        assert!(pieces >= 2, "{height}: {pieces} numbers");
+    }
+}
+
+#[test]
+fn the_clearance_of_the_past_stays_where_it_was() {
+    let mut harness = window("spcmm");
+    let player = harness.state_mut().player_mut();
+    player.run_to(0.02);
+    player.set("contact.clearance", "0.6 mm").expect("in range");
+    player.run_to(0.05);
+    harness.run();
+    let drawn = picture(&mut harness);
+    // Dashed in the colour of weak text: how much of it there is in a row, from one time to another.
+    let dashes = |harness: &mut Harness<'_, App>, from: f64, to: f64, clearance: f64| {
+        let plots = harness.state_mut().plots_mut();
+        let place = |time| plots.place(Quantity::Eccentricity, time, clearance);
+        let (left, right) = (place(from).expect("shown"), place(to).expect("shown"));
+        let row = left.y.floor() as usize;
+        let area = [left.x as usize, row - 1, right.x as usize, row + 2];
+        let found = drawn.coloured(area, [0x57, 0x64, 0x70], 70).len() as f32;
+        found / (right.x - left.x)
+    };
+    for (clearance, past, since) in [(0.3e-3, true, false), (0.6e-3, false, true)] {
+        let before = dashes(&mut harness, 1e-3, 0.018, clearance);
+        let after = dashes(&mut harness, 0.025, 0.049, clearance);
+        assert_eq!(
+            (before > 0.3, after > 0.3),
+            (past, since),
+            "{clearance}: {before} {after}"
+        );
+    }
+}
+
+#[test]
+fn units_are_printed_alike_everywhere() {
+    let mut harness = window("spcmm");
+    for group in ["Gravity", "Solver", "Contact"] {
+        harness.get_by_role_and_label(Role::Button, group).click();
+        harness.run();
+    }
+    let field = harness.get_by_role_and_label(Role::TextInput, "Gravity X");
+    assert_eq!(field.value().as_deref(), Some("9.81 m/s²"));
+    type_into(&mut harness, "Gravity X", "9.7 m/s²");
+    type_into(&mut harness, "Gravity Y", "1 kg");
+    let nodes = harness.root().children_recursive();
+    let texts = nodes.flat_map(|node| {
+        let node = node.accesskit_node();
+        [node.label(), node.value()].map(|text| text.map(|text| text.to_string()))
+    });
+    let plain: Vec<String> = texts
+        .flatten()
+        .filter(|text| {
+            text.contains("^2")
+                || text
+                    .split(|c: char| !c.is_alphabetic())
+                    .any(|w| w == "um" || w == "us")
+        })
+        .collect();
+    assert!(plain.is_empty(), "{plain:?}");
 }

@@ -114,7 +114,7 @@ impl Accuracy {
         let doubts = player.simulation().doubts().into_iter();
         let doubts = doubts.map(|doubt| doubt.to_string());
         for doubt in doubts.filter(|doubt| !said.contains(doubt)) {
-            let words = RichText::new(doubt).small();
+            let words = RichText::new(value::typeset(&doubt)).small();
             ui.label(words.color(ui.visuals().warn_fg_color));
         }
     }
@@ -257,7 +257,7 @@ fn solver(player: &Player, preset: Option<Preset>) -> Row {
     let size = if solver.method.is_adaptive() {
         value::power_of_ten(solver.tolerance)
     } else {
-        crate::scene::format_quantity(solver.step, "us")
+        value::quantity(solver.step, "us", 6)
     };
     let name = preset.map_or_else(
         || "no preset".to_owned(),
@@ -356,7 +356,7 @@ fn residual(player: &Player) -> Option<Row> {
         doubtful: share > BALANCED,
         help: format!(
             "Energy that the ledger cannot account for since the start, over the energy exchanged ({}). Amber beyond {}.",
-            crate::scene::format_quantity_digits(ledger.exchanged, "J", 3),
+            value::quantity(ledger.exchanged, "J", 3),
             value::power_of_ten(BALANCED)
         ),
     })

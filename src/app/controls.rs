@@ -13,8 +13,7 @@ use super::icons::{Icon, icon_button};
 use super::player::Player;
 use super::{theme, value};
 use crate::scene::{
-    Kind, Parameter, SceneError, Scope, Value, format_quantity, format_quantity_digits,
-    from_display, to_display,
+    Kind, Parameter, SceneError, Scope, Value, format_quantity_digits, from_display, to_display,
 };
 use crate::simulate::Effect;
 
@@ -176,7 +175,7 @@ impl Controls {
         });
         if let Some(error) = self.drafts.get(key).and_then(|draft| draft.error.as_ref()) {
             ui.label(
-                RichText::new(error)
+                RichText::new(value::typeset(error))
                     .small()
                     .color(ui.visuals().error_fg_color),
             );
@@ -199,7 +198,7 @@ impl Controls {
         }
         if let Some(warning) = player.warning(key) {
             ui.label(
-                RichText::new(warning)
+                RichText::new(value::typeset(warning))
                     .small()
                     .color(ui.visuals().warn_fg_color),
             );
@@ -480,7 +479,7 @@ fn tooltip(ui: &Ui, response: &Response, player: &Player, parameter: &Parameter,
     tooltip.popup = tooltip.popup.anchor(row).align(RectAlign::RIGHT_START);
     tooltip.show(|ui| {
         ui.strong(parameter.label);
-        ui.label(parameter.help);
+        ui.label(value::typeset(parameter.help));
         let equation = match parameter.equation.strip_prefix("Paper") {
             Some(rest) => format!("Enters paper{rest}"),
             None => parameter.equation.to_owned(),
@@ -488,13 +487,13 @@ fn tooltip(ui: &Ui, response: &Response, player: &Player, parameter: &Parameter,
         if !equation.is_empty() {
             ui.label(RichText::new(equation).small());
         }
-        let mut range = parameter.range();
+        let mut range = value::typeset(&parameter.range());
         if parameter.key == "contact.clearance"
             && let Ok(Value::Number(radius)) = player
                 .wanted()
                 .get(&key.replace("clearance", "ball_radius"))
         {
-            range = format!("{range} ({})", format_quantity(radius, "mm"));
+            range = format!("{range} ({})", value::quantity(radius, "mm", 6));
         }
         ui.label(RichText::new(format!("Range {range}")).small());
         ui.label(RichText::new(format!("Key {key}")).small().weak());

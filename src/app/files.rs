@@ -308,7 +308,7 @@ fn record_csv(player: &Player) -> String {
     for (time, values) in player.history().rows(ROWS) {
         let _ = write!(text, "{time:.9e}");
         for (least, greatest) in values {
-            let _ = write!(text, ",{least:e},{greatest:e}");
+            let _ = write!(text, ",{least:.7e},{greatest:.7e}");
         }
         text.push('\n');
     }
@@ -331,6 +331,7 @@ fn meta(player: &Player) -> String {
         scene: SceneText::of(player.wanted()),
         log: player.log().clone(),
         steps: Some(player.steps()),
+        time: Some(player.pacer.shown()),
         hash: Some(player.simulation().state_hash()),
         ..Link::default()
     };
@@ -344,7 +345,9 @@ fn meta(player: &Player) -> String {
         "method": word("solver.method"),
         "step_s": scene.solver.step,
         "tolerance": scene.solver.tolerance,
-        "time_s": player.simulation().time(),
+        "time_s": player.pacer.shown(),
+        // The state is that at the end of the latest step.
+        "state_time_s": player.simulation().time(),
         "state_hash": format!("{:016x}", player.simulation().state_hash()),
         "link": link.format(),
     });

@@ -8,6 +8,7 @@ mod announce;
 mod background;
 mod bench;
 mod controls;
+mod curve;
 mod dialogs;
 mod files;
 mod header;

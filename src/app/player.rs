@@ -10,17 +10,22 @@ use super::watch::Watch;
 use crate::analysis::section::Schedule;
 use crate::scene::{Scene, SceneError, Value};
 use crate::simulate::{
-    Channels, Effect, Frame, History, Pacer, Peak, Simulation, Snapshot, StartError, Stopped,
+    Channels, Effect, Frame, History, Mark, Pacer, Peak, Simulation, Snapshot, StartError, Stopped,
 };
 
 /// Narrowest bin of the record, s: shorter than any step that resolves an impact.
 const FINEST_BIN: f64 = 2e-6;
 
 /// A simulation and everything needed to play and plot it.
+///
+/// There is one instant on show, the pacer's: frame, record, peaks, sections and link are those of it. The simulation itself
+/// is further on by a part of its latest step, of which nothing is told before its time.
 pub struct Player {
     /// How fast simulated time passes.
     pub pacer: Pacer,
     simulation: Simulation,
+    /// The run as it was before a change in the middle of the latest step: what that step did until the change.
+    unchanged: Option<Box<Simulation>>,
     /// The scene as its file gives it.
     original: Scene,
     /// What is allowed but may not mean what the user expects.
@@ -29,14 +34,18 @@ pub struct Player {
     stopped: Option<Stopped>,
     frame: Frame,
     peaks: Vec<Peak>,
+    /// Of the latest step, as far as they are still to come.
+    coming: Vec<Peak>,
+    /// Since the frame before.
+    passed: Vec<Peak>,
     channels: Channels,
     history: History,
     recorded: Frame,
     values: Vec<f64>,
     /// When a ball last struck, s; `None` before the first time.
     last_impact: Option<f64>,
-    /// States before the latest single steps, oldest first, with the length that the log had.
-    past: VecDeque<(Snapshot, usize)>,
+    /// What was before the latest single steps, oldest first.
+    past: VecDeque<Before>,
     /// What was done since the start.
     log: Log,
     /// Instants at which steps end.
@@ -46,6 +55,15 @@ pub struct Player {
     /// Simulated time and seconds of stepping that it took, both fading.
     stepped: f64,
     stepping: f64,
+}
+
+/// What a single step is taken back to.
+struct Before {
+    state: Snapshot,
+    /// Length of the log.
+    entries: usize,
+    record: Mark,
+    last_impact: Option<f64>,
 }
 
 /// Keys of the solver that win over its preset.
@@ -86,6 +104,9 @@ impl Player {
             stopped: None,
             frame: Frame::default(),
             peaks: Vec::new(),
+            coming: Vec::new(),
+            passed: Vec::new(),
+            unchanged: None,
             history: History::new(channels.len(), FINEST_BIN),
             channels,
             recorded: Frame::default(),
@@ -151,7 +172,7 @@ impl Player {
 
     /// Another drive phase of the sections.
     pub fn set_phase(&mut self, phase: f64) {
-        self.watch.set_phase(phase, self.simulation.time());
+        self.watch.set_phase(phase, self.pacer.shown());
     }
 
     /// The twin run, if there is one.
@@ -259,9 +280,9 @@ impl Player {
                 clock.elapsed().as_secs_f64(),
             );
             self.pacer.end(dt, target, self.simulation.time());
-            self.simulation.sample(self.pacer.shown(), &mut self.frame);
+            self.present();
         }
-        self.take_peaks();
+        self.hand_out_peaks();
     }
 
     fn measure(&mut self, stepped: f64, stepping: f64) {
@@ -281,25 +302,35 @@ impl Player {
         if self.stopped.is_some() {
             return;
         }
+        // Where the step begins, not the instant on show within the one before.
+        self.record_until(self.simulation.time());
         if self.past.len() == PAST {
             self.past.pop_front();
         }
-        self.past
-            .push_back((self.simulation.snapshot(), self.log.entries.len()));
+        self.past.push_back(Before {
+            state: self.simulation.snapshot(),
+            entries: self.log.entries.len(),
+            record: self.history.mark(),
+            last_impact: self.last_impact,
+        });
         self.step();
         self.show_latest();
     }
 
     /// Takes the latest single step back; nothing where there is none.
     pub fn step_back(&mut self) {
-        let Some((snapshot, entries)) = self.past.pop_back() else {
+        let Some(before) = self.past.pop_back() else {
             return;
         };
         self.playing = false;
         // A scene that has run once starts again.
-        if self.simulation.restore(&snapshot).is_ok() {
+        if self.simulation.restore(&before.state).is_ok() {
             self.stopped = None;
-            self.log.entries.truncate(entries);
+            self.unchanged = None;
+            self.log.entries.truncate(before.entries);
+            self.history.rewind(&before.record);
+            self.last_impact = before.last_impact;
+            self.forget_peaks();
             self.watch.back_to(self.simulation.time());
             self.restart_twin();
             self.show_latest();
@@ -313,27 +344,20 @@ impl Player {
         while self.simulation.time() < time && self.stopped.is_none() {
             self.step();
         }
-        let shown = time
-            .min(self.simulation.time())
-            .max(self.simulation.step_start());
-        self.pacer.jump(shown);
-        self.simulation.sample(shown, &mut self.frame);
+        self.show(time);
     }
 
     /// One step towards an instant that a link names, with its record; false when the guard stopped the run.
     pub(super) fn replay_step(&mut self) -> bool {
-        let runs = self.step();
-        // Step by step, so that the record holds every peak.
-        self.take_peaks();
-        runs
+        self.step()
     }
 
-    /// Puts `time`, s, on show, or the latest state where that comes before. A time before the latest step, as after a
-    /// change within one, shows the state at its start, and time goes on from there.
+    /// Puts `time`, s, on show, as far as it lies in what is left of the latest step: no way leads back.
     pub(super) fn show(&mut self, time: f64) {
-        let shown = time.min(self.simulation.time());
+        let recorded = self.history.span().map_or(0.0, |(_, end)| end);
+        let shown = time.max(recorded).min(self.simulation.time());
         self.pacer.jump(shown);
-        self.simulation.sample(shown, &mut self.frame);
+        self.present();
     }
 
     /// Back to t = 0 with every change applied.
@@ -361,7 +385,7 @@ impl Player {
     /// # Errors
     /// As [`Simulation::set`]; nothing has changed then.
     pub fn set(&mut self, key: &str, value: &str) -> Result<Effect, SceneError> {
-        let effect = self.simulation.set(key, value)?;
+        let effect = self.change(|run| run.set(key, value))?;
         self.log.set(self.steps(), key, value);
         if key == "solver.preset" {
             // Chosen here, a preset is to have effect: it replaces what was set by name before.
@@ -386,7 +410,7 @@ impl Player {
     /// As [`Simulation::set_value`]; nothing has changed then.
     pub fn set_original(&mut self, key: &str) -> Result<Effect, SceneError> {
         let value = self.original.get(key)?;
-        let effect = self.simulation.set_value(key, &value)?;
+        let effect = self.change(|run| run.set_value(key, &value))?;
         let event = Event::Original {
             key: key.to_owned(),
         };
@@ -395,18 +419,35 @@ impl Player {
         Ok(effect)
     }
 
+    /// Changes the run at its latest state. What is left to show of the step before is shown as it was.
+    fn change<T>(
+        &mut self,
+        change: impl FnOnce(&mut Simulation) -> Result<T, SceneError>,
+    ) -> Result<T, SceneError> {
+        let run = &mut self.simulation;
+        if self.pacer.shown() >= run.time() || run.step_start() >= run.time() {
+            return change(run);
+        }
+        let mut copy = match Simulation::new(run.running_scene()) {
+            Ok(copy) => copy,
+            // A scene that runs starts again; should it not, the rest of the step is left out.
+            Err(_) => return change(run),
+        };
+        if copy.restore(&run.snapshot()).is_err() {
+            return change(run);
+        }
+        let done = change(&mut copy)?;
+        self.unchanged = Some(Box::new(std::mem::replace(run, copy)));
+        Ok(done)
+    }
+
     fn after_change(&mut self) {
         self.warnings = self.wanted().warnings();
         self.past.clear();
         self.watch
             .begin(self.simulation.running_scene(), self.simulation.time());
         self.restart_twin();
-        // What was recorded before steps were taken back belongs to another future.
-        let recorded = self.history.span().map_or(0.0, |(_, end)| end);
-        if recorded > self.simulation.time() {
-            self.history.clear();
-            self.record();
-        }
+        self.present();
     }
 
     /// Whether `key` was changed and waits for a reset.
@@ -443,15 +484,16 @@ impl Player {
         self.original.get(key).ok()
     }
 
-    /// One step with its record; false when the guard stopped it.
+    /// One step, the rest of the one before recorded first; false when the guard stopped it.
     fn step(&mut self) -> bool {
+        self.record_until(self.simulation.time());
         match self.simulation.step_until(self.next_section()) {
             Ok(()) => {
-                self.watch.step(&mut self.simulation);
+                self.unchanged = None;
+                self.simulation.take_peaks(&mut self.coming);
                 if let Some(twin) = &mut self.twin {
                     twin.follow(&self.simulation);
                 }
-                self.record();
                 true
             }
             Err(stopped) => {
@@ -473,52 +515,139 @@ impl Player {
         })
     }
 
-    fn record(&mut self) {
-        // A long step is recorded at instants within it, so that a curve stays one on a plot.
-        let (start, end) = (self.simulation.step_start(), self.simulation.time());
-        let parts = ((end - start) / self.automatic_window() * 400.0)
-            .ceil()
-            .clamp(1.0, MOST_RECORDED);
-        for part in 1..=parts as u32 {
-            let time = if f64::from(part) == parts {
-                end
-            } else {
-                start + (end - start) * f64::from(part) / parts
-            };
-            self.simulation.sample(time, &mut self.recorded);
-            self.channels.read(&self.recorded, &mut self.values);
-            self.history.push(time, &self.values);
-            self.watch.record(&self.recorded);
+    /// The run that knows what was at `time`, s, in the latest step.
+    fn run_at(&mut self, time: f64) -> &mut Simulation {
+        match &mut self.unchanged {
+            Some(run) if time < self.simulation.time() => run,
+            _ => &mut self.simulation,
         }
+    }
+
+    /// Takes what the latest step did until `until`, s, into the record.
+    fn record_until(&mut self, until: f64) {
+        let Some((_, start)) = self.history.span() else {
+            return;
+        };
+        if until > start {
+            // A long step is recorded at instants within it, so that a curve stays one on a plot.
+            let parts = ((until - start) / self.automatic_window() * 400.0)
+                .ceil()
+                .clamp(1.0, MOST_RECORDED);
+            for part in 1..=parts as u32 {
+                let end = if f64::from(part) == parts {
+                    until
+                } else {
+                    start + (until - start) * f64::from(part) / parts
+                };
+                // A peak between two instants is one more.
+                let close = end - 1e-3 * (end - start) / parts;
+                while let Some(peak) = self.next_peak().filter(|peak| *peak < close) {
+                    self.record(peak);
+                    self.pass_peaks(peak);
+                }
+                self.record(end);
+            }
+        }
+        self.pass_peaks(until);
+        let run = match &mut self.unchanged {
+            Some(run) => run,
+            None => &mut self.simulation,
+        };
+        self.watch.step(run, until);
+    }
+
+    /// When the next peak comes, s.
+    fn next_peak(&self) -> Option<f64> {
+        let forces = self.coming.iter().filter(|peak| peak.normal > 0.0);
+        forces.map(|peak| peak.time).min_by(f64::total_cmp)
+    }
+
+    fn record(&mut self, time: f64) {
+        let mut frame = std::mem::take(&mut self.recorded);
+        self.run_at(time).sample(time, &mut frame);
+        self.channels.read(&frame, &mut self.values);
+        for (joint, peak) in self.coming.iter().enumerate() {
+            // The peak of the step is that of its cubic, not of the interpolated state.
+            if peak.normal > 0.0
+                && peak.time == time
+                && let Some(channel) = self.channels.normal_force(joint)
+            {
+                self.values[channel] = peak.normal;
+            }
+        }
+        self.history.push(time, &self.values);
+        self.watch.record(&frame);
+        self.recorded = frame;
+    }
+
+    /// Takes the peaks up to `time`, s, into the record and among those of the frame.
+    fn pass_peaks(&mut self, time: f64) {
+        self.passed.resize(self.coming.len(), Peak::default());
+        let all = time >= self.simulation.time();
+        for joint in 0..self.coming.len() {
+            let peak = self.coming[joint];
+            // A contact that began without a force yet began with the end of the step.
+            if !all && (peak.normal <= 0.0 || peak.time > time) {
+                continue;
+            }
+            self.coming[joint] = Peak::default();
+            if peak.impacts > 0 {
+                self.last_impact = Some(self.simulation.time());
+            }
+            if peak.normal > 0.0
+                && let Some(channel) = self.channels.normal_force(joint)
+            {
+                self.history.widen(peak.time, channel, peak.normal);
+            }
+            let passed = &mut self.passed[joint];
+            let (impacts, speed) = (passed.impacts, passed.approach_speed);
+            if peak.normal > passed.normal {
+                *passed = peak;
+            }
+            passed.impacts = impacts + peak.impacts;
+            passed.approach_speed = speed.max(peak.approach_speed);
+        }
+    }
+
+    /// Peaks since the call before.
+    fn hand_out_peaks(&mut self) {
+        std::mem::swap(&mut self.peaks, &mut self.passed);
+        self.passed.clear();
+        self.passed.resize(self.peaks.len(), Peak::default());
+    }
+
+    fn forget_peaks(&mut self) {
+        let joints = self.simulation.running_scene().ball_joints.len();
+        for peaks in [&mut self.peaks, &mut self.coming, &mut self.passed] {
+            peaks.clear();
+            peaks.resize(joints, Peak::default());
+        }
+    }
+
+    /// Records up to the instant on show and fills the frame with it.
+    fn present(&mut self) {
+        let shown = self.pacer.shown();
+        self.record_until(shown);
+        let mut frame = std::mem::take(&mut self.frame);
+        self.run_at(shown).sample(shown, &mut frame);
+        self.frame = frame;
     }
 
     fn show_latest(&mut self) {
         self.pacer.jump(self.simulation.time());
-        self.simulation
-            .sample(self.simulation.time(), &mut self.frame);
+        self.present();
     }
 
     fn start_record(&mut self) {
         self.history.clear();
         self.past.clear();
+        self.unchanged = None;
         self.last_impact = None;
+        // Forces at the start are those of the first frame: nothing has struck yet.
+        self.simulation.take_peaks(&mut self.coming);
+        self.forget_peaks();
+        self.record(self.simulation.time());
         self.show_latest();
-        self.record();
-        self.simulation.take_peaks(&mut self.peaks);
-    }
-
-    fn take_peaks(&mut self) {
-        self.simulation.take_peaks(&mut self.peaks);
-        if self.peaks.iter().any(|peak| peak.impacts > 0) {
-            self.last_impact = Some(self.simulation.time());
-        }
-        for (joint, peak) in self.peaks.iter().enumerate() {
-            if let Some(channel) = self.channels.normal_force(joint)
-                && peak.normal > 0.0
-            {
-                self.history.widen(peak.time, channel, peak.normal);
-            }
-        }
     }
 }
 
@@ -549,9 +678,10 @@ mod tests {
             .iter()
             .position(|c| c.quantity == quantity)
             .expect("recorded");
-        let mut points = Vec::new();
-        player.history().query(channel, 0.0, to, 400, &mut points);
-        points
+        let mut bins = Vec::new();
+        player.history().bins(channel, 0.0, to, 400, &mut bins);
+        let points = bins.iter().map(|b| [0.5 * (b.from + b.to), b.greatest]);
+        points.collect()
     }
 
     #[test]
@@ -580,6 +710,122 @@ mod tests {
                 "{point:?}: {fall}"
             );
         }
+    }
+
+    /// The instant on show is that of frame, record, peaks and sections, whatever the run itself has computed beyond it.
+    fn one_clock(player: &Player) {
+        let shown = player.pacer.shown();
+        assert_eq!(player.frame().time, shown);
+        let (_, end) = player.history().span().expect("recorded");
+        assert_eq!(end, shown);
+        assert!(player.peaks().iter().all(|peak| peak.time <= shown));
+        assert!(player.watch().orbit().all(|(time, _)| *time <= shown));
+        assert!(player.watch().sections().all(|(time, _)| *time <= shown));
+        assert!(player.simulation().time() >= shown);
+    }
+
+    #[test]
+    fn nothing_tells_of_what_is_still_to_come() {
+        let mut player = player("spcmm");
+        one_clock(&player);
+        player.pacer.set_scale(0.01);
+        player.set_playing(true);
+        let mut within = 0;
+        for frame in 0..150 {
+            player.advance(1.0 / 60.0);
+            one_clock(&player);
+            let far = player.simulation().time() - player.pacer.shown();
+            within += usize::from(far > 1e-4);
+            if frame == 60 {
+                player.set_playing(false);
+                player.advance(1.0 / 60.0);
+                one_clock(&player);
+                player.set_playing(true);
+            }
+        }
+        assert!(within > 20, "in the midst of long steps: {within}");
+        // Strictly after the peak of the second impact: the record has its top, and the last value is that on show.
+        let forces = recorded(&player, Quantity::NormalForce, 1.0);
+        let peak = player.simulation().statistics().peak_normal[0];
+        let top = forces.iter().map(|p| p[1]).fold(0.0, f64::max);
+        assert!((top / peak - 1.0).abs() < 1e-6, "{top} {peak}");
+        for back in 0..6 {
+            player.single_step();
+            one_clock(&player);
+            if back > 2 {
+                player.step_back();
+                one_clock(&player);
+            }
+        }
+        player.run_to(0.2);
+        one_clock(&player);
+        player.reset().expect("starts");
+        one_clock(&player);
+        assert!(player.peaks().iter().all(|peak| *peak == Peak::default()));
+        assert_eq!(player.history().rows(9).len(), 1);
+    }
+
+    #[test]
+    fn after_steps_back_the_record_is_as_before_and_another_future_follows_it() {
+        let mut player = player("spcmm");
+        player.run_to(8.6e-3);
+        player.single_step();
+        let rows = player.history().rows(200);
+        for _ in 0..40 {
+            player.single_step();
+        }
+        assert!(player.history().rows(200) != rows);
+        for _ in 0..40 {
+            player.step_back();
+        }
+        assert!(player.history().rows(200) == rows);
+        // A change takes nothing of the past away.
+        player.set("contact.friction", "0.3").expect("in range");
+        assert!(player.history().rows(200) == rows);
+        player.run_to(12e-3);
+        one_clock(&player);
+        let forces = recorded(&player, Quantity::NormalForce, 8.6e-3);
+        assert!(forces.iter().any(|point| point[1] > 300.0));
+    }
+
+    #[test]
+    fn a_change_in_the_middle_of_a_step_leaves_the_rest_of_it_as_it_was() {
+        let (mut player, mut other) = (player("spcmm"), player("spcmm"));
+        for player in [&mut player, &mut other] {
+            player.pacer.set_scale(0.005);
+            player.set_playing(true);
+            while player.simulation().time() < 2e-3 + player.pacer.shown() {
+                player.advance(1.0 / 60.0);
+            }
+        }
+        let change = player.simulation().time();
+        player.set("contact.clearance", "0.6 mm").expect("in range");
+        one_clock(&player);
+        // The run goes on as if it had been changed there by itself.
+        let mut straight = Simulation::new(other.scene()).expect("starts");
+        straight
+            .restore(&other.simulation().snapshot())
+            .expect("the same scene");
+        straight
+            .set("contact.clearance", "0.6 mm")
+            .expect("in range");
+        assert_eq!(player.simulation().state_hash(), straight.state_hash());
+        let mut frames = 0;
+        loop {
+            player.advance(1.0 / 60.0);
+            other.advance(1.0 / 60.0);
+            one_clock(&player);
+            if player.pacer.shown() >= change {
+                break;
+            }
+            frames += 1;
+            assert_eq!(player.frame().pose, other.frame().pose);
+            assert_eq!(player.frame().joints, other.frame().joints);
+        }
+        assert!(frames > 5, "{frames}");
+        assert_eq!(player.frame().joints[0].clearance, 0.6e-3);
+        let clearances = recorded(&player, Quantity::Clearance, 1.0);
+        assert!(clearances[0][1] < 0.31e-3);
     }
 
     #[test]

@@ -1,23 +1,27 @@
 //! Live plots of the recorded channels: one plot per quantity, one line per joint, axis or kind.
 
-use eframe::egui::{self, ComboBox, RichText, Ui, Vec2b, vec2};
+use eframe::egui::{self, ComboBox, Pos2, Rangef, RichText, Ui, Vec2b, vec2};
 use egui_plot::{
-    AxisHints, FilledArea, GridInput, GridMark, HLine, HoverPosition, Line, LineStyle, Plot,
-    PlotPoint, PlotPoints,
+    AxisHints, FilledArea, GridInput, GridMark, HoverPosition, Plot, PlotPoint, PlotTransform,
 };
 
+use super::curve::{Curves, Path, Trace};
 use super::layout;
 use super::player::Player;
-use super::stack::{middles, stack};
+use super::stack::stack;
 use super::{theme, value};
-use crate::simulate::{Quantity, RECORDED_JOINTS};
+use crate::simulate::{Bin, Quantity, RECORDED_JOINTS};
 
-/// Bins asked of the record for one line: two points each.
-const BINS: usize = 400;
 /// Windows to choose from, s.
 const WINDOWS: [f64; 6] = [1e-3, 1e-2, 0.05, 0.1, 1.0, 10.0];
 /// Height below which a plot says nothing.
 const LEAST_HEIGHT: f32 = 110.0;
+/// Least distance of two marks on an axis, points: the height of their numbers.
+const MARKS_APART: f32 = 16.0;
+/// Marks that an axis has at most, about.
+const MARKS: f64 = 5.0;
+/// A range smaller than this share of the values, or than this in the unit of the axis, is rounding and no motion.
+const GRAIN: f64 = 1e-9;
 
 /// How much of the past the plots show.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,8 +42,18 @@ pub struct Plots {
     pub window: Window,
     /// Channels whose lines are hidden.
     hidden: Vec<usize>,
-    points: Vec<[f64; 2]>,
-    lines: Vec<Vec<PlotPoint>>,
+    /// Those of one plot at a time, and the points of each that the pointer finds.
+    traces: Vec<Trace>,
+    levels: Vec<Trace>,
+    readings: Vec<Vec<PlotPoint>>,
+    /// Where each plot was last.
+    places: Vec<(Quantity, Place)>,
+}
+
+/// Where a plot is on the screen, and its units in SI.
+struct Place {
+    transform: PlotTransform,
+    units: [f64; 2],
 }
 
 impl Default for Plots {
@@ -48,13 +62,22 @@ impl Default for Plots {
             chosen: vec![Quantity::NormalForce, Quantity::Eccentricity],
             window: Window::Automatic,
             hidden: Vec::new(),
-            points: Vec::new(),
-            lines: Vec::new(),
+            traces: Vec::new(),
+            levels: Vec::new(),
+            readings: Vec::new(),
+            places: Vec::new(),
         }
     }
 }
 
 impl Plots {
+    /// Where the plot of `quantity` drew a value (SI) at `time`, s, last; points of the screen. `None` where it is not shown.
+    pub fn place(&self, quantity: Quantity, time: f64, value: f64) -> Option<Pos2> {
+        let (_, place) = self.places.iter().find(|(shown, _)| *shown == quantity)?;
+        let point = PlotPoint::new(time / place.units[0], value / place.units[1]);
+        Some(place.transform.position_from_point(&point))
+    }
+
     /// Which quantities and how much of the past.
     pub fn header(&mut self, ui: &mut Ui, player: &Player) {
         ui.horizontal_wrapped(|ui| {
@@ -121,6 +144,7 @@ impl Plots {
 
     /// The chosen plots, beside each other where there is room, else below each other.
     pub fn ui(&mut self, ui: &mut Ui, player: &Player) {
+        self.places.clear();
         let chosen: Vec<Quantity> = self
             .chosen
             .iter()
@@ -168,6 +192,7 @@ impl Plots {
             (end - length, end)
         };
         let (time_unit, time_size) = time_axis(length);
+        let units = [time_size, size];
 
         let members: Vec<(usize, &str)> = player
             .channels()
@@ -177,38 +202,111 @@ impl Plots {
             .filter(|(_, channel)| channel.quantity == quantity)
             .map(|(index, channel)| (index, channel.member.as_str()))
             .collect();
-        self.lines
-            .resize_with(members.len().max(self.lines.len()), Vec::new);
-        for ((channel, _), line) in members.iter().zip(&mut self.lines) {
-            self.points.clear();
-            player
-                .history()
-                .query(*channel, from, to, BINS, &mut self.points);
-            line.clear();
-            line.extend(
-                self.points
-                    .iter()
-                    .map(|p| PlotPoint::new(p[0] / time_size, p[1] / size)),
-            );
+        let dark = ui.visuals().dark_mode;
+        let faint = ui.visuals().weak_text_color();
+        // No bin is wider than a column of pixels, as long as the record has them.
+        let bins = (2.0 * space.x * ui.ctx().pixels_per_point()) as usize;
+        let query = |channel: usize, out: &mut Vec<Bin>| {
+            out.clear();
+            player.history().bins(channel, from, to, bins, out);
+        };
+        self.traces.resize_with(members.len(), Trace::default);
+        for (index, (channel, _)) in members.iter().enumerate() {
+            let trace = &mut self.traces[index];
+            trace.colour = theme::series(index, dark);
+            trace.bins.clear();
+            if !self.hidden.contains(channel) {
+                query(*channel, &mut trace.bins);
+            }
+        }
+        self.levels.clear();
+        if quantity == Quantity::Eccentricity {
+            // As they were: today's value says nothing about the past.
+            let channels = player.channels().list().iter().enumerate();
+            for (index, _) in channels.filter(|(_, c)| c.quantity == Quantity::Clearance) {
+                let mut trace = Trace {
+                    colour: faint,
+                    ..Trace::default()
+                };
+                query(index, &mut trace.bins);
+                let closed = trace.bins.iter().all(|bin| bin.greatest <= 0.0);
+                if !closed && !self.levels.iter().any(|level| level.bins == trace.bins) {
+                    self.levels.push(trace);
+                }
+            }
+        }
+        let bands = if quantity == Quantity::EnergyBalance {
+            self.bands(&members, units)
+        } else {
+            Vec::new()
+        };
+        let from_zero = matches!(
+            quantity,
+            Quantity::NormalForce
+                | Quantity::FrictionForce
+                | Quantity::Eccentricity
+                | Quantity::Clearance
+        );
+        let values = if bands.is_empty() {
+            extremes(self.traces.iter().chain(&self.levels), size)
+        } else {
+            let edges = bands
+                .iter()
+                .flat_map(|band| band.low.iter().chain(&band.high));
+            edges.fold(None, |all, &edge| widened(all, edge, edge))
+        };
+        let (least, greatest) = range(values, from_zero);
+        self.readings.resize_with(members.len(), Vec::new);
+        for (trace, readings) in self.traces.iter().zip(&mut self.readings) {
+            readings.clear();
+            readings.extend(trace.bins.iter().flat_map(|bin| {
+                let time = 0.5 * (bin.from + bin.to) / time_size;
+                let ends = [bin.least, bin.greatest].map(|v| PlotPoint::new(time, v / size));
+                ends.into_iter()
+                    .take(1 + usize::from(bin.least != bin.greatest))
+            }));
         }
 
         ui.vertical(|ui| {
             self.title(ui, quantity, &members);
-            let dark = ui.visuals().dark_mode;
-            let faint = ui.visuals().weak_text_color();
             let font = egui::TextStyle::Small.resolve(ui.style());
             let axis = |hints: AxisHints<'static>| {
                 hints.tick_label_color(faint).tick_label_font(font.clone())
             };
+            let width = space.x - 12.0;
+            let time_mark = move |mark: &GridMark| {
+                format!(
+                    "{} {time_unit}",
+                    tick(mark.value, mark.step_size, to / time_size)
+                )
+            };
             let across = axis(AxisHints::new_x())
-                .label_spacing(egui::Rangef::new(20.0, 24.0))
-                .formatter(move |mark, _| format!("{} {time_unit}", tick(mark.value)));
+                .label_spacing(Rangef::new(0.0, 1.0))
+                .formatter(move |mark, _| time_mark(&mark));
             let up = axis(AxisHints::new_y())
                 .min_thickness(40.0)
-                .label_spacing(egui::Rangef::new(14.0, 18.0))
-                .formatter(|mark, _| tick(mark.value));
-            let mut plot = Plot::new(("plot", quantity))
-                .width(space.x - 12.0)
+                .label_spacing(Rangef::new(0.0, 1.0))
+                .formatter(|mark, range| {
+                    let most = range.start().abs().max(range.end().abs());
+                    tick(mark.value, mark.step_size, most)
+                });
+            // Numbers of a late time are long: fewer of them stand side by side.
+            let letters = |mark: &GridMark| time_mark(mark).chars().count();
+            let most = f64::from(width - 52.0);
+            let marks_across = move |input: GridInput| {
+                let marks = marks(&input, MARKS);
+                let longest = marks.iter().map(letters).max().unwrap_or(1);
+                let room = most / (7.0 * longest as f64 + 8.0);
+                if room < MARKS {
+                    self::marks(&input, room.max(1.0))
+                } else {
+                    marks
+                }
+            };
+            let finest = value::digits_within(greatest - least, least.abs().max(greatest.abs()));
+            let earliest = value::digits_within(length, to);
+            let plot = Plot::new(("plot", quantity))
+                .width(width)
                 .height((space.y - 20.0 - theme::side(ui, 18.0)).max(60.0))
                 .allow_drag(false)
                 .allow_zoom(false)
@@ -216,11 +314,12 @@ impl Plots {
                 .allow_boxed_zoom(false)
                 .allow_axis_zoom_drag(false)
                 .allow_double_click_reset(false)
-                .auto_bounds(Vec2b::new(false, true))
+                .auto_bounds(Vec2b::FALSE)
                 .custom_x_axes(vec![across])
                 .custom_y_axes(vec![up])
-                .x_grid_spacer(|input| marks(&input, 5.0))
-                .y_grid_spacer(|input| marks(&input, 5.0))
+                .x_grid_spacer(marks_across)
+                .y_grid_spacer(|input| marks(&input, MARKS))
+                .grid_spacing(Rangef::new(MARKS_APART, 300.0))
                 .grid_color(faint.gamma_multiply(0.35))
                 .grid_fade(0.0)
                 .label_formatter(move |position| match position {
@@ -230,78 +329,76 @@ impl Plots {
                         ..
                     } => Some(format!(
                         "{plot_name}\n{} {unit}\nat {} {time_unit}",
-                        value::number(position.y, 4),
-                        value::number(position.x, 5)
+                        value::number(position.y, finest),
+                        value::number(position.x, earliest)
                     )),
                     HoverPosition::Elsewhere { .. } => None,
                 });
-            if matches!(
-                quantity,
-                Quantity::NormalForce | Quantity::FrictionForce | Quantity::Eccentricity
-            ) {
-                plot = plot.include_y(0.0);
-            }
-            plot.show(ui, |plot| {
+            let Self {
+                traces,
+                levels,
+                readings,
+                hidden,
+                ..
+            } = &*self;
+            let shown = plot.show(ui, |plot| {
                 plot.set_plot_bounds_x(from / time_size..=to / time_size);
-                if quantity == Quantity::Eccentricity {
-                    for clearance in clearances(player) {
-                        plot.hline(
-                            HLine::new("clearance", clearance / size)
-                                .color(faint)
-                                .style(LineStyle::dashed_loose())
-                                .width(1.0),
+                plot.set_plot_bounds_y(least..=greatest);
+                if quantity == Quantity::EnergyBalance {
+                    for band in &bands {
+                        plot.add(
+                            FilledArea::new(band.member, &band.times, &band.low, &band.high)
+                                .fill_color(band.colour.gamma_multiply(0.75))
+                                // Edges would jump where a term changes sides.
+                                .stroke(egui::Stroke::NONE),
                         );
                     }
-                }
-                if quantity == Quantity::EnergyBalance {
-                    self.balance(plot, &members, dark);
                     return;
                 }
-                for (index, ((channel, member), line)) in
-                    members.iter().zip(&self.lines).enumerate()
+                plot.add(Curves::new(levels, units).dashed());
+                plot.add(Curves::new(traces, units));
+                for ((channel, member), (trace, points)) in
+                    members.iter().zip(traces.iter().zip(readings))
                 {
-                    if !self.hidden.contains(channel) {
-                        plot.line(
-                            Line::new(*member, PlotPoints::Borrowed(line))
-                                .color(theme::series(index, dark))
-                                .width(1.4),
-                        );
+                    if !hidden.contains(channel) {
+                        plot.add(Path::readings(member, points, trace.colour));
                     }
                 }
             });
+            let transform = shown.transform;
+            self.places.push((quantity, Place { transform, units }));
         });
     }
 
     /// The terms of the energy balance, stacked: what gives energy above zero, what takes or holds it below.
-    fn balance(&self, plot: &mut egui_plot::PlotUi<'_>, members: &[(usize, &str)], dark: bool) {
-        let mut times = Vec::new();
-        let shown: Vec<(usize, &str)> = (0..members.len())
-            .filter(|&index| !self.hidden.contains(&members[index].0))
-            .map(|index| (index, members[index].1))
-            .collect();
-        let terms: Vec<Vec<f64>> = shown
-            .iter()
-            .map(|&(index, member)| {
-                let points: Vec<[f64; 2]> = self.lines[index].iter().map(|p| [p.x, p.y]).collect();
-                let mut values = Vec::new();
-                times = middles(&points, &mut values);
-                if Quantity::TAKES.contains(&member) {
-                    values.iter_mut().for_each(|value| *value = -*value);
-                }
-                values
-            })
-            .collect();
-        for (&(index, member), (low, high)) in shown.iter().zip(stack(&terms)) {
-            let colour = theme::series(index, dark);
-            if low.len() == times.len() {
-                plot.add(
-                    FilledArea::new(member, &times, &low, &high)
-                        .fill_color(colour.gamma_multiply(0.75))
-                        // Edges would jump where a term changes sides.
-                        .stroke(egui::Stroke::NONE),
-                );
+    fn bands<'a>(&self, members: &[(usize, &'a str)], units: [f64; 2]) -> Vec<Band<'a>> {
+        let mut bands: Vec<Band<'a>> = Vec::new();
+        let mut terms = Vec::new();
+        for ((_, member), trace) in members.iter().zip(&self.traces) {
+            let sign = if Quantity::TAKES.contains(member) {
+                -0.5
+            } else {
+                0.5
+            };
+            let value = |bin: &Bin| sign * (bin.least + bin.greatest) / units[1];
+            let terms_of: Vec<f64> = trace.bins.iter().map(value).collect();
+            if terms_of.is_empty() {
+                continue;
             }
+            terms.push(terms_of);
+            let middle = |bin: &Bin| 0.5 * (bin.from + bin.to) / units[0];
+            bands.push(Band {
+                member,
+                colour: trace.colour,
+                times: trace.bins.iter().map(middle).collect(),
+                low: Vec::new(),
+                high: Vec::new(),
+            });
         }
+        for (band, (low, high)) in bands.iter_mut().zip(stack(&terms)) {
+            (band.low, band.high) = (low, high);
+        }
+        bands
     }
 
     /// Quantity with its unit, and its members as switches in the colours of their lines.
@@ -338,38 +435,76 @@ impl Plots {
     }
 }
 
-/// The different clearances of the joints now, m.
-fn clearances(player: &Player) -> Vec<f64> {
-    let mut found = Vec::new();
-    for joint in &player.frame().joints {
-        if joint.clearance > 0.0 && !found.contains(&joint.clearance) {
-            found.push(joint.clearance);
-        }
-    }
-    found
+/// One term of a stack, in the units of the axes.
+struct Band<'a> {
+    member: &'a str,
+    colour: egui::Color32,
+    times: Vec<f64>,
+    low: Vec<f64>,
+    high: Vec<f64>,
 }
 
-/// About `count` marks at 1, 2 or 5 times a power of ten.
+fn widened(all: Option<(f64, f64)>, least: f64, greatest: f64) -> Option<(f64, f64)> {
+    let (a, b) = all.unwrap_or((least, greatest));
+    Some((a.min(least), b.max(greatest)))
+}
+
+/// The least and the greatest of everything in `traces`, in units of `size`.
+fn extremes<'a>(traces: impl Iterator<Item = &'a Trace>, size: f64) -> Option<(f64, f64)> {
+    let bins = traces.flat_map(|trace| &trace.bins);
+    bins.fold(None, |all, bin| {
+        widened(all, bin.least / size, bin.greatest / size)
+    })
+}
+
+/// What an axis shows for values in a range, or for none: all of them with a margin, and where there is nothing but rounding
+/// a range in which that is flat.
+fn range(values: Option<(f64, f64)>, from_zero: bool) -> (f64, f64) {
+    let (mut least, mut greatest) = values.unwrap_or((0.0, 0.0));
+    if from_zero {
+        (least, greatest) = (least.min(0.0), greatest.max(0.0));
+    }
+    let size = least.abs().max(greatest.abs());
+    if !size.is_finite() || size <= GRAIN {
+        (least, greatest) = (if from_zero { 0.0 } else { -1.0 }, 1.0);
+    } else if greatest - least <= GRAIN * size {
+        let middle = 0.5 * (least + greatest);
+        let half = 0.05 * 10_f64.powf(size.log10().floor());
+        (least, greatest) = (middle - half, middle + half);
+    }
+    let margin = 0.05 * (greatest - least);
+    (least - margin, greatest + margin)
+}
+
+/// About `count` marks at 1, 2 or 5 times a power of ten, no closer than the axis allows; two at least where there is room.
 pub(super) fn marks(input: &GridInput, count: f64) -> Vec<GridMark> {
+    const ROUND: &[f64] = &[1.0, 2.0, 5.0, 10.0];
+    const ROUND_ENOUGH: &[f64] = &[1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
     let (least, greatest) = input.bounds;
-    let rough = (greatest - least) / count;
+    let rough = ((greatest - least) / count).max(input.base_step_size);
     if !(rough.is_finite() && rough > 0.0) {
         return Vec::new();
     }
     let power = 10_f64.powf(rough.log10().floor());
-    let step = [1.0, 2.0, 5.0, 10.0]
-        .into_iter()
-        .map(|factor| factor * power)
-        .find(|step| *step >= rough * 0.999)
-        .unwrap_or(10.0 * power);
-    let first = (least / step).ceil() as i64;
-    let last = (greatest / step).floor() as i64;
-    (first..=last)
-        .map(|index| GridMark {
-            value: index as f64 * step,
-            step_size: step,
-        })
-        .collect()
+    let marks = |factors: &[f64]| -> Vec<GridMark> {
+        let steps = factors.iter().map(|factor| factor * power);
+        let step = steps.into_iter().find(|step| *step >= rough * 0.999);
+        let step = step.unwrap_or(10.0 * power);
+        let first = (least / step).ceil() as i64;
+        let last = (greatest / step).floor() as i64;
+        (first..=last)
+            .map(|index| GridMark {
+                value: index as f64 * step,
+                step_size: step,
+            })
+            .collect()
+    };
+    let round = marks(ROUND);
+    if round.len() < 2 {
+        marks(ROUND_ENOUGH)
+    } else {
+        round
+    }
 }
 
 impl Window {
@@ -377,7 +512,11 @@ impl Window {
         match self {
             Self::Automatic => "Automatic".to_owned(),
             Self::Last(length) => {
-                let (unit, size) = time_axis(length * 0.1);
+                let (unit, size) = match length {
+                    _ if length >= 1.0 => ("s", 1.0),
+                    _ if length >= 1e-3 => ("ms", 1e-3),
+                    _ => ("µs", 1e-6),
+                };
                 format!("{} {unit}", value::number(length / size, 4))
             }
             Self::Everything => "Everything".to_owned(),
@@ -396,45 +535,95 @@ pub(super) fn time_axis(length: f64) -> (&'static str, f64) {
     }
 }
 
-/// A mark on an axis.
-pub(super) fn tick(mark: f64) -> String {
-    value::number(mark, 6)
+/// A mark on an axis that reaches to `most` and has marks `step` apart: as many digits as tell it from its neighbours.
+pub(super) fn tick(mark: f64, step: f64, most: f64) -> String {
+    if mark.abs() < 1e-6 * step {
+        return "0".to_owned();
+    }
+    // A step of 2.5 has a digit more than one of 2.
+    let power = step.log10().floor() as i32;
+    let mantissa = step / 10_f64.powi(power);
+    let last = power - i32::from((mantissa - mantissa.round()).abs() > 1e-6);
+    if (1e-4..1e9).contains(&most) {
+        return format!("{mark:.*}", (-last).max(0) as usize);
+    }
+    let digits = mark.abs().log10().floor() as i32 - last;
+    format!("{mark:.*e}", digits.max(0) as usize)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn words(least: f64, greatest: f64, height: f64) -> Vec<String> {
+        let input = GridInput {
+            bounds: (least, greatest),
+            base_step_size: f64::from(MARKS_APART) * (greatest - least) / height,
+        };
+        let most = least.abs().max(greatest.abs());
+        let marks = marks(&input, MARKS);
+        assert!(marks.iter().all(|m| (least..=greatest).contains(&m.value)));
+        let apart = marks
+            .windows(2)
+            .all(|w| w[1].value - w[0].value >= 0.99 * input.base_step_size);
+        assert!(apart, "{marks:?}");
+        marks
+            .iter()
+            .map(|m| tick(m.value, m.step_size, most))
+            .collect()
+    }
+
     #[test]
-    fn marks_are_round_and_few() {
-        for bounds in [(0.0, 100.0), (-3.3, 8.1), (202.9, 203.4), (0.0, 871.0)] {
-            let marks = marks(
-                &GridInput {
-                    bounds,
-                    base_step_size: 1.0,
-                },
-                5.0,
-            );
-            assert!(
-                (2..=7).contains(&marks.len()),
-                "{bounds:?}: {}",
-                marks.len()
-            );
-            assert!(
-                marks
-                    .iter()
-                    .all(|m| m.value >= bounds.0 && m.value <= bounds.1)
-            );
-        }
-        assert!(
-            marks(
-                &GridInput {
-                    bounds: (1.0, 1.0),
-                    base_step_size: 1.0
-                },
-                5.0
-            )
-            .is_empty()
+    fn marks_are_round_few_and_told_apart() {
+        assert_eq!(words(0.0, 871.0, 120.0), ["0", "200", "400", "600", "800"]);
+        assert_eq!(words(-0.015, 0.315, 120.0), ["0", "0.1", "0.2", "0.3"]);
+        assert_eq!(
+            words(203.44080, 203.44120, 120.0),
+            ["203.4408", "203.4409", "203.4410", "203.4411", "203.4412"]
         );
+        assert_eq!(words(-1e-7, 2e-7, 120.0), ["-1e-7", "0", "1e-7", "2e-7"]);
+        for height in [36.0, 45.0, 60.0, 200.0] {
+            for (least, greatest) in [
+                (0.0, 100.0),
+                (-3.3, 8.1),
+                (202.9, 203.4),
+                (1e9, 1e9 + 1.0),
+                (-0.05, 1.05),
+                (-44.0, 914.0),
+                (0.203, 0.203 + 1e-9),
+            ] {
+                let words = words(least, greatest, height);
+                assert!((2..=7).contains(&words.len()), "{height}: {words:?}");
+                let different: std::collections::HashSet<_> = words.iter().collect();
+                assert_eq!(different.len(), words.len(), "{words:?}");
+            }
+        }
+        let nothing = GridInput {
+            bounds: (1.0, 1.0),
+            base_step_size: 0.0,
+        };
+        assert!(marks(&nothing, 5.0).is_empty());
+    }
+
+    #[test]
+    fn rounding_is_drawn_flat_and_motion_is_not() {
+        // Nothing at all has an axis of its own, and its zero is on it.
+        assert_eq!(range(None, true), (-0.05, 1.05));
+        assert_eq!(range(Some((0.0, 0.0)), true), (-0.05, 1.05));
+        assert_eq!(range(Some((0.0, 0.0)), false), (-1.1, 1.1));
+        let (least, greatest) = range(Some((-3e-13, 8e-13)), false);
+        assert!(greatest - least > 1.0);
+        let (least, greatest) = range(Some((203.441, 203.441 + 1e-11)), false);
+        assert!(least > 190.0 && greatest < 220.0 && greatest - least > 5.0);
+        let (least, greatest) = range(Some((203.441, 203.442)), false);
+        assert!((greatest - least - 1.1e-3).abs() < 1e-9);
+        let (least, greatest) = range(Some((5.0, 5.0)), true);
+        assert!((least, greatest) == (-0.25, 5.25));
+    }
+
+    #[test]
+    fn windows_are_told_in_the_unit_that_suits() {
+        let all = WINDOWS.map(|length| Window::Last(length).label());
+        assert_eq!(all, ["1 ms", "10 ms", "50 ms", "100 ms", "1 s", "10 s"]);
     }
 }

@@ -27,22 +27,6 @@ pub fn stack(terms: &[Vec<f64>]) -> Vec<Band> {
         .collect()
 }
 
-/// The record's points, one or two to a bin, as one value per instant: the middle of each bin. Returns the instants.
-pub fn middles(points: &[[f64; 2]], values: &mut Vec<f64>) -> Vec<f64> {
-    let mut times: Vec<f64> = Vec::with_capacity(points.len());
-    values.clear();
-    for [time, value] in points {
-        match (times.last(), values.last_mut()) {
-            (Some(last), Some(before)) if last == time => *before = 0.5 * (*before + value),
-            _ => {
-                times.push(*time);
-                values.push(*value);
-            }
-        }
-    }
-    times
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -60,15 +44,5 @@ mod tests {
         assert_eq!(bands[1], (vec![3.0, -2.0], vec![5.0, 0.0]));
         assert_eq!(bands[2], (vec![-4.0, 1.0], vec![0.0, 4.0]));
         assert_eq!(bands[3], (vec![-5.0, -4.0], vec![-4.0, -2.0]));
-    }
-
-    #[test]
-    fn a_bin_counts_once() {
-        let mut values = Vec::new();
-        let times = middles(
-            &[[0.0, 1.0], [1.0, 2.0], [1.0, 4.0], [2.0, 5.0]],
-            &mut values,
-        );
-        assert_eq!((times, values), (vec![0.0, 1.0, 2.0], vec![1.0, 3.0, 5.0]));
     }
 }

@@ -1,11 +1,47 @@
-//! Parameter values as text: the same words and units that files and the command line take.
+//! Values as text on the screen: the words that files and the command line take, their units as they are printed.
 
 use crate::scene::{Kind, Value, format_quantity, format_quantity_digits};
+
+/// Units in `text` as they are printed, `µm` and `m/s²`. Files and the command line write `um` and `m/s^2`, and read both.
+pub fn typeset(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    let mut word = String::new();
+    // A last separator, so that the last word is seen.
+    for letter in text.chars().chain(['\0']) {
+        if letter.is_alphanumeric() {
+            word.push(letter);
+            continue;
+        }
+        let number = word.trim_start_matches(|c: char| c.is_ascii_digit());
+        let digits = word.len() - number.len();
+        let power = out.ends_with('^') && digits == word.len();
+        match (number, word.as_str()) {
+            ("um" | "us", _) => {
+                out.push_str(&word[..digits]);
+                out.push('µ');
+                out.push_str(&number[1..]);
+            }
+            (_, "2") if power => out.replace_range(out.len() - 1.., "²"),
+            (_, "3") if power => out.replace_range(out.len() - 1.., "³"),
+            _ => out.push_str(&word),
+        }
+        word.clear();
+        if letter != '\0' {
+            out.push(letter);
+        }
+    }
+    out
+}
+
+/// An SI value in `unit` for a person.
+pub fn quantity(si: f64, unit: &str, digits: usize) -> String {
+    typeset(&format_quantity_digits(si, unit, digits))
+}
 
 /// `value` for a person: display unit, six digits.
 pub fn shown(value: &Value, kind: &Kind) -> String {
     match (value, kind) {
-        (Value::Number(si), Kind::Number { display, .. }) => format_quantity(*si, display),
+        (Value::Number(si), Kind::Number { display, .. }) => quantity(*si, display, 6),
         (Value::Number(si), _) => format_quantity(*si, ""),
         (Value::Count(count), _) => count.to_string(),
         (Value::Choice(word), _) => (*word).to_owned(),
@@ -27,6 +63,16 @@ pub fn completed(typed: &str, kind: &Kind) -> String {
 /// A bare number with at most `digits` significant digits.
 pub fn number(value: f64, digits: usize) -> String {
     format_quantity_digits(value, "", digits)
+}
+
+/// Digits that tell values apart which lie as close as a thousandth of `span`, where they are as large as `most`.
+pub fn digits_within(span: f64, most: f64) -> usize {
+    let more = (most / span).log10().ceil();
+    if more.is_finite() {
+        4 + (more.max(0.0) as usize).min(11)
+    } else {
+        4
+    }
 }
 
 /// A small share, as a power of ten where a decimal would hide its size: `2e-6`.
@@ -101,6 +147,45 @@ mod tests {
         assert_eq!(completed(" 0.5 ", &LENGTH), "0.5 mm");
         assert_eq!(completed("500 um", &LENGTH), "500 um");
         assert_eq!(completed("half", &LENGTH), "half");
+    }
+
+    #[test]
+    fn units_are_printed_one_way_and_read_back() {
+        for (plain, printed) in [
+            ("3 um", "3 µm"),
+            ("3um and 5 us.", "3µm and 5 µs."),
+            ("units m, mm, um, um/s", "units m, mm, µm, µm/s"),
+            (
+                "-9.81 m/s^2 to 20 kg mm^2, m^3",
+                "-9.81 m/s² to 20 kg mm², m³",
+            ),
+            (
+                "maximum of status, 2^20, x^2y",
+                "maximum of status, 2^20, x^2y",
+            ),
+            ("", ""),
+        ] {
+            assert_eq!(typeset(plain), printed);
+        }
+        let kinds = crate::scene::table().iter().map(|parameter| parameter.kind);
+        let mut seen = 0;
+        for kind in kinds {
+            let Kind::Number {
+                dimension, display, ..
+            } = kind
+            else {
+                continue;
+            };
+            let printed = shown(&Value::Number(0.25), &kind);
+            assert!(
+                !printed.contains('^') && !printed.contains("um"),
+                "{printed}"
+            );
+            let read = crate::scene::parse_quantity(&printed, dimension).expect("reads back");
+            assert!((read - 0.25).abs() < 1e-6, "{display}: {printed}");
+            seen += 1;
+        }
+        assert!(seen > 10);
     }
 
     #[test]

@@ -11,8 +11,8 @@ use glam::{Vec2, Vec3};
 use super::overlay;
 use super::player::Player;
 use super::share::CameraPose;
+use super::value;
 use crate::render;
-use crate::scene::format_quantity_digits;
 use crate::simulate::ContactState;
 use crate::view::{
     ArrowMemory, Camera, DrawList, Picked, Preset, Scaling, SceneView, Shot, Theme, ViewOptions,
@@ -255,7 +255,10 @@ impl Viewport {
             .and_then(|pixel| self.view.pick(&shot, Vec2::new(pixel.x, pixel.y)));
         // egui has dropped the clone of the frame before: nothing is copied.
         self.view.build(&shot, Arc::make_mut(&mut self.list));
-        if let Some(twin) = player.twin() {
+        // One that starts at the end of the step on show has not started yet.
+        if let Some(twin) = player.twin()
+            && twin.frame().time <= player.frame().time
+        {
             let list = Arc::make_mut(&mut self.list);
             self.view.add_ghost(&shot, twin.frame(), list);
         }
@@ -537,7 +540,7 @@ fn describe(ui: &mut Ui, player: &Player, picked: Picked) {
     // A tooltip is as wide as its longest line, not as the first.
     ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Extend);
     let row = |ui: &mut Ui, name: &str, si: f64, unit: &str| {
-        ui.label(format!("{name}  {}", format_quantity_digits(si, unit, 4)));
+        ui.label(format!("{name}  {}", value::quantity(si, unit, 4)));
     };
     let frame = player.frame();
     let Some(name) = name_of(player, picked) else {

@@ -119,9 +119,9 @@ impl Watch {
         self.orbit.push_back((frame.time, observed(&frame.pose)));
     }
 
-    /// A step was taken: sections within it are interpolated. Sampling never changes a run.
-    pub fn step(&mut self, simulation: &mut Simulation) {
-        while let Some(time) = self.next_time().filter(|time| *time <= simulation.time()) {
+    /// The latest step is on show until `until`, s: sections within it are interpolated. Sampling never changes a run.
+    pub fn step(&mut self, simulation: &mut Simulation, until: f64) {
+        while let Some(time) = self.next_time().filter(|time| *time <= until) {
             simulation.sample(time, &mut self.frame);
             if self.sections.len() == SECTIONS {
                 self.sections.pop_front();
@@ -140,7 +140,7 @@ mod tests {
         let mut frame = Frame::default();
         while simulation.time() < to {
             simulation.step().expect("runs");
-            watch.step(simulation);
+            watch.step(simulation, simulation.time());
             simulation.sample(simulation.time(), &mut frame);
             watch.record(&frame);
         }

@@ -14,6 +14,7 @@ pub enum Quantity {
     FrictionForce,
     Eccentricity,
     Penetration,
+    Clearance,
     Position,
     Angles,
     Velocity,
@@ -27,13 +28,17 @@ pub enum Quantity {
     ProbeError,
 }
 
+/// Of these each recorded joint has a channel, in this order.
+const OF_JOINTS: usize = 5;
+
 impl Quantity {
     /// All of them, in the order in which a list shows them.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 16] = [
         Self::NormalForce,
         Self::FrictionForce,
         Self::Eccentricity,
         Self::Penetration,
+        Self::Clearance,
         Self::Position,
         Self::Angles,
         Self::Velocity,
@@ -71,6 +76,7 @@ impl Quantity {
             Self::FrictionForce => "Friction force",
             Self::Eccentricity => "Eccentricity",
             Self::Penetration => "Penetration",
+            Self::Clearance => "Clearance",
             Self::Position => "Position",
             Self::Angles => "Angles",
             Self::Velocity => "Velocity",
@@ -90,7 +96,9 @@ impl Quantity {
         match self {
             Self::NormalForce | Self::FrictionForce | Self::ActuatorForce => ("N", 1.0),
             Self::ActuatorTorque => ("N m", 1.0),
-            Self::Eccentricity | Self::Position | Self::ProbeError => ("mm", 1e-3),
+            Self::Eccentricity | Self::Clearance | Self::Position | Self::ProbeError => {
+                ("mm", 1e-3)
+            }
             Self::Penetration => ("µm", 1e-6),
             Self::Angles => ("mrad", 1e-3),
             Self::Velocity => ("m/s", 1.0),
@@ -113,6 +121,10 @@ impl Quantity {
             }
             Self::Penetration => {
                 "How deep each ball presses into its socket; below zero there is a gap."
+            }
+            Self::Clearance => {
+                "Clearance of each joint as it is in force; one that is made smaller than the ball's eccentricity closes \
+                 gradually."
             }
             Self::Position => "Origin of the output body in world axes.",
             Self::Angles => "Angles α, β, γ of the output body.",
@@ -157,6 +169,7 @@ impl Channel {
             Quantity::FrictionForce => format!("{member}_friction_N"),
             Quantity::Eccentricity => format!("{member}_eccentricity_m"),
             Quantity::Penetration => format!("{member}_penetration_m"),
+            Quantity::Clearance => format!("{member}_clearance_m"),
             Quantity::Position => format!("{member}_m"),
             Quantity::Angles => format!("{angle}_rad"),
             Quantity::Velocity => format!("v{member}_m_s"),
@@ -202,7 +215,7 @@ impl Channels {
             });
         };
         for joint in scene.ball_joints.iter().take(joints) {
-            for quantity in &Quantity::ALL[..4] {
+            for quantity in &Quantity::ALL[..OF_JOINTS] {
                 add(*quantity, &joint.name);
             }
         }
@@ -264,7 +277,7 @@ impl Channels {
 
     /// Index of the normal force of ball joint `joint`, if it is recorded.
     pub fn normal_force(&self, joint: usize) -> Option<usize> {
-        (joint < self.joints).then_some(4 * joint)
+        (joint < self.joints).then_some(OF_JOINTS * joint)
     }
 
     /// Reads every channel from `frame` into `out`, SI units.
@@ -276,6 +289,7 @@ impl Channels {
                 report.friction_force.norm(),
                 report.eccentricity.norm(),
                 report.penetration,
+                report.clearance,
             ]);
         }
         let pose = &frame.pose;

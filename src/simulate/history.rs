@@ -1,10 +1,10 @@
 //! The recorded past of some channels, thinned so that no extreme is lost: bins of doubling width, each with the
 //! least and the greatest value that fell into it.
 
-/// Bins kept per level.
-const BINS: usize = 1024;
+/// Bins kept per level: more than a wide plot has columns of pixels.
+const BINS: usize = 2048;
 /// Levels: the widest bin is `finest * 2^(LEVELS - 1)`.
-const LEVELS: usize = 24;
+const LEVELS: usize = 23;
 /// No bin.
 const EMPTY: i64 = i64::MIN;
 
@@ -17,10 +17,33 @@ pub struct History {
     indices: Vec<i64>,
     /// Newest index per level.
     newest: [i64; LEVELS],
-    /// (least, greatest) per channel, slot by slot, level by level.
+    /// Greatest index per level that there ever was: what is older by a round is overwritten.
+    reached: [i64; LEVELS],
+    /// First value per channel. What is kept is the difference from it: a small motion far from zero has all its digits.
+    base: Vec<f64>,
+    /// (least, greatest) per channel less its base, slot by slot, level by level.
     ranges: Vec<(f32, f32)>,
     start: Option<f64>,
     end: f64,
+}
+
+/// What was recorded from `from` to `to`, s: the least and the greatest value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
+pub struct Bin {
+    pub from: f64,
+    pub to: f64,
+    pub least: f64,
+    pub greatest: f64,
+}
+
+/// Where a record stood, to go back to: see [`History::rewind`].
+#[derive(Clone, Debug)]
+pub struct Mark {
+    newest: [i64; LEVELS],
+    /// Of the newest bin of each level.
+    ranges: Vec<(f32, f32)>,
+    span: Option<(f64, f64)>,
 }
 
 impl History {
@@ -35,6 +58,8 @@ impl History {
             },
             indices: vec![EMPTY; LEVELS * BINS],
             newest: [EMPTY; LEVELS],
+            reached: [EMPTY; LEVELS],
+            base: vec![0.0; channels],
             ranges: vec![(0.0, 0.0); LEVELS * BINS * channels],
             start: None,
             end: 0.0,
@@ -55,8 +80,47 @@ impl History {
     pub fn clear(&mut self) {
         self.indices.fill(EMPTY);
         self.newest = [EMPTY; LEVELS];
+        self.reached = [EMPTY; LEVELS];
         self.start = None;
         self.end = 0.0;
+    }
+
+    /// Where the record stands.
+    pub fn mark(&self) -> Mark {
+        let mut ranges = Vec::with_capacity(LEVELS * self.channels);
+        for (level, &index) in self.newest.iter().enumerate() {
+            if index != EMPTY {
+                ranges.extend_from_slice(&self.ranges[self.at(level, index)]);
+            }
+        }
+        Mark {
+            newest: self.newest,
+            ranges,
+            span: self.span(),
+        }
+    }
+
+    /// Forgets what was recorded after `mark`, which is this record's own since it was last cleared.
+    pub fn rewind(&mut self, mark: &Mark) {
+        let Some((start, end)) = mark.span else {
+            return self.clear();
+        };
+        (self.start, self.end) = (Some(start), end);
+        self.newest = mark.newest;
+        let mut kept = mark.ranges.chunks_exact(self.channels.max(1));
+        for (level, &newest) in mark.newest.iter().enumerate() {
+            for index in &mut self.indices[level * BINS..(level + 1) * BINS] {
+                if *index > newest {
+                    *index = EMPTY;
+                }
+            }
+            if newest != EMPTY
+                && let Some(ranges) = kept.next()
+            {
+                self.indices[level * BINS + slot_of(newest)] = newest;
+                self.slot_mut(level, newest).copy_from_slice(ranges);
+            }
+        }
     }
 
     /// Records one instant, s; one value per channel. An instant before the latest, or not finite, is ignored.
@@ -65,21 +129,24 @@ impl History {
             return;
         }
         debug_assert_eq!(values.len(), self.channels);
-        self.start.get_or_insert(time);
+        if self.start.is_none() {
+            self.start = Some(time);
+            for (base, &value) in self.base.iter_mut().zip(values) {
+                *base = if value.is_finite() { value } else { 0.0 };
+            }
+        }
         self.end = time;
         let index = self.index(0, time);
-        if self.newest[0] != index {
+        let fresh = self.newest[0] != index;
+        if fresh {
             self.close(0);
             self.open(0, index);
-            let ranges = self.slot_mut(0, index);
-            for (range, &value) in ranges.iter_mut().zip(values) {
-                *range = (value as f32, value as f32);
-            }
-        } else {
-            let ranges = self.slot_mut(0, index);
-            for (range, &value) in ranges.iter_mut().zip(values) {
-                *range = join(*range, (value as f32, value as f32));
-            }
+        }
+        let at = self.at(0, index);
+        let slot = self.ranges[at].iter_mut().zip(values).zip(&self.base);
+        for ((range, &value), &base) in slot {
+            let kept = ((value - base) as f32, (value - base) as f32);
+            *range = if fresh { kept } else { join(*range, kept) };
         }
     }
 
@@ -88,25 +155,19 @@ impl History {
         if channel >= self.channels || !time.is_finite() || !value.is_finite() {
             return;
         }
+        let kept = (value - self.base[channel]) as f32;
         for level in 0..LEVELS {
             let index = self.index(level, time);
             if self.indices[level * BINS + slot_of(index)] == index {
                 let range = &mut self.slot_mut(level, index)[channel];
-                *range = join(*range, (value as f32, value as f32));
+                *range = join(*range, (kept, kept));
             }
         }
     }
 
-    /// Points (time in s, value) of `channel` from `from` to `to`, in order of time, at most two for each of
-    /// `most_bins` bins and two beyond each end; appended to `out`.
-    pub fn query(
-        &self,
-        channel: usize,
-        from: f64,
-        to: f64,
-        most_bins: usize,
-        out: &mut Vec<[f64; 2]>,
-    ) {
+    /// What was recorded of `channel` from `from` to `to`, s, in order of time, in at most `most_bins` bins and one beyond
+    /// each end; appended to `out`. The latest ends with the record; between two that do not touch nothing was recorded.
+    pub fn bins(&self, channel: usize, from: f64, to: f64, most_bins: usize, out: &mut Vec<Bin>) {
         if channel >= self.channels || to <= from {
             return;
         }
@@ -114,48 +175,34 @@ impl History {
             return;
         };
         let (from, to) = (from.max(start), to.min(end));
-        let level = self.level(to - from, most_bins);
-        let width = self.width(level);
-        let first = self.index(level, from);
-        let last = self.index(level, to);
-        for index in first..=last {
-            let Some((least, greatest)) = self.range(level, index, channel) else {
-                continue;
-            };
-            if least.is_nan() {
-                continue;
-            }
-            let time = ((index as f64 + 0.5) * width).clamp(start, end);
-            if least == greatest {
-                out.push([time, f64::from(least)]);
-            } else {
-                // Up one bin and down the next: an even line where the values rise and fall slowly.
-                let rising = out.last().is_none_or(|p| {
-                    (p[1] - f64::from(least)).abs() <= (p[1] - f64::from(greatest)).abs()
+        let level = self.level(from, to, most_bins);
+        let (width, complete) = (self.width(level), self.complete(level));
+        for index in self.index(level, from)..=self.index(level, to) {
+            if let Some((least, greatest)) = self.range(level, index, complete, channel)
+                && !least.is_nan()
+            {
+                out.push(Bin {
+                    from: (index as f64 * width).max(start),
+                    to: ((index + 1) as f64 * width).min(end),
+                    least,
+                    greatest,
                 });
-                let (a, b) = if rising {
-                    (least, greatest)
-                } else {
-                    (greatest, least)
-                };
-                out.push([time, f64::from(a)]);
-                out.push([time, f64::from(b)]);
             }
         }
     }
 
     /// Everything that is kept in at most so many rows: time of each bin's middle in s, then the least and the greatest
     /// value of each channel in it, channel after channel.
-    pub fn rows(&self, most_bins: usize) -> Vec<(f64, Vec<(f32, f32)>)> {
+    pub fn rows(&self, most_bins: usize) -> Vec<(f64, Vec<(f64, f64)>)> {
         let Some((start, end)) = self.span() else {
             return Vec::new();
         };
-        let level = self.level(end - start, most_bins);
-        let width = self.width(level);
+        let level = self.level(start, end, most_bins);
+        let (width, complete) = (self.width(level), self.complete(level));
         (self.index(level, start)..=self.index(level, end))
             .filter_map(|index| {
-                let values: Option<Vec<(f32, f32)>> = (0..self.channels)
-                    .map(|channel| self.range(level, index, channel))
+                let values: Option<Vec<(f64, f64)>> = (0..self.channels)
+                    .map(|channel| self.range(level, index, complete, channel))
                     .collect();
                 let time = ((index as f64 + 0.5) * width).clamp(start, end);
                 values.map(|values| (time, values))
@@ -163,12 +210,15 @@ impl History {
             .collect()
     }
 
-    /// The narrowest bins of which `most_bins` cover `length` seconds.
-    fn level(&self, length: f64, most_bins: usize) -> usize {
+    /// The narrowest bins of which `most_bins` cover the time between `from` and `to`, s, and that are still there.
+    fn level(&self, from: f64, to: f64, most_bins: usize) -> usize {
         // Two bins of room: the window seldom starts and ends on a bin's edge.
         let most_bins = most_bins.clamp(2, BINS - 2) as f64;
         (0..LEVELS)
-            .find(|&level| length / self.width(level) <= most_bins)
+            .find(|&level| {
+                let oldest = self.reached[level].saturating_sub(BINS as i64);
+                (to - from) / self.width(level) <= most_bins && self.index(level, from) > oldest
+            })
             .unwrap_or(LEVELS - 1)
     }
 
@@ -181,15 +231,29 @@ impl History {
         ((time / self.finest).floor() as i64) >> level
     }
 
-    fn slot_mut(&mut self, level: usize, index: i64) -> &mut [(f32, f32)] {
+    /// Where the ranges of a bin lie.
+    fn at(&self, level: usize, index: i64) -> std::ops::Range<usize> {
         let at = (level * BINS + slot_of(index)) * self.channels;
-        &mut self.ranges[at..at + self.channels]
+        at..at + self.channels
     }
 
-    /// Range of `channel` in one bin, what the narrower levels have not yet handed up included.
-    fn range(&self, level: usize, index: i64, channel: usize) -> Option<(f32, f32)> {
+    fn slot_mut(&mut self, level: usize, index: i64) -> &mut [(f32, f32)] {
+        let at = self.at(level, index);
+        &mut self.ranges[at]
+    }
+
+    /// First bin of `level` that narrower levels have still to hand something up to.
+    fn complete(&self, level: usize) -> i64 {
+        let newest = self.newest[..level].iter().enumerate();
+        let above = newest.map(|(below, index)| index >> (level - below));
+        above.min().unwrap_or(i64::MAX)
+    }
+
+    /// Range of `channel` in one bin, what the narrower levels have not yet handed up included: those before the bin
+    /// `complete` have it all.
+    fn range(&self, level: usize, index: i64, complete: i64, channel: usize) -> Option<(f64, f64)> {
         let mut found: Option<(f32, f32)> = None;
-        for below in 0..=level {
+        for below in if index < complete { level } else { 0 }..=level {
             let at = if below == level {
                 index
             } else {
@@ -204,7 +268,17 @@ impl History {
                 found = Some(found.map_or(range, |f| join(f, range)));
             }
         }
-        found
+        let base = self.base[channel];
+        let whole = |kept: f32| {
+            let value = base + f64::from(kept);
+            // As far from its base as that is from zero, it has no more digits than this: zero stays zero.
+            if value.abs() <= f64::from(f32::EPSILON) * base.abs() {
+                0.0
+            } else {
+                value
+            }
+        };
+        found.map(|(least, greatest)| (whole(least), whole(greatest)))
     }
 
     /// Hands the newest bin of `level` up to the level above.
@@ -230,6 +304,7 @@ impl History {
 
     fn open(&mut self, level: usize, index: i64) {
         self.newest[level] = index;
+        self.reached[level] = self.reached[level].max(index);
         self.indices[level * BINS + slot_of(index)] = index;
     }
 }
@@ -250,6 +325,12 @@ mod tests {
         libm::sin(n as f64 * 0.001)
     }
 
+    fn bins(history: &History, channel: usize, from: f64, to: f64, most: usize) -> Vec<Bin> {
+        let mut bins = Vec::new();
+        history.bins(channel, from, to, most, &mut bins);
+        bins
+    }
+
     #[test]
     fn every_extreme_survives_at_every_width() {
         let mut history = History::new(2, 1e-5);
@@ -258,33 +339,35 @@ mod tests {
             history.push(n as f64 * 1e-5, &[spike, -spike]);
         }
         for window in [1.0, 1.9, 2.0] {
-            let mut points = Vec::new();
-            history.query(0, 2.0 - window, 2.0, 500, &mut points);
-            assert!(points.len() <= 1004, "{}", points.len());
-            let greatest = points.iter().map(|p| p[1]).fold(f64::MIN, f64::max);
-            let least = points.iter().map(|p| p[1]).fold(f64::MAX, f64::min);
-            assert_eq!(greatest, 50.0, "window {window}");
+            let bins = bins(&history, 0, 2.0 - window, 2.0, 500);
+            assert!((250..=502).contains(&bins.len()), "{}", bins.len());
+            let least = bins.iter().map(|b| b.least).fold(f64::MAX, f64::min);
             assert!((least + 1.0).abs() < 1e-6, "window {window}: {least}");
-            let at = points.iter().find(|p| p[1] == 50.0).expect("found above")[0];
-            assert!((at - 1.23456).abs() <= window / 250.0, "{at}");
+            let spikes: Vec<&Bin> = bins.iter().filter(|b| b.greatest > 1.0).collect();
+            assert_eq!((spikes.len(), spikes[0].greatest), (1, 50.0));
+            let at = spikes[0];
+            assert!(at.from <= 1.23456 && 1.23456 < at.to, "{at:?}");
         }
     }
 
     #[test]
-    fn points_come_in_order_and_inside_the_window() {
+    fn bins_come_in_order_inside_the_window_and_end_with_the_record() {
         let mut history = History::new(1, 1e-6);
         for n in 0..50_000_u64 {
             history.push(n as f64 * 1e-5, &[wave(n)]);
         }
-        let mut points = Vec::new();
-        history.query(0, 0.2, 0.3, 300, &mut points);
-        assert!(points.len() > 100, "{}", points.len());
-        assert!(points.windows(2).all(|w| w[0][0] <= w[1][0]));
-        let bin = 0.1 / 150.0;
-        assert!(points.iter().all(|p| p[0] > 0.2 - bin && p[0] < 0.3 + bin));
-        for p in points {
-            assert!((p[1] - libm::sin(p[0] * 100.0)).abs() < 0.1);
+        let found = bins(&history, 0, 0.2, 0.3, 300);
+        assert!(found.len() > 100, "{}", found.len());
+        assert!(found.windows(2).all(|w| w[0].to == w[1].from));
+        let width = 0.1 / 150.0;
+        for bin in found {
+            assert!(bin.from > 0.2 - width && bin.to < 0.3 + width);
+            let middle = libm::sin((bin.from + bin.to) * 50.0);
+            assert!((bin.least - middle).abs() < 0.1 && (bin.greatest - middle).abs() < 0.1);
         }
+        let found = bins(&history, 0, 0.0, 1.0, 300);
+        assert_eq!(found[0].from, 0.0);
+        assert_eq!(found[found.len() - 1].to, 49_999.0 * 1e-5);
     }
 
     #[test]
@@ -294,9 +377,25 @@ mod tests {
             history.push(f64::from(n) * 1e-3, &[0.0]);
         }
         history.push(1.0, &[7.0]);
-        let mut points = Vec::new();
-        history.query(0, 0.0, 1.0, 100, &mut points);
-        assert_eq!(points.iter().map(|p| p[1]).fold(f64::MIN, f64::max), 7.0);
+        let bins = bins(&history, 0, 0.0, 1.0, 100);
+        assert_eq!(bins[bins.len() - 1].greatest, 7.0);
+    }
+
+    #[test]
+    fn a_small_motion_far_from_zero_keeps_its_digits_and_zero_is_zero() {
+        let mut history = History::new(2, 1e-5);
+        for n in 0..1000_u64 {
+            let time = (n as f64 + 0.5) * 1e-5;
+            history.push(time, &[0.203_441 + 1e-12 * wave(n), 1.6 * f64::from(n < 9)]);
+        }
+        let found = bins(&history, 0, 0.0, 1e-2, 1000);
+        assert_eq!(found.len(), 1000);
+        for (n, bin) in found.iter().enumerate() {
+            let wanted = 0.203_441 + 1e-12 * wave(n as u64);
+            assert!((bin.least - wanted).abs() < 1e-15, "{n}: {bin:?}");
+        }
+        let found = bins(&history, 1, 0.0, 1e-2, 1000);
+        assert_eq!(found[found.len() - 1].greatest, 0.0);
     }
 
     #[test]
@@ -306,21 +405,45 @@ mod tests {
             history.push(f64::from(n) * 1e-4, &[1.0, 2.0]);
         }
         history.widen(0.05, 0, 9.0);
-        for bins in [50, 500] {
-            let mut points = Vec::new();
-            history.query(0, 0.0, 0.1, bins, &mut points);
-            let peak = points
-                .iter()
-                .find(|p| p[1] == 9.0)
-                .expect("the peak is kept");
-            assert!((peak[0] - 0.05).abs() < 0.1 / bins as f64 * 2.0);
-            points.clear();
-            history.query(1, 0.0, 0.1, bins, &mut points);
-            assert!(
-                points.iter().all(|p| p[1] == 2.0),
-                "the other channel is untouched"
-            );
+        for most in [50, 500] {
+            let found = bins(&history, 0, 0.0, 0.1, most);
+            let peak = found.iter().find(|b| b.greatest == 9.0);
+            let peak = peak.expect("the peak is kept");
+            assert!(peak.from <= 0.05 && 0.05 < peak.to);
+            let other = bins(&history, 1, 0.0, 0.1, most);
+            assert!(other.iter().all(|b| (b.least, b.greatest) == (2.0, 2.0)));
         }
+    }
+
+    #[test]
+    fn rewound_it_is_as_if_the_rest_had_never_been() {
+        let push = |history: &mut History, from: u64, to: u64| {
+            for n in from..to {
+                history.push(n as f64 * 1e-5, &[wave(n), n as f64]);
+            }
+        };
+        let mut history = History::new(2, 1e-6);
+        let nothing = history.mark();
+        push(&mut history, 0, 3_333);
+        let mark = history.mark();
+        let (before, rows) = (bins(&history, 0, 0.0, 1.0, 700), history.rows(70));
+        push(&mut history, 3_333, 60_000);
+        history.widen(0.033_32, 0, 9.0);
+        assert!(history.rows(70) != rows);
+        history.rewind(&mark);
+        assert_eq!(history.span(), Some((0.0, 3_332.0 * 1e-5)));
+        assert!(history.rows(70) == rows);
+        // What the future overwrote is there in wider bins.
+        let after = bins(&history, 0, 0.0, 1.0, 700);
+        let ends = |bins: &[Bin]| (bins[0].from, bins[bins.len() - 1].to);
+        assert_eq!(ends(&after), ends(&before));
+        let mut straight = history.clone();
+        push(&mut straight, 3_333, 9_000);
+        let mut anew = History::new(2, 1e-6);
+        push(&mut anew, 0, 9_000);
+        assert!(straight.rows(70) == anew.rows(70));
+        history.rewind(&nothing);
+        assert_eq!((history.span(), history.rows(9).len()), (None, 0));
     }
 
     #[test]
@@ -329,14 +452,11 @@ mod tests {
         for n in 0..200_000_u64 {
             history.push(n as f64 * 1e-4, &[n as f64]);
         }
-        let mut points = Vec::new();
-        history.query(0, 0.0, 20.0, 400, &mut points);
-        assert_eq!(points[0][1], 0.0);
-        assert_eq!(points[points.len() - 1][1], 199_999.0);
+        let found = bins(&history, 0, 0.0, 20.0, 400);
+        assert_eq!(found[0].least, 0.0);
+        assert_eq!(found[found.len() - 1].greatest, 199_999.0);
         history.clear();
-        points.clear();
-        history.query(0, 0.0, 20.0, 400, &mut points);
-        assert!(points.is_empty() && history.span().is_none());
+        assert!(bins(&history, 0, 0.0, 20.0, 400).is_empty() && history.span().is_none());
     }
 
     #[test]

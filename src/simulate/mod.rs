@@ -18,7 +18,7 @@ pub use angles::angles_of;
 pub use channels::*;
 pub use doubt::{Doubt, Joints, Work};
 pub use frame::*;
-pub use history::History;
+pub use history::{Bin, History, Mark};
 pub use impacts::Impact;
 pub use ledger::Ledger;
 pub use pace::{LARGEST_BUDGET, LONGEST_FRAME, Pacer, SCALE_RANGE};

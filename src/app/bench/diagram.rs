@@ -8,7 +8,7 @@ use super::plane::{Axis, plane};
 use super::portrait::title;
 use super::sweep::Swept;
 use crate::analysis::swept::SweptPoint;
-use crate::app::theme;
+use crate::app::{theme, value};
 use crate::scene::{table, to_display};
 
 const HEIGHT: f32 = 230.0;
@@ -106,7 +106,7 @@ impl Diagram {
         if self.made != Some((self.ordinate, coordinate)) {
             self.make(swept, coordinate, &shown);
         }
-        let across = Axis::new(label.to_lowercase(), unit);
+        let across = Axis::new(label.to_lowercase(), value::typeset(unit));
         let up = self.ordinate.axis(coordinate);
         title(
             ui,

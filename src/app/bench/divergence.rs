@@ -1,10 +1,11 @@
 //! The twin run: how far it is from the run, on a logarithmic plot, and the slope of that.
 
 use eframe::egui::{Checkbox, RichText, Ui};
-use egui_plot::{GridMark, Line, LineStyle, PlotPoints};
+use egui_plot::{GridMark, Line, LineStyle, PlotPoint, PlotPoints};
 
 use super::plane::{Axis, plane};
 use super::portrait::title;
+use crate::app::curve::Path;
 use crate::app::player::Player;
 use crate::app::{plots, theme, value};
 
@@ -38,7 +39,11 @@ pub fn ui(ui: &mut Ui, player: &mut Player, problem: &mut Option<String>) {
         return;
     };
     let dark = ui.visuals().dark_mode;
-    let span = twin.distances().last().zip(twin.distances().first());
+    // The twin is as far as the latest step, the picture within it.
+    let shown = player.pacer.shown();
+    let distances = twin.distances();
+    let distances = &distances[..distances.partition_point(|[time, _]| *time <= shown)];
+    let span = distances.last().zip(distances.first());
     let length = span.map_or(0.0, |(last, first)| last[0] - first[0]);
     let (unit, size) = plots::time_axis(length);
     let across = Axis::new("at", unit);
@@ -49,10 +54,9 @@ pub fn ui(ui: &mut Ui, player: &mut Player, problem: &mut Option<String>) {
         "Euclidean distance of all coordinates and velocities, each over its scale of the tolerance (1 ball radius, 0.1 rad \
          and so on); the line is fitted over the growing part",
     );
-    let points: Vec<[f64; 2]> = twin
-        .distances()
+    let points: Vec<PlotPoint> = distances
         .iter()
-        .map(|[time, distance]| [time / size, distance.log10()])
+        .map(|[time, distance]| PlotPoint::new(time / size, distance.log10()))
         .collect();
     let fit = twin.fit();
     let ink = ui.visuals().weak_text_color();
@@ -66,8 +70,7 @@ pub fn ui(ui: &mut Ui, player: &mut Player, problem: &mut Option<String>) {
                 .formatter(|mark, _| format!("1e{}", mark.value)),
         ])
         .show(ui, |plot| {
-            let distance = Line::new("Distance", PlotPoints::from(points));
-            plot.line(distance.color(theme::series(5, dark)).width(1.4));
+            plot.add(Path::line("Distance", &points, theme::series(5, dark), 1.4));
             if let Some(fit) = fit {
                 let at = |time: f64| {
                     let ln = fit.start + fit.slope * (time - fit.from);

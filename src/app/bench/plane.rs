@@ -1,7 +1,7 @@
 //! A plot of one quantity over another in the bench: no legend, no dragging, units on the axes.
 
 use eframe::egui::{self, Rangef, Sense, Ui, Vec2b};
-use egui_plot::{AxisHints, HoverPosition, Plot};
+use egui_plot::{AxisHints, GridMark, HoverPosition, Plot};
 
 use crate::app::plots::{marks, tick};
 use crate::app::value;
@@ -36,6 +36,12 @@ fn with_unit(text: &str, unit: &str, between: &str) -> String {
     }
 }
 
+/// The number at a mark.
+fn word(mark: GridMark, range: &std::ops::RangeInclusive<f64>) -> String {
+    let most = range.start().abs().max(range.end().abs());
+    tick(mark.value, mark.step_size, most)
+}
+
 /// A plot of `up` over `across`, `height` points high and as wide as there is room.
 pub fn plane<'a>(ui: &Ui, id: &'static str, across: &Axis, up: &Axis, height: f32) -> Plot<'a> {
     let faint = ui.visuals().weak_text_color();
@@ -44,11 +50,11 @@ pub fn plane<'a>(ui: &Ui, id: &'static str, across: &Axis, up: &Axis, height: f3
     let unit = across.unit.clone();
     let below = hints(AxisHints::new_x())
         .label_spacing(Rangef::new(24.0, 28.0))
-        .formatter(move |mark, _| with_unit(&tick(mark.value), &unit, " "));
+        .formatter(move |mark, range| with_unit(&word(mark, range), &unit, " "));
     let beside = hints(AxisHints::new_y())
         .min_thickness(46.0)
         .label_spacing(Rangef::new(14.0, 18.0))
-        .formatter(|mark, _| tick(mark.value));
+        .formatter(word);
     let (across, up) = (across.clone(), up.clone());
     Plot::new(id)
         .width(ui.available_width() - 12.0)
@@ -66,6 +72,7 @@ pub fn plane<'a>(ui: &Ui, id: &'static str, across: &Axis, up: &Axis, height: f3
         .custom_y_axes(vec![beside])
         .x_grid_spacer(|input| marks(&input, 4.0))
         .y_grid_spacer(|input| marks(&input, 5.0))
+        .grid_spacing(Rangef::new(16.0, 300.0))
         .grid_color(faint.gamma_multiply(0.35))
         .grid_fade(0.0)
         .label_formatter(move |position| match position {

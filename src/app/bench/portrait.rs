@@ -1,14 +1,15 @@
 //! Phase portrait of the output body, and its Poincaré section at the drive phase.
 
 use eframe::egui::{RichText, Slider, SliderClamping, Ui};
-use egui_plot::{Line, PlotPoint, PlotPoints, Points};
+use egui_plot::{PlotPoint, PlotPoints, Points};
 
 use super::coordinate::Coordinate;
 use super::plane::{Axis, plane};
+use crate::analysis::drive::observed;
+use crate::app::curve::Path;
 use crate::app::player::Player;
-use crate::app::theme;
 use crate::app::watch::Observed;
-use crate::scene::format_quantity_digits;
+use crate::app::{theme, value};
 
 /// Height of each plot, points.
 const HEIGHT: f32 = 190.0;
@@ -29,18 +30,17 @@ impl Portrait {
         title(
             ui,
             &format!("Phase portrait: {} over {}", up.title(), across.title()),
-            "The orbit of the last periods of the drive, at most 1000 instants in each, with the latest state and the sections",
+            "The orbit of the last periods of the drive, at most 1000 instants in each, with the state on show and the sections",
         );
         let (line, mark) = (theme::series(0, dark), theme::series(1, dark));
         let Self { orbit, sections } = self;
         plane(ui, "portrait", &across, &up, HEIGHT).show(ui, |plot| {
-            let series = PlotPoints::Borrowed(orbit);
-            plot.line(Line::new("Orbit", series).color(line).width(1.2));
+            plot.add(Path::line("Orbit", orbit, line, 1.2));
             let series = PlotPoints::Borrowed(sections);
             plot.points(Points::new("Section", series).color(mark).radius(2.5));
             if let Some(last) = orbit.last() {
                 let now = PlotPoints::Owned(vec![*last]);
-                plot.points(Points::new("Latest state", now).color(line).radius(4.0));
+                plot.points(Points::new("State on show", now).color(line).radius(4.0));
             }
         });
         match player.watch().period().map_err(ToOwned::to_owned) {
@@ -86,7 +86,7 @@ impl Portrait {
             RichText::new(format!(
                 "Sections: {}, one every {}",
                 self.sections.len(),
-                format_quantity_digits(period, "s", 5)
+                value::quantity(period, "s", 5)
             ))
             .small()
             .weak(),
@@ -103,6 +103,9 @@ impl Portrait {
         };
         self.orbit.clear();
         self.orbit.extend(watch.orbit().map(point));
+        // The orbit leaves out instants close to one another; the one on show is its end.
+        let frame = player.frame();
+        self.orbit.push(point(&(frame.time, observed(&frame.pose))));
         self.sections.clear();
         self.sections.extend(watch.sections().map(point));
     }

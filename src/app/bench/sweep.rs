@@ -161,7 +161,7 @@ impl Sweep {
                 .show_ui(ui, |ui| {
                     for parameter in &parameters {
                         ui.selectable_value(&mut key, parameter.key, parameter.label)
-                            .on_hover_text(parameter.help);
+                            .on_hover_text(value::typeset(parameter.help));
                     }
                 })
                 .response
@@ -303,7 +303,7 @@ impl Settings {
         (self.from, self.to) = match parameter.kind {
             _ if parameter.key == FIRST.0 => (FIRST.1.to_owned(), FIRST.2.to_owned()),
             Kind::Number { slider, .. } => {
-                let end = |si| parameter.show(&Value::Number(si));
+                let end = |si| value::shown(&Value::Number(si), &parameter.kind);
                 (end(slider.0), end(slider.1))
             }
             Kind::Count { min, .. } => (min.to_string(), (min + 3).to_string()),

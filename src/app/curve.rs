@@ -1,0 +1,479 @@
+//! Curves of recorded quantities, drawn so that no pixel of colour stands for a value that was not recorded: each column of
+//! pixels from the least to the greatest value that fell into it. Lines with joined corners would overshoot at every peak.
+
+use std::ops::RangeInclusive;
+use std::sync::Arc;
+
+use eframe::egui::{Color32, Mesh, Pos2, Shape, Stroke, Ui, pos2};
+use egui_plot::{PlotBounds, PlotGeometry, PlotItem, PlotItemBase, PlotPoint, PlotTransform};
+
+use crate::simulate::Bin;
+
+/// Width of a curve, points.
+pub const WIDTH: f32 = 1.4;
+/// Length of a dash of one colour where curves coincide, points.
+const DASH: f32 = 6.0;
+
+/// One curve: what was recorded, in SI units.
+#[derive(Clone, Debug, Default)]
+pub struct Trace {
+    /// In order of time.
+    pub bins: Vec<Bin>,
+    /// Its colour.
+    pub colour: Color32,
+}
+
+/// Curves over one time axis. Where one would hide another they share the place: in a column of pixels the taller stands
+/// behind the shorter, and those that coincide take turns.
+pub struct Curves<'a> {
+    base: PlotItemBase,
+    traces: &'a [Trace],
+    /// One of the time axis in s, and of the other in SI units.
+    units: [f64; 2],
+    width: f32,
+    dashed: bool,
+}
+
+impl<'a> Curves<'a> {
+    /// Curves over axes of which one is so many seconds, and so many SI units.
+    pub fn new(traces: &'a [Trace], units: [f64; 2]) -> Self {
+        Self {
+            base: PlotItemBase::new("curves".to_owned()),
+            traces,
+            units,
+            width: WIDTH,
+            dashed: false,
+        }
+    }
+
+    /// Thin and dashed: a level, not a motion.
+    pub fn dashed(mut self) -> Self {
+        (self.width, self.dashed) = (1.0, true);
+        self
+    }
+
+    fn mesh(&self, transform: &PlotTransform, scale: f32) -> Mesh {
+        let frame = transform.frame();
+        let bounds = transform.bounds();
+        let per = |d: usize, length: f32| {
+            f64::from(length * scale) / (bounds.max()[d] - bounds.min()[d]) / self.units[d]
+        };
+        let (across, up) = (per(0, frame.width()), per(1, frame.height()));
+        let origin = [
+            f64::from(frame.left() * scale) - bounds.min()[0] * self.units[0] * across,
+            f64::from(frame.bottom() * scale) + bounds.min()[1] * self.units[1] * up,
+        ];
+        let first = (frame.left() * scale).floor() as i64;
+        let count = ((frame.right() * scale).ceil() as i64 - first).max(0) as usize;
+        // Far outside is outside, too.
+        let (top, bottom) = (
+            frame.top() - frame.height(),
+            frame.bottom() + frame.height(),
+        );
+        let clip = (f64::from(top * scale), f64::from(bottom * scale));
+        let place = |time: f64, value: f64| {
+            let y = (origin[1] - value * up).clamp(clip.0, clip.1);
+            [origin[0] + time * across, y]
+        };
+        let width = self.width * scale;
+        let all: Vec<Vec<Bar>> = self
+            .traces
+            .iter()
+            .map(|trace| bars(&spans(&trace.bins, place, first, count), width))
+            .collect();
+        let dash = (DASH * scale).round().max(1.0);
+        let mut mesh = Mesh::default();
+        let mut here: Vec<(usize, Bar)> = Vec::new();
+        let mut groups: Vec<Vec<(usize, Bar)>> = Vec::new();
+        for column in 0..count {
+            here.clear();
+            let present = all
+                .iter()
+                .enumerate()
+                .map(|(index, bars)| (index, bars[column]));
+            here.extend(present.filter(|(_, bar)| bar.height() > 0.0));
+            if self.dashed {
+                let gap = (column as f32 / dash) as usize % 2 == 1;
+                here.retain(|(_, bar)| !gap || bar.height() > 3.0 * width);
+            }
+            // Curves that run side by side keep their order, whichever is steeper just here.
+            let rank = |bar: &Bar| {
+                if bar.height() > 3.0 * width {
+                    bar.height()
+                } else {
+                    0.0
+                }
+            };
+            here.sort_by(|a, b| rank(&b.1).total_cmp(&rank(&a.1)));
+            groups.clear();
+            for &(index, bar) in &here {
+                match groups.iter_mut().find(|group| group[0].1.coincides(&bar)) {
+                    Some(group) => group.push((index, bar)),
+                    None => groups.push(vec![(index, bar)]),
+                }
+            }
+            let x = (first + column as i64) as f32;
+            for group in &groups {
+                paint(&mut mesh, x, scale, dash, group, |index| {
+                    self.traces[index].colour
+                });
+            }
+        }
+        mesh
+    }
+}
+
+/// Paints what stands in the column of pixels at `x`: one bar, or some that coincide and take turns along it.
+fn paint(
+    mesh: &mut Mesh,
+    x: f32,
+    scale: f32,
+    dash: f32,
+    group: &[(usize, Bar)],
+    colour: impl Fn(usize) -> Color32,
+) {
+    if let [(index, bar)] = group {
+        bar.paint(
+            mesh,
+            x,
+            scale,
+            (f32::NEG_INFINITY, f32::INFINITY),
+            colour(*index),
+        );
+        return;
+    }
+    let low = group
+        .iter()
+        .map(|(_, bar)| bar.top - bar.soft_top)
+        .fold(f32::INFINITY, f32::min);
+    let high = group
+        .iter()
+        .map(|(_, bar)| bar.bottom + bar.soft_bottom)
+        .fold(0.0, f32::max);
+    // Diagonal, so that level stretches and upright ones alternate.
+    let (from, to) = (
+        ((x + low) / dash).floor() as i64,
+        ((x + high) / dash).floor() as i64,
+    );
+    for piece in from..=to {
+        let (index, bar) = group[piece.rem_euclid(group.len() as i64) as usize];
+        let ends = (piece as f32 * dash - x, (piece + 1) as f32 * dash - x);
+        bar.paint(mesh, x, scale, ends, colour(index));
+    }
+}
+
+/// The part of a column of pixels that a curve passes, y downwards; nothing where `top` is below `bottom`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Span {
+    top: f32,
+    bottom: f32,
+}
+
+impl Span {
+    const NOTHING: Self = Self {
+        top: f32::INFINITY,
+        bottom: f32::NEG_INFINITY,
+    };
+
+    fn reach(&mut self, y: f64) {
+        self.top = self.top.min(y as f32);
+        self.bottom = self.bottom.max(y as f32);
+    }
+
+    fn join(self, other: Self) -> Self {
+        Self {
+            top: self.top.min(other.top),
+            bottom: self.bottom.max(other.bottom),
+        }
+    }
+}
+
+/// The columns from pixel `first` on that a curve through `bins` passes; `place` turns time and value to pixels.
+fn spans(
+    bins: &[Bin],
+    place: impl Fn(f64, f64) -> [f64; 2],
+    first: i64,
+    count: usize,
+) -> Vec<Span> {
+    let mut spans = vec![Span::NOTHING; count];
+    let column = |x: f64| {
+        let at = x.floor() as i64 - first;
+        usize::try_from(at).ok().filter(|at| *at < count)
+    };
+    let mut line = |[xa, ya]: [f64; 2], [xb, yb]: [f64; 2]| {
+        let last = first + count as i64;
+        let slope = if xb > xa { (yb - ya) / (xb - xa) } else { 0.0 };
+        for at in (xa.floor() as i64).max(first)..=(xb.floor() as i64).min(last - 1) {
+            let span = &mut spans[(at - first) as usize];
+            let (left, right) = (at as f64, (at + 1) as f64);
+            span.reach(if left <= xa {
+                ya
+            } else {
+                ya + (left - xa) * slope
+            });
+            span.reach(if right >= xb {
+                yb
+            } else {
+                ya + (right - xa) * slope
+            });
+        }
+    };
+    // The pen goes through every bin: from where it touches the one before, over its middle, to where it touches the next.
+    let mut pen: Option<(f64, f64)> = None;
+    let mut extremes: Vec<(f64, f64)> = Vec::new();
+    for (index, bin) in bins.iter().enumerate() {
+        if bin.least.is_nan() || bin.greatest.is_nan() {
+            pen = None;
+            continue;
+        }
+        let next = bins.get(index + 1).filter(|next| next.from == bin.to);
+        let exit = next.map(|next| {
+            // The middle of what both have, or of the jump between them.
+            0.5 * (bin.least.max(next.least) + bin.greatest.min(next.greatest))
+        });
+        let wanted = match (pen, exit) {
+            (Some((_, entry)), Some(exit)) => 0.5 * (entry + exit),
+            (Some((_, value)), None) | (None, Some(value)) => value,
+            (None, None) => 0.5 * (bin.least + bin.greatest),
+        };
+        let value = wanted.clamp(bin.least, bin.greatest);
+        let middle = 0.5 * (bin.from + bin.to);
+        let (time, entry) = pen.unwrap_or((bin.from, value));
+        line(place(time, entry), place(middle, value));
+        let end = exit.unwrap_or(value);
+        line(place(middle, value), place(bin.to, end));
+        for (extreme, reached) in [
+            (bin.greatest, bin.greatest <= entry.max(end)),
+            (bin.least, bin.least >= entry.min(end)),
+        ] {
+            if !reached {
+                extremes.push((middle, extreme));
+            }
+        }
+        pen = Some((bin.to, end));
+    }
+    for (time, value) in extremes {
+        let [x, y] = place(time, value);
+        if let Some(at) = column(x) {
+            spans[at].reach(y);
+        }
+    }
+    spans
+}
+
+/// A painted column: full colour between its ends, each of which fades over so many pixels around it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Bar {
+    top: f32,
+    bottom: f32,
+    soft_top: f32,
+    soft_bottom: f32,
+}
+
+impl Bar {
+    const NOTHING: Self = Self {
+        top: 0.0,
+        bottom: 0.0,
+        soft_top: 0.0,
+        soft_bottom: 0.0,
+    };
+
+    fn height(&self) -> f32 {
+        self.bottom - self.top
+    }
+
+    /// Whether it would hide the other, and the other it.
+    fn coincides(&self, other: &Self) -> bool {
+        (self.top - other.top).abs() < 1.0 && (self.bottom - other.bottom).abs() < 1.0
+    }
+
+    /// Adds it to `mesh`, as far as it lies between two heights (pixels).
+    fn paint(&self, mesh: &mut Mesh, x: f32, scale: f32, (low, high): (f32, f32), colour: Color32) {
+        let profile = [
+            (self.top - 0.5 * self.soft_top, 0.0),
+            (self.top + 0.5 * self.soft_top, 1.0),
+            (self.bottom - 0.5 * self.soft_bottom, 1.0),
+            (self.bottom + 0.5 * self.soft_bottom, 0.0),
+        ];
+        for ends in profile.windows(2) {
+            let ((ya, a), (yb, b)) = (ends[0], ends[1]);
+            let (from, to) = (ya.max(low), yb.min(high));
+            if from >= to {
+                continue;
+            }
+            let index = mesh.vertices.len() as u32;
+            for y in [from, to] {
+                let part = a + (b - a) * (y - ya) / (yb - ya);
+                let colour = colour.gamma_multiply(part);
+                for x in [x, x + 1.0] {
+                    mesh.colored_vertex(pos2(x / scale, y / scale), colour);
+                }
+            }
+            mesh.add_triangle(index, index + 1, index + 2);
+            mesh.add_triangle(index + 1, index + 2, index + 3);
+        }
+    }
+}
+
+/// What is painted of a curve: `width` pixels thick where it runs level, and as wide where it is steep; at its own peaks and
+/// hollows not a pixel more than it reaches.
+fn bars(spans: &[Span], width: f32) -> Vec<Bar> {
+    // Whole columns to either side, and what is left of the width as softer ends.
+    let beside = (0.5 * (width - 1.0) + 0.25).floor().max(0.0) as usize;
+    let rest = (width - 2.0 * beside as f32 - 1.0).max(0.0);
+    let wide = |at: usize| {
+        let last = spans.len() - 1;
+        let near = spans[at.saturating_sub(beside)..=(at + beside).min(last)].iter();
+        near.fold(Span::NOTHING, |all, span| all.join(*span))
+    };
+    let wide: Vec<Span> = (0..spans.len()).map(wide).collect();
+    let bar = |at: usize| {
+        let Span { top, bottom } = wide[at];
+        if top > bottom {
+            return Bar::NOTHING;
+        }
+        let before = at.checked_sub(1).map_or(Span::NOTHING, |at| wide[at]);
+        let around = before.join(wide.get(at + 1).copied().unwrap_or(Span::NOTHING));
+        // How far the curve goes on beyond this column, as far as that is its slope.
+        let goes_on = |by: f32| by.clamp(0.0, bottom - top);
+        let (up, down) = (goes_on(top - around.top), goes_on(around.bottom - bottom));
+        let (mut top, mut bottom) = (top - 0.5 * rest * up, bottom + 0.5 * rest * down);
+        if bottom - top < width {
+            let middle = 0.5 * (top + bottom);
+            (top, bottom) = (middle - 0.5 * width, middle + 0.5 * width);
+        }
+        Bar {
+            top,
+            bottom,
+            soft_top: up.max(1.0),
+            soft_bottom: down.max(1.0),
+        }
+    };
+    (0..spans.len()).map(bar).collect()
+}
+
+impl PlotItem for Curves<'_> {
+    fn shapes(&self, ui: &Ui, transform: &PlotTransform, shapes: &mut Vec<Shape>) {
+        let mesh = self.mesh(transform, ui.ctx().pixels_per_point());
+        if !mesh.is_empty() {
+            shapes.push(Shape::Mesh(Arc::new(mesh)));
+        }
+    }
+
+    fn initialize(&mut self, _x_range: RangeInclusive<f64>) {}
+
+    fn color(&self) -> Color32 {
+        Color32::TRANSPARENT
+    }
+
+    fn geometry(&self) -> PlotGeometry<'_> {
+        PlotGeometry::None
+    }
+
+    fn bounds(&self) -> PlotBounds {
+        PlotBounds::NOTHING
+    }
+
+    fn base(&self) -> &PlotItemBase {
+        &self.base
+    }
+
+    fn base_mut(&mut self) -> &mut PlotItemBase {
+        &mut self.base
+    }
+}
+
+/// Points that the pointer finds, joined by a line where it has a width; its sharp corners are cut off.
+pub struct Path<'a> {
+    base: PlotItemBase,
+    points: &'a [PlotPoint],
+    colour: Color32,
+    width: f32,
+}
+
+impl<'a> Path<'a> {
+    /// The readings of a curve that is drawn by [`Curves`].
+    pub fn readings(name: &str, points: &'a [PlotPoint], colour: Color32) -> Self {
+        Self::line(name, points, colour, 0.0)
+    }
+
+    /// A line of `width` points.
+    pub fn line(name: &str, points: &'a [PlotPoint], colour: Color32, width: f32) -> Self {
+        let base = PlotItemBase::new(name.to_owned());
+        Self {
+            base,
+            points,
+            colour,
+            width,
+        }
+    }
+}
+
+impl PlotItem for Path<'_> {
+    fn shapes(&self, _ui: &Ui, transform: &PlotTransform, shapes: &mut Vec<Shape>) {
+        if self.width <= 0.0 {
+            return;
+        }
+        let stroke = Stroke::new(self.width, self.colour);
+        let places = self.points.iter().map(|p| transform.position_from_point(p));
+        shapes.extend(
+            parts(places)
+                .into_iter()
+                .map(|part| Shape::line(part, stroke)),
+        );
+    }
+
+    fn initialize(&mut self, _x_range: RangeInclusive<f64>) {}
+
+    fn color(&self) -> Color32 {
+        self.colour
+    }
+
+    fn geometry(&self) -> PlotGeometry<'_> {
+        PlotGeometry::Points(self.points)
+    }
+
+    fn bounds(&self) -> PlotBounds {
+        let mut bounds = PlotBounds::NOTHING;
+        self.points
+            .iter()
+            .for_each(|point| bounds.extend_with(point));
+        bounds
+    }
+
+    fn base(&self) -> &PlotItemBase {
+        &self.base
+    }
+
+    fn base_mut(&mut self) -> &mut PlotItemBase {
+        &mut self.base
+    }
+}
+
+/// A line in parts without sharp corners: no part has a join that sticks out.
+fn parts(points: impl Iterator<Item = Pos2>) -> Vec<Vec<Pos2>> {
+    /// Least cosine of a turn that a join follows smoothly.
+    const SMOOTH: f32 = 0.8;
+    let mut parts: Vec<Vec<Pos2>> = vec![Vec::new()];
+    for point in points {
+        let Some(part) = parts.last_mut() else { break };
+        let turn = match part[..] {
+            [.., last] if last.distance_sq(point) < 0.01 => continue,
+            [.., before, last] => (last - before)
+                .normalized()
+                .dot((point - last).normalized()),
+            _ => 1.0,
+        };
+        if turn < SMOOTH {
+            let corner = part[part.len() - 1];
+            parts.push(vec![corner, point]);
+        } else {
+            part.push(point);
+        }
+    }
+    parts.retain(|part| part.len() > 1);
+    parts
+}
+
+#[cfg(all(test, not(target_arch = "wasm32")))]
+mod tests;

@@ -1,0 +1,52 @@
+//! What can be found in the pixels of a picture: `#[path = "common/pixels.rs"] mod pixels;`.
+#![allow(
+    dead_code,
+    reason = "each test file is a crate of its own and uses some of this"
+)]
+
+/// A picture: rows of red, green, blue, alpha from the top left corner.
+pub struct Picture {
+    width: usize,
+    rgba: Vec<u8>,
+}
+
+/// Pixels from a left and upper edge to a right and lower one, these not included.
+pub type Area = [usize; 4];
+
+impl Picture {
+    /// Of so many pixels across; `Picture::new(image.width(), image.into_raw())`.
+    pub fn new(width: u32, rgba: Vec<u8>) -> Self {
+        let width = width as usize;
+        Self { width, rgba }
+    }
+
+    /// All of it.
+    pub fn area(&self) -> Area {
+        [0, 0, self.width, self.rgba.len() / 4 / self.width]
+    }
+
+    /// Red, green and blue at a place.
+    pub fn at(&self, x: usize, y: usize) -> [u8; 3] {
+        let at = 4 * (y * self.width + x);
+        [self.rgba[at], self.rgba[at + 1], self.rgba[at + 2]]
+    }
+
+    /// Places in `area` whose colour differs from `colour` by no more than `most` in red, green and blue each: column, row.
+    pub fn coloured(&self, area: Area, colour: [u8; 3], most: u8) -> Vec<(usize, usize)> {
+        let [left, top, right, bottom] = self.area();
+        let (left, top) = (area[0].max(left), area[1].max(top));
+        let (right, bottom) = (area[2].min(right), area[3].min(bottom));
+        let near = |(x, y): &(usize, usize)| {
+            let pairs = self.at(*x, *y).into_iter().zip(colour);
+            pairs.into_iter().all(|(a, b)| a.abs_diff(b) <= most)
+        };
+        let places = (top..bottom).flat_map(|y| (left..right).map(move |x| (x, y)));
+        places.filter(near).collect()
+    }
+
+    /// The highest row in `area` that has such a pixel.
+    pub fn top(&self, area: Area, colour: [u8; 3], most: u8) -> Option<usize> {
+        let places = self.coloured(area, colour, most);
+        places.iter().map(|(_, y)| *y).min()
+    }
+}
