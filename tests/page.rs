@@ -858,3 +858,42 @@ fn pictures() {
         results.extend_harness(&mut harness);
     }
 }
+
+fn focused(harness: &Harness<'_, App>) -> Option<String> {
+    harness
+        .root()
+        .children_recursive()
+        .find(|node| node.accesskit_node().is_focused())
+        .and_then(|node| node.accesskit_node().label())
+}
+
+#[test]
+fn tab_walks_through_the_entries_of_a_menu_that_the_keyboard_opened() {
+    for (size, name) in [(LARGE, "Save")] {
+      for playing in [false, true] {
+        for open in [Key::Enter, Key::Space] {
+            for key in [Key::Tab, Key::ArrowDown] {
+            for wait in [1, 2, 4] {
+                let (mut harness, _) = window("spcmm", size);
+                harness.state_mut().player_mut().set_playing(playing);
+                for _ in 0..40 {
+                    harness.key_press(Key::Tab);
+                    harness.run_steps(1);
+                    if focused(&harness).as_deref() == Some(name) { break; }
+                }
+                let mut all = vec![focused(&harness)];
+                harness.key_press(open);
+                harness.run_steps(wait);
+                all.push(focused(&harness));
+                for _ in 0..4 {
+                    harness.key_press(key);
+                    harness.run_steps(wait);
+                    all.push(focused(&harness));
+                }
+                println!("{playing} {open:?} {key:?} {wait} {all:?}");
+            }
+            }
+        }
+      }
+    }
+}

@@ -1,17 +1,25 @@
 //! How far the numbers on show can be trusted: what the preset was measured to do, and how the running scene does.
 
-use eframe::egui::{Label, ProgressBar, RichText, Ui, vec2};
+use eframe::egui::{Button, Label, ProgressBar, RichText, Ui, vec2};
 
 use super::host::{Host, Running};
+use super::layout::reserved;
 use super::player::Player;
 use super::value;
 use crate::analysis::presets::{self, Measured};
 use crate::analysis::task::{Job, Message, SceneSource};
-use crate::scene::{Preset, Value};
+use crate::scene::Preset;
 use crate::simulate::Impact;
 
 /// Width of the names, points.
 const LABELS: f32 = 122.0;
+/// Height of a row, points, and of the place where doubts stand, lines.
+const ROW: f32 = 20.0;
+const DOUBTS: usize = 3;
+/// Width of the button that starts and ends a measurement, points: it stays where it is.
+const MEASURE: f32 = 130.0;
+/// What stands where there was no impact yet.
+const NONE: &str = "—";
 /// Fewer steps than this do not resolve an impact.
 const STEPS_OF_AN_IMPACT: u64 = 10;
 /// Error beyond which a measured preset is to be doubted.
@@ -19,7 +27,8 @@ const DOUBTFUL_ERROR: f64 = 0.05;
 /// Share of the exchanged energy beyond which the balance is out.
 const BALANCED: f64 = 1e-3;
 
-/// A row: what it is, its value, whether that is reason for doubt, and what to know about it.
+/// A row: what it is, its value, whether that is reason for doubt, and what to know about it. There are the same rows at all
+/// times, so that nothing moves while the scene plays.
 struct Row {
     label: &'static str,
     value: String,
@@ -29,9 +38,10 @@ struct Row {
 
 impl Row {
     fn ui(&self, ui: &mut Ui) {
+        // No control: it needs no height for fingers.
+        ui.spacing_mut().interact_size.y = ROW;
         ui.horizontal(|ui| {
-            let height = ui.spacing().interact_size.y * 0.8;
-            ui.allocate_ui(vec2(LABELS, height), |ui| {
+            ui.allocate_ui(vec2(LABELS, ROW), |ui| {
                 ui.set_width(LABELS);
                 ui.label(self.label).on_hover_text(&self.help);
             });
@@ -99,99 +109,114 @@ impl Accuracy {
     pub fn ui(&mut self, ui: &mut Ui, player: &Player) {
         let preset = preset_of(player);
         let mut list = vec![solver(player, preset)];
-        if let Some(preset) = preset {
-            list.extend(self.measured(player, preset));
-        }
-        list.extend(rows(player));
-        for row in list {
-            row.ui(ui);
-        }
-        if let Some(preset) = preset {
-            self.measure_ui(ui, player, preset);
-        }
+        list.extend(self.measured(player, preset));
+        list.push(capacity(player));
+        list.extend(latest_impact(player));
+        list.push(residual(player));
+        ui.scope(|ui| list.iter().for_each(|row| row.ui(ui)));
+        self.measure_ui(ui, player, preset);
+        self.doubts_ui(ui, player);
+    }
+
+    /// Why the result is not to be trusted, in a place of its own height.
+    fn doubts_ui(&self, ui: &mut Ui, player: &Player) {
         // What a control says already is not said again.
         let said = player.warnings();
         let doubts = player.simulation().doubts().into_iter();
-        let doubts = doubts.map(|doubt| doubt.to_string());
-        for doubt in doubts.filter(|doubt| !said.contains(doubt)) {
-            let words = RichText::new(value::typeset(&doubt)).small();
-            ui.label(words.color(ui.visuals().warn_fg_color));
-        }
+        let mut doubts: Vec<String> = doubts.map(|doubt| doubt.to_string()).collect();
+        doubts.retain(|doubt| !said.contains(doubt));
+        reserved(ui, "doubts", DOUBTS, |ui| {
+            let small = |words: &str| RichText::new(words).small();
+            if let Some(problem) = &self.problem {
+                ui.label(small(problem).color(ui.visuals().error_fg_color));
+            }
+            for doubt in &doubts {
+                ui.label(small(&value::typeset(doubt)).color(ui.visuals().warn_fg_color));
+            }
+            if doubts.is_empty() && self.problem.is_none() {
+                ui.label(small("No doubts about this run so far").weak())
+                    .on_hover_text("Here stands why the numbers are not to be trusted, if anything speaks against them");
+            }
+        });
     }
 
-    fn measure_ui(&mut self, ui: &mut Ui, player: &Player, preset: Preset) {
-        if self.running.is_some() {
-            ui.horizontal(|ui| {
-                if ui
-                    .button("Cancel")
-                    .on_hover_text("End the measurement")
-                    .clicked()
-                {
-                    self.running = None;
-                }
-                ui.add(
-                    ProgressBar::new(self.progress as f32)
-                        .show_percentage()
-                        .desired_width(ui.available_width()),
-                )
-                .accessible_name("Measured so far");
-            });
-        } else if ui
-            .button("Measure preset")
-            .on_hover_text(
+    fn measure_ui(&mut self, ui: &mut Ui, player: &Player, preset: Option<Preset>) {
+        let running = self.running.is_some() || self.asked.is_some();
+        let (name, help) = if running {
+            ("Cancel", "End the measurement")
+        } else {
+            (
+                "Measure preset",
                 "Runs this scene with its present values under the preset and under a reference that is converged, beside the \
                  running one, and compares forces and speed. Takes seconds.",
             )
-            .clicked()
-        {
-            let scene = model_of(player);
-            let job = Job::Presets {
-                scene: scene.clone(),
-                presets: vec![preset.word().to_owned()],
-            };
-            self.asked = Some((job, scene, preset));
-        }
-        if let Some(problem) = &self.problem {
-            ui.label(
-                RichText::new(problem)
-                    .small()
-                    .color(ui.visuals().error_fg_color),
-            );
-        }
+        };
+        ui.horizontal(|ui| {
+            let button = Button::new(name).min_size(vec2(MEASURE, 0.0));
+            let clicked = ui
+                .add_enabled(running || preset.is_some(), button)
+                .on_hover_text(help)
+                .on_disabled_hover_text("Presets are measured; the present method and tolerance are none")
+                .clicked();
+            if running {
+                let bar = ProgressBar::new(self.progress as f32).show_percentage();
+                ui.add(bar.desired_width(ui.available_width()))
+                    .accessible_name("Measured so far");
+            }
+            match preset {
+                _ if !clicked => {}
+                _ if running => (self.running, self.asked) = (None, None),
+                None => {}
+                Some(preset) => {
+                    let scene = model_of(player);
+                    let job = Job::Presets {
+                        scene: scene.clone(),
+                        presets: vec![preset.word().to_owned()],
+                    };
+                    self.asked = Some((job, scene, preset));
+                }
+            }
+        });
     }
 
     /// What `preset` was measured to do on the scene as it is.
-    fn measured(&self, player: &Player, preset: Preset) -> Vec<Row> {
+    fn measured(&self, player: &Player, preset: Option<Preset>) -> [Row; 2] {
         let scene = model_of(player);
         let own = self.found.as_ref();
-        let here = own.filter(|found| found.preset == preset && found.scene == scene);
-        let (measured, place) = match here {
-            Some(found) => (
+        let here = own.filter(|found| Some(found.preset) == preset && found.scene == scene);
+        let (measured, place) = match (here, preset) {
+            (Some(found), _) => (
                 Some(found.measured),
                 "on this scene with its present values",
             ),
-            None if scene.changes.is_empty() && player.wanted().source.file.is_none() => (
-                presets::measured(&player.wanted().name, preset),
-                "on this scene as it comes with the program",
-            ),
-            None => (None, ""),
+            (None, Some(preset))
+                if scene.changes.is_empty() && player.wanted().source.file.is_none() =>
+            {
+                (
+                    presets::measured(&player.wanted().name, preset),
+                    "on this scene as it comes with the program",
+                )
+            }
+            _ => (None, ""),
         };
         let row = |label, error: Option<f64>, what: &str| Row {
             label,
             value: match (&measured, error) {
+                (None, _) if preset.is_none() => "no preset".to_owned(),
                 (None, _) => "not measured".to_owned(),
                 (Some(_), None) => "does not apply".to_owned(),
                 (Some(_), Some(error)) => value::percent(error),
             },
             doubtful: error.is_some_and(|error| error > DOUBTFUL_ERROR),
             help: match measured {
+                None if preset.is_none() => what.to_owned(),
                 None => {
                     format!("{what} It was not measured for these values: press Measure preset.")
                 }
                 Some(_) => format!("{what} Measured {place}, against a converged run."),
             },
         };
-        vec![
+        [
             row(
                 "Peak force error",
                 measured.and_then(|m| m.peak_error),
@@ -231,17 +256,6 @@ fn model_of(player: &Player) -> SceneSource {
     scene
 }
 
-fn rows(player: &Player) -> Vec<Row> {
-    let mut rows = vec![capacity(player)];
-    if let Some(impact) = player.simulation().impacts().next_back() {
-        rows.push(steps(player, impact));
-        rows.push(restitution(player, impact));
-        rows.extend(flags(impact));
-    }
-    rows.extend(residual(player));
-    rows
-}
-
 /// Name of a ball joint.
 fn joint(player: &Player, index: usize) -> &str {
     let joints = &player.scene().ball_joints;
@@ -249,23 +263,13 @@ fn joint(player: &Player, index: usize) -> &str {
 }
 
 fn solver(player: &Player, preset: Option<Preset>) -> Row {
-    let solver = &player.wanted().solver;
-    let method = match player.wanted().get("solver.method") {
-        Ok(Value::Choice(word)) => word,
-        _ => "",
-    };
-    let size = if solver.method.is_adaptive() {
-        value::power_of_ten(solver.tolerance)
-    } else {
-        value::quantity(solver.step, "us", 6)
-    };
     let name = preset.map_or_else(
         || "no preset".to_owned(),
         |preset| format!("what the preset {} has", preset.word()),
     );
     Row {
         label: "Runs with",
-        value: format!("{method} {size}"),
+        value: value::solver(player.wanted()),
         doubtful: false,
         help: format!(
             "Method with its tolerance, or its fixed step: {name}. They stand under Solver; a measured error is given for presets \
@@ -292,72 +296,89 @@ fn capacity(player: &Player) -> Row {
     }
 }
 
-fn steps(player: &Player, impact: &Impact) -> Row {
-    Row {
-        label: "Steps in last impact",
-        value: format!("{} ({})", impact.steps, joint(player, impact.joint)),
-        doubtful: impact.steps < STEPS_OF_AN_IMPACT,
-        help: format!(
-            "Steps of the solver from the beginning to the end of the latest impact, and the ball joint that it was in. \
-             Fewer than {STEPS_OF_AN_IMPACT} (amber) do not resolve its force (19)."
+/// What the latest impact was like: where, how finely it was resolved, and what became of the speed.
+fn latest_impact(player: &Player) -> [Row; 3] {
+    let impact = player.simulation().impacts().next_back();
+    let row = |label, value: Option<String>, doubtful, help: String| Row {
+        label,
+        value: value.unwrap_or_else(|| NONE.to_owned()),
+        doubtful,
+        help,
+    };
+    let what = impact.map_or_else(
+        || "none yet".to_owned(),
+        |impact| format!("{}, {}", joint(player, impact.joint), kind(impact)),
+    );
+    let ratio = |impact: &Impact| {
+        let [given, asked] = [impact.given(), impact.asked].map(|ratio| value::number(ratio, 3));
+        format!("{given}, asked {asked}")
+    };
+    let law = impact.map_or_else(String::new, |impact| {
+        format!(
+            " An undisturbed impact under its normal-force law gives {}.",
+            value::number(impact.law, 3)
+        )
+    });
+    [
+        row(
+            "Latest impact",
+            Some(what),
+            false,
+            "Ball joint of the latest impact that is over. Disturbed: another joint touched meanwhile, or the parameters of the \
+             contact changed, so that the ratio of the speeds is not the law's alone. Slow: it began below the impact speed \
+             floor, so it rebounds higher than asked."
+                .to_owned(),
         ),
+        row(
+            "Steps in it",
+            impact.map(|impact| impact.steps.to_string()),
+            impact.is_some_and(|impact| impact.steps < STEPS_OF_AN_IMPACT),
+            format!(
+                "Steps of the solver from the beginning to the end of the latest impact. Fewer than {STEPS_OF_AN_IMPACT} \
+                 (amber) do not resolve its force (19)."
+            ),
+        ),
+        row(
+            "Restitution in it",
+            impact.map(ratio),
+            // An impact that nothing disturbed gives what its law gives, or else the steps were too long.
+            impact.is_some_and(|impact| {
+                !impact.disturbed && !impact.floored && (impact.given() - impact.law).abs() > 0.02
+            }),
+            format!("Separation speed over approach speed of the latest impact, and what was asked for.{law}"),
+        ),
+    ]
+}
+
+/// Whether the restitution of an impact can be its law's.
+fn kind(impact: &Impact) -> &'static str {
+    match (impact.disturbed, impact.floored) {
+        (true, _) => "disturbed",
+        (false, true) => "slow",
+        (false, false) => "undisturbed",
     }
 }
 
-fn restitution(player: &Player, impact: &Impact) -> Row {
-    let given = impact.given();
-    let help = format!(
-        "Separation speed over approach speed of the latest impact, in {}: asked for {}, an undisturbed impact under its \
-         normal-force law gives {}.",
-        joint(player, impact.joint),
-        value::number(impact.asked, 3),
-        value::number(impact.law, 3),
+fn residual(player: &Player) -> Row {
+    let ledger = player.frame().ledger;
+    let share = ledger.map(|ledger| ledger.relative_residual().abs());
+    let exchanged = ledger.map_or_else(
+        || "Not kept: see Energy ledger under Solver.".to_owned(),
+        |ledger| {
+            let energy = value::quantity(ledger.exchanged, "J", 3);
+            format!("{energy} were exchanged.")
+        },
     );
     Row {
-        label: "Its restitution",
-        value: format!(
-            "{} of {}",
-            value::number(given, 3),
-            value::number(impact.asked, 3)
-        ),
-        // An impact that nothing disturbed gives what its law gives, or else the steps were too long.
-        doubtful: !impact.disturbed && !impact.floored && (given - impact.law).abs() > 0.02,
-        help,
-    }
-}
-
-/// Why the restitution of an impact is not its law's.
-fn flags(impact: &Impact) -> Option<Row> {
-    let (value, help) = match (impact.disturbed, impact.floored) {
-        (true, _) => (
-            "disturbed",
-            "Another joint touched meanwhile, or the parameters of the contact changed: the ratio is not the law's alone.",
-        ),
-        (false, true) => (
-            "slow",
-            "The impact began slower than the impact speed floor, so it rebounds higher than asked.",
-        ),
-        (false, false) => return None,
-    };
-    Some(Row {
-        label: "",
-        value: value.to_owned(),
-        doubtful: false,
-        help: help.to_owned(),
-    })
-}
-
-fn residual(player: &Player) -> Option<Row> {
-    let ledger = player.frame().ledger?;
-    let share = ledger.relative_residual().abs();
-    Some(Row {
         label: "Energy residual",
-        value: format!("{} of exchanged", value::power_of_ten(share)),
-        doubtful: share > BALANCED,
+        value: share.map_or_else(
+            || NONE.to_owned(),
+            |share| format!("{}, relative", value::power_of_ten(share)),
+        ),
+        doubtful: share.is_some_and(|share| share > BALANCED),
         help: format!(
-            "Energy that the ledger cannot account for since the start, over the energy exchanged ({}). Amber beyond {}.",
-            value::quantity(ledger.exchanged, "J", 3),
+            "Energy that the ledger cannot account for since the start, over the energy exchanged. {exchanged} Amber beyond {}.",
             value::power_of_ten(BALANCED)
         ),
-    })
+    }
 }

@@ -11,7 +11,7 @@ use eframe::egui::{
 use super::accuracy::{self, Accuracy};
 use super::icons::{Icon, icon_button};
 use super::player::Player;
-use super::{theme, value};
+use super::{keys, theme, value};
 use crate::scene::{
     Kind, Parameter, SceneError, Scope, Value, format_quantity_digits, from_display, to_display,
 };
@@ -234,12 +234,11 @@ impl Controls {
         let mut shown = to_display(si, display);
         let (least, greatest) = (to_display(slider.0, display), to_display(slider.1, display));
         ui.spacing_mut().slider_width = ui.available_width().max(40.0);
-        let response = ui.add(
-            Slider::new(&mut shown, least..=greatest)
-                .logarithmic(logarithmic)
-                .clamping(SliderClamping::Never)
-                .show_value(false),
-        );
+        let slider = Slider::new(&mut shown, least..=greatest)
+            .logarithmic(logarithmic)
+            .clamping(SliderClamping::Never)
+            .show_value(false);
+        let response = keys::slider(ui, slider);
         tooltip(ui, &response, player, parameter, key);
         let changed = response.changed();
         response.accessible_name(name);

@@ -4,21 +4,22 @@ use eframe::egui::{self, Grid, Id, Modal, RichText, ScrollArea, TextEdit, Ui};
 
 use super::host::SaveFile;
 use super::keys::{BINDINGS, POINTER};
+use super::load::Load;
 use super::player::Player;
 
 /// Below this width keys and what they do stand below each other, points.
 const NARROW: f32 = 480.0;
 
 /// Which dialog is open.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Dialog {
     /// List of keys.
     Help,
     /// Version and state.
     About,
-    /// Opens a file: the path as typed so far and what was wrong with it.
+    /// Opens a link, a file or a built-in scene: what was typed so far and what was wrong with it.
     Open {
-        /// Path or name.
+        /// Link, path or name.
         path: String,
         /// Why it could not be opened.
         error: Option<String>,
@@ -32,6 +33,36 @@ pub enum Dialog {
         /// Why they could not be saved.
         error: Option<String>,
     },
+    /// Runs to a section of a sweep that was made of something else than what is on show.
+    Load {
+        /// The way there.
+        load: Box<Load>,
+        /// What it would change, a phrase each.
+        changes: Vec<String>,
+    },
+}
+
+impl Dialog {
+    fn title(&self) -> &'static str {
+        match self {
+            Self::Help => "Keys",
+            Self::About => "About Jointplay",
+            Self::Open { .. } => "Open a link or a scene",
+            Self::Save { .. } => "Save as",
+            Self::Load { .. } => "Change what is on show?",
+        }
+    }
+
+    /// What its button says, and what that asks for; `None` where there is nothing to answer, or nothing typed yet.
+    fn answer(&self) -> Option<(&'static str, Option<Answer>)> {
+        let typed = |path: &str| Some(path.trim().to_owned()).filter(|path| !path.is_empty());
+        match self {
+            Self::Help | Self::About => None,
+            Self::Open { path, .. } => Some(("Open", typed(path).map(Answer::Open))),
+            Self::Save { path, .. } => Some(("Save", typed(path).map(Answer::Save))),
+            Self::Load { .. } => Some(("Change and run", Some(Answer::Load))),
+        }
+    }
 }
 
 /// What a dialog asks for.
@@ -39,10 +70,12 @@ pub enum Dialog {
 pub enum Answer {
     /// It wants to be closed.
     Close,
-    /// Open this scene.
+    /// Open this link or scene.
     Open(String),
     /// Save under this path.
     Save(String),
+    /// Run to the section.
+    Load,
 }
 
 /// Shows `dialog`.
@@ -59,29 +92,36 @@ pub fn ui(
         .frame(frame)
         .show(ctx, |ui| {
             ui.set_width(widest);
-            let title = match dialog {
-                Dialog::Help => "Keys",
-                Dialog::About => "About Jointplay",
-                Dialog::Open { .. } => "Open a scene file",
-                Dialog::Save { .. } => "Save as",
-            };
-            ui.heading(title);
+            ui.heading(dialog.title());
             ui.add_space(6.0);
-            // Title, button and frame stay in sight on a low screen.
-            let most = ctx.content_rect().height() - 140.0;
-            let scrolled = ScrollArea::vertical().max_height(most.max(80.0));
-            scrolled.show(ui, |ui| match dialog {
-                Dialog::Help => help(ui),
-                Dialog::About => about(ui, player, renderer),
-                Dialog::Open { path, error } => answer = open(ui, path, error.as_deref()),
-                Dialog::Save { path, files, error } => {
-                    answer = save(ui, path, files, error.as_deref());
+            // Title, buttons and frame stay in sight on a low screen, and in a dialog that comes to say more.
+            let most = (ctx.content_rect().height() - 140.0).max(80.0);
+            let scrolled = ScrollArea::vertical()
+                .max_height(most)
+                .min_scrolled_height(most);
+            let entered = scrolled
+                .show(ui, |ui| match dialog {
+                    Dialog::Help => help(ui),
+                    Dialog::About => about(ui, player, renderer),
+                    Dialog::Open { path, error } => open(ui, path, error.as_deref()),
+                    Dialog::Save { path, files, error } => {
+                        save(ui, path, files, error.as_deref())
+                    }
+                    Dialog::Load { changes, .. } => load(ui, changes),
+                })
+                .inner;
+            ui.add_space(8.0);
+            ui.horizontal(|ui| {
+                if let Some((verb, asked)) = dialog.answer() {
+                    let button = ui.add_enabled(asked.is_some(), egui::Button::new(verb));
+                    if button.clicked() || entered {
+                        answer = asked;
+                    }
+                }
+                if ui.button("Close").clicked() {
+                    answer = Some(Answer::Close);
                 }
             });
-            ui.add_space(8.0);
-            if ui.button("Close").clicked() {
-                answer = Some(Answer::Close);
-            }
         });
     if modal.should_close() {
         answer = Some(Answer::Close);
@@ -89,7 +129,7 @@ pub fn ui(
     answer
 }
 
-fn help(ui: &mut Ui) {
+fn help(ui: &mut Ui) -> bool {
     ui.spacing_mut().interact_size.y = 18.0;
     let rows = BINDINGS
         .iter()
@@ -102,7 +142,7 @@ fn help(ui: &mut Ui) {
             ui.label(RichText::new(key).strong());
             ui.indent(key, |ui| ui.label(help));
         }
-        return;
+        return false;
     }
     Grid::new("keys")
         .num_columns(2)
@@ -115,9 +155,10 @@ fn help(ui: &mut Ui) {
                 ui.end_row();
             }
         });
+    false
 }
 
-fn about(ui: &mut Ui, player: &Player, renderer: &str) {
+fn about(ui: &mut Ui, player: &Player, renderer: &str) -> bool {
     ui.label(format!("Version {}", crate::VERSION));
     if !renderer.is_empty() {
         ui.label(format!("Drawn with {renderer}"))
@@ -143,14 +184,18 @@ fn about(ui: &mut Ui, player: &Player, renderer: &str) {
             ui.monospace(format!("{key} = {value}"));
         }
     }
+    false
 }
 
-fn open(ui: &mut Ui, path: &mut String, error: Option<&str>) -> Option<Answer> {
-    ui.label("Path of a scene file (.toml), or the name of a built-in scene. A file can also be dropped on the window.");
-    path_field(ui, path, "scene.toml", "Open", error).map(Answer::Open)
+fn open(ui: &mut Ui, path: &mut String, error: Option<&str>) -> bool {
+    ui.label(
+        "A link, the path of a scene file (.toml), or the name of a built-in scene. A file can also be dropped on the window, \
+         and a link pasted into it.",
+    );
+    path_field(ui, path, "https://…#scene=…, scene.toml or pendulum", error)
 }
 
-fn save(ui: &mut Ui, path: &mut String, files: &[SaveFile], error: Option<&str>) -> Option<Answer> {
+fn save(ui: &mut Ui, path: &mut String, files: &[SaveFile], error: Option<&str>) -> bool {
     ui.label("Path of the file. A name without folders goes to the folder that the program was started in.");
     if let [first, rest @ ..] = files {
         for file in rest {
@@ -158,17 +203,19 @@ fn save(ui: &mut Ui, path: &mut String, files: &[SaveFile], error: Option<&str>)
             ui.label(RichText::new(format!("What made it is saved beside it (…{ending})")).weak());
         }
     }
-    path_field(ui, path, "name", "Save", error).map(Answer::Save)
+    path_field(ui, path, "name", error)
 }
 
-/// A path with a button below it; the path once it is entered.
-fn path_field(
-    ui: &mut Ui,
-    path: &mut String,
-    hint: &str,
-    button: &str,
-    error: Option<&str>,
-) -> Option<String> {
+fn load(ui: &mut Ui, changes: &[String]) -> bool {
+    ui.label("The sweep was not made of what is on show. To run to this section changes:");
+    for change in changes {
+        ui.label(RichText::new(change).strong());
+    }
+    false
+}
+
+/// What is typed, with what was wrong with it below; whether it was entered.
+fn path_field(ui: &mut Ui, path: &mut String, hint: &str, error: Option<&str>) -> bool {
     let field = ui.add(
         TextEdit::singleline(path)
             .desired_width(f32::INFINITY)
@@ -182,8 +229,5 @@ fn path_field(
     if let Some(error) = error {
         ui.label(RichText::new(error).color(ui.visuals().error_fg_color));
     }
-    let clicked = ui
-        .add_enabled(!path.trim().is_empty(), egui::Button::new(button))
-        .clicked();
-    ((clicked || entered) && !path.trim().is_empty()).then(|| path.trim().to_owned())
+    entered
 }

@@ -1,32 +1,20 @@
 //! Links and files: what comes in from outside, and what is given out.
 
 use std::fmt::Write as _;
-use std::sync::{Arc, Mutex, PoisonError};
 
-use eframe::egui::{self, ColorImage, Rect};
+use eframe::egui;
 use serde_json::{Map, json};
 
 use super::dialogs::Dialog;
 use super::host::{Host, SaveFile};
 use super::player::Player;
 use super::replay::Verdict;
-use super::share::{Link, SceneText, shown};
+use super::share::{Link, SceneText, is_link, shown};
 use super::{App, Notice};
-use crate::render::Image;
 use crate::scene::{Scene, Value};
 
 /// Rows of a saved record.
 const ROWS: usize = 1000;
-/// Time after which a picture that never came is given up, s.
-const PATIENCE: f64 = 10.0;
-
-/// A picture of the viewport on its way back from the graphics adapter.
-pub struct Capture {
-    image: Arc<Mutex<Option<Arc<ColorImage>>>>,
-    /// When it was asked for, s of viewing; `None` in the frame of the click, whose menu is still open.
-    since: Option<f64>,
-}
-
 impl App {
     /// Gives the application the services of the place it runs in.
     pub fn set_host(&mut self, host: Box<dyn Host>) {
@@ -102,10 +90,33 @@ impl App {
     /// Lets the user choose a scene file.
     pub(super) fn choose_file(&mut self) {
         if !self.host.pick_file() {
-            self.dialog = Some(Dialog::Open {
-                path: String::new(),
-                error: None,
+            self.ask_what_to_open();
+        }
+    }
+
+    /// Asks for a link, a file or a built-in scene.
+    pub(super) fn ask_what_to_open(&mut self) {
+        self.dialog = Some(Dialog::Open {
+            path: String::new(),
+            error: None,
+        });
+    }
+
+    /// Opens a link that was pasted where nothing is typed; other text is none of our business.
+    pub(super) fn receive_links(&mut self, ctx: &egui::Context) {
+        if self.dialog.is_some() || ctx.text_edit_focused() {
+            return;
+        }
+        let pasted = ctx.input(|input| {
+            let text = input.events.iter().find_map(|event| match event {
+                egui::Event::Paste(text) => Some(text.clone()),
+                _ => None,
             });
+            text.filter(|text| is_link(text))
+        });
+        if let Some(link) = pasted {
+            // The reason is shown.
+            let _ = self.open_link(ctx, &link);
         }
     }
 
@@ -125,7 +136,7 @@ impl App {
     }
 
     /// Gives files to the host, or asks for a path first.
-    fn save(&mut self, files: Vec<SaveFile>) {
+    pub(super) fn save(&mut self, files: Vec<SaveFile>) {
         if self.host.asks_for_path() {
             self.dialog = Some(Dialog::Save {
                 path: files.first().map_or(String::new(), |f| f.name.clone()),
@@ -197,61 +208,13 @@ impl App {
         ]);
     }
 
-    /// Saves a picture of the viewport, once it is back from the graphics adapter; nothing waits for it.
-    pub fn save_picture(&mut self, ctx: &egui::Context) {
-        self.capture = Some(Capture {
-            image: Arc::default(),
-            since: None,
-        });
-        ctx.request_repaint();
-    }
-
-    /// Asks for the picture that [`Self::save_picture`] is about, and takes it once it is there.
-    pub(super) fn receive_picture(&mut self, ctx: &egui::Context) {
-        let Some(capture) = &mut self.capture else {
-            return;
-        };
-        let now = ctx.input(|input| input.time);
-        let Some(since) = capture.since else {
-            capture.since = Some(now);
-            let (slot, waker) = (capture.image.clone(), ctx.clone());
-            ctx.request_screenshot(move |shot| {
-                *slot.lock().unwrap_or_else(PoisonError::into_inner) = Some(shot);
-                waker.request_repaint();
-            });
-            return;
-        };
-        let mut slot = capture.image.lock().unwrap_or_else(PoisonError::into_inner);
-        let shot = slot.take();
-        drop(slot);
-        let Some(shot) = shot else {
-            if now - since > PATIENCE {
-                self.capture = None;
-                self.problem = Some("The picture never came back from the graphics adapter".into());
-            }
-            ctx.request_repaint();
-            return;
-        };
-        self.capture = None;
-        let image = cut(&shot, self.picture_rect, ctx.pixels_per_point());
-        let described = describe(&self.player);
-        let software = format!("jointplay {}", crate::VERSION);
-        let texts = [
-            ("Software", software.as_str()),
-            ("Description", described.as_str()),
-        ];
-        match image.png(&texts) {
-            Ok(bytes) => self.save(vec![SaveFile {
-                name: format!("{}.png", self.file_stem()),
-                mime: "image/png",
-                bytes,
-            }]),
-            Err(error) => self.problem = Some(format!("The picture cannot be saved: {error}")),
-        }
+    /// What a picture shows, for its own text.
+    pub(super) fn describe(&self) -> String {
+        describe(&self.player)
     }
 
     /// Scene and time, for the names of files.
-    fn file_stem(&self) -> String {
+    pub(super) fn file_stem(&self) -> String {
         let time = self.player.pacer.shown() * 1e3;
         format!("{}-{time:.3}ms", self.player.scene().name)
     }
@@ -369,25 +332,6 @@ fn describe(player: &Player) -> String {
     words.chars().map(latin).collect()
 }
 
-/// The part of a picture of the whole window that `rect`, points, covers.
-fn cut(shot: &ColorImage, rect: Rect, scale: f32) -> Image {
-    let pixel = |point: f32, most: usize| ((point * scale).round().max(0.0) as usize).min(most);
-    let [width, height] = shot.size;
-    let (left, right) = (pixel(rect.left(), width), pixel(rect.right(), width));
-    let (top, bottom) = (pixel(rect.top(), height), pixel(rect.bottom(), height));
-    let mut rgba = Vec::with_capacity(4 * right.saturating_sub(left) * bottom.saturating_sub(top));
-    for row in top..bottom {
-        for pixel in &shot.pixels[row * width + left..row * width + right.max(left)] {
-            rgba.extend([pixel.r(), pixel.g(), pixel.b(), 255]);
-        }
-    }
-    Image {
-        width: right.saturating_sub(left) as u32,
-        height: bottom.saturating_sub(top) as u32,
-        rgba,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -441,20 +385,5 @@ mod tests {
         assert_eq!(meta["method"], "automatic");
         let link = Link::parse(meta["link"].as_str().expect("a text")).expect("a link");
         assert_eq!(link.steps, Some(player.steps()));
-    }
-
-    #[test]
-    fn the_part_of_the_window_that_is_cut_out_stays_inside_it() {
-        let pixels = (0..12 * 8)
-            .map(|i| egui::Color32::from_rgb(i, 0, 0))
-            .collect();
-        let shot = ColorImage::new([12, 8], pixels);
-        let rect = |x0, y0, x1, y1| Rect::from_min_max(egui::pos2(x0, y0), egui::pos2(x1, y1));
-        let image = cut(&shot, rect(1.0, 2.0, 3.0, 3.0), 2.0);
-        assert_eq!((image.width, image.height), (4, 2));
-        assert_eq!(&image.rgba[..4], [4 * 12 + 2, 0, 0, 255]);
-        let image = cut(&shot, rect(-5.0, 0.0, 99.0, 99.0), 2.0);
-        assert_eq!((image.width, image.height), (12, 8));
-        assert_eq!(cut(&shot, rect(50.0, 50.0, 60.0, 60.0), 1.0).rgba.len(), 0);
     }
 }

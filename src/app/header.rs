@@ -1,6 +1,6 @@
 //! The bar at the top, its menus, and the strips below it.
 
-use eframe::egui::{self, ComboBox, Frame, Panel, RichText, ThemePreference, Ui};
+use eframe::egui::{self, ComboBox, Frame, RichText, ThemePreference, Ui};
 
 use super::App;
 use super::dialogs::Dialog;
@@ -19,21 +19,13 @@ impl App {
             self.scene_box(ui, compact);
             if compact {
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                    ui.menu_button("Menu", |ui| layout::entries(ui, |ui| self.menu(ui)))
-                        .response
+                    layout::menu(ui, "Menu", true, |ui| self.menu(ui))
                         .on_hover_text("Open, save, share, theme, keys");
                 });
                 return;
             }
-            if ui
-                .button("Open…")
-                .on_hover_text("Open a scene file")
-                .clicked()
-            {
-                self.choose_file();
-            }
-            ui.menu_button("Save", |ui| self.save_menu(ui))
-                .response
+            self.open_button(ui);
+            layout::menu(ui, "Save", true, |ui| self.save_menu(ui))
                 .on_hover_text("Save a picture, the record or the scene");
             self.link_button(ui);
             let bench = egui::Button::selectable(self.show_bench, "Bench");
@@ -64,9 +56,10 @@ impl App {
 
     fn scene_box(&mut self, ui: &mut Ui, compact: bool) {
         let name = self.player.scene().name.clone();
-        let mut wanted = None;
+        let (mut wanted, mut link) = (None, false);
         ComboBox::from_id_salt("scene")
             .width(if compact { 150.0 } else { 170.0 })
+            .truncate()
             .selected_text(&name)
             .show_ui(ui, |ui| {
                 for built_in in BUILT_IN {
@@ -74,6 +67,10 @@ impl App {
                         wanted = Some(built_in);
                     }
                 }
+                ui.separator();
+                let help = "A link that somebody gave you, the name of a scene, or a file";
+                let other = ui.selectable_label(false, "Link…").on_hover_text(help);
+                link = other.clicked();
             })
             .response
             .on_hover_text(&self.player.scene().title)
@@ -81,50 +78,50 @@ impl App {
         if let Some(wanted) = wanted {
             self.problem = self.open(wanted).err();
         }
+        if link {
+            self.ask_what_to_open();
+        }
+    }
+
+    fn open_button(&mut self, ui: &mut Ui) {
+        let help = "Open a scene file; a link can be pasted anywhere, or into Link… in the list of scenes";
+        if ui.button("Open…").on_hover_text(help).clicked() {
+            self.choose_file();
+            layout::close_menu(ui);
+        }
     }
 
     fn link_button(&mut self, ui: &mut Ui) {
-        let help =
-            "Copies a link that opens this scene in this state, with every change made on the way";
+        let mut help = "Copies a link that opens this scene in this state and view, with every change made on the way"
+            .to_owned();
+        if self.host.address().is_empty() {
+            help += ". It has no address in front: --page or JOINTPLAY_PAGE gives it that of a page";
+        }
         if ui.button("Copy link").on_hover_text(help).clicked() {
             self.copy_link(ui.ctx());
+            layout::close_menu(ui);
         }
     }
 
     fn save_menu(&mut self, ui: &mut Ui) {
-        if ui
-            .button("Picture…")
-            .on_hover_text("The 3D view as it is, PNG")
-            .clicked()
-        {
-            self.save_picture(ui.ctx());
-        }
-        if ui
-            .button("Record…")
-            .on_hover_text("What the plots recorded since the reset, CSV")
-            .clicked()
-        {
+        self.picture_menu(ui);
+        ui.separator();
+        let help = "What the plots recorded since the reset, CSV";
+        if ui.button("Record…").on_hover_text(help).clicked() {
             self.save_record();
+            layout::close_menu(ui);
         }
-        if ui
-            .button("Scene…")
-            .on_hover_text("The scene file with the changed values in it, TOML")
-            .clicked()
-        {
+        let help = "The scene file with the changed values in it, TOML";
+        if ui.button("Scene…").on_hover_text(help).clicked() {
             self.save_scene();
+            layout::close_menu(ui);
         }
     }
 
     /// Everything that has no room in a small header.
     fn menu(&mut self, ui: &mut Ui) {
         ui.set_min_width(180.0);
-        if ui
-            .button("Open…")
-            .on_hover_text("Open a scene file")
-            .clicked()
-        {
-            self.choose_file();
-        }
+        self.open_button(ui);
         self.link_button(ui);
         ui.separator();
         ui.label(RichText::new("Save").small().weak());
@@ -133,54 +130,37 @@ impl App {
         theme_box(ui);
         if ui.button("Keys").on_hover_text("Keys (?)").clicked() {
             self.dialog = Some(Dialog::Help);
+            layout::close_menu(ui);
         }
         if ui.button("About").clicked() {
             self.dialog = Some(Dialog::About);
+            layout::close_menu(ui);
         }
     }
 
+    /// Whether [`Self::strips`] has anything to say.
+    pub(super) fn has_messages(&self) -> bool {
+        self.problem.is_some() || self.verdict.is_some() || self.is_under_way()
+    }
+
     /// What went wrong, how far a link has come, and what became of it.
-    pub(super) fn strips(&mut self, ui: &mut Ui, bar: Frame) {
+    pub(super) fn strips(&mut self, ui: &mut Ui) {
         if let Some(problem) = self.problem.clone() {
             let colour = ui.visuals().error_fg_color;
-            if strip(ui, bar, "problem", &problem, colour) {
+            if strip(ui, &problem, colour) {
                 self.problem = None;
             }
         }
-        if let Some(replay) = &self.replay {
-            let fraction = replay.fraction(&self.player);
-            let mut cancelled = false;
-            Panel::top("replay").frame(bar).show(ui, |ui| {
-                ui.horizontal_wrapped(|ui| {
-                    let percent = (fraction * 100.0).floor();
-                    ui.label(format!("Reproducing the state of the link… {percent} %"));
-                    ui.add(egui::ProgressBar::new(fraction).desired_width(120.0))
-                        .accessible_name("Run so far");
-                    cancelled = ui
-                        .button("Stop here")
-                        .on_hover_text("Stay at the time that the run has reached (Esc)")
-                        .clicked();
-                });
-            });
-            if cancelled {
-                self.cancel_replay();
-            }
-        }
-        if let Some(fraction) = self.loading() {
-            let mut cancelled = false;
-            Panel::top("load").frame(bar).show(ui, |ui| {
-                ui.horizontal_wrapped(|ui| {
-                    let percent = (fraction * 100.0).floor();
-                    ui.label(format!("Running to the chosen section… {percent} %"));
-                    ui.add(egui::ProgressBar::new(fraction).desired_width(120.0))
-                        .accessible_name("Run so far");
-                    cancelled = ui
-                        .button("Stop here")
-                        .on_hover_text("Stay at the time that the run has reached (Esc)")
-                        .clicked();
-                });
-            });
-            if cancelled {
+        let replay = self.replay.as_ref();
+        let ways = [
+            (
+                "Reproducing the state of the link…",
+                replay.map(|replay| replay.fraction(&self.player)),
+            ),
+            ("Running to the chosen section…", self.loading()),
+        ];
+        for (words, fraction) in ways {
+            if fraction.is_some_and(|fraction| under_way(ui, words, fraction)) {
                 self.cancel_replay();
             }
         }
@@ -191,38 +171,61 @@ impl App {
                 Verdict::Differs { .. } => ui.visuals().warn_fg_color,
                 Verdict::Failed(_) => ui.visuals().error_fg_color,
             };
-            if strip(ui, bar, "verdict", &verdict_words(verdict), colour) {
+            if strip(ui, &verdict_words(verdict), colour) {
                 self.verdict = None;
             }
         }
     }
 }
 
-/// A coloured strip with a sentence; whether it was dismissed.
-fn strip(ui: &mut Ui, bar: Frame, id: &'static str, words: &str, colour: egui::Color32) -> bool {
-    // Nothing lies under the panel that would shine through.
+/// The plate of a message; it shines through nothing.
+fn plate(ui: &Ui, colour: egui::Color32) -> Frame {
     let fill = ui.visuals().panel_fill.lerp_to_gamma(colour, 0.14);
-    Panel::top(id)
-        .frame(bar.fill(fill))
-        .show(ui, |ui| {
-            let narrow = ui.available_width() < 520.0;
-            let words = egui::Label::new(RichText::new(words).color(colour)).wrap();
-            if narrow {
-                ui.add(words);
-                return ui.button("Dismiss").clicked();
-            }
-            ui.horizontal_top(|ui| {
-                // What the button needs, and the gap before it.
-                let room = ui.available_width() - 90.0;
-                ui.vertical(|ui| {
-                    ui.set_max_width(room);
-                    ui.add(words);
-                });
-                ui.button("Dismiss").clicked()
-            })
-            .inner
+    Frame::new()
+        .fill(fill)
+        .corner_radius(6.0)
+        .inner_margin(egui::Margin::symmetric(12, 8))
+}
+
+/// How far a run is on its way; whether it is to stop.
+fn under_way(ui: &mut Ui, words: &str, fraction: f32) -> bool {
+    let plate = plate(ui, ui.visuals().panel_fill);
+    let row = plate.show(ui, |ui| {
+        ui.horizontal_wrapped(|ui| {
+            let percent = (fraction * 100.0).floor();
+            ui.label(format!("{words} {percent} %"));
+            ui.add(egui::ProgressBar::new(fraction).desired_width(120.0))
+                .accessible_name("Run so far");
+            ui.button("Stop here")
+                .on_hover_text("Stay at the time that the run has reached (Esc)")
+                .clicked()
         })
         .inner
+    });
+    row.inner
+}
+
+/// A coloured strip with a sentence; whether it was dismissed.
+fn strip(ui: &mut Ui, words: &str, colour: egui::Color32) -> bool {
+    let shown = plate(ui, colour).show(ui, |ui| {
+        let narrow = ui.available_width() < 520.0;
+        let words = egui::Label::new(RichText::new(words).color(colour)).wrap();
+        if narrow {
+            ui.add(words);
+            return ui.button("Dismiss").clicked();
+        }
+        ui.horizontal_top(|ui| {
+            // What the button needs, and the gap before it.
+            let room = ui.available_width() - 90.0;
+            ui.vertical(|ui| {
+                ui.set_width(room);
+                ui.add(words);
+            });
+            ui.button("Dismiss").clicked()
+        })
+        .inner
+    });
+    shown.inner
 }
 
 /// Light, dark or as the system asks.

@@ -118,9 +118,24 @@ mod desktop {
     #[derive(Debug, Default)]
     pub struct DesktopHost {
         opened: VecDeque<OpenedFile>,
+        page: String,
+    }
+
+    impl DesktopHost {
+        /// Links are hung on the address `page`; on "" they have none.
+        pub fn new(page: String) -> Self {
+            Self {
+                page,
+                ..Self::default()
+            }
+        }
     }
 
     impl Host for DesktopHost {
+        fn address(&self) -> String {
+            self.page.clone()
+        }
+
         fn asks_for_path(&self) -> bool {
             true
         }

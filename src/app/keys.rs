@@ -1,6 +1,6 @@
 //! The keyboard: one table for what a key does and for the overlay that lists them.
 
-use eframe::egui::{self, Key};
+use eframe::egui::{self, EventFilter, Id, Key, Response, Slider, Ui};
 
 /// What a key asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,7 +102,7 @@ pub const BINDINGS: [Binding; 29] = [
 ];
 
 /// Mouse and touch, for the overlay.
-pub const POINTER: [(&str, &str); 6] = [
+pub const POINTER: [(&str, &str); 8] = [
     ("Drag, one finger", "Turn the view"),
     (
         "Right or middle drag, shift-drag, two fingers",
@@ -115,20 +115,57 @@ pub const POINTER: [(&str, &str); 6] = [
         "Follow a body or joint; the ground lets go",
     ),
     ("Drop a file", "Open a scene"),
+    ("Paste", "Open a link"),
+    ("Arrows after a drag on a slider", "Move that slider"),
 ];
 
-/// Actions of the keys pressed since the last frame. A field that is being typed in keeps all keys; a control
-/// that has the focus keeps space and arrows.
+/// Where the slider that has the focus is noted.
+const SLIDER: &str = "slider with the focus";
+
+/// A slider that keeps the arrow keys once it was dragged, or reached by Tab, until something else is clicked.
+pub fn slider(ui: &mut Ui, slider: Slider<'_>) -> Response {
+    let response = ui.add(slider);
+    if response.drag_started() {
+        response.request_focus();
+    }
+    if response.has_focus() {
+        ui.data_mut(|data| data.insert_temp(Id::unique(SLIDER), response.id));
+        let arrows = EventFilter {
+            horizontal_arrows: true,
+            vertical_arrows: true,
+            ..EventFilter::default()
+        };
+        ui.memory_mut(|memory| memory.set_focus_lock_filter(response.id, arrows));
+    }
+    response
+}
+
+/// Actions of the keys pressed since the last frame. A field that is being typed in keeps all keys; a slider that has the
+/// focus keeps the arrows, any other control the space bar, too.
 pub fn pressed(ctx: &egui::Context) -> Vec<Action> {
     if ctx.text_edit_focused() {
         return Vec::new();
     }
-    let focused = ctx.memory(|memory| memory.focused().is_some());
-    let held_back = |key: Key| {
-        matches!(
-            key,
-            Key::Space | Key::ArrowUp | Key::ArrowDown | Key::ArrowLeft | Key::ArrowRight
-        ) && focused
+    let focused = ctx.memory(egui::Memory::focused);
+    let slider = focused.is_some() && focused == ctx.data(|data| data.get_temp(Id::unique(SLIDER)));
+    if slider {
+        // A slider of egui's knows the arrows along it only.
+        ctx.input_mut(|input| {
+            for event in &mut input.events {
+                if let egui::Event::Key { key, .. } = event {
+                    *key = match *key {
+                        Key::ArrowUp => Key::ArrowRight,
+                        Key::ArrowDown => Key::ArrowLeft,
+                        other => other,
+                    };
+                }
+            }
+        });
+    }
+    let held_back = |key: Key| match key {
+        Key::Space => focused.is_some() && !slider,
+        Key::ArrowUp | Key::ArrowDown | Key::ArrowLeft | Key::ArrowRight => focused.is_some(),
+        _ => false,
     };
     ctx.input(|input| {
         input

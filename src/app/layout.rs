@@ -1,6 +1,8 @@
 //! Where everything goes: side by side on a large window; on a small one the picture, and a sheet that folds away.
 
-use eframe::egui::{self, CentralPanel, Frame, Panel, RichText, ScrollArea, Ui};
+use eframe::egui::{
+    self, Align2, Area, CentralPanel, Frame, Id, Panel, Popup, RichText, ScrollArea, Ui,
+};
 
 use super::{App, theme, transport};
 
@@ -34,7 +36,81 @@ pub enum Sheet {
 pub(super) fn entries(ui: &mut Ui, add: impl FnOnce(&mut Ui)) {
     // Its frame, and a strip of what lies under it.
     let most = ui.ctx().content_rect().height() - 48.0;
-    ScrollArea::vertical().max_height(most).show(ui, add);
+    ScrollArea::vertical()
+        .max_height(most)
+        // Else it would stay as low as it was at first when an entry comes to need more room.
+        .min_scrolled_height(most)
+        .show(ui, add);
+}
+
+/// A menu. Opened by the keyboard it gives its first entry the focus, and it closes when the focus leaves it; `stays`: a click
+/// on an entry leaves it open.
+pub(super) fn menu(
+    ui: &mut Ui,
+    name: &str,
+    stays: bool,
+    add: impl FnOnce(&mut Ui),
+) -> egui::Response {
+    use egui::containers::menu::{MenuButton, MenuConfig};
+    let close = if stays {
+        egui::PopupCloseBehavior::CloseOnClickOutside
+    } else {
+        egui::PopupCloseBehavior::CloseOnClick
+    };
+    let opened = ui.scope_id().with((name, "opened by keyboard"));
+    // In the pass after the opening the entries are there, and this one goes from the button to the first of them.
+    if ui.data_mut(|data| data.remove_temp::<bool>(opened)).is_some() {
+        ui.memory_mut(|memory| memory.move_focus(egui::FocusDirection::Next));
+    }
+    let button = MenuButton::new(name).config(MenuConfig::new().close_behavior(close));
+    let (response, shown) = button.ui(ui, |ui| entries(ui, add));
+    if shown.is_some() {
+        if response.clicked() && response.has_focus() {
+            ui.data_mut(|data| data.insert_temp(opened, true));
+            ui.ctx().request_repaint();
+        }
+        let elsewhere = ui
+            .memory(egui::Memory::focused)
+            .filter(|focused| *focused != response.id)
+            .and_then(|focused| ui.ctx().read_response(focused))
+            // What a menu opens in its turn lies in the foreground, too.
+            .is_some_and(|focused| focused.layer_id.order != egui::Order::Foreground);
+        if elsewhere {
+            Popup::close_id(ui.ctx(), Popup::default_response_id(&response));
+        }
+    }
+    response
+}
+
+/// Closes the menu that `ui` is in; an entry that stands elsewhere, too, is in none there.
+pub(super) fn close_menu(ui: &Ui) {
+    if egui::containers::menu::is_in_menu(ui) {
+        ui.close();
+    }
+}
+
+/// A place of `lines` lines of small text, whatever is in it: what is too long scrolls, and nothing below it moves.
+pub(super) fn reserved(ui: &mut Ui, id: &str, lines: usize, add: impl FnOnce(&mut Ui)) {
+    let line = ui.text_style_height(&egui::TextStyle::Small) + 2.0;
+    let height = lines as f32 * line;
+    let size = egui::vec2(ui.available_width(), height);
+    let place = ui.allocate_exact_size(size, egui::Sense::hover()).0;
+    let inside = egui::UiBuilder::new()
+        .max_rect(place)
+        .layout(egui::Layout::top_down(egui::Align::LEFT));
+    ui.scope_builder(inside, |ui| {
+        ui.spacing_mut().item_spacing.y = 2.0;
+        ScrollArea::vertical()
+            .id_salt(id)
+            .max_height(height)
+            .min_scrolled_height(height)
+            .auto_shrink(false)
+            .show(ui, |ui| {
+                // Room for the scroll bar.
+                ui.set_max_width(ui.available_width() - 10.0);
+                add(ui);
+            });
+    });
 }
 
 /// Over the picture, while a file is held above the window.
@@ -90,7 +166,6 @@ impl App {
         Panel::top("header")
             .frame(bar)
             .show(ui, |ui| self.header(ui, compact));
-        self.strips(ui, bar);
         match arrangement {
             Arrangement::Large => self.side_by_side(ui, bar),
             Arrangement::Upright => self.upright(ui, bar),
@@ -292,10 +367,10 @@ impl App {
     }
 
     /// The 3D view with its buttons and, after a stop, the reason.
-    fn picture(&mut self, ui: &mut Ui) -> Option<transport::Asked> {
+    pub(super) fn picture(&mut self, ui: &mut Ui) -> Option<transport::Asked> {
         let area = ui.max_rect();
         self.picture_rect = area;
-        let plain = self.capture.is_some();
+        let plain = self.picture.is_plain();
         self.player.place_ghost();
         self.viewport.ui(ui, &self.player, plain);
         if plain {
@@ -310,15 +385,13 @@ impl App {
             .max_rect(egui::Rect::from_min_size(inner.min, row))
             .layout(backwards);
         ui.scope_builder(buttons, |ui| {
-            ui.menu_button("View options", |ui| {
-                entries(ui, |ui| {
-                    ui.set_min_width(230.0);
-                    if narrow {
-                        ui.horizontal_wrapped(|ui| self.viewport.camera_buttons(ui, false));
-                        ui.separator();
-                    }
-                    self.viewport.options_ui(ui);
-                });
+            menu(ui, "View options", false, |ui| {
+                ui.set_min_width(230.0);
+                if narrow {
+                    ui.horizontal_wrapped(|ui| self.viewport.camera_buttons(ui, false));
+                    ui.separator();
+                }
+                self.viewport.options_ui(ui);
             });
             if !narrow {
                 ui.with_layout(backwards, |ui| self.viewport.camera_buttons(ui, true));
@@ -326,7 +399,8 @@ impl App {
         });
         self.settled_hint(ui, inner);
         drop_hint(ui, area);
-        self.notice_plate(ui, inner);
+        let messages = self.messages(ui, inner);
+        self.notice_plate(ui, messages);
         let middle = egui::UiBuilder::new().max_rect(inner.shrink2(egui::vec2(0.0, 44.0)));
         ui.scope_builder(middle, |ui| transport::banner(ui, &self.player))
             .inner
@@ -361,6 +435,28 @@ impl App {
                 .accessible_name("Dismiss the hint");
             self.hint_dismissed |= close.clicked();
         });
+    }
+
+    /// What has to be said, over the lower edge of the picture: it comes and goes by itself, and moves nothing. Returns the
+    /// part of `area` that is free of it.
+    fn messages(&mut self, ui: &Ui, area: egui::Rect) -> egui::Rect {
+        if !self.has_messages() {
+            return area;
+        }
+        let most = (area.height() - ui.spacing().interact_size.y - 8.0).max(60.0);
+        let shown = Area::new(Id::unique("messages"))
+            .pivot(Align2::CENTER_BOTTOM)
+            .fixed_pos(area.center_bottom())
+            .constrain_to(area)
+            .default_width(area.width().min(640.0))
+            .show(ui.ctx(), |ui| {
+                ui.set_width(area.width().min(640.0));
+                ScrollArea::vertical()
+                    .max_height(most)
+                    .min_scrolled_height(most)
+                    .show(ui, |ui| self.strips(ui));
+            });
+        area.with_max_y(shown.response.rect.top() - 8.0)
     }
 
     /// What was just done, for a few seconds.

@@ -17,6 +17,8 @@ struct Leg {
 pub struct Load {
     /// The scene as the run starts.
     pub scene: SceneSource,
+    /// Keys that the sweep varied.
+    varied: Vec<String>,
     legs: Vec<Leg>,
     next: usize,
     total: f64,
@@ -52,15 +54,22 @@ impl Load {
         }
         legs.reverse();
         let mut scene = scene.clone();
+        let varied = legs[0].settings.iter().map(|(key, _)| key.clone()).collect();
         // The first point is where the run starts.
         scene.changes.append(&mut legs[0].settings);
         let last = legs.last()?.schedule;
         Some(Self {
             scene,
+            varied,
             total: last.time(last.sections.saturating_sub(1)),
             legs,
             next: 0,
         })
+    }
+
+    /// Keys that the sweep varied.
+    pub fn varied(&self) -> &[String] {
+        &self.varied
     }
 
     /// Part of the way that lies behind, 0 to 1.

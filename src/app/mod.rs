@@ -7,6 +7,7 @@ mod announce;
 #[cfg(not(target_arch = "wasm32"))]
 mod background;
 mod bench;
+mod canvas;
 mod controls;
 mod curve;
 mod dialogs;
@@ -21,6 +22,7 @@ mod layout;
 mod load;
 mod log;
 mod overlay;
+mod picture;
 mod player;
 mod plots;
 mod replay;
@@ -59,6 +61,7 @@ use layout::Sheet;
 use load::Load;
 pub use log::{Entry, Event, Log};
 pub use overlay::{force_notes, plate};
+use picture::Picture;
 pub use player::Player;
 pub use plots::{Plots, Window};
 pub use replay::{Replay, Verdict};
@@ -209,11 +212,13 @@ pub struct App {
     verdict: Option<Verdict>,
     notice: Option<Notice>,
     announcer: Announcer,
-    capture: Option<files::Capture>,
+    picture: Picture,
     /// Where the 3D view is, points.
     picture_rect: egui::Rect,
     /// The graphics adapter and its interface; "" without a window.
     renderer: String,
+    /// The graphics of the window, to draw pictures beside it.
+    graphics: Option<egui_wgpu::RenderState>,
 }
 
 impl App {
@@ -268,9 +273,10 @@ impl App {
             verdict: None,
             notice: None,
             announcer: Announcer::default(),
-            capture: None,
+            picture: Picture::default(),
             picture_rect: egui::Rect::ZERO,
             renderer: String::new(),
+            graphics: None,
             player,
         };
         app.attach(ctx, state, options.theme);
@@ -293,8 +299,9 @@ impl App {
             self.renderer = format!("{} {}", info.backend, info.name).trim().to_owned();
         }
         self.fingers = None;
+        self.graphics = state.cloned();
         // A picture on its way is lost.
-        self.capture = None;
+        self.picture.forget();
     }
 
     /// The running scene.
@@ -328,8 +335,24 @@ impl App {
         Some(load.fraction(&self.player))
     }
 
-    /// Runs the scene of a sweep anew towards a section.
+    /// Runs to a section of a sweep; what that would change beyond the varied parameter is asked first.
     fn start_load(&mut self, load: Load) {
+        match load.scene.scene() {
+            Err(error) => self.problem = Some(error.to_string()),
+            Ok(scene) => {
+                let changes = value::differences(&scene, self.player.wanted(), load.varied());
+                if changes.is_empty() {
+                    self.go_to_section(load);
+                } else {
+                    let load = Box::new(load);
+                    self.dialog = Some(Dialog::Load { load, changes });
+                }
+            }
+        }
+    }
+
+    /// Runs the scene of a sweep anew towards a section.
+    fn go_to_section(&mut self, load: Load) {
         let phase = self.player.watch().phase();
         let twin = self.player.twin().is_some();
         let pose = self.viewport.pose();
@@ -373,6 +396,18 @@ impl App {
     pub fn open(&mut self, argument: &str) -> Result<(), String> {
         let scene = Scene::load(argument, &[]).map_err(|error| error.to_string())?;
         self.show_scene(&scene)
+    }
+
+    /// Opens a link in any of its forms, a built-in scene or a file; on an error the running scene stays.
+    ///
+    /// # Errors
+    /// As [`Self::open_link`] and [`Self::open`], in words.
+    pub fn open_any(&mut self, ctx: &egui::Context, text: &str) -> Result<(), String> {
+        if share::is_link(text) {
+            self.open_link(ctx, text)
+        } else {
+            self.open(text.trim())
+        }
     }
 
     /// Shows `problem` above everything until it is dismissed.
@@ -587,8 +622,15 @@ impl App {
                     self.save_as(path, files);
                 }
             }
+            Some(Answer::Load) => {
+                if let Dialog::Load { load, .. } = dialog {
+                    self.go_to_section(*load);
+                }
+            }
             Some(Answer::Open(argument)) => {
-                if let Err(reason) = self.open(&argument) {
+                if let Err(reason) = self.open_any(ctx, &argument) {
+                    // It is said in the dialog.
+                    self.problem = None;
                     self.dialog = Some(Dialog::Open {
                         path: argument,
                         error: Some(reason),
@@ -610,6 +652,7 @@ impl eframe::App for App {
             self.act(ctx, action);
         }
         self.receive_files(ctx);
+        self.receive_links(ctx);
         self.receive_picture(ctx);
         let measuring = self.accuracy.update(self.host.as_mut());
         if self.bench.update(self.host.as_mut()) || measuring {

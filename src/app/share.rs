@@ -106,6 +106,9 @@ pub struct CameraPose {
     pub distance: f32,
     /// What it looks at, m.
     pub target: [f32; 3],
+    /// Width over height of the picture that everything was fitted into, and nobody has moved the camera since; a picture
+    /// of another shape fits it anew. `None`: it stands where somebody put it.
+    pub fitted: Option<f32>,
 }
 
 /// What a link says.
@@ -123,7 +126,7 @@ pub struct Link {
     pub hash: Option<u64>,
     /// Simulated seconds per second.
     pub time_scale: Option<f64>,
-    /// Point of view; without it everything is shown.
+    /// Point of view; without it everything is shown as when a scene opens.
     pub camera: Option<CameraPose>,
     /// Magnification of the play.
     pub magnification: Option<f32>,
@@ -160,6 +163,19 @@ impl Default for Link {
             version: None,
         }
     }
+}
+
+/// Whether `text` is a link in one of the forms of [`Link::parse`], rather than the name of a scene or of a file.
+pub fn is_link(text: &str) -> bool {
+    let text = text.trim();
+    text.starts_with(['#', '?'])
+        || text.contains("://")
+        || (text.contains('=') && !text.ends_with(".toml") && !is_file(text))
+}
+
+/// A page has no files by name.
+fn is_file(text: &str) -> bool {
+    cfg!(not(target_arch = "wasm32")) && std::path::Path::new(text).is_file()
 }
 
 impl Link {
@@ -473,23 +489,29 @@ fn read_camera(text: &str) -> Result<CameraPose, String> {
         .collect();
     let numbers = numbers.unwrap_or_default();
     let steepest = std::f32::consts::FRAC_PI_2;
-    match numbers[..] {
+    let (numbers, fitted) = match numbers[..] {
+        [.., aspect] if numbers.len() == 7 => (&numbers[..6], Some(aspect)),
+        _ => (&numbers[..], None),
+    };
+    match *numbers {
         [yaw, pitch, distance, x, y, z]
             if yaw.abs() <= 1e3
                 && pitch.abs() <= steepest
                 && (1e-4..=1e4).contains(&distance)
-                && [x, y, z].iter().all(|part| part.abs() <= 1e4) =>
+                && [x, y, z].iter().all(|part| part.abs() <= 1e4)
+                && fitted.is_none_or(|aspect| (1e-2..=1e2).contains(&aspect)) =>
         {
             Ok(CameraPose {
                 yaw,
                 pitch,
                 distance,
                 target: [x, y, z],
+                fitted,
             })
         }
         _ => Err(
             "is no camera: yaw and pitch (-1.57 to 1.57) in rad, distance (0.0001 to 10000) and target x, y, z \
-             (-10000 to 10000) in m"
+             (-10000 to 10000) in m; then, if it shows everything, width over height (0.01 to 100) of the picture"
                 .to_owned(),
         ),
     }
@@ -497,10 +519,15 @@ fn read_camera(text: &str) -> Result<CameraPose, String> {
 
 fn write_camera(camera: CameraPose) -> String {
     let [x, y, z] = camera.target;
-    format!(
+    let mut words = format!(
         "{} {} {} {x} {y} {z}",
         camera.yaw, camera.pitch, camera.distance
-    )
+    );
+    if let Some(aspect) = camera.fitted {
+        // Writing to a String cannot fail.
+        let _ = write!(words, " {aspect}");
+    }
+    words
 }
 
 fn pack(text: &str) -> String {

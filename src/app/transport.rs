@@ -1,14 +1,17 @@
 //! Transport: play, step, reset, time scale, and how fast time really passes.
 
-use eframe::egui::{self, ComboBox, RichText, Slider, Ui};
+use eframe::egui::{self, ComboBox, RichText, Slider, Ui, Vec2};
 
 use super::icons::{Icon, icon_button};
 use super::player::Player;
-use super::{theme, value};
+use super::{keys, theme, value};
 use crate::simulate::SCALE_RANGE;
 
 /// Time scales that a list offers.
 pub const SCALES: [f64; 8] = [1.0, 0.5, 0.1, 0.05, 0.02, 0.01, 1e-3, 1e-4];
+
+/// Width of the list of time scales, points: room for the longest.
+const SCALES_WIDTH: f32 = 94.0;
 
 /// Size of the button that plays and pauses, points.
 const PLAY: f32 = 40.0;
@@ -65,7 +68,7 @@ pub fn row(ui: &mut Ui, player: &mut Player) -> Option<Asked> {
     ui.horizontal(|ui| {
         let asked = buttons(ui, player);
         // Else the time scale would stick out; the time stands over the picture, too.
-        if ui.available_width() > 172.0 {
+        if ui.available_width() > clock(ui).x + SCALES_WIDTH + ui.spacing().item_spacing.x {
             time(ui, player);
         }
         scales(ui, player);
@@ -108,9 +111,20 @@ fn buttons(ui: &mut Ui, player: &mut Player) -> Option<Asked> {
     asked
 }
 
+/// Room for any time: what stands beside the clock does not move with its digits.
+fn clock(ui: &Ui) -> Vec2 {
+    let font = egui::TextStyle::Monospace.resolve(ui.style());
+    let digits = "0".repeat(value::LONGEST_TIME);
+    let galley = ui
+        .painter()
+        .layout_no_wrap(digits, font, egui::Color32::PLACEHOLDER);
+    galley.size().ceil()
+}
+
 fn time(ui: &mut Ui, player: &Player) {
-    let time = value::time(player.pacer.shown());
-    ui.label(RichText::new(time).monospace().strong())
+    let time = RichText::new(value::time(player.pacer.shown()));
+    let label = egui::Label::new(time.monospace().strong()).halign(egui::Align::RIGHT);
+    ui.add_sized(clock(ui), label)
         .on_hover_text("Simulated time");
 }
 
@@ -120,12 +134,10 @@ fn speed(ui: &mut Ui, player: &mut Player, narrow: bool) {
         "Simulated against real time: 1:50 shows a fiftieth of a second in a second (keys + and -)",
     );
     ui.spacing_mut().slider_width = if narrow { 90.0 } else { 150.0 };
-    let response = ui
-        .add(
-            Slider::new(&mut scale, SCALE_RANGE.0..=SCALE_RANGE.1)
-                .logarithmic(true)
-                .show_value(false),
-        )
+    let slider = Slider::new(&mut scale, SCALE_RANGE.0..=SCALE_RANGE.1)
+        .logarithmic(true)
+        .show_value(false);
+    let response = keys::slider(ui, slider)
         .on_hover_text("1:1 is real time, 1:10 000 the slowest motion");
     if response.changed() {
         player.pacer.set_scale(scale);
@@ -138,7 +150,8 @@ fn speed(ui: &mut Ui, player: &mut Player, narrow: bool) {
 /// Time scales to choose from.
 fn scales(ui: &mut Ui, player: &mut Player) {
     ComboBox::from_id_salt("time scale")
-        .width(78.0)
+        .width(SCALES_WIDTH)
+        .truncate()
         .selected_text(value::time_scale(player.pacer.scale()))
         .show_ui(ui, |ui| {
             for preset in SCALES {

@@ -1,6 +1,6 @@
 //! Values as text on the screen: the words that files and the command line take, their units as they are printed.
 
-use crate::scene::{Kind, Value, format_quantity, format_quantity_digits};
+use crate::scene::{Kind, Scene, Value, format_quantity, format_quantity_digits};
 
 /// Units in `text` as they are printed, `µm` and `m/s²`. Files and the command line write `um` and `m/s^2`, and read both.
 pub fn typeset(text: &str) -> String {
@@ -49,6 +49,82 @@ pub fn shown(value: &Value, kind: &Kind) -> String {
     }
 }
 
+/// The value of `key` of `scene` for a person, after its name; `None` where the scene has no such key.
+fn named(scene: &Scene, key: &str) -> Option<(String, String)> {
+    let (value, parameter) = (scene.get(key).ok()?, scene.parameter(key).ok()?);
+    let name = match key.strip_prefix("joint.").and_then(|rest| rest.rsplit_once('.')) {
+        Some((joint, _)) => format!("{} of {joint}", parameter.label),
+        None => parameter.label.to_owned(),
+    };
+    Some((name, shown(&value, &parameter.kind)))
+}
+
+/// A scene in a line: its name, what is changed in it except for the keys `except`, and what solves it.
+pub fn scene_line(scene: &Scene, except: &[String]) -> String {
+    let changed = scene.changes.iter().map(|(key, _)| key);
+    let changed = changed.filter(|key| !except.contains(key) && !is_about_the_way(key));
+    let mut parts = vec![scene.name.clone()];
+    parts.extend(
+        changed
+            .filter_map(|key| named(scene, key))
+            .map(|(name, value)| format!("{} {value}", name.to_lowercase())),
+    );
+    parts.push(solver(scene));
+    parts.join(", ")
+}
+
+/// Keys that say how a scene is solved or looked at: the solver is named as a whole, the look changes no motion.
+fn is_about_the_way(key: &str) -> bool {
+    key.starts_with("solver.") || key.starts_with("view.")
+}
+
+/// Method with its tolerance, or its fixed step.
+pub fn solver(scene: &Scene) -> String {
+    let method = match scene.get("solver.method") {
+        Ok(Value::Choice(word)) => word,
+        _ => "",
+    };
+    if scene.solver.method.is_adaptive() {
+        format!("{method} {}", power_of_ten(scene.solver.tolerance))
+    } else {
+        format!("{method} {}", format_quantity(scene.solver.step, "us"))
+    }
+}
+
+/// What would change with `there` in the place of `here`, a phrase each, but for the keys `except`; empty where it is the same
+/// motion.
+pub fn differences(there: &Scene, here: &Scene, except: &[String]) -> Vec<String> {
+    if there.source.text != here.source.text {
+        let (new, old) = (&there.name, &here.name);
+        return vec![if new == old {
+            format!("Scene: another file of the name {new}")
+        } else {
+            format!("Scene: {new} instead of {old}")
+        }];
+    }
+    let mut keys: Vec<&String> = Vec::new();
+    for (key, _) in there.changes.iter().chain(&here.changes) {
+        if !keys.contains(&key) && !except.contains(key) && !is_about_the_way(key) {
+            keys.push(key);
+        }
+    }
+    let mut all: Vec<String> = keys
+        .into_iter()
+        .filter(|key| there.get(key).ok() != here.get(key).ok())
+        .map(|key| {
+            let value = |scene| named(scene, key).map_or_else(|| "none".to_owned(), |n| n.1);
+            let name = named(there, key).or_else(|| named(here, key));
+            let name = name.map_or_else(|| key.clone(), |n| n.0);
+            format!("{name}: {} instead of {}", value(there), value(here))
+        })
+        .collect();
+    let (new, old) = (solver(there), solver(here));
+    if new != old {
+        all.push(format!("Solver: {new} instead of {old}"));
+    }
+    all
+}
+
 /// What a user typed, with the display unit added to a bare number.
 pub fn completed(typed: &str, kind: &Kind) -> String {
     let typed = typed.trim();
@@ -94,16 +170,23 @@ pub fn percent(share: f64) -> String {
     }
 }
 
-/// A time with the unit that suits its size.
+/// Most characters of [`time`] up to 10^9 s: what a clock keeps free.
+pub const LONGEST_TIME: usize = 11;
+
+/// A time with the unit that suits its size; a long one has fewer decimals, so that it takes no more room.
 pub fn time(seconds: f64) -> String {
     let size = seconds.abs();
-    if size == 0.0 || size >= 1.0 {
-        format!("{seconds:.4} s")
-    } else if size >= 1e-3 {
-        format!("{:.4} ms", seconds * 1e3)
-    } else {
-        format!("{:.3} µs", seconds * 1e6)
+    for (unit, name, decimals) in [(1e-6, "µs", 3), (1e-3, "ms", 4)] {
+        // A value that rounds up to the next unit is written in that one.
+        let whole = 1000.0 - 0.5 * libm::pow(10.0, -f64::from(decimals));
+        if size > 0.0 && size / unit < whole {
+            return format!("{:.*} {name}", decimals as usize, seconds / unit);
+        }
     }
+    let decimals = (0..4)
+        .find(|taken| size < libm::pow(10.0, f64::from(4 + taken)) - 0.5)
+        .map_or(0, |taken| 4 - taken as usize);
+    format!("{seconds:.decimals$} s")
 }
 
 /// A time scale as people say it: `1:50`.
@@ -198,6 +281,12 @@ mod tests {
         assert_eq!(time(0.0), "0.0000 s");
         assert_eq!(time(7.85e-3), "7.8500 ms");
         assert_eq!(time(12.5e-6), "12.500 µs");
+        assert_eq!(time(0.999_999_99), "1.0000 s");
+        assert_eq!(time(999.999_9e-6), "1.0000 ms");
+        assert_eq!(time(12_345.678_9), "12345.679 s");
+        let longest = (-90..90).map(|k| time(libm::pow(10.0, f64::from(k) / 10.0) * 0.999_999_99));
+        let longest = longest.map(|words| words.chars().count()).max();
+        assert_eq!(longest, Some(LONGEST_TIME));
         assert_eq!(time_scale(1.0), "1:1");
         assert_eq!(time_scale(0.4), "1:2.5");
         assert_eq!(time_scale(0.02), "1:50");

@@ -8,7 +8,7 @@ use eframe::egui::{
 };
 use glam::{Vec2, Vec3};
 
-use super::overlay;
+use super::{keys, overlay};
 use super::player::Player;
 use super::share::CameraPose;
 use super::value;
@@ -52,6 +52,8 @@ pub struct Viewport {
     fit_pending: bool,
     /// Width over height of the picture that was last fitted.
     fitted: f32,
+    /// While a picture is drawn beside the window: width over height of the view on the screen.
+    frozen: Option<f32>,
     arrows: ArrowMemory,
     list: Arc<DrawList>,
     trail: Vec<Vec3>,
@@ -72,6 +74,7 @@ impl Viewport {
             goal: None,
             fit_pending: true,
             fitted: 1.0,
+            frozen: None,
             view,
             options,
             arrows: ArrowMemory::new(),
@@ -84,10 +87,12 @@ impl Viewport {
         }
     }
 
-    /// Where the camera stands or is going; `None` where it shows everything as at the start and follows nothing.
+    /// Where the camera stands or is going; `None` before the first picture.
     pub fn pose(&self) -> Option<CameraPose> {
         let camera = self.goal.unwrap_or(self.camera);
-        (self.moved || self.followed.is_some()).then(|| CameraPose {
+        let own = self.moved || self.followed.is_some();
+        (own || !self.fit_pending).then(|| CameraPose {
+            fitted: (!own).then_some(self.fitted),
             yaw: camera.yaw,
             pitch: camera.pitch,
             distance: camera.distance,
@@ -101,7 +106,8 @@ impl Viewport {
         self.camera.pitch = pose.pitch;
         self.camera.distance = pose.distance;
         self.camera.target = Vec3::from_array(pose.target);
-        (self.goal, self.fit_pending, self.moved) = (None, false, true);
+        (self.goal, self.fit_pending, self.moved) = (None, false, pose.fitted.is_none());
+        self.fitted = pose.fitted.unwrap_or(self.fitted);
     }
 
     /// After a leap in time: what was remembered from before has no part in the picture.
@@ -199,6 +205,22 @@ impl Viewport {
         self.followed
     }
 
+    /// From now on the view is drawn as it is, whatever the shape of the picture: all is in it that a view of this `aspect`
+    /// (width by height) holds. `None`: it fits itself again where that is due.
+    pub fn freeze(&mut self, aspect: Option<f32>) {
+        self.frozen = aspect;
+    }
+
+    /// The camera for a picture of `aspect`, width by height.
+    fn framed(&self, aspect: f32) -> Camera {
+        let mut camera = self.camera;
+        if let Some(shape) = self.frozen.filter(|shape| *shape > aspect) {
+            let half = (camera.field_of_view / 2.0).tan() * shape / aspect;
+            camera.field_of_view = 2.0 * half.atan();
+        }
+        camera
+    }
+
     /// The next factor of a short list for the magnification of the play.
     pub fn next_magnification(&mut self) {
         const STEPS: [f32; 6] = [1.0, 5.0, 10.0, 20.0, 50.0, 100.0];
@@ -226,7 +248,7 @@ impl Viewport {
         let aspect = size[0] as f32 / size[1] as f32;
         // A sheet that folds away, or a phone that is turned, would leave half of the mechanism outside.
         let reshaped = !(0.8..=1.25).contains(&(aspect / self.fitted));
-        if self.fit_pending || (reshaped && !self.moved) {
+        if self.frozen.is_none() && (self.fit_pending || (reshaped && !self.moved)) {
             self.fit_pending = false;
             self.fitted = aspect;
             // The first picture of a scene starts where it should be.
@@ -247,7 +269,8 @@ impl Viewport {
             }
         }
         self.drag(ui, &response, player, rect, size, scale);
-        let shot = shot!(self, player, &self.camera, size, scale);
+        let camera = self.framed(aspect);
+        let shot = shot!(self, player, &camera, size, scale);
         let hovered = response
             .hover_pos()
             .filter(|_| !plain && !response.dragged())
@@ -433,13 +456,11 @@ impl Viewport {
             "Draws eccentricity and clearance larger than they are, together, so that the ball never leaves its \
              socket. The motion of the machine stays as it is. Key M.",
         );
-        ui.add(
-            Slider::new(&mut options.magnification, 1.0..=100.0)
-                .logarithmic(true)
-                .prefix("×")
-                .max_decimals(1),
-        )
-        .accessible_name("Magnification of the play");
+        let slider = Slider::new(&mut options.magnification, 1.0..=100.0)
+            .logarithmic(true)
+            .prefix("×")
+            .max_decimals(1);
+        keys::slider(ui, slider).accessible_name("Magnification of the play");
         ui.add_space(4.0);
         ui.label("Force arrows");
         ui.horizontal(|ui| {

@@ -21,11 +21,11 @@ pub enum WindowError {
     Window(String),
 }
 
-/// Opens the window and returns when it is closed.
+/// Opens the window and returns when it is closed. Links that are copied in it are hung on the address `page`.
 ///
 /// # Errors
 /// A scene that cannot start, no graphics adapter, no display.
-pub fn run_native(options: AppOptions) -> Result<(), WindowError> {
+pub fn run_native(options: AppOptions, page: String) -> Result<(), WindowError> {
     let native = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
             .with_title("Jointplay")
@@ -38,7 +38,7 @@ pub fn run_native(options: AppOptions) -> Result<(), WindowError> {
     Player::new(&options.scene).map_err(|error| error.located(&options.scene))?;
     let create: eframe::AppCreator<'_> = Box::new(|cc| {
         let mut app = App::new(cc, options)?;
-        app.set_host(Box::new(DesktopHost::default()));
+        app.set_host(Box::new(DesktopHost::new(page)));
         Ok(Box::new(app))
     });
     eframe::run_native("Jointplay", native, create).map_err(|error| match error {

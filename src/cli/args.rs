@@ -62,9 +62,14 @@ pub struct ViewArguments {
     /// Change a parameter, e.g. `contact.clearance=0.5mm`; may be repeated, the last wins.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = change)]
     pub changes: Vec<(String, String)>,
-    /// Open a share link, e.g. `?scene=pendulum&c=0.5mm&t=20ms`, and reproduce its state.
+    /// Open a share link, e.g. `?scene=pendulum&c=0.5mm&t=20ms`, and reproduce its state; with or without an address before
+    /// its `?` or `#`.
     #[arg(long, value_name = "LINK", conflicts_with_all = ["scene", "changes"])]
     pub link: Option<String>,
+    /// Address of a page with the laboratory, e.g. `https://example.org/lab/`: `Copy link` hangs its links on it
+    /// [default: the environment variable JOINTPLAY_PAGE; without either a link begins with its `#`].
+    #[arg(long, value_name = "URL")]
+    pub page: Option<String>,
 }
 
 /// `run`.
@@ -487,6 +492,18 @@ fn size(text: &str) -> Result<(u32, u32), String> {
             .ok_or_else(wrong)
     };
     Ok((edge(width)?, edge(height)?))
+}
+
+impl Default for ViewArguments {
+    /// As where no command is given.
+    fn default() -> Self {
+        Self {
+            scene: super::DEFAULT_SCENE.into(),
+            changes: Vec::new(),
+            link: None,
+            page: None,
+        }
+    }
 }
 
 #[cfg(test)]

@@ -29,7 +29,7 @@ use std::io::{self, Write as _};
 
 use clap::Parser;
 
-use self::args::{Arguments, Command, SceneArguments};
+use self::args::{Arguments, Command, SceneArguments, ViewArguments};
 pub use self::failure::Failure;
 pub use crate::scene::DEFAULT_SCENE;
 use crate::scene::{BUILT_IN, Scene, reference_page, visible};
@@ -58,12 +58,8 @@ pub fn main() -> u8 {
 
 fn dispatch(arguments: Arguments) -> Result<(), Failure> {
     match arguments.command {
-        None => view(DEFAULT_SCENE.as_ref(), &[], None),
-        Some(Command::View(arguments)) => view(
-            &arguments.scene,
-            &arguments.changes,
-            arguments.link.as_deref(),
-        ),
+        None => view(&ViewArguments::default()),
+        Some(Command::View(arguments)) => view(&arguments),
         Some(Command::Scenes) => print(&scenes()?),
         Some(Command::Check(arguments)) => check::check(&arguments),
         Some(Command::Run(arguments)) => run::run(&arguments),
@@ -84,14 +80,15 @@ fn dispatch(arguments: Arguments) -> Result<(), Failure> {
 }
 
 #[cfg(feature = "gui")]
-fn view(scene: &OsStr, changes: &[(String, String)], link: Option<&str>) -> Result<(), Failure> {
+fn view(arguments: &ViewArguments) -> Result<(), Failure> {
     use crate::app::{AppOptions, WindowError, run_native};
     drivers::quieten();
-    let options = match link {
+    let page = page(arguments.page.as_deref(), std::env::var(PAGE).ok())?;
+    let options = match &arguments.link {
         Some(link) => AppOptions::from_link(link).map_err(Failure::usage)?,
-        None => AppOptions::new(Scene::load(scene, changes)?),
+        None => AppOptions::new(Scene::load(&arguments.scene, &arguments.changes)?),
     };
-    run_native(options).map_err(|error| {
+    run_native(options, page).map_err(|error| {
         let code = match error {
             WindowError::Start(_) => Failure::USAGE,
             WindowError::NoAdapter(_) => Failure::NO_ADAPTER,
@@ -108,6 +105,33 @@ fn view(scene: &OsStr, changes: &[(String, String)], link: Option<&str>) -> Resu
     })
 }
 
+/// Environment variable with the address that links are hung on.
+#[cfg(feature = "gui")]
+const PAGE: &str = "JOINTPLAY_PAGE";
+
+/// The address that links are hung on, from `--page` or else from [`PAGE`]; "" for none.
+#[cfg(feature = "gui")]
+fn page(option: Option<&str>, variable: Option<String>) -> Result<String, Failure> {
+    let (name, page) = match (option, variable) {
+        (Some(page), _) => ("--page", page.to_owned()),
+        (None, Some(page)) => (PAGE, page),
+        (None, None) => return Ok(String::new()),
+    };
+    let page = page.trim();
+    let is_address = ["https://", "http://"].iter().any(|scheme| {
+        page.strip_prefix(scheme).is_some_and(|rest| {
+            !rest.is_empty() && !rest.contains(|c: char| c == '#' || c.is_whitespace())
+        })
+    });
+    if page.is_empty() || is_address {
+        return Ok(page.to_owned());
+    }
+    Err(Failure::usage(format!(
+        "{name} {page}: no address of a page; expected one that begins with https:// or http:// and has no `#`, e.g. \
+         https://example.org/lab/"
+    )))
+}
+
 #[cfg(feature = "gui")]
 fn no_display() -> bool {
     let unset = |name| std::env::var_os(name).is_none_or(|value| value.is_empty());
@@ -115,7 +139,7 @@ fn no_display() -> bool {
 }
 
 #[cfg(not(feature = "gui"))]
-fn view(_scene: &OsStr, _changes: &[(String, String)], _link: Option<&str>) -> Result<(), Failure> {
+fn view(_arguments: &ViewArguments) -> Result<(), Failure> {
     Err(no_graphics())
 }
 
@@ -177,4 +201,23 @@ fn warn(text: &str) {
 /// Standard error may be closed: then there is nobody to tell.
 fn complain(text: &str) {
     let _ = writeln!(io::stderr(), "{}", visible(text));
+}
+
+#[cfg(all(test, feature = "gui"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_option_beats_the_variable_and_what_is_no_address_is_refused() {
+        let (lab, other) = ("https://example.org/lab/", "http://localhost:8000");
+        let of = |option, variable: Option<&str>| page(option, variable.map(str::to_owned));
+        assert_eq!(of(None, None).expect("none"), "");
+        assert_eq!(of(None, Some(other)).expect("an address"), other);
+        assert_eq!(of(Some(lab), Some("nonsense")).expect("an address"), lab);
+        for bad in ["example.org/lab", "https://", "https://a.b/#x", "https://a b/"] {
+            let error = of(None, Some(bad)).expect_err("no address");
+            assert_eq!(error.code, Failure::USAGE);
+            assert!(error.to_string().contains(&format!("{PAGE} {bad}: ")), "{error}");
+        }
+    }
 }

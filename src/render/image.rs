@@ -1,5 +1,25 @@
 //! A picture in memory, and as a file.
 
+/// Why a picture could not be drawn.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum RenderError {
+    /// A size of 0 or beyond the device's limit.
+    #[error(
+        "picture of {width}x{height} pixels: each side must be 1 to {limit} on this graphics adapter"
+    )]
+    Size {
+        /// Asked width.
+        width: u32,
+        /// Asked height.
+        height: u32,
+        /// Greatest side.
+        limit: u32,
+    },
+    /// The device failed while drawing or reading back.
+    #[error("the graphics adapter failed: {0}")]
+    Device(String),
+}
+
 /// 8-bit picture, rows from the top, sRGB-encoded, opaque.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Image {

@@ -18,8 +18,8 @@ mod tests;
 
 pub use callback::{Viewport, install};
 pub use eframe::egui_wgpu::wgpu;
-pub use image::Image;
+pub use image::{Image, RenderError};
 #[cfg(not(target_arch = "wasm32"))]
-pub use offscreen::{NoAdapter, Offscreen, RenderError};
+pub use offscreen::{NoAdapter, Offscreen};
 pub use renderer::Renderer;
 pub use target::Target;

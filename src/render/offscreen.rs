@@ -1,6 +1,6 @@
 //! Pictures without a window.
 
-use super::{Image, Renderer, Target, wgpu};
+use super::{Image, RenderError, Renderer, Target, wgpu};
 use crate::view::DrawList;
 
 /// No graphics adapter on this machine.
@@ -9,26 +9,6 @@ use crate::view::DrawList;
     "no graphics adapter found: install a Vulkan driver (software: Debian and Ubuntu package mesa-vulkan-drivers)"
 )]
 pub struct NoAdapter;
-
-/// Why a picture could not be drawn.
-#[derive(Clone, Debug, thiserror::Error)]
-pub enum RenderError {
-    /// A size of 0 or beyond the device's limit.
-    #[error(
-        "picture of {width}x{height} pixels: each side must be 1 to {limit} on this graphics adapter"
-    )]
-    Size {
-        /// Asked width.
-        width: u32,
-        /// Asked height.
-        height: u32,
-        /// Greatest side.
-        limit: u32,
-    },
-    /// The device failed while drawing or reading back.
-    #[error("the graphics adapter failed: {0}")]
-    Device(String),
-}
 
 /// A device without a window, with its renderer.
 pub struct Offscreen {

@@ -246,7 +246,9 @@ impl Laboratory {
             .iter()
             .map(|(key, value)| (key.clone(), json!(value)))
             .collect();
-        let camera = self.app.link().camera.map(|camera| {
+        // Where nobody has moved it, it shows everything.
+        let camera = self.app.link().camera.filter(|camera| camera.fitted.is_none());
+        let camera = camera.map(|camera| {
             json!({
                 "yaw_rad": camera.yaw,
                 "pitch_rad": camera.pitch,

@@ -1,6 +1,6 @@
 //! The bifurcation diagram of a sweep, and what else it found at each value; a click picks a section.
 
-use eframe::egui::{ComboBox, Pos2, RichText, Sense, Ui};
+use eframe::egui::{ComboBox, Grid, Pos2, RichText, Sense, Ui};
 use egui_plot::{HLine, LineStyle, PlotPoint, PlotPoints, PlotTransform, Points, VLine};
 
 use super::coordinate::Coordinate;
@@ -111,8 +111,8 @@ impl Diagram {
         title(
             ui,
             &format!("{} over {}", up.title(), across.title()),
-            "What the sweep found at each value. A click on a point runs the scene with that value from its start to that \
-             section, and plays on from there.",
+            "What the sweep found at each value. A click on a point runs the swept scene with that value from its start to that \
+             section, and plays on from there; what that would change besides is asked first.",
         );
         let dark = ui.visuals().dark_mode;
         let (faint, bad) = (ui.visuals().weak_text_color(), ui.visuals().error_fg_color);
@@ -191,30 +191,38 @@ impl Diagram {
         });
     }
 
-    /// What the colours mean, as far as they occur.
+    /// What the colours mean, and at how many values each was found.
     fn key(&self, ui: &mut Ui, swept: &Swept, dark: bool) {
-        ui.horizontal_wrapped(|ui| {
-            for (code, word, colour) in REGIMES {
+        let weak = ui.visuals().weak_text_color();
+        let mut entries: Vec<_> = REGIMES
+            .iter()
+            .map(|(code, word, colour)| {
                 let points = swept.points.iter().flatten();
-                let count = points.filter(|point| point.regime_code == code).count();
-                if count > 0 {
-                    let text = RichText::new(format!("{count} {word}")).small().strong();
-                    ui.label(text.color(theme::series(colour, dark)))
-                        .on_hover_text("Kind of motion, and at how many values it was found");
+                let count = points.filter(|point| point.regime_code == *code).count();
+                let help = "Kind of motion, and at how many values it was found";
+                (count, *word, theme::series(*colour, dark), help)
+            })
+            .collect();
+        let help = "Values at which the divergence guard stopped the run, or that could not start";
+        let bad = ui.visuals().error_fg_color;
+        entries.push((self.diverged.len(), "diverged", bad, help));
+        ui.scope(|ui| {
+            // No controls: they need no height for fingers.
+            ui.spacing_mut().interact_size.y = 0.0;
+            Grid::new("regimes").num_columns(3).show(ui, |ui| {
+                for (index, (count, word, colour, help)) in entries.into_iter().enumerate() {
+                    let text = RichText::new(format!("{count} {word}")).small();
+                    let text = if count > 0 {
+                        text.strong().color(colour)
+                    } else {
+                        text.color(weak)
+                    };
+                    ui.label(text).on_hover_text(help);
+                    if index % 3 == 2 {
+                        ui.end_row();
+                    }
                 }
-            }
-            if !self.diverged.is_empty() {
-                let words = format!("{} diverged", self.diverged.len());
-                ui.label(
-                    RichText::new(words)
-                        .small()
-                        .strong()
-                        .color(ui.visuals().error_fg_color),
-                )
-                .on_hover_text(
-                    "Values at which the divergence guard stopped the run, or that could not start",
-                );
-            }
+            });
         });
     }
 

@@ -7,6 +7,7 @@ use super::plane::{Axis, plane};
 use super::portrait::title;
 use crate::app::curve::Path;
 use crate::app::player::Player;
+use crate::app::layout::reserved;
 use crate::app::{plots, theme, value};
 
 const HEIGHT: f32 = 170.0;
@@ -81,20 +82,24 @@ pub fn ui(ui: &mut Ui, player: &mut Player, problem: &mut Option<String>) {
                 plot.line(line.color(theme::series(1, dark)).style(style).width(2.0));
             }
         });
-    if let Some(fit) = fit {
-        ui.label(format!("Slope {} 1/s", value::number(fit.slope, 4)))
-            .on_hover_text(format!(
-                "Slope of the natural logarithm of the distance by least squares, from {} to {}: from the displacement to \
-                 where the distance first reaches a tenth of its largest value. The largest Lyapunov exponent of a sweep \
-                 brings its twin back again and again, and so tells of the whole motion.",
-                value::time(fit.from),
-                value::time(fit.to)
-            ));
-    }
-    if let Some(why) = twin.ended() {
-        let words = RichText::new(format!("The twin run {why}")).small();
-        ui.label(words.color(ui.visuals().warn_fg_color));
-    }
+    let (slope, over) = fit.map_or_else(
+        || ("—".to_owned(), String::new()),
+        |fit| {
+            let [from, to] = [fit.from, fit.to].map(value::time);
+            (value::number(fit.slope, 4), format!(", here from {from} to {to}"))
+        },
+    );
+    ui.label(format!("Slope {slope} 1/s")).on_hover_text(format!(
+        "Slope of the natural logarithm of the distance by least squares, from the displacement to where the distance first \
+         reaches a tenth of its largest value{over}. The largest Lyapunov exponent of a sweep brings its twin back again \
+         and again, and so tells of the whole motion.",
+    ));
+    reserved(ui, "twin says", 2, |ui| {
+        if let Some(why) = twin.ended() {
+            let words = RichText::new(format!("The twin run {why}")).small();
+            ui.label(words.color(ui.visuals().warn_fg_color));
+        }
+    });
 }
 
 /// Marks at whole powers of ten, few enough.

@@ -8,8 +8,9 @@ use super::plane::{Axis, plane};
 use crate::analysis::drive::observed;
 use crate::app::curve::Path;
 use crate::app::player::Player;
+use crate::app::layout::reserved;
+use crate::app::{keys, theme, value};
 use crate::app::watch::Observed;
-use crate::app::{theme, value};
 
 /// Height of each plot, points.
 const HEIGHT: f32 = 190.0;
@@ -27,6 +28,15 @@ impl Portrait {
         self.read(player, coordinate);
         let (across, up) = (coordinate.axis(), coordinate.rate_axis());
         let dark = ui.visuals().dark_mode;
+        reserved(ui, "portrait of", 2, |ui| {
+            let words = format!(
+                "Running: {}; sections at phase {}°",
+                value::scene_line(player.scene(), &[]),
+                value::number(360.0 * player.watch().phase(), 4)
+            );
+            ui.label(RichText::new(words).small())
+                .on_hover_text("What the portrait and the section below are of");
+        });
         title(
             ui,
             &format!("Phase portrait: {} over {}", up.title(), across.title()),
@@ -70,8 +80,7 @@ impl Portrait {
                 .suffix("°")
                 .max_decimals(1)
                 .clamping(SliderClamping::Always);
-            let changed = ui
-                .add(slider)
+            let changed = keys::slider(ui, slider)
                 .on_hover_text(
                     "Where in the period of the drive sections are taken, of the running scene and of the next sweep; 0° is \
                      the phase at t = 0. Another phase starts the section anew.",

@@ -1,6 +1,6 @@
 //! A sweep in the background: what is asked for, how far it is, and the points that came.
 
-use eframe::egui::{ComboBox, DragValue, ProgressBar, RichText, TextEdit, Ui};
+use eframe::egui::{Button, ComboBox, DragValue, ProgressBar, RichText, TextEdit, Ui, vec2};
 
 use super::coordinate::Coordinate;
 use super::diagram::Diagram;
@@ -9,13 +9,17 @@ use crate::analysis::point::LOOSEST_FOR_EXPONENT;
 use crate::analysis::swept::{Range, SweepTask, SweptPoint};
 use crate::analysis::task::{Job, Message, SceneSource};
 use crate::app::host::{Host, Running};
+use crate::app::layout::reserved;
 use crate::app::load::Load;
 use crate::app::player::Player;
 use crate::app::value;
-use crate::scene::{Kind, Parameter, Value};
+use crate::scene::{Kind, Parameter, Scene, Value, table};
 
 /// Parameter that is varied at first, and its range.
 const FIRST: (&str, &str, &str) = ("contact.clearance", "0.01 mm", "1 mm");
+
+/// Width of the button that starts and ends a sweep, points: it stays where it is.
+const GO: f32 = 120.0;
 
 /// A sweep that was started, and what came of it.
 pub struct Swept {
@@ -25,6 +29,51 @@ pub struct Swept {
     pub range: Range,
     /// Points by their number; `None` where one is still to come.
     pub points: Vec<Option<SweptPoint>>,
+    /// The scene that it was made of, without what varies.
+    scene: Option<Scene>,
+}
+
+impl Swept {
+    /// What it was made of: scene, changed parameters, range, periods.
+    fn caption(&self) -> String {
+        let Self { task, range, .. } = self;
+        let varied = [range.key.clone()];
+        let scene = self.scene.as_ref();
+        let scene = scene.map_or_else(String::new, |scene| value::scene_line(scene, &varied));
+        let parameter = table().iter().find(|parameter| parameter.key == range.key);
+        let label = parameter.map_or_else(|| range.key.clone(), |p| p.label.to_lowercase());
+        let end = |si| match parameter.map(|p| (p, &p.kind)) {
+            Some((_, Kind::Count { .. })) | None => value::number(si, 6),
+            Some((parameter, _)) => parameter.show(&Value::Number(si)),
+        };
+        format!(
+            "{scene}; {label} {} to {}, {} values; {} periods of which {} discarded, phase {}°, {} start",
+            end(range.from),
+            end(range.to),
+            range.count,
+            task.periods,
+            task.discard,
+            value::number(360.0 * task.phase, 4),
+            start_word(task.start),
+        )
+    }
+
+    /// What stands against its being of the scene on show, a phrase each.
+    fn differences(&self, player: &Player) -> Vec<String> {
+        let varied = [self.range.key.clone()];
+        let scene = self.scene.as_ref();
+        scene.map_or_else(Vec::new, |scene| {
+            value::differences(scene, player.wanted(), &varied)
+        })
+    }
+}
+
+fn start_word(start: Start) -> &'static str {
+    match start {
+        Start::Cold => "cold",
+        Start::FollowUp => "follow upwards",
+        Start::FollowDown => "follow downwards",
+    }
 }
 
 /// What the next sweep is to be.
@@ -72,6 +121,7 @@ impl Sweep {
                     self.swept = ranges.into_iter().next().map(|range| Swept {
                         task: task.clone(),
                         points: vec![None; range.count],
+                        scene: task.scene.scene().ok(),
                         range,
                     });
                     self.diagram.clear();
@@ -112,17 +162,24 @@ impl Sweep {
 
     /// Settings, progress and diagram; the section that was clicked.
     pub fn ui(&mut self, ui: &mut Ui, player: &Player, coordinate: Coordinate) -> Option<Load> {
-        if let Err(why) = player.watch().period() {
-            ui.label(RichText::new(format!("No sweep: {why}")).weak());
-        } else {
-            self.settings_ui(ui, player);
-            self.go_ui(ui, player);
+        match player.watch().period() {
+            Err(why) => {
+                ui.label(RichText::new(format!("No sweep: {why}")).weak());
+                if self.is_running() {
+                    self.go_ui(ui, player);
+                }
+            }
+            Ok(_) => {
+                self.settings_ui(ui, player);
+                self.go_ui(ui, player);
+            }
         }
-        if let Some(problem) = &self.problem {
-            let words = RichText::new(problem).small();
-            ui.label(words.color(ui.visuals().error_fg_color));
-        }
+        reserved(ui, "sweep says", 2, |ui| self.state_ui(ui, player));
         let swept = self.swept.as_ref()?;
+        reserved(ui, "sweep of", 3, |ui| {
+            ui.label(RichText::new(swept.caption()).small())
+                .on_hover_text("What the diagram below was made of");
+        });
         let (index, section) = self.diagram.ui(ui, swept, coordinate)?;
         Load::new(
             &swept.task.scene,
@@ -131,6 +188,34 @@ impl Sweep {
             swept.task.discard + section,
             swept.task.periods,
         )
+    }
+
+    /// What went wrong, or whether the diagram is of what is on show.
+    fn state_ui(&self, ui: &mut Ui, player: &Player) {
+        let small = |words: &str| RichText::new(words).small();
+        if let Some(problem) = &self.problem {
+            ui.label(small(problem).color(ui.visuals().error_fg_color));
+            return;
+        }
+        let running = self.running.as_ref().map(|(_, task)| task);
+        let swept = self.swept.as_ref();
+        let Some(swept) = swept.filter(|swept| running.is_none_or(|task| *task == swept.task)) else {
+            let words = if self.is_running() {
+                "Begins…"
+            } else {
+                "No sweep yet"
+            };
+            ui.label(small(words).weak());
+            return;
+        };
+        let differences = swept.differences(player);
+        if differences.is_empty() {
+            ui.label(small("Of the scene on show, with its values").weak());
+        } else {
+            let words = format!("Not of what is on show. {}", differences.join("; "));
+            ui.label(small(&words).color(ui.visuals().warn_fg_color))
+                .on_hover_text("A click on a point asks before it changes this");
+        }
     }
 
     fn settings_ui(&mut self, ui: &mut Ui, player: &Player) {
@@ -201,17 +286,12 @@ impl Sweep {
         });
         ui.horizontal_wrapped(|ui| {
             ui.label("Start");
-            let word = |start| match start {
-                Start::Cold => "cold",
-                Start::FollowUp => "follow upwards",
-                Start::FollowDown => "follow downwards",
-            };
             ComboBox::from_id_salt("start")
                 .width(120.0)
-                .selected_text(word(settings.start))
+                .selected_text(start_word(settings.start))
                 .show_ui(ui, |ui| {
                     for start in [Start::Cold, Start::FollowUp, Start::FollowDown] {
-                        ui.selectable_value(&mut settings.start, start, word(start));
+                        ui.selectable_value(&mut settings.start, start, start_word(start));
                     }
                 })
                 .response
@@ -239,21 +319,30 @@ impl Sweep {
     }
 
     fn go_ui(&mut self, ui: &mut Ui, player: &Player) {
-        if self.is_running() {
-            ui.horizontal(|ui| {
-                let help = "End the sweep; the points that are there stay";
-                if ui.button("Cancel sweep").on_hover_text(help).clicked() {
-                    (self.running, self.asked) = (None, None);
-                }
+        let running = self.is_running();
+        let (name, help) = if running {
+            ("Cancel sweep", "End the sweep; the points that are there stay")
+        } else {
+            (
+                "Start sweep",
+                "Runs the scene with its present values at each value of the varied parameter, in the background, and \
+                 draws the bifurcation diagram as points arrive",
+            )
+        };
+        let clicked = ui.horizontal(|ui| {
+            let button = Button::new(name).min_size(vec2(GO, 0.0));
+            let clicked = ui.add(button).on_hover_text(help).clicked();
+            if running {
                 let bar = ProgressBar::new(self.progress as f32).show_percentage();
                 ui.add(bar.desired_width(ui.available_width()))
                     .accessible_name("Swept so far");
-            });
-            return;
-        }
-        let help = "Runs the scene with its present values at each value of the varied parameter, in the background, and \
-                    draws the bifurcation diagram as points arrive";
-        if ui.button("Start sweep").on_hover_text(help).clicked()
+            }
+            clicked
+        });
+        let clicked = clicked.inner;
+        if clicked && running {
+            (self.running, self.asked) = (None, None);
+        } else if clicked
             && let Some(settings) = &self.settings
             && let Ok(parameter) = player.wanted().parameter(settings.key)
         {

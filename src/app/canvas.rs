@@ -1,0 +1,302 @@
+//! Frames of an interface painted to a texture and read back: beside a window, on its device, or without one.
+
+use std::future::Future;
+use std::pin::Pin;
+use std::sync::{Arc, OnceLock};
+use std::task::{Context, Poll, Waker};
+
+use eframe::egui::mutex::RwLock;
+use eframe::egui::{self, Ui, vec2};
+use eframe::egui_wgpu::{self, RenderState, RendererOptions, ScreenDescriptor};
+
+use crate::render::{self, Image, RenderError, wgpu};
+
+/// Time between two passes, s.
+const FRAME: f64 = 1.0 / 60.0;
+
+/// An egui context and a device, without a window.
+pub struct Canvas {
+    /// What is drawn in it.
+    pub ctx: egui::Context,
+    /// Time of its last pass, s.
+    pub time: f64,
+    state: RenderState,
+}
+
+impl Canvas {
+    /// Draws with `state`, which is its own.
+    pub fn new(state: RenderState) -> Self {
+        render::install(&state);
+        Self {
+            ctx: egui::Context::default(),
+            time: 0.0,
+            state,
+        }
+    }
+
+    /// Draws on the device of a window, of whose textures and pipelines it uses none.
+    pub fn beside(window: &RenderState) -> Self {
+        // Rows are read back as red, green, blue, whatever the order of the window's own.
+        let target_format = wgpu::TextureFormat::Rgba8Unorm;
+        let renderer = egui_wgpu::Renderer::new(
+            &window.device,
+            target_format,
+            RendererOptions::PREDICTABLE,
+        );
+        Self::new(RenderState {
+            renderer: Arc::new(RwLock::new(renderer)),
+            target_format,
+            ..window.clone()
+        })
+    }
+
+    /// The device.
+    pub fn state(&self) -> &RenderState {
+        &self.state
+    }
+
+    /// One pass over an interface of `size` pixels, `scale` pixels to a point.
+    ///
+    /// # Errors
+    /// A size that cannot be drawn.
+    pub fn pass(
+        &mut self,
+        size: [u32; 2],
+        scale: f32,
+        mut show: impl FnMut(&mut Ui),
+    ) -> Result<egui::FullOutput, RenderError> {
+        let limit = check_size(&self.state.device, size)?;
+        self.time += FRAME;
+        let points = vec2(size[0] as f32, size[1] as f32) / scale;
+        let mut input = egui::RawInput {
+            screen_rect: Some(egui::Rect::from_min_size(egui::Pos2::ZERO, points)),
+            time: Some(self.time),
+            max_texture_side: Some(limit as usize),
+            ..Default::default()
+        };
+        input
+            .viewports
+            .entry(egui::ViewportId::ROOT)
+            .or_default()
+            .native_pixels_per_point = Some(scale);
+        let mut output = self.ctx.run_ui(input, |ui| show(ui));
+        self.upload(&mut output);
+        Ok(output)
+    }
+
+    fn upload(&self, output: &mut egui::FullOutput) {
+        let mut renderer = self.state.renderer.write();
+        for (id, images) in output.textures_delta.set.drain() {
+            for image in images {
+                renderer.update_texture(&self.state.device, &self.state.queue, id, &image);
+            }
+        }
+        for id in output.textures_delta.free.drain() {
+            renderer.free_texture(&id);
+        }
+    }
+
+    /// The commands that draw a pass, and the texture that they draw on.
+    pub fn encode(
+        &mut self,
+        output: egui::FullOutput,
+        size: [u32; 2],
+        scale: f32,
+    ) -> (Vec<wgpu::CommandBuffer>, wgpu::Texture) {
+        let (device, queue) = (&self.state.device, &self.state.queue);
+        let screen = ScreenDescriptor {
+            pixels_per_point: scale,
+            size_in_pixels: size,
+        };
+        let primitives = self.ctx.tessellate(output.shapes, scale);
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
+            label: Some("interface"),
+        });
+        let mut renderer = self.state.renderer.write();
+        let mut commands =
+            renderer.update_buffers(device, queue, &mut encoder, &primitives, &screen);
+        let texture = device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("interface"),
+            size: wgpu::Extent3d {
+                width: size[0],
+                height: size[1],
+                depth_or_array_layers: 1,
+            },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: self.state.target_format,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+            view_formats: &[],
+        });
+        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        {
+            let mut pass = encoder
+                .begin_render_pass(&wgpu::RenderPassDescriptor {
+                    label: Some("interface"),
+                    color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                        view: &view,
+                        resolve_target: None,
+                        ops: wgpu::Operations {
+                            load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                            store: wgpu::StoreOp::Store,
+                        },
+                        depth_slice: None,
+                    })],
+                    ..Default::default()
+                })
+                .forget_lifetime();
+            renderer.render(&mut pass, &primitives, &screen);
+        }
+        commands.push(encoder.finish());
+        (commands, texture)
+    }
+
+    /// Draws a pass and has it read back.
+    pub fn paint(&mut self, output: egui::FullOutput, size: [u32; 2], scale: f32) -> Pending {
+        let device = self.state.device.clone();
+        // Else a picture that is too large for the adapter's memory would end the program.
+        let short = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let wrong = device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let (mut commands, texture) = self.encode(output, size, scale);
+        let [width, height] = size;
+        let stride = (width * 4).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let buffer = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("read back"),
+            size: u64::from(stride) * u64::from(height),
+            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+            mapped_at_creation: false,
+        });
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        encoder.copy_texture_to_buffer(
+            texture.as_image_copy(),
+            wgpu::TexelCopyBufferInfo {
+                buffer: &buffer,
+                layout: wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(stride),
+                    rows_per_image: None,
+                },
+            },
+            texture.size(),
+        );
+        commands.push(encoder.finish());
+        self.state.queue.submit(commands);
+        let mapped = Arc::new(OnceLock::new());
+        let report = mapped.clone();
+        buffer.map_async(wgpu::MapMode::Read, .., move |result| {
+            // It is told once.
+            let _ = report.set(result.map_err(|error| error.to_string()));
+        });
+        let wrong = wrong.pop();
+        let short = short.pop();
+        Pending {
+            device,
+            buffer,
+            size,
+            stride,
+            mapped,
+            faults: vec![Box::pin(short), Box::pin(wrong)],
+        }
+    }
+}
+
+/// What the device can draw along an edge, pixels.
+///
+/// # Errors
+/// [`RenderError::Size`]: `size` is beyond that, or 0.
+fn check_size(device: &wgpu::Device, [width, height]: [u32; 2]) -> Result<u32, RenderError> {
+    let limit = device.limits().max_texture_dimension_2d;
+    if (1..=limit).contains(&width) && (1..=limit).contains(&height) {
+        return Ok(limit);
+    }
+    Err(RenderError::Size {
+        width,
+        height,
+        limit,
+    })
+}
+
+type Fault = Pin<Box<dyn Future<Output = Option<wgpu::Error>>>>;
+
+/// A picture on its way back from the graphics adapter.
+pub struct Pending {
+    device: wgpu::Device,
+    buffer: wgpu::Buffer,
+    size: [u32; 2],
+    stride: u32,
+    mapped: Arc<OnceLock<Result<(), String>>>,
+    /// What may have gone wrong on the device.
+    faults: Vec<Fault>,
+}
+
+impl Pending {
+    /// The picture once it is there; nothing waits for it.
+    pub fn take(&mut self) -> Option<Result<Image, RenderError>> {
+        if let Err(error) = self.device.poll(wgpu::PollType::Poll) {
+            return Some(Err(RenderError::Device(error.to_string())));
+        }
+        let mut found = None;
+        self.faults.retain_mut(|fault| {
+            let state = fault
+                .as_mut()
+                .poll(&mut Context::from_waker(Waker::noop()));
+            match state {
+                Poll::Pending => true,
+                Poll::Ready(error) => {
+                    found = found.take().or(error);
+                    false
+                }
+            }
+        });
+        if let Some(error) = found {
+            let reason = match error {
+                wgpu::Error::OutOfMemory { .. } => {
+                    let [width, height] = self.size;
+                    format!("{width}x{height} pixels are more than its memory holds")
+                }
+                other => other.to_string(),
+            };
+            return Some(Err(RenderError::Device(reason)));
+        }
+        match self.mapped.get()? {
+            Ok(()) if self.faults.is_empty() => Some(self.read()),
+            Ok(()) => None,
+            Err(reason) => Some(Err(RenderError::Device(reason.clone()))),
+        }
+    }
+
+    /// Waits for the picture.
+    ///
+    /// # Errors
+    /// The device fails.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub fn wait(mut self) -> Result<Image, RenderError> {
+        self.device
+            .poll(wgpu::PollType::wait_indefinitely())
+            .map_err(|error| RenderError::Device(error.to_string()))?;
+        let never = || Err(RenderError::Device("the picture never came back".to_owned()));
+        self.take().unwrap_or_else(never)
+    }
+
+    fn read(&self) -> Result<Image, RenderError> {
+        let [width, height] = self.size;
+        let rows = self
+            .buffer
+            .get_mapped_range(..)
+            .map_err(|error| RenderError::Device(error.to_string()))?;
+        let row = 4 * width as usize;
+        let mut rgba = Vec::with_capacity(row * height as usize);
+        for line in rows.chunks(self.stride as usize) {
+            rgba.extend_from_slice(&line[..row]);
+        }
+        for pixel in rgba.chunks_exact_mut(4) {
+            pixel[3] = 255;
+        }
+        Ok(Image {
+            width,
+            height,
+            rgba,
+        })
+    }
+}

@@ -1,0 +1,288 @@
+//! Pictures to save: of the 3D view, with the plots below it, or of the whole window, at any size. They are drawn anew at that
+//! size by the same code, beside the window, so that labels and arrows are as sharp as the rest.
+
+use eframe::egui::{
+    self, Button, CentralPanel, DragValue, Frame, Panel, RichText, Ui, Vec2, vec2,
+};
+use eframe::egui_wgpu::RenderState;
+
+use super::App;
+use super::canvas::{Canvas, Pending};
+use super::host::SaveFile;
+use super::layout;
+
+/// Height of the plots below the view, points.
+const PLOTS: f32 = 230.0;
+/// Edge below which names and legends of a view are left out, and a little more, points: a picture of a small view is given at
+/// least so much room, where its pixels allow.
+const LEAST_EDGE: f32 = 360.0;
+/// Sizes to choose from, times that of the screen.
+const TIMES: [u32; 3] = [1, 2, 4];
+/// Range of a typed edge, pixels. The adapter's own limit is told when it is met.
+const EDGE: std::ops::RangeInclusive<u32> = 16..=65_536;
+/// Time after which a picture that never came is given up, s.
+const PATIENCE: f64 = 20.0;
+
+/// What a picture shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Contents {
+    /// The 3D view without its buttons.
+    #[default]
+    View,
+    /// The same with the plots below it.
+    Plots,
+    /// Everything.
+    Window,
+}
+
+impl Contents {
+    const ALL: [(Self, &'static str, &'static str); 3] = [
+        (Self::View, "View", "The 3D view without its buttons"),
+        (Self::Plots, "View and plots", "The 3D view with the plots below it"),
+        (Self::Window, "Whole window", "The window as it is, with all panels"),
+    ];
+}
+
+/// What the next picture is to be, and one that is on its way.
+pub struct Picture {
+    contents: Contents,
+    /// Times the size on the screen; `None`: the own size.
+    times: Option<u32>,
+    own: [u32; 2],
+    /// The size on the screen of what is drawn, points, and pixels per point, where a picture is asked for.
+    asked: bool,
+    pending: Option<(Pending, f64)>,
+    /// What is being drawn beside the window, in the middle of it.
+    drawn: Option<Contents>,
+}
+
+impl Default for Picture {
+    fn default() -> Self {
+        Self {
+            contents: Contents::View,
+            times: Some(TIMES[0]),
+            own: [1920, 1080],
+            asked: false,
+            pending: None,
+            drawn: None,
+        }
+    }
+}
+
+impl Picture {
+    /// Whether the view is drawn without its buttons and hints.
+    pub fn is_plain(&self) -> bool {
+        self.drawn.is_some_and(|drawn| drawn != Contents::Window)
+    }
+
+    /// Gives up what is on its way.
+    pub fn forget(&mut self) {
+        (self.asked, self.pending) = (false, None);
+    }
+
+    /// Pixels of the picture and pixels per point in it, where what it shows is `points` large on the screen.
+    fn size(&self, points: Vec2, screen: f32) -> ([u32; 2], f32) {
+        let (pixels, scale) = match self.times {
+            Some(times) => {
+                let pixels = [points.x, points.y].map(|edge| (edge * screen).round() as u32);
+                (pixels.map(|edge| edge * times), screen * times as f32)
+            }
+            None => {
+                let [across, down] = self.own.map(|edge| edge as f32);
+                (self.own, (across / points.x).min(down / points.y))
+            }
+        };
+        if self.times == Some(1) {
+            return (pixels, scale);
+        }
+        // Letters of fewer pixels than on a plain screen cannot be read; on a small view they would leave no room for names.
+        let readable = screen.min(1.0);
+        let room = match self.contents {
+            Contents::Window => f32::INFINITY,
+            Contents::View | Contents::Plots => {
+                pixels[0].min(pixels[1]) as f32 / LEAST_EDGE
+            }
+        };
+        (pixels, scale.min(room).max(readable))
+    }
+}
+
+impl App {
+    /// The choices about the picture, and its button.
+    pub(super) fn picture_menu(&mut self, ui: &mut Ui) {
+        let help = "A picture as chosen below, PNG";
+        if ui.button("Picture…").on_hover_text(help).clicked() {
+            self.save_picture(ui.ctx());
+            layout::close_menu(ui);
+        }
+        let (points, screen) = (self.picture_points(ui.ctx()), ui.ctx().pixels_per_point());
+        let picture = &mut self.picture;
+        ui.horizontal(|ui| {
+            for (contents, name, help) in Contents::ALL {
+                ui.selectable_value(&mut picture.contents, contents, name)
+                    .on_hover_text(help);
+            }
+        });
+        ui.horizontal(|ui| {
+            for times in TIMES {
+                let help = format!("{times} times as many pixels along each edge as on the screen");
+                ui.selectable_value(&mut picture.times, Some(times), format!("{times}×"))
+                    .on_hover_text(help);
+            }
+            let own = Button::selectable(picture.times.is_none(), "Own size");
+            if ui.add(own).on_hover_text("Any width and height").clicked() {
+                picture.times = None;
+            }
+        });
+        ui.add_enabled_ui(picture.times.is_none(), |ui| {
+            ui.horizontal(|ui| {
+                for (edge, name) in picture.own.iter_mut().zip(["Width", "Height"]) {
+                    ui.label(name);
+                    ui.add(DragValue::new(edge).range(EDGE).suffix(" px"))
+                        .on_hover_text("Edge of the picture, pixels")
+                        .accessible_name(format!("{name} of the picture"));
+                }
+            });
+        });
+        let ([width, height], _) = picture.size(points, screen);
+        ui.label(RichText::new(format!("{width} × {height} pixels")).small().weak());
+    }
+
+    /// Size on the screen of what the picture shows, points.
+    fn picture_points(&self, ctx: &egui::Context) -> Vec2 {
+        let view = self.picture_rect.size();
+        let points = match self.picture.contents {
+            Contents::View => view,
+            Contents::Plots => view + vec2(0.0, PLOTS),
+            Contents::Window => ctx.content_rect().size(),
+        };
+        points.max(Vec2::splat(1.0))
+    }
+
+    /// Saves a picture as chosen, once it is back from the graphics adapter; nothing waits for it.
+    pub fn save_picture(&mut self, ctx: &egui::Context) {
+        self.picture.forget();
+        self.picture.asked = true;
+        ctx.request_repaint();
+    }
+
+    /// Draws the picture that [`Self::save_picture`] is about, and takes it once it is there.
+    pub(super) fn receive_picture(&mut self, ctx: &egui::Context) {
+        let now = ctx.input(|input| input.time);
+        if std::mem::take(&mut self.picture.asked) {
+            match self.draw_picture(ctx) {
+                Ok(pending) => self.picture.pending = Some((pending, now)),
+                Err(reason) => self.problem = Some(reason),
+            }
+        }
+        let Some((pending, since)) = &mut self.picture.pending else {
+            return;
+        };
+        let Some(image) = pending.take() else {
+            if now - *since > PATIENCE {
+                self.picture.forget();
+                self.problem = Some("The picture never came back from the graphics adapter".into());
+            }
+            ctx.request_repaint();
+            return;
+        };
+        self.picture.pending = None;
+        let described = self.describe();
+        let software = format!("jointplay {}", crate::VERSION);
+        let texts = [
+            ("Software", software.as_str()),
+            ("Description", described.as_str()),
+        ];
+        let bytes = image
+            .map_err(|error| error.to_string())
+            .and_then(|image| image.png(&texts).map_err(|error| error.to_string()));
+        match bytes {
+            Ok(bytes) => self.save(vec![SaveFile {
+                name: format!("{}.png", self.file_stem()),
+                mime: "image/png",
+                bytes,
+            }]),
+            Err(reason) => self.problem = Some(format!("The picture cannot be saved: {reason}")),
+        }
+    }
+
+    /// Has the picture drawn beside the window.
+    fn draw_picture(&mut self, ctx: &egui::Context) -> Result<Pending, String> {
+        let state: RenderState = self
+            .graphics
+            .clone()
+            .ok_or("The picture cannot be drawn: there is no graphics adapter")?;
+        let (size, scale) = self
+            .picture
+            .size(self.picture_points(ctx), ctx.pixels_per_point());
+        let mut canvas = Canvas::beside(&state);
+        // Panels, folded parts and what is scrolled to are as in the window.
+        let memory = ctx.memory(Clone::clone);
+        canvas.ctx.memory_mut(|own| *own = memory);
+        canvas.ctx.options_mut(|options| options.zoom_factor = 1.0);
+        canvas.ctx.set_theme(ctx.theme());
+        canvas.time = ctx.input(|input| input.time);
+
+        let kept = (self.picture_rect, self.compact, self.fingers);
+        self.viewport.freeze(Some(self.picture_rect.aspect_ratio()));
+        let contents = self.picture.contents;
+        self.picture.drawn = Some(contents);
+        // egui settles the size of what is new to it over a few passes.
+        let mut output = Ok(egui::FullOutput::default());
+        for _ in 0..3 {
+            output = canvas.pass(size, scale, |ui| self.show_contents(ui, contents));
+            if output.is_err() {
+                break;
+            }
+        }
+        self.picture.drawn = None;
+        self.viewport.freeze(None);
+        (self.picture_rect, self.compact, self.fingers) = kept;
+        let output = output.map_err(|error| format!("The picture cannot be drawn: {error}"))?;
+        Ok(canvas.paint(output, size, scale))
+    }
+
+    fn show_contents(&mut self, ui: &mut Ui, contents: Contents) {
+        if contents == Contents::Window {
+            return self.show(ui);
+        }
+        if contents == Contents::Plots {
+            let bar = Frame::side_top_panel(ui.style());
+            Panel::bottom("plots of a picture")
+                .frame(bar.inner_margin(egui::Margin::symmetric(12, 8)))
+                .exact_size(PLOTS)
+                .show(ui, |ui| self.plots.ui(ui, &self.player));
+        }
+        CentralPanel::no_frame().show(ui, |ui| self.picture(ui));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_larger_picture_is_sharper_and_a_small_view_gets_room_for_its_names() {
+        let of = |times, own, points, screen| {
+            let picture = Picture {
+                times,
+                own,
+                ..Picture::default()
+            };
+            picture.size(points, screen)
+        };
+        let view = vec2(980.0, 470.0);
+        assert_eq!(of(Some(1), [0, 0], view, 1.0), ([980, 470], 1.0));
+        assert_eq!(of(Some(4), [0, 0], view, 1.0), ([3920, 1880], 4.0));
+        assert_eq!(of(Some(2), [0, 0], view, 1.5), ([2940, 1410], 3.0));
+        // As large against the picture as in the view: it just holds it.
+        assert_eq!(of(None, [1960, 2000], view, 1.0), ([1960, 2000], 2.0));
+        // Letters are never smaller than on the screen.
+        assert_eq!(of(None, [490, 235], view, 1.0), ([490, 235], 1.0));
+        let small = vec2(390.0, 150.0);
+        assert_eq!(of(Some(1), [0, 0], small, 1.0), ([390, 150], 1.0));
+        let (pixels, scale) = of(Some(4), [0, 0], small, 1.0);
+        assert_eq!(pixels, [1560, 600]);
+        assert!((pixels[1] as f32 / scale - LEAST_EDGE).abs() < 0.1, "{scale}");
+    }
+}
