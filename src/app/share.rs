@@ -5,6 +5,8 @@
 //! person can read and write it, and it outlives the program's inner layout. The price is the stepping from t = 0, which
 //! takes no longer than the run itself did. The state hash proves the result.
 
+use std::fmt::Write as _;
+
 use base64::Engine as _;
 use base64::engine::general_purpose::URL_SAFE_NO_PAD as BASE64;
 use eframe::egui::ThemePreference;

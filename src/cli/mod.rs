@@ -23,7 +23,6 @@ mod summary;
 mod sweep;
 pub mod tradeoff;
 
-use std::ffi::OsStr;
 use std::fmt::Write as _;
 use std::io::{self, Write as _};
 

@@ -210,7 +210,7 @@ impl Scene {
 }
 
 /// What can be compared and sorted of contact parameters: equal where they are.
-fn bits(contact: &contact::Parameters) -> ([u64; 9], [u8; 3]) {
+fn bits(contact: &contact::Parameters) -> ([u64; 9], [u8; 4]) {
     let contact::Parameters {
         clearance,
         friction,
@@ -222,6 +222,7 @@ fn bits(contact: &contact::Parameters) -> ([u64; 9], [u8; 3]) {
         slip_speed_low,
         slip_speed_high,
         impact_speed_floor,
+        approach_speed,
         normal_law,
         friction_law,
     } = *contact;
@@ -240,6 +241,7 @@ fn bits(contact: &contact::Parameters) -> ([u64; 9], [u8; 3]) {
     let numbers = numbers.map(|number| (number + 0.0).to_bits());
     let words = [
         friction_velocity as u8,
+        approach_speed as u8,
         normal_law as u8,
         friction_law as u8,
     ];
