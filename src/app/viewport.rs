@@ -8,9 +8,9 @@ use eframe::egui::{
 };
 use glam::{Vec2, Vec3};
 
-use super::{keys, overlay};
 use super::player::Player;
 use super::share::CameraPose;
+use super::{keys, overlay};
 use crate::render;
 use crate::scene::format_quantity_digits;
 use crate::simulate::ContactState;

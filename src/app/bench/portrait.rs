@@ -5,10 +5,10 @@ use egui_plot::{Line, PlotPoint, PlotPoints, Points};
 
 use super::coordinate::Coordinate;
 use super::plane::{Axis, plane};
-use crate::app::player::Player;
 use crate::app::layout::reserved;
-use crate::app::{keys, theme, value};
+use crate::app::player::Player;
 use crate::app::watch::Observed;
+use crate::app::{keys, theme, value};
 use crate::scene::format_quantity_digits;
 
 /// Height of each plot, points.
