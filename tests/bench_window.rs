@@ -165,10 +165,71 @@ fn a_sweep_fills_the_diagram_and_a_click_loads_the_section() {
 }
 
 #[test]
-fn a_sweep_is_cancelled_and_keeps_what_it_has() {
+fn a_sweep_of_something_else_says_so_and_a_click_asks_before_it_changes_what_is_on_show() {
+    let mut harness = window("spcmm", &[FAST]);
+    harness.get_by_label_contains("Running: spcmm, drive frequency 5 Hz");
+    sweep(&mut harness, "0.2 mm", "0.4", 3.0);
+    wait(&mut harness, |app| !app.bench().is_sweeping());
+    harness.run_steps(3);
+    harness.get_by_label_contains(
+        "clearance 0.2 mm to 0.4 mm, 3 values; 4 periods of which 1 discarded, phase 0°, cold",
+    );
+    harness.get_by_label("Of the scene on show, with its values");
+    let click_point = |harness: &mut Harness<'_, App>| {
+        let at = harness.state().bench().place(1, 1).expect("drawn");
+        harness.hover_at(at);
+        harness.step();
+        harness.drag_at(at);
+        harness.step();
+        harness.drop_at(at);
+        harness.run_steps(3);
+    };
+    // Its own parameter is no difference, another is.
+    let player = harness.state_mut().player_mut();
+    player.set("contact.clearance", "0.5 mm").expect("in range");
+    harness.run_steps(2);
+    harness.get_by_label("Of the scene on show, with its values");
+    let player = harness.state_mut().player_mut();
+    player.set("contact.friction", "0.3").expect("in range");
+    harness.run_steps(2);
+    harness.get_by_label_contains("Not of what is on show. Friction coefficient: ");
+
+    harness.state_mut().open("pendulum").expect("built in");
+    harness.run_steps(3);
+    harness.get_by_label("Not of what is on show. Scene: spcmm instead of pendulum");
+    harness.get_by_label_contains("Running: pendulum, ");
+    click_point(&mut harness);
+    assert_eq!(harness.state().loading(), None);
+    harness.get_by_label("Change what is on show?");
+    harness.get_by_label("Scene: spcmm instead of pendulum");
+    click(&mut harness, Role::Button, "Close");
+    assert_eq!(harness.state().player().scene().name, "pendulum");
+    click_point(&mut harness);
+    click(&mut harness, Role::Button, "Change and run");
+    assert!(harness.state().loading().is_some());
+    assert_eq!(harness.state().player().scene().name, "spcmm");
+}
+
+#[test]
+fn a_sweep_that_goes_on_can_be_cancelled_over_a_scene_without_a_drive() {
     let mut harness = window("spcmm", &[FAST]);
     sweep(&mut harness, "0.1 mm", "0.9 mm", 2000.0);
+    harness.state_mut().open("pendulum").expect("built in");
+    harness.run_steps(2);
+    let before = harness.get_by_label("Cancel sweep").rect();
     wait(&mut harness, |app| come(app) >= 2);
+    assert_eq!(harness.get_by_label("Cancel sweep").rect(), before);
+    click(&mut harness, Role::Button, "Cancel sweep");
+    assert!(!harness.state().bench().is_sweeping());
+}
+
+#[test]
+fn a_sweep_is_cancelled_and_keeps_what_it_has() {
+    let mut harness = window("spcmm", &[FAST]);
+    let start = harness.get_by_label("Start sweep").rect();
+    sweep(&mut harness, "0.1 mm", "0.9 mm", 2000.0);
+    wait(&mut harness, |app| come(app) >= 2);
+    assert_eq!(harness.get_by_label("Cancel sweep").rect(), start);
     click(&mut harness, Role::Button, "Cancel sweep");
     assert!(!harness.state().bench().is_sweeping());
     let there = come(harness.state());

@@ -310,7 +310,8 @@ fn camera(harness: &Harness<'_, App>) -> Option<CameraPose> {
 #[test]
 fn one_finger_turns_and_two_shift_and_come_nearer() {
     let (mut harness, _) = window("spcmm", UPRIGHT);
-    assert!(camera(&harness).is_none(), "as the scene opens");
+    let opened = camera(&harness).expect("a link carries the camera");
+    assert!(opened.fitted.is_some(), "as the scene opens");
     let middle = harness.get_by_label("3D view").rect().center();
     touch(&harness, 1, TouchPhase::Start, middle);
     harness.step();
@@ -658,22 +659,16 @@ fn scene_record_and_picture_are_saved() {
 
     click(&mut harness, "Save");
     click(&mut harness, "Picture…");
-    harness.run_steps(4);
-    let picture = calls.borrow_mut().saved.remove(0);
+    let picture = next_file(&mut harness, &calls);
     assert_eq!(
         (picture.name.as_str(), picture.mime),
         ("spcmm-12.000ms.png", "image/png")
     );
-    let mut reader = png::Decoder::new(std::io::Cursor::new(picture.bytes.as_slice()))
-        .read_info()
-        .expect("a PNG file");
-    let mut rgba = vec![0; reader.output_buffer_size().expect("fits in memory")];
-    reader.next_frame(&mut rgba).expect("whole");
+    let (info, rgba) = decoded(&picture);
     let view = harness.get_by_label("3D view").rect();
-    let info = reader.info();
     assert_eq!(
         (info.width, info.height),
-        (view.width() as u32, view.height() as u32)
+        (view.width().round() as u32, view.height().round() as u32)
     );
     let texts = &info.uncompressed_latin1_text;
     assert!(
@@ -699,6 +694,136 @@ fn scene_record_and_picture_are_saved() {
     let (on, beside) = (pixel(at.x, at.y), pixel(at.x - 16.0, at.y));
     let apart = (0..3).map(|c| (on[c] - beside[c]).abs()).max();
     assert!(apart < Some(6), "{on:?} {beside:?}");
+}
+
+/// The next file that is saved.
+fn next_file(harness: &mut Harness<'_, App>, calls: &Rc<RefCell<Calls>>) -> SaveFile {
+    let begun = std::time::Instant::now();
+    while calls.borrow().saved.is_empty() {
+        assert!(begun.elapsed().as_secs() < 30, "nothing comes");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+        harness.step();
+    }
+    calls.borrow_mut().saved.remove(0)
+}
+
+/// A picture's header and its pixels.
+fn decoded(file: &SaveFile) -> (png::Info<'static>, Vec<u8>) {
+    let mut reader = png::Decoder::new(std::io::Cursor::new(file.bytes.as_slice()))
+        .read_info()
+        .expect("a PNG file");
+    let mut rgba = vec![0; reader.output_buffer_size().expect("fits in memory")];
+    reader.next_frame(&mut rgba).expect("whole");
+    (reader.info().clone(), rgba)
+}
+
+/// Mean difference of the colours of a picture of the same view at `times` the size, put together again, 0 to 255.
+fn apart(small: &(png::Info<'_>, Vec<u8>), large: &(png::Info<'_>, Vec<u8>), times: usize) -> f64 {
+    let (width, height) = (small.0.width as usize, small.0.height as usize);
+    assert_eq!(
+        (large.0.width as usize, large.0.height as usize),
+        (times * width, times * height)
+    );
+    let mut sum = 0.0;
+    for (y, x, c) in
+        (0..height).flat_map(|y| (0..width).flat_map(move |x| (0..3).map(move |c| (y, x, c))))
+    {
+        let block = (0..times * times).map(|k| {
+            let (row, column) = (times * y + k / times, times * x + k % times);
+            f64::from(large.1[4 * (row * times * width + column) + c])
+        });
+        let mean = block.sum::<f64>() / (times * times) as f64;
+        sum += (mean - f64::from(small.1[4 * (y * width + x) + c])).abs();
+    }
+    sum / (3 * width * height) as f64
+}
+
+/// Length of the ruler of the forces in the lower right corner, pixels: the longest dark line across.
+fn ruler((info, rgba): &(png::Info<'_>, Vec<u8>)) -> usize {
+    let (width, height) = (info.width as usize, info.height as usize);
+    let dark = |x: usize, y: usize| {
+        let at = 4 * (y * width + x);
+        rgba[at..at + 3].iter().all(|colour| *colour < 110)
+    };
+    let longest = |y: usize| {
+        let (mut run, mut longest) = (0, 0);
+        for x in 7 * width / 10..width {
+            run = if dark(x, y) { run + 1 } else { 0 };
+            longest = longest.max(run);
+        }
+        longest
+    };
+    (7 * height / 10..height).map(longest).max().unwrap_or(0)
+}
+
+#[test]
+fn a_picture_has_the_size_and_the_parts_that_were_chosen_and_holds_what_is_on_show() {
+    let (mut harness, calls) = window("spcmm", [900.0, 640.0]);
+    harness.state_mut().player_mut().run_to(7.85e-3);
+    harness.run();
+    let picture = |harness: &mut Harness<'_, App>, choices: &[&str]| {
+        click(harness, "Save");
+        for choice in choices {
+            click(harness, choice);
+        }
+        click(harness, "Picture…");
+        decoded(&next_file(harness, &calls))
+    };
+    let shown = harness.render().expect("a picture");
+    let view = harness.get_by_label("3D view").rect();
+    let window = picture(&mut harness, &["Whole window", "1×"]);
+    assert_eq!((window.0.width, window.0.height), (900, 640));
+    let screen = (window.0.clone(), shown.into_raw());
+    let off = apart(&screen, &window, 1);
+    assert!(off < 0.3, "the window itself: {off}");
+    // The same names, ruler and arrows, only sharper.
+    let once = picture(&mut harness, &["View only"]);
+    let twice = picture(&mut harness, &["2×"]);
+    let off = apart(&once, &twice, 2);
+    // Finer lines of the floor, and letters.
+    assert!(off < 4.5, "the view at twice the size: {off}");
+    let [short, long] = [ruler(&once), ruler(&twice)];
+    assert!(
+        short > 40 && long.abs_diff(2 * short) <= 3,
+        "ruler {short}, {long}"
+    );
+    // A little more than the view was: its buttons are left out, and the plots are below.
+    let plots = picture(&mut harness, &["View and plots", "1×"]);
+    assert_eq!(plots.0.width, once.0.width);
+    assert!(plots.0.height > once.0.height + 150);
+    let colours = |(info, rgba): &(png::Info<'_>, Vec<u8>)| {
+        let below = &rgba[4 * (info.width * once.0.height) as usize..];
+        let all: std::collections::HashSet<&[u8]> = below.chunks_exact(4).collect();
+        all.len()
+    };
+    assert!(colours(&plots) > 100, "plots: {}", colours(&plots));
+    // What was drawn beside the window has changed nothing in it.
+    assert_eq!(harness.get_by_label("3D view").rect(), view);
+
+    click(&mut harness, "Save");
+    click(&mut harness, "View only");
+    click(&mut harness, "Own size");
+    for (name, edge) in [
+        ("Width of the picture", 300.0),
+        ("Height of the picture", 777.0),
+    ] {
+        let field = harness.get_by_role_and_label(Role::SpinButton, name);
+        field.set_value_accesskit(edge);
+        harness.run_steps(2);
+    }
+    harness.get_by_label("300 × 777 pixels");
+    click(&mut harness, "Picture…");
+    let own = decoded(&next_file(&mut harness, &calls));
+    assert_eq!((own.0.width, own.0.height), (300, 777));
+
+    click(&mut harness, "Save");
+    let field = harness.get_by_role_and_label(Role::SpinButton, "Width of the picture");
+    field.set_value_accesskit(60_000.0);
+    harness.run_steps(2);
+    click(&mut harness, "Picture…");
+    harness.run_steps(4);
+    assert!(label(&harness, "60000x777 pixels: each side must be 1 to "));
+    assert!(calls.borrow().saved.is_empty());
 }
 
 #[test]
@@ -859,41 +984,158 @@ fn pictures() {
     }
 }
 
+/// Name of the control that has the focus.
 fn focused(harness: &Harness<'_, App>) -> Option<String> {
-    harness
-        .root()
-        .children_recursive()
-        .find(|node| node.accesskit_node().is_focused())
-        .and_then(|node| node.accesskit_node().label())
+    let mut all = harness.root().children_recursive();
+    let node = all.find(|node| node.accesskit_node().is_focused())?;
+    node.accesskit_node().label()
 }
 
 #[test]
-fn tab_walks_through_the_entries_of_a_menu_that_the_keyboard_opened() {
-    for (size, name) in [(LARGE, "Save")] {
-      for playing in [false, true] {
-        for open in [Key::Enter, Key::Space] {
-            for key in [Key::Tab, Key::ArrowDown] {
-            for wait in [1, 2, 4] {
-                let (mut harness, _) = window("spcmm", size);
-                harness.state_mut().player_mut().set_playing(playing);
-                for _ in 0..40 {
-                    harness.key_press(Key::Tab);
-                    harness.run_steps(1);
-                    if focused(&harness).as_deref() == Some(name) { break; }
-                }
-                let mut all = vec![focused(&harness)];
-                harness.key_press(open);
-                harness.run_steps(wait);
-                all.push(focused(&harness));
-                for _ in 0..4 {
-                    harness.key_press(key);
-                    harness.run_steps(wait);
-                    all.push(focused(&harness));
-                }
-                println!("{playing} {open:?} {key:?} {wait} {all:?}");
-            }
-            }
+fn a_menu_that_the_keyboard_opens_begins_at_its_first_entry_and_closes_behind_its_last() {
+    for (size, name, first) in [(LARGE, "Save", "Picture…"), (UPRIGHT, "Menu", "Open…")] {
+        let (mut harness, _) = window("spcmm", size);
+        let menu = harness.get_by_role_and_label(Role::Button, name);
+        menu.focus();
+        harness.run_steps(2);
+        harness.key_press(Key::Enter);
+        harness.run_steps(4);
+        let mut seen = vec![focused(&harness).expect("has the focus")];
+        assert_eq!(seen[0], first);
+        while harness.query_by_label("Record…").is_some() {
+            harness.key_press(Key::Tab);
+            harness.run_steps(2);
+            seen.push(focused(&harness).unwrap_or_default());
+            assert!(seen.len() < 30, "{seen:?}");
         }
-      }
+        for entry in ["Picture…", "2×", "Whole window", "Record…", "Scene…"] {
+            assert!(seen.iter().any(|label| label == entry), "{entry}: {seen:?}");
+        }
     }
+}
+
+/// Types `text` into the dialog that is open and enters it.
+fn answer(harness: &mut Harness<'_, App>, text: &str) {
+    harness
+        .get_by_role_and_label(Role::TextInput, "Path")
+        .focus();
+    harness.step();
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::A);
+    harness.step();
+    harness
+        .get_by_role_and_label(Role::TextInput, "Path")
+        .type_text(text);
+    harness.step();
+    harness.key_press(Key::Enter);
+    harness.run_steps(4);
+}
+
+#[test]
+fn the_buttons_of_a_dialog_stay_when_it_has_an_error_to_show() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("bad.toml");
+    std::fs::write(&path, "[contact]\nclearance = 3\n".repeat(20)).expect("written");
+    for size in [LARGE, LYING, TINY] {
+        let (mut harness, _) = window("spcmm", size);
+        harness
+            .state_mut()
+            .set_host(Box::new(DesktopHost::default()));
+        harness
+            .get_by_role_and_label(Role::ComboBox, "Scene")
+            .click();
+        harness.run_steps(3);
+        click(&mut harness, "Link…");
+        answer(&mut harness, &path.display().to_string());
+        harness.get_by_label_contains("bad.toml:");
+        let [open, close] =
+            ["Open", "Close"].map(|name| harness.get_by_role_and_label(Role::Button, name).rect());
+        assert!(!open.intersects(close.shrink(1.0)), "{open:?} {close:?}");
+        assert!(open.bottom() <= size[1] && (open.center().y - close.center().y).abs() < 1.0);
+        // It can be mended and entered with the mouse.
+        let field = harness.get_by_role_and_label(Role::TextInput, "Path");
+        field.focus();
+        harness.step();
+        harness.key_press_modifiers(Modifiers::COMMAND, Key::A);
+        harness.step();
+        let field = harness.get_by_role_and_label(Role::TextInput, "Path");
+        field.type_text("pendulum");
+        harness.run_steps(2);
+        harness.get_by_role_and_label(Role::Button, "Open").click();
+        harness.run_steps(3);
+        assert_eq!(harness.state().player().scene().name, "pendulum");
+        assert!(harness.query_by_label("Path").is_none());
+    }
+}
+
+/// What a click on `Copy link` puts on the clipboard.
+fn copied(harness: &mut Harness<'_, App>) -> String {
+    harness.get_by_label("Copy link").click();
+    for _ in 0..3 {
+        harness.step();
+        let commands = &harness.output().platform_output.commands;
+        let text = commands.iter().find_map(|command| match command {
+            egui::OutputCommand::CopyText(text) => Some(text.clone()),
+            _ => None,
+        });
+        if let Some(text) = text {
+            return text;
+        }
+    }
+    panic!("nothing was copied");
+}
+
+#[test]
+fn a_link_of_the_window_opens_in_every_form_and_brings_the_camera() {
+    let (mut harness, _) = window("spcmm", LARGE);
+    harness.state_mut().player_mut().run_to(9e-3);
+    harness.run();
+    let bare = copied_from(&mut harness, "");
+    assert!(bare.starts_with("#scene=spcmm&"), "{bare}");
+    let page = "https://example.org/lab/";
+    let whole = copied_from(&mut harness, page);
+    assert_eq!(whole, format!("{page}{bare}"));
+    let pairs = bare.trim_start_matches('#');
+    let here = (hash(&harness), camera(&harness));
+    assert!(here.1.is_some());
+    for link in [
+        whole.clone(),
+        bare.clone(),
+        format!("?{pairs}"),
+        pairs.to_owned(),
+        format!("{page}?{pairs}"),
+    ] {
+        assert!(AppOptions::from_link(&link).is_ok(), "{link}");
+        for pasted in [false, true] {
+            let (mut other, _) = window("pendulum", LARGE);
+            other.state_mut().set_host(Box::new(DesktopHost::default()));
+            if !pasted {
+                click(&mut other, "Open…");
+                answer(&mut other, &link);
+            } else if link == pairs {
+                // Without a sign of a link before it, text is left alone only where it has no pairs.
+                other.event(Event::Paste("some words".to_owned()));
+                other.run_steps(2);
+                assert_eq!(other.state().player().scene().name, "pendulum");
+                continue;
+            } else {
+                other.event(Event::Paste(link.clone()));
+                other.run_steps(2);
+            }
+            assert_eq!(verdict(&mut other), Verdict::Agrees(here.0), "{link}");
+            assert_eq!((hash(&other), camera(&other)), here, "{link}");
+        }
+    }
+    // On a screen of another shape everything is in sight again.
+    let (mut phone, _) = open(AppOptions::from_link(&whole).expect("a link"), UPRIGHT);
+    verdict(&mut phone);
+    phone.run();
+    let there = camera(&phone).expect("a camera");
+    assert!(there.fitted.is_some_and(|aspect| aspect < 1.5), "{there:?}");
+    assert_ne!(Some(there), here.1);
+}
+
+fn copied_from(harness: &mut Harness<'_, App>, page: &str) -> String {
+    let host = DesktopHost::new(page.to_owned());
+    harness.state_mut().set_host(Box::new(host));
+    copied(harness)
 }

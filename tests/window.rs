@@ -429,6 +429,47 @@ fn a_narrow_window_keeps_the_controls_within_reach() {
 }
 
 #[test]
+fn arrows_move_the_slider_that_was_dragged_and_step_again_after_a_click_elsewhere() {
+    let mut harness = window("spcmm");
+    let friction = |harness: &Harness<'_, App>| {
+        let scene = harness.state().player().simulation().scene();
+        scene.contact.friction
+    };
+    let steps = |harness: &Harness<'_, App>| harness.state().player().steps();
+    let track = harness
+        .get_by_role_and_label(Role::Slider, "Friction coefficient")
+        .rect();
+    harness.drag_at(track.center());
+    harness.step();
+    harness.drop_at(track.center());
+    harness.run();
+    let mut before = friction(&harness);
+    for (key, sign) in [
+        (Key::ArrowRight, 1.0),
+        (Key::ArrowLeft, -1.0),
+        (Key::ArrowUp, 1.0),
+        (Key::ArrowDown, -1.0),
+    ] {
+        harness.key_press(key);
+        harness.run();
+        let now = friction(&harness);
+        assert!(sign * (now - before) > 0.0, "{key:?}: {before} to {now}");
+        before = now;
+    }
+    assert_eq!(steps(&harness), 0, "the machine stands");
+    assert_eq!(harness.state().player().pacer.scale(), 0.02);
+    // A slider has no use for the space bar.
+    harness.key_press(Key::Space);
+    harness.step();
+    assert!(harness.state().player().is_playing());
+    click(&mut harness, "Pause");
+    let played = steps(&harness);
+    harness.key_press(Key::ArrowRight);
+    harness.run();
+    assert_eq!((steps(&harness), friction(&harness)), (played + 1, before));
+}
+
+#[test]
 fn keys_leave_a_field_alone_that_is_being_typed_in() {
     let mut harness = window("spcmm");
     harness
@@ -635,18 +676,25 @@ fn the_accuracy_of_the_running_scene_stands_beside_the_controls() {
         choice.value().map(|name| name.to_string())
     };
     assert_eq!(preset(&harness).as_deref(), Some("real-time"));
-    // Nothing has been hit yet, and nothing is said about impacts.
-    assert!(harness.query_by_label("Steps in last impact").is_none());
+    // Nothing has been hit yet, and the rows about impacts say so.
+    harness.get_by_label("none yet");
+    harness.get_by_label("No doubts about this run so far");
+    assert_eq!(harness.query_all_by_label("—").count(), 2);
     harness.state_mut().player_mut().run_to(9e-3);
     harness.run();
-    harness.get_by_label("Steps in last impact");
     harness.get_by_label("Energy residual");
     let player = harness.state().player();
     let impact = *player.simulation().impacts().next_back().expect("hit");
     assert!(impact.steps >= 10, "{impact:?}");
     let joint = &player.scene().ball_joints[impact.joint].name;
-    let words = format!("{} ({joint})", impact.steps);
-    harness.get_by_label(&words);
+    let disturbed = if impact.disturbed {
+        "disturbed"
+    } else {
+        "undisturbed"
+    };
+    harness.get_by_label(&format!("{joint}, {disturbed}"));
+    harness.get_by_label(&impact.steps.to_string());
+    harness.get_by_label_contains(", asked 0.9");
     // A coarse step shows in the count, and real stepping is measured.
     let player = harness.state_mut().player_mut();
     player.set("solver.method", "rk4").expect("a method");
@@ -852,4 +900,87 @@ fn units_are_printed_alike_everywhere() {
         })
         .collect();
     assert!(plain.is_empty(), "{plain:?}");
+}
+
+/// Role, name and place of every control, in their order; the button that plays or pauses is the same one.
+fn places(harness: &Harness<'_, App>) -> Vec<(Role, String, [f64; 4])> {
+    let all = harness.root().children_recursive();
+    all.filter_map(|node| {
+        let node = node.accesskit_node();
+        let rect = node.bounding_box()?;
+        let rect = [rect.x0, rect.y0, rect.x1, rect.y1];
+        let label = node.label().filter(|label| !label.trim().is_empty())?;
+        let name = match label.as_str() {
+            "Pause" => "Play".to_owned(),
+            other => other.to_owned(),
+        };
+        let is_control = matches!(
+            node.role(),
+            Role::Button
+                | Role::Slider
+                | Role::TextInput
+                | Role::ComboBox
+                | Role::CheckBox
+                | Role::RadioButton
+                | Role::SpinButton
+                | Role::DisclosureTriangle
+                | Role::Image
+        );
+        is_control.then_some((node.role(), name, rect))
+    })
+    .collect()
+}
+
+/// Runs and plays the scene on show and looks at every place on the way.
+fn nothing_moves(harness: &mut Harness<'_, App>, what: &str) {
+    harness.state_mut().player_mut().set_playing(false);
+    harness.run_steps(4);
+    let before = places(harness);
+    assert!(before.len() > 10, "{what}: {}", before.len());
+    for time in [9e-3, 0.12] {
+        let player = harness.state_mut().player_mut();
+        player.run_to(time);
+        player.pacer.set_scale(0.5);
+        player.set_playing(true);
+        harness.run_steps(2);
+        let now = places(harness);
+        for (was, is) in before.iter().zip(&now) {
+            assert_eq!(was, is, "{what} at {time} s");
+        }
+        assert_eq!(before.len(), now.len(), "{what} at {time} s");
+        harness.state_mut().player_mut().set_playing(false);
+    }
+}
+
+#[test]
+fn nothing_moves_while_a_scene_plays() {
+    for size in [
+        [1280.0, 800.0],
+        [900.0, 640.0],
+        [390.0, 844.0],
+        [844.0, 390.0],
+        [320.0, 480.0],
+    ] {
+        let mut options = AppOptions::new(Scene::load("spcmm", &[]).expect("built in"));
+        options.playing = false;
+        let mut harness = Harness::builder()
+            .with_size(size)
+            .with_step_dt(1.0 / 60.0)
+            .build_eframe(move |cc| App::new(cc, options).expect("the scene starts"));
+        harness.state_mut().player_mut().pacer.set_scale(0.5);
+        for scene in jointplay::scene::BUILT_IN {
+            harness.state_mut().open(scene).expect("built in");
+            nothing_moves(&mut harness, &format!("{scene} in {size:?}"));
+        }
+        // The bench with a twin, and a run that raises doubts.
+        harness.key_press(Key::B);
+        harness.state_mut().open("spcmm").expect("built in");
+        let player = harness.state_mut().player_mut();
+        player.set("solver.method", "rk4").expect("a method");
+        player.set("solver.step", "40 us").expect("in range");
+        player.set_twin(true).expect("starts");
+        nothing_moves(&mut harness, &format!("doubts in {size:?}"));
+        let doubts = harness.state().player().simulation().doubts();
+        assert!(!doubts.is_empty());
+    }
 }

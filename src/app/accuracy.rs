@@ -156,7 +156,9 @@ impl Accuracy {
             let clicked = ui
                 .add_enabled(running || preset.is_some(), button)
                 .on_hover_text(help)
-                .on_disabled_hover_text("Presets are measured; the present method and tolerance are none")
+                .on_disabled_hover_text(
+                    "Presets are measured; the present method and tolerance are none",
+                )
                 .clicked();
             if running {
                 let bar = ProgressBar::new(self.progress as f32).show_percentage();

@@ -38,11 +38,8 @@ impl Canvas {
     pub fn beside(window: &RenderState) -> Self {
         // Rows are read back as red, green, blue, whatever the order of the window's own.
         let target_format = wgpu::TextureFormat::Rgba8Unorm;
-        let renderer = egui_wgpu::Renderer::new(
-            &window.device,
-            target_format,
-            RendererOptions::PREDICTABLE,
-        );
+        let renderer =
+            egui_wgpu::Renderer::new(&window.device, target_format, RendererOptions::PREDICTABLE);
         Self::new(RenderState {
             renderer: Arc::new(RwLock::new(renderer)),
             target_format,
@@ -238,9 +235,7 @@ impl Pending {
         }
         let mut found = None;
         self.faults.retain_mut(|fault| {
-            let state = fault
-                .as_mut()
-                .poll(&mut Context::from_waker(Waker::noop()));
+            let state = fault.as_mut().poll(&mut Context::from_waker(Waker::noop()));
             match state {
                 Poll::Pending => true,
                 Poll::Ready(error) => {
@@ -275,7 +270,11 @@ impl Pending {
         self.device
             .poll(wgpu::PollType::wait_indefinitely())
             .map_err(|error| RenderError::Device(error.to_string()))?;
-        let never = || Err(RenderError::Device("the picture never came back".to_owned()));
+        let never = || {
+            Err(RenderError::Device(
+                "the picture never came back".to_owned(),
+            ))
+        };
         self.take().unwrap_or_else(never)
     }
 

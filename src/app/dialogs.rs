@@ -104,9 +104,7 @@ pub fn ui(
                     Dialog::Help => help(ui),
                     Dialog::About => about(ui, player, renderer),
                     Dialog::Open { path, error } => open(ui, path, error.as_deref()),
-                    Dialog::Save { path, files, error } => {
-                        save(ui, path, files, error.as_deref())
-                    }
+                    Dialog::Save { path, files, error } => save(ui, path, files, error.as_deref()),
                     Dialog::Load { changes, .. } => load(ui, changes),
                 })
                 .inner;

@@ -84,7 +84,8 @@ impl App {
     }
 
     fn open_button(&mut self, ui: &mut Ui) {
-        let help = "Open a scene file; a link can be pasted anywhere, or into Link… in the list of scenes";
+        let help =
+            "Open a scene file; a link can be pasted anywhere, or into Link… in the list of scenes";
         if ui.button("Open…").on_hover_text(help).clicked() {
             self.choose_file();
             layout::close_menu(ui);
@@ -95,7 +96,8 @@ impl App {
         let mut help = "Copies a link that opens this scene in this state and view, with every change made on the way"
             .to_owned();
         if self.host.address().is_empty() {
-            help += ". It has no address in front: --page or JOINTPLAY_PAGE gives it that of a page";
+            help +=
+                ". It has no address in front: --page or JOINTPLAY_PAGE gives it that of a page";
         }
         if ui.button("Copy link").on_hover_text(help).clicked() {
             self.copy_link(ui.ctx());

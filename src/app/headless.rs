@@ -185,7 +185,12 @@ impl Headless {
 
     /// Waits until the device has drawn what was submitted.
     pub fn wait(&self) {
-        if let Err(error) = self.canvas.state().device.poll(wgpu::PollType::wait_indefinitely()) {
+        if let Err(error) = self
+            .canvas
+            .state()
+            .device
+            .poll(wgpu::PollType::wait_indefinitely())
+        {
             log::warn!("waiting for the device: {error}");
         }
     }

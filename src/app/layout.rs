@@ -1,8 +1,6 @@
 //! Where everything goes: side by side on a large window; on a small one the picture, and a sheet that folds away.
 
-use eframe::egui::{
-    self, Align2, Area, CentralPanel, Frame, Id, Panel, Popup, RichText, ScrollArea, Ui,
-};
+use eframe::egui::{self, Align2, CentralPanel, Frame, Id, Panel, Popup, RichText, ScrollArea, Ui};
 
 use super::{App, theme, transport};
 
@@ -59,7 +57,10 @@ pub(super) fn menu(
     };
     let opened = ui.scope_id().with((name, "opened by keyboard"));
     // In the pass after the opening the entries are there, and this one goes from the button to the first of them.
-    if ui.data_mut(|data| data.remove_temp::<bool>(opened)).is_some() {
+    if ui
+        .data_mut(|data| data.remove_temp::<bool>(opened))
+        .is_some()
+    {
         ui.memory_mut(|memory| memory.move_focus(egui::FocusDirection::Next));
     }
     let button = MenuButton::new(name).config(MenuConfig::new().close_behavior(close));
@@ -439,24 +440,31 @@ impl App {
 
     /// What has to be said, over the lower edge of the picture: it comes and goes by itself, and moves nothing. Returns the
     /// part of `area` that is free of it.
-    fn messages(&mut self, ui: &Ui, area: egui::Rect) -> egui::Rect {
+    fn messages(&mut self, ui: &mut Ui, area: egui::Rect) -> egui::Rect {
+        let id = Id::unique("height of the messages");
         if !self.has_messages() {
+            ui.data_mut(|data| data.remove_temp::<f32>(id));
             return area;
         }
-        let most = (area.height() - ui.spacing().interact_size.y - 8.0).max(60.0);
-        let shown = Area::new(Id::unique("messages"))
-            .pivot(Align2::CENTER_BOTTOM)
-            .fixed_pos(area.center_bottom())
-            .constrain_to(area)
-            .default_width(area.width().min(640.0))
-            .show(ui.ctx(), |ui| {
-                ui.set_width(area.width().min(640.0));
-                ScrollArea::vertical()
-                    .max_height(most)
-                    .min_scrolled_height(most)
-                    .show(ui, |ui| self.strips(ui));
-            });
-        area.with_max_y(shown.response.rect.top() - 8.0)
+        let row = ui.spacing().interact_size.y;
+        let most = (area.height() - row - 8.0).max(60.0);
+        // As high as in the frame before; at first a line with a button.
+        let height = ui.data(|data| data.get_temp(id)).unwrap_or(row + 16.0);
+        let size = egui::vec2(area.width().min(640.0), height);
+        let place = Align2::CENTER_BOTTOM.align_size_within_rect(size, area);
+        let shown = ui.scope_builder(egui::UiBuilder::new().max_rect(place), |ui| {
+            ScrollArea::vertical()
+                .id_salt("messages")
+                .max_height(most)
+                .min_scrolled_height(most)
+                .show(ui, |ui| self.strips(ui));
+        });
+        let now = shown.response.rect.height();
+        if now != height {
+            ui.data_mut(|data| data.insert_temp(id, now));
+            ui.ctx().request_repaint();
+        }
+        area.with_max_y(place.top() - 8.0)
     }
 
     /// What was just done, for a few seconds.

@@ -54,7 +54,11 @@ impl Load {
         }
         legs.reverse();
         let mut scene = scene.clone();
-        let varied = legs[0].settings.iter().map(|(key, _)| key.clone()).collect();
+        let varied = legs[0]
+            .settings
+            .iter()
+            .map(|(key, _)| key.clone())
+            .collect();
         // The first point is where the run starts.
         scene.changes.append(&mut legs[0].settings);
         let last = legs.last()?.schedule;

@@ -36,7 +36,7 @@ fn text(
 }
 
 /// Least edge of a picture that has room for more than the time, points.
-const SMALL: f32 = 200.0;
+pub(super) const SMALL: f32 = 200.0;
 
 /// Whether a picture is large enough for a legend, names and forces.
 pub fn has_room(rect: Rect) -> bool {

@@ -1,21 +1,20 @@
 //! Pictures to save: of the 3D view, with the plots below it, or of the whole window, at any size. They are drawn anew at that
 //! size by the same code, beside the window, so that labels and arrows are as sharp as the rest.
 
-use eframe::egui::{
-    self, Button, CentralPanel, DragValue, Frame, Panel, RichText, Ui, Vec2, vec2,
-};
+use eframe::egui::{self, Button, CentralPanel, DragValue, Frame, Panel, RichText, Ui, Vec2, vec2};
 use eframe::egui_wgpu::RenderState;
 
 use super::App;
 use super::canvas::{Canvas, Pending};
 use super::host::SaveFile;
 use super::layout;
+use super::overlay::SMALL;
 
 /// Height of the plots below the view, points.
 const PLOTS: f32 = 230.0;
-/// Edge below which names and legends of a view are left out, and a little more, points: a picture of a small view is given at
-/// least so much room, where its pixels allow.
-const LEAST_EDGE: f32 = 360.0;
+/// Least edge of a picture of the view, points, where its pixels allow it: a small view is drawn with room for its names and
+/// legend.
+const LEAST_EDGE: f32 = 1.1 * SMALL;
 /// Sizes to choose from, times that of the screen.
 const TIMES: [u32; 3] = [1, 2, 4];
 /// Range of a typed edge, pixels. The adapter's own limit is told when it is met.
@@ -37,9 +36,17 @@ pub enum Contents {
 
 impl Contents {
     const ALL: [(Self, &'static str, &'static str); 3] = [
-        (Self::View, "View", "The 3D view without its buttons"),
-        (Self::Plots, "View and plots", "The 3D view with the plots below it"),
-        (Self::Window, "Whole window", "The window as it is, with all panels"),
+        (Self::View, "View only", "The 3D view without its buttons"),
+        (
+            Self::Plots,
+            "View and plots",
+            "The 3D view with the plots below it",
+        ),
+        (
+            Self::Window,
+            "Whole window",
+            "The window as it is, with all panels",
+        ),
     ];
 }
 
@@ -99,9 +106,7 @@ impl Picture {
         let readable = screen.min(1.0);
         let room = match self.contents {
             Contents::Window => f32::INFINITY,
-            Contents::View | Contents::Plots => {
-                pixels[0].min(pixels[1]) as f32 / LEAST_EDGE
-            }
+            Contents::View | Contents::Plots => pixels[0].min(pixels[1]) as f32 / LEAST_EDGE,
         };
         (pixels, scale.min(room).max(readable))
     }
@@ -145,7 +150,11 @@ impl App {
             });
         });
         let ([width, height], _) = picture.size(points, screen);
-        ui.label(RichText::new(format!("{width} × {height} pixels")).small().weak());
+        ui.label(
+            RichText::new(format!("{width} × {height} pixels"))
+                .small()
+                .weak(),
+        );
     }
 
     /// Size on the screen of what the picture shows, points.
@@ -283,6 +292,9 @@ mod tests {
         assert_eq!(of(Some(1), [0, 0], small, 1.0), ([390, 150], 1.0));
         let (pixels, scale) = of(Some(4), [0, 0], small, 1.0);
         assert_eq!(pixels, [1560, 600]);
-        assert!((pixels[1] as f32 / scale - LEAST_EDGE).abs() < 0.1, "{scale}");
+        assert!(
+            (pixels[1] as f32 / scale - LEAST_EDGE).abs() < 0.1,
+            "{scale}"
+        );
     }
 }

@@ -52,7 +52,10 @@ pub fn shown(value: &Value, kind: &Kind) -> String {
 /// The value of `key` of `scene` for a person, after its name; `None` where the scene has no such key.
 fn named(scene: &Scene, key: &str) -> Option<(String, String)> {
     let (value, parameter) = (scene.get(key).ok()?, scene.parameter(key).ok()?);
-    let name = match key.strip_prefix("joint.").and_then(|rest| rest.rsplit_once('.')) {
+    let name = match key
+        .strip_prefix("joint.")
+        .and_then(|rest| rest.rsplit_once('.'))
+    {
         Some((joint, _)) => format!("{} of {joint}", parameter.label),
         None => parameter.label.to_owned(),
     };

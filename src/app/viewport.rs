@@ -8,10 +8,9 @@ use eframe::egui::{
 };
 use glam::{Vec2, Vec3};
 
-use super::{keys, overlay};
 use super::player::Player;
 use super::share::CameraPose;
-use super::value;
+use super::{keys, overlay, value};
 use crate::render;
 use crate::simulate::ContactState;
 use crate::view::{

@@ -213,10 +213,18 @@ mod tests {
         assert_eq!(of(None, None).expect("none"), "");
         assert_eq!(of(None, Some(other)).expect("an address"), other);
         assert_eq!(of(Some(lab), Some("nonsense")).expect("an address"), lab);
-        for bad in ["example.org/lab", "https://", "https://a.b/#x", "https://a b/"] {
+        for bad in [
+            "example.org/lab",
+            "https://",
+            "https://a.b/#x",
+            "https://a b/",
+        ] {
             let error = of(None, Some(bad)).expect_err("no address");
             assert_eq!(error.code, Failure::USAGE);
-            assert!(error.to_string().contains(&format!("{PAGE} {bad}: ")), "{error}");
+            assert!(
+                error.to_string().contains(&format!("{PAGE} {bad}: ")),
+                "{error}"
+            );
         }
     }
 }

@@ -247,7 +247,11 @@ impl Laboratory {
             .map(|(key, value)| (key.clone(), json!(value)))
             .collect();
         // Where nobody has moved it, it shows everything.
-        let camera = self.app.link().camera.filter(|camera| camera.fitted.is_none());
+        let camera = self
+            .app
+            .link()
+            .camera
+            .filter(|camera| camera.fitted.is_none());
         let camera = camera.map(|camera| {
             json!({
                 "yaw_rad": camera.yaw,

@@ -6,8 +6,8 @@ use egui_plot::{GridMark, Line, LineStyle, PlotPoint, PlotPoints};
 use super::plane::{Axis, plane};
 use super::portrait::title;
 use crate::app::curve::Path;
-use crate::app::player::Player;
 use crate::app::layout::reserved;
+use crate::app::player::Player;
 use crate::app::{plots, theme, value};
 
 const HEIGHT: f32 = 170.0;
@@ -86,7 +86,10 @@ pub fn ui(ui: &mut Ui, player: &mut Player, problem: &mut Option<String>) {
         || ("—".to_owned(), String::new()),
         |fit| {
             let [from, to] = [fit.from, fit.to].map(value::time);
-            (value::number(fit.slope, 4), format!(", here from {from} to {to}"))
+            (
+                value::number(fit.slope, 4),
+                format!(", here from {from} to {to}"),
+            )
         },
     );
     ui.label(format!("Slope {slope} 1/s")).on_hover_text(format!(

@@ -7,10 +7,10 @@ use super::coordinate::Coordinate;
 use super::plane::{Axis, plane};
 use crate::analysis::drive::observed;
 use crate::app::curve::Path;
-use crate::app::player::Player;
 use crate::app::layout::reserved;
-use crate::app::{keys, theme, value};
+use crate::app::player::Player;
 use crate::app::watch::Observed;
+use crate::app::{keys, theme, value};
 
 /// Height of each plot, points.
 const HEIGHT: f32 = 190.0;

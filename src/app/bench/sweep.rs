@@ -199,11 +199,12 @@ impl Sweep {
         }
         let running = self.running.as_ref().map(|(_, task)| task);
         let swept = self.swept.as_ref();
-        let Some(swept) = swept.filter(|swept| running.is_none_or(|task| *task == swept.task)) else {
+        let Some(swept) = swept.filter(|swept| running.is_none_or(|task| *task == swept.task))
+        else {
             let words = if self.is_running() {
                 "Begins…"
             } else {
-                "No sweep yet"
+                "Nothing swept yet"
             };
             ui.label(small(words).weak());
             return;
@@ -321,7 +322,10 @@ impl Sweep {
     fn go_ui(&mut self, ui: &mut Ui, player: &Player) {
         let running = self.is_running();
         let (name, help) = if running {
-            ("Cancel sweep", "End the sweep; the points that are there stay")
+            (
+                "Cancel sweep",
+                "End the sweep; the points that are there stay",
+            )
         } else {
             (
                 "Start sweep",

@@ -72,6 +72,7 @@ impl Chance {
                 pitch: 1.5 - 3.0 * c.unit() as f32,
                 distance: 0.1 + c.unit() as f32,
                 target: [0; 3].map(|_| c.unit() as f32 - 0.5),
+                fitted: c.maybe(|c| 0.5 + c.unit() as f32),
             }),
             magnification: self.maybe(|c| 1.0 + 99.0 * c.unit() as f32),
             follow: self.maybe(|c| format!("joint.x{}x", c.text(6)).replace('\n', " ")),
@@ -192,6 +193,7 @@ fn what_is_wrong_in_a_link_is_said() {
         ("steps=many", "is no number of steps"),
         ("hash=12", "is no state hash"),
         ("camera=1,2,3", "is no camera"),
+        ("camera=0,0,1,0,0,0,0", "is no camera"),
         ("camera=0,0,nan,0,0,0", "is no camera"),
         ("magnification=1000", "allowed 1 to 100"),
         (
@@ -289,4 +291,24 @@ fn a_built_in_scene_is_named_and_any_other_travels() {
     let mine = Scene::parse(&text, Some("/home/me/chain.toml"), &[]).expect("reads");
     let name = "chain.toml".to_owned();
     assert_eq!(SceneText::of(&mine), SceneText::File { name, text });
+}
+
+#[test]
+fn links_are_told_from_files_and_scenes() {
+    for link in [
+        "https://example.org/lab/#scene=pendulum",
+        "example.org/lab/?scene=pendulum",
+        " ?scene=pendulum",
+        "#scene=pendulum&v=0.5m/s",
+        "scene=pendulum&c=0.5mm",
+    ] {
+        assert!(is_link(link), "{link}");
+    }
+    for other in ["pendulum", "mine.toml", "runs/mine", "c=0.5mm/mine.toml"] {
+        assert!(!is_link(other), "{other}");
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("c=0.5mm");
+    std::fs::write(&path, "").expect("written");
+    assert!(!is_link(&path.display().to_string()), "it is a file");
 }
