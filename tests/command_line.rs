@@ -1,5 +1,7 @@
 //! The command line as scripts see it: streams, exit codes, columns, files.
 
+mod common;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -497,36 +499,76 @@ fn a_stopped_run_keeps_its_rows_and_says_why() {
     assert_eq!(meta["status"], "diverged");
 }
 
+/// Starts `command` and waits until signal 15, the last that the program asks for, is among those it catches.
 #[cfg(target_os = "linux")]
-#[test]
-fn an_interrupted_run_keeps_its_complete_rows() {
-    let folder = folder();
-    let line = "run pendulum --duration 1000000s --every 1s --out a.json --summary json";
-    let child = command(folder.path(), line)
+fn start_and_listen(command: &mut Command) -> std::process::Child {
+    let child = command
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    let pid = child.id();
-    // Ctrl-C counts once the program listens for it: signal 2 is then among those it catches.
     let listens = || {
-        let status = fs::read_to_string(format!("/proc/{pid}/status")).unwrap();
+        let status = fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap();
         let caught = status
             .lines()
             .find_map(|line| line.strip_prefix("SigCgt:"))
             .unwrap();
-        u64::from_str_radix(caught.trim(), 16).unwrap() & 2 != 0
+        u64::from_str_radix(caught.trim(), 16).unwrap() & (1 << 14) != 0
     };
     while !listens() {
         std::thread::sleep(std::time::Duration::from_millis(10));
     }
-    assert!(
-        Command::new("kill")
-            .args(["-INT", &pid.to_string()])
-            .status()
-            .unwrap()
-            .success()
+    // SIGHUP follows at once.
+    std::thread::sleep(std::time::Duration::from_millis(50));
+    child
+}
+
+#[cfg(target_os = "linux")]
+fn signal(child: &std::process::Child, name: &str) {
+    let id = child.id().to_string();
+    let told = Command::new("kill").args([name, &id]).status().unwrap();
+    assert!(told.success());
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn an_interrupted_run_keeps_its_complete_rows() {
+    for name in ["-INT", "-TERM", "-HUP"] {
+        interrupted_run("1000000s --every 1s", &|child| signal(child, name));
+    }
+    // `timeout -s INT` sends two. So many rows take longer to write than the second takes to come.
+    interrupted_run("100s --every 10us", &|child| {
+        std::thread::sleep(std::time::Duration::from_secs(1));
+        signal(child, "-INT");
+        std::thread::sleep(std::time::Duration::from_millis(20));
+        signal(child, "-INT");
+    });
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn what_nohup_started_outlives_its_terminal() {
+    let folder = folder();
+    let run = format!(
+        "trap '' HUP; exec {} run pendulum --duration 1000000s --summary json",
+        env!("CARGO_BIN_EXE_jointplay")
     );
+    let mut command = Command::new("sh");
+    let mut child = start_and_listen(command.args(["-c", &run]).current_dir(folder.path()));
+    signal(&child, "-HUP");
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    assert!(child.try_wait().unwrap().is_none());
+    signal(&child, "-TERM");
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+}
+
+#[cfg(target_os = "linux")]
+#[track_caller]
+fn interrupted_run(times: &str, interrupt: &dyn Fn(&std::process::Child)) {
+    let folder = folder();
+    let line = format!("run pendulum --duration {times} --out a.json --summary json");
+    let child = start_and_listen(&mut command(folder.path(), &line));
+    interrupt(&child);
     let output = child.wait_with_output().unwrap();
     assert_eq!(
         output.status.code(),
@@ -663,6 +705,89 @@ fn a_file_works_wherever_a_name_does() {
     assert_eq!(mine["state_hash"], built_in["state_hash"]);
     assert_eq!(mine["scene_file"], "mine.toml");
     jointplay(folder.path(), "check ./mine.toml").expect(0);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_name_need_be_no_text() {
+    use std::os::unix::ffi::OsStrExt;
+    let folder = folder();
+    let name = |bytes: &[u8]| PathBuf::from(std::ffi::OsStr::from_bytes(bytes));
+    let source = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("assets/scenes/pendulum.toml");
+    fs::copy(source, folder.path().join(name(b"\xff.toml"))).unwrap();
+    let run = |scene: &[u8]| {
+        command(folder.path(), "run --duration 1ms --every 1ms --out")
+            .args([name(b"\xfe.json"), name(scene)])
+            .output()
+            .unwrap()
+    };
+    let output = run(b"\xff.toml");
+    assert!(output.status.success(), "{output:?}");
+    let file: Json =
+        serde_json::from_slice(&fs::read(folder.path().join(name(b"\xfe.json"))).unwrap()).unwrap();
+    assert_eq!(file["meta"]["scene_file"], "\u{fffd}.toml");
+    let missing = run(b"./\xfd.toml");
+    assert_eq!(missing.status.code(), Some(1), "{missing:?}");
+}
+
+/// The shell has every write beyond a few kilobytes fail, as on a full disk.
+#[cfg(unix)]
+#[test]
+fn a_full_disk_is_told_in_one_line_and_leaves_nothing() {
+    let folder = folder();
+    let run = "run spcmm --duration 20ms --every 50us --quiet --out";
+    let sweep = "sweep spcmm --vary contact.clearance=0.2mm..0.3mm:2 --periods 2 --discard 0 --no-exponent --quiet --out";
+    for (line, out) in [
+        (run, "a.csv"),
+        (run, "a.json"),
+        (run, "a.npz"),
+        (sweep, "b.npz"),
+    ] {
+        let program = env!("CARGO_BIN_EXE_jointplay");
+        let full = format!("trap '' XFSZ; ulimit -f 16; exec {program} {line} {out}");
+        let mut shell = Command::new("sh");
+        let output = shell.args(["-c", &full]).current_dir(folder.path());
+        let output = output.output().unwrap();
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{stderr}");
+        assert!(
+            stderr.starts_with(&format!("error: cannot write {out}: ")),
+            "{stderr}"
+        );
+        assert_eq!(stderr.lines().count(), 1, "{stderr}");
+        assert!(stderr.ends_with("(os error 27)\n"), "{stderr}");
+    }
+    assert_eq!(names(folder.path()), ["b.npz.partial"]);
+}
+
+#[test]
+fn what_would_take_for_ever_is_refused_with_the_largest_that_does_not() {
+    let folder = folder();
+    let sweep = "sweep spcmm --vary contact.clearance=0.2mm..0.3mm:2 --out a.npz";
+    for (line, words) in [
+        ("run pendulum --duration 1e300s".to_owned(), "1e6 s"),
+        ("run pendulum --duration 1000001s".to_owned(), "1e6 s"),
+        (
+            format!("{sweep} --periods 9000000000000000000 --discard 8999999999999999999"),
+            "500000 periods of 2 s",
+        ),
+        (
+            format!("{sweep} --periods 500001 --discard 500000"),
+            "500000 periods of 2 s",
+        ),
+        (
+            format!("{sweep} --periods 9e18 --discard 1"),
+            "67108864 sections",
+        ),
+        (
+            "run pendulum --duration 1s --every 1ns --out a.csv".to_owned(),
+            "4 GiB",
+        ),
+    ] {
+        let run = jointplay(folder.path(), &line).expect(2);
+        assert!(run.stderr.contains(words), "{line}: {}", run.stderr);
+    }
+    assert_eq!(names(folder.path()), [""; 0]);
 }
 
 #[test]
@@ -807,6 +932,44 @@ mod frames {
             last("film_without", film) == last("single_without", single),
             "and are all that differs"
         );
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn frames_that_are_killed_at_any_instant_are_the_old_or_the_new() {
+        let work = folder();
+        let render = |friction: &str| {
+            format!(
+                "render pendulum --duration 20ms --fps 200 --size 64x64 --force --set contact.friction={friction} --out film"
+            )
+        };
+        let film = |folder: &Path| -> Vec<(String, Vec<u8>)> {
+            let folder = folder.join("film");
+            let content = |name: String| (name.clone(), fs::read(folder.join(name)).unwrap());
+            names(&folder).into_iter().map(content).collect()
+        };
+        jointplay(work.path(), &render("0.1")).expect(0);
+        let old = film(work.path());
+        let started = std::time::Instant::now();
+        jointplay(work.path(), &render("0.2")).expect(0);
+        let length = started.elapsed();
+        let new = film(work.path());
+        assert!(old != new);
+        common::at_random_instants(length, 3, |instant| {
+            jointplay(work.path(), &render("0.1")).expect(0);
+            let mut child = command(work.path(), &render("0.2"))
+                .stdout(Stdio::null())
+                .spawn()
+                .unwrap();
+            std::thread::sleep(instant);
+            child.kill().unwrap();
+            child.wait().unwrap();
+            let found = film(work.path());
+            assert!(found == old || found == new);
+            jointplay(work.path(), &render("0.2")).expect(0);
+            assert!(film(work.path()) == new);
+            assert_eq!(names(work.path()), ["film"]);
+        });
     }
 
     #[test]

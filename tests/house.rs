@@ -203,6 +203,42 @@ fn modules_use_only_lower_floors() {
 }
 
 #[test]
+fn files_are_written_through_one_module() {
+    // Reading is free; tests of a module may do as they like.
+    const WRITING: [&str; 12] = [
+        "fs::write",
+        "fs::rename",
+        "fs::copy",
+        "fs::remove",
+        "fs::create_dir",
+        "fs::hard_link",
+        "File::create(",
+        "File::options",
+        "OpenOptions",
+        "DirBuilder",
+        "tempfile::",
+        "NamedTempFile",
+    ];
+    for (module, file, code) in files() {
+        let (plain, _) = code
+            .split_once("#[cfg(test)]\nmod tests")
+            .unwrap_or((&code, ""));
+        // Pictures that are drawn to be looked at.
+        if module == "files" || file.ends_with("survival.rs") || file == "render/look.rs" {
+            continue;
+        }
+        for call in WRITING {
+            let at = plain.find(call);
+            assert!(
+                at.is_none(),
+                "src/{file}:{}: {call}",
+                line_of(plain, at.unwrap_or(0))
+            );
+        }
+    }
+}
+
+#[test]
 fn physics_knows_no_screen_clock_or_platform_dependent_function() {
     // Crates of the screen, clocks and threads, hash order.
     const FORBIDDEN: [&str; 15] = [

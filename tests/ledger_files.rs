@@ -171,12 +171,30 @@ fn every_impact_has_its_row() {
     assert_eq!(text.lines().count(), joint.len() + 1);
     assert!(folder.path().join("hits.csv.meta.json").is_file());
     done(folder.path(), &format!("{run} --impacts hits.npz"));
+    #[cfg(unix)]
+    std::os::unix::fs::symlink("same.csv", folder.path().join("link.csv")).unwrap();
     for (line, code, word) in [
         ("--impacts hits.csv", 1, "--force"),
         ("--impacts hits.txt", 2, ".npz"),
         ("--impacts no/hits.csv", 1, "cannot write"),
         (
             "--impacts same.csv --out same.csv --every 1ms",
+            2,
+            "same file",
+        ),
+        (
+            "--impacts ./same.csv --out same.csv --every 1ms",
+            2,
+            "same file",
+        ),
+        (
+            "--impacts same.csv.meta.json --out same.csv --every 1ms",
+            2,
+            "--impacts and the .meta.json of --out name the same file",
+        ),
+        #[cfg(unix)]
+        (
+            "--impacts link.csv --out same.csv --every 1ms --force",
             2,
             "same file",
         ),

@@ -472,7 +472,10 @@ fn change(text: &str) -> Result<(String, String), String> {
 
 /// A whole number, also one like `1e3`; what is too many is said where the period is known.
 fn periods(text: &str) -> Result<usize, String> {
-    let number = text.parse::<f64>().ok().filter(|n| *n >= 0.0 && n.fract() == 0.0);
+    let number = text
+        .parse::<f64>()
+        .ok()
+        .filter(|n| *n >= 0.0 && n.fract() == 0.0);
     let whole = text.parse().ok().or(number.map(|n| n as usize));
     whole.ok_or_else(|| "expected a whole number, e.g. 100".to_owned())
 }

@@ -20,6 +20,8 @@ mod render;
 pub mod reproduce;
 mod run;
 mod summary;
+#[cfg(test)]
+mod survival;
 mod sweep;
 pub mod tradeoff;
 

@@ -79,15 +79,7 @@ mod tests {
         assert_eq!(duration("--at", "0"), Ok(0.0));
         assert_eq!(duration("--duration", "1e6s"), Ok(1e6));
         for bad in [
-            "20",
-            "-1ms",
-            "20mm",
-            "soon",
-            "",
-            "inf s",
-            "nan",
-            "1e300s",
-            "1000001s",
+            "20", "-1ms", "20mm", "soon", "", "inf s", "nan", "1e300s", "1000001s",
         ] {
             let failure = duration("--duration", bad).unwrap_err();
             assert_eq!(failure.code, crate::cli::Failure::USAGE, "{bad}");

@@ -78,7 +78,10 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         Some(every) => Some(Times::new(duration, quantity::duration("--every", every)?)?),
         None => None,
     };
-    let mut names = vec![("the scene".to_owned(), PathBuf::from(&arguments.scene.scene))];
+    let mut names = vec![(
+        "the scene".to_owned(),
+        PathBuf::from(&arguments.scene.scene),
+    )];
     for (option, path) in [("--out", &arguments.out), ("--impacts", &arguments.impacts)] {
         names.extend(path.iter().flat_map(|path| RowsFile::names(option, path)));
     }
@@ -126,7 +129,9 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     progress.finish_and_clear();
     let end = match (end, &file) {
         (Ok(end), _) => end,
-        (Err(error), Some(file)) => return Err(FileError::cannot(file.target().path(), error).into()),
+        (Err(error), Some(file)) => {
+            return Err(FileError::cannot(file.target().path(), error).into());
+        }
         (Err(error), None) => return Err(Failure::io(error.to_string())),
     };
     let wall = stopwatch.as_secs_f64();

@@ -138,8 +138,15 @@ impl ScratchFolder {
 
 impl Drop for ScratchFolder {
     fn drop(&mut self) {
-        disk::remove_tree(&self.path);
+        remove(&self.path);
     }
+}
+
+/// Takes a scratch folder away, its lock last: a kill in the middle leaves what the next run knows.
+fn remove(path: &Path) {
+    disk::remove_content(path, LOCK);
+    let _ = disk::remove_file(&path.join(LOCK));
+    let _ = disk::remove_folder(path);
 }
 
 /// Takes away what killed runs of this machine left in `folder`; leaves alone what a live run has locked.
@@ -166,13 +173,17 @@ fn clear_folder(folder: &Path, scratch: &Path) {
         return;
     };
     // Killed between two renames: what stood there goes back to its name.
-    for old in fs::read_dir(scratch.join(OLD)).into_iter().flatten().flatten() {
+    for old in fs::read_dir(scratch.join(OLD))
+        .into_iter()
+        .flatten()
+        .flatten()
+    {
         let name = folder.join(old.file_name());
         if !disk::exists(&name) && disk::rename(&old.path(), &name).is_err() {
             return;
         }
     }
-    disk::remove_tree(scratch);
+    remove(scratch);
 }
 
 /// The file, locked, if no live run holds it.

@@ -63,10 +63,7 @@ impl Target {
     ///
     /// # Errors
     /// Input/output.
-    pub fn fill(
-        self,
-        fill: impl FnOnce(&mut Sink) -> io::Result<()>,
-    ) -> Result<Filled, FileError> {
+    pub fn fill(self, fill: impl FnOnce(&mut Sink) -> io::Result<()>) -> Result<Filled, FileError> {
         let content = || {
             let scratch = ScratchFile::new(parent(&self.place))?;
             Sink::fill(scratch.file(), fill)?;

@@ -6,8 +6,24 @@
 
 pub mod invariants;
 
+use std::hash::{BuildHasher, Hasher, RandomState};
+use std::time::Duration;
+
 use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation};
+
+/// Calls `kill` with instants within `length`, `JOINTPLAY_KILLS` of them or `few`.
+pub fn at_random_instants(length: Duration, few: u32, mut kill: impl FnMut(Duration)) {
+    let asked = std::env::var("JOINTPLAY_KILLS").ok();
+    let number = asked.and_then(|n| n.parse().ok()).unwrap_or(few);
+    for k in 0..number {
+        // Seeded anew by the system each time; spread so that few kills, too, meet start, middle and end.
+        let random = RandomState::new().build_hasher().finish() as f64 / u64::MAX as f64;
+        let instant = length.mul_f64((f64::from(k) + random) / f64::from(number));
+        eprintln!("killed after {instant:?} of {length:?}");
+        kill(instant);
+    }
+}
 
 /// Built-in scenes.
 pub const SCENES: [&str; 5] = jointplay::scene::BUILT_IN;

@@ -34,3 +34,41 @@ fn as_io(error: WriteNpzError) -> io::Error {
         other => io::Error::other(other.to_string()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::files::Call;
+    use crate::files::Target;
+    use crate::files::faults::{Fault, Kind, with};
+
+    #[test]
+    fn an_archive_on_a_full_disk_ends_without_a_word_of_its_own() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.npz");
+        let values = Array1::from(vec![1.0; 10_000]);
+        for n in 1.. {
+            let mut failed = false;
+            let work = || {
+                Target::claim(&path, true)?.write(|file| {
+                    let mut archive = NpzWriter::new(file);
+                    let added = archive
+                        .add_array("a", &values)
+                        .and_then(|()| archive.add_array("b", &values));
+                    failed = added.is_err();
+                    // As the archive does when it is dropped, and complains of what goes wrong then.
+                    let ended = archive.finish().map(|_| ());
+                    assert!(ended.is_ok() || !failed, "{ended:?}");
+                    // Whatever is said here, the disk comes first.
+                    Ok(())
+                })
+            };
+            let written = with(Fault::Fails(Call::Write, n), Kind::default(), work).0;
+            if written.is_ok() {
+                assert!(n > 4 && !failed, "{n}");
+                break;
+            }
+            assert!(!path.exists());
+        }
+    }
+}

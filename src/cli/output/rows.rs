@@ -77,7 +77,9 @@ impl Rows {
             let values = self.read(block, 0, self.width * n)?;
             for k in 0..n {
                 let of_row = values[k..].iter().step_by(n);
-                row.iter_mut().zip(of_row).for_each(|(to, from)| *to = *from);
+                row.iter_mut()
+                    .zip(of_row)
+                    .for_each(|(to, from)| *to = *from);
                 each(&row)?;
             }
         }
@@ -128,7 +130,8 @@ mod tests {
         rows.spool_to(target.spool().unwrap());
         let value = |k: usize, column: usize| (10 * k + column) as f64;
         for k in 0..11 {
-            rows.push(&[0, 1, 2].map(|column| value(k, column))).unwrap();
+            rows.push(&[0, 1, 2].map(|column| value(k, column)))
+                .unwrap();
         }
         assert_eq!((rows.len(), rows.spooled, rows.block.len()), (11, 2, 9));
         let mut k = 0;
@@ -150,6 +153,10 @@ mod tests {
             assert_eq!(all, expected);
         }
         #[cfg(unix)]
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "nameless");
+        assert_eq!(
+            std::fs::read_dir(folder.path()).unwrap().count(),
+            0,
+            "nameless"
+        );
     }
 }

@@ -177,11 +177,7 @@ impl Table {
     ///
     /// # Errors
     /// The disk; that of `each`.
-    pub fn column(
-        &self,
-        column: usize,
-        each: impl FnMut(f64) -> io::Result<()>,
-    ) -> io::Result<()> {
+    pub fn column(&self, column: usize, each: impl FnMut(f64) -> io::Result<()>) -> io::Result<()> {
         self.rows.column(column, each)
     }
 

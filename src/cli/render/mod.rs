@@ -5,7 +5,8 @@ mod studio;
 
 use serde_json::{Map, Value as Json, json};
 
-use self::studio::{ApplicationStudio, SceneStudio, Studio};
+pub(super) use self::studio::Studio;
+use self::studio::{ApplicationStudio, SceneStudio};
 use super::args::RenderArguments;
 use super::summary::{Status, count as count_of, hash_text};
 use super::{Failure, interrupt, load, print, progress, provenance, quantity, start, warn};
@@ -19,7 +20,7 @@ const MOST_FRAMES: f64 = 100_000.0;
 
 /// When to draw, and how much viewing time passes between two pictures.
 #[derive(Clone, Debug, PartialEq)]
-struct Times {
+pub(super) struct Times {
     /// Instants, s, in the order of the frame numbers.
     instants: Vec<f64>,
     /// Viewing time from one frame of a film to the next, s; `None` for single pictures.
@@ -27,7 +28,7 @@ struct Times {
 }
 
 impl Times {
-    fn new(arguments: &RenderArguments) -> Result<Self, Failure> {
+    pub(super) fn new(arguments: &RenderArguments) -> Result<Self, Failure> {
         let (Some(duration), Some(fps)) = (&arguments.duration, arguments.fps) else {
             let instants = arguments
                 .at
@@ -94,7 +95,7 @@ pub fn render(arguments: &RenderArguments) -> Result<(), Failure> {
 }
 
 /// Draws all frames and gives the folder its name.
-fn fill(
+pub(super) fn fill(
     folder: Folder,
     studio: &mut dyn Studio,
     scene: &Scene,

@@ -188,7 +188,9 @@ impl Partial {
     /// Checks the whole file.
     fn read(&mut self, settings: &Json) -> Result<(), Failure> {
         let length = self.length()?;
-        let mut reader = BufReader::new(&self.file);
+        let mut file = &self.file;
+        file.seek(SeekFrom::Start(0)).map_err(self.failed())?;
+        let mut reader = BufReader::new(file);
         let mut magic = [0; 8];
         let cut = |_| self.damaged("it is cut short");
         reader.read_exact(&mut magic).map_err(cut)?;
@@ -352,4 +354,78 @@ fn read_u32(reader: &mut impl Read) -> std::io::Result<u32> {
     let mut bytes = [0; 4];
     reader.read_exact(&mut bytes)?;
     Ok(u32::from_le_bytes(bytes))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::grid::{Axis, Grid, Start};
+    use crate::analysis::point::Plan;
+    use crate::scene::Scene;
+
+    #[test]
+    fn a_cut_costs_the_block_it_is_in_and_other_damage_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("a.npz");
+        let path = Partial::path_of(&out);
+        let scene = Scene::load("spcmm", &[]).unwrap();
+        let axis = Axis::parse(&scene, "contact.clearance=0.2mm..0.3mm:3").unwrap();
+        let grid = Grid::new(&scene, vec![axis], Start::Cold).unwrap();
+        let plan = Plan {
+            periods: 1,
+            discard: 0,
+            phase: 0.0,
+            exponent: false,
+        };
+        let sweep = Sweep::new(scene, grid, plan).unwrap();
+        let mut settings = Map::new();
+        settings.insert("periods".into(), 1.into());
+        let open = || Partial::open(&out, &settings, &sweep, &[0, 1, 2]);
+        let length = sweep.layout().record_length();
+        let mut partial = open().unwrap();
+        let begin = partial.end as usize;
+        for b in [2, 0, 1] {
+            partial.append(b, &vec![b as f64; length]).unwrap();
+        }
+        drop(partial);
+        let whole = std::fs::read(&path).unwrap();
+        let block = 20 + 8 * length;
+        assert_eq!(whole.len(), begin + 3 * block);
+        for cut in begin..=whole.len() {
+            std::fs::write(&path, &whole[..cut]).unwrap();
+            let mut partial = open().unwrap_or_else(|e| panic!("cut at {cut}: {e}"));
+            let blocks = (cut - begin) / block;
+            let left: Vec<usize> = [2, 0, 1][..blocks].to_vec();
+            assert!(
+                (0..3).all(|b| partial.has(b) == left.contains(&b)),
+                "cut at {cut}"
+            );
+            // It goes on behind the last whole block.
+            for b in [2, 0, 1].into_iter().skip(blocks) {
+                partial.append(b, &vec![b as f64; length]).unwrap();
+            }
+            drop(partial);
+            assert!(std::fs::read(&path).unwrap() == whole, "cut at {cut}");
+        }
+        let refused = |bytes: &[u8]| {
+            std::fs::write(&path, bytes).unwrap();
+            let Err(failure) = open() else {
+                panic!("taken");
+            };
+            assert!(
+                failure.message.contains("a.npz.partial is damaged"),
+                "{failure}"
+            );
+            assert!(std::fs::read(&path).unwrap() == bytes, "left as it was");
+        };
+        for cut in 1..begin {
+            refused(&whole[..cut]);
+        }
+        for at in (0..whole.len()).step_by(7) {
+            let mut bytes = whole.clone();
+            bytes[at] ^= 0x10;
+            refused(&bytes);
+        }
+        refused(&[&whole[..], &whole[whole.len() - 8..]].concat());
+    }
 }

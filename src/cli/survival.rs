@@ -1,0 +1,188 @@
+//! Every command that writes, on a file system that fails at any call: what was there or the whole result, nothing beside it, and
+//! the same again makes the same bytes. `JOINTPLAY_FAULTS` sets how many faults each command meets.
+
+use std::path::Path;
+
+use clap::Parser;
+use serde_json::Value as Json;
+
+use super::{Arguments, Failure, dispatch};
+use crate::files::faults::{Kind, Tree, survive};
+
+/// Does the command of `line`; `@` is the folder.
+fn command(folder: &Path, line: &str) -> Result<(), Failure> {
+    let words = line.split_whitespace();
+    let words = words.map(|word| word.replace('@', &folder.display().to_string()));
+    dispatch(Arguments::try_parse_from(["jointplay".to_owned()].into_iter().chain(words)).unwrap())
+}
+
+/// As a script sees it: what the disk does is an input or output error.
+fn outcome(result: Result<(), Failure>) -> Result<(), String> {
+    result.map_err(|failure| {
+        assert_eq!(failure.code, Failure::INPUT_OUTPUT, "{failure}");
+        assert!(!failure.message.is_empty());
+        failure.message
+    })
+}
+
+/// Every file is the old or the new one, and of rows with an account beside them the checksum tells whether both are one run's.
+fn whole_or_told(old: &Tree, new: &Tree, found: &Tree) -> bool {
+    let is = |of: &Tree, name: &str| of.get(name) == found.get(name);
+    found.iter().all(|(name, content)| {
+        let Some(rows) = name.strip_suffix(".meta.json") else {
+            // Rows have their account, whatever happens.
+            let account = format!("{name}.meta.json");
+            return (is(old, name) || is(new, name))
+                && (!name.ends_with(".csv") || found.contains_key(&account));
+        };
+        let meta: Json = serde_json::from_slice(content).unwrap();
+        let checksum = found
+            .get(rows)
+            .map(|rows| format!("{:08x}", crc32fast::hash(rows)));
+        let told = checksum.is_some_and(|checksum| meta["rows_crc32"] == checksum.as_str());
+        let whole = [old, new].iter().any(|of| is(of, name) && is(of, rows));
+        (is(old, name) || is(new, name)) && whole == told
+    })
+}
+
+fn check(before: &[&str], line: &str) {
+    let before = |folder: &Path| {
+        for line in before {
+            command(folder, line).unwrap();
+        }
+    };
+    let work = |folder: &Path| outcome(command(folder, line));
+    survive(Kind::default(), &before, &work, &whole_or_told);
+}
+
+#[test]
+fn rows_and_impacts_survive_in_every_format() {
+    let run = "run pendulum --duration 30ms --every 3ms --quiet";
+    check(&[], &format!("{run} --out @/a.csv --impacts @/b.csv"));
+    let old = format!("{run} --set contact.friction=0.3 --out @/a.csv --impacts @/b.csv");
+    check(
+        &[&old],
+        &format!("{run} --out @/a.csv --impacts @/b.csv --force"),
+    );
+    for ending in ["json", "npz"] {
+        check(&[], &format!("{run} --out @/a.{ending}"));
+    }
+}
+
+#[test]
+fn sweeps_and_merges_survive() {
+    let sweep = "sweep spcmm --vary contact.clearance=0.2mm..0.3mm:3 --periods 1 --discard 0 --no-exponent --threads 1 --quiet";
+    check(&[], &format!("{sweep} --out @/a.npz"));
+    let shard = |k: usize| format!("{sweep} --shard {k}/2 --out @/{k}.npz");
+    check(
+        &[&shard(1), &shard(2)],
+        "merge @/1.npz @/2.npz --out @/a.npz",
+    );
+}
+
+#[test]
+fn two_writers_at_once_leave_one_whole_pair() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |friction: &str| {
+        for _ in 0..12 {
+            let line = format!(
+                "run pendulum --duration 2ms --every 1ms --quiet --force --set contact.friction={friction} --out @/a.csv"
+            );
+            command(folder.path(), &line).unwrap();
+        }
+    };
+    std::thread::scope(|scope| {
+        scope.spawn(|| write("0.1"));
+        scope.spawn(|| write("0.2"));
+    });
+    let found = crate::files::faults::tree(folder.path());
+    assert_eq!(
+        found.keys().collect::<Vec<_>>(),
+        ["a.csv", "a.csv.meta.json"]
+    );
+    assert!(whole_or_told(&found, &found, &found));
+}
+
+#[test]
+fn an_account_that_lost_its_rows_stands_in_no_way() {
+    let folder = tempfile::tempdir().unwrap();
+    let line = "run pendulum --duration 2ms --every 1ms --quiet --out @/a.csv";
+    let at = |name: &str| folder.path().join(name);
+    command(folder.path(), line).unwrap();
+    std::fs::remove_file(at("a.csv")).unwrap();
+    command(folder.path(), line).unwrap();
+    // One that somebody else wrote is left alone.
+    std::fs::remove_file(at("a.csv")).unwrap();
+    std::fs::write(at("a.csv.meta.json"), "{}").unwrap();
+    let failure = command(folder.path(), line).unwrap_err();
+    assert!(
+        failure.message.contains("a.csv.meta.json already exists"),
+        "{failure}"
+    );
+    assert!(!at("a.csv").exists());
+}
+
+#[cfg(feature = "gui")]
+#[test]
+fn frames_survive() {
+    use super::Command;
+    use super::render::{Studio, Times, fill};
+    use crate::files::Folder;
+    use crate::render::Image;
+    use crate::scene::Scene;
+    use crate::simulate::Simulation;
+
+    /// Draws nothing: this is about files.
+    struct Blank(Simulation);
+
+    impl Studio for Blank {
+        fn go_to(&mut self, instant: f64) -> Result<(), Failure> {
+            self.0.advance_to(instant).unwrap();
+            Ok(())
+        }
+
+        fn draw(&mut self, _instant: f64, _frame_time: Option<f64>) -> Result<Image, Failure> {
+            Ok(Image {
+                width: 2,
+                height: 2,
+                rgba: vec![self.0.statistics().steps as u8; 16],
+            })
+        }
+
+        fn fix_arrow_scale(&mut self, _reference: f32) {}
+
+        fn simulation(&self) -> &Simulation {
+            &self.0
+        }
+
+        fn adapter(&self) -> String {
+            "none".to_owned()
+        }
+    }
+
+    let render = |folder: &Path, at: &str| {
+        let out = folder.join("out");
+        let line = format!("jointplay render pendulum --at {at} --quiet --force --out");
+        let words = line
+            .split_whitespace()
+            .map(Into::into)
+            .chain([out.into_os_string()]);
+        let Some(Command::Render(arguments)) = Arguments::try_parse_from(words).unwrap().command
+        else {
+            panic!("not a command to render");
+        };
+        let scene = Scene::load("pendulum", &[]).unwrap();
+        let times = Times::new(&arguments).unwrap();
+        let folder = Folder::claim(&arguments.out, arguments.force)?;
+        let mut studio = Blank(Simulation::new(&scene).unwrap());
+        fill(folder, &mut studio, &scene, &times, &arguments)
+    };
+    let whole = |old: &Tree, new: &Tree, found: &Tree| found == old || found == new;
+    let old = |folder: &Path| render(folder, "0s,1ms,3ms").unwrap();
+    survive(
+        Kind::default(),
+        &old,
+        &|folder| outcome(render(folder, "0s,2ms")),
+        &whole,
+    );
+}
