@@ -7,34 +7,37 @@
 mod common;
 
 use common::{METHODS, SCENES, simulation};
-use jointplay::simulate::Frame;
+use jointplay::scene::Scene;
+use jointplay::simulate::{Frame, Simulation};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 thread_local! {
-    /// Allocations of this thread: tests run side by side.
+    /// Allocations of this thread, and their bytes: tests run side by side.
     static COUNT: Cell<u64> = const { Cell::new(0) };
+    static BYTES: Cell<u64> = const { Cell::new(0) };
 }
 
 struct Counting;
 
-fn count() {
+fn count(bytes: usize) {
     // A thread that is ending has no counter any more, and none of its allocations matter.
     let _ = COUNT.try_with(|count| count.set(count.get() + 1));
+    let _ = BYTES.try_with(|count| count.set(count.get() + bytes as u64));
 }
 
 // SAFETY: every call is handed on unchanged to the system's allocator.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count();
+        count(layout.size());
         unsafe { System.alloc(layout) }
     }
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
-        count();
+        count(layout.size());
         unsafe { System.alloc_zeroed(layout) }
     }
     unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        count();
+        count(size);
         unsafe { System.realloc(pointer, layout, size) }
     }
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
@@ -108,5 +111,68 @@ fn a_clearance_on_its_way_allocates_nothing() {
         simulation.set("contact.friction", "0.2").unwrap();
         let found = allocations(|| simulation.advance_to(0.06).unwrap());
         assert_eq!(found, 0, "{method}");
+    }
+}
+
+/// A scene of one kind with `n` bodies.
+fn scene_text(kind: &str, n: usize) -> String {
+    let mut text = String::from("[contact]\nball_radius = \"1 mm\"\n");
+    for i in 0..n {
+        let hinge = "kind = \"revolute\"\naxis = [0, 1, 0]\n";
+        let joint = match kind {
+            "hinges in a row" if i > 0 => format!("{hinge}parent = \"b{}\"", i - 1),
+            "hinges in a row" => hinge.to_owned(),
+            _ => format!("kind = \"free\"\nstart = {{ position = \"{i} 0 0 mm\" }}"),
+        };
+        text += &format!(
+            "[[body]]\nname = \"b{i}\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n\
+             [[joint]]\nname = \"f{i}\"\nchild = \"b{i}\"\n{joint}\n"
+        );
+    }
+    for i in 0..n {
+        let here = format!("{i} 0 0 mm");
+        let (before, own) = (format!("b{}", i.saturating_sub(1)), format!("b{i}"));
+        let [clearance, socket, at, ball, end] = match kind {
+            "pendulums" => ["0", "world", &here, &own, "0 0 0 mm"],
+            "sockets of one body" => ["\"0.1 mm\"", "world", &here, "b0", &here],
+            "balls of one body" if i > 0 => ["\"0.1 mm\"", "b0", &here, &own, "0 0 0 mm"],
+            "a chain" if i > 0 => ["0", &before, "1 0 0 mm", &own, "0 0 0 mm"],
+            _ => continue,
+        };
+        text += &format!(
+            "[[ball_joint]]\nname = \"S{i}\"\nclearance = {clearance}\n\
+             socket = {{ body = \"{socket}\", at = \"{at}\" }}\nball = {{ body = \"{ball}\", at = \"{end}\" }}\n"
+        );
+    }
+    text
+}
+
+#[test]
+fn what_setting_up_allocates_grows_with_the_scene_and_not_with_its_square() {
+    for (kind, form) in [
+        ("free bodies", "tree"),
+        ("free bodies", "lagrange"),
+        ("pendulums", "tree"),
+        ("pendulums", "lagrange"),
+        ("balls of one body", "tree"),
+        ("balls of one body", "lagrange"),
+        ("sockets of one body", "tree"),
+        ("a chain", "tree"),
+        ("a chain", "lagrange"),
+        ("hinges in a row", "lagrange"),
+    ] {
+        let bytes = |n: usize| {
+            let text = scene_text(kind, n);
+            let before = BYTES.get();
+            let changes = [("formulation".to_owned(), form.to_owned())];
+            let scene = Scene::parse(&text, Some("big.toml"), &changes).unwrap();
+            std::hint::black_box(scene.warnings());
+            std::hint::black_box(Simulation::new(&scene).unwrap().time());
+            BYTES.get() - before
+        };
+        let (once, twice) = (bytes(400), bytes(800));
+        // Vectors double as they grow: which of two sizes wastes more is a matter of chance.
+        let growth = twice as f64 / once as f64;
+        assert!(growth < 2.6, "{kind}, {form}: {once}, then {twice} bytes");
     }
 }

@@ -107,6 +107,16 @@ fn text_and_picture_follow_from_the_description_alone() {
 }
 
 #[test]
+fn words_that_xml_cannot_hold_are_shown_and_drawn() {
+    let mut sheet = sheet((600, 300));
+    sheet.title = "</text><script>\u{1b}]0;x\u{7}\u{202e}".to_owned();
+    let svg = sheet.svg().unwrap();
+    assert!(svg.contains("&lt;/text&gt;&lt;script&gt;\\u001b]0;x\\u0007\\u202e"));
+    assert!(!svg.chars().any(|c| c.is_control() && c != '\n'));
+    sheet.png(1.0).unwrap();
+}
+
+#[test]
 fn a_page_that_cannot_be_drawn_is_refused() {
     assert!(sheet((200, 100)).svg().is_err());
     assert!(sheet((900, 420)).png(0.0).is_err());

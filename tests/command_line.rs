@@ -1090,3 +1090,95 @@ fn a_bad_link_is_refused_before_any_window_opens() {
     let outcome = jointplay(folder.path(), "view pendulum --link ?c=1mm");
     assert_eq!(outcome.code, Some(2), "{}", outcome.stderr);
 }
+
+/// Everything that a person can write, with what would set a terminal's title, clear it, or turn its direction.
+#[test]
+fn no_words_of_others_steer_the_terminal() {
+    const STEERING: &str = "\u{1b}]0;title\u{7}\u{9b}2J\u{7f}\r\u{202e}\u{2066}";
+    let folder = folder();
+    let good = fs::read_to_string("assets/scenes/pendulum.toml").unwrap();
+    let escape = |c: char| format!("\\u{:04x}", u32::from(c));
+    let escaped: String = STEERING.chars().map(escape).collect();
+    let title = good.lines().find(|line| line.starts_with("title")).unwrap();
+    let titled = good.replace(title, &format!("title = \"{escaped}\""));
+    let own_name = |line: &&str| !line.starts_with("name = \"pendulum\"");
+    let unnamed = good.lines().filter(own_name).collect::<Vec<_>>().join("\n");
+    let file = |name: &str, text: &str| {
+        fs::write(folder.path().join(name), text).unwrap();
+        format!("./{name}")
+    };
+    let hostile = |of: &str| {
+        good.replace(
+            of,
+            &format!("{} = \"{escaped}\"", of.split(' ').next().unwrap()),
+        )
+    };
+    let scenes = [
+        file("title.toml", &titled),
+        file(&format!("{STEERING}.toml"), &unnamed),
+        file("joint.toml", &hostile("name = \"S1\"")),
+        file("body.toml", &hostile("child = \"rod\"")),
+        file("key.toml", &format!("\"{escaped}\" = 1\n{good}")),
+        file("raw.toml", &format!("{STEERING}\n{good}")),
+        STEERING.to_owned(),
+    ];
+    let title = scenes[0].clone();
+    let mut lines: Vec<Vec<String>> = Vec::new();
+    let words = |line: &[&str]| {
+        line.iter()
+            .map(|word| (*word).to_owned())
+            .collect::<Vec<_>>()
+    };
+    for scene in &scenes {
+        lines.push(words(&["check", scene]));
+    }
+    for change in [
+        format!("{STEERING}=1"),
+        format!("contact.clearance={STEERING}"),
+        format!("joint.{STEERING}.clearance=1mm"),
+        STEERING.to_owned(),
+    ] {
+        lines.push(words(&["check", "pendulum", "--set", &change]));
+    }
+    let run = ["run", &title, "--duration", "1ms"];
+    for more in [
+        words(&[]),
+        words(&["--summary", "json"]),
+        words(&["--every", STEERING, "--out", "rows.csv"]),
+        words(&["--every", "1ms", "--out", &format!("{STEERING}.csv")]),
+        words(&["--every", "1ms", "--out", &format!("{STEERING}.txt")]),
+    ] {
+        lines.push([words(&run), more].concat());
+    }
+    lines.push(words(&[STEERING]));
+    lines.push(words(&["run", &format!("--{STEERING}")]));
+    #[cfg(feature = "gui")]
+    for link in [
+        "?scene=%1b]0;title%07",
+        "?%9b=1&%1b=2",
+        "?c=%1b]0;",
+        "?log=%1b",
+    ] {
+        lines.push(words(&["view", "--link", link]));
+    }
+    let mut shown = 0;
+    for line in lines {
+        let output = command(folder.path(), "").args(&line).output().unwrap();
+        for stream in [output.stdout, output.stderr] {
+            let text = String::from_utf8(stream).unwrap();
+            let steers = |c: char| {
+                (c.is_control() && c != '\n') || STEERING[10..].contains(c) && !c.is_ascii()
+            };
+            assert!(!text.contains(steers), "{line:?}: {text:?}");
+            assert!(!text.contains("failed inside"), "{text}");
+            shown += usize::from(text.contains("\\u001b"));
+        }
+    }
+    // They are said, not left out.
+    assert!(shown >= 12, "{shown}");
+    let summary = jointplay(
+        folder.path(),
+        &format!("run {title} --duration 1ms --summary json"),
+    );
+    summary.expect(0).json();
+}

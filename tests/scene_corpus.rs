@@ -10,9 +10,29 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use fuzz::{Fate, check};
 use jointplay::scene::{BUILT_IN, built_in_text};
 
-/// Mutations of each text of the corpus, and of each built-in scene.
+/// Mutations of each text of the corpus, and of each built-in scene; times `SCENE_MUTATIONS`, a number in the environment.
 const MUTATIONS: u64 = 40;
 const MUTATIONS_OF_BUILT_IN: u64 = 200;
+
+/// Changes that a mutated text comes with now and then, some of them right.
+const CHANGES: [&str; 16] = [
+    "contact.clearance=0",
+    "contact.clearance=0.5mm",
+    "contact.clearance=1e400 mm",
+    "contact.restitution=0",
+    "contact.normal_law=flores",
+    "contact.friction=10",
+    "joint.S1.clearance=0",
+    "joint..clearance=1 mm",
+    "joint.\u{1b}]0;.x=1",
+    "chain.links=4096",
+    "chain.links=-1",
+    "solver.method=radau5",
+    "solver.method=imex-euler",
+    "solver.method=rk4",
+    "spcmm.frequency=50 Hz",
+    "\u{202e}=\u{9b}",
+];
 
 /// What tends to break readers.
 const TOKENS: [&str; 40] = [
@@ -153,6 +173,10 @@ fn mutate(text: &[u8], numbers: &mut Numbers) -> Vec<u8> {
             }
         }
     }
+    if numbers.below(3) == 0 {
+        let change = CHANGES[numbers.below(CHANGES.len())];
+        bytes.extend(format!("\n#set {change}\n").into_bytes());
+    }
     bytes
 }
 
@@ -201,6 +225,8 @@ fn the_corpus_ends_as_its_names_say() {
 
 #[test]
 fn mutations_of_the_corpus_break_nothing() {
+    let times = std::env::var("SCENE_MUTATIONS").ok();
+    let times = times.map_or(1, |times| times.parse::<u64>().expect("a number"));
     let mut seeds: Vec<(String, Vec<u8>, u64)> = corpus()
         .into_iter()
         .map(|(name, bytes)| (name, bytes, MUTATIONS))
@@ -222,7 +248,7 @@ fn mutations_of_the_corpus_break_nothing() {
                 while let Some((name, bytes, count)) =
                     seeds.get(next.fetch_add(1, Ordering::Relaxed))
                 {
-                    for seed in 1..=*count {
+                    for seed in 1..=*count * times {
                         let mutated = mutate(bytes, &mut Numbers(seed));
                         let fate = survives(&format!("{name}, mutation {seed}"), &mutated);
                         *fates

@@ -753,3 +753,71 @@ fn a_drive_that_swings_backwards_in_time_is_refused() {
         );
     }
 }
+
+#[test]
+fn a_scene_beyond_a_limit_is_refused_with_its_line() {
+    let many =
+        |count: usize, part: &dyn Fn(usize) -> String| -> String { (0..count).map(part).collect() };
+    let body =
+        |n: usize| format!("[[body]]\nname=\"b{n}\"\nmass=\"1 kg\"\ninertia=\"1 1 1 kg m^2\"\n");
+    let joint = |n: usize| {
+        format!(
+            "[[joint]]\nname=\"f{n}\"\nkind=\"free\"\nchild=\"b{n}\"\nstart={{position=[0,0,0]}}\n"
+        )
+    };
+    let ball = |n: usize| {
+        format!("[[ball_joint]]\nname=\"S{n}\"\nsocket={{body=\"world\"}}\nball={{body=\"b0\"}}\n")
+    };
+    let shapes = |count: usize| {
+        let shape = "{form=\"sphere\",centre=[0,0,0],radius=\"1 m\",role=\"pin\"},";
+        format!("shapes=[{}]\n", shape.repeat(count))
+    };
+    let corners = "[0,0,0],".repeat(101);
+    let plate =
+        format!("shapes=[{{form=\"plate\",role=\"pin\",thickness=\"1 m\",corners=[{corners}]}}]\n");
+    let cases = [
+        (
+            many(10_001, &body),
+            "my.toml:40001:1: body[10000]: too many: 10001 bodies; allowed at most 10000",
+        ),
+        (
+            body(0) + &many(10_001, &joint),
+            "my.toml:50005:1: joint[10000]: too many: 10001 joints; allowed at most 10000",
+        ),
+        (
+            body(0) + &joint(0) + &many(10_001, &ball),
+            "my.toml:40010:1: ball_joint[10000]: too many: 10001 ball joints; allowed at most 10000",
+        ),
+        (
+            body(0) + &shapes(50_001),
+            "body.b0.shapes[50000]: too many: 50001 shapes; allowed at most 50000",
+        ),
+        (
+            body(0) + &shapes(25_001) + &body(1) + &shapes(25_001) + &joint(0) + &joint(1),
+            "too many shapes: 50002; allowed at most 50000",
+        ),
+        (
+            body(0) + &plate,
+            "corners[100]: too many: 101 corners; allowed at most 100",
+        ),
+    ];
+    for (text, words) in cases {
+        holds(words, &parse(&text).expect_err(words), &[words]);
+    }
+    let chain = jointplay::scene::built_in_text("chain").unwrap();
+    let changes = vec![("chain.links".to_owned(), "4096".to_owned())];
+    let beside = chain.to_owned() + &many(5905, &body) + &many(5905, &joint);
+    let words =
+        "chain.links: too many bodies with those of the file: 5905 and 4096; allowed at most 10000";
+    let error = Scene::parse(&beside, None, &changes).expect_err(words);
+    holds("chain", &error, &[words]);
+
+    let more = (1..=4096).map(|n| (format!("joint.J{n}.friction"), "0.1".to_owned()));
+    let changes: Vec<_> = changes.into_iter().chain(more).collect();
+    let error = Scene::parse(chain, None, &changes).expect_err("too many changes");
+    holds(
+        "changes",
+        &error,
+        &["joint.J4096.friction = 0.1", "allowed at most 4096"],
+    );
+}

@@ -1,10 +1,16 @@
 //! What must hold for any bytes that are given as a scene file: shared by the fuzz target and the test that runs its corpus.
+//!
+//! A line `#set KEY=VALUE`, a comment of the file, stands for `--set KEY=VALUE`.
 
-use jointplay::scene::{Scene, Value};
+use jointplay::scene::{Scene, Value, visible};
 use jointplay::simulate::{Frame, Simulation};
 
-/// Bodies beyond which a scene is only read: starting costs time, not insight.
+/// Bodies beyond which a scene is only started: stepping costs time, not insight.
 const MOST_BODIES: usize = 16;
+/// Steps that are taken in each formulation.
+const STEPS: usize = 4;
+/// Most changes that are applied.
+const MOST_CHANGES: usize = 8;
 
 /// What became of the bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,20 +25,35 @@ pub enum Fate {
     Starts,
 }
 
-/// Reads `bytes` as the scene file `fuzz.toml`, writes and reads back its parameters, and starts it.
+/// The changes that a text asks for.
+fn changes(text: &str) -> Vec<(String, String)> {
+    text.lines()
+        .filter_map(|line| line.strip_prefix("#set ")?.split_once('='))
+        .map(|(key, value)| (key.to_owned(), value.to_owned()))
+        .take(MOST_CHANGES)
+        .collect()
+}
+
+/// Reads `bytes` as the scene file `fuzz.toml`, writes and reads back its parameters, starts it in both formulations and
+/// takes some steps.
 ///
 /// # Panics
-/// Where the program breaks a promise: an error without a place or words, a value that does not read back, a start that is
-/// not finite.
+/// Where the program breaks a promise: an error without a place or words, words that steer a terminal, a value that does
+/// not read back, a start or a step that is not finite.
 pub fn check(bytes: &[u8]) -> Fate {
     let Ok(text) = std::str::from_utf8(bytes) else {
         return Fate::NoText;
     };
-    let scene = match Scene::parse(text, Some("fuzz.toml"), &[]) {
+    let changes = changes(text);
+    let scene = match Scene::parse(text, Some("fuzz.toml"), &changes) {
         Ok(scene) => scene,
         Err(error) => {
-            let words = error.to_string();
+            let words = said(&error);
             assert!(!error.message.is_empty(), "an error says what is wrong");
+            let changed = |key: &String| changes.iter().any(|(changed, _)| changed == key);
+            if error.file.is_none() && error.key.as_ref().is_some_and(changed) {
+                return Fate::Refused;
+            }
             assert!(words.starts_with("fuzz.toml"), "{words}");
             if let Some((line, column)) = error.position {
                 // A carriage return counts as a character of its line.
@@ -56,7 +77,9 @@ pub fn check(bytes: &[u8]) -> Fate {
             return Fate::Refused;
         }
     };
-    let _ = scene.warnings();
+    for words in scene.warnings().iter().chain([&scene.title, &scene.name]) {
+        assert_eq!(visible(words), *words);
+    }
     for parameter in scene.parameters() {
         let value = scene.get(parameter.key).expect("its own key");
         if value != Value::Unset {
@@ -69,24 +92,63 @@ pub fn check(bytes: &[u8]) -> Fate {
             );
         }
     }
-    if scene.bodies.len() > MOST_BODIES {
-        return Fate::Starts;
+    if !changes.is_empty() {
+        // What is saved opens again, or is not saved.
+        match scene.to_toml() {
+            Ok(saved) => assert!(Scene::parse(&saved, None, &[]).is_ok(), "{saved}"),
+            Err(error) => assert!(!said(&error).is_empty()),
+        }
     }
-    let mut simulation = match Simulation::new(&scene) {
+    let fate = run(&scene);
+    let other = match scene.get("formulation") {
+        Ok(Value::Choice("tree")) => "lagrange",
+        _ => "tree",
+    };
+    let mut scene = scene;
+    scene
+        .set("formulation", other)
+        .expect("a choice of every scene");
+    run(&scene);
+    fate
+}
+
+/// Starts `scene` and takes some steps.
+fn run(scene: &Scene) -> Fate {
+    let mut simulation = match Simulation::new(scene) {
         Ok(simulation) => simulation,
         Err(error) => {
-            assert!(!error.located(&scene).to_string().is_empty());
+            assert!(!said(&error.located(scene)).is_empty());
             return Fate::NoStart;
         }
     };
     let mut frame = Frame::default();
     simulation.sample(0.0, &mut frame);
     for body in &frame.bodies {
-        assert!(body.position.iter().all(|x| x.is_finite()), "{text}");
+        assert!(body.position.iter().all(|x| x.is_finite()));
     }
-    if let Err(stopped) = simulation.step() {
-        assert!(!stopped.to_string().is_empty());
+    if scene.bodies.len() > MOST_BODIES {
+        return Fate::Starts;
     }
-    assert!(simulation.state().iter().all(|x| x.is_finite()), "{text}");
+    for _ in 0..STEPS {
+        let before = simulation.time();
+        if let Err(stopped) = simulation.step() {
+            assert_eq!(visible(&stopped.to_string()), stopped.to_string());
+            break;
+        }
+        assert!(simulation.time() > before, "a step that takes no time");
+    }
+    assert!(simulation.state().iter().all(|x| x.is_finite()));
+    let peaks = &simulation.statistics().peak_normal;
+    assert!(peaks.iter().all(|peak| *peak >= 0.0 && peak.is_finite()));
+    for words in simulation.doubts() {
+        assert_eq!(visible(&words), words);
+    }
     Fate::Starts
+}
+
+/// The words of an error, which steer no terminal.
+fn said(error: &impl std::fmt::Display) -> String {
+    let words = error.to_string();
+    assert_eq!(visible(&words), words);
+    words
 }

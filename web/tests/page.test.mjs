@@ -140,9 +140,10 @@ test('an address by hand sets scene and parameters; a bad one says what is wrong
     assert.equal(state.playing, false);
     assert.deepEqual(Object.keys(state.changed_parameters), ['contact.clearance']);
     await lab.close();
-    const bad = await open('scene=pendulun', { backend: 'webgl' });
+    // What would steer a terminal, or a page, is shown.
+    const bad = await open('scene=pendulun%1b', { backend: 'webgl' });
     assert.equal((await bad.state()).scene, 'spcmm');
-    await bad.until(async () => (await bad.widgets()).some((w) => w.label.includes('did you mean `pendulum`')), 'no word about it');
+    await bad.until(async () => (await bad.widgets()).some((w) => w.label.includes('`pendulun\\u001b` (did you mean `pendulum`')), 'no word about it');
     await bad.click('Button', 'Dismiss');
     await bad.until(async () => !(await bad.has('Button', 'Dismiss')), 'it stays');
     await bad.close();

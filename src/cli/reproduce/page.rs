@@ -524,3 +524,24 @@ fn provenance(out: &mut String, found: &Findings) -> Result<(), Failure> {
     );
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_stay_words() {
+        let hostile = "<script>alert(1)</script> & <b>".to_owned();
+        let statement = Statement {
+            place: hostile.clone().into(),
+            says: hostile.clone(),
+            criterion: hostile.clone(),
+            verdict: Verdict::Confirmed,
+            evidence: hostile,
+        };
+        let mut out = String::new();
+        statement_table(&mut out, &[statement]);
+        assert!(!out.contains("<script>") && !out.contains(" & "), "{out}");
+        assert_eq!(out.matches("&lt;script&gt;").count(), 4, "{out}");
+    }
+}

@@ -1,0 +1,37 @@
+//! Any bytes as a share link.
+#![no_main]
+
+use jointplay::app::Link;
+use jointplay::scene::visible;
+use jointplay::simulate::Simulation;
+
+/// Bodies beyond which a scene is only read.
+const MOST_BODIES: usize = 16;
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
+    let Ok(text) = std::str::from_utf8(bytes) else {
+        return;
+    };
+    let link = match Link::parse(text) {
+        Ok(link) => link,
+        Err(error) => {
+            let words = error.to_string();
+            assert_eq!(visible(&words), words);
+            return;
+        }
+    };
+    // What is given out is what was read.
+    assert_eq!(Link::parse(&link.format()).as_ref(), Ok(&link));
+    match link.load() {
+        Ok(scene) if scene.bodies.len() <= MOST_BODIES => {
+            if let Ok(mut simulation) = Simulation::new(&scene) {
+                let _ = simulation.step();
+            }
+        }
+        Ok(_) => {}
+        Err(error) => {
+            let words = error.to_string();
+            assert_eq!(visible(&words), words);
+        }
+    }
+});
