@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 use web_time::Instant;
 
 use super::log::{Event, Log, Number};
+use super::settled::Settling;
 use super::twin::Twin;
 use super::watch::Watch;
 use crate::analysis::section::Schedule;
@@ -33,8 +34,7 @@ pub struct Player {
     history: History,
     recorded: Frame,
     values: Vec<f64>,
-    /// When a ball last struck, s; `None` before the first time.
-    last_impact: Option<f64>,
+    settling: Settling,
     /// States before the latest single steps, oldest first, with the length that the log had.
     past: VecDeque<(Snapshot, usize)>,
     /// What was done since the start.
@@ -50,9 +50,6 @@ pub struct Player {
 
 /// Keys of the solver that win over its preset.
 const SOLVER_KEYS: [&str; 3] = ["solver.method", "solver.step", "solver.tolerance"];
-
-/// Simulated time without an impact after which the motion counts as settled, s.
-const SETTLED: f64 = 0.2;
 
 /// Single steps that can be taken back.
 const PAST: usize = 64;
@@ -90,7 +87,7 @@ impl Player {
             channels,
             recorded: Frame::default(),
             values: Vec::new(),
-            last_impact: None,
+            settling: Settling::new(scene),
             past: VecDeque::new(),
             stepped: 0.0,
             stepping: 0.0,
@@ -235,10 +232,9 @@ impl Player {
         self.stopped.as_ref()
     }
 
-    /// Whether the balls have struck and now lie in their sockets: no impact for a while.
+    /// Whether the motion relative to the drives has ended.
     pub fn has_settled(&self) -> bool {
-        self.last_impact
-            .is_some_and(|last| self.simulation.time() - last > SETTLED)
+        self.settling.has_settled()
     }
 
     /// Moves on by one frame that comes `dt` seconds after the last, and refreshes what is on show.
@@ -301,6 +297,7 @@ impl Player {
             self.stopped = None;
             self.log.entries.truncate(entries);
             self.watch.back_to(self.simulation.time());
+            self.settling = Settling::new(self.simulation.running_scene());
             self.restart_twin();
             self.show_latest();
         }
@@ -400,6 +397,7 @@ impl Player {
         self.past.clear();
         self.watch
             .begin(self.simulation.running_scene(), self.simulation.time());
+        self.settling = Settling::new(self.simulation.running_scene());
         self.restart_twin();
         // What was recorded before steps were taken back belongs to another future.
         let recorded = self.history.span().map_or(0.0, |(_, end)| end);
@@ -489,6 +487,7 @@ impl Player {
             self.channels.read(&self.recorded, &mut self.values);
             self.history.push(time, &self.values);
             self.watch.record(&self.recorded);
+            self.settling.record(&self.recorded);
         }
     }
 
@@ -501,7 +500,7 @@ impl Player {
     fn start_record(&mut self) {
         self.history.clear();
         self.past.clear();
-        self.last_impact = None;
+        self.settling = Settling::new(self.simulation.running_scene());
         self.show_latest();
         self.record();
         self.simulation.take_peaks(&mut self.peaks);
@@ -509,9 +508,6 @@ impl Player {
 
     fn take_peaks(&mut self) {
         self.simulation.take_peaks(&mut self.peaks);
-        if self.peaks.iter().any(|peak| peak.impacts > 0) {
-            self.last_impact = Some(self.simulation.time());
-        }
         for (joint, peak) in self.peaks.iter().enumerate() {
             if let Some(channel) = self.channels.normal_force(joint)
                 && peak.normal > 0.0
