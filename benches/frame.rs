@@ -11,7 +11,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use jointplay::app::{AppOptions, Headless};
 use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation};
-use jointplay::view::{ArrowMemory, DrawList, SceneView, Shot, ViewOptions};
+use jointplay::view::{PeakMarks, DrawList, SceneView, Shot, ViewOptions};
 
 const SIZE: [u32; 2] = [1280, 800];
 /// Simulated before the frame, s: the plots have something to show.
@@ -53,8 +53,8 @@ fn draw_list(c: &mut Criterion) {
         magnification: 20.0,
         ..ViewOptions::default()
     };
-    let mut arrows = ArrowMemory::new();
-    arrows.update(&frame, &[], 0.0, &options.arrows);
+    let mut marks = PeakMarks::new();
+    marks.update(&frame, &[], f64::INFINITY);
     let camera = view.camera();
     let mut list = DrawList::default();
     c.bench_function("draw list alone", |b| {
@@ -62,7 +62,7 @@ fn draw_list(c: &mut Criterion) {
             let shot = Shot {
                 scene: &scene,
                 frame: &frame,
-                arrows: &arrows,
+                marks: &marks,
                 options: &options,
                 camera: &camera,
                 trail: &[],

@@ -11,7 +11,6 @@ struct Globals {
     up: vec4<f32>,
     background_top: vec4<f32>,
     background_bottom: vec4<f32>,
-    flash: vec4<f32>,
     // width and height of the picture, pixels; 1 / size of the shadow map
     picture: vec4<f32>,
     // xyz: centre; w: radius
@@ -96,7 +95,7 @@ struct Vertex {
     @location(3) row_1: vec4<f32>,
     @location(4) row_2: vec4<f32>,
     @location(5) colour: vec4<f32>,
-    // roughness, metal, glow, inner radius
+    // roughness, metal, inner radius
     @location(6) surface: vec4<f32>,
 }
 
@@ -105,14 +104,14 @@ struct Surface {
     @location(0) world: vec3<f32>,
     @location(1) normal: vec3<f32>,
     @location(2) colour: vec4<f32>,
-    // roughness, metal, glow, 1 on a cut face
-    @location(3) surface: vec4<f32>,
+    // roughness, metal, 1 on a cut face
+    @location(3) surface: vec3<f32>,
 }
 
 fn place(in: Vertex) -> Surface {
     let cut = step(1.5, in.position.w);
     let inner = in.position.w - 2.0 * cut;
-    let p = vec4<f32>(in.position.xyz * mix(1.0, in.surface.w, inner), 1.0);
+    let p = vec4<f32>(in.position.xyz * mix(1.0, in.surface.z, inner), 1.0);
     let world = vec3<f32>(dot(in.row_0, p), dot(in.row_1, p), dot(in.row_2, p));
     // Cofactors carry normals through any scaling.
     let x = in.row_0.xyz;
@@ -124,7 +123,7 @@ fn place(in: Vertex) -> Surface {
     out.clip = globals.clip_from_world * vec4<f32>(world, 1.0);
     out.normal = normalize(n);
     out.colour = in.colour;
-    out.surface = vec4<f32>(in.surface.xyz, cut);
+    out.surface = vec3<f32>(in.surface.xy, cut);
     return out;
 }
 
@@ -148,8 +147,7 @@ fn place(in: Vertex) -> Surface {
     let v = normalize(globals.eye.xyz - in.world);
     let base = to_linear(in.colour.rgb);
     let colour = shade(base, in.surface.x, in.surface.y, n, v, lit(in.world, n));
-    let flash = to_linear(globals.flash.rgb) * (0.75 + 0.5 * (1.0 - max(dot(n, v), 0.0)));
-    return finish(mix(colour, flash, 0.45 * in.surface.z), in.clip.xy, 1.0);
+    return finish(colour, in.clip.xy, in.colour.a);
 }
 
 // Marks keep their colour: only enough shading to show their form.
@@ -167,30 +165,30 @@ fn mark(in: Surface) -> vec3<f32> {
     return finish(mark(in), in.clip.xy, 0.6);
 }
 
-// A second state of the machine, seen through.
+// A second state of the machine, seen through: clearest along its edge.
 @fragment fn fs_ghost(in: Surface) -> @location(0) vec4<f32> {
-    return finish(mark(in), in.clip.xy, in.colour.a);
+    let facing = max(dot(normalize(in.normal), normalize(globals.eye.xyz - in.world)), 0.0);
+    return finish(mark(in), in.clip.xy, in.colour.a * mix(1.0, 0.4, facing));
 }
 
-// Light about a joint that was hit: strongest round the socket, gone at its own edge.
+// Light about a joint that was hit: a ring outside of its socket, which hides nothing of the contact.
 @fragment fn fs_halo(in: Surface) -> @location(0) vec4<f32> {
     let facing = max(dot(normalize(in.normal), normalize(globals.eye.xyz - in.world)), 0.0);
-    let opacity = in.surface.z * facing * facing * (1.0 - 0.55 * facing);
-    return finish(to_linear(globals.flash.rgb) * 1.15, in.clip.xy, min(1.5 * opacity, 0.8));
+    // The socket's outline lies where this ball of 1.7 times its radius faces the eye by 0.81.
+    let ring = smoothstep(0.0, 0.55, facing) * (1.0 - smoothstep(0.68, 0.79, facing));
+    return finish(to_linear(in.colour.rgb) * 1.15, in.clip.xy, in.colour.a * ring);
 }
 
 @fragment fn fs_socket(in: Surface, @builtin(front_facing) front: bool) -> @location(0) vec4<f32> {
     let n = normalize(select(-in.normal, in.normal, front));
     let v = normalize(globals.eye.xyz - in.world);
     let facing = max(dot(n, v), 0.0);
-    let cut = in.surface.w;
+    let cut = in.surface.z;
     let rim = pow(1.0 - facing, 3.0);
     let base = to_linear(in.colour.rgb);
     let colour = shade(base, in.surface.x, in.surface.y, n, v, 1.0) + rim * 0.15;
-    let flash = to_linear(globals.flash.rgb);
-    let glow = in.surface.z;
     let opacity = in.colour.a * mix(1.0 + 2.25 * rim, 3.6, cut);
-    return finish(mix(colour, flash, 0.6 * glow), in.clip.xy, min(opacity + 0.35 * glow, 0.95));
+    return finish(colour, in.clip.xy, min(opacity, 0.95));
 }
 
 // ---- background

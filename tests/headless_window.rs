@@ -9,7 +9,7 @@ use jointplay::app::{AppOptions, Headless, Overlay, UiFrame, force_notes};
 use jointplay::render::Image;
 use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation};
-use jointplay::view::{ArrowMemory, DrawList, SceneView, Shot, Theme, ViewOptions};
+use jointplay::view::{PeakMarks, DrawList, SceneView, Shot, Theme, ViewOptions};
 
 fn colours(image: &Image) -> usize {
     let pixels: HashSet<&[u8]> = image.rgba.chunks_exact(4).collect();
@@ -63,14 +63,14 @@ fn the_overlay_adds_to_the_plain_picture() {
     simulation.sample(7.85e-3, &mut frame);
     let view = SceneView::new(&scene, &frame);
     let options = ViewOptions::default();
-    let mut arrows = ArrowMemory::new();
-    arrows.update(&frame, &[], 0.0, &options.arrows);
+    let mut marks = PeakMarks::new();
+    marks.update(&frame, &[], f64::INFINITY);
     let mut list = DrawList::default();
     view.build(
         &Shot {
             scene: &scene,
             frame: &frame,
-            arrows: &arrows,
+            marks: &marks,
             options: &options,
             camera: &view.camera(),
             trail: &[],

@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 
 use eframe::egui::{
-    self, ComboBox, DragValue, FontId, Rect, RectAlign, Response, RichText, Slider, SliderClamping,
+    self, ComboBox, DragValue, FontId, Frame, Rect, RectAlign, Response, RichText, Slider, SliderClamping,
     TextEdit, Tooltip, Ui,
 };
 
@@ -471,11 +471,18 @@ fn fitting(ui: &Ui, text: &str, room: f32) -> FontId {
     FontId::new(size, body.family)
 }
 
-/// What a control is about, beside its panel: the control in use stays in sight.
+/// What a control is about, above or below it within its panel: the control in use and the picture stay in sight.
 fn tooltip(ui: &Ui, response: &Response, player: &Player, parameter: &Parameter, key: &str) {
-    let row = Rect::from_x_y_ranges(ui.clip_rect().x_range(), response.rect.y_range());
-    let mut tooltip = Tooltip::for_enabled(response);
-    tooltip.popup = tooltip.popup.anchor(row).align(RectAlign::RIGHT_START);
+    const ABOVE: [RectAlign; 1] = [RectAlign::TOP_START];
+    let panel = ui.clip_rect().x_range();
+    let row = Rect::from_x_y_ranges(panel, response.rect.y_range());
+    let frame = Frame::popup(ui.style()).total_margin().sum().x;
+    let mut tooltip = Tooltip::for_enabled(response).width(panel.span() - frame);
+    tooltip.popup = tooltip
+        .popup
+        .anchor(row)
+        .align(RectAlign::BOTTOM_START)
+        .align_alternatives(&ABOVE);
     tooltip.show(|ui| {
         ui.strong(parameter.label);
         ui.label(value::typeset(parameter.help));

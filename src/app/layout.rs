@@ -158,6 +158,11 @@ impl App {
             ui.set_style(ui.ctx().global_style());
         }
         self.summary(ui);
+        if self.dialog.is_some() {
+            // Out of reach, and no tooltip stays open above the dialog. The dialog's own backdrop dims what lies under it.
+            ui.visuals_mut().disabled_alpha = 1.0;
+            ui.disable();
+        }
         let margin = if arrangement == Arrangement::Lying {
             egui::Margin::symmetric(12, 4)
         } else {
@@ -398,44 +403,12 @@ impl App {
                 ui.with_layout(backwards, |ui| self.viewport.camera_buttons(ui, true));
             }
         });
-        self.settled_hint(ui, inner);
         drop_hint(ui, area);
         let messages = self.messages(ui, inner);
         self.notice_plate(ui, messages);
         let middle = egui::UiBuilder::new().max_rect(inner.shrink2(egui::vec2(0.0, 44.0)));
         ui.scope_builder(middle, |ui| transport::banner(ui, &self.player))
             .inner
-    }
-
-    /// What to do when nothing happens any more, in the middle of the lower edge.
-    fn settled_hint(&mut self, ui: &mut Ui, area: egui::Rect) {
-        let player = &self.player;
-        if self.hint_dismissed || !player.is_playing() || !player.has_settled() {
-            return;
-        }
-        let words = "Settled: R restarts";
-        let height = ui.spacing().interact_size.y;
-        let size = egui::vec2(160.0 + height, height);
-        let place = egui::Align2::CENTER_BOTTOM.align_size_within_rect(size, area);
-        let row = egui::UiBuilder::new()
-            .max_rect(place)
-            .layout(egui::Layout::left_to_right(egui::Align::Center));
-        let fill = ui.visuals().window_fill.gamma_multiply(0.8);
-        ui.painter().rect_filled(place, 6.0, fill);
-        ui.scope_builder(row, |ui| {
-            ui.add_space(8.0);
-            ui.label(RichText::new(words).weak())
-                .on_hover_text("No ball has struck its socket for 0.2 s of simulated time");
-            let close = ui
-                .add(
-                    egui::Button::new("×")
-                        .frame(false)
-                        .min_size(egui::Vec2::splat(height)),
-                )
-                .on_hover_text("Do not show this again")
-                .accessible_name("Dismiss the hint");
-            self.hint_dismissed |= close.clicked();
-        });
     }
 
     /// What has to be said, over the lower edge of the picture: it comes and goes by itself, and moves nothing. Returns the

@@ -26,6 +26,7 @@ mod picture;
 mod player;
 mod plots;
 mod replay;
+mod settled;
 mod share;
 mod stack;
 mod theme;
@@ -197,7 +198,6 @@ pub struct App {
     show_controls: bool,
     show_plots: bool,
     show_bench: bool,
-    hint_dismissed: bool,
     /// Of a small window: what its sheet shows.
     sheet: Option<Sheet>,
     compact: bool,
@@ -262,7 +262,6 @@ impl App {
             show_controls: true,
             show_plots: true,
             show_bench: false,
-            hint_dismissed: false,
             sheet: Some(Sheet::Controls),
             compact: false,
             touched: false,

@@ -1,7 +1,7 @@
 //! What the interface paints over a picture: labels, the legend of the arrows, the time. Used by the viewport and
 //! by headless frames.
 
-use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, pos2, vec2};
+use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, pos2, vec2};
 
 use super::value;
 use super::viewport::lower_right;
@@ -51,12 +51,18 @@ pub fn labels(painter: &Painter, rect: Rect, scale: f32, list: &DrawList) {
     let halo = colour(list.background.bottom);
     for label in &list.labels {
         let at = rect.min + vec2(label.pixel.x, label.pixel.y) / scale;
-        if let LabelKind::Joint(_) = label.kind {
+        let plate = match label.kind {
+            LabelKind::Joint(_) => Some((13.0, Align2::LEFT_BOTTOM, vec2(10.0, -8.0))),
+            LabelKind::Peak(_) => Some((12.0, Align2::LEFT_CENTER, vec2(9.0, 0.0))),
+            LabelKind::Axis | LabelKind::Gravity => None,
+        };
+        if let Some((size, anchor, beside)) = plate {
             // On a plate of its own: it often lies over a dark part.
-            let font = FontId::proportional(13.0);
+            let font = FontId::proportional(size);
             let words = painter.layout_no_wrap(label.text.to_string(), font, colour(label.colour));
-            let place = Align2::LEFT_BOTTOM.anchor_size(at + vec2(10.0, -8.0), words.size());
-            painter.rect_filled(place.expand2(vec2(4.0, 1.0)), 4.0, halo.gamma_multiply(0.8));
+            let place = anchor.anchor_size(at + beside, words.size());
+            let opacity = 0.8 * label.colour.0[3];
+            painter.rect_filled(place.expand2(vec2(4.0, 1.0)), 4.0, halo.gamma_multiply(opacity));
             painter.galley(place.min, words, colour(label.colour));
             continue;
         }
@@ -188,23 +194,38 @@ pub fn legend(painter: &Painter, rect: Rect, scale: f32, legend: &Legend, theme:
         Scaling::Logarithmic => "Force on the ball, N (logarithmic)".to_owned(),
     };
     if legend.clipped {
-        title.push_str(", longer ones cut");
+        title.push_str(", broken ones are longer");
     }
     at.y = text(painter, at, Align2::RIGHT_BOTTOM, &title, 12.0, ink, halo)
         .min
         .y
         - 2.0;
-    for (name, hue) in [("friction", legend.friction), ("normal", legend.normal)] {
+    for (name, hue, hollow) in [
+        ("friction", legend.friction, false),
+        ("peak before", legend.normal.filter(|_| legend.peaks), true),
+        ("normal", legend.normal, false),
+    ] {
         let Some(hue) = hue else {
             continue;
         };
         let placed = text(painter, at, Align2::RIGHT_BOTTOM, name, 12.0, ink, halo);
-        let y = placed.center().y;
-        painter.arrow(
-            pos2(placed.min.x - 30.0, y),
-            vec2(24.0, 0.0),
-            Stroke::new(2.5, colour(hue)),
-        );
+        let tail = pos2(placed.min.x - 30.0, placed.center().y);
+        if hollow {
+            let outline = [
+                vec2(0.0, -2.0),
+                vec2(15.0, -2.0),
+                vec2(15.0, -4.5),
+                vec2(24.0, 0.0),
+                vec2(15.0, 4.5),
+                vec2(15.0, 2.0),
+                vec2(0.0, 2.0),
+            ];
+            let corners = outline.map(|corner| tail + corner).to_vec();
+            let line = Stroke::new(1.3, colour(hue));
+            painter.add(Shape::closed_line(corners, line));
+        } else {
+            painter.arrow(tail, vec2(24.0, 0.0), Stroke::new(2.5, colour(hue)));
+        }
         at.y = placed.min.y - 1.0;
     }
 }

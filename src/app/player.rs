@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 use web_time::Instant;
 
 use super::log::{Event, Log, Number};
+use super::settled::Settling;
 use super::twin::Twin;
 use super::watch::Watch;
 use crate::analysis::section::Schedule;
@@ -42,8 +43,7 @@ pub struct Player {
     history: History,
     recorded: Frame,
     values: Vec<f64>,
-    /// When a ball last struck, s; `None` before the first time.
-    last_impact: Option<f64>,
+    settling: Settling,
     /// What was before the latest single steps, oldest first.
     past: VecDeque<Before>,
     /// What was done since the start.
@@ -63,14 +63,10 @@ struct Before {
     /// Length of the log.
     entries: usize,
     record: Mark,
-    last_impact: Option<f64>,
 }
 
 /// Keys of the solver that win over its preset.
 const SOLVER_KEYS: [&str; 3] = ["solver.method", "solver.step", "solver.tolerance"];
-
-/// Simulated time without an impact after which the motion counts as settled, s.
-const SETTLED: f64 = 0.2;
 
 /// Single steps that can be taken back.
 const PAST: usize = 64;
@@ -111,7 +107,7 @@ impl Player {
             channels,
             recorded: Frame::default(),
             values: Vec::new(),
-            last_impact: None,
+            settling: Settling::new(scene),
             past: VecDeque::new(),
             stepped: 0.0,
             stepping: 0.0,
@@ -256,10 +252,9 @@ impl Player {
         self.stopped.as_ref()
     }
 
-    /// Whether the balls have struck and now lie in their sockets: no impact for a while.
+    /// Whether the motion relative to the drives has ended.
     pub fn has_settled(&self) -> bool {
-        self.last_impact
-            .is_some_and(|last| self.simulation.time() - last > SETTLED)
+        self.settling.has_settled()
     }
 
     /// Moves on by one frame that comes `dt` seconds after the last, and refreshes what is on show.
@@ -311,7 +306,6 @@ impl Player {
             state: self.simulation.snapshot(),
             entries: self.log.entries.len(),
             record: self.history.mark(),
-            last_impact: self.last_impact,
         });
         self.step();
         self.show_latest();
@@ -329,9 +323,9 @@ impl Player {
             self.unchanged = None;
             self.log.entries.truncate(before.entries);
             self.history.rewind(&before.record);
-            self.last_impact = before.last_impact;
             self.forget_peaks();
             self.watch.back_to(self.simulation.time());
+            self.settling = Settling::new(self.simulation.running_scene());
             self.restart_twin();
             self.show_latest();
         }
@@ -446,6 +440,7 @@ impl Player {
         self.past.clear();
         self.watch
             .begin(self.simulation.running_scene(), self.simulation.time());
+        self.settling = Settling::new(self.simulation.running_scene());
         self.restart_twin();
         self.present();
     }
@@ -577,6 +572,7 @@ impl Player {
         }
         self.history.push(time, &self.values);
         self.watch.record(&frame);
+        self.settling.record(&frame);
         self.recorded = frame;
     }
 
@@ -591,9 +587,6 @@ impl Player {
                 continue;
             }
             self.coming[joint] = Peak::default();
-            if peak.impacts > 0 {
-                self.last_impact = Some(self.simulation.time());
-            }
             if peak.normal > 0.0
                 && let Some(channel) = self.channels.normal_force(joint)
             {
@@ -642,7 +635,7 @@ impl Player {
         self.history.clear();
         self.past.clear();
         self.unchanged = None;
-        self.last_impact = None;
+        self.settling = Settling::new(self.simulation.running_scene());
         // Forces at the start are those of the first frame: nothing has struck yet.
         self.simulation.take_peaks(&mut self.coming);
         self.forget_peaks();

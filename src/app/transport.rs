@@ -53,12 +53,16 @@ pub fn ui(ui: &mut Ui, player: &mut Player) -> Option<Asked> {
             if !narrow {
                 ui.add_space(6.0);
                 speed(ui, player, narrow);
+                settled(ui, player);
             }
             asked
         })
         .inner;
     if narrow {
-        ui.horizontal(|ui| speed(ui, player, narrow));
+        ui.horizontal(|ui| {
+            speed(ui, player, narrow);
+            settled(ui, player);
+        });
     }
     asked
 }
@@ -75,9 +79,25 @@ pub fn row(ui: &mut Ui, player: &mut Player) -> Option<Asked> {
         if ui.available_width() > 120.0 {
             reached(ui, player);
         }
+        settled(ui, player);
         asked
     })
     .inner
+}
+
+/// What to do when nothing happens any more, at the right end, where nothing else gives way for it.
+fn settled(ui: &mut Ui, player: &Player) {
+    if !player.is_playing() || !player.has_settled() || ui.available_width() < 130.0 {
+        return;
+    }
+    ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+        ui.label(RichText::new("Settled: R restarts").weak())
+            .on_hover_text(
+                "The motion relative to the drives has ended: for an eighth of their period no ball with play has left \
+                 its socket's wall or moved along it by more than 15 % of the clearance, and no load has changed by more \
+                 than 25 %. Without drives: no body has moved for 0.5 s.",
+            );
+    });
 }
 
 /// Reset, play and step.

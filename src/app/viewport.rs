@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use eframe::egui::{
-    self, PointerButton, Pos2, Rect, RectAlign, RichText, Role, Sense, Slider, Tooltip, Ui,
+    self, Checkbox, PointerButton, Pos2, Rect, RectAlign, RichText, Role, Sense, Slider, Tooltip, Ui,
     WidgetInfo, pos2, vec2,
 };
 use glam::{Vec2, Vec3};
@@ -14,8 +14,8 @@ use super::{keys, overlay, value};
 use crate::render;
 use crate::simulate::ContactState;
 use crate::view::{
-    ArrowMemory, Camera, DrawList, Picked, Preset, Scaling, SceneView, Shot, Theme, ViewOptions,
-    to_f32,
+    Camera, DrawList, PeakMarks, Picked, Preset, SEEN, Scaling, SceneView, Shot, Theme,
+    ViewOptions, to_f32,
 };
 
 /// Points of the probe's trail that are kept.
@@ -30,7 +30,7 @@ macro_rules! shot {
         Shot {
             scene: $player.scene(),
             frame: $player.frame(),
-            arrows: &$self.arrows,
+            marks: &$self.marks,
             options: &$self.options,
             camera: $camera,
             trail: &$self.trail,
@@ -53,7 +53,7 @@ pub struct Viewport {
     fitted: f32,
     /// While a picture is drawn beside the window: width over height of the view on the screen.
     frozen: Option<f32>,
-    arrows: ArrowMemory,
+    marks: PeakMarks,
     list: Arc<DrawList>,
     trail: Vec<Vec3>,
     followed: Option<Picked>,
@@ -76,7 +76,7 @@ impl Viewport {
             frozen: None,
             view,
             options,
-            arrows: ArrowMemory::new(),
+            marks: PeakMarks::new(),
             list: Arc::new(DrawList::default()),
             trail: Vec::new(),
             followed: None,
@@ -111,9 +111,9 @@ impl Viewport {
 
     /// After a leap in time: what was remembered from before has no part in the picture.
     pub fn arrive(&mut self, player: &Player) {
-        self.arrows.clear();
-        self.trail.clear();
         self.time = player.pacer.shown();
+        self.marks.clear(self.time);
+        self.trail.clear();
     }
 
     /// Shows another scene, or the same one after a reset that changed its shapes; the choices stay.
@@ -124,25 +124,23 @@ impl Viewport {
     /// After a reset: the same shapes at t = 0.
     pub fn restart(&mut self, player: &Player) {
         self.view = SceneView::new(player.scene(), player.frame());
-        self.arrows.clear();
-        self.trail.clear();
+        self.arrive(player);
         self.followed = None;
-        self.time = player.pacer.shown();
     }
 
-    /// Takes what happened since the last frame, `dt` seconds ago: held forces, flashes, trail, moving camera.
+    /// Takes what happened since the last frame, `dt` seconds ago: marks of peaks, flashes, trail, moving camera.
     /// Returns whether something still moves by itself.
     pub fn advance(&mut self, player: &Player, dt: f32) -> bool {
-        // Paused, the arrows stand: what is on show is one instant.
         let shown = player.pacer.shown();
+        let fade = SEEN * player.pacer.scale();
+        self.marks.update(player.frame(), player.peaks(), fade);
         if shown != self.time || player.is_playing() {
+            if shown < self.time {
+                // What comes after the instant on show has not been yet.
+                self.trail.clear();
+            }
             self.time = shown;
-            self.arrows
-                .update(player.frame(), player.peaks(), dt, &self.options.arrows);
             self.extend_trail(player);
-        } else if self.arrows.joints().is_empty() {
-            self.arrows
-                .update(player.frame(), player.peaks(), 0.0, &self.options.arrows);
         }
         if let Some(picked) = self.followed {
             self.camera.follow(self.view.anchor(player.frame(), picked));
@@ -277,13 +275,12 @@ impl Viewport {
             .and_then(|pixel| self.view.pick(&shot, Vec2::new(pixel.x, pixel.y)));
         // egui has dropped the clone of the frame before: nothing is copied.
         self.view.build(&shot, Arc::make_mut(&mut self.list));
+        let list = Arc::make_mut(&mut self.list);
         // One that starts at the end of the step on show has not started yet.
-        if let Some(twin) = player.twin()
-            && twin.frame().time <= player.frame().time
-        {
-            let list = Arc::make_mut(&mut self.list);
-            self.view.add_ghost(&shot, twin.frame(), list);
-        }
+        let ghost = player
+            .twin()
+            .filter(|twin| twin.frame().time <= player.frame().time)
+            .map(|twin| self.view.add_ghost(&shot, twin.frame(), list));
         if response.double_clicked() {
             // A finger that has left hovers over nothing.
             let tapped = response
@@ -304,8 +301,13 @@ impl Viewport {
         if let Some(name) = self.followed.and_then(|picked| name_of(player, picked)) {
             notes.push(format!("following {name}"));
         }
-        if player.twin().is_some() {
-            notes.push("ghost: the twin run".to_owned());
+        if let Some(apart) = ghost {
+            let words = if apart {
+                "ghost: the twin run"
+            } else {
+                "ghost: the twin run, less than a pixel away"
+            };
+            notes.push(words.to_owned());
         }
         overlay::time(
             &painter,
@@ -467,6 +469,11 @@ impl Viewport {
                 .on_hover_text("Normal force on each ball, N");
             ui.checkbox(&mut options.arrows.friction, "Friction")
                 .on_hover_text("Friction force on each ball, N");
+            ui.add_enabled(options.arrows.normal, Checkbox::new(&mut options.arrows.peaks, "Peaks"))
+                .on_hover_text(
+                    "A hollow arrow where a ball has struck: its largest normal force, N, and how long ago that was in \
+                     simulated time. It fades as simulated time passes.",
+                );
         });
         ui.horizontal(|ui| {
             ui.radio_value(&mut options.arrows.scaling, Scaling::Linear, "Linear")
@@ -487,7 +494,7 @@ impl Viewport {
             options.arrows.reference = if automatic {
                 None
             } else {
-                Some(self.arrows.reference(&options.arrows))
+                Some(self.marks.reference(&options.arrows))
             };
         }
         if let Some(reference) = &mut options.arrows.reference {
@@ -503,7 +510,7 @@ impl Viewport {
         ui.add_space(4.0);
         ui.label("Show");
         ui.checkbox(&mut options.flash, "Flash joints that are hit")
-            .on_hover_text("A joint lights up when its ball strikes, brighter for a harder blow");
+            .on_hover_text("A ring of light about a joint when its ball has struck, brighter for a harder blow");
         ui.checkbox(&mut options.joint_names, "Joint names")
             .on_hover_text("Names beside the ball joints");
         ui.checkbox(&mut options.sockets, "Sockets")

@@ -459,6 +459,8 @@ pub enum Hideable {
     Trail,
     /// Flash of a joint that was hit.
     Flash,
+    /// Hollow arrows of peaks that are over.
+    Peaks,
 }
 
 fn change(text: &str) -> Result<(String, String), String> {

@@ -1,7 +1,7 @@
 //! Pictures for a person to look at: `JOINTPLAY_LOOK=folder cargo test --lib render::look -- --ignored`.
 
 use super::Offscreen;
-use crate::view::{ArrowMemory, DrawList, Preset, SceneView, Shot, Theme, ViewOptions, fixture};
+use crate::view::{PeakMarks, DrawList, Preset, SceneView, Shot, Theme, ViewOptions, fixture};
 
 #[test]
 #[ignore = "writes pictures for a person to look at"]
@@ -15,7 +15,7 @@ fn look() {
         ("legs", fixture::three_legs()),
     ] {
         let view = SceneView::new(&scene, &frame);
-        let mut arrows = ArrowMemory::new();
+        let mut marks = PeakMarks::new();
         for (theme, mood) in [(Theme::Light, "light"), (Theme::Dark, "dark")] {
             for (shot, magnification) in [
                 ("whole", 1.0),
@@ -29,16 +29,15 @@ fn look() {
                     magnification,
                     ..Default::default()
                 };
-                arrows.clear();
-                arrows.update(&frame, &[], 0.0, &options.arrows);
+                marks.clear(-1.0);
+                marks.update(&frame, &[], f64::INFINITY);
                 let mut camera = view.camera();
                 match shot {
                     "close" => view.close_up(&mut camera, 0, &scene, &frame, &options),
                     "hit" => {
                         view.close_up(&mut camera, 0, &scene, &frame, &options);
                         camera.distance *= 3.0;
-                        arrows.update(&frame, &fixture::hits(&frame), 0.016, &options.arrows);
-                        arrows.update(&frame, &[], 0.05, &options.arrows);
+                        marks.update(&frame, &fixture::hits(&frame), 1.0);
                     }
                     "front" => {
                         camera.preset(Preset::Front);
@@ -63,7 +62,7 @@ fn look() {
                 let input = Shot {
                     scene: &scene,
                     frame: &frame,
-                    arrows: &arrows,
+                    marks: &marks,
                     options: &options,
                     camera: &camera,
                     trail: &trail,
@@ -94,8 +93,8 @@ fn time() {
     let (scene, frame) = fixture::three_legs();
     let view = SceneView::new(&scene, &frame);
     let (options, camera) = (ViewOptions::default(), view.camera());
-    let mut arrows = ArrowMemory::new();
-    arrows.update(&frame, &fixture::hits(&frame), 0.016, &options.arrows);
+    let mut marks = PeakMarks::new();
+    marks.update(&frame, &fixture::hits(&frame), 1.0);
     let trail = vec![glam::Vec3::ZERO; 1000];
     let mut list = DrawList::default();
     let (mut build, mut record) = (Vec::new(), Vec::new());
@@ -104,7 +103,7 @@ fn time() {
         let shot = Shot {
             scene: &scene,
             frame: &frame,
-            arrows: &arrows,
+            marks: &marks,
             options: &options,
             camera: &camera,
             trail: &trail,

@@ -20,6 +20,8 @@ pub(super) struct Pipelines {
     pub solid: wgpu::RenderPipeline,
     pub floor: wgpu::RenderPipeline,
     pub line: wgpu::RenderPipeline,
+    pub outline: wgpu::RenderPipeline,
+    pub faded: wgpu::RenderPipeline,
     pub ghost: wgpu::RenderPipeline,
     pub halo: wgpu::RenderPipeline,
     pub socket_far: wgpu::RenderPipeline,
@@ -156,9 +158,15 @@ impl Pipelines {
                 buffers: &lines,
                 ..flat("line", "vs_line", "fs_line", TriangleStrip)
             }),
-            // Where it all but coincides with the solid parts it is not seen, rather than in patches.
+            outline: make(Recipe {
+                buffers: &lines,
+                compare: Always,
+                ..flat("outline", "vs_line", "fs_line", TriangleStrip)
+            }),
+            faded: make(glass("faded", "fs_solid", Back)),
+            // Whatever stands there: where it all but coincides with a solid part, depths would take turns.
             ghost: make(Recipe {
-                behind: true,
+                compare: Always,
                 ..glass("ghost", "fs_ghost", Back)
             }),
             halo: make(glass("halo", "fs_halo", Back)),

@@ -26,7 +26,6 @@ struct Globals {
     up: [f32; 4],
     background_top: [f32; 4],
     background_bottom: [f32; 4],
-    flash: [f32; 4],
     picture: [f32; 4],
     floor_centre: [f32; 4],
     floor_along: [f32; 4],
@@ -65,6 +64,7 @@ pub struct Renderer {
     plates: Arc<[MeshData]>,
     instances: Growing,
     lines: Growing,
+    marks: Growing,
     /// All instances of a picture, layer by layer.
     packed: Vec<Instance>,
 }
@@ -137,6 +137,7 @@ impl Renderer {
             plates: Arc::new([]),
             instances: Growing::new(device, "instances"),
             lines: Growing::new(device, "lines"),
+            marks: Growing::new(device, "marks"),
             packed: Vec::new(),
             pipelines,
         }
@@ -159,6 +160,7 @@ impl Renderer {
         }
         self.packed.clear();
         let solid = self.pack(&list.solid);
+        let faded = self.pack(&list.faded);
         let ghost = self.pack(&list.ghost);
         let arrows = self.pack(&list.arrows);
         let overlay = self.pack(&list.overlay);
@@ -168,6 +170,8 @@ impl Renderer {
             .write(device, queue, bytemuck::cast_slice(&self.packed));
         self.lines
             .write(device, queue, bytemuck::cast_slice(&list.lines));
+        self.marks
+            .write(device, queue, bytemuck::cast_slice(&list.marks));
         queue.write_buffer(
             &self.globals,
             0,
@@ -186,6 +190,7 @@ impl Renderer {
             });
             pass.set_bind_group(0, &self.globals_group, &[]);
             self.draw_meshes(&mut pass, &self.pipelines.cast_shadow, &solid);
+            self.draw_meshes(&mut pass, &self.pipelines.cast_shadow, &faded);
         }
 
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -212,17 +217,14 @@ impl Renderer {
             pass.set_pipeline(&pipelines.floor);
             pass.draw(0..4, 0..1);
         }
-        if !list.lines.is_empty() {
-            pass.set_pipeline(&pipelines.line);
-            let bytes = (list.lines.len() * size_of::<Line>()) as u64;
-            pass.set_vertex_buffer(0, self.lines.buffer.slice(..bytes));
-            pass.draw(0..4, 0..list.lines.len() as u32);
-        }
-        self.draw_meshes(&mut pass, &pipelines.ghost, &ghost);
+        draw_lines(&mut pass, &pipelines.line, &self.lines, &list.lines);
+        self.draw_meshes(&mut pass, &pipelines.faded, &faded);
         self.draw_meshes(&mut pass, &pipelines.halo, &halos);
         self.draw_meshes(&mut pass, &pipelines.socket_far, &sockets);
         self.draw_meshes(&mut pass, &pipelines.socket_near, &sockets);
+        self.draw_meshes(&mut pass, &pipelines.ghost, &ghost);
         // After the sockets, so that glass does not dim a force.
+        draw_lines(&mut pass, &pipelines.outline, &self.marks, &list.marks);
         self.draw_meshes(&mut pass, &pipelines.mark_behind, &arrows);
         self.draw_meshes(&mut pass, &pipelines.mark, &arrows);
         self.draw_meshes(&mut pass, &pipelines.overlay, &overlay);
@@ -300,6 +302,21 @@ impl Growing {
     }
 }
 
+fn draw_lines(
+    pass: &mut wgpu::RenderPass<'_>,
+    pipeline: &wgpu::RenderPipeline,
+    buffer: &Growing,
+    lines: &[Line],
+) {
+    if lines.is_empty() {
+        return;
+    }
+    pass.set_pipeline(pipeline);
+    let bytes = size_of_val(lines) as u64;
+    pass.set_vertex_buffer(0, buffer.buffer.slice(..bytes));
+    pass.draw(0..4, 0..lines.len() as u32);
+}
+
 fn depth_attachment(
     view: &wgpu::TextureView,
     store: wgpu::StoreOp,
@@ -355,7 +372,6 @@ fn globals(list: &DrawList, size: [u32; 2]) -> Globals {
         up: with(light.up, 2.0 * light.radius / SHADOW_SIZE as f32),
         background_top: list.background.top.0,
         background_bottom: list.background.bottom.0,
-        flash: list.flash.0,
         picture: [
             size[0] as f32,
             size[1] as f32,

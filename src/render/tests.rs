@@ -7,7 +7,7 @@ use super::{Image, Offscreen, RenderError};
 use crate::scene::Scene;
 use crate::simulate::Frame;
 use crate::view::{
-    ArrowMemory, Camera, DrawList, Preset, SceneView, Shot, Theme, ViewOptions, fixture, to_f32,
+    PeakMarks, Camera, DrawList, Preset, SceneView, Shot, Theme, ViewOptions, fixture, to_f32,
 };
 
 const SIZE: [u32; 2] = [480, 360];
@@ -37,18 +37,18 @@ fn picture(
     hit: bool,
 ) -> DrawList {
     let view = SceneView::new(scene, frame);
-    let mut arrows = ArrowMemory::new();
+    let mut marks = PeakMarks::new();
     let peaks = if hit {
         fixture::hits(frame)
     } else {
         Vec::new()
     };
-    arrows.update(frame, &peaks, 0.0, &options.arrows);
+    marks.update(frame, &peaks, f64::INFINITY);
     let mut list = DrawList::default();
     let shot = Shot {
         scene,
         frame,
-        arrows: &arrows,
+        marks: &marks,
         options,
         camera,
         trail: &[],
@@ -299,6 +299,14 @@ fn a_hit_joint_lights_up_and_themes_differ() {
     let [r0, _, b0] = at(&quiet, &camera, beside).map(i32::from);
     let [r1, _, b1] = at(&hit, &camera, beside).map(i32::from);
     assert!((r1 - b1) - (r0 - b0) > 20, "warm light beside the socket");
+    // Nothing of the joint is painted over: neither the contact nor the ball, nor any of the socket.
+    let centre = to_f32(&frame.joints[0].socket_centre);
+    let (right, up, _) = camera.axes();
+    for k in 0..400 {
+        let (turn, part) = (k as f32 * 2.4, k as f32 / 400.0);
+        let point = centre + 0.0186 * part.sqrt() * (right * turn.cos() + up * turn.sin());
+        assert_eq!(at(&hit, &camera, point), at(&quiet, &camera, point));
+    }
     let dark = draw(
         &ViewOptions {
             theme: Theme::Dark,
@@ -315,6 +323,163 @@ fn a_hit_joint_lights_up_and_themes_differ() {
         true,
     );
     assert_eq!(calm, quiet, "no flash where none is wanted");
+}
+
+/// Pixels at which two pictures differ by more than `by`.
+fn differing(a: &Image, b: &Image, by: u8) -> Vec<[u32; 2]> {
+    let mut found = Vec::new();
+    for y in 0..a.height {
+        for x in 0..a.width {
+            if difference(a.pixel(x, y), b.pixel(x, y)) > by {
+                found.push([x, y]);
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn an_arrow_across_the_sight_covers_as_many_pixels_as_the_ruler_says() {
+    let (scene, mut frame) = fixture::pendulum();
+    let view = SceneView::new(&scene, &frame);
+    let mut options = ViewOptions {
+        sockets: false,
+        floor: false,
+        joint_names: false,
+        ..bare()
+    };
+    options.arrows.normal = true;
+    options.arrows.reference = Some(10.0);
+    let mut device = offscreen();
+    let mut draw = |list: &DrawList| device.render(list).expect("a picture");
+    for (newtons, zoom, shift) in [
+        (8.0, 1.0, [0.0, 0.0]),
+        (8.0, 9.0, [0.0, 0.0]),
+        (8.0, 0.4, [0.7, -0.3]),
+        (3.0, 2.5, [-0.8, 0.2]),
+        (0.6, 1.0, [0.0, 0.0]),
+    ] {
+        let mut camera = view.camera();
+        camera.distance /= zoom;
+        // At another depth than the target, and beside the middle.
+        let (right, up, back) = camera.axes();
+        let half = 0.3 * camera.distance;
+        camera.target = to_f32(&frame.joints[0].socket_centre) + back * (0.5 * camera.distance)
+            - right * (shift[0] * half)
+            - up * (shift[1] * half);
+        let along = (right * 0.8 - up * 0.6).as_dvec3();
+        frame.joints[0].normal_force =
+            crate::scene::Vec3::new(along.x, along.y, along.z) * newtons;
+        let mut list = picture(&scene, &frame, &options, &camera, false);
+        list.solid.by_mesh.iter_mut().for_each(Vec::clear);
+        let with = draw(&list);
+        list.arrows.by_mesh.iter_mut().for_each(Vec::clear);
+        let reach = differing(&with, &draw(&list), 12)
+            .into_iter()
+            .map(|[x, y]| x as f32 * 0.8 + y as f32 * 0.6);
+        let (low, high) = reach.fold((f32::MAX, f32::MIN), |(low, high), at| {
+            (low.min(at), high.max(at))
+        });
+        let ruler = list.legend.as_ref().expect("a ruler").pixels * newtons as f32 / 10.0;
+        let seen = high - low + 1.0;
+        // The tip is a point and the tail a disc seen from its edge: a pixel or two at either end.
+        assert!((seen - ruler).abs() < 4.0, "{newtons} N at {zoom}: {seen} of {ruler}");
+    }
+}
+
+#[test]
+fn a_ghost_in_the_same_place_is_not_seen_in_patches() {
+    let options = ViewOptions {
+        sockets: false,
+        floor: false,
+        ..bare()
+    };
+    let (scene, frame, camera) = close_up(&options);
+    let view = SceneView::new(&scene, &frame);
+    let mut device = offscreen();
+    let plain = picture(&scene, &frame, &options, &camera, false);
+    let without = device.render(&plain).expect("a picture");
+    let back = camera.axes().2.as_dvec3();
+    let centre = to_f32(&(frame.joints[0].socket_centre + 20.0 * frame.joints[0].eccentricity));
+    // A little nearer, and a little farther: its ball lies within the other all but for a hair's breadth.
+    for move_by in [4.0, -4.0] {
+        let metres = move_by * f64::from(camera.metres_per_pixel(SIZE)) / 20.0;
+        let mut ghost = frame.clone();
+        ghost.joints[0].eccentricity +=
+            crate::scene::Vec3::new(back.x, back.y, back.z) * metres;
+        let mut list = plain.clone();
+        let (marks, trail) = (PeakMarks::new(), []);
+        let shot = Shot {
+            scene: &scene,
+            frame: &frame,
+            marks: &marks,
+            options: &options,
+            camera: &camera,
+            trail: &trail,
+            size: SIZE,
+            pixels_per_point: 1.0,
+        };
+        assert!(view.add_ghost(&shot, &ghost, &mut list));
+        let with = device.render(&list).expect("a picture");
+        let (right, up, _) = camera.axes();
+        for k in 0..400 {
+            let (turn, part) = (k as f32 * 2.4, k as f32 / 400.0);
+            let point = centre + 0.009 * part.sqrt() * (right * turn.cos() + up * turn.sin());
+            let change = difference(at(&with, &camera, point), at(&without, &camera, point));
+            assert!(change > 8, "{move_by}: {change} at {point}");
+        }
+    }
+}
+
+#[test]
+fn every_standard_view_shows_what_moves() {
+    let mut device = offscreen();
+    let mut draw = |list: &DrawList| device.render(list).expect("a picture");
+    let options = ViewOptions {
+        floor: false,
+        ..bare()
+    };
+    for name in crate::scene::BUILT_IN {
+        let scene = Scene::load(name, &[]).expect("built in");
+        let mut frame = Frame::default();
+        let mut simulation = crate::simulate::Simulation::new(&scene).expect("starts");
+        for time in [0.0, 0.3] {
+            simulation.advance_to(time).expect("runs");
+            simulation.sample(time, &mut frame);
+            let view = SceneView::new(&scene, &frame);
+            for preset in Preset::ALL {
+                let mut camera = view.camera();
+                camera.preset(preset);
+                view.fit(&mut camera, &scene, &frame, &options, SIZE);
+                let whole = picture(&scene, &frame, &options, &camera, false);
+                let mut free = scene.clone();
+                free.fixed_shapes.clear();
+                let mut moving = picture(&free, &frame, &options, &camera, false);
+                moving.light = whole.light;
+                let (mut fixed, mut nothing) = (whole.clone(), moving.clone());
+                // Fixed parts come first.
+                let both = fixed.solid.by_mesh.iter_mut().zip(&mut nothing.solid.by_mesh);
+                for (fixed, moving) in both {
+                    fixed.truncate(fixed.len() - moving.len());
+                    moving.clear();
+                }
+                fixed.sockets.clear();
+                nothing.sockets.clear();
+                let possible = differing(&draw(&moving), &draw(&nothing), 24);
+                let (whole, fixed) = (draw(&whole), draw(&fixed));
+                let seen = possible
+                    .iter()
+                    .filter(|[x, y]| difference(whole.pixel(*x, *y), fixed.pixel(*x, *y)) > 24);
+                let (seen, possible) = (seen.count(), possible.len());
+                println!("{name} {time} {preset:?}: {seen} of {possible}");
+                assert!(possible > 300, "{name} {preset:?}: {possible}");
+                assert!(
+                    seen as f64 > 0.6 * possible as f64,
+                    "{name} at {time} s, {preset:?}: {seen} of {possible} pixels of what moves are seen"
+                );
+            }
+        }
+    }
 }
 
 #[test]

@@ -1,195 +1,329 @@
-//! Memory of the force arrows: an impact lasts a hundredth of a frame, an eye needs longer.
+//! Force arrows, the ruler that they are read by, and the hollow marks of peaks that are over.
 
 use glam::Vec3;
 
-use super::{ArrowOptions, to_f32};
-use crate::simulate::{Frame, Peak};
+use super::build::{bar, push_label};
+use super::drawn::DrawnJoint;
+use super::theme::Material;
+use super::{
+    Camera, Colour, DrawList, LabelKind, Layer, Legend, Line, Mark, Mesh, Palette, Scaling, Shot,
+    Tick, to_f32,
+};
+use crate::scene::format_quantity_digits;
 
-/// What one joint's arrows show.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct HeldForce {
-    /// Normal force on the ball, N (reaction of an ideal joint).
-    pub normal: Vec3,
-    /// Friction force on the ball, N.
-    pub friction: Vec3,
-    /// Brightness of the flash, 0..=1.
-    pub flash: f32,
+/// Reference length of arrows, in heights of the picture.
+pub(super) const ARROW_LENGTH: f32 = 0.22;
+/// Longest arrow, in reference lengths.
+const LONGEST_ARROW: f32 = 2.5;
+/// Radius of the thickest shaft, in heights of the picture.
+const THICKEST: f32 = 0.0045;
+/// Length of an arrow that is as thick as it may be, in radii of its shaft; a shorter one is thinner in proportion.
+const STOUTEST: f32 = 10.0;
+/// Length and radius of a head, in radii of the shaft.
+const HEAD: [f32; 2] = [5.5, 2.3];
+/// Where the shaft of an arrow that is longer than can be drawn is left out, from tail to neck.
+const BREAK: [[f32; 2]; 3] = [[0.0, 0.44], [0.48, 0.52], [0.56, 1.0]];
+/// Width of the outline of a mark, points.
+const OUTLINE: f32 = 1.8;
+
+/// A shaft with its head.
+#[derive(Clone, Copy)]
+pub(super) struct Arrow {
+    pub tail: Vec3,
+    pub along: Vec3,
+    /// Of the shaft, m.
+    pub radius: f32,
+    /// Longer than it is drawn.
+    pub broken: bool,
 }
 
-/// Forces held since their peaks, fading. Deterministic: depends on what it was given and nothing else.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct ArrowMemory {
-    joints: Vec<HeldForce>,
-    /// Largest force held lately, N: what the automatic scale follows.
-    largest: f32,
+impl Arrow {
+    /// At most as thick as `radius` says.
+    pub fn new(tail: Vec3, along: Vec3, radius: f32) -> Self {
+        Self {
+            tail,
+            along,
+            radius: radius.min(along.length() / STOUTEST),
+            broken: false,
+        }
+    }
+
+    fn neck(&self) -> Vec3 {
+        let length = self.along.length();
+        self.along * ((length - HEAD[0] * self.radius) / length)
+    }
+
+    pub fn push(&self, layer: &mut Layer, colour: Colour) {
+        if !(self.radius > 0.0 && self.radius.is_finite()) {
+            return;
+        }
+        let material = Material {
+            colour,
+            roughness: 0.55,
+            metal: 0.0,
+        };
+        let (neck, radius) = (self.neck(), self.radius);
+        let pieces = if self.broken {
+            &BREAK[..]
+        } else {
+            &[[0.0, 1.0]][..]
+        };
+        for [from, to] in pieces {
+            let piece = bar(
+                self.tail + neck * *from,
+                neck * (to - from),
+                radius,
+                material,
+            );
+            layer.push(Mesh::Cylinder, piece);
+        }
+        let head = bar(self.tail + neck, self.along - neck, HEAD[1] * radius, material);
+        layer.push(Mesh::Cone, head);
+    }
+
+    /// Its outline as seen from `eye`.
+    fn outline(&self, eye: Vec3, colour: Colour, width: f32, lines: &mut Vec<Line>) {
+        let side = self.along.cross(eye - self.tail).normalize_or_zero();
+        let neck = self.tail + self.neck();
+        let (shaft, head) = (side * self.radius, side * (HEAD[1] * self.radius));
+        let corners = [
+            self.tail - shaft,
+            neck - shaft,
+            neck - head,
+            self.tail + self.along,
+            neck + head,
+            neck + shaft,
+            self.tail + shaft,
+        ];
+        lines.extend((0..corners.len()).map(|i| Line {
+            from: corners[i].to_array(),
+            width,
+            to: corners[(i + 1) % corners.len()].to_array(),
+            pad: 0.0,
+            from_colour: colour.0,
+            to_colour: colour.0,
+        }));
+    }
 }
 
-/// A flash fades by half in this time, s.
-const FLASH_HALF_LIFE: f32 = 0.10;
-/// The automatic scale shrinks by half in this time, s: slowly, so that lengths can be compared.
-const SCALE_HALF_LIFE: f32 = 2.0;
+/// Turns pixels into lengths in the scene.
+struct Ruler {
+    eye: Vec3,
+    axes: (Vec3, Vec3, Vec3),
+    /// Pixels of a slope of 1.
+    slope: f32,
+}
 
-impl ArrowMemory {
-    /// Nothing held.
-    pub fn new() -> Self {
-        Self::default()
+impl Ruler {
+    fn new(camera: &Camera, size: [u32; 2]) -> Self {
+        Self {
+            eye: camera.eye(),
+            axes: camera.axes(),
+            slope: size[1] as f32 / (2.0 * (camera.field_of_view / 2.0).tan()),
+        }
     }
 
-    /// Forgets everything, as after a reset.
-    pub fn clear(&mut self) {
-        *self = Self::default();
+    /// Length, m, of a line from `tail` along the unit vector `along` that is `pixels` long on the screen where it lies
+    /// across the line of sight, whether that means parallel to the picture or square to the ray from the eye, and never
+    /// longer; and the size of a pixel there, m. `None` behind the eye.
+    ///
+    /// In slopes (x, y) of the picture and depth z the end of a line of length s lies at (p + s q) / (z + s w), q and w the
+    /// parts of `along` in the picture and away from the eye. Its start is p / z, so it has s |q - p w / z| / (z + s w) of
+    /// slope: solved for s. The size of q - p w / z is 1 in the picture's plane, 0 along the ray, and more than 1 where a
+    /// wide picture stretches what is square to the ray.
+    fn measure(&self, tail: Vec3, along: Vec3, pixels: f32) -> Option<(f32, f32)> {
+        let (right, up, back) = self.axes;
+        let from_eye = tail - self.eye;
+        let (depth, away) = (-from_eye.dot(back), -along.dot(back));
+        let across = |axis: Vec3| along.dot(axis) - from_eye.dot(axis) / depth * away;
+        let stretch = across(right).hypot(across(up)).max(1.0);
+        let length = pixels * depth / (self.slope * stretch - pixels * away);
+        let pixel = depth / self.slope;
+        (pixel > 0.0 && length.is_finite() && length > 0.0).then_some((length, pixel))
     }
+}
 
-    /// What each ball joint shows, scene order.
-    pub fn joints(&self) -> &[HeldForce] {
-        &self.joints
+/// Length of an arrow in reference lengths, and whether it had to be cut.
+fn arrow_length(force: f32, reference: f32, scaling: Scaling) -> (f32, bool) {
+    let ratio = force / reference;
+    let length = match scaling {
+        Scaling::Linear => ratio,
+        Scaling::Logarithmic => (1.0 + 999.0 * ratio).log10() / 3.0,
+    };
+    (length.min(LONGEST_ARROW), length > LONGEST_ARROW)
+}
+
+/// Arrows of the forces of the instant on show, marks of the peaks before it, and how to read them.
+pub(super) fn push_forces(
+    shot: &Shot<'_>,
+    joints: &[DrawnJoint],
+    palette: &Palette,
+    out: &mut DrawList,
+) {
+    let options = &shot.options.arrows;
+    if !(options.normal || options.friction) || joints.is_empty() {
+        return;
     }
-
-    /// Takes what happened since the last picture: `peaks` (one per ball joint, or empty), the forces of `frame`, and
-    /// `dt` seconds of viewing time. The strongest of held, peak and present force is kept.
-    pub fn update(&mut self, frame: &Frame, peaks: &[Peak], dt: f32, options: &ArrowOptions) {
-        let dt = dt.max(0.0);
-        let fade = |half_life: f32| (-dt / half_life.max(1e-3)).exp2();
-        let (fade_force, fade_flash) = (fade(options.half_life), fade(FLASH_HALF_LIFE));
-        self.joints.resize(frame.joints.len(), HeldForce::default());
-        let hardest = peaks
-            .iter()
-            .map(|peak| peak.normal as f32)
-            .fold(0.0, f32::max);
-        let mut largest = 0.0_f32;
-        for (i, (held, now)) in self.joints.iter_mut().zip(&frame.joints).enumerate() {
-            held.normal *= fade_force;
-            held.friction *= fade_force;
-            held.flash *= fade_flash;
-            if let Some(peak) = peaks.get(i) {
-                hold(
-                    held,
-                    to_f32(&peak.normal_force),
-                    to_f32(&peak.friction_force),
-                );
-                if peak.impacts > 0 {
-                    // A touch a hundred times softer than the hardest lately still shows, but does not dazzle.
-                    let relative =
-                        peak.normal as f32 / self.largest.max(hardest).max(f32::MIN_POSITIVE);
-                    held.flash = held.flash.max(relative.clamp(0.0, 1.0).sqrt().max(0.15));
-                }
+    let ruler = Ruler::new(shot.camera, shot.size);
+    let height = shot.size[1] as f32;
+    let reference = shot.marks.reference(options);
+    let mut clipped = false;
+    // `None` of no force.
+    let mut arrow = |force: Vec3, tail: Vec3| {
+        let along = force.try_normalize()?;
+        let (length, broken) = arrow_length(force.length(), reference, options.scaling);
+        let (length, pixel) = ruler.measure(tail, along, length * ARROW_LENGTH * height)?;
+        clipped |= broken;
+        Some(Arrow {
+            broken,
+            ..Arrow::new(tail, along * length, THICKEST * height * pixel)
+        })
+    };
+    for (joint, report) in joints.iter().zip(&shot.frame.joints) {
+        let normal = to_f32(&report.normal_force);
+        // The wall pushes the ball away from the point of contact, so that lies against the normal force.
+        let contact = joint.ball_centre - normal.normalize_or_zero() * joint.ball_radius;
+        let friction = to_f32(&report.friction_force);
+        for (shown, force, colour) in [
+            (options.normal, normal, palette.normal),
+            (options.friction, friction, palette.friction),
+        ] {
+            if let Some(arrow) = shown.then(|| arrow(force, contact)).flatten() {
+                arrow.push(&mut out.arrows, colour);
             }
-            hold(held, to_f32(&now.normal_force), to_f32(&now.friction_force));
-            largest = largest.max(held.normal.length());
-        }
-        self.largest = largest.max(self.largest * fade(SCALE_HALF_LIFE));
-    }
-
-    /// Force of the reference length: the option's, or the largest held, rounded up to 1, 2 or 5 times a power of ten.
-    pub fn reference(&self, options: &ArrowOptions) -> f32 {
-        match options.reference {
-            Some(force) if force.is_finite() && force > 0.0 => force,
-            _ => round_up_125(self.largest),
         }
     }
+    let marked = options.normal && options.peaks;
+    for mark in shot.marks.marks(shot.frame).filter(|_| marked) {
+        let Some(joint) = joints.get(mark.joint) else {
+            continue;
+        };
+        // On the wall that was struck.
+        let contact = joint.socket_centre - mark.force.normalize_or_zero() * joint.inner;
+        if let Some(arrow) = arrow(mark.force, contact) {
+            let colour = palette.normal.with_opacity(mark.strength.sqrt());
+            let width = OUTLINE * shot.pixels_per_point;
+            arrow.outline(ruler.eye, colour, width, &mut out.marks);
+            let kind = LabelKind::Peak(mark.joint);
+            push_label(out, &words(&mark).into(), kind, arrow.tail + arrow.along, colour);
+        }
+    }
+    let marks: &[f32] = match options.scaling {
+        Scaling::Linear => &[0.5, 1.0],
+        Scaling::Logarithmic => &[0.001, 0.01, 0.1, 1.0],
+    };
+    let tick = |mark: &f32| Tick {
+        force: mark * reference,
+        fraction: arrow_length(mark * reference, reference, options.scaling).0,
+    };
+    out.legend = Some(Legend {
+        reference,
+        pixels: ARROW_LENGTH * height,
+        scaling: options.scaling,
+        automatic: options.reference.is_none(),
+        clipped,
+        ticks: marks.iter().map(tick).collect(),
+        normal: options.normal.then_some(palette.normal),
+        peaks: marked,
+        friction: options.friction.then_some(palette.friction),
+    });
 }
 
-/// Normal and friction belong to one instant: the stronger normal force brings its friction along.
-fn hold(held: &mut HeldForce, normal: Vec3, friction: Vec3) {
-    if normal.is_finite()
-        && friction.is_finite()
-        && normal.length_squared() >= held.normal.length_squared()
-    {
-        (held.normal, held.friction) = (normal, friction);
-    }
+/// How hard, and how long ago in simulated time.
+fn words(mark: &Mark) -> String {
+    let (ago, unit) = match mark.age {
+        age if age < 0.9995e-3 => (age * 1e6, "µs"),
+        age if age < 0.9995 => (age * 1e3, "ms"),
+        age => (age, "s"),
+    };
+    let force = format_quantity_digits(f64::from(mark.force.length()), "N", 3);
+    format!("peak {force}, {} {unit} ago", format_quantity_digits(ago, "", 2))
 }
 
-/// Least of …, 1, 2, 5, 10, 20, … that is not below `x`; 1 where `x` is not positive.
-fn round_up_125(x: f32) -> f32 {
-    if !(x.is_finite() && x > 1e-6) {
-        return 1.0;
-    }
-    let decade = 10_f32.powi(x.log10().floor() as i32);
-    [1.0, 2.0, 5.0]
-        .into_iter()
-        .map(|k| k * decade)
-        .find(|&step| step >= x * 0.9999)
-        .unwrap_or(10.0 * decade)
+/// An arrow of the triad.
+pub(super) fn push_arrow(layer: &mut Layer, tail: Vec3, along: Vec3, radius: f32, colour: Colour) {
+    Arrow::new(tail, along, radius).push(layer, colour);
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene;
-    use crate::simulate::JointReport;
+    use crate::scene::SignedAxis;
+    use crate::view::Bounds;
 
-    fn frame(normal: f64) -> Frame {
-        let report = JointReport {
-            normal_force: scene::Vec3::new(0.0, 0.0, normal),
-            ..Default::default()
+    #[test]
+    fn a_line_across_the_sight_has_its_length_in_pixels_everywhere() {
+        const SIZE: [u32; 2] = [1600, 700];
+        const PIXELS: f32 = 154.0;
+        let bounds = Bounds {
+            centre: Vec3::new(0.1, -0.2, 0.3),
+            radius: 0.4,
         };
-        Frame {
-            joints: vec![report],
-            ..Default::default()
+        let mut checked = 0;
+        for (field_of_view, zoom) in [(0.6, 1.0), (0.6, 12.0), (1.2, 1.0), (0.2, 0.3)] {
+            let mut camera = Camera::new(SignedAxis::PlusX, bounds);
+            camera.field_of_view = field_of_view;
+            camera.distance /= zoom;
+            let ruler = Ruler::new(&camera, SIZE);
+            let (right, up, back) = camera.axes();
+            for (x, y) in [(0.5, 0.5), (0.15, 0.5), (0.9, 0.8), (0.6, 0.1)] {
+                let pixel = glam::Vec2::new(x * SIZE[0] as f32, y * SIZE[1] as f32);
+                let (eye, ray) = camera.ray(pixel, SIZE);
+                for depth in [0.3, 1.0, 2.0] {
+                    let tail = eye + ray * (depth * camera.distance);
+                    for turn in 0..12 {
+                        let (sin, cos) = (turn as f32 * 0.5236).sin_cos();
+                        let in_picture = right * cos + up * sin;
+                        let square = in_picture.reject_from(ray).normalize();
+                        let length = |along: Vec3| {
+                            let (length, _) = ruler.measure(tail, along, PIXELS).expect("seen");
+                            let end = camera.project(tail + along * length, SIZE);
+                            end.expect("seen").distance(pixel)
+                        };
+                        for along in [in_picture, square] {
+                            let seen = length(along);
+                            assert!((seen - PIXELS).abs() < 0.01 * PIXELS, "{along}: {seen}");
+                            checked += 1;
+                        }
+                        // Towards the eye or away from it, it is shorter.
+                        for tilt in [0.7, -0.7] {
+                            let seen = length((in_picture + back * tilt).normalize());
+                            assert!(seen <= PIXELS * 1.001, "{seen}");
+                        }
+                        let seen = length(-ray);
+                        assert!(seen < 1.0, "along the ray: {seen}");
+                    }
+                }
+            }
         }
-    }
-
-    fn hit(normal: f64) -> Peak {
-        Peak {
-            normal,
-            normal_force: scene::Vec3::new(normal, 0.0, 0.0),
-            friction_force: scene::Vec3::new(0.0, 0.1 * normal, 0.0),
-            impacts: 1,
-            ..Default::default()
-        }
+        assert!(checked > 1000);
     }
 
     #[test]
-    fn a_peak_between_two_frames_is_held_and_halves_in_its_half_life() {
-        let options = ArrowOptions {
-            half_life: 0.2,
-            ..Default::default()
+    fn an_arrow_that_would_be_too_long_is_broken() {
+        let arrow = Arrow {
+            broken: true,
+            ..Arrow::new(Vec3::ZERO, Vec3::X, 0.01)
         };
-        let mut memory = ArrowMemory::new();
-        memory.update(&frame(0.0), &[hit(800.0)], 0.016, &options);
-        assert_eq!(memory.joints()[0].normal, Vec3::new(800.0, 0.0, 0.0));
-        assert_eq!(memory.joints()[0].friction, Vec3::new(0.0, 80.0, 0.0));
-        assert_eq!(memory.joints()[0].flash, 1.0);
-        memory.update(&frame(0.0), &[Peak::default()], 0.2, &options);
-        assert!((memory.joints()[0].normal.x - 400.0).abs() < 1e-2);
-        assert!(
-            (memory.joints()[0].flash - 0.25).abs() < 1e-3,
-            "two half-lives of the flash"
-        );
+        let mut layer = Layer::default();
+        layer.clear(Mesh::SHARED);
+        arrow.push(&mut layer, Colour::hex(0));
+        assert_eq!(layer.by_mesh[Mesh::Cylinder.index()].len(), 3);
+        let linear = |force| arrow_length(force, 100.0, Scaling::Linear);
+        assert_eq!((linear(250.0), linear(300.0)), ((2.5, false), (2.5, true)));
     }
 
     #[test]
-    fn a_lasting_force_outlives_a_faded_peak() {
-        let options = ArrowOptions::default();
-        let mut memory = ArrowMemory::new();
-        memory.update(&frame(8.0), &[hit(800.0)], 0.016, &options);
-        for _ in 0..200 {
-            memory.update(&frame(8.0), &[], 0.016, &options);
-        }
-        assert_eq!(memory.joints()[0].normal, Vec3::new(0.0, 0.0, 8.0));
-    }
-
-    #[test]
-    fn the_scale_is_a_round_number_that_covers_the_largest_force() {
-        for (x, expect) in [
-            (0.0, 1.0),
-            (0.9, 1.0),
-            (1.0, 1.0),
-            (1.1, 2.0),
-            (3.0, 5.0),
-            (621.0, 1000.0),
-            (771.0, 1000.0),
-        ] {
-            assert!(
-                (round_up_125(x) / expect - 1.0).abs() < 1e-5,
-                "{x}: {}",
-                round_up_125(x)
-            );
-        }
-        let fixed = ArrowOptions {
-            reference: Some(30.0),
-            ..Default::default()
+    fn a_peak_is_told_with_three_digits_and_its_age_in_a_fitting_unit() {
+        let mark = |age: f64| Mark {
+            joint: 0,
+            force: Vec3::new(0.0, 870.6, 0.0),
+            age,
+            strength: 1.0,
         };
-        assert_eq!(ArrowMemory::new().reference(&fixed), 30.0);
+        assert_eq!(words(&mark(2.14e-3)), "peak 871 N, 2.1 ms ago");
+        assert_eq!(words(&mark(38.4e-6)), "peak 871 N, 38 µs ago");
+        assert_eq!(words(&mark(0.312)), "peak 871 N, 310 ms ago");
+        assert_eq!(words(&mark(1.26)), "peak 871 N, 1.3 s ago");
     }
 }

@@ -3,13 +3,15 @@
 use std::sync::Arc;
 
 use glam::{Mat3, Quat, Vec2, Vec3, Vec4};
+use parry3d::query::Ray;
 
-use super::arrows::ArrowMemory;
+use super::arrows::{ARROW_LENGTH, push_arrow, push_forces};
 use super::drawn::{self, BarKind, DrawnJoint, Part, Solid};
+use super::pick::cast;
 use super::theme::Material;
 use super::{
-    ArrowOptions, Background, Bounds, Camera, Colour, DrawList, Floor, Instance, Label, LabelKind,
-    Layer, Legend, Light, Line, Mesh, MeshData, Palette, Scaling, Tick, ViewOptions, to_f32,
+    Background, Bounds, Camera, Colour, DrawList, Floor, Instance, Label, LabelKind, Layer, Light,
+    Line, Mesh, MeshData, Palette, PeakMarks, ViewOptions, to_f32,
 };
 use crate::scene::{Scene, SignedAxis};
 use crate::simulate::Frame;
@@ -25,6 +27,10 @@ pub struct SceneView {
     isometric: Option<(f64, f64)>,
     /// Coordinate of the floor along `down`, m.
     floor: f32,
+    /// Greatest outer radius of each drawn socket, m: where its carrier begins.
+    pub(super) room: Vec<f32>,
+    /// Points of the moving parts, m: what a fixed part that is in the way hides.
+    watched: Vec<Vec3>,
 }
 
 /// One picture: everything [`SceneView::build`] reads.
@@ -34,8 +40,8 @@ pub struct Shot<'a> {
     pub scene: &'a Scene,
     /// The instant.
     pub frame: &'a Frame,
-    /// Held forces.
-    pub arrows: &'a ArrowMemory,
+    /// Peaks that are over.
+    pub marks: &'a PeakMarks,
     /// Choices.
     pub options: &'a ViewOptions,
     /// Point of view.
@@ -48,12 +54,10 @@ pub struct Shot<'a> {
     pub pixels_per_point: f32,
 }
 
-/// Reference length of arrows, in heights of the picture.
-const ARROW_LENGTH: f32 = 0.22;
 /// Least edge of a picture that has room for the triad, points.
 const SMALLEST_WITH_TRIAD: f32 = 200.0;
-/// Longest arrow, in reference lengths.
-const LONGEST_ARROW: f32 = 2.5;
+/// Radius of the light about a joint that was hit, in radii of its socket.
+const HALO: f32 = 1.7;
 
 impl SceneView {
     /// Prepares the meshes and bounds of `scene`; `frame` is any frame of it, best the first.
@@ -73,7 +77,21 @@ impl SceneView {
             None if lowest.is_finite() => lowest + 0.15 * bounds.radius,
             None => bounds.radius,
         };
+        let room = drawn::room(scene, &parts, frame, &joints);
+        let moving = parts.iter().filter(|part| part.body.is_some());
+        let mut watched = Vec::new();
+        for part in moving {
+            let mut ends = Vec::new();
+            part.place(frame, &joints).extent(|point, _| ends.push(point));
+            let middle = ends.iter().sum::<Vec3>() / ends.len().max(1) as f32;
+            watched.push(middle);
+            // A bar is long: its ends count, too.
+            watched.extend(ends.into_iter().take(2).filter(|_| part.is_bar()));
+        }
+        watched.retain(|point| point.is_finite());
         Self {
+            room,
+            watched,
             parts,
             plates: plates.into(),
             joint_names: scene
@@ -136,8 +154,37 @@ impl SceneView {
         }
     }
 
+    /// What is drawn where `options` ask for a magnification.
+    pub(super) fn magnification(
+        &self,
+        scene: &Scene,
+        frame: &Frame,
+        options: &ViewOptions,
+    ) -> f32 {
+        drawn::magnification(scene, frame, &self.room, options.magnification)
+    }
+
+    /// Opacity of part `index` from `eye`: a fixed part before much of what moves is seen through. It follows from the
+    /// first frame, so that it changes with the point of view alone.
+    pub(super) fn opacity(&self, index: usize, eye: Vec3) -> f32 {
+        const HIDES: [f32; 2] = [0.06, 0.18];
+        const LEAST: f32 = 0.22;
+        if self.parts[index].body.is_some() || self.watched.is_empty() {
+            return 1.0;
+        }
+        let solid = self.parts[index].place(&Frame::default(), &[]);
+        let hidden = |point: &&Vec3| {
+            let to_point = **point - eye;
+            let ray = Ray::new(eye, to_point.normalize_or_zero());
+            cast(&solid, &ray).is_some_and(|distance| distance < to_point.length())
+        };
+        let share = self.watched.iter().filter(hidden).count() as f32 / self.watched.len() as f32;
+        let t = ((share - HIDES[0]) / (HIDES[1] - HIDES[0])).clamp(0.0, 1.0);
+        1.0 - (1.0 - LEAST) * t * t * (3.0 - 2.0 * t)
+    }
+
     fn extents(&self, scene: &Scene, frame: &Frame, options: &ViewOptions) -> Vec<(Vec3, f32)> {
-        let m = drawn::magnification(scene, frame, options.magnification);
+        let m = self.magnification(scene, frame, options);
         let joints = drawn::joints(scene, frame, m);
         let mut extents = extents(&self.parts, frame, &joints);
         // Half a reference length of arrows around each joint: they lean any way, and most are shorter. Drawn or not, so
@@ -156,7 +203,7 @@ impl SceneView {
         frame: &Frame,
         options: &ViewOptions,
     ) {
-        let m = drawn::magnification(scene, frame, options.magnification);
+        let m = self.magnification(scene, frame, options);
         if let Some(drawn) = drawn::joints(scene, frame, m).get(joint) {
             camera.close_up(drawn.socket_centre, drawn.opening, 2.2 * drawn.outer);
         }
@@ -174,36 +221,36 @@ impl SceneView {
         let palette = Palette::of(options.theme);
         self.start(shot, &palette, out);
 
-        let m = drawn::magnification(scene, frame, options.magnification);
+        let m = self.magnification(scene, frame, options);
         out.magnification = m;
         out.magnification_text = magnification_text(m, options.magnification);
         let joints = drawn::joints(scene, frame, m);
-        for part in &self.parts {
-            push_solid(
-                &mut out.solid,
-                &part.place(frame, &joints),
-                palette.material(part.role),
-            );
+        let eye = camera.eye();
+        for (i, part) in self.parts.iter().enumerate() {
+            let opacity = self.opacity(i, eye);
+            let layer = if opacity < 1.0 {
+                &mut out.faded
+            } else {
+                &mut out.solid
+            };
+            let material = palette.material(part.role).with_opacity(opacity);
+            push_solid(layer, &part.place(frame, &joints), material);
         }
         for (i, joint) in joints.iter().enumerate() {
-            let glow = if options.flash {
-                shot.arrows.joints().get(i).map_or(0.0, |held| held.flash)
-            } else {
-                0.0
-            };
             let ball = placed(
                 Mat3::from_diagonal(Vec3::splat(joint.ball_radius)),
                 joint.ball_centre,
                 palette.ball,
             );
-            out.solid.push(Mesh::Sphere, Instance { glow, ..ball });
-            if glow > 0.02 {
-                let halo = placed(
-                    Mat3::from_diagonal(Vec3::splat(1.7 * joint.outer)),
-                    joint.socket_centre,
-                    palette.ball,
-                );
-                out.halos.push(Instance { glow, ..halo });
+            out.solid.push(Mesh::Sphere, ball);
+            let flash = shot.marks.flash(i);
+            if options.flash && flash > 0.02 {
+                let light = Material {
+                    colour: palette.flash.with_opacity(flash),
+                    ..palette.ball
+                };
+                let size = Mat3::from_diagonal(Vec3::splat(HALO * joint.outer));
+                out.halos.push(placed(size, joint.socket_centre, light));
             }
             if options.sockets {
                 let half = |opening, material| {
@@ -214,10 +261,7 @@ impl SceneView {
                         ..socket
                     }
                 };
-                out.sockets.push(Instance {
-                    glow,
-                    ..half(joint.opening, palette.socket)
-                });
+                out.sockets.push(half(joint.opening, palette.socket));
                 // The half that is cut away stays as a breath: a ball that touches there is still in its socket.
                 let colour = palette
                     .socket
@@ -232,7 +276,6 @@ impl SceneView {
                 ));
             }
         }
-        let eye = camera.eye();
         let distance = |socket: &Instance| {
             let [x, y, z] = socket.world_from_mesh;
             Vec3::new(x[3], y[3], z[3]).distance_squared(eye)
@@ -240,7 +283,7 @@ impl SceneView {
         out.sockets
             .sort_by(|a, b| distance(b).total_cmp(&distance(a)));
 
-        push_arrows(shot, &joints, &palette, out);
+        push_forces(shot, &joints, &palette, out);
         if options.trail {
             push_trail(shot, &palette, &mut out.lines);
         }
@@ -257,24 +300,50 @@ impl SceneView {
     }
 
     /// Adds the moving parts as they stand in `ghost`, another state of the scene of `shot`, to the list that was built of
-    /// it. Where both states are the same nothing is seen.
-    pub fn add_ghost(&self, shot: &Shot<'_>, ghost: &Frame, out: &mut DrawList) {
+    /// it, each the clearer the farther it stands from its place there; whether any differs by a pixel or more.
+    pub fn add_ghost(&self, shot: &Shot<'_>, ghost: &Frame, out: &mut DrawList) -> bool {
         let palette = Palette::of(shot.options.theme);
-        let joints = drawn::joints(shot.scene, ghost, out.magnification);
+        let at = |frame| drawn::joints(shot.scene, frame, out.magnification);
+        let (here, there) = (at(shot.frame), at(ghost));
+        let (eye, back) = (shot.camera.eye(), shot.camera.axes().2);
+        let target = shot.camera.metres_per_pixel(shot.size) / shot.camera.distance;
+        // From one pixel to three.
+        let material = |from: Vec3, to: Vec3| {
+            let pixel = target * (eye - to).dot(back);
+            let seen = (from.distance(to) / pixel / shot.pixels_per_point - 0.5) / 2.5;
+            let opacity = palette.ghost.colour.0[3] * seen.clamp(0.0, 1.0);
+            (pixel > 0.0 && opacity > 0.0).then(|| palette.ghost.with_opacity(opacity))
+        };
         for part in self.parts.iter().filter(|part| part.body.is_some()) {
-            push_solid(&mut out.ghost, &part.place(ghost, &joints), palette.ghost);
+            let (from, to) = (part.place(shot.frame, &here), part.place(ghost, &there));
+            let (mut starts, mut farthest) = (Vec::new(), (0.0, Vec3::ZERO, Vec3::ZERO));
+            from.extent(|point, _| starts.push(point));
+            let mut starts = starts.into_iter();
+            to.extent(|point, _| {
+                let start = starts.next().unwrap_or(point);
+                if start.distance(point) > farthest.0 {
+                    farthest = (start.distance(point), start, point);
+                }
+            });
+            if let Some(material) = material(farthest.1, farthest.2) {
+                push_solid(&mut out.ghost, &to, material);
+            }
         }
-        for joint in &joints {
-            let size = Mat3::from_diagonal(Vec3::splat(joint.ball_radius));
-            let ball = placed(size, joint.ball_centre, palette.ghost);
-            out.ghost.push(Mesh::Sphere, ball);
+        for (from, to) in here.iter().zip(&there) {
+            if let Some(material) = material(from.ball_centre, to.ball_centre) {
+                let size = Mat3::from_diagonal(Vec3::splat(to.ball_radius));
+                let ball = placed(size, to.ball_centre, material);
+                out.ghost.push(Mesh::Sphere, ball);
+            }
         }
+        !out.ghost.is_empty()
     }
 
     fn start(&self, shot: &Shot<'_>, palette: &Palette, out: &mut DrawList) {
         let meshes = Mesh::SHARED + self.plates.len();
         for layer in [
             &mut out.solid,
+            &mut out.faded,
             &mut out.ghost,
             &mut out.arrows,
             &mut out.overlay,
@@ -284,6 +353,7 @@ impl SceneView {
         out.halos.clear();
         out.sockets.clear();
         out.lines.clear();
+        out.marks.clear();
         out.labels.clear();
         out.legend = None;
         out.size = shot.size;
@@ -293,7 +363,6 @@ impl SceneView {
             bottom: palette.ground,
         };
         out.exposure = palette.exposure;
-        out.flash = palette.flash;
         if !Arc::ptr_eq(&out.plates, &self.plates) {
             out.plates = self.plates.clone();
         }
@@ -448,13 +517,13 @@ fn placed(linear: Mat3, at: Vec3, material: Material) -> Instance {
         colour: material.colour.0,
         roughness: material.roughness,
         metal: material.metal,
-        glow: 0.0,
         inner_radius: 0.0,
+        pad: 0.0,
     }
 }
 
 /// A bar mesh (axis z from 0 to 1) from `from` along `along`.
-fn bar(from: Vec3, along: Vec3, radius: f32, material: Material) -> Instance {
+pub(super) fn bar(from: Vec3, along: Vec3, radius: f32, material: Material) -> Instance {
     let turn = Mat3::from_quat(Quat::from_rotation_arc(
         Vec3::Z,
         along.normalize_or(Vec3::Z),
@@ -513,97 +582,6 @@ fn push_solid(layer: &mut Layer, solid: &Solid<'_>, material: Material) {
     }
 }
 
-/// Length of an arrow that is as thick as it may be, in radii of its shaft; a shorter one is thinner in proportion.
-const STOUTEST: f32 = 10.0;
-/// Least length of a force arrow, in radii of the thickest shaft: what an eye still takes for a direction.
-const LEAST_ARROW: f32 = 7.0;
-/// Force of the shortest arrow that is drawn, in reference forces: less is no arrow.
-const LEAST_FORCE: f32 = 1e-3;
-
-/// Shaft and head, at most as thick as `radius` says.
-fn push_arrow(layer: &mut Layer, tail: Vec3, along: Vec3, radius: f32, colour: Colour) {
-    let length = along.length();
-    if length.is_nan() || length < 0.2 * radius {
-        return;
-    }
-    let radius = radius.min(length / STOUTEST);
-    let material = Material {
-        colour,
-        roughness: 0.55,
-        metal: 0.0,
-    };
-    let head = 5.5 * radius;
-    let neck = along * ((length - head) / length);
-    layer.push(Mesh::Cylinder, bar(tail, neck, radius, material));
-    layer.push(
-        Mesh::Cone,
-        bar(tail + neck, along - neck, 2.3 * radius, material),
-    );
-}
-
-/// Length of an arrow in reference lengths, and whether it had to be cut.
-fn arrow_length(force: f32, reference: f32, scaling: Scaling) -> (f32, bool) {
-    let ratio = force / reference;
-    let length = match scaling {
-        Scaling::Linear => ratio,
-        Scaling::Logarithmic => (1.0 + 999.0 * ratio).log10() / 3.0,
-    };
-    (length.min(LONGEST_ARROW), length > LONGEST_ARROW)
-}
-
-fn push_arrows(shot: &Shot<'_>, joints: &[DrawnJoint], palette: &Palette, out: &mut DrawList) {
-    let options: &ArrowOptions = &shot.options.arrows;
-    if !(options.normal || options.friction) || joints.is_empty() {
-        return;
-    }
-    let height = shot.camera.metres_per_pixel(shot.size) * shot.size[1] as f32;
-    let reference = shot.arrows.reference(options);
-    let reference_length = ARROW_LENGTH * height;
-    let radius = 0.0045 * height;
-    let mut any_clipped = false;
-    for (joint, held) in joints.iter().zip(shot.arrows.joints()) {
-        // The wall pushes the ball away from the point of contact, so that lies against the normal force.
-        let contact = joint.ball_centre - held.normal.normalize_or_zero() * joint.ball_radius;
-        let shown = [
-            (options.normal, held.normal, palette.normal),
-            (options.friction, held.friction, palette.friction),
-        ];
-        for (_, force, colour) in shown.into_iter().filter(|(shown, ..)| *shown) {
-            let (length, clipped) = arrow_length(force.length(), reference, options.scaling);
-            any_clipped |= clipped;
-            if force.length() < LEAST_FORCE * reference {
-                continue;
-            }
-            // A small force still shows where it points.
-            let length = (length * reference_length).max(LEAST_ARROW * radius);
-            let along = force.normalize_or_zero() * length;
-            push_arrow(&mut out.arrows, contact, along, radius, colour);
-        }
-    }
-    let marks: &[f32] = match options.scaling {
-        Scaling::Linear => &[0.5, 1.0],
-        Scaling::Logarithmic => &[0.001, 0.01, 0.1, 1.0],
-    };
-    let tick = |mark: &f32| {
-        let force = mark * reference;
-        Tick {
-            force,
-            fraction: arrow_length(force, reference, options.scaling).0,
-        }
-    };
-    out.legend = Some(Legend {
-        reference,
-        length: reference_length,
-        pixels: ARROW_LENGTH * shot.size[1] as f32,
-        scaling: options.scaling,
-        automatic: options.reference.is_none(),
-        clipped: any_clipped,
-        ticks: marks.iter().map(tick).collect(),
-        normal: options.normal.then_some(palette.normal),
-        friction: options.friction.then_some(palette.friction),
-    });
-}
-
 /// The older, the fainter.
 fn push_trail(shot: &Shot<'_>, palette: &Palette, lines: &mut Vec<Line>) {
     let last = shot.trail.len().saturating_sub(1) as f32;
@@ -618,7 +596,7 @@ fn push_trail(shot: &Shot<'_>, palette: &Palette, lines: &mut Vec<Line>) {
     }));
 }
 
-fn push_label(out: &mut DrawList, text: &Arc<str>, kind: LabelKind, anchor: Vec3, colour: Colour) {
+pub(super) fn push_label(out: &mut DrawList, text: &Arc<str>, kind: LabelKind, anchor: Vec3, colour: Colour) {
     let Some(pixel) = out.eye.project(anchor, out.size) else {
         return;
     };

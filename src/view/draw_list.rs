@@ -63,10 +63,10 @@ pub struct Instance {
     pub roughness: f32,
     /// 0 plastic, 1 metal.
     pub metal: f32,
-    /// Own light of the flash colour, 0..=1.
-    pub glow: f32,
     /// Inner radius of a socket, in units of its outer radius; unused elsewhere.
     pub inner_radius: f32,
+    /// Unused.
+    pub pad: f32,
 }
 
 /// Instances by mesh ([`Mesh::index`]).
@@ -172,6 +172,8 @@ pub enum LabelKind {
     Gravity,
     /// A ball joint, by index.
     Joint(usize),
+    /// The mark of a peak of a ball joint, by index.
+    Peak(usize),
 }
 
 /// Text that the interface paints over the picture.
@@ -203,20 +205,20 @@ pub struct Tick {
 pub struct Legend {
     /// Force whose arrow has the reference length, N.
     pub reference: f32,
-    /// Reference length, m.
-    pub length: f32,
-    /// Reference length at the distance of the camera's target, pixels.
+    /// Reference length, pixels: what an arrow across the line of sight has anywhere in the picture.
     pub pixels: f32,
     /// Length against force.
     pub scaling: super::Scaling,
     /// Whether the reference follows the forces.
     pub automatic: bool,
-    /// Whether some arrow would be longer than is drawn (a fixed reference far too small).
+    /// Whether some arrow would be longer than is drawn (a fixed reference far too small): its shaft is broken.
     pub clipped: bool,
     /// Marks on the scale, rising.
     pub ticks: Vec<Tick>,
     /// Colour of normal forces; `None` where they are not drawn.
     pub normal: Option<Colour>,
+    /// Whether peaks that are over are marked.
+    pub peaks: bool,
     /// Colour of friction; `None` where it is not drawn.
     pub friction: Option<Colour>,
 }
@@ -234,19 +236,19 @@ pub struct DrawList {
     pub background: Background,
     /// Factor on all light.
     pub exposure: f32,
-    /// Colour of glowing instances.
-    pub flash: Colour,
     /// Floor, if any.
     pub floor: Option<Floor>,
     /// Meshes of this scene's own; shared, so that a renderer can tell by the pointer whether it has them.
     pub plates: Arc<[MeshData]>,
     /// Solid things that cast shadows.
     pub solid: Layer,
+    /// Fixed things before what moves, seen through.
+    pub faded: Layer,
     /// Solid things seen through all others where these stand before them: force arrows.
     pub arrows: Layer,
-    /// A second state of the machine, translucent over the solid things.
+    /// A second state of the machine, translucent before all others but arrows.
     pub ghost: Layer,
-    /// Balls of light about joints that were hit.
+    /// Rings of light about joints that were hit.
     pub halos: Vec<Instance>,
     /// Sockets, farthest first: for each the half that stands and, fainter, the half that is cut away.
     pub sockets: Vec<Instance>,
@@ -254,6 +256,8 @@ pub struct DrawList {
     pub overlay: Layer,
     /// Lines.
     pub lines: Vec<Line>,
+    /// Lines before all others: outlines of peaks that are over.
+    pub marks: Vec<Line>,
     /// Text for the interface to paint.
     pub labels: Vec<Label>,
     /// How to read the arrows; `None` where none are drawn.
@@ -285,16 +289,17 @@ impl Default for DrawList {
                 bottom: ground,
             },
             exposure: 1.0,
-            flash: ground,
             floor: None,
             plates: Arc::new([]),
             solid: Layer::default(),
+            faded: Layer::default(),
             ghost: Layer::default(),
             arrows: Layer::default(),
             halos: Vec::new(),
             sockets: Vec::new(),
             overlay: Layer::default(),
             lines: Vec::new(),
+            marks: Vec::new(),
             labels: Vec::new(),
             legend: None,
             magnification: 1.0,

@@ -9,6 +9,7 @@ use std::sync::Arc;
 use glam::{Mat3, Vec3};
 use parry3d::shape::ConvexPolyhedron;
 
+use super::pick::distance;
 use super::{Mesh, MeshData, to_f32};
 use crate::scene::{Geometry, Role, Scene, Shape};
 use crate::simulate::{BodyMotion, Frame};
@@ -295,8 +296,29 @@ fn plate(corners: &[Vec3], thickness: f32) -> Option<MeshData> {
     Some(mesh)
 }
 
-/// Magnification that is drawn where `asked` is wanted: no socket may outgrow [`LARGEST_SOCKET`] ball radii.
-pub(super) fn magnification(scene: &Scene, frame: &Frame, asked: f32) -> f32 {
+/// Outer radius, m, to which the socket of each ball joint may grow before it cuts into what carries it, `joints` drawn
+/// without magnification. What it touches already, or what is cut at its outer face, is no limit.
+pub(super) fn room(
+    scene: &Scene,
+    parts: &[Part],
+    frame: &Frame,
+    joints: &[DrawnJoint],
+) -> Vec<f32> {
+    let room_of = |(i, joint): (usize, &DrawnJoint)| {
+        let body = scene.ball_joints[i].socket.body;
+        parts
+            .iter()
+            .filter(|part| part.body == body && !part.reaches_socket(i))
+            .filter_map(|part| distance(&part.place(frame, joints), joint.socket_centre))
+            .filter(|&distance| distance > joint.outer)
+            .fold(f32::INFINITY, f32::min)
+    };
+    joints.iter().enumerate().map(room_of).collect()
+}
+
+/// Magnification that is drawn where `asked` is wanted: no socket may outgrow [`LARGEST_SOCKET`] ball radii, nor its
+/// [`room`].
+pub(super) fn magnification(scene: &Scene, frame: &Frame, room: &[f32], asked: f32) -> f32 {
     let asked = if asked.is_finite() {
         asked.clamp(1.0, 100.0)
     } else {
@@ -306,10 +328,13 @@ pub(super) fn magnification(scene: &Scene, frame: &Frame, asked: f32) -> f32 {
         .ball_joints
         .iter()
         .zip(&frame.joints)
-        .map(|(joint, now)| {
+        .enumerate()
+        .map(|(i, (joint, now))| {
             let gap = (now.clearance as f32).max(to_f32(&now.eccentricity).length());
+            let radius = joint.contact.ball_radius as f32;
+            let room = room.get(i).copied().unwrap_or(f32::INFINITY) - WALL * radius;
             if gap > 0.0 {
-                (LARGEST_SOCKET - 1.0) * joint.contact.ball_radius as f32 / gap
+                (room.min(LARGEST_SOCKET * radius) - radius) / gap
             } else {
                 f32::INFINITY
             }
@@ -348,6 +373,21 @@ pub(super) fn joints(scene: &Scene, frame: &Frame, m: f32) -> Vec<DrawnJoint> {
 }
 
 impl Part {
+    /// Whether it is long and thin.
+    pub fn is_bar(&self) -> bool {
+        matches!(self.form, Form::Bar { .. })
+    }
+
+    /// Whether it ends at the outer face of the socket of ball joint `joint`.
+    pub fn reaches_socket(&self, joint: usize) -> bool {
+        match &self.form {
+            Form::Bar { ends, .. } => ends
+                .iter()
+                .any(|end| matches!(end.at, Some(Reach::Socket(j)) if j == joint)),
+            _ => false,
+        }
+    }
+
     /// The part where it stands in `frame`, its ends fitted to the drawn joints.
     pub fn place(&self, frame: &Frame, joints: &[DrawnJoint]) -> Solid<'_> {
         let pose = Pose::in_frame(frame, self.body);

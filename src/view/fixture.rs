@@ -104,7 +104,7 @@ pub(crate) fn pendulum() -> (Scene, Frame) {
         )],
     );
     let frame_shape = Geometry::Box {
-        centre: Vec3::new(0.0, 0.0, 0.035),
+        centre: Vec3::new(0.0, 0.0, 0.056),
         size: Vec3::new(0.06, 0.03, 0.02),
     };
     let scene = scene(

@@ -5,8 +5,8 @@
 //!
 //! ```ignore
 //! let view = SceneView::new(&scene, &first_frame);            // once per scene
-//! arrows.update(&frame, &peaks, dt, &options.arrows);         // holds peaks, fades them
-//! view.build(&Shot { frame: &frame, arrows: &arrows, options: &options, camera: &camera, trail: &[], size }, &mut list);
+//! marks.update(&frame, &peaks, SEEN * time_scale);            // holds peaks, fades them
+//! view.build(&Shot { frame: &frame, marks: &marks, options: &options, camera: &camera, trail: &[], size }, &mut list);
 //! ```
 
 mod arrows;
@@ -17,12 +17,12 @@ mod drawn;
 #[cfg(test)]
 pub(crate) mod fixture;
 mod options;
+mod peaks;
 mod pick;
 #[cfg(test)]
 mod tests;
 mod theme;
 
-pub use arrows::{ArrowMemory, HeldForce};
 pub use build::{SceneView, Shot};
 pub use camera::{Camera, Preset};
 pub use draw_list::{
@@ -30,6 +30,7 @@ pub use draw_list::{
     MeshData, Tick,
 };
 pub use options::{ArrowOptions, Scaling, ViewOptions};
+pub use peaks::{Mark, PeakMarks, SEEN};
 pub use pick::{Hit, Picked};
 pub use theme::{Colour, Palette, Theme};
 

@@ -51,10 +51,10 @@ pub struct ArrowOptions {
     pub friction: bool,
     /// Length against force.
     pub scaling: Scaling,
-    /// Force of the reference length, N; `None` follows the largest force held.
+    /// Force of the reference length, N; `None` follows the largest force shown lately.
     pub reference: Option<f32>,
-    /// Time in which a held peak falls to half, s of viewing time.
-    pub half_life: f32,
+    /// Mark peaks of the normal force that are over.
+    pub peaks: bool,
 }
 
 impl Default for ArrowOptions {
@@ -64,7 +64,7 @@ impl Default for ArrowOptions {
             friction: true,
             scaling: Scaling::Linear,
             reference: None,
-            half_life: 0.12,
+            peaks: true,
         }
     }
 }

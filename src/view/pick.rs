@@ -3,7 +3,7 @@
 use glam::{Quat, Vec2, Vec3};
 use parry3d::math::Pose as ParryPose;
 use parry3d::query::{Ray, RayCast};
-use parry3d::shape::{Ball, Capsule, Cone, Cuboid, Cylinder};
+use parry3d::shape::{Ball, Capsule, Cone, Cuboid, Cylinder, Shape};
 
 use super::drawn::{self, BarKind, Pose, Solid};
 use super::{SceneView, Shot};
@@ -36,11 +36,13 @@ impl SceneView {
     pub fn pick(&self, shot: &Shot<'_>, pixel: Vec2) -> Option<Hit> {
         let (origin, direction) = shot.camera.ray(pixel, shot.size);
         let ray = Ray::new(origin, direction);
-        let m = drawn::magnification(shot.scene, shot.frame, shot.options.magnification);
+        let m = self.magnification(shot.scene, shot.frame, shot.options);
         let joints = drawn::joints(shot.scene, shot.frame, m);
-        let parts = self.parts.iter().filter_map(|part| {
+        let parts = self.parts.iter().enumerate().filter_map(|(i, part)| {
             let what = part.body.map_or(Picked::Fixed(part.index), Picked::Body);
-            Some((cast(&part.place(shot.frame, &joints), &ray)?, what))
+            let distance = cast(&part.place(shot.frame, &joints), &ray)?;
+            // What can be seen through can be reached through.
+            (self.opacity(i, origin) > 0.6).then_some((distance, what))
         });
         let balls = joints.iter().enumerate().filter_map(|(i, joint)| {
             let ball = cast_ball(joint.ball_centre, joint.ball_radius, &ray);
@@ -83,14 +85,24 @@ impl SceneView {
 }
 
 /// Distance along `ray` to the solid.
-fn cast(solid: &Solid<'_>, ray: &Ray) -> Option<f32> {
+pub(super) fn cast(solid: &Solid<'_>, ray: &Ray) -> Option<f32> {
+    with_shape(solid, |shape, pose| shape.cast_ray(pose, ray, f32::MAX, true))?
+}
+
+/// Distance from `point` to the solid, 0 within it.
+pub(super) fn distance(solid: &Solid<'_>, point: Vec3) -> Option<f32> {
+    with_shape(solid, |shape, pose| shape.distance_to_point(pose, point, true))
+}
+
+/// Asks something of the solid's shape where it stands; `None` where there is none.
+fn with_shape<T>(solid: &Solid<'_>, ask: impl FnOnce(&dyn Shape, &ParryPose) -> T) -> Option<T> {
     // A broken frame must not reach parry's iterations.
     let mut finite = true;
     solid.extent(|centre, radius| finite &= centre.is_finite() && radius.is_finite());
     if !finite {
         return None;
     }
-    match *solid {
+    Some(match *solid {
         Solid::Bar {
             from,
             to,
@@ -102,17 +114,13 @@ fn cast(solid: &Solid<'_>, ray: &Ray) -> Option<f32> {
             if half == 0.0 {
                 return None;
             }
-            // parry's cylinder and cone stand along Y.
+            // parry's bars stand along Y.
             let turn = Quat::from_rotation_arc(Vec3::Y, (to - from).normalize_or(Vec3::Y));
             let pose = ParryPose::from_parts((from + to) / 2.0, turn);
             match kind {
-                BarKind::Capsule => {
-                    Capsule::new(from, to, radius).cast_local_ray(ray, f32::MAX, true)
-                }
-                BarKind::Cylinder => {
-                    Cylinder::new(half, radius).cast_ray(&pose, ray, f32::MAX, true)
-                }
-                BarKind::Cone => Cone::new(half, radius).cast_ray(&pose, ray, f32::MAX, true),
+                BarKind::Capsule => ask(&Capsule::new_y(half, radius), &pose),
+                BarKind::Cylinder => ask(&Cylinder::new(half, radius), &pose),
+                BarKind::Cone => ask(&Cone::new(half, radius), &pose),
             }
         }
         Solid::Box {
@@ -121,18 +129,20 @@ fn cast(solid: &Solid<'_>, ray: &Ray) -> Option<f32> {
             rotation,
         } => {
             let pose = ParryPose::from_parts(centre, Quat::from_mat3(&rotation));
-            Cuboid::new(size / 2.0).cast_ray(&pose, ray, f32::MAX, true)
+            ask(&Cuboid::new(size / 2.0), &pose)
         }
-        Solid::Ball { centre, radius } => cast_ball(centre, radius, ray),
+        Solid::Ball { centre, radius } => {
+            ask(&Ball::new(radius), &ParryPose::from_translation(centre))
+        }
         Solid::Plate {
             hull,
             pose: Pose { position, rotation },
             ..
         } => {
             let pose = ParryPose::from_parts(position, Quat::from_mat3(&rotation));
-            hull?.cast_ray(&pose, ray, f32::MAX, true)
+            ask(hull?, &pose)
         }
-    }
+    })
 }
 
 fn cast_ball(centre: Vec3, radius: f32, ray: &Ray) -> Option<f32> {

@@ -49,6 +49,16 @@ pub struct Material {
     pub metal: f32,
 }
 
+impl Material {
+    /// The same surface with another opacity.
+    pub const fn with_opacity(self, opacity: f32) -> Self {
+        Self {
+            colour: self.colour.with_opacity(opacity),
+            ..self
+        }
+    }
+}
+
 const fn material(rgb: u32, roughness: f32, metal: f32) -> Material {
     Material {
         colour: Colour::hex(rgb),

@@ -13,7 +13,7 @@ use super::{Failure, interrupt, load, print, progress, provenance, quantity, sta
 use crate::files::{Folder, MANIFEST};
 use crate::scene::Scene;
 use crate::simulate::{Frame, Peak};
-use crate::view::{ArrowMemory, ViewOptions};
+use crate::view::{PeakMarks, ViewOptions};
 
 /// Frame names have five digits.
 const MOST_FRAMES: f64 = 100_000.0;
@@ -23,8 +23,8 @@ const MOST_FRAMES: f64 = 100_000.0;
 pub(super) struct Times {
     /// Instants, s, in the order of the frame numbers.
     instants: Vec<f64>,
-    /// Viewing time from one frame of a film to the next, s; `None` for single pictures.
-    frame_time: Option<f64>,
+    /// Simulated seconds in a second of a film; `None` for single pictures.
+    time_scale: Option<f64>,
 }
 
 impl Times {
@@ -37,7 +37,7 @@ impl Times {
                 .collect::<Result<_, _>>()?;
             return Ok(Self {
                 instants,
-                frame_time: None,
+                time_scale: None,
             });
         };
         let duration = quantity::duration("--duration", duration)?;
@@ -57,7 +57,7 @@ impl Times {
             instants: (0..=last as u64)
                 .map(|k| (k as f64 / rate).min(duration))
                 .collect(),
-            frame_time: Some(1.0 / fps),
+            time_scale: Some(1.0 / arguments.slow),
         })
     }
 
@@ -124,7 +124,7 @@ pub(super) fn fill(
             break;
         }
         let png = studio
-            .draw(instant, times.frame_time)?
+            .draw(instant, times.time_scale)?
             .png(&labels)
             .map_err(|error| Failure::io(error.to_string()))?;
         let file = format!("frame_{number:05}.png");
@@ -170,26 +170,26 @@ fn common_reference(
         return Ok(None);
     }
     let mut simulation = start(scene)?;
-    let (mut frame, mut peaks, mut memory) = (Frame::default(), Vec::new(), ArrowMemory::new());
+    let (mut frame, mut peaks, mut marks) = (Frame::default(), Vec::new(), PeakMarks::new());
     for number in times.in_order() {
         let instant = times.instants[number];
         while simulation.time() < instant {
             // The frames themselves say why they end early.
             if interrupt::asked() || simulation.step().is_err() {
-                return Ok(Some(memory.reference(arrows)));
+                return Ok(Some(marks.reference(arrows)));
             }
         }
         simulation.sample(instant, &mut frame);
         simulation.take_peaks(&mut peaks);
-        let since: &[Peak] = if times.frame_time.is_some() {
+        let since: &[Peak] = if times.time_scale.is_some() && arrows.peaks {
             &peaks
         } else {
             &[]
         };
-        // No viewing time passes: what was large stays.
-        memory.update(&frame, since, 0.0, arrows);
+        // Nothing fades: what was large stays.
+        marks.update(&frame, since, f64::INFINITY);
     }
-    Ok(Some(memory.reference(arrows)))
+    Ok(Some(marks.reference(arrows)))
 }
 
 /// What made a picture, as texts inside it: a frame that has lost its manifest still tells.

@@ -96,7 +96,7 @@ pub fn view_options(arguments: &RenderArguments) -> Result<ViewOptions, Failure>
                 Some(force) => Some(quantity::force("--arrow-reference", force)? as f32),
                 None => None,
             },
-            ..ArrowOptions::default()
+            peaks: shown(Hideable::Peaks),
         },
         flash: shown(Hideable::Flash),
         floor: shown(Hideable::Floor),

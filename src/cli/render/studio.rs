@@ -9,7 +9,7 @@ use crate::cli::{Failure, interrupt, start};
 use crate::render::{Image, NoAdapter, Offscreen, RenderError};
 use crate::scene::{Scene, Vec3};
 use crate::simulate::{Frame, Peak, Simulation};
-use crate::view::{ArrowMemory, Camera, DrawList, SceneView, Shot, ViewOptions, to_f32};
+use crate::view::{Camera, DrawList, PeakMarks, SEEN, SceneView, Shot, ViewOptions, to_f32};
 
 /// A simulation and what draws it.
 pub trait Studio {
@@ -19,12 +19,12 @@ pub trait Studio {
     /// The divergence guard, Ctrl-C.
     fn go_to(&mut self, instant: f64) -> Result<(), Failure>;
 
-    /// Draws `instant`, which lies in the latest step; in a film, `frame_time` seconds of viewing time after the frame
-    /// before and with what happened since.
+    /// Draws `instant`, which lies in the latest step; in a film, which shows `time_scale` simulated seconds in a second,
+    /// with what happened since the frame before.
     ///
     /// # Errors
     /// A failing graphics adapter.
-    fn draw(&mut self, instant: f64, frame_time: Option<f64>) -> Result<Image, Failure>;
+    fn draw(&mut self, instant: f64, time_scale: Option<f64>) -> Result<Image, Failure>;
 
     /// Gives the reference arrow a force, N, that all frames share.
     fn fix_arrow_scale(&mut self, reference: f32);
@@ -57,7 +57,7 @@ pub struct SceneStudio {
     view: SceneView,
     camera: Camera,
     options: ViewOptions,
-    arrows: ArrowMemory,
+    marks: PeakMarks,
     list: Arc<DrawList>,
     size: [u32; 2],
 }
@@ -99,7 +99,7 @@ impl SceneStudio {
             view,
             camera,
             options,
-            arrows: ArrowMemory::new(),
+            marks: PeakMarks::new(),
             list: Arc::default(),
             size,
         })
@@ -119,14 +119,13 @@ impl Studio for SceneStudio {
         Ok(())
     }
 
-    fn draw(&mut self, instant: f64, frame_time: Option<f64>) -> Result<Image, Failure> {
+    fn draw(&mut self, instant: f64, time_scale: Option<f64>) -> Result<Image, Failure> {
         self.simulation.sample(instant, &mut self.frame);
         self.simulation.take_peaks(&mut self.peaks);
-        match frame_time {
-            Some(frame_time) => {
-                let options = &self.options.arrows;
-                self.arrows
-                    .update(&self.frame, &self.peaks, frame_time as f32, options);
+        match time_scale {
+            Some(time_scale) => {
+                let fade = SEEN * time_scale;
+                self.marks.update(&self.frame, &self.peaks, fade);
                 if let Some((body, tip)) = self.probe {
                     let motion = &self.frame.bodies[body];
                     self.trail
@@ -134,16 +133,15 @@ impl Studio for SceneStudio {
                 }
             }
             None => {
-                // A single picture shows the forces of its own instant.
-                self.arrows.clear();
-                self.arrows
-                    .update(&self.frame, &[], 0.0, &self.options.arrows);
+                // A single picture shows its own instant and nothing before it.
+                self.marks.clear(instant);
+                self.marks.update(&self.frame, &[], f64::INFINITY);
             }
         }
         let shot = Shot {
             scene: self.simulation.scene(),
             frame: &self.frame,
-            arrows: &self.arrows,
+            marks: &self.marks,
             options: &self.options,
             camera: &self.camera,
             trail: &self.trail,
@@ -241,8 +239,16 @@ impl Studio for ApplicationStudio {
         Ok(())
     }
 
-    fn draw(&mut self, instant: f64, _frame_time: Option<f64>) -> Result<Image, Failure> {
-        self.app.player_mut().run_to(instant);
+    fn draw(&mut self, instant: f64, time_scale: Option<f64>) -> Result<Image, Failure> {
+        match time_scale {
+            Some(time_scale) => {
+                let player = self.app.player_mut();
+                player.pacer.set_scale(time_scale);
+                player.run_to(instant);
+                player.advance(0.0);
+            }
+            None => self.app.run_to(instant),
+        }
         self.headless
             .app_frame(&mut self.app, self.size, 1.0)
             .map_err(|error| failed(&error))

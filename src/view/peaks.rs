@@ -1,0 +1,382 @@
+//! Memory of the hardest blow to each ball joint: an impact lasts a hundredth of a picture, an eye needs longer.
+//!
+//! What is remembered is a mark of its own, never an arrow: arrows are the forces of the instant on show. It fades with
+//! simulated time alone; how fast follows from the time scale, so that it is seen equally long at every one.
+
+use glam::Vec3;
+
+use super::{ArrowOptions, to_f32};
+use crate::simulate::{Frame, Peak};
+
+/// A peak that is over.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mark {
+    /// Ball joint.
+    pub joint: usize,
+    /// Normal force on the ball at the peak, N, world axes.
+    pub force: Vec3,
+    /// Simulated time since, s.
+    pub age: f64,
+    /// 1 at the peak, falling to 0 when it is forgotten.
+    pub strength: f32,
+}
+
+/// The hardest blow to each joint since it was last forgotten. Deterministic: depends on what it was given and nothing else.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PeakMarks {
+    joints: Vec<Joint>,
+    /// Instant on show, s.
+    now: f64,
+    /// Peaks up to here have been taken, s.
+    seen: f64,
+    /// Simulated time in which a mark fades, s.
+    fade: f64,
+    /// Largest force shown lately, N: what the automatic scale follows.
+    largest: f32,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Joint {
+    blow: Option<Blow>,
+    /// Within the latest step, after the instant on show.
+    coming: Option<Blow>,
+    /// Largest force of a contact that began lately, N, while it still rises.
+    rising: Option<f32>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Blow {
+    force: Vec3,
+    time: f64,
+    /// Brightness of its flash.
+    flash: f32,
+}
+
+/// How long a mark is seen, s of viewing; a flash half as long.
+pub const SEEN: f64 = 0.8;
+/// The automatic scale shrinks by half in so many times that: slowly, so that lengths can be compared.
+const SCALE_HALF_LIFE: f64 = 2.5;
+/// A force on show of so much of the peak is the peak: nothing is left to mark.
+const PRESENT: f32 = 0.95;
+/// Least brightness: a touch a hundred times softer than the hardest lately still shows, but does not dazzle.
+const FAINTEST: f32 = 0.15;
+
+impl Default for PeakMarks {
+    fn default() -> Self {
+        Self {
+            joints: Vec::new(),
+            now: f64::NEG_INFINITY,
+            seen: f64::NEG_INFINITY,
+            fade: f64::INFINITY,
+            largest: 0.0,
+        }
+    }
+}
+
+impl PeakMarks {
+    /// Nothing remembered.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Forgets everything up to `time`, s, as after a reset.
+    pub fn clear(&mut self, time: f64) {
+        *self = Self {
+            now: time,
+            seen: time,
+            ..Self::default()
+        };
+    }
+
+    /// Takes the instant on show and the strongest instants since the one before, `peaks` (one per ball joint, or empty).
+    /// A blow is forgotten `fade` seconds of simulated time after its peak. Where time has run back, nothing is
+    /// remembered.
+    pub fn update(&mut self, frame: &Frame, peaks: &[Peak], fade: f64) {
+        if frame.time < self.now {
+            // The scale stays: the run is the same.
+            let largest = self.largest;
+            self.clear(frame.time);
+            self.largest = largest;
+        }
+        let passed = if self.now.is_finite() {
+            frame.time - self.now
+        } else {
+            0.0
+        };
+        (self.now, self.fade) = (frame.time, fade.max(f64::MIN_POSITIVE));
+        self.joints.resize(frame.joints.len(), Joint::default());
+        let hardest = peaks
+            .iter()
+            .zip(&frame.joints)
+            .flat_map(|(peak, now)| [peak.normal, now.normal_force.norm()])
+            .map(|force| force as f32)
+            .filter(|force| force.is_finite())
+            .fold(self.largest, f32::max);
+        let Self { now, seen, .. } = *self;
+        for (joint, peak) in self.joints.iter_mut().zip(peaks) {
+            // What comes later than the instant on show comes no later than the next.
+            if let Some(blow) = joint.coming.take_if(|blow| blow.time <= now) {
+                joint.take(blow, self.fade);
+            }
+            let force = to_f32(&peak.normal_force);
+            let size = force.length();
+            let rises = joint.rising.is_some_and(|before| size > before);
+            if !(peak.time > seen && size.is_finite() && (peak.impacts > 0 || rises)) {
+                if peak.impacts > 0 && size == 0.0 {
+                    // It begins where the latest step ends.
+                    joint.rising = Some(0.0);
+                } else if peak.time > seen {
+                    joint.rising = None;
+                }
+                continue;
+            }
+            joint.rising = Some(size);
+            let blow = Blow {
+                force,
+                time: peak.time,
+                flash: (size / hardest.max(f32::MIN_POSITIVE))
+                    .sqrt()
+                    .clamp(FAINTEST, 1.0),
+            };
+            if peak.time > now {
+                joint.coming = Some(blow);
+            } else {
+                joint.take(blow, self.fade);
+            }
+        }
+        self.seen = peaks.iter().map(|peak| peak.time).fold(seen, f64::max);
+        for joint in &mut self.joints {
+            joint.blow = joint.blow.filter(|blow| now - blow.time < self.fade);
+        }
+        let half_lives = passed / (SCALE_HALF_LIFE * self.fade);
+        let present = frame
+            .joints
+            .iter()
+            .map(|joint| joint.normal_force.norm() as f32)
+            .filter(|force| force.is_finite());
+        let marked = self.joints.iter().filter_map(|joint| joint.blow);
+        self.largest = present
+            .chain(marked.map(|blow| blow.force.length()))
+            .fold(self.largest * (-half_lives as f32).exp2(), f32::max);
+    }
+
+    /// The marks to draw beside the forces of `frame`: none where a joint bears as much now.
+    pub fn marks<'a>(&'a self, frame: &'a Frame) -> impl Iterator<Item = Mark> + 'a {
+        let mark = |(joint, (held, report)): (usize, (&Joint, _))| {
+            let blow = held.blow?;
+            let report: &crate::simulate::JointReport = report;
+            let age = self.now - blow.time;
+            let over = (report.normal_force.norm() as f32) < PRESENT * blow.force.length();
+            over.then_some(Mark {
+                joint,
+                force: blow.force,
+                age,
+                strength: (1.0 - age / self.fade) as f32,
+            })
+        };
+        self.joints
+            .iter()
+            .zip(&frame.joints)
+            .enumerate()
+            .filter_map(mark)
+    }
+
+    /// Brightness of the flash of ball joint `joint`, 0..=1.
+    pub fn flash(&self, joint: usize) -> f32 {
+        let blow = self.joints.get(joint).and_then(|joint| joint.blow);
+        blow.map_or(0.0, |blow| {
+            let left = 1.0 - 2.0 * (self.now - blow.time) / self.fade;
+            blow.flash * left.max(0.0) as f32
+        })
+    }
+
+    /// Force of the reference length: the option's, or the largest shown lately, rounded up to 1, 2 or 5 times a power of
+    /// ten.
+    pub fn reference(&self, options: &ArrowOptions) -> f32 {
+        match options.reference {
+            Some(force) if force.is_finite() && force > 0.0 => force,
+            _ => round_up_125(self.largest),
+        }
+    }
+}
+
+impl Joint {
+    /// Shows `blow` unless the one on show is still the stronger, faded as it is.
+    fn take(&mut self, blow: Blow, fade: f64) {
+        let faded = self.blow.map_or(0.0, |before| {
+            let left = 1.0 - (blow.time - before.time) / fade;
+            before.force.length() * left.max(0.0) as f32
+        });
+        if blow.force.length() >= faded {
+            self.blow = Some(blow);
+        }
+    }
+}
+
+/// Least of …, 1, 2, 5, 10, 20, … that is not below `x`; 1 where `x` is not positive.
+fn round_up_125(x: f32) -> f32 {
+    if !(x.is_finite() && x > 1e-6) {
+        return 1.0;
+    }
+    let decade = 10_f32.powi(x.log10().floor() as i32);
+    [1.0, 2.0, 5.0]
+        .into_iter()
+        .map(|k| k * decade)
+        .find(|&step| step >= x * 0.9999)
+        .unwrap_or(10.0 * decade)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene;
+    use crate::simulate::JointReport;
+
+    fn frame(time: f64, normal: f64) -> Frame {
+        let report = JointReport {
+            normal_force: scene::Vec3::new(0.0, 0.0, normal),
+            ..Default::default()
+        };
+        Frame {
+            time,
+            joints: vec![report],
+            ..Default::default()
+        }
+    }
+
+    fn peak(time: f64, normal: f64, impacts: u32) -> [Peak; 1] {
+        [Peak {
+            normal,
+            time,
+            normal_force: scene::Vec3::new(normal, 0.0, 0.0),
+            impacts,
+            ..Default::default()
+        }]
+    }
+
+    fn mark(marks: &PeakMarks, frame: &Frame) -> Option<Mark> {
+        marks.marks(frame).next()
+    }
+
+    #[test]
+    fn an_impact_between_two_pictures_is_marked_with_its_age_and_fades_with_simulated_time() {
+        let mut marks = PeakMarks::new();
+        let shown = frame(1e-3, 0.0);
+        marks.update(&shown, &peak(0.6e-3, 800.0, 1), 4e-3);
+        let first = mark(&marks, &shown).expect("a mark");
+        assert_eq!(first.force, Vec3::new(800.0, 0.0, 0.0));
+        assert!((first.age - 0.4e-3).abs() < 1e-12 && (first.strength - 0.9).abs() < 1e-6);
+        assert!((marks.flash(0) - 0.8).abs() < 1e-6);
+        // The same instant again, as while it is paused.
+        for _ in 0..100 {
+            marks.update(&shown, &peak(0.6e-3, 800.0, 1), 4e-3);
+            marks.update(&shown, &[Peak::default()], 4e-3);
+        }
+        assert_eq!(mark(&marks, &shown), Some(first));
+        let later = frame(2.6e-3, 0.0);
+        marks.update(&later, &[], 4e-3);
+        assert!((mark(&marks, &later).expect("a mark").strength - 0.5).abs() < 1e-6);
+        assert_eq!(marks.flash(0), 0.0);
+        marks.update(&frame(4.7e-3, 0.0), &[], 4e-3);
+        assert_eq!(mark(&marks, &later), None);
+    }
+
+    #[test]
+    fn time_that_runs_back_and_a_reset_leave_nothing() {
+        let mut marks = PeakMarks::new();
+        let hit = peak(0.6e-3, 800.0, 1);
+        let (before, after) = (frame(0.5e-3, 0.0), frame(1e-3, 0.0));
+        marks.update(&after, &hit, 1.0);
+        marks.update(&before, &[Peak::default()], 1.0);
+        assert_eq!((mark(&marks, &before), marks.flash(0)), (None, 0.0));
+        marks.update(&after, &hit, 1.0);
+        assert!(mark(&marks, &after).is_some());
+        marks.clear(1e-3);
+        // What was struck before then is not news.
+        marks.update(&after, &hit, 1.0);
+        assert_eq!((mark(&marks, &after), marks.flash(0)), (None, 0.0));
+    }
+
+    #[test]
+    fn a_contact_that_lasts_is_neither_marked_nor_lit() {
+        let mut marks = PeakMarks::new();
+        for k in 1..100 {
+            let time = f64::from(k) * 1e-3;
+            let force = 8.0 + 4.0 * (100.0 * time).sin();
+            let shown = frame(time, force);
+            marks.update(&shown, &peak(time, force, 0), 0.05);
+            assert_eq!((mark(&marks, &shown), marks.flash(0)), (None, 0.0));
+        }
+    }
+
+    #[test]
+    fn a_blow_that_is_watched_as_it_rises_and_falls_is_marked_once_it_falls() {
+        // It begins where a step ends, in a picture of its own: without any force yet.
+        let mut marks = PeakMarks::new();
+        marks.update(&frame(1e-6, 0.0), &peak(0.0, 0.0, 1), 80e-6);
+        for k in 2..=60 {
+            let time = f64::from(k) * 1e-6;
+            let force = 600.0 * (std::f64::consts::PI * f64::from(k) / 60.0).sin();
+            let shown = frame(time, force);
+            let strongest = force.max(600.0 * (std::f64::consts::PI * f64::from(k - 1) / 60.0).sin());
+            let at = if k <= 30 { time } else { time - 1e-6 };
+            marks.update(&shown, &peak(at, strongest, 0), 80e-6);
+            let mark = mark(&marks, &shown);
+            assert_eq!(mark.is_some(), k > 36, "{k}: {mark:?}");
+            if let Some(mark) = mark {
+                assert!((mark.force.x - 600.0).abs() < 1e-3 && (mark.age - (time - 30e-6)).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn a_peak_later_than_the_instant_on_show_waits_for_it() {
+        let mut marks = PeakMarks::new();
+        let shown = frame(1.0e-3, 0.0);
+        marks.update(&shown, &peak(1.2e-3, 500.0, 1), 0.1);
+        assert_eq!((mark(&marks, &shown), marks.flash(0)), (None, 0.0));
+        assert_eq!(marks.reference(&ArrowOptions::default()), 1.0);
+        let shown = frame(1.3e-3, 0.0);
+        marks.update(&shown, &[Peak::default()], 0.1);
+        assert!((mark(&marks, &shown).expect("a mark").age - 0.1e-3).abs() < 1e-12);
+        assert_eq!(marks.reference(&ArrowOptions::default()), 500.0);
+    }
+
+    #[test]
+    fn the_stronger_of_two_blows_is_marked_until_it_has_faded_below_the_other() {
+        let mut marks = PeakMarks::new();
+        let mut blow = |time: f64, force: f64| {
+            let shown = frame(time + 1e-4, 0.0);
+            marks.update(&shown, &peak(time, force, 1), 0.1);
+            mark(&marks, &shown).expect("a mark").force.x
+        };
+        assert_eq!(blow(0.01, 800.0), 800.0);
+        assert_eq!(blow(0.02, 300.0), 800.0);
+        assert_eq!(blow(0.08, 300.0), 300.0);
+        assert_eq!(blow(0.09, 400.0), 400.0);
+    }
+
+    #[test]
+    fn the_scale_is_a_round_number_that_covers_the_largest_force() {
+        for (x, expect) in [
+            (0.0, 1.0),
+            (0.9, 1.0),
+            (1.0, 1.0),
+            (1.1, 2.0),
+            (3.0, 5.0),
+            (621.0, 1000.0),
+            (771.0, 1000.0),
+        ] {
+            assert!(
+                (round_up_125(x) / expect - 1.0).abs() < 1e-5,
+                "{x}: {}",
+                round_up_125(x)
+            );
+        }
+        let fixed = ArrowOptions {
+            reference: Some(30.0),
+            ..Default::default()
+        };
+        assert_eq!(PeakMarks::new().reference(&fixed), 30.0);
+    }
+}
