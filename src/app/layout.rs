@@ -1,6 +1,6 @@
 //! Where everything goes: side by side on a large window; on a small one the picture, and a sheet that folds away.
 
-use eframe::egui::{self, Align2, CentralPanel, Frame, Id, Panel, Popup, RichText, ScrollArea, Ui};
+use eframe::egui::{self, Align2, CentralPanel, Frame, Id, Panel, Popup, ScrollArea, Ui};
 
 use super::{App, theme, transport};
 

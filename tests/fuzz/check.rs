@@ -140,7 +140,8 @@ fn run(scene: &Scene) -> Fate {
     assert!(simulation.state().iter().all(|x| x.is_finite()));
     let peaks = &simulation.statistics().peak_normal;
     assert!(peaks.iter().all(|peak| *peak >= 0.0 && peak.is_finite()));
-    for words in simulation.doubts() {
+    for doubt in simulation.doubts() {
+        let words = doubt.to_string();
         assert_eq!(visible(&words), words);
     }
     Fate::Starts
