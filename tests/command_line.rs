@@ -324,6 +324,25 @@ fn the_three_formats_hold_the_same_values_and_say_what_made_them() {
         assert_eq!(meta["changed_parameters"]["contact.friction"], "0.25");
         assert!(meta["method"].is_string());
         assert_eq!(meta["status"], "done");
+        // The same run again, from nothing but this.
+        let text = meta["scene_text"].as_str().unwrap();
+        fs::write(folder.path().join("again.toml"), text).unwrap();
+        let changed = meta["changed_parameters"].as_object().unwrap();
+        let changed = changed
+            .iter()
+            .map(|(key, value)| format!("--set {key}={}", value.as_str().unwrap()));
+        let changed: Vec<String> = changed.collect();
+        let line = format!(
+            "run again.toml {} --duration {}s --summary json",
+            changed.join(" "),
+            meta["duration_s"]
+        );
+        let again = jointplay(folder.path(), &line).expect(0).json();
+        assert_eq!(again["state_hash"], meta["state_hash"]);
+        assert!(
+            again["scene_text"].is_null(),
+            "it stands with rows, not in a summary"
+        );
     }
     for (i, name) in csv.header.iter().enumerate() {
         let columns: ndarray::Array1<f64> = npz.by_name(name).unwrap();
@@ -370,6 +389,134 @@ fn other_scenes_report_their_own_joints_and_drives() {
         csv.column("B_normal_N")[0] > 0.0,
         "an ideal joint reports its reaction"
     );
+}
+
+/// The slider-crank with its slider 30 mm too far out, for an assembled start.
+fn misplaced(folder: &Path) {
+    let text = jointplay::scene::built_in_text("slider-crank").unwrap();
+    let moved = text.replace("position = \"200 mm\"", "position = \"230 mm\"");
+    assert_ne!(moved, text);
+    fs::write(
+        folder.join("moved.toml"),
+        format!("start = \"ideal\"\n{moved}"),
+    )
+    .unwrap();
+}
+
+#[test]
+fn what_the_assembly_moved_is_printed_and_warned_of() {
+    let folder = folder();
+    misplaced(folder.path());
+    let check = jointplay(folder.path(), "check moved.toml")
+        .expect(0)
+        .stdout;
+    println!("{check}");
+    for words in [
+        "largest gap as given 30 mm at C",
+        "  slider",
+        "Warning               assembling the start took",
+    ] {
+        assert!(check.contains(words), "{words}: {check}");
+    }
+    let run = jointplay(
+        folder.path(),
+        "run moved.toml --duration 1ms --summary json",
+    )
+    .expect(0);
+    assert!(
+        run.stderr
+            .contains("warning: assembling the start took bodies far"),
+        "{}",
+        run.stderr
+    );
+    let assembly = &run.json()["assembly"];
+    assert_eq!(assembly["largest_gap_joint"], "C");
+    assert!((assembly["largest_gap_m"].as_f64().unwrap() - 0.03).abs() < 1e-6);
+    let moved = |body: &str| assembly["bodies"][body]["moved_m"].as_f64().unwrap();
+    // Slider, rod and crank share the way.
+    assert!(
+        moved("slider") > 5e-3 && moved("slider") < 0.03,
+        "{assembly}"
+    );
+    for (scene, words) in [
+        ("spcmm", "no gap in the drives' closed form"),
+        ("pendulum", "none: no joint starts closed"),
+        ("slider-crank", "no gap as given"),
+    ] {
+        let check = jointplay(folder.path(), &format!("check {scene}"))
+            .expect(0)
+            .stdout;
+        assert!(check.contains(words), "{words}: {check}");
+        assert!(!check.contains("assembling the start took"), "{check}");
+    }
+}
+
+#[test]
+fn a_probe_is_compared_with_the_same_scene_with_every_ball_joint_closed() {
+    let folder = folder();
+    let text = jointplay::scene::built_in_text("pendulum").unwrap();
+    let probed = text.replace(
+        "body = \"rod\"\n\n",
+        "body = \"rod\"\nprobe = \"0 0 -100 mm\"\n\n",
+    );
+    assert_ne!(probed, text);
+    fs::write(folder.path().join("probed.toml"), probed).unwrap();
+    let run = |set: &str, every: &str, out: &str| {
+        let line = format!(
+            "run probed.toml {set} --duration 60ms --every {every} --out {out} --summary json"
+        );
+        let summary = jointplay(folder.path(), &line).expect(0).json();
+        (
+            summary["state_hash"].clone(),
+            Csv::read(&folder.path().join(out)),
+        )
+    };
+    let (hash, rows) = run("", "1ms", "play.csv");
+    // Whoever looks more often changes nothing.
+    assert_eq!(run("", "0.1ms", "often.csv").0, hash);
+    let line = "run pendulum --duration 60ms --summary json";
+    assert_eq!(
+        jointplay(folder.path(), line).expect(0).json()["state_hash"],
+        hash
+    );
+    let tight = "--set contact.clearance=0 --set solver.tolerance=1e-10";
+    let (_, ideal) = run(tight, "1ms", "ideal.csv");
+    // Tip from the pose of the rod: R = Rx(alpha) Rz(beta) Ry(gamma).
+    let tips = |csv: &Csv| -> Vec<[f64; 3]> {
+        let column = |name: &str| csv.column(name);
+        let p = ["x_m", "y_m", "z_m"].map(column);
+        let a = ["alpha_rad", "beta_rad", "gamma_rad"].map(column);
+        let tip = |k: usize| {
+            let ((sa, ca), (sb, cb), (sg, cg)) =
+                (a[0][k].sin_cos(), a[1][k].sin_cos(), a[2][k].sin_cos());
+            let w = [cb * sg, ca * sb * sg - sa * cg, sa * sb * sg + ca * cg];
+            [0, 1, 2].map(|i| p[i][k] - 0.1 * w[i])
+        };
+        (0..csv.rows.len()).map(tip).collect()
+    };
+    let (play, ideal_tips) = (tips(&rows), tips(&ideal));
+    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+        let errors = rows.column(&format!("probe_error_{name}_m"));
+        for (k, error) in errors.iter().enumerate() {
+            let expected = play[k][axis] - ideal_tips[k][axis];
+            assert!(
+                (error - expected).abs() < 1e-9,
+                "{name} row {k}: {error} {expected}"
+            );
+        }
+        // A joint without play is its own reference.
+        assert!(
+            ideal
+                .column(&format!("probe_error_{name}_m"))
+                .iter()
+                .all(|e| *e == 0.0)
+        );
+    }
+    let largest = rows
+        .column("probe_error_z_m")
+        .into_iter()
+        .fold(0.0, |m: f64, e| m.max(e.abs()));
+    assert!(largest > 1e-4, "{largest}");
 }
 
 #[test]

@@ -48,6 +48,27 @@ fn the_unbroken_scene_is_read() {
 }
 
 #[test]
+fn a_law_and_a_role_that_are_none_are_named_before_their_keys() {
+    let text = jointplay::scene::built_in_text("slider-crank-driven").unwrap();
+    for (right, wrong, words) in [
+        (
+            "law = \"constant\"",
+            "law = \"sinus\", speed = \"3 Hz\"",
+            ["drive.law = \"sinus\"", "allowed spcmm, constant, harmonic"],
+        ),
+        (
+            "role = \"frame\"",
+            "role = \"fame\"\ncolour = \"red\"",
+            ["role = \"fame\"", "did you mean `frame`"],
+        ),
+    ] {
+        let broken = text.replacen(right, wrong, 1);
+        assert_ne!(broken, text, "{right}");
+        holds(wrong, &parse(&broken).unwrap_err(), &words);
+    }
+}
+
+#[test]
 fn every_broken_line_is_named_with_its_remedy() {
     // (line as it should be, line as written, what the error must say)
     let cases: &[(&str, &str, &[&str])] = &[
@@ -259,6 +280,28 @@ fn every_broken_line_is_named_with_its_remedy() {
             "form = \"sphere\"",
             "form = \"shere\"",
             &["my.toml:10:20", "did you mean `sphere`"],
+        ),
+        // A wrong word decides which other keys are wrong: it is named, not these.
+        (
+            "form = \"sphere\"",
+            "form = \"torus\", bore = \"1 mm\"",
+            &[
+                "body.rod.shapes[0].form = \"torus\"",
+                "allowed capsule, cylinder, cone, box, sphere, plate",
+            ],
+        ),
+        (
+            "form = \"sphere\"",
+            "form = \"sphere\", bore = \"1 mm\"",
+            &["shapes[0].bore", "unknown key"],
+        ),
+        (
+            "kind = \"free\"",
+            "kind = \"spherical\"\nstiffness = 3",
+            &[
+                "joint.free.kind = \"spherical\"",
+                "allowed fixed, prismatic, revolute, free",
+            ],
         ),
         (
             "radius = \"4 mm\"",
@@ -566,6 +609,22 @@ fn changes_are_refused_with_key_value_and_range() {
             "joint.S1.clearence",
             "0.3mm",
             &["did you mean `clearance`"],
+        ),
+        (
+            "spcmm",
+            "clearence",
+            "0.3mm",
+            &["clearence", "did you mean `contact.clearance`"],
+        ),
+        (
+            "slider-crank-driven",
+            "joint.crank.drive.velocity",
+            "7 rad/s",
+            &[
+                "`crank` is no ball joint",
+                "in the scene file alone",
+                "joint.<ball joint>.<key>; ball joints: B, C; keys: clearance, friction,",
+            ],
         ),
         (
             "spcmm",

@@ -344,6 +344,13 @@ fn a_point_that_diverges_is_recorded_and_the_rest_goes_on() {
         "{}",
         outcome.stdout
     );
+    assert!(
+        outcome
+            .stderr
+            .contains("1 section of each point: with fewer than 8 no regime"),
+        "{}",
+        outcome.stderr
+    );
     let (arrays, _) = archive(&folder.path().join("a.npz"));
     assert_eq!(arrays["status"].as_slice(), Some(&[0.0, 1.0][..]));
     assert_eq!(arrays["regime"][1], -1.0);

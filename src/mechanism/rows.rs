@@ -5,6 +5,9 @@ use super::factor::Skyline;
 
 /// Scaled pivots at or below this are rounding.
 const ROUNDING: f64 = 1e-12;
+/// Scaled pivots far below this, near a pose in which one more row depends on the others, press less and less on their
+/// multiplier instead of more and more: whoever passes such a pose passes it in finite steps, with an error of its square.
+const WEAK: f64 = 1e-10;
 /// Part of a null vector's largest component below which a row has no part in it.
 const NO_PART: f64 = 1e-7;
 
@@ -213,7 +216,7 @@ impl Dependent {
                     a.swap(i * n + k, i * n + best);
                 }
             }
-            let root = pivot.sqrt();
+            let root = (pivot + WEAK * WEAK / pivot).sqrt();
             a[k * n + k] = root;
             for i in k + 1..n {
                 a[i * n + k] /= root;
