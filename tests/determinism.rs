@@ -173,3 +173,62 @@ fn a_reset_is_a_new_start() {
         assert_eq!(go_on(&mut simulation, 200), first, "{name}");
     }
 }
+
+/// A slider-crank with an ideal joint and a pendulum whose loose balls start off the centres of their sockets.
+fn eccentric() -> [(&'static str, String); 2] {
+    let text = |name: &str, from: &str, to: &str| {
+        let text = jointplay::scene::built_in_text(name).unwrap();
+        assert!(text.contains(from));
+        text.replace(from, to)
+    };
+    let slider = "position = \"200 mm\", velocity";
+    [
+        (
+            "C",
+            text("slider-crank", slider, "position = \"200.2 mm\", velocity"),
+        ),
+        (
+            "S1",
+            text(
+                "pendulum",
+                "position = [0, 0, 0]",
+                "position = \"0.2 0 0 mm\"",
+            ),
+        ),
+    ]
+}
+
+#[test]
+fn a_state_is_restored_where_no_start_would_be_accepted() {
+    for (joint, text) in eccentric() {
+        for method in METHODS {
+            for form in ["tree", "lagrange"] {
+                let case = format!("{joint}, {method}, {form}");
+                let changes = [("solver.method", method), ("formulation", form)];
+                let scene = common::parse(&text, &changes);
+                let mut simulation = Simulation::new(&scene).unwrap();
+                simulation.advance_to(1e-3).unwrap();
+                let key = format!("joint.{joint}.clearance");
+                simulation.set(&key, "0.05 mm").unwrap();
+                assert!(
+                    Simulation::new(simulation.running_scene()).is_err(),
+                    "{case}"
+                );
+                simulation.advance_to(4e-3).unwrap();
+                let snapshot = simulation.snapshot();
+                let (mut peaks, mut again) = (Vec::new(), Vec::new());
+                simulation.take_peaks(&mut peaks);
+                let statistics = simulation.statistics().clone();
+                let first = go_on(&mut simulation, 100);
+                let mut other = Simulation::new(&scene).unwrap();
+                for target in [&mut simulation, &mut other] {
+                    target.restore(&snapshot).unwrap();
+                    assert_eq!(*target.statistics(), statistics, "{case}");
+                    target.take_peaks(&mut again);
+                    assert_eq!(again, peaks, "{case}");
+                    assert_eq!(go_on(target, 100), first, "{case}");
+                }
+            }
+        }
+    }
+}

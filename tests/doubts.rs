@@ -3,7 +3,7 @@
 mod common;
 
 use common::{Changes, run_until, simulation};
-use jointplay::simulate::Simulation;
+use jointplay::simulate::{Doubt, Simulation};
 
 fn words(simulation: &Simulation) -> Vec<String> {
     let doubts = simulation.doubts();
@@ -28,6 +28,85 @@ fn nothing_speaks_against_the_built_in_scenes_with_any_preset() {
     let rk4 = ran("spcmm", &[("solver.method", "rk4")], 0.03);
     assert_eq!(rk4.statistics().coarse, [0; 3]);
     assert!(rk4.doubts().is_empty(), "{:?}", rk4.doubts());
+}
+
+#[test]
+fn nothing_speaks_against_the_default_settings_for_longer() {
+    for scene in common::SCENES {
+        let simulation = ran(scene, &[], 0.1);
+        assert_eq!(simulation.doubts(), [], "{scene}");
+        let simulation = ran(scene, &[("formulation", "lagrange")], 0.03);
+        assert_eq!(simulation.doubts(), [], "{scene}, lagrange");
+    }
+}
+
+/// A scene, changes, for how long, and whether a doubt is the one expected.
+type Case<'a> = (&'a str, &'a Changes<'a>, f64, fn(&Doubt) -> bool);
+
+#[test]
+fn energy_that_is_wrong_is_marked() {
+    let imex = [("solver.method", "imex-euler")];
+    let loose = [("solver.method", "dopri5"), ("solver.tolerance", "1e-3")];
+    let heavy = [("solver.method", "rk4"), ("gravity.x", "981 m/s^2")];
+    let energy = |doubt: &Doubt| matches!(doubt, Doubt::Energy { share, .. } if *share > 5e-3);
+    let short = |doubt: &Doubt| matches!(doubt, Doubt::Unresolved { steps: 40, .. });
+    let held = |doubt: &Doubt| matches!(doubt, Doubt::Held { share, .. } if *share > 0.1);
+    let work = |doubt: &Doubt| matches!(doubt, Doubt::Work { value, residual, .. } if residual.abs() > 0.1 * value.abs());
+    let looser = [("solver.method", "dopri5"), ("solver.tolerance", "4e-4")];
+    let cases: [Case; 7] = [
+        ("pendulum", &imex, 0.01, energy),
+        ("pendulum", &imex, 0.01, short),
+        ("spcmm", &imex, 0.012, energy),
+        ("spcmm", &imex, 0.012, short),
+        ("spcmm", &heavy, 0.01, energy),
+        ("spcmm", &loose, 0.5, held),
+        ("pendulum", &looser, 0.5, work),
+    ];
+    for (scene, changes, duration, expected) in cases {
+        let doubts = ran(scene, changes, duration).doubts();
+        let told = doubts.iter().filter(|doubt| expected(doubt)).count();
+        assert_eq!(told, 1, "{scene} {changes:?}: {doubts:#?}");
+        for doubt in &doubts {
+            let words = doubt.to_string();
+            assert!(words.ends_with('.') && !words.contains("NaN"), "{words}");
+        }
+    }
+    // Without a ledger the energy says nothing; what the steps say stays.
+    let off = [imex[0], ("solver.energy_ledger", "off")];
+    let doubts = ran("pendulum", &off, 0.01).doubts();
+    assert!(
+        doubts.iter().any(short) && !doubts.iter().any(energy),
+        "{doubts:?}"
+    );
+}
+
+#[test]
+fn damping_beyond_its_domain_names_joint_and_instant() {
+    let changes = [
+        ("chain.links", "12"),
+        ("contact.approach_speed", "start"),
+        ("solver.tolerance", "1e-4"),
+    ];
+    let simulation = ran("chain", &changes, 0.06);
+    let doubts = simulation.doubts();
+    let found = doubts.iter().find_map(|doubt| match doubt {
+        Doubt::Damping {
+            joints,
+            time,
+            ratio,
+            usual,
+        } => Some((joints, *time, *ratio, *usual)),
+        _ => None,
+    });
+    let (joints, time, ratio, usual) = found.expect("a doubt about damping");
+    assert!(
+        joints.worst.starts_with('J') && (0.0..0.06).contains(&time),
+        "{doubts:?}"
+    );
+    assert!(
+        ratio > usual + 1.0 && (usual - 0.1425).abs() < 1e-6,
+        "{doubts:?}"
+    );
 }
 
 #[test]

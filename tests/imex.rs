@@ -54,7 +54,7 @@ fn settled_forces_are_right_within_a_per_cent_at_steps_far_beyond_the_contacts_p
 }
 
 #[test]
-fn a_step_costs_one_evaluation() {
+fn a_step_costs_one_evaluation_and_one_more_for_reactions() {
     for name in common::SCENES {
         let mut simulation = simulation(
             name,
@@ -62,8 +62,31 @@ fn a_step_costs_one_evaluation() {
         );
         simulation.advance_to(0.05).unwrap();
         let statistics = simulation.statistics();
-        assert_eq!(statistics.evaluations, statistics.steps, "{name}");
+        let reactions = simulation.mechanism().has_reactions();
+        let each = 1 + u64::from(reactions);
+        assert_eq!(statistics.evaluations, each * statistics.steps, "{name}");
     }
+}
+
+#[test]
+fn the_peak_of_an_ideal_joint_is_that_of_its_rows() {
+    let mut simulation = simulation("slider-crank-driven", &[("solver.method", "imex-euler")]);
+    let mut frame = Frame::default();
+    let mut rows = 0.0_f64;
+    while simulation.time() < 0.025 {
+        simulation.step().unwrap();
+        let middle = 0.5 * (simulation.step_start() + simulation.time());
+        for time in [middle, simulation.time()] {
+            simulation.sample(time, &mut frame);
+            rows = rows.max(frame.joints[0].normal_force.norm());
+        }
+    }
+    let found = simulation.statistics().peak_normal[0];
+    assert!(
+        rows > 200.0 && (found / rows - 1.0).abs() < 1e-2,
+        "{found} {rows}"
+    );
+    assert!(simulation.peak(0).0 >= rows);
 }
 
 #[test]

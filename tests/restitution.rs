@@ -5,7 +5,7 @@ mod common;
 use common::{Changes, METHODS, parse, simulation};
 use jointplay::contact::{NormalLaw, damping_factor, restitution_given};
 use jointplay::scene::built_in_text;
-use jointplay::simulate::{Impact, Simulation};
+use jointplay::simulate::{Doubt, Impact, Simulation};
 
 /// All impacts that finish before `end`, taken step by step.
 fn impacts(simulation: &mut Simulation, end: f64) -> Vec<Impact> {
@@ -236,4 +236,150 @@ fn the_latest_are_kept_all_can_be_taken_and_snapshots_hold_them() {
     assert_eq!(go_on(&mut simulation), first);
     simulation.reset().unwrap();
     assert_eq!(simulation.impacts().len(), 0);
+}
+
+/// The pendulum's rod upright, its ball about to touch the bottom of its socket at 2 mm/s, and then under a hundred times its
+/// weight: what a blow by a neighbour does to a joint that touches softly.
+fn struck(method: &str, approach_speed: &str) -> Simulation {
+    let text = built_in_text("pendulum").unwrap();
+    let start = "position = [0, 0, 0]\nrotation = { axis = [0, 1, 0], angle = \"-30 deg\" }";
+    assert!(text.contains(start));
+    let touching = "position = \"0 0 -0.2999 mm\"\nvelocity = \"0 0 -0.002 m/s\"";
+    let changes = [
+        ("gravity.z", "0"),
+        ("contact.friction", "0"),
+        ("contact.approach_speed", approach_speed),
+        ("solver.method", method),
+        ("solver.step", "0.2 us"),
+        ("solver.tolerance", "1e-9"),
+    ];
+    let mut simulation = Simulation::new(&parse(&text.replace(start, touching), &changes)).unwrap();
+    while !simulation.contact_memory(0).active {
+        simulation.step().unwrap();
+    }
+    simulation.set("gravity.z", "-981 m/s^2").unwrap();
+    simulation
+}
+
+/// The same by itself: m x'' = m g - K x^1.5 (1 + chi x' / v0), where v0 is the largest rate so far or stays that of the start.
+/// Returns the largest force and the largest damping over elastic force of the first 200 us.
+fn blow(largest: bool) -> (f64, f64) {
+    let scene = common::scene("pendulum", &[]);
+    let c = jointplay::contact::Coefficients::new(&scene.contact, scene.contact.clearance);
+    let (mass, g, h) = (scene.bodies[0].mass, 981.0, 1e-9);
+    let (mut x, mut v, mut v0) = (0.0_f64, 2e-3_f64, 2e-3_f64);
+    let (mut force, mut ratio) = (0.0_f64, 0.0_f64);
+    for _ in 0..200_000 {
+        let of = |x: f64, v: f64| c.normal_force(x, v, if largest { v0.max(v) } else { v0 });
+        let middle = v + 0.5 * h * (g - of(x, v) / mass);
+        v += h * (g - of(x + 0.5 * h * v, middle) / mass);
+        x += h * middle;
+        if largest {
+            v0 = v0.max(v);
+        }
+        force = force.max(c.normal_force(x, v, v0));
+        ratio = ratio.max(c.damping * v / v0);
+    }
+    (force, ratio)
+}
+
+#[test]
+fn damping_of_a_joint_that_is_hit_again_stays_at_chi_by_the_largest_speed() {
+    for (word, largest) in [("start", false), ("largest", true)] {
+        let (force, ratio) = blow(largest);
+        let chi = damping_factor(NormalLaw::LankaraniNikravesh, 0.9);
+        assert_eq!(ratio > 1.01 * chi, !largest, "{ratio}");
+        for method in METHODS {
+            let mut simulation = struck(method, word);
+            let start = simulation.time();
+            while simulation.time() < start + 2e-4 {
+                simulation.step().unwrap();
+            }
+            let statistics = simulation.statistics();
+            let (peak, damping) = (statistics.peak_normal[0], statistics.damping[0]);
+            let ledger = simulation.ledger().unwrap();
+            let case =
+                format!("{word}, {method}: {peak} against {force}, {damping} against {ratio}");
+            println!("{case}; residual {:.1e}", ledger.relative_residual());
+            let bound = match method {
+                "semi-implicit-euler" | "imex-euler" => 5e-3,
+                _ => 1e-5,
+            };
+            assert!((peak / force - 1.0).abs() < bound, "{case}");
+            assert!((damping / ratio - 1.0).abs() < 2.0 * bound, "{case}");
+            assert!(
+                ledger.relative_residual().abs() < bound,
+                "{case}: {ledger:?}"
+            );
+            let said = simulation
+                .doubts()
+                .iter()
+                .any(|doubt| matches!(doubt, Doubt::Damping { .. }));
+            assert_eq!(said, !largest, "{case}");
+        }
+    }
+}
+
+#[test]
+fn an_undisturbed_impact_is_the_same_by_the_start_and_by_the_largest_speed() {
+    for method in METHODS {
+        let first = |word: &str| {
+            let changes = [
+                ("solver.method", method),
+                ("solver.step", "2 us"),
+                ("contact.approach_speed", word),
+            ];
+            impacts(&mut flung(&changes), 0.01)[0]
+        };
+        let (start, largest) = (first("start"), first("largest"));
+        for (a, b) in [
+            (start.given(), largest.given()),
+            (start.peak, largest.peak),
+            (start.end, largest.end),
+        ] {
+            assert!(
+                (a / b - 1.0).abs() < 1e-9,
+                "{method}: {start:?} {largest:?}"
+            );
+        }
+        let chi = damping_factor(NormalLaw::LankaraniNikravesh, 0.9);
+        assert!(
+            (start.damping / chi - 1.0).abs() < 1e-2,
+            "{method}: {start:?}"
+        );
+    }
+}
+
+#[test]
+fn damping_in_a_chain_stays_at_chi_by_the_largest_speed() {
+    for method in METHODS {
+        for (word, bounded) in [("start", false), ("largest", true)] {
+            let changes = [
+                ("chain.links", "5"),
+                ("contact.approach_speed", word),
+                ("solver.method", method),
+                ("solver.tolerance", "1e-5"),
+            ];
+            let mut simulation = simulation("chain", &changes);
+            let found = impacts(&mut simulation, 0.04);
+            let most = found
+                .iter()
+                .map(|impact| impact.damping)
+                .fold(0.0, f64::max);
+            let chi = damping_factor(NormalLaw::LankaraniNikravesh, 0.9);
+            println!("{method}, {word}: {most:.3} in {} impacts", found.len());
+            assert_eq!(
+                most <= chi * (1.0 + 2e-6),
+                bounded,
+                "{method}, {word}: {most}"
+            );
+            assert!(
+                simulation
+                    .statistics()
+                    .damping
+                    .iter()
+                    .all(|d| !bounded || *d <= chi * (1.0 + 2e-6))
+            );
+        }
+    }
 }

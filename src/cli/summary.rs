@@ -63,8 +63,8 @@ pub fn json(
         "rejected": statistics.rejected,
         "impacts": by_joint(&|i| json!(statistics.impacts[i])),
         "floored": by_joint(&|i| json!(statistics.floored[i])),
-        "peak_normal_N": by_joint(&|i| json!(statistics.peak_normal[i])),
-        "peak_time_s": by_joint(&|i| json!(statistics.peak_time[i])),
+        "peak_normal_N": by_joint(&|i| json!(simulation.peak(i).0)),
+        "peak_time_s": by_joint(&|i| json!(simulation.peak(i).1)),
         "constraint_drift_m": statistics.constraint_drift,
         "doubts": simulation.doubts().iter().map(ToString::to_string).collect::<Vec<_>>(),
         "wall_s": wall,
@@ -137,14 +137,15 @@ pub fn text(
         ),
     );
     for (i, joint) in scene.ball_joints.iter().enumerate() {
+        let (force, at) = simulation.peak(i);
         let peak = format!(
             "peak {} N at {} s",
-            significant(statistics.peak_normal[i], 6),
-            significant(statistics.peak_time[i], 6)
+            significant(force, 6),
+            significant(at, 6)
         );
         let story = if joint.contact.clearance == 0.0 {
             format!("ideal, {peak}")
-        } else if statistics.peak_normal[i] == 0.0 {
+        } else if force == 0.0 {
             "no contact".to_owned()
         } else {
             let impacts = count(statistics.impacts[i], "impact");

@@ -19,6 +19,12 @@ pub(super) struct Recent {
 }
 
 impl Recent {
+    /// Its values at these two instants, if they are the latest.
+    pub(super) fn ends(&self, start: f64, end: f64) -> Option<(f64, f64)> {
+        let [(t0, f0), (t1, f1)] = self.before;
+        (t0 == start && t1 == end && f0 > 0.0).then_some((f0, f1))
+    }
+
     /// Takes the value at a new instant; returns the largest since the one before, by the parabola through three.
     pub(super) fn rise(&mut self, time: f64, value: f64) -> f64 {
         let [(t0, f0), (t1, f1)] = self.before;

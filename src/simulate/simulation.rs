@@ -9,6 +9,7 @@ mod doubts;
 mod energy;
 mod guard;
 mod live;
+mod reactions;
 mod sample;
 mod snapshot;
 
@@ -54,6 +55,8 @@ pub struct Simulation {
     stepper: AnyStepper,
     state: State,
     peaks: Vec<Peak>,
+    /// Largest force that a sample met and when, by joint: no part of the state, which sampling does not change.
+    sampled: Vec<(f64, f64)>,
     /// Scratch of the step's end.
     y_end: Vec<f64>,
     k_end: Vec<f64>,
@@ -199,6 +202,7 @@ impl Simulation {
             stepper: AnyStepper::new(scene.solver.method, n),
             state,
             peaks: vec![Peak::default(); joints],
+            sampled: vec![(0.0, 0.0); joints],
             y_end: vec![0.0; n],
             k_end: vec![0.0; n],
             scratch_y: vec![0.0; n],
@@ -475,7 +479,8 @@ impl Simulation {
         let switched = self.switch_contacts(h);
         self.track_peaks(h);
         let differs = self.stepper.differs_rates();
-        if !differs {
+        let again = (differs && self.mechanism.has_reactions()) || (!differs && switched.forces);
+        if !again {
             self.track_reactions();
         }
         self.book_step(h, switched.contacts || switched.forces);
@@ -489,7 +494,7 @@ impl Simulation {
         let rate = if differs { scratch_k } else { &mut state.k };
         // The force now divides by the approach speed just found. Where no step needs the derivative at its end, the reactions of
         // ideal joints do.
-        if (differs && mechanism.has_reactions()) || (!differs && switched.forces) {
+        if again {
             mechanism
                 .contacts
                 .memory_mut()
@@ -497,10 +502,9 @@ impl Simulation {
             mechanism.derivative(state.t, &state.y, rate);
             mechanism.forget_evaluation();
             state.statistics.evaluations += 1;
-            if differs {
-                self.track_reactions();
-            }
+            self.track_reactions();
         }
+        self.search_reactions();
         Ok(())
     }
 

@@ -150,31 +150,6 @@ impl Simulation {
         switched
     }
 
-    /// Largest reactions of ideal joints at the end of the step just accepted, of which everything was just evaluated.
-    pub(super) fn track_reactions(&mut self) {
-        let Self {
-            mechanism,
-            state,
-            peaks,
-            ..
-        } = self;
-        for j in 0..state.gaps.len() {
-            let Some(reaction) = mechanism.reaction(j) else {
-                continue;
-            };
-            let force = state.reactions[j].rise(state.t, reaction.norm());
-            if force > state.statistics.peak_normal[j] {
-                state.statistics.peak_normal[j] = force;
-                state.statistics.peak_time[j] = state.t;
-            }
-            if force > peaks[j].normal {
-                peaks[j].normal = force;
-                peaks[j].time = state.t;
-                peaks[j].normal_force = reaction;
-            }
-        }
-    }
-
     /// Largest contact forces of the step just accepted, in continuous time.
     pub(super) fn track_peaks(&mut self, h: f64) {
         let Self {

@@ -98,9 +98,8 @@ impl Simulation {
             .into_iter()
             .filter(|(_, value)| *value != 0.0)
             .min_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
-        let beyond = |value: f64| {
-            residual.abs() > RESIDUAL_OF_WORK * value.abs() && share > NOTEWORTHY
-        };
+        let beyond =
+            |value: f64| residual.abs() > RESIDUAL_OF_WORK * value.abs() && share > NOTEWORTHY;
         least
             .filter(|(_, value)| beyond(*value))
             .map(|(work, value)| Doubt::Work {

@@ -7,11 +7,39 @@ use crate::simulate::ideal::Reference;
 use crate::simulate::{Frame, report};
 
 impl Simulation {
+    /// Largest normal force of ball joint `j` (reaction, where it is ideal) since the last reset and when, (N, s): that of
+    /// [`Statistics`](crate::simulate::Statistics), which is found from the ends of steps, or a larger one that a sample met.
+    pub fn peak(&self, j: usize) -> (f64, f64) {
+        let statistics = self.statistics();
+        let found = (statistics.peak_normal[j], statistics.peak_time[j]);
+        if self.sampled[j].0 > found.0 {
+            self.sampled[j]
+        } else {
+            found
+        }
+    }
+
     /// Everything at `time`, interpolated within the latest step; forces come from the interpolated state.
     /// Allocates only while `out` is too small.
     pub fn sample(&mut self, time: f64, out: &mut Frame) {
-        let h = self.state.t - self.state.t0;
         let time = time.clamp(self.state.t0, self.state.t);
+        self.look(time);
+        report::fill(&mut self.mechanism, &self.running, time, out);
+        for (sampled, report) in self.sampled.iter_mut().zip(&out.joints) {
+            let force = report.normal_force.norm();
+            if force > sampled.0 {
+                *sampled = (force, time);
+            }
+        }
+        out.ledger = self.ledger_of(out);
+        if !matches!(self.reference, Reference::Elsewhere) {
+            out.probe_error = self.reference.error(out);
+        }
+    }
+
+    /// Evaluates everything at `time` within the latest step, for the mechanism to be read; counts as no evaluation.
+    pub(super) fn look(&mut self, time: f64) {
+        let h = self.state.t - self.state.t0;
         let inside = h > 0.0 && time < self.state.t;
         if inside {
             let theta = (time - self.state.t0) / h;
@@ -46,21 +74,7 @@ impl Simulation {
             .memory_mut()
             .copy_from_slice(scratch_memory);
         mechanism.evaluate_fully(time, scratch_y, scratch_k);
-        report::fill(mechanism, &self.running, time, out);
         (mechanism.evaluations, mechanism.contacts.evaluations) = counts;
-        // Peaks are found from the ends of steps; a sample that comes closer is one, too.
-        let statistics = &mut state.statistics;
-        for (j, report) in out.joints.iter().enumerate() {
-            let force = report.normal_force.norm();
-            if force > statistics.peak_normal[j] {
-                statistics.peak_normal[j] = force;
-                statistics.peak_time[j] = time;
-            }
-        }
-        out.ledger = self.ledger_of(out);
-        if !matches!(self.reference, Reference::Elsewhere) {
-            out.probe_error = self.reference.error(out);
-        }
     }
 
     /// State at the part `theta` of the latest step, of size `h`, into the scratch state, as the method interpolates it.

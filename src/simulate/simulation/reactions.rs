@@ -1,0 +1,74 @@
+//! Peaks of the reactions of ideal joints, in continuous time.
+
+use super::Simulation;
+
+/// A step at whose ends no reaction is above this part of its peak so far is not looked into.
+const NEAR_PEAK: f64 = 0.5;
+
+impl Simulation {
+    /// Takes the reactions at the end of the step just accepted, of which everything was just evaluated. Without a
+    /// contact they are smooth, and have their peaks on the parabola through three ends.
+    pub(super) fn track_reactions(&mut self) {
+        let joints = self.state.gaps.len();
+        let smooth = !(0..joints).any(|j| self.mechanism.contacts.has_clearance(j));
+        for j in 0..joints {
+            let Some(reaction) = self.mechanism.reaction(j) else {
+                continue;
+            };
+            let (size, time) = (reaction.norm(), self.state.t);
+            let vertex = self.state.reactions[j].rise(time, size);
+            self.take_reaction(j, if smooth { vertex } else { size }, time);
+        }
+    }
+
+    /// Looks for peaks of reactions inside the step just accepted, where impacts at other joints make them. Steps around an
+    /// impact are too uneven for a parabola through their ends: it would have peaks that never were.
+    pub(super) fn search_reactions(&mut self) {
+        let joints = self.state.gaps.len();
+        if !self.mechanism.has_reactions()
+            || !(0..joints).any(|j| self.mechanism.contacts.has_clearance(j))
+        {
+            return;
+        }
+        let (t0, t) = (self.state.t0, self.state.t);
+        for j in 0..joints {
+            let Some((start, end)) = self.state.reactions[j].ends(t0, t) else {
+                continue;
+            };
+            if start.max(end) <= NEAR_PEAK * self.state.statistics.peak_normal[j] {
+                continue;
+            }
+            let middle = self.reaction_at(j, 0.5 * (t0 + t));
+            let curvature = start - 2.0 * middle + end;
+            // Vertex of the parabola through the three.
+            let theta = 0.5 + 0.25 * (start - end) / curvature;
+            if curvature < 0.0 && theta > 0.0 && theta < 1.0 {
+                self.reaction_at(j, t0 + theta * (t - t0));
+            }
+        }
+    }
+
+    /// Size of the reaction of joint `j` at `time` within the latest step, N; it may be a peak.
+    fn reaction_at(&mut self, j: usize, time: f64) -> f64 {
+        self.look(time);
+        let size = self.mechanism.reaction(j).map_or(0.0, |force| force.norm());
+        self.take_reaction(j, size, time);
+        size
+    }
+
+    fn take_reaction(&mut self, j: usize, size: f64, time: f64) {
+        let statistics = &mut self.state.statistics;
+        if size > statistics.peak_normal[j] {
+            statistics.peak_normal[j] = size;
+            statistics.peak_time[j] = time;
+        }
+        let peak = &mut self.peaks[j];
+        if size > peak.normal
+            && let Some(reaction) = self.mechanism.reaction(j)
+        {
+            peak.normal = size;
+            peak.time = time;
+            peak.normal_force = reaction;
+        }
+    }
+}
