@@ -218,6 +218,8 @@ impl<'a> Sink<'a> {
                 None => error.kind().into(),
             };
             self.failure = Some(error);
+            // A header that was being corrected lies before what it is the header of.
+            self.position = self.end;
             copy
         })
     }
