@@ -1,4 +1,5 @@
-//! What the equations of motion cost: one evaluation, real time with Runge-Kutta 4, growth with the number of links.
+//! What the equations of motion cost: one evaluation, real time with Runge-Kutta 4, growth with the number of links, and
+//! the setting up of the largest scenes.
 //!
 //! `cargo bench --bench physics`; figures are ratios of one run or of one machine, never absolute promises.
 
@@ -7,7 +8,11 @@ use jointplay::integrate::System;
 use jointplay::mechanism::Mechanism;
 use jointplay::scene::Scene;
 use jointplay::simulate::Simulation;
+use large::scene_text;
 use std::hint::black_box;
+
+#[path = "../tests/common/large.rs"]
+mod large;
 
 /// Keys with their values.
 type Changes = [(&'static str, &'static str)];
@@ -160,5 +165,36 @@ fn chain(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, evaluations, real_time, spans, chain);
+/// From a text to a simulation at t = 0, for the largest scene of each kind: `docs/scene-format.md` says what the limits are.
+fn set_up(c: &mut Criterion) {
+    let mut group = c.benchmark_group("set up");
+    group.sample_size(10);
+    for (kind, n, form, clearance) in [
+        ("free bodies", 10_000, "tree", "0 m"),
+        ("free bodies", 10_000, "lagrange", "0 m"),
+        ("pendulums", 10_000, "tree", "0.1 mm"),
+        ("pendulums", 10_000, "tree", "0 m"),
+        ("pendulums", 10_000, "lagrange", "0 m"),
+        ("sockets of one body", 10_000, "tree", "0.1 mm"),
+        ("balls of one body", 10_000, "lagrange", "0.1 mm"),
+        ("balls of one body", 194, "tree", "0 m"),
+        ("balls of one body", 188, "lagrange", "0 m"),
+        ("hinges in a row", 566, "tree", "0 m"),
+        ("hinges in a row", 10_000, "lagrange", "0 m"),
+        ("hinges on one body", 2043, "tree", "0 m"),
+        ("hinges on one body", 113, "lagrange", "0 m"),
+    ] {
+        let text = scene_text(kind, n, clearance);
+        let changes = [("formulation".to_owned(), form.to_owned())];
+        group.bench_function(format!("{n} {kind}, {form}, clearance {clearance}"), |b| {
+            b.iter(|| {
+                let scene = Scene::parse(&text, None, &changes).expect("a scene");
+                Simulation::new(&scene).expect("starts").time()
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, evaluations, real_time, spans, chain, set_up);
 criterion_main!(benches);

@@ -5,10 +5,13 @@
 )]
 
 mod common;
+#[path = "common/large.rs"]
+mod large;
 
 use common::{METHODS, SCENES, simulation};
 use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation};
+use large::scene_text;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
@@ -114,55 +117,22 @@ fn a_clearance_on_its_way_allocates_nothing() {
     }
 }
 
-/// A scene of one kind with `n` bodies.
-fn scene_text(kind: &str, n: usize) -> String {
-    let mut text = String::from("[contact]\nball_radius = \"1 mm\"\n");
-    for i in 0..n {
-        let hinge = "kind = \"revolute\"\naxis = [0, 1, 0]\n";
-        let joint = match kind {
-            "hinges in a row" if i > 0 => format!("{hinge}parent = \"b{}\"", i - 1),
-            "hinges in a row" => hinge.to_owned(),
-            _ => format!("kind = \"free\"\nstart = {{ position = \"{i} 0 0 mm\" }}"),
-        };
-        text += &format!(
-            "[[body]]\nname = \"b{i}\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n\
-             [[joint]]\nname = \"f{i}\"\nchild = \"b{i}\"\n{joint}\n"
-        );
-    }
-    for i in 0..n {
-        let here = format!("{i} 0 0 mm");
-        let (before, own) = (format!("b{}", i.saturating_sub(1)), format!("b{i}"));
-        let [clearance, socket, at, ball, end] = match kind {
-            "pendulums" => ["0", "world", &here, &own, "0 0 0 mm"],
-            "sockets of one body" => ["\"0.1 mm\"", "world", &here, "b0", &here],
-            "balls of one body" if i > 0 => ["\"0.1 mm\"", "b0", &here, &own, "0 0 0 mm"],
-            "a chain" if i > 0 => ["0", &before, "1 0 0 mm", &own, "0 0 0 mm"],
-            _ => continue,
-        };
-        text += &format!(
-            "[[ball_joint]]\nname = \"S{i}\"\nclearance = {clearance}\n\
-             socket = {{ body = \"{socket}\", at = \"{at}\" }}\nball = {{ body = \"{ball}\", at = \"{end}\" }}\n"
-        );
-    }
-    text
-}
-
 #[test]
 fn what_setting_up_allocates_grows_with_the_scene_and_not_with_its_square() {
-    for (kind, form) in [
-        ("free bodies", "tree"),
-        ("free bodies", "lagrange"),
-        ("pendulums", "tree"),
-        ("pendulums", "lagrange"),
-        ("balls of one body", "tree"),
-        ("balls of one body", "lagrange"),
-        ("sockets of one body", "tree"),
-        ("a chain", "tree"),
-        ("a chain", "lagrange"),
-        ("hinges in a row", "lagrange"),
+    for (kind, form, clearance) in [
+        ("free bodies", "tree", "0 m"),
+        ("free bodies", "lagrange", "0 m"),
+        ("pendulums", "tree", "0 m"),
+        ("pendulums", "lagrange", "0 m"),
+        ("balls of one body", "tree", "0.1 mm"),
+        ("balls of one body", "lagrange", "0.1 mm"),
+        ("sockets of one body", "tree", "0.1 mm"),
+        ("a chain", "tree", "0 m"),
+        ("a chain", "lagrange", "0 m"),
+        ("hinges in a row", "lagrange", "0 m"),
     ] {
         let bytes = |n: usize| {
-            let text = scene_text(kind, n);
+            let text = scene_text(kind, n, clearance);
             let before = BYTES.get();
             let changes = [("formulation".to_owned(), form.to_owned())];
             let scene = Scene::parse(&text, Some("big.toml"), &changes).unwrap();

@@ -3,7 +3,7 @@
 use super::Frame;
 use crate::scene::{JointKind, Scene, Vec3};
 
-/// Ball joints that are recorded; in a longer chain the rest would cost more memory than they tell.
+/// Ball joints, and drives, that are recorded; in a longer chain the rest would cost more memory than they tell.
 pub const RECORDED_JOINTS: usize = 12;
 
 /// A physical quantity that a plot shows; its channels share one axis.
@@ -206,7 +206,8 @@ impl Channels {
     /// The channels that `scene` has.
     pub fn of(scene: &Scene) -> Self {
         let joints = scene.ball_joints.len().min(RECORDED_JOINTS);
-        let driven = || scene.joints.iter().filter(|joint| joint.drive.is_some());
+        let all_driven = scene.joints.iter().filter(|joint| joint.drive.is_some());
+        let driven = || all_driven.clone().take(RECORDED_JOINTS);
         let mut list = Vec::new();
         let mut add = |quantity, member: &str| {
             list.push(Channel {
