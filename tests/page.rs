@@ -2,6 +2,8 @@
 //! screen readers.
 #![cfg(feature = "gui")]
 
+mod common;
+
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -90,6 +92,7 @@ impl egui::DroppedFile for Dropped {
 fn open(options: AppOptions, size: [f32; 2]) -> (Harness<'static, App>, Rc<RefCell<Calls>>) {
     let mut options = options;
     options.theme = egui::Theme::Light.into();
+    options.clock = common::looks::<10>;
     let calls = Rc::new(RefCell::new(Calls::default()));
     let page = Page(calls.clone());
     let mut harness = Harness::builder()

@@ -273,7 +273,7 @@ fn bad_input_is_refused_before_anything_runs() {
 fn ctrl_c_leaves_nothing_half_written_and_the_same_command_goes_on() {
     let folder = tempfile::tempdir().unwrap();
     let entries = || files(folder.path());
-    let child = Command::new(env!("CARGO_BIN_EXE_jointplay"))
+    let mut child = Command::new(env!("CARGO_BIN_EXE_jointplay"))
         .args("reproduce --out report/ --quick --threads 1".split(' '))
         .current_dir(folder.path())
         .stdout(Stdio::piped())
@@ -293,6 +293,7 @@ fn ctrl_c_leaves_nothing_half_written_and_the_same_command_goes_on() {
         if grown.last() != Some(&now) {
             grown.push(now);
         }
+        assert!(child.try_wait().unwrap().is_none(), "over before it began");
         std::thread::sleep(std::time::Duration::from_millis(1));
     }
     let kill = Command::new("kill")

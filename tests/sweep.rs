@@ -218,39 +218,49 @@ fn neither_threads_nor_shards_change_a_bit() {
 fn an_interrupted_sweep_goes_on_where_it_stopped_and_a_damaged_part_is_refused() {
     let folder = folder();
     let at = |name: &str| folder.path().join(name);
-    let line = |out: &str| {
+    let sweep = |points: usize, out: &str| {
         format!(
-            "sweep spcmm --vary contact.clearance=0.2mm..0.3mm:12 --periods 6 --discard 2 --threads 2 --out {out}"
+            "sweep spcmm --vary contact.clearance=0.2mm..0.3mm:{points} --periods 6 --discard 2 --threads 2 --out {out}"
         )
     };
-    let mut child = command(folder.path(), &line("a.npz"))
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    // Once some blocks are in.
-    let length = || fs::metadata(at("a.npz.partial")).map_or(0, |file| file.len());
-    let mut grown = Vec::new();
-    while grown.len() < 4 {
-        let now = length();
-        if now > 0 && grown.last() != Some(&now) {
-            grown.push(now);
+    // One that is over before it can be interrupted gets twice as much to do.
+    let mut points = 12;
+    loop {
+        let mut child = command(folder.path(), &sweep(points, "a.npz"))
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        // Once some blocks are in.
+        let length = || fs::metadata(at("a.npz.partial")).map_or(0, |file| file.len());
+        let mut grown = Vec::new();
+        while grown.len() < 4 && child.try_wait().unwrap().is_none() {
+            let now = length();
+            if now > 0 && grown.last() != Some(&now) {
+                grown.push(now);
+            }
+            std::thread::sleep(std::time::Duration::from_millis(1));
         }
-        assert!(
-            child.try_wait().unwrap().is_none(),
-            "over before it could be interrupted"
-        );
-        std::thread::sleep(std::time::Duration::from_millis(1));
+        if child.try_wait().unwrap().is_none() {
+            let interrupted = Command::new("kill")
+                .args(["-INT", &child.id().to_string()])
+                .status();
+            assert!(interrupted.unwrap().success());
+        }
+        let output = child.wait_with_output().unwrap();
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        if output.status.code() == Some(0) {
+            fs::remove_file(at("a.npz")).unwrap();
+            points *= 2;
+            continue;
+        }
+        assert_eq!(output.status.code(), Some(130), "{stderr}");
+        let done = format!("of {points} points done");
+        assert!(stderr.contains(&done), "{stderr}");
+        assert_eq!(names(folder.path()), ["a.npz.partial"]);
+        break;
     }
-    let interrupted = Command::new("kill")
-        .args(["-INT", &child.id().to_string()])
-        .status();
-    assert!(interrupted.unwrap().success());
-    let output = child.wait_with_output().unwrap();
-    let stderr = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(130), "{stderr}");
-    assert!(stderr.contains("of 12 points done"), "{stderr}");
-    assert_eq!(names(folder.path()), ["a.npz.partial"]);
+    let line = |out: &str| sweep(points, out);
     let partial = fs::read(at("a.npz.partial")).unwrap();
 
     // Damage of every kind, and settings of another sweep.

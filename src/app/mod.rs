@@ -40,7 +40,6 @@ mod window;
 
 use eframe::egui::{self, ThemePreference, Ui};
 use eframe::egui_wgpu;
-use web_time::Instant;
 
 use crate::render;
 use crate::scene::{DEFAULT_SCENE, Scene};
@@ -63,7 +62,7 @@ use load::Load;
 pub use log::{Entry, Event, Log};
 pub use overlay::{force_notes, plate};
 use picture::Picture;
-pub use player::Player;
+pub use player::{Clock, Player};
 pub use plots::{Plots, Window};
 pub use replay::{Replay, Verdict};
 pub use share::{CameraPose, LONGEST_LINK, Link, LinkError, SceneText};
@@ -73,6 +72,12 @@ pub use window::{WindowError, run_native};
 
 /// Most stepping towards the state of a link in one frame, s: the window still answers twenty times a second.
 const REPLAY_BUDGET: f64 = 0.03;
+
+/// Whether a frame that begins now may still step.
+fn replay_budget(clock: Clock) -> impl Fn() -> bool {
+    let start = clock();
+    move || clock() - start < REPLAY_BUDGET
+}
 
 /// How often a computation beside the interface is asked how far it is.
 const POLL: std::time::Duration = std::time::Duration::from_millis(100);
@@ -94,6 +99,8 @@ pub struct AppOptions {
     pub link: Option<Link>,
     /// What to tell the user at once, say why a link could not be opened.
     pub problem: Option<String>,
+    /// What measures how much of a frame is spent on stepping.
+    pub clock: Clock,
 }
 
 impl AppOptions {
@@ -110,6 +117,7 @@ impl AppOptions {
             },
             link: None,
             problem: None,
+            clock: player::wall,
         }
     }
 
@@ -240,6 +248,7 @@ impl App {
         options: AppOptions,
     ) -> Result<Self, StartError> {
         let mut player = Player::new(&options.scene)?;
+        player.clock = options.clock;
         player.pacer.set_scale(options.time_scale);
         player.set_playing(options.playing);
         let mut viewport = Viewport::new(&player, options.view);
@@ -373,8 +382,7 @@ impl App {
         let Some((load, twin)) = &mut self.load else {
             return;
         };
-        let clock = Instant::now();
-        let may_step = || clock.elapsed().as_secs_f64() < REPLAY_BUDGET;
+        let may_step = replay_budget(self.player.clock);
         let Some(arrival) = load.advance(&mut self.player, may_step) else {
             return;
         };
@@ -490,8 +498,7 @@ impl App {
     /// Moves the state on by `dt` seconds; whether it goes on moving by itself.
     pub fn advance(&mut self, dt: f64) -> bool {
         if let Some(replay) = &mut self.replay {
-            let clock = Instant::now();
-            let may_step = || clock.elapsed().as_secs_f64() < REPLAY_BUDGET;
+            let may_step = replay_budget(self.player.clock);
             self.verdict = replay.advance(&mut self.player, may_step);
             if self.verdict.is_some() {
                 self.replay = None;
@@ -511,6 +518,7 @@ impl App {
 
     fn show_scene(&mut self, scene: &Scene) -> Result<(), String> {
         let mut player = Player::new(scene).map_err(|error| error.located(scene).to_string())?;
+        player.clock = self.player.clock;
         player.pacer.set_scale(self.player.pacer.scale());
         player.set_playing(self.player.is_playing() || self.player.stopped().is_some());
         self.player = player;

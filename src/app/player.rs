@@ -1,6 +1,7 @@
 //! A running scene with its transport: playing, pacing, recording, peaks and what went wrong. No egui here.
 
 use std::collections::VecDeque;
+use std::sync::OnceLock;
 
 use web_time::Instant;
 
@@ -17,6 +18,15 @@ use crate::simulate::{
 /// Narrowest bin of the record, s: shorter than any step that resolves an impact.
 const FINEST_BIN: f64 = 2e-6;
 
+/// Seconds from any start: what a frame has spent on stepping is measured by it.
+pub type Clock = fn() -> f64;
+
+/// The clock on the wall.
+pub fn wall() -> f64 {
+    static START: OnceLock<Instant> = OnceLock::new();
+    START.get_or_init(Instant::now).elapsed().as_secs_f64()
+}
+
 /// A simulation and everything needed to play and plot it.
 ///
 /// There is one instant on show, the pacer's: frame, record, peaks, sections and link are those of it. The simulation itself
@@ -24,6 +34,8 @@ const FINEST_BIN: f64 = 2e-6;
 pub struct Player {
     /// How fast simulated time passes.
     pub pacer: Pacer,
+    /// What measures how long stepping takes.
+    pub clock: Clock,
     simulation: Simulation,
     /// The run as it was before a change in the middle of the latest step: what that step did until the change.
     unchanged: Option<Box<Simulation>>,
@@ -94,6 +106,7 @@ impl Player {
         let channels = Channels::of(scene);
         let mut player = Self {
             pacer: Pacer::default(),
+            clock: wall,
             original,
             warnings: scene.warnings(),
             playing: false,
@@ -261,19 +274,14 @@ impl Player {
     pub fn advance(&mut self, dt: f64) {
         if self.playing {
             let target = self.pacer.begin(dt);
-            let clock = Instant::now();
+            let start = (self.clock)();
             let before = self.simulation.time();
-            while self.simulation.time() < target
-                && self.pacer.may_step(clock.elapsed().as_secs_f64())
-            {
+            while self.simulation.time() < target && self.pacer.may_step((self.clock)() - start) {
                 if !self.step() {
                     break;
                 }
             }
-            self.measure(
-                self.simulation.time() - before,
-                clock.elapsed().as_secs_f64(),
-            );
+            self.measure(self.simulation.time() - before, (self.clock)() - start);
             self.pacer.end(dt, target, self.simulation.time());
             self.present();
         }

@@ -48,8 +48,8 @@ fn tell(bar: &WeakProgressBar, mut wait: impl FnMut() -> Duration, mut say: impl
         };
         let (done, all) = (bar.position(), bar.length().unwrap_or(0).max(1));
         let mut line = format!(
-            "progress: {} %, {} elapsed",
-            (100.0 * done as f64 / all as f64).min(100.0).floor(),
+            "progress: {:.1} %, {} elapsed",
+            (1000.0 * done as f64 / all as f64).min(1000.0).floor() / 10.0,
             HumanDuration(elapsed)
         );
         let (since, before) = *first.get_or_insert((elapsed, done));
@@ -89,10 +89,10 @@ mod tests {
         assert_eq!(
             lines,
             [
-                "progress: 60 %, 10 seconds elapsed",
-                "progress: 70 %, 20 seconds elapsed, about 30 seconds to go",
-                "progress: 80 %, 30 seconds elapsed, about 20 seconds to go",
-                "progress: 90 %, 40 seconds elapsed, about 10 seconds to go",
+                "progress: 60.0 %, 10 seconds elapsed",
+                "progress: 70.0 %, 20 seconds elapsed, about 30 seconds to go",
+                "progress: 80.0 %, 30 seconds elapsed, about 20 seconds to go",
+                "progress: 90.0 %, 40 seconds elapsed, about 10 seconds to go",
             ]
         );
     }

@@ -88,3 +88,13 @@ pub fn slope(points: &[(f64, f64)]) -> f64 {
     }
     (n * sxy - sx * sy) / (n * sxx - sx * sx)
 }
+
+/// A clock for the interface, by which each look costs so many microseconds: what a frame has time for does not depend on
+/// the machine.
+pub fn looks<const MICROSECONDS: u32>() -> f64 {
+    thread_local! {
+        static LOOKS: std::cell::Cell<u32> = const { std::cell::Cell::new(0) };
+    }
+    LOOKS.set(LOOKS.get() + 1);
+    f64::from(LOOKS.get()) * f64::from(MICROSECONDS) * 1e-6
+}

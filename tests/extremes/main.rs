@@ -15,7 +15,7 @@ use outcome::{Outcome, run};
 use rows::{Columns, Row, rows};
 
 /// Without a result for so long a call hangs.
-const DEAD: Duration = Duration::from_secs(60);
+const DEAD: Duration = Duration::from_secs(600);
 const FORMS: [&str; 2] = ["tree", "lagrange"];
 const PRESETS: [&str; 4] = ["preview", "real-time", "accurate", "reference"];
 
