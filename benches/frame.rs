@@ -11,7 +11,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use jointplay::app::{AppOptions, Headless};
 use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation};
-use jointplay::view::{PeakMarks, DrawList, SceneView, Shot, ViewOptions};
+use jointplay::view::{DrawList, PeakMarks, SceneView, Shot, ViewOptions};
 
 const SIZE: [u32; 2] = [1280, 800];
 /// Simulated before the frame, s: the plots have something to show.

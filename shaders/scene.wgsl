@@ -168,15 +168,16 @@ fn mark(in: Surface) -> vec3<f32> {
 // A second state of the machine, seen through: clearest along its edge.
 @fragment fn fs_ghost(in: Surface) -> @location(0) vec4<f32> {
     let facing = max(dot(normalize(in.normal), normalize(globals.eye.xyz - in.world)), 0.0);
-    return finish(mark(in), in.clip.xy, in.colour.a * mix(1.0, 0.4, facing));
+    let edge = pow(1.0 - facing, 1.5);
+    return finish(to_linear(in.colour.rgb), in.clip.xy, in.colour.a * mix(0.3, 1.0, edge));
 }
 
 // Light about a joint that was hit: a ring outside of its socket, which hides nothing of the contact.
 @fragment fn fs_halo(in: Surface) -> @location(0) vec4<f32> {
     let facing = max(dot(normalize(in.normal), normalize(globals.eye.xyz - in.world)), 0.0);
     // The socket's outline lies where this ball of 1.7 times its radius faces the eye by 0.81.
-    let ring = smoothstep(0.0, 0.55, facing) * (1.0 - smoothstep(0.68, 0.79, facing));
-    return finish(to_linear(in.colour.rgb) * 1.15, in.clip.xy, in.colour.a * ring);
+    let ring = smoothstep(0.1, 0.65, facing) * (1.0 - smoothstep(0.7, 0.79, facing));
+    return finish(to_linear(in.colour.rgb) * 1.15, in.clip.xy, 0.85 * in.colour.a * ring);
 }
 
 @fragment fn fs_socket(in: Surface, @builtin(front_facing) front: bool) -> @location(0) vec4<f32> {

@@ -1054,7 +1054,7 @@ mod frames {
     }
 
     #[test]
-    fn a_film_holds_the_impacts_between_its_frames_and_a_single_picture_does_not() {
+    fn a_film_marks_the_impacts_between_its_frames_and_a_single_picture_does_not() {
         let folder = folder();
         // At 9 ms every ball flies free; each joint was hit 1.2 ms before.
         let common = "--size 320x180 --hide trail,flash";
@@ -1073,7 +1073,7 @@ mod frames {
         let (film, single) = ("frame_00001.png", "frame_00000.png");
         assert!(
             last("film_with", film) != last("single_with", single),
-            "held forces are drawn"
+            "peaks are marked"
         );
         assert!(
             last("film_without", film) == last("single_without", single),

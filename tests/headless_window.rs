@@ -9,7 +9,7 @@ use jointplay::app::{AppOptions, Headless, Overlay, UiFrame, force_notes};
 use jointplay::render::Image;
 use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation};
-use jointplay::view::{PeakMarks, DrawList, SceneView, Shot, Theme, ViewOptions};
+use jointplay::view::{DrawList, PeakMarks, SceneView, Shot, Theme, ViewOptions};
 
 fn colours(image: &Image) -> usize {
     let pixels: HashSet<&[u8]> = image.rgba.chunks_exact(4).collect();

@@ -592,25 +592,148 @@ fn look() {
 }
 
 #[test]
-fn a_settled_run_says_how_to_start_again_until_told_not_to() {
+fn a_settled_run_says_so_beside_the_picture_and_a_swinging_one_never() {
     let mut harness = window("spcmm");
     let player = harness.state_mut().player_mut();
     player.pacer.set_scale(1.0);
-    player.run_to(0.06);
+    player.run_to(9e-3);
     player.set_playing(true);
     harness.step();
     assert!(harness.query_by_label("Settled: R restarts").is_none());
-    harness.run_steps(60);
-    assert!(time(&harness) > 0.5);
-    harness.get_by_label("Settled: R restarts");
-    click_once(&mut harness, "Dismiss the hint");
-    harness.run_steps(3);
+
+    // Stepping must not depend on how fast this machine is.
+    harness.state_mut().player_mut().run_to(0.5);
+    let places = |harness: &Harness<'_, App>| {
+        ["Step", "3D view", "Time scale preset"].map(|label| harness.get_by_label(label).rect())
+    };
+    harness.step();
     assert!(harness.query_by_label("Settled: R restarts").is_none());
+    let paused = places(&harness);
+    harness.state_mut().player_mut().set_playing(true);
+    harness.step();
+    let words = harness.get_by_label("Settled: R restarts").rect();
+    assert!(!words.intersects(harness.get_by_label("3D view").rect()));
+    assert_eq!(places(&harness), paused, "nothing gives way for it");
+
+    for (scene, times) in [("pendulum", [1.0, 2.0]), ("chain", [0.7, 1.0])] {
+        let mut harness = window(scene);
+        for time in times {
+            harness.state_mut().player_mut().run_to(time);
+            harness.state_mut().player_mut().set_playing(true);
+            harness.step();
+            assert!(
+                harness.query_by_label("Settled: R restarts").is_none(),
+                "{scene} swings at {time} s"
+            );
+        }
+    }
 }
 
-fn click_once(harness: &mut Harness<'_, App>, label: &str) {
-    harness.get_by_label(label).click();
-    harness.step();
+/// Pixels in the colour of normal forces, left of the legend in the 3D view.
+fn orange(harness: &mut Harness<'_, App>) -> usize {
+    let view = harness.get_by_label("3D view").rect();
+    let picture = harness.render().expect("drawn");
+    let mut found = 0;
+    for y in view.top() as u32..view.bottom() as u32 {
+        for x in view.left() as u32..(view.right() - 200.0) as u32 {
+            let [r, g, b, _] = picture.get_pixel(x, y).0.map(u32::from);
+            // Less yellow than a rod, less red than the probe and the X axis.
+            let hue = (25..52).contains(&(100 * g / r.max(1))) && 100 * b < 25 * r;
+            found += usize::from(r > 110 && hue);
+        }
+    }
+    found
+}
+
+#[test]
+fn an_arrow_is_a_force_of_the_instant_on_show_and_a_peak_is_marked_apart() {
+    let mut harness = window("spcmm");
+    harness.state_mut().player_mut().run_to(7.0e-3);
+    harness.run();
+    assert_eq!(orange(&mut harness), 0, "nothing has touched yet");
+    harness.state_mut().player_mut().run_to(9.0e-3);
+    harness.run();
+    let player = harness.state().player();
+    assert!(
+        player
+            .frame()
+            .joints
+            .iter()
+            .all(|joint| joint.normal_force.norm() == 0.0)
+    );
+    let marked = orange(&mut harness);
+    assert!(marked > 100, "three joints were hit: {marked}");
+    // It stands for as long as nobody plays.
+    harness.run_steps(120);
+    assert_eq!(orange(&mut harness), marked);
+
+    harness.get_by_label("View options").click();
+    harness.run();
+    harness
+        .get_by_role_and_label(Role::CheckBox, "Peaks")
+        .click();
+    harness.run();
+    harness.key_press(Key::Escape);
+    harness.run();
+    assert_eq!(orange(&mut harness), 0, "no arrow without a force");
+}
+
+#[test]
+fn after_a_reset_or_a_step_back_no_force_is_on_show_that_is_yet_to_come() {
+    let mut harness = window("spcmm");
+    harness.state_mut().player_mut().run_to(9.0e-3);
+    harness.run();
+    assert!(orange(&mut harness) > 100);
+    harness.key_press(Key::R);
+    harness.run();
+    assert_eq!(orange(&mut harness), 0);
+
+    harness.state_mut().player_mut().run_to(7.79e-3);
+    harness.run();
+    let mut steps = 0;
+    while hardest(&harness) < 400.0 {
+        harness.key_press(Key::ArrowRight);
+        harness.step();
+        steps += 1;
+        assert!(steps < 64);
+    }
+    assert!(orange(&mut harness) > 100);
+    for _ in 0..steps {
+        harness.key_press(Key::ArrowLeft);
+        harness.step();
+    }
+    harness.run();
+    assert!(hardest(&harness) < 1.0);
+    assert_eq!(orange(&mut harness), 0);
+}
+
+#[test]
+fn a_tooltip_of_a_control_leaves_the_picture_alone_and_gives_way_to_a_dialog() {
+    let mut harness = window("spcmm");
+    let slider = harness
+        .get_by_role_and_label(Role::Slider, "Clearance")
+        .rect();
+    harness.hover_at(slider.center());
+    harness.run_steps(60);
+    let range = |harness: &Harness<'_, App>| {
+        harness
+            .query_by_label_contains("Key contact.clearance")
+            .map(|label| label.rect())
+    };
+    let tooltip = range(&harness).expect("a tooltip");
+    let view = harness.get_by_label("3D view").rect();
+    assert!(tooltip.right() < view.left(), "{tooltip:?} over {view:?}");
+    assert!(
+        tooltip.top() > slider.bottom(),
+        "{tooltip:?} over {slider:?}"
+    );
+    harness.key_press(Key::Questionmark);
+    harness.run_steps(10);
+    harness.get_by_label("Play or pause");
+    assert!(
+        range(&harness).is_none(),
+        "it stays open over the list of keys"
+    );
 }
 
 #[test]

@@ -4,8 +4,8 @@
 use std::collections::HashMap;
 
 use eframe::egui::{
-    self, ComboBox, DragValue, FontId, Frame, Rect, RectAlign, Response, RichText, Slider, SliderClamping,
-    TextEdit, Tooltip, Ui,
+    self, ComboBox, DragValue, FontId, Frame, Rect, RectAlign, Response, RichText, Slider,
+    SliderClamping, TextEdit, Tooltip, Ui,
 };
 
 use super::accuracy::{self, Accuracy};

@@ -7,7 +7,7 @@ use super::value;
 use super::viewport::lower_right;
 use crate::scene::{Scene, format_quantity_digits};
 use crate::simulate::{ContactState, Frame};
-use crate::view::{Colour, DrawList, LabelKind, Legend, Palette, Scaling, Theme};
+use crate::view::{Colour, DrawList, Label, LabelKind, Legend, Palette, Scaling, Theme};
 
 /// Distance of overlays from the edge, points.
 const MARGIN: f32 = 14.0;
@@ -49,7 +49,11 @@ pub fn labels(painter: &Painter, rect: Rect, scale: f32, list: &DrawList) {
         return;
     }
     let halo = colour(list.background.bottom);
-    for label in &list.labels {
+    let is_peak = |label: &&Label| matches!(label.kind, LabelKind::Peak(_));
+    let (mut names, mut peaks) = (Vec::new(), list.labels.iter().filter(is_peak));
+    // Peaks come and go: they make room for the names.
+    let mut labels = list.labels.iter().filter(|label| !is_peak(label));
+    while let Some(label) = labels.next().or_else(|| peaks.next()) {
         let at = rect.min + vec2(label.pixel.x, label.pixel.y) / scale;
         let plate = match label.kind {
             LabelKind::Joint(_) => Some((13.0, Align2::LEFT_BOTTOM, vec2(10.0, -8.0))),
@@ -60,9 +64,17 @@ pub fn labels(painter: &Painter, rect: Rect, scale: f32, list: &DrawList) {
             // On a plate of its own: it often lies over a dark part.
             let font = FontId::proportional(size);
             let words = painter.layout_no_wrap(label.text.to_string(), font, colour(label.colour));
-            let place = anchor.anchor_size(at + beside, words.size());
+            let mut place = anchor.anchor_size(at + beside, words.size());
+            while let Some(name) = names.iter().find(|name: &&Rect| name.intersects(place)) {
+                place = place.translate(vec2(0.0, name.max.y + 1.0 - place.min.y));
+            }
+            names.push(place.expand2(vec2(4.0, 1.0)));
             let opacity = 0.8 * label.colour.0[3];
-            painter.rect_filled(place.expand2(vec2(4.0, 1.0)), 4.0, halo.gamma_multiply(opacity));
+            painter.rect_filled(
+                place.expand2(vec2(4.0, 1.0)),
+                4.0,
+                halo.gamma_multiply(opacity),
+            );
             painter.galley(place.min, words, colour(label.colour));
             continue;
         }
@@ -202,7 +214,7 @@ pub fn legend(painter: &Painter, rect: Rect, scale: f32, legend: &Legend, theme:
         - 2.0;
     for (name, hue, hollow) in [
         ("friction", legend.friction, false),
-        ("peak before", legend.normal.filter(|_| legend.peaks), true),
+        ("last peak", legend.normal.filter(|_| legend.peaks), true),
         ("normal", legend.normal, false),
     ] {
         let Some(hue) = hue else {

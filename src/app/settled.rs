@@ -80,7 +80,8 @@ impl Settling {
             Some(period) if self.broke => period,
             _ => 0.0,
         };
-        self.quiet.is_some_and(|since| self.here.time - since >= needed)
+        self.quiet
+            .is_some_and(|since| self.here.time - since >= needed)
     }
 
     /// Takes the next instant of the run.
@@ -187,7 +188,10 @@ mod tests {
     #[test]
     fn the_papers_mechanism_settles_once_it_has_rattled_and_stays_so() {
         let turns = turns(&scene("spcmm", &[]), 2.2);
-        assert!(turns.len() == 1 && (0.1..0.45).contains(&turns[0]), "{turns:?}");
+        assert!(
+            turns.len() == 1 && (0.1..0.45).contains(&turns[0]),
+            "{turns:?}"
+        );
     }
 
     #[test]

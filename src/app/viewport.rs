@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use eframe::egui::{
-    self, Checkbox, PointerButton, Pos2, Rect, RectAlign, RichText, Role, Sense, Slider, Tooltip, Ui,
-    WidgetInfo, pos2, vec2,
+    self, Checkbox, PointerButton, Pos2, Rect, RectAlign, RichText, Role, Sense, Slider, Tooltip,
+    Ui, WidgetInfo, pos2, vec2,
 };
 use glam::{Vec2, Vec3};
 

@@ -1,7 +1,7 @@
 //! Pictures for a person to look at: `JOINTPLAY_LOOK=folder cargo test --lib render::look -- --ignored`.
 
 use super::Offscreen;
-use crate::view::{PeakMarks, DrawList, Preset, SceneView, Shot, Theme, ViewOptions, fixture};
+use crate::view::{DrawList, PeakMarks, Preset, SceneView, Shot, Theme, ViewOptions, fixture};
 
 #[test]
 #[ignore = "writes pictures for a person to look at"]

@@ -7,7 +7,7 @@ use super::{Image, Offscreen, RenderError};
 use crate::scene::Scene;
 use crate::simulate::Frame;
 use crate::view::{
-    PeakMarks, Camera, DrawList, Preset, SceneView, Shot, Theme, ViewOptions, fixture, to_f32,
+    Camera, DrawList, PeakMarks, Preset, SceneView, Shot, Theme, ViewOptions, fixture, to_f32,
 };
 
 const SIZE: [u32; 2] = [480, 360];
@@ -368,8 +368,7 @@ fn an_arrow_across_the_sight_covers_as_many_pixels_as_the_ruler_says() {
             - right * (shift[0] * half)
             - up * (shift[1] * half);
         let along = (right * 0.8 - up * 0.6).as_dvec3();
-        frame.joints[0].normal_force =
-            crate::scene::Vec3::new(along.x, along.y, along.z) * newtons;
+        frame.joints[0].normal_force = crate::scene::Vec3::new(along.x, along.y, along.z) * newtons;
         let mut list = picture(&scene, &frame, &options, &camera, false);
         list.solid.by_mesh.iter_mut().for_each(Vec::clear);
         let with = draw(&list);
@@ -383,7 +382,10 @@ fn an_arrow_across_the_sight_covers_as_many_pixels_as_the_ruler_says() {
         let ruler = list.legend.as_ref().expect("a ruler").pixels * newtons as f32 / 10.0;
         let seen = high - low + 1.0;
         // The tip is a point and the tail a disc seen from its edge: a pixel or two at either end.
-        assert!((seen - ruler).abs() < 4.0, "{newtons} N at {zoom}: {seen} of {ruler}");
+        assert!(
+            (seen - ruler).abs() < 4.0,
+            "{newtons} N at {zoom}: {seen} of {ruler}"
+        );
     }
 }
 
@@ -405,8 +407,7 @@ fn a_ghost_in_the_same_place_is_not_seen_in_patches() {
     for move_by in [4.0, -4.0] {
         let metres = move_by * f64::from(camera.metres_per_pixel(SIZE)) / 20.0;
         let mut ghost = frame.clone();
-        ghost.joints[0].eccentricity +=
-            crate::scene::Vec3::new(back.x, back.y, back.z) * metres;
+        ghost.joints[0].eccentricity += crate::scene::Vec3::new(back.x, back.y, back.z) * metres;
         let mut list = plain.clone();
         let (marks, trail) = (PeakMarks::new(), []);
         let shot = Shot {
@@ -458,7 +459,11 @@ fn every_standard_view_shows_what_moves() {
                 moving.light = whole.light;
                 let (mut fixed, mut nothing) = (whole.clone(), moving.clone());
                 // Fixed parts come first.
-                let both = fixed.solid.by_mesh.iter_mut().zip(&mut nothing.solid.by_mesh);
+                let both = fixed
+                    .solid
+                    .by_mesh
+                    .iter_mut()
+                    .zip(&mut nothing.solid.by_mesh);
                 for (fixed, moving) in both {
                     fixed.truncate(fixed.len() - moving.len());
                     moving.clear();

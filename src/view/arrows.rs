@@ -77,7 +77,12 @@ impl Arrow {
             );
             layer.push(Mesh::Cylinder, piece);
         }
-        let head = bar(self.tail + neck, self.along - neck, HEAD[1] * radius, material);
+        let head = bar(
+            self.tail + neck,
+            self.along - neck,
+            HEAD[1] * radius,
+            material,
+        );
         layer.push(Mesh::Cone, head);
     }
 
@@ -205,7 +210,13 @@ pub(super) fn push_forces(
             let width = OUTLINE * shot.pixels_per_point;
             arrow.outline(ruler.eye, colour, width, &mut out.marks);
             let kind = LabelKind::Peak(mark.joint);
-            push_label(out, &words(&mark).into(), kind, arrow.tail + arrow.along, colour);
+            push_label(
+                out,
+                &words(&mark).into(),
+                kind,
+                arrow.tail + arrow.along,
+                colour,
+            );
         }
     }
     let marks: &[f32] = match options.scaling {
@@ -237,7 +248,10 @@ fn words(mark: &Mark) -> String {
         age => (age, "s"),
     };
     let force = format_quantity_digits(f64::from(mark.force.length()), "N", 3);
-    format!("peak {force}, {} {unit} ago", format_quantity_digits(ago, "", 2))
+    format!(
+        "peak {force}, {} {unit} ago",
+        format_quantity_digits(ago, "", 2)
+    )
 }
 
 /// An arrow of the triad.
@@ -272,7 +286,7 @@ mod tests {
                 for depth in [0.3, 1.0, 2.0] {
                     let tail = eye + ray * (depth * camera.distance);
                     for turn in 0..12 {
-                        let (sin, cos) = (turn as f32 * 0.5236).sin_cos();
+                        let (sin, cos) = (turn as f32 * 0.52).sin_cos();
                         let in_picture = right * cos + up * sin;
                         let square = in_picture.reject_from(ray).normalize();
                         let length = |along: Vec3| {

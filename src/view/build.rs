@@ -82,7 +82,8 @@ impl SceneView {
         let mut watched = Vec::new();
         for part in moving {
             let mut ends = Vec::new();
-            part.place(frame, &joints).extent(|point, _| ends.push(point));
+            part.place(frame, &joints)
+                .extent(|point, _| ends.push(point));
             let middle = ends.iter().sum::<Vec3>() / ends.len().max(1) as f32;
             watched.push(middle);
             // A bar is long: its ends count, too.
@@ -155,19 +156,14 @@ impl SceneView {
     }
 
     /// What is drawn where `options` ask for a magnification.
-    pub(super) fn magnification(
-        &self,
-        scene: &Scene,
-        frame: &Frame,
-        options: &ViewOptions,
-    ) -> f32 {
+    pub(super) fn magnification(&self, scene: &Scene, frame: &Frame, options: &ViewOptions) -> f32 {
         drawn::magnification(scene, frame, &self.room, options.magnification)
     }
 
     /// Opacity of part `index` from `eye`: a fixed part before much of what moves is seen through. It follows from the
     /// first frame, so that it changes with the point of view alone.
     pub(super) fn opacity(&self, index: usize, eye: Vec3) -> f32 {
-        const HIDES: [f32; 2] = [0.06, 0.18];
+        const HIDES: [f32; 2] = [0.03, 0.12];
         const LEAST: f32 = 0.22;
         if self.parts[index].body.is_some() || self.watched.is_empty() {
             return 1.0;
@@ -596,7 +592,13 @@ fn push_trail(shot: &Shot<'_>, palette: &Palette, lines: &mut Vec<Line>) {
     }));
 }
 
-pub(super) fn push_label(out: &mut DrawList, text: &Arc<str>, kind: LabelKind, anchor: Vec3, colour: Colour) {
+pub(super) fn push_label(
+    out: &mut DrawList,
+    text: &Arc<str>,
+    kind: LabelKind,
+    anchor: Vec3,
+    colour: Colour,
+) {
     let Some(pixel) = out.eye.project(anchor, out.size) else {
         return;
     };

@@ -324,21 +324,22 @@ pub(super) fn magnification(scene: &Scene, frame: &Frame, room: &[f32], asked: f
     } else {
         1.0
     };
-    let drawable = scene
-        .ball_joints
-        .iter()
-        .zip(&frame.joints)
-        .enumerate()
-        .map(|(i, (joint, now))| {
-            let gap = (now.clearance as f32).max(to_f32(&now.eccentricity).length());
-            let radius = joint.contact.ball_radius as f32;
-            let room = room.get(i).copied().unwrap_or(f32::INFINITY) - WALL * radius;
-            if gap > 0.0 {
-                (room.min(LARGEST_SOCKET * radius) - radius) / gap
-            } else {
-                f32::INFINITY
-            }
-        });
+    let drawable =
+        scene
+            .ball_joints
+            .iter()
+            .zip(&frame.joints)
+            .enumerate()
+            .map(|(i, (joint, now))| {
+                let gap = (now.clearance as f32).max(to_f32(&now.eccentricity).length());
+                let radius = joint.contact.ball_radius as f32;
+                let room = room.get(i).copied().unwrap_or(f32::INFINITY) - WALL * radius;
+                if gap > 0.0 {
+                    (room.min(LARGEST_SOCKET * radius) - radius) / gap
+                } else {
+                    f32::INFINITY
+                }
+            });
     drawable.fold(asked, f32::min).max(1.0)
 }
 

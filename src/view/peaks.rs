@@ -113,7 +113,7 @@ impl PeakMarks {
             .filter(|force| force.is_finite())
             .fold(self.largest, f32::max);
         let Self { now, seen, .. } = *self;
-        for (joint, peak) in self.joints.iter_mut().zip(peaks) {
+        for ((joint, peak), report) in self.joints.iter_mut().zip(peaks).zip(&frame.joints) {
             // What comes later than the instant on show comes no later than the next.
             if let Some(blow) = joint.coming.take_if(|blow| blow.time <= now) {
                 joint.take(blow, self.fade);
@@ -131,17 +131,22 @@ impl PeakMarks {
                 continue;
             }
             joint.rising = Some(size);
-            let blow = Blow {
+            let blow = |force: Vec3, time: f64| Blow {
                 force,
-                time: peak.time,
-                flash: (size / hardest.max(f32::MIN_POSITIVE))
+                time,
+                flash: (force.length() / hardest.max(f32::MIN_POSITIVE))
                     .sqrt()
                     .clamp(FAINTEST, 1.0),
             };
-            if peak.time > now {
-                joint.coming = Some(blow);
-            } else {
-                joint.take(blow, self.fade);
+            if peak.time <= now {
+                joint.take(blow(force, peak.time), self.fade);
+                continue;
+            }
+            joint.coming = Some(blow(force, peak.time));
+            let present = to_f32(&report.normal_force);
+            if present.is_finite() && present != Vec3::ZERO {
+                // It has begun: it strikes as hard as it is seen to.
+                joint.take(blow(present, now), self.fade);
             }
         }
         self.seen = peaks.iter().map(|peak| peak.time).fold(seen, f64::max);
@@ -318,13 +323,17 @@ mod tests {
             let time = f64::from(k) * 1e-6;
             let force = 600.0 * (std::f64::consts::PI * f64::from(k) / 60.0).sin();
             let shown = frame(time, force);
-            let strongest = force.max(600.0 * (std::f64::consts::PI * f64::from(k - 1) / 60.0).sin());
+            let strongest =
+                force.max(600.0 * (std::f64::consts::PI * f64::from(k - 1) / 60.0).sin());
             let at = if k <= 30 { time } else { time - 1e-6 };
             marks.update(&shown, &peak(at, strongest, 0), 80e-6);
             let mark = mark(&marks, &shown);
             assert_eq!(mark.is_some(), k > 36, "{k}: {mark:?}");
             if let Some(mark) = mark {
-                assert!((mark.force.x - 600.0).abs() < 1e-3 && (mark.age - (time - 30e-6)).abs() < 1e-12);
+                assert!(
+                    (mark.force.x - 600.0).abs() < 1e-3
+                        && (mark.age - (time - 30e-6)).abs() < 1e-12
+                );
             }
         }
     }
@@ -340,6 +349,15 @@ mod tests {
         marks.update(&shown, &[Peak::default()], 0.1);
         assert!((mark(&marks, &shown).expect("a mark").age - 0.1e-3).abs() < 1e-12);
         assert_eq!(marks.reference(&ArrowOptions::default()), 500.0);
+    }
+
+    #[test]
+    fn a_blow_whose_peak_is_yet_to_come_lights_up_and_is_not_marked() {
+        let mut marks = PeakMarks::new();
+        let shown = frame(1.0e-3, 300.0);
+        marks.update(&shown, &peak(1.001e-3, 310.0, 1), 0.1);
+        assert_eq!(mark(&marks, &shown), None);
+        assert!(marks.flash(0) > 0.9);
     }
 
     #[test]

@@ -86,12 +86,16 @@ impl SceneView {
 
 /// Distance along `ray` to the solid.
 pub(super) fn cast(solid: &Solid<'_>, ray: &Ray) -> Option<f32> {
-    with_shape(solid, |shape, pose| shape.cast_ray(pose, ray, f32::MAX, true))?
+    with_shape(solid, |shape, pose| {
+        shape.cast_ray(pose, ray, f32::MAX, true)
+    })?
 }
 
 /// Distance from `point` to the solid, 0 within it.
 pub(super) fn distance(solid: &Solid<'_>, point: Vec3) -> Option<f32> {
-    with_shape(solid, |shape, pose| shape.distance_to_point(pose, point, true))
+    with_shape(solid, |shape, pose| {
+        shape.distance_to_point(pose, point, true)
+    })
 }
 
 /// Asks something of the solid's shape where it stands; `None` where there is none.

@@ -219,11 +219,18 @@ fn a_ghost_is_drawn_where_it_differs_and_only_there() {
     assert!(!view.add_ghost(&shot, &ghost, &mut list) && list.ghost.is_empty());
     let pixel = f64::from(camera.metres_per_pixel(SIZE));
     ghost.bodies[3].position.y += 0.2 * pixel;
-    assert!(!view.add_ghost(&shot, &ghost, &mut list), "a fifth of a pixel");
+    assert!(
+        !view.add_ghost(&shot, &ghost, &mut list),
+        "a fifth of a pixel"
+    );
     ghost.bodies[3].position.y += 10.0 * pixel;
     assert!(view.add_ghost(&shot, &ghost, &mut list));
     let moved = list.ghost.by_mesh[Mesh::Cylinder.index()].len();
-    assert_eq!((list.ghost.len(), moved), (3, 1), "one rod with its two ends");
+    assert_eq!(
+        (list.ghost.len(), moved),
+        (3, 1),
+        "one rod with its two ends"
+    );
 }
 
 #[test]

@@ -96,7 +96,7 @@ pub struct Palette {
     pub ball: Material,
     /// Sockets (opacity applies).
     pub socket: Material,
-    /// Parts of a second state (opacity applies).
+    /// Parts of a second state (opacity applies along their edges).
     pub ghost: Material,
     /// Factor on all light.
     pub exposure: f32,
@@ -129,7 +129,7 @@ impl Palette {
                     metal: 0.0,
                 },
                 ghost: Material {
-                    colour: Colour::hex(0x7B2FBE).with_opacity(0.40),
+                    colour: Colour::hex(0x7B2FBE).with_opacity(0.85),
                     roughness: 0.5,
                     metal: 0.0,
                 },
@@ -158,7 +158,7 @@ impl Palette {
                     metal: 0.0,
                 },
                 ghost: Material {
-                    colour: Colour::hex(0xC9A0FF).with_opacity(0.40),
+                    colour: Colour::hex(0xC9A0FF).with_opacity(0.85),
                     roughness: 0.5,
                     metal: 0.0,
                 },
