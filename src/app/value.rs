@@ -54,7 +54,7 @@ pub fn solver(scene: &Scene) -> String {
     if scene.solver.method.is_adaptive() {
         format!("{method} {}", power_of_ten(scene.solver.tolerance))
     } else {
-        format!("{method} {}", format_quantity(scene.solver.step, "us"))
+        format!("{method} {} µs", number(1e6 * scene.solver.step, 6))
     }
 }
 
