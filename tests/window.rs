@@ -559,7 +559,8 @@ fn look() {
     h.key_press(Key::Escape);
     h.run();
     for group in ["Contact", "Solver", "One joint"] {
-        h.get_by_role_and_label(Role::Button, group).click();
+        h.get_by_role_and_label(Role::DisclosureTriangle, group)
+            .click();
         h.run();
     }
     type_into(&mut h, "Clearance", "0.4 kg");
@@ -584,11 +585,21 @@ fn look() {
     player.run_to(2.5);
     h.run();
     save(&mut h, "stopped");
+    h.state_mut()
+        .report("mine.toml:2: contact.clearance = 3: needs a unit".to_owned());
+    h.get_by_role_and_label(Role::Button, "Save").click();
+    h.run_steps(5);
+    save(&mut h, "save_menu");
     let mut h = sized("slider-crank", [420.0, 800.0], egui::Theme::Dark);
     h.state_mut().player_mut().run_to(0.05);
-    h.get_by_label("Choose plots").scroll_to_me();
+    h.get_by_role_and_label(Role::Button, "Plots").click();
     h.run();
     save(&mut h, "narrow_dark");
+    h.state_mut()
+        .report("mine.toml:2: contact.clearance = 3: needs a unit".to_owned());
+    h.get_by_label("Menu").click();
+    h.run_steps(5);
+    save(&mut h, "narrow_menu");
 }
 
 #[test]

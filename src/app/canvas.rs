@@ -48,6 +48,7 @@ impl Canvas {
     }
 
     /// The device.
+    #[cfg(not(target_arch = "wasm32"))]
     pub fn state(&self) -> &RenderState {
         &self.state
     }
