@@ -9,8 +9,8 @@ mod doubts;
 mod energy;
 mod guard;
 mod live;
-mod reactions;
 mod sample;
+mod search;
 mod snapshot;
 
 use super::impacts::{Impact, Impacts};
@@ -70,6 +70,8 @@ pub struct Simulation {
     /// The step being taken was begun again on another piece.
     turned: bool,
     scratch_memory: Vec<Memory>,
+    /// The step just accepted may hold the largest force of a contact.
+    near_peak: bool,
 }
 
 /// What a snapshot copies.
@@ -209,6 +211,7 @@ impl Simulation {
             corner: None,
             turned: false,
             scratch_memory: vec![Memory::default(); joints],
+            near_peak: false,
             mechanism,
         }
     }
@@ -499,7 +502,7 @@ impl Simulation {
             state.statistics.evaluations += 1;
             self.track_reactions();
         }
-        self.search_reactions();
+        self.search_peaks();
         Ok(())
     }
 
