@@ -5,8 +5,10 @@ mod common;
 
 use common::METHODS;
 use common::invariants::finite;
-use jointplay::scene::{BUILT_IN, Kind, Parameter, Scene, Scope, Value, table};
-use jointplay::simulate::{Frame, Simulation};
+use jointplay::scene::{
+    BUILT_IN, Doubt as SceneDoubt, Kind, Parameter, Scene, Scope, Value, table,
+};
+use jointplay::simulate::{Doubt, Frame, Simulation};
 use proptest::prelude::*;
 use proptest::test_runner::{RngSeed, TestCaseError};
 
@@ -125,8 +127,8 @@ fn mixed() -> impl Strategy<Value = Mixed> {
         word(&METHODS[..]),
         word(&["tree", "lagrange"][..]),
         word(&["start", "largest"][..]),
-        word(&["10 us", "25 us", "100 us"][..]),
-        1e-6..1e-3_f64,
+        word(&["5 us", "10 us", "25 us", "100 us"][..]),
+        1e-7..5e-5_f64,
         proptest::collection::vec(proptest::option::weighted(0.7, 0.02..0.4_f64), 3),
     )
         .prop_map(|(scene, method, form, approach, step, tolerance, joints)| {
@@ -150,14 +152,10 @@ fn mixed() -> impl Strategy<Value = Mixed> {
         })
 }
 
-/// How far a peak found from the ends of steps may be off the largest of many rows: a fixed step of 100 us is longer than an impact, and
-/// what happens within it is a matter of interpolation.
-fn agreement(scene: &Scene) -> f64 {
-    match scene.solver.method {
-        method if method.is_adaptive() => 0.02,
-        _ => 0.02 + 0.2 * (scene.solver.step / 1e-4),
-    }
-}
+/// How far a peak found from the ends of steps may be below the largest of many rows, and above: at a loose tolerance the cubic through
+/// both ends of a step and the method's own interpolant differ.
+const BELOW: f64 = 0.02;
+const ABOVE: f64 = 0.06;
 
 /// Rows within every step.
 const ROWS: u32 = 6;
@@ -191,14 +189,16 @@ proptest! {
         }
         prop_assert_eq!(plain.state_hash(), sampled.state_hash());
         let statistics = plain.statistics();
-        let off = agreement(&scene);
+        let unresolved = |doubt: &Doubt| matches!(doubt, Doubt::Unresolved { .. } | Doubt::Scene(SceneDoubt::Step { .. }));
+        // What happens within a step that is longer than an impact is a matter of interpolation, and marked.
+        let resolved = !plain.doubts().iter().any(unresolved);
         for (j, joint) in scene.ball_joints.iter().enumerate() {
             let (row, name) = (rows[j], &joint.name);
             // What a run prints after its rows, and what a sweep, which has none, prints.
             let (printed, found) = (sampled.peak(j).0, statistics.peak_normal[j]);
             prop_assert!(printed >= row, "{}: {} below the rows' {}", name, printed, row);
-            prop_assert!(found >= row * (1.0 - off) - 1.0, "{}: {} below the rows' {}", name, found, row);
-            prop_assert!(found <= row * (1.0 + off) + 1.0, "{}: {} beyond the rows' {}", name, found, row);
+            let agrees = found >= row * (1.0 - BELOW) - 1.0 && found <= row * (1.0 + ABOVE) + 1.0;
+            prop_assert!(!resolved || agrees, "{}: {}, rows {}", name, found, row);
             prop_assert!((0.0..=plain.time()).contains(&statistics.peak_time[j]));
             let own = || impacts.iter().filter(move |impact| impact.joint == j);
             prop_assert!(own().count() as u64 <= statistics.impacts[j], "{}", name);

@@ -9,8 +9,8 @@ mod doubts;
 mod energy;
 mod guard;
 mod live;
-mod reactions;
 mod sample;
+mod search;
 mod snapshot;
 
 use super::ideal::Reference;
@@ -74,6 +74,8 @@ pub struct Simulation {
     scratch_memory: Vec<Memory>,
     /// What the probe is compared with.
     pub(super) reference: Reference,
+    /// The step just accepted may hold the largest force of a contact.
+    near_peak: bool,
 }
 
 /// What a snapshot copies.
@@ -214,6 +216,7 @@ impl Simulation {
             turned: false,
             scratch_memory: vec![Memory::default(); joints],
             reference: Reference::of(scene),
+            near_peak: false,
             mechanism,
         }
     }
@@ -504,7 +507,7 @@ impl Simulation {
             state.statistics.evaluations += 1;
             self.track_reactions();
         }
-        self.search_reactions();
+        self.search_peaks();
         Ok(())
     }
 

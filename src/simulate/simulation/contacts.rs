@@ -1,5 +1,6 @@
 //! Contact memory and continuous-time peaks of the step just accepted.
 
+use super::search::NEAR_PEAK;
 use super::{Simulation, State};
 use crate::contact::{Coefficients, Pace};
 use crate::integrate::Method;
@@ -114,10 +115,10 @@ impl Simulation {
                 let mut approach_speed = rate.max(floor);
                 // A located one begins where the step ends.
                 if immediate {
-                    state.follow(j, &course, coefficients, approach_speed, theta);
                     if coefficients.largest {
                         approach_speed = approach_speed.max(course.fastest(theta).0);
                     }
+                    state.follow(j, &course, coefficients, approach_speed, theta);
                 }
                 state.memory[j] = Memory {
                     active: true,
@@ -156,6 +157,7 @@ impl Simulation {
             mechanism,
             state,
             peaks,
+            near_peak,
             ..
         } = self;
         let immediate = mechanism.contacts.switching == Switching::Immediate;
@@ -180,6 +182,7 @@ impl Simulation {
             };
             let (force, theta) = Course::new(start, end, h).strongest(&coefficients, approach);
             let time = state.t0 + theta * h;
+            *near_peak |= force > NEAR_PEAK * state.statistics.peak_normal[j];
             if force > state.statistics.peak_normal[j] {
                 state.statistics.peak_normal[j] = force;
                 state.statistics.peak_time[j] = time;

@@ -1,9 +1,12 @@
-//! Peaks of the reactions of ideal joints, in continuous time.
+//! Peaks that the ends of a step do not tell: its inside is looked into, as a row would.
 
 use super::Simulation;
+use crate::mechanism::Switching;
 
-/// A step at whose ends no reaction is above this part of its peak so far is not looked into.
-const NEAR_PEAK: f64 = 0.5;
+/// A step whose forces stay below this part of their peaks so far is not looked into.
+pub(super) const NEAR_PEAK: f64 = 0.5;
+/// Where a fixed step is looked into.
+const PARTS: [f64; 3] = [0.25, 0.5, 0.75];
 
 impl Simulation {
     /// Takes the reactions at the end of the step just accepted, of which everything was just evaluated. Without a
@@ -21,9 +24,40 @@ impl Simulation {
         }
     }
 
+    /// Looks into the step just accepted for peaks.
+    pub(super) fn search_peaks(&mut self) {
+        self.search_contacts();
+        self.search_reactions();
+    }
+
+    /// Where a fixed step is long against an impact, a row reads other rates inside it than the cubic through the penetration.
+    fn search_contacts(&mut self) {
+        let near = std::mem::take(&mut self.near_peak);
+        if !near || self.mechanism.contacts.switching == Switching::Located {
+            return;
+        }
+        let (t0, t) = (self.state.t0, self.state.t);
+        for part in PARTS {
+            let time = t0 + part * (t - t0);
+            self.look(time);
+            for j in 0..self.state.gaps.len() {
+                if let Some(reaction) = self.mechanism.reaction(j) {
+                    self.take_reaction(j, reaction.norm(), time);
+                    continue;
+                }
+                let gap = &self.mechanism.contacts.gaps()[j];
+                let (normal, size, friction) = (gap.normal, gap.normal_force, gap.friction);
+                if self.is_peak(j, size, time) {
+                    self.peaks[j].normal_force = normal * -size;
+                    self.peaks[j].friction_force = friction;
+                }
+            }
+        }
+    }
+
     /// Looks for peaks of reactions inside the step just accepted, where impacts at other joints make them. Steps around an
     /// impact are too uneven for a parabola through their ends: it would have peaks that never were.
-    pub(super) fn search_reactions(&mut self) {
+    fn search_reactions(&mut self) {
         let joints = self.state.gaps.len();
         if !self.mechanism.has_reactions()
             || !(0..joints).any(|j| self.mechanism.contacts.has_clearance(j))
@@ -57,18 +91,25 @@ impl Simulation {
     }
 
     fn take_reaction(&mut self, j: usize, size: f64, time: f64) {
+        if self.is_peak(j, size, time)
+            && let Some(reaction) = self.mechanism.reaction(j)
+        {
+            self.peaks[j].normal_force = reaction;
+        }
+    }
+
+    /// Puts down a force if it is the largest so far; whether it is the largest since the peaks were last taken.
+    fn is_peak(&mut self, j: usize, size: f64, time: f64) -> bool {
         let statistics = &mut self.state.statistics;
         if size > statistics.peak_normal[j] {
             statistics.peak_normal[j] = size;
             statistics.peak_time[j] = time;
         }
         let peak = &mut self.peaks[j];
-        if size > peak.normal
-            && let Some(reaction) = self.mechanism.reaction(j)
-        {
-            peak.normal = size;
-            peak.time = time;
-            peak.normal_force = reaction;
+        let largest = size > peak.normal;
+        if largest {
+            (peak.normal, peak.time) = (size, time);
         }
+        largest
     }
 }
