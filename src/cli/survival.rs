@@ -71,7 +71,7 @@ fn rows_and_impacts_survive_in_every_format() {
 
 #[test]
 fn sweeps_and_merges_survive() {
-    let sweep = "sweep spcmm --vary contact.clearance=0.2mm..0.3mm:3 --periods 1 --discard 0 --no-exponent --threads 1 --quiet";
+    let sweep = "sweep spcmm --set spcmm.frequency=20Hz --vary contact.clearance=0.2mm..0.3mm:3 --periods 1 --discard 0 --no-exponent --threads 1 --quiet";
     check(&[], &format!("{sweep} --out @/a.npz"));
     let shard = |k: usize| format!("{sweep} --shard {k}/2 --out @/{k}.npz");
     check(
