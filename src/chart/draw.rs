@@ -116,10 +116,14 @@ impl Sheet {
             self.draw(&root)?;
             root.present().map_err(failed)?;
         }
-        // The page is as large as asked; inside it the finer units stay.
+        // The page is as large as asked; inside it the finer units stay. Corners are rounded: joined to a point, a line would
+        // stand higher than its peaks.
         let (found, wanted) = (
             format!("width=\"{width}\" height=\"{height}\""),
-            format!("width=\"{}\" height=\"{}\"", self.size.0, self.size.1),
+            format!(
+                "width=\"{}\" height=\"{}\" stroke-linejoin=\"round\"",
+                self.size.0, self.size.1
+            ),
         );
         Ok(text.replacen(&found, &wanted, 1))
     }
