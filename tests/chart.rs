@@ -202,3 +202,41 @@ fn a_hundred_thousand_points_make_no_large_file() {
     let dots = sheet(false).matches("<circle").count();
     assert!((1000..20_000).contains(&dots), "{dots}");
 }
+
+#[test]
+fn a_line_stands_no_higher_than_its_peak() {
+    // The highest coloured row of a line through `points`, pixels.
+    let top = |points: &[(f64, f64)]| {
+        let axis = Axis {
+            range: Some((0.0, 10.0)),
+            ..Axis::default()
+        };
+        let line = Series {
+            marker: None,
+            ..series("", points.to_vec(), 1)
+        };
+        let sheet = Sheet {
+            charts: vec![Chart {
+                x: axis.clone(),
+                y: axis,
+                series: vec![line],
+                ..Chart::default()
+            }],
+            columns: 1,
+            size: (500, 400),
+            title: String::new(),
+            note: String::new(),
+        };
+        let png = sheet.png(2.0).unwrap();
+        let picture = resvg::tiny_skia::Pixmap::decode_png(&png).unwrap();
+        let blue =
+            |p: &resvg::tiny_skia::PremultipliedColorU8| p.blue() > p.red().saturating_add(60);
+        let at = picture.pixels().iter().position(blue).unwrap();
+        at as u32 / picture.width()
+    };
+    let level = top(&[(1.0, 8.0), (9.0, 8.0)]);
+    for half in [0.2, 0.5, 0.8, 1.2, 2.0] {
+        let peak = top(&[(5.0 - half, 3.0), (5.0, 8.0), (5.0 + half, 3.0)]);
+        assert!(peak.abs_diff(level) <= 1, "{half}: {peak} {level}");
+    }
+}

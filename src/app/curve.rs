@@ -14,6 +14,9 @@ pub const WIDTH: f32 = 1.4;
 /// Length of a dash of one colour where curves coincide, points.
 const DASH: f32 = 6.0;
 
+/// Most pixels over which a steep curve fades into the next column.
+const SOFTEST: f32 = 6.0;
+
 /// One curve: what was recorded, in SI units.
 #[derive(Clone, Debug, Default)]
 pub struct Trace {
@@ -335,9 +338,10 @@ fn bars(spans: &[Span], width: f32) -> Vec<Bar> {
         let before = at.checked_sub(1).map_or(Span::NOTHING, |at| wide[at]);
         let around = before.join(wide.get(at + 1).copied().unwrap_or(Span::NOTHING));
         // How far the curve goes on beyond this column, as far as that is its slope.
-        let goes_on = |by: f32| by.clamp(0.0, bottom - top);
+        let goes_on = |by: f32| by.clamp(0.0, (bottom - top).min(SOFTEST));
         let (up, down) = (goes_on(top - around.top), goes_on(around.bottom - bottom));
-        let (mut top, mut bottom) = (top - 0.5 * rest * up, bottom + 0.5 * rest * down);
+        let more = |beyond: f32| (0.5 * rest * beyond).min(1.0);
+        let (mut top, mut bottom) = (top - more(up), bottom + more(down));
         if bottom - top < width {
             let middle = 0.5 * (top + bottom);
             (top, bottom) = (middle - 0.5 * width, middle + 0.5 * width);

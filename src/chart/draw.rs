@@ -117,10 +117,14 @@ impl Sheet {
             self.draw(&root)?;
             root.present().map_err(failed)?;
         }
-        // The page is as large as asked; inside it the finer units stay.
+        // The page is as large as asked; inside it the finer units stay. Corners are rounded: joined to a point, a line would
+        // stand higher than its peaks.
         let (found, wanted) = (
             format!("width=\"{width}\" height=\"{height}\""),
-            format!("width=\"{}\" height=\"{}\"", self.size.0, self.size.1),
+            format!(
+                "width=\"{}\" height=\"{}\" stroke-linejoin=\"round\"",
+                self.size.0, self.size.1
+            ),
         );
         // XML has no control characters, not even escaped ones.
         Ok(visible(&text).replacen(&found, &wanted, 1))

@@ -14,7 +14,6 @@ pub enum Quantity {
     FrictionForce,
     Eccentricity,
     Penetration,
-    Clearance,
     Position,
     Angles,
     Velocity,
@@ -26,10 +25,17 @@ pub enum Quantity {
     Energy,
     EnergyBalance,
     ProbeError,
+    Clearance,
 }
 
 /// Of these each recorded joint has a channel, in this order.
-const OF_JOINTS: usize = 5;
+const OF_JOINTS: [Quantity; 5] = [
+    Quantity::NormalForce,
+    Quantity::FrictionForce,
+    Quantity::Eccentricity,
+    Quantity::Penetration,
+    Quantity::Clearance,
+];
 
 impl Quantity {
     /// All of them, in the order in which a list shows them.
@@ -38,7 +44,6 @@ impl Quantity {
         Self::FrictionForce,
         Self::Eccentricity,
         Self::Penetration,
-        Self::Clearance,
         Self::Position,
         Self::Angles,
         Self::Velocity,
@@ -50,6 +55,7 @@ impl Quantity {
         Self::Energy,
         Self::EnergyBalance,
         Self::ProbeError,
+        Self::Clearance,
     ];
 
     /// Members of [`Self::EnergyBalance`]: kinetic and elastic change equal the works given by drives, gravity, clearance
@@ -216,8 +222,8 @@ impl Channels {
             });
         };
         for joint in scene.ball_joints.iter().take(joints) {
-            for quantity in &Quantity::ALL[..OF_JOINTS] {
-                add(*quantity, &joint.name);
+            for quantity in OF_JOINTS {
+                add(quantity, &joint.name);
             }
         }
         for (quantity, members) in [
@@ -278,7 +284,7 @@ impl Channels {
 
     /// Index of the normal force of ball joint `joint`, if it is recorded.
     pub fn normal_force(&self, joint: usize) -> Option<usize> {
-        (joint < self.joints).then_some(OF_JOINTS * joint)
+        (joint < self.joints).then_some(OF_JOINTS.len() * joint)
     }
 
     /// Reads every channel from `frame` into `out`, SI units.

@@ -44,9 +44,23 @@ impl Picture {
         places.filter(near).collect()
     }
 
-    /// The highest row in `area` that has such a pixel.
-    pub fn top(&self, area: Area, colour: [u8; 3], most: u8) -> Option<usize> {
-        let places = self.coloured(area, colour, most);
-        places.iter().map(|(_, y)| *y).min()
+    /// Places in `area` that are about half covered with `colour`, or more, over a background: column, row.
+    pub fn covered(&self, area: Area, colour: [u8; 3], background: [u8; 3]) -> Vec<(usize, usize)> {
+        let less = |a: [u8; 3]| [0, 1, 2].map(|i| f32::from(a[i]) - f32::from(background[i]));
+        let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        let whole = less(colour);
+        let mut places = self.coloured(area, colour, 255);
+        places.retain(|&(x, y)| {
+            let seen = less(self.at(x, y));
+            let share = dot(seen, whole) / dot(whole, whole);
+            let rest = [0, 1, 2].map(|i| seen[i] - share * whole[i]);
+            share > 0.45 && dot(rest, rest) < 300.0
+        });
+        places
     }
+}
+
+/// The highest row of some places.
+pub fn top(places: &[(usize, usize)]) -> Option<usize> {
+    places.iter().map(|(_, y)| *y).min()
 }

@@ -12,7 +12,7 @@ use crate::simulate::History;
 
 #[path = "../../../tests/common/pixels.rs"]
 mod pixels;
-use pixels::Picture;
+use pixels::{Picture, top};
 
 const COLOURS: [[u8; 3]; 3] = [[255, 0, 0], [0, 160, 0], [0, 0, 255]];
 /// Largest difference of a pixel that is mostly of a colour.
@@ -111,12 +111,11 @@ fn a_spike_is_as_high_as_it_was_recorded_the_newest_included() {
             let (picture, place) = drawn(&history, length, size, scale);
             for (n, channel, force) in spikes.into_iter().filter(|spike| spike.2 != 101.0) {
                 let [x, y] = place(f64::from(n) * 1e-4, force);
-                let top = picture
-                    .top(around(x), COLOURS[channel], MOSTLY)
-                    .expect("drawn");
+                let highest =
+                    top(&picture.coloured(around(x), COLOURS[channel], MOSTLY)).expect("drawn");
                 assert!(
-                    (top as f64 + 0.5 - y).abs() <= 1.0,
-                    "{size:?} {n}: {top} for {y}"
+                    (highest as f64 + 0.5 - y).abs() <= 1.0,
+                    "{size:?} {n}: {highest} for {y}"
                 );
             }
         }
@@ -153,10 +152,10 @@ fn coincident_spikes_are_all_seen_of_different_height_and_of_the_same() {
                 let found = picture.coloured(area, colour, 110);
                 assert!(found.len() > 2, "{heights:?} {size:?}: {colour:?}");
                 if heights[0] != heights[1] {
-                    let top = picture.top(area, colour, MOSTLY).expect("drawn");
+                    let highest = top(&picture.coloured(area, colour, MOSTLY)).expect("drawn");
                     assert!(
-                        (top as f64 + 0.5 - y).abs() <= 1.0,
-                        "{heights:?}: {top} for {y}"
+                        (highest as f64 + 0.5 - y).abs() <= 1.0,
+                        "{heights:?}: {highest} for {y}"
                     );
                 }
             }
