@@ -273,10 +273,11 @@ fn a_sweep_of_something_else_says_so_and_a_click_asks_before_it_changes_what_is_
 fn a_sweep_that_goes_on_can_be_cancelled_over_a_scene_without_a_drive() {
     let mut harness = window("spcmm", &[FAST]);
     let points = hold(&mut harness);
-    points.set(2);
     sweep(&mut harness, "0.1 mm", "0.9 mm", 5.0);
     harness.state_mut().open("pendulum").expect("built in");
+    harness.run_steps(2);
     let before = harness.get_by_label("Cancel sweep").rect();
+    points.set(2);
     harness.run_steps(10);
     harness.get_by_label("2 of 5 values");
     assert_eq!(harness.get_by_label("Cancel sweep").rect(), before);

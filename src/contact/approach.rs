@@ -69,7 +69,7 @@ mod tests {
             let piece = c.pace_at(remembered, rate);
             assert_eq!(c.approach(piece, remembered, rate), whole, "{rate}");
             assert!(c.damping * rate / whole <= c.damping * (1.0 + 1e-15));
-            let elastic = c.stiffness * 1e-6_f64.powf(1.5);
+            let elastic = c.stiffness * libm::pow(1e-6, 1.5);
             let force = c.normal_force(1e-6, rate, whole);
             assert!(force <= elastic * (1.0 + c.damping) * (1.0 + 1e-12));
         }

@@ -159,15 +159,17 @@ fn place(section: &mut Item, name: &str, item: Item) {
     }
 }
 
-/// Puts `item` into `table`; a comment behind the old value stays.
+/// Puts `item` into `table`; comments above and behind the old value stay.
 fn put(table: &mut Table, name: &str, mut item: Item) {
-    if let (Some(old), Some(new)) = (
-        table.get(name).and_then(Item::as_value),
-        item.as_value_mut(),
-    ) {
+    let Some(old) = table.get_mut(name) else {
+        table.insert(name, item);
+        return;
+    };
+    if let (Some(old), Some(new)) = (old.as_value(), item.as_value_mut()) {
         *new.decor_mut() = old.decor().clone();
     }
-    table.insert(name, item);
+    // Inserting would format the key anew, and drop what stands above it.
+    *old = item;
 }
 
 fn text_of(item: Option<&Item>) -> Option<&str> {

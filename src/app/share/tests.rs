@@ -307,8 +307,7 @@ fn links_are_told_from_files_and_scenes() {
     for other in ["pendulum", "mine.toml", "runs/mine", "c=0.5mm/mine.toml"] {
         assert!(!is_link(other), "{other}");
     }
-    let folder = tempfile::tempdir().expect("a folder");
-    let path = folder.path().join("c=0.5mm");
-    std::fs::write(&path, "").expect("written");
+    let file = tempfile::Builder::new().prefix("c=0.5mm").tempfile();
+    let path = file.expect("a file").into_temp_path();
     assert!(!is_link(&path.display().to_string()), "it is a file");
 }
