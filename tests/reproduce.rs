@@ -320,7 +320,9 @@ fn ctrl_c_leaves_nothing_half_written_and_the_same_command_goes_on() {
         .path()
         .join("report.partial/runs_by_clearance.partial");
     let whole = fs::read(&first).unwrap();
-    fs::write(&first, &whole[..whole.len() - 1]).unwrap();
+    let mut damage = whole.clone();
+    damage[whole.len() / 2] ^= 1;
+    fs::write(&first, &damage).unwrap();
     let damaged = jointplay(folder.path(), "reproduce --out report --quick");
     assert_eq!(damaged.code, Some(1), "{}", damaged.stderr);
     assert!(

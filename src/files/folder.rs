@@ -50,7 +50,7 @@ impl Folder {
         let refused = |why: &str| Err(FileError::cannot(path, why));
         if disk::exists(&place) {
             if !place.is_dir() {
-                return refused("it is there and no folder");
+                return refused("it is a file, not a folder");
             }
             if is_mount_point(&place) {
                 return refused("a file system is mounted there; name a folder in it");
