@@ -12,6 +12,8 @@ mod interrupt;
 mod machine;
 mod measuring;
 pub mod output;
+#[cfg(feature = "gui")]
+mod page;
 mod progress;
 mod provenance;
 mod quantity;
@@ -84,7 +86,7 @@ fn dispatch(arguments: Arguments) -> Result<(), Failure> {
 fn view(arguments: &ViewArguments) -> Result<(), Failure> {
     use crate::app::{AppOptions, WindowError, run_native};
     drivers::quieten();
-    let page = page(arguments.page.as_deref(), std::env::var(PAGE).ok())?;
+    let page = page::address(arguments.page.as_deref())?;
     let options = match &arguments.link {
         Some(link) => AppOptions::from_link(link).map_err(Failure::usage)?,
         None => AppOptions::new(Scene::load(&arguments.scene, &arguments.changes)?),
@@ -104,33 +106,6 @@ fn view(arguments: &ViewArguments) -> Result<(), Failure> {
         };
         Failure::new(code, message)
     })
-}
-
-/// Environment variable with the address that links are hung on.
-#[cfg(feature = "gui")]
-const PAGE: &str = "JOINTPLAY_PAGE";
-
-/// The address that links are hung on, from `--page` or else from [`PAGE`]; "" for none.
-#[cfg(feature = "gui")]
-fn page(option: Option<&str>, variable: Option<String>) -> Result<String, Failure> {
-    let (name, page) = match (option, variable) {
-        (Some(page), _) => ("--page", page.to_owned()),
-        (None, Some(page)) => (PAGE, page),
-        (None, None) => return Ok(String::new()),
-    };
-    let page = page.trim();
-    let is_address = ["https://", "http://"].iter().any(|scheme| {
-        page.strip_prefix(scheme).is_some_and(|rest| {
-            !rest.is_empty() && !rest.contains(|c: char| c == '#' || c.is_whitespace())
-        })
-    });
-    if page.is_empty() || is_address {
-        return Ok(page.to_owned());
-    }
-    Err(Failure::usage(format!(
-        "{name} {page}: no address of a page; expected one that begins with https:// or http:// and has no `#`, e.g. \
-         https://example.org/lab/"
-    )))
 }
 
 #[cfg(feature = "gui")]
@@ -202,31 +177,4 @@ fn warn(text: &str) {
 /// Standard error may be closed: then there is nobody to tell.
 fn complain(text: &str) {
     let _ = writeln!(io::stderr(), "{}", visible(text));
-}
-
-#[cfg(all(test, feature = "gui"))]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_option_beats_the_variable_and_what_is_no_address_is_refused() {
-        let (lab, other) = ("https://example.org/lab/", "http://localhost:8000");
-        let of = |option, variable: Option<&str>| page(option, variable.map(str::to_owned));
-        assert_eq!(of(None, None).expect("none"), "");
-        assert_eq!(of(None, Some(other)).expect("an address"), other);
-        assert_eq!(of(Some(lab), Some("nonsense")).expect("an address"), lab);
-        for bad in [
-            "example.org/lab",
-            "https://",
-            "https://a.b/#x",
-            "https://a b/",
-        ] {
-            let error = of(None, Some(bad)).expect_err("no address");
-            assert_eq!(error.code, Failure::USAGE);
-            assert!(
-                error.to_string().contains(&format!("{PAGE} {bad}: ")),
-                "{error}"
-            );
-        }
-    }
 }
