@@ -169,7 +169,7 @@ fn a_folder_that_cannot_get_its_name_is_refused_before_the_work() {
     refused(Path::new("."), "the command runs in it");
     refused(Path::new(".."), "the command runs in it");
     refused(Path::new("no/such/out"), "cannot write no/such/out");
-    refused(Path::new(file!()), "no folder");
+    refused(Path::new(file!()), "not a folder");
     #[cfg(target_os = "linux")]
     refused(Path::new("/proc"), "mounted");
 }
