@@ -13,6 +13,11 @@ const LEAST_STEPS: f64 = 5.0;
 /// Loosest tolerance at which impacts keep their energy to a few per cent.
 const LOOSEST: f64 = 1e-3;
 
+/// Sentences about ball joints, after which a last one stands for the rest.
+const MOST_LISTED: usize = 40;
+const NOT_LISTED: &str =
+    "More ball joints differ from one another: what speaks against each of them is not listed.";
+
 impl Scene {
     /// What must hold between the contact parameters of one joint.
     pub(super) fn check_contacts(&self) -> Result<(), Fault> {
@@ -35,7 +40,12 @@ impl Scene {
     /// makes a run slow.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = self.doubts();
+        let doubts = warnings.len();
         for (joints, contact) in self.contact_groups() {
+            if warnings.len() - doubts >= MOST_LISTED {
+                warnings.push(NOT_LISTED.to_owned());
+                break;
+            }
             if contact.clearance > 0.0
                 && contact.slip_speed_high < 1e-6
                 && contact.friction_law == FrictionLaw::ModifiedCoulomb
@@ -53,6 +63,10 @@ impl Scene {
     pub fn doubts(&self) -> Vec<String> {
         let mut doubts = Vec::new();
         for (joints, contact) in self.contact_groups() {
+            if doubts.len() >= MOST_LISTED {
+                doubts.push(NOT_LISTED.to_owned());
+                break;
+            }
             let law = match contact.normal_law {
                 NormalLaw::LankaraniNikravesh => Some("lankarani-nikravesh"),
                 NormalLaw::HuntCrossley => Some("hunt-crossley"),
