@@ -880,3 +880,15 @@ fn a_scene_beyond_a_limit_is_refused_with_its_line() {
         &["joint.J4096.friction = 0.1", "allowed at most 4096"],
     );
 }
+
+#[test]
+fn thousands_of_joints_that_differ_do_not_make_thousands_of_warnings() {
+    for links in [30, 4000] {
+        // So small that each has its warning.
+        let own = |n: usize| (format!("joint.J{n}.clearance"), format!("{n}e-9 m"));
+        let mut changes = vec![("chain.links".to_owned(), links.to_string())];
+        changes.extend((1..=links).map(own));
+        let warnings = Scene::load("chain", &changes).unwrap().warnings();
+        assert_eq!(warnings.len(), links.min(41), "{links}");
+    }
+}

@@ -15,6 +15,9 @@ const LEAST_IMPLICIT_STEPS: f64 = 40.0;
 /// Loosest tolerance at which impacts keep their energy to a few per cent.
 const LOOSEST: f64 = 1e-3;
 
+/// Sentences about ball joints, after which a last one stands for the rest.
+const MOST_LISTED: usize = 40;
+
 impl Scene {
     /// What must hold between the contact parameters of one joint.
     pub(super) fn check_contacts(&self) -> Result<(), Fault> {
@@ -38,7 +41,12 @@ impl Scene {
     pub fn warnings(&self) -> Vec<String> {
         let doubts = self.doubts().into_iter();
         let mut warnings: Vec<String> = doubts.map(|doubt| doubt.to_string()).collect();
+        let doubts = warnings.len();
         for (joints, contact) in self.contact_groups() {
+            if warnings.len() - doubts >= MOST_LISTED {
+                warnings.push(Doubt::MoreJoints.to_string());
+                break;
+            }
             if contact.clearance > 0.0
                 && contact.slip_speed_high < 1e-6
                 && contact.friction_law == FrictionLaw::ModifiedCoulomb
@@ -56,6 +64,10 @@ impl Scene {
     pub fn doubts(&self) -> Vec<Doubt> {
         let mut doubts = Vec::new();
         for (joints, contact) in self.contact_groups() {
+            if doubts.len() >= MOST_LISTED {
+                doubts.push(Doubt::MoreJoints);
+                break;
+            }
             let suits = matches!(contact.normal_law, NormalLaw::Flores | NormalLaw::Gonthier);
             let near_one = contact.restitution >= 0.8 || contact.clearance == 0.0;
             if !suits && !near_one {

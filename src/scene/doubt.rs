@@ -49,11 +49,16 @@ pub enum Doubt {
         /// The loosest that will do.
         loosest: f64,
     },
+    /// More ball joints differ from one another than are listed.
+    MoreJoints,
 }
 
 impl fmt::Display for Doubt {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::MoreJoints => f.write_str(
+                "More ball joints differ from one another: what speaks against each of them is not listed.",
+            ),
             Self::Restitution {
                 joints,
                 law,
