@@ -145,22 +145,32 @@ fn paint(
         );
         return;
     }
-    let low = group
+    // Turns along the longer side, so that level stretches and upright ones alternate alike.
+    let turn = |piece: i64| group[piece.rem_euclid(group.len() as i64) as usize];
+    let tallest = group
         .iter()
-        .map(|(_, bar)| bar.top - bar.soft_top)
-        .fold(f32::INFINITY, f32::min);
-    let high = group
-        .iter()
-        .map(|(_, bar)| bar.bottom + bar.soft_bottom)
+        .map(|(_, bar)| bar.height())
         .fold(0.0, f32::max);
-    // Diagonal, so that level stretches and upright ones alternate.
-    let (from, to) = (
-        ((x + low) / dash).floor() as i64,
-        ((x + high) / dash).floor() as i64,
-    );
-    for piece in from..=to {
-        let (index, bar) = group[piece.rem_euclid(group.len() as i64) as usize];
-        let ends = (piece as f32 * dash - x, (piece + 1) as f32 * dash - x);
+    if tallest <= 0.5 * dash {
+        let (index, bar) = turn((x / dash).floor() as i64);
+        bar.paint(
+            mesh,
+            x,
+            scale,
+            (f32::NEG_INFINITY, f32::INFINITY),
+            colour(index),
+        );
+        return;
+    }
+    let ends = group
+        .iter()
+        .map(|(_, bar)| (bar.top - bar.soft_top, bar.bottom + bar.soft_bottom));
+    let (low, high) = ends.fold((f32::INFINITY, f32::NEG_INFINITY), |a, b| {
+        (a.0.min(b.0), a.1.max(b.1))
+    });
+    for piece in (low / dash).floor() as i64..=(high / dash).floor() as i64 {
+        let (index, bar) = turn(piece);
+        let ends = (piece as f32 * dash, (piece + 1) as f32 * dash);
         bar.paint(mesh, x, scale, ends, colour(index));
     }
 }

@@ -18,6 +18,8 @@ const WINDOWS: [f64; 6] = [1e-3, 1e-2, 0.05, 0.1, 1.0, 10.0];
 const LEAST_HEIGHT: f32 = 110.0;
 /// Least distance of two marks on an axis, points: the height of their numbers.
 const MARKS_APART: f32 = 16.0;
+/// Width of a letter of the numbers, points, generously.
+const LETTER: f64 = 7.0;
 /// Marks that an axis has at most, about.
 const MARKS: f64 = 5.0;
 /// A range smaller than this share of the values, or than this in the unit of the axis, is rounding and no motion.
@@ -280,9 +282,18 @@ impl Plots {
                     tick(mark.value, mark.step_size, to / time_size)
                 )
             };
+            let frame = f64::from(width - 52.0);
             let across = axis(AxisHints::new_x())
                 .label_spacing(Rangef::new(0.0, 1.0))
-                .formatter(move |mark, _| time_mark(&mark));
+                .formatter(move |mark, range| {
+                    let words = time_mark(&mark);
+                    let beyond = (range.end() - mark.value) / (range.end() - range.start()) * frame;
+                    // One that reached into the next plot is left out.
+                    if 0.5 * LETTER * words.chars().count() as f64 > beyond + 28.0 {
+                        return String::new();
+                    }
+                    words
+                });
             let up = axis(AxisHints::new_y())
                 .min_thickness(40.0)
                 .label_spacing(Rangef::new(0.0, 1.0))
@@ -292,11 +303,10 @@ impl Plots {
                 });
             // Numbers of a late time are long: fewer of them stand side by side.
             let letters = |mark: &GridMark| time_mark(mark).chars().count();
-            let most = f64::from(width - 52.0);
             let marks_across = move |input: GridInput| {
                 let marks = marks(&input, MARKS);
                 let longest = marks.iter().map(letters).max().unwrap_or(1);
-                let room = most / (7.0 * longest as f64 + 8.0);
+                let room = frame / (LETTER * longest as f64 + 8.0);
                 if room < MARKS {
                     self::marks(&input, room.max(1.0))
                 } else {

@@ -177,7 +177,14 @@ impl History {
         let (from, to) = (from.max(start), to.min(end));
         let level = self.level(from, to, most_bins);
         let (width, complete) = (self.width(level), self.complete(level));
-        for index in self.index(level, from)..=self.index(level, to) {
+        // Where nothing was recorded at the very beginning, what was before it.
+        let (mut first, oldest) = (self.index(level, from), self.index(level, start));
+        let gone = self.reached[level].saturating_sub(BINS as i64);
+        while first > oldest.max(gone + 1) && self.range(level, first, complete, channel).is_none()
+        {
+            first -= 1;
+        }
+        for index in first..=self.index(level, to) {
             if let Some((least, greatest)) = self.range(level, index, complete, channel)
                 && !least.is_nan()
             {
@@ -365,6 +372,9 @@ mod tests {
             let middle = libm::sin((bin.from + bin.to) * 50.0);
             assert!((bin.least - middle).abs() < 0.1 && (bin.greatest - middle).abs() < 0.1);
         }
+        // Records are fewer than the bins of a short window: it begins with the one before it.
+        let found = bins(&history, 0, 0.499_953, 0.499_973, 300);
+        assert!(found[0].from < 0.499_952 && found.len() == 3, "{found:?}");
         let found = bins(&history, 0, 0.0, 1.0, 300);
         assert_eq!(found[0].from, 0.0);
         assert_eq!(found[found.len() - 1].to, 49_999.0 * 1e-5);
