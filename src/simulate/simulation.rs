@@ -72,6 +72,8 @@ pub struct Simulation {
     scratch_memory: Vec<Memory>,
     /// The step just accepted may hold the largest force of a contact.
     near_peak: bool,
+    /// Largest normal force of each joint that was in contact over the step just accepted, N, and at which part of it.
+    strongest: Vec<(f64, f64)>,
 }
 
 /// What a snapshot copies.
@@ -212,6 +214,7 @@ impl Simulation {
             turned: false,
             scratch_memory: vec![Memory::default(); joints],
             near_peak: false,
+            strongest: vec![(0.0, 0.0); joints],
             mechanism,
         }
     }
@@ -474,11 +477,16 @@ impl Simulation {
             .statistics
             .constraint_drift
             .max(mechanism.constraint_drift());
+        let differs = self.stepper.differs_rates();
+        let located = self.mechanism.contacts.switching == Switching::Located;
+        if located {
+            self.track_reactions();
+        }
+        self.find_strongest(h);
         let switched = self.switch_contacts(h);
         self.track_peaks(h);
-        let differs = self.stepper.differs_rates();
         let again = (differs && self.mechanism.has_reactions()) || (!differs && switched.forces);
-        if !again {
+        if !again && !located {
             self.track_reactions();
         }
         self.book_step(h, switched.contacts || switched.forces);
@@ -500,7 +508,9 @@ impl Simulation {
             mechanism.derivative(state.t, &state.y, rate);
             mechanism.forget_evaluation();
             state.statistics.evaluations += 1;
-            self.track_reactions();
+            if !located {
+                self.track_reactions();
+            }
         }
         self.search_peaks();
         Ok(())
