@@ -332,7 +332,8 @@ mod tests {
     use crate::scene::Scene;
 
     /// The default scene with its platform lowered until every ball rests 0.2 um deep in its wall and creeps along it.
-    fn resting(changes: &[(&str, &str)]) -> (Mechanism, Vec<f64>) {
+    /// The memory of each contact holds `remembered`, m/s.
+    fn resting(changes: &[(&str, &str)], remembered: f64) -> (Mechanism, Vec<f64>) {
         let changes: Vec<(String, String)> = changes
             .iter()
             .map(|(k, v)| ((*k).to_owned(), (*v).to_owned()))
@@ -349,7 +350,7 @@ mod tests {
         for memory in mechanism.contacts.memory_mut() {
             *memory = Memory {
                 active: true,
-                approach_speed: 1e-3,
+                approach_speed: remembered,
                 floored: true,
                 ..Memory::default()
             };
@@ -359,10 +360,22 @@ mod tests {
 
     #[test]
     fn jacobian_is_that_of_central_differences_in_everything_stiff() {
-        for surface in ["centres", "surface"] {
-            let (mut m, y) = resting(&[("contact.friction_velocity", surface)]);
+        // With the last, the rate is the largest so far: the damping term does not answer to it.
+        for (surface, approach, remembered) in [
+            ("centres", "start", 1e-3),
+            ("surface", "start", 1e-3),
+            ("surface", "largest", 1e-3),
+            ("surface", "largest", 1e-9),
+        ] {
+            let changes = [
+                ("contact.friction_velocity", surface),
+                ("contact.approach_speed", approach),
+            ];
+            let (mut m, y) = resting(&changes, remembered);
             let (t, nq) = (0.0, m.positions());
             m.linearise(t, &y);
+            let rises = m.contacts.gaps().iter().all(|gap| gap.rate > remembered);
+            assert_eq!(rises, remembered < 1e-6);
             let stiff = m.stiff.take().unwrap();
             let n = stiff.n;
             let (mut plus, mut minus) = (vec![0.0; y.len()], vec![0.0; y.len()]);

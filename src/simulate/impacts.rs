@@ -104,23 +104,21 @@ impl Impacts {
         });
     }
 
-    /// A step in which the contact of `joint`, whose memory held `remembered` (m/s), was on, or came on: the course of its
-    /// penetration, and the largest ratio of damping to elastic force in it.
-    pub(super) fn follow(
-        &mut self,
-        joint: usize,
-        course: &Course,
-        coefficients: &Coefficients,
-        remembered: f64,
-        damping: f64,
-    ) {
+    /// A step in which the contact of `joint` was on, or came on: the course of its penetration, its largest normal force (N)
+    /// and its largest ratio of damping to elastic force.
+    pub(super) fn follow(&mut self, joint: usize, course: &Course, force: f64, damping: f64) {
         if let Some(impact) = &mut self.under_way[joint] {
-            let (force, _) = course.strongest(coefficients, remembered);
             impact.steps += 1;
             impact.damping = impact.damping.max(damping);
             impact.deepest = impact.deepest.max(course.deepest());
             impact.peak = impact.peak.max(force);
         }
+    }
+
+    /// Largest normal force so far of the impact of `joint` under way, N; infinite without one.
+    pub(super) fn peak_under_way(&self, joint: usize) -> f64 {
+        let impact = &self.under_way[joint];
+        impact.as_ref().map_or(f64::INFINITY, |impact| impact.peak)
     }
 
     /// The contact of `joint` ends at `time` with the penetration rate `rate`.

@@ -137,6 +137,16 @@ impl Course {
         (c.damping * rate / approach, theta)
     }
 
+    /// Larger normal force of both ends and where: (N, theta).
+    pub(super) fn stronger_end(&self, c: &Coefficients, approach_speed: f64) -> (f64, f64) {
+        let force = |at: &Approach| {
+            let approach = c.approach(Pace::Whole, approach_speed, at.rate);
+            c.normal_force(at.penetration, at.rate, approach)
+        };
+        let (f0, f1) = (force(&self.start), force(&self.end));
+        if f1 >= f0 { (f1, 1.0) } else { (f0, 0.0) }
+    }
+
     /// Largest normal force over the step and where: (N, theta). The contact's memory holds `approach_speed`.
     pub(super) fn strongest(&self, c: &Coefficients, approach_speed: f64) -> (f64, f64) {
         let force = |theta: f64| {

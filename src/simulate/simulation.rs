@@ -76,6 +76,8 @@ pub struct Simulation {
     pub(super) reference: Reference,
     /// The step just accepted may hold the largest force of a contact.
     near_peak: bool,
+    /// Largest normal force of each joint that was in contact over the step just accepted, N, and at which part of it.
+    strongest: Vec<(f64, f64)>,
 }
 
 /// What a snapshot copies.
@@ -217,6 +219,7 @@ impl Simulation {
             scratch_memory: vec![Memory::default(); joints],
             reference: Reference::of(scene),
             near_peak: false,
+            strongest: vec![(0.0, 0.0); joints],
             mechanism,
         }
     }
@@ -479,11 +482,16 @@ impl Simulation {
             .statistics
             .constraint_drift
             .max(mechanism.constraint_drift());
+        let differs = self.stepper.differs_rates();
+        let located = self.mechanism.contacts.switching == Switching::Located;
+        if located {
+            self.track_reactions();
+        }
+        self.find_strongest(h);
         let switched = self.switch_contacts(h);
         self.track_peaks(h);
-        let differs = self.stepper.differs_rates();
         let again = (differs && self.mechanism.has_reactions()) || (!differs && switched.forces);
-        if !again {
+        if !again && !located {
             self.track_reactions();
         }
         self.book_step(h, switched.contacts || switched.forces);
@@ -505,7 +513,9 @@ impl Simulation {
             mechanism.derivative(state.t, &state.y, rate);
             mechanism.forget_evaluation();
             state.statistics.evaluations += 1;
-            self.track_reactions();
+            if !located {
+                self.track_reactions();
+            }
         }
         self.search_peaks();
         Ok(())

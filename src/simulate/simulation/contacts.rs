@@ -30,10 +30,19 @@ pub(super) struct Switched {
 }
 
 impl State {
-    /// Puts down a step of contact `j`, from its part `from` on, while its memory held `remembered` (m/s).
-    fn follow(&mut self, j: usize, course: &Course, c: &Coefficients, remembered: f64, from: f64) {
+    /// Puts down a step of contact `j`, from its part `from` on, with the largest normal force `force` (N), while its memory held
+    /// `remembered` (m/s).
+    fn follow(
+        &mut self,
+        j: usize,
+        course: &Course,
+        c: &Coefficients,
+        force: f64,
+        remembered: f64,
+        from: f64,
+    ) {
         let (damping, theta) = course.most_damped(c, remembered, from);
-        self.impacts.follow(j, course, c, remembered, damping);
+        self.impacts.follow(j, course, force, damping);
         if damping > self.statistics.damping[j] {
             self.statistics.damping[j] = damping;
             self.statistics.damping_time[j] = self.t0 + theta * (self.t - self.t0);
@@ -51,6 +60,7 @@ impl Simulation {
             running,
             state,
             peaks,
+            strongest,
             ..
         } = self;
         let least = least_steps(running.solver.method);
@@ -68,7 +78,7 @@ impl Simulation {
             if state.memory[j].active {
                 let course = Course::new(start, end, h);
                 let remembered = state.memory[j].approach_speed;
-                state.follow(j, &course, coefficients, remembered, 0.0);
+                state.follow(j, &course, coefficients, strongest[j].0, remembered, 0.0);
             }
             // A located switch ends within rounding of the wall, on either side; but the step taken again may show that a
             // ball that was about to separate turned around before.
@@ -118,7 +128,8 @@ impl Simulation {
                     if coefficients.largest {
                         approach_speed = approach_speed.max(course.fastest(theta).0);
                     }
-                    state.follow(j, &course, coefficients, approach_speed, theta);
+                    let (force, _) = course.strongest(coefficients, approach_speed);
+                    state.follow(j, &course, coefficients, force, approach_speed, theta);
                 }
                 state.memory[j] = Memory {
                     active: true,
@@ -158,6 +169,7 @@ impl Simulation {
             state,
             peaks,
             near_peak,
+            strongest,
             ..
         } = self;
         let immediate = mechanism.contacts.switching == Switching::Immediate;
@@ -171,16 +183,16 @@ impl Simulation {
                 continue;
             }
             let mut coefficients = *mechanism.contacts.coefficients(j);
-            let approach = if state.memory0[j].active {
-                state.memory0[j].approach_speed
+            let course = Course::new(start, end, h);
+            let (force, theta) = if state.memory0[j].active {
+                strongest[j]
             } else if state.memory[j].active {
-                state.memory[j].approach_speed
+                course.strongest(&coefficients, state.memory[j].approach_speed)
             } else {
                 // It came and went within the step, without a memory: its approach speed was the rate at each instant.
                 coefficients.largest = true;
-                coefficients.speed_floor
+                course.strongest(&coefficients, coefficients.speed_floor)
             };
-            let (force, theta) = Course::new(start, end, h).strongest(&coefficients, approach);
             let time = state.t0 + theta * h;
             *near_peak |= force > NEAR_PEAK * state.statistics.peak_normal[j];
             if force > state.statistics.peak_normal[j] {

@@ -2,6 +2,7 @@
 
 use super::Simulation;
 use crate::mechanism::Switching;
+use crate::simulate::peaks::Course;
 
 /// A step whose forces stay below this part of their peaks so far is not looked into.
 pub(super) const NEAR_PEAK: f64 = 0.5;
@@ -21,6 +22,37 @@ impl Simulation {
             let (size, time) = (reaction.norm(), self.state.t);
             let vertex = self.state.reactions[j].rise(time, size);
             self.take_reaction(j, if smooth { vertex } else { size }, time);
+        }
+    }
+
+    /// Finds the largest normal force of every joint that was in contact over the step just accepted, and where, from the cubic through
+    /// the penetration. Where that has a peak inside a located step it is looked up: the cubic's rate, by which damping
+    /// goes, is not that of the motion.
+    pub(super) fn find_strongest(&mut self, h: f64) {
+        let located = self.mechanism.contacts.switching == Switching::Located;
+        for j in 0..self.state.gaps.len() {
+            let memory = self.state.memory0[j];
+            if !memory.active || !self.mechanism.contacts.has_clearance(j) {
+                continue;
+            }
+            let course = Course::new(self.state.gaps0[j], self.state.gaps[j], h);
+            let c = *self.mechanism.contacts.coefficients(j);
+            let (force, theta) = course.strongest(&c, memory.approach_speed);
+            self.strongest[j] = (force, theta);
+            let least = self.state.statistics.peak_normal[j]
+                .min(self.peaks[j].normal)
+                .min(self.state.impacts.peak_under_way(j));
+            if !located || theta <= 0.0 || theta >= 1.0 || force <= least {
+                continue;
+            }
+            self.look(self.state.t0 + theta * h);
+            let inside = self.mechanism.contacts.gaps()[j].normal_force;
+            let ends = course.stronger_end(&c, memory.approach_speed);
+            self.strongest[j] = if inside > ends.0 {
+                (inside, theta)
+            } else {
+                ends
+            };
         }
     }
 
