@@ -224,7 +224,11 @@ fn files_are_written_through_one_module() {
             .split_once("#[cfg(test)]\nmod tests")
             .unwrap_or((&code, ""));
         // Pictures that are drawn to be looked at.
-        if module == "files" || file.ends_with("survival.rs") || file == "render/look.rs" || file.ends_with("/tests.rs") {
+        if module == "files"
+            || file.ends_with("survival.rs")
+            || file == "render/look.rs"
+            || file.ends_with("/tests.rs")
+        {
             continue;
         }
         for call in WRITING {

@@ -227,7 +227,10 @@ impl Scene {
                 )
             } else {
                 let near = nearest(name, names.iter().copied());
-                format!("no ball joint `{}`{near}; ball joints: {listed}", brief(name))
+                format!(
+                    "no ball joint `{}`{near}; ball joints: {listed}",
+                    brief(name)
+                )
             };
             return Err(SceneError::about(key, None, message));
         };

@@ -18,7 +18,7 @@ use super::impacts::{Impact, Impacts};
 use super::ledger::Account;
 use super::peaks::{Approach, Recent};
 use super::stepper::AnyStepper;
-use super::{NotUnique, Frame, Peak, StartError, Statistics, Stopped};
+use super::{Frame, NotUnique, Peak, StartError, Statistics, Stopped};
 use crate::integrate::{Controller, System};
 use crate::mechanism::{Mechanism, MechanismError, Memory, Ramp, Switching};
 use crate::scene::Scene;
