@@ -305,7 +305,7 @@ mod tests {
         })
         .expect("runs");
         assert!(looks > 100);
-        // The peaks of `tests/reference.rs`; friction moves no peak of the first 20 ms by more.
+        // The peaks of `tests/physics/reference.rs`; friction moves no peak of the first 20 ms by more.
         for (peak, expected) in response.full.normal.iter().zip([771.15, 870.59, 533.36]) {
             assert!((peak / expected - 1.0).abs() < 5e-3, "{peak} {expected}");
         }

@@ -5,7 +5,7 @@ use super::exponent::Benettin;
 
 /// A motion that can be stepped, observed and followed by a twin: a map, a driven oscillator, a mechanism.
 ///
-/// All that [`Watch`] knows of a system; known systems (`tests/known_systems.rs`) and mechanisms go through the same code.
+/// All that [`Watch`] knows of a system; known systems (`tests/physics/known_systems.rs`) and mechanisms go through the same code.
 pub trait Orbit: Sized {
     /// Why a step failed.
     type Stop;

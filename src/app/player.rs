@@ -692,7 +692,7 @@ mod tests {
         player.advance(0.0);
         let points = recorded(&player, Quantity::NormalForce, 9e-3);
         let peak = points.iter().map(|p| p[1]).fold(0.0, f64::max);
-        // Peak of the first impact of S1 (`tests/reference.rs`); the live tolerance is coarser than the reference's.
+        // Peak of the first impact of S1 (`tests/physics/reference.rs`); the live tolerance is coarser than the reference's.
         assert!((peak - 621.35).abs() < 0.005 * 621.35, "{peak}");
     }
 

@@ -1,0 +1,12 @@
+//! The program as scripts see it.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod chart;
+mod cluster;
+mod command_line;
+mod ledger_files;
+mod reproduce;
+mod sweep;
+mod tradeoff;

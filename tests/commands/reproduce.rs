@@ -1,0 +1,387 @@
+//! `reproduce`: everything is there, the page says what the data say, and threads change nothing.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::sync::OnceLock;
+
+use jointplay::analysis::paper::PUBLISHED;
+use jointplay::analysis::reproduction::Extent;
+use jointplay::cli::output::significant;
+use jointplay::cli::reproduce::into_folder;
+
+struct Outcome {
+    code: Option<i32>,
+    stdout: String,
+    stderr: String,
+}
+
+fn jointplay(folder: &Path, line: &str) -> Outcome {
+    let output = Command::new(env!("CARGO_BIN_EXE_jointplay"))
+        .args(line.split_whitespace())
+        .current_dir(folder)
+        .output()
+        .unwrap();
+    Outcome {
+        code: output.status.code(),
+        stdout: String::from_utf8(output.stdout).unwrap(),
+        stderr: String::from_utf8(output.stderr).unwrap(),
+    }
+}
+
+/// Every file under `folder` with its content.
+fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    fn walk(root: &Path, folder: &Path, out: &mut BTreeMap<String, Vec<u8>>) {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                walk(root, &path, out);
+            } else {
+                let name = path.strip_prefix(root).unwrap().display().to_string();
+                out.insert(name, fs::read(&path).unwrap());
+            }
+        }
+    }
+    let mut out = BTreeMap::new();
+    walk(folder, folder, &mut out);
+    out
+}
+
+/// As the page writes a number that needs no power of ten.
+fn shown(value: f64) -> String {
+    let text = significant(value, 4);
+    assert!(!text.contains('e'), "{text}");
+    text
+}
+
+/// Cells of every row of every table of the page, tags removed.
+fn rows(page: &str) -> Vec<Vec<String>> {
+    let plain = |cell: &str| {
+        let mut text = String::new();
+        let mut inside = false;
+        for c in cell.chars() {
+            match c {
+                '<' => inside = true,
+                '>' => inside = false,
+                c if !inside => text.push(c),
+                _ => {}
+            }
+        }
+        text
+    };
+    page.split("<tr>")
+        .skip(1)
+        .map(|row| {
+            let row = row.split("</tr>").next().unwrap();
+            row.split("</td>")
+                .map(plain)
+                .filter(|cell| !cell.is_empty())
+                .collect()
+        })
+        .collect()
+}
+
+/// The quick report, in `report/` of the folder, made once and left as it is.
+fn quick() -> &'static (tempfile::TempDir, Outcome) {
+    static REPORT: OnceLock<(tempfile::TempDir, Outcome)> = OnceLock::new();
+    REPORT.get_or_init(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let run = jointplay(folder.path(), "reproduce --out report --quick --quiet");
+        (folder, run)
+    })
+}
+
+#[test]
+fn a_quick_report_is_whole_and_its_page_says_what_its_data_say() {
+    let (folder, run) = quick();
+    assert_eq!(run.code, Some(0), "{}{}", run.stdout, run.stderr);
+    assert!(run.stdout.contains("Statements") && run.stdout.contains("report/index.html"));
+    let all = files(&folder.path().join("report"));
+    let page = String::from_utf8(all["index.html"].clone()).unwrap();
+
+    // The manifest names every file but itself, and every figure of the paper is there twice and in the page.
+    let manifest: serde_json::Value = serde_json::from_slice(&all["manifest.json"]).unwrap();
+    let named: Vec<&str> = manifest["files"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|f| f.as_str().unwrap())
+        .collect();
+    let there: Vec<&str> = all
+        .keys()
+        .map(String::as_str)
+        .filter(|name| *name != "manifest.json")
+        .collect();
+    assert_eq!(named, there);
+    for figure in 5..=23 {
+        let name = format!("figure-{figure:02}");
+        for ending in ["svg", "png"] {
+            assert!(
+                all.contains_key(&format!("plots/{name}.{ending}")),
+                "{name}.{ending}"
+            );
+        }
+        assert!(
+            page.contains(&format!("<h3 id=\"{name}\">Figure {figure}:")),
+            "{name}"
+        );
+    }
+    assert_eq!(
+        page.matches("<svg ").count(),
+        all.keys().filter(|n| n.ends_with(".svg")).count()
+    );
+
+    // One file: nothing comes from anywhere, and nothing is missing that a link names.
+    for outside in ["http://", "https://", "<script", "src=", "@import", "<link"] {
+        let found = page.replace("http://www.w3.org/2000/svg", "");
+        assert!(!found.contains(outside), "{outside}");
+    }
+    for link in page
+        .split("href=\"")
+        .skip(1)
+        .map(|rest| rest.split('"').next().unwrap())
+    {
+        let exists = match link.strip_prefix('#') {
+            Some(id) => page.contains(&format!("id=\"{id}\"")),
+            None => all.contains_key(link),
+        };
+        assert!(exists, "{link}");
+    }
+    assert!(page.len() < 5_000_000, "{}", page.len());
+    assert!(!page.contains("NaN"), "a number is missing");
+
+    // Every number that the paper prints has its row, with the numbers of the data.
+    let text = String::from_utf8(all["data/numbers.csv"].clone()).unwrap();
+    let table = rows(&page);
+    let lines: Vec<Vec<&str>> = text
+        .lines()
+        .skip(1)
+        .map(|line| line.split(',').collect())
+        .collect();
+    assert_eq!(lines.len(), PUBLISHED.len());
+    for (line, published) in lines.iter().zip(PUBLISHED) {
+        let number = |k: usize| line[k].parse::<f64>().unwrap();
+        assert_eq!((line[0], number(5)), (published.figure, published.value));
+        let full = number(6);
+        assert!((full / number(5) - number(8)).abs() < 1e-9);
+        let run = format!(
+            "{} mm, {}",
+            published.case.clearance, published.case.friction
+        );
+        let what = format!("{} ({})", line[3].replace("beta", "β"), line[4]);
+        let row = table
+            .iter()
+            .find(|row| row.len() == 9 && row[0] == line[0] && row[1] == run && row[2] == what);
+        let row = row.unwrap_or_else(|| panic!("no row for {line:?}"));
+        assert_eq!(row[3], shown(published.value));
+        assert_eq!(row[4], shown(full));
+        if !line[7].is_empty() {
+            assert_eq!(row[6], shown(number(7)));
+            assert!(
+                number(7) <= full * (1.0 + 1e-9),
+                "samples exceed continuous time: {line:?}"
+            );
+        }
+        let word = if (0.9..=1.1).contains(&number(8)) {
+            "agrees within 10 %"
+        } else if (0.5..=2.0).contains(&number(8)) {
+            "within a factor of 2"
+        } else {
+            "differs"
+        };
+        assert_eq!((row[8].as_str(), line[10]), (word, word));
+    }
+    // The first peaks of the nominal run are those of the reference solution (`tests/physics/reference.rs`).
+    let velocity = lines.iter().find(|line| line[0] == "6a").unwrap();
+    assert!(
+        (velocity[7].parse::<f64>().unwrap() / 0.147 - 1.0).abs() < 0.01,
+        "{velocity:?}"
+    );
+
+    // Statements: each in the page with its verdict, some of either kind.
+    let statements = String::from_utf8(all["data/statements.csv"].clone()).unwrap();
+    let confirmed = statements
+        .lines()
+        .filter(|l| l.contains(",confirmed,"))
+        .count();
+    let not = statements
+        .lines()
+        .filter(|l| l.contains(",not confirmed,"))
+        .count();
+    assert_eq!(confirmed + not, statements.lines().count() - 1);
+    assert!(confirmed > 10 && not > 5, "{confirmed} {not}");
+    assert_eq!(
+        page.matches("<span class=\"ok\">confirmed</span>").count(),
+        confirmed
+    );
+    assert_eq!(
+        page.matches("<span class=\"off\">not confirmed</span>")
+            .count(),
+        not
+    );
+    assert!(page.contains(&format!("<b>{confirmed} of {}</b>", confirmed + not)));
+
+    // A quick report says that it is one; numbers and names are set as in print.
+    assert!(page.contains("This is a quick report"), "no notice");
+    assert!(!page.contains("beta"), "β has one name on the page");
+    let power =
+        |c: &[char]| c[0].is_ascii_digit() && c[1] == 'e' && (c[2] == '-' || c[2].is_ascii_digit());
+    for row in &table {
+        for cell in row {
+            let letters: Vec<char> = cell.chars().collect();
+            assert!(!letters.windows(3).any(power), "{cell}");
+        }
+    }
+
+    // It is not written over, and --force replaces it only as what it is.
+    let again = jointplay(folder.path(), "reproduce --out report --quick --quiet");
+    assert_eq!(again.code, Some(1), "{}", again.stderr);
+    assert!(again.stderr.contains("--force"), "{}", again.stderr);
+    assert_eq!(all, files(&folder.path().join("report")));
+    fs::create_dir(folder.path().join("other")).unwrap();
+    fs::write(folder.path().join("other/mine.txt"), "mine").unwrap();
+    let other = jointplay(folder.path(), "reproduce --out other --quick --force");
+    assert_eq!(other.code, Some(1), "{}", other.stderr);
+    assert!(folder.path().join("other/mine.txt").exists());
+}
+
+#[test]
+fn bad_input_is_refused_before_anything_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("file"), "x").unwrap();
+    for (line, code, says) in [
+        ("reproduce --out file", 1, "it is a file"),
+        ("reproduce --out no/such/report", 1, "cannot write"),
+        ("reproduce", 2, "--out"),
+        ("reproduce --out report --threads 0", 2, "threads"),
+        ("reproduce --out report spcmm", 2, "spcmm"),
+    ] {
+        let outcome = jointplay(folder.path(), line);
+        assert_eq!(outcome.code, Some(code), "{line}: {}", outcome.stderr);
+        assert!(outcome.stderr.contains(says), "{line}: {}", outcome.stderr);
+    }
+    assert_eq!(
+        fs::read_dir(folder.path()).unwrap().count(),
+        1,
+        "nothing is left"
+    );
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_leaves_nothing_half_written_and_the_same_command_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let entries = || files(folder.path());
+    let mut child = Command::new(env!("CARGO_BIN_EXE_jointplay"))
+        .args("reproduce --out report/ --quick --threads 1".split(' '))
+        .current_dir(folder.path())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // Once some blocks are in.
+    let length = || -> usize {
+        let part = |name: &str| {
+            fs::read(folder.path().join("report.partial").join(name)).map_or(0, |b| b.len())
+        };
+        part("runs_by_clearance.partial") + part("runs_by_friction.partial")
+    };
+    let mut grown = Vec::new();
+    while grown.len() < 5 {
+        let now = length();
+        if grown.last() != Some(&now) {
+            grown.push(now);
+        }
+        assert!(child.try_wait().unwrap().is_none(), "over before it began");
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    let kill = Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status();
+    assert!(kill.unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(130), "{stderr}");
+    assert!(
+        stderr.contains("no report was written") && stderr.contains("goes on from report.partial"),
+        "{stderr}"
+    );
+    assert!(output.stdout.is_empty());
+    let left = entries();
+    assert!(
+        left.keys().all(|name| name.starts_with("report.partial/")),
+        "{:?}",
+        left.keys()
+    );
+
+    // Damage, and what was begun otherwise, is refused by name and left alone.
+    let first = folder
+        .path()
+        .join("report.partial/runs_by_clearance.partial");
+    let whole = fs::read(&first).unwrap();
+    let mut damage = whole.clone();
+    damage[whole.len() / 2] ^= 1;
+    fs::write(&first, &damage).unwrap();
+    let damaged = jointplay(folder.path(), "reproduce --out report --quick");
+    assert_eq!(damaged.code, Some(1), "{}", damaged.stderr);
+    assert!(
+        damaged
+            .stderr
+            .contains("report.partial/runs_by_clearance.partial is damaged"),
+        "{}",
+        damaged.stderr
+    );
+    fs::write(&first, &whole).unwrap();
+    let other = jointplay(folder.path(), "reproduce --out report");
+    assert_eq!(other.code, Some(2), "{}", other.stderr);
+    assert!(
+        other.stderr.contains("begun with other settings"),
+        "{}",
+        other.stderr
+    );
+    assert!(entries() == left, "left as it was");
+
+    // It goes on to the very report that comes without an interruption.
+    let resumed = jointplay(folder.path(), "reproduce --out report --quick --threads 2");
+    assert_eq!(resumed.code, Some(0), "{}", resumed.stderr);
+    assert!(
+        resumed
+            .stderr
+            .contains("going on where report.partial stopped"),
+        "{}",
+        resumed.stderr
+    );
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    let straight = quick().0.path().join("report");
+    let (one, other) = (files(&folder.path().join("report")), files(&straight));
+    assert!(one.keys().eq(other.keys()));
+    for (name, content) in &one {
+        assert!(*content == other[name], "{name} differs");
+    }
+}
+
+#[test]
+fn the_number_of_threads_changes_no_byte() {
+    const TINY: Extent = Extent {
+        settle: 1,
+        runs: (9, 1),
+        values: [2, 2],
+        sweep: (3, 1),
+        map: [2, 2],
+        map_periods: (2, 1),
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let made = [1, 3].map(|threads| {
+        let out = folder.path().join(format!("with-{threads}"));
+        into_folder(&out, TINY, threads).unwrap();
+        files(&out)
+    });
+    assert_eq!(
+        made[0].keys().collect::<Vec<_>>(),
+        made[1].keys().collect::<Vec<_>>()
+    );
+    for (name, content) in &made[0] {
+        assert!(*content == made[1][name], "{name} differs");
+    }
+}

@@ -1,0 +1,561 @@
+//! `sweep` and `merge` as scripts see them: the same bytes whatever the threads, interruptions and shards.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use jointplay::analysis::grid::{Axis, FOLLOW_BLOCK, Grid, Start};
+use jointplay::analysis::point::Plan;
+use jointplay::analysis::sweep::Sweep;
+use jointplay::scene::Scene;
+use ndarray::{ArrayD, IxDyn, OwnedRepr};
+use ndarray_npy::NpzReader;
+use serde_json::Value as Json;
+use tempfile::TempDir;
+
+/// A sweep of four points that takes a fraction of a second.
+const SMALL: &str = "sweep spcmm --vary contact.clearance=0.2mm..0.5mm:4 --periods 3 --discard 1";
+
+struct Outcome {
+    code: Option<i32>,
+    stdout: String,
+    stderr: String,
+}
+
+impl Outcome {
+    #[track_caller]
+    fn expect(self, code: i32) -> Self {
+        assert_eq!(self.code, Some(code), "{}\n{}", self.stdout, self.stderr);
+        self
+    }
+}
+
+fn command(folder: &Path, line: &str) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_jointplay"));
+    command
+        .args(line.split_whitespace())
+        .current_dir(folder)
+        .env_remove("RUST_LOG")
+        .env_remove("RUST_BACKTRACE");
+    command
+}
+
+fn jointplay(folder: &Path, line: &str) -> Outcome {
+    let output = command(folder, line).output().unwrap();
+    Outcome {
+        code: output.status.code(),
+        stdout: String::from_utf8(output.stdout).unwrap(),
+        stderr: String::from_utf8(output.stderr).unwrap(),
+    }
+}
+
+fn folder() -> TempDir {
+    tempfile::tempdir().unwrap()
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).unwrap();
+    let mut names: Vec<String> = entries
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    names
+}
+
+/// The arrays of an archive, whole numbers as floating-point ones, and its `meta`.
+fn archive(path: &Path) -> (BTreeMap<String, ArrayD<f64>>, Json) {
+    let mut reader = NpzReader::new(fs::File::open(path).unwrap()).unwrap();
+    let mut arrays = BTreeMap::new();
+    let mut meta = Json::Null;
+    for name in reader.names().unwrap() {
+        if name == "meta" {
+            let bytes: ArrayD<u8> = reader.by_name::<OwnedRepr<u8>, IxDyn>(&name).unwrap();
+            meta = serde_json::from_slice(&bytes.into_raw_vec_and_offset().0).unwrap();
+        } else if let Ok(array) = reader.by_name::<OwnedRepr<f64>, IxDyn>(&name) {
+            arrays.insert(name, array);
+        } else {
+            let array: ArrayD<i64> = reader.by_name::<OwnedRepr<i64>, IxDyn>(&name).unwrap();
+            arrays.insert(name, array.mapv(|value| value as f64));
+        }
+    }
+    (arrays, meta)
+}
+
+#[test]
+fn a_map_has_the_shape_of_its_ranges_and_the_values_of_single_runs() {
+    let folder = folder();
+    let line = "sweep spcmm --vary contact.friction=0.1..0.2:2 --vary contact.clearance=0.2mm..0.3mm:3 --periods 2 \
+                --discard 0 --out map.npz --summary json";
+    let summary = jointplay(folder.path(), line).expect(0).stdout;
+    let summary: Json = serde_json::from_str(&summary).unwrap();
+    assert_eq!(summary["points"], 6);
+    assert_eq!(summary["status"], "done");
+    let (arrays, meta) = archive(&folder.path().join("map.npz"));
+    assert_eq!(arrays["contact.friction"].shape(), [2]);
+    assert_eq!(arrays["contact.clearance"].shape(), [3]);
+    for array in meta["arrays"].as_array().unwrap() {
+        let name = array["name"].as_str().unwrap();
+        let shape: &[usize] = if array["per_section"] == true {
+            &[2, 3, 2]
+        } else {
+            &[2, 3]
+        };
+        assert_eq!(arrays[name].shape(), shape, "{name}");
+    }
+    assert_eq!(meta["scene"], "spcmm");
+    assert_eq!(meta["regimes"]["3"], "chaotic");
+    assert!(arrays["status"].iter().all(|status| *status == 0.0));
+    // The point at friction 0.2, clearance 0.25 mm is the run of that scene.
+    let run = jointplay(
+        folder.path(),
+        "run spcmm --set contact.friction=0.2 --set contact.clearance=0.25mm --duration 4s --every 2s --out run.json \
+         --summary json",
+    );
+    let run: Json = serde_json::from_str(&run.expect(0).stdout).unwrap();
+    for joint in ["S1", "S2", "S3"] {
+        let value = |name: &str| arrays[&format!("{joint}_{name}")][[1, 1]];
+        assert_eq!(value("peak_N"), run["peak_normal_N"][joint]);
+        assert_eq!(value("impacts"), run["impacts"][joint].as_f64().unwrap());
+        assert!(value("mean_N") > 2.0 && value("mean_N") < 20.0);
+        let separation = value("last_separation_s");
+        assert!(separation > 0.01 && separation < 0.3, "{separation}");
+    }
+    let rows: Json =
+        serde_json::from_slice(&fs::read(folder.path().join("run.json")).unwrap()).unwrap();
+    for (quantity, tolerance) in [("x_m", 1e-9), ("beta_rad", 1e-8), ("beta_rate_rad_s", 1e-6)] {
+        for k in 0..2 {
+            let row = rows["columns"][quantity][k + 1].as_f64().unwrap();
+            let section = arrays[&format!("section_{quantity}")][[1, 1, k]];
+            assert!(
+                (row - section).abs() < tolerance,
+                "{quantity}: {row} {section}"
+            );
+        }
+    }
+    let error = arrays["probe_error_max_um"][[1, 1]];
+    assert!(error > 200.0 && error < 2000.0, "{error} um");
+    assert!(arrays["probe_error_rms_um"][[1, 1]] < error);
+}
+
+#[test]
+fn neither_threads_nor_shards_change_a_bit() {
+    let folder = folder();
+    let run = |rest: &str| jointplay(folder.path(), &format!("{SMALL} {rest}")).expect(0);
+    let read = |name: &str| fs::read(folder.path().join(name)).unwrap();
+    run("--threads 1 --out one.npz");
+    run("--threads 3 --out three.npz");
+    assert!(read("one.npz") == read("three.npz"));
+    run("--shard 1/3 --out s1.npz");
+    run("--shard 2/3 --out s2.npz");
+    run("--shard 3/3 --out s3.npz");
+    let merge = |line: &str| jointplay(folder.path(), &format!("merge {line}"));
+    merge("s3.npz s1.npz s2.npz --out merged.npz").expect(0);
+    assert!(read("one.npz") == read("merged.npz"));
+
+    // What is not all of one sweep is refused, and nothing is written.
+    let before = names(folder.path());
+    let lacking = merge("s1.npz s3.npz --out bad.npz").expect(2);
+    assert!(
+        lacking.stderr.contains("shards not given: 2/3"),
+        "{}",
+        lacking.stderr
+    );
+    let twice = merge("s1.npz s2.npz s1.npz s3.npz --out bad.npz").expect(2);
+    assert!(
+        twice.stderr.contains("hold the same points"),
+        "{}",
+        twice.stderr
+    );
+    let whole = merge("one.npz --out bad.npz").expect(2);
+    assert!(
+        whole.stderr.contains("one.npz is no shard"),
+        "{}",
+        whole.stderr
+    );
+    fs::write(folder.path().join("text.npz"), "no archive").unwrap();
+    let text = merge("s1.npz text.npz --out bad.npz").expect(1);
+    assert!(text.stderr.contains("text.npz"), "{}", text.stderr);
+    merge("nowhere.npz --out bad.npz").expect(1);
+    merge("s1.npz s2.npz s3.npz --out merged.npz").expect(1);
+    merge("s1.npz s2.npz s3.npz --out merged.csv").expect(2);
+    let over = merge("s1.npz s2.npz s3.npz --out ./s2.npz --force").expect(2);
+    assert!(over.stderr.contains("one of the shards"), "{}", over.stderr);
+    fs::remove_file(folder.path().join("text.npz")).unwrap();
+    assert_eq!(names(folder.path()), before);
+
+    // More shards than points: an empty one is a shard, too.
+    let empty = run("--shard 5/5 --out e5.npz").stdout;
+    assert!(
+        empty.contains("Points            0") && empty.contains("Regimes           none"),
+        "{empty}"
+    );
+    for k in 1..5 {
+        run(&format!("--shard {k}/5 --out e{k}.npz"));
+    }
+    merge("e1.npz e2.npz e3.npz e4.npz e5.npz --out five.npz").expect(0);
+    assert!(read("one.npz") == read("five.npz"));
+
+    jointplay(
+        folder.path(),
+        "sweep spcmm --vary contact.clearance=0.2mm..0.5mm:4 --periods 3 --discard 2 --shard 2/3 --out other.npz",
+    )
+    .expect(0);
+    let mixed = merge("s1.npz other.npz s3.npz --out bad.npz").expect(2);
+    assert!(
+        mixed
+            .stderr
+            .contains("different sweeps: discard: 1 there, 2 now"),
+        "{}",
+        mixed.stderr
+    );
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_sweep_goes_on_where_it_stopped_and_a_damaged_part_is_refused() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    let sweep = |points: usize, out: &str| {
+        format!(
+            "sweep spcmm --vary contact.clearance=0.2mm..0.3mm:{points} --periods 6 --discard 2 --threads 2 --out {out}"
+        )
+    };
+    // One that is over before it can be interrupted gets twice as much to do.
+    let mut points = 12;
+    loop {
+        let mut child = command(folder.path(), &sweep(points, "a.npz"))
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        // Once some blocks are in.
+        let length = || fs::metadata(at("a.npz.partial")).map_or(0, |file| file.len());
+        let mut grown = Vec::new();
+        while grown.len() < 4 && child.try_wait().unwrap().is_none() {
+            let now = length();
+            if now > 0 && grown.last() != Some(&now) {
+                grown.push(now);
+            }
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
+        if child.try_wait().unwrap().is_none() {
+            let interrupted = Command::new("kill")
+                .args(["-INT", &child.id().to_string()])
+                .status();
+            assert!(interrupted.unwrap().success());
+        }
+        let output = child.wait_with_output().unwrap();
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        if output.status.code() == Some(0) {
+            fs::remove_file(at("a.npz")).unwrap();
+            points *= 2;
+            continue;
+        }
+        assert_eq!(output.status.code(), Some(130), "{stderr}");
+        let done = format!("of {points} points done");
+        assert!(stderr.contains(&done), "{stderr}");
+        assert_eq!(names(folder.path()), ["a.npz.partial"]);
+        break;
+    }
+    let line = |out: &str| sweep(points, out);
+    let partial = fs::read(at("a.npz.partial")).unwrap();
+
+    // Damage of every kind, and settings of another sweep.
+    let refused = |bytes: &[u8], line: &str, code: i32, fragment: &str| {
+        fs::write(at("a.npz.partial"), bytes).unwrap();
+        let outcome = jointplay(folder.path(), line).expect(code);
+        assert!(
+            outcome.stderr.contains("a.npz.partial"),
+            "{}",
+            outcome.stderr
+        );
+        assert!(outcome.stderr.contains(fragment), "{}", outcome.stderr);
+        assert_eq!(names(folder.path()), ["a.npz.partial"]);
+        assert!(
+            fs::read(at("a.npz.partial")).unwrap() == bytes,
+            "left as it was"
+        );
+    };
+    let flipped = |place: usize| {
+        let mut bytes = partial.clone();
+        bytes[place] ^= 0x10;
+        bytes
+    };
+    let n = partial.len();
+    refused(&partial[..5], &line("a.npz"), 1, "cut short");
+    refused(&flipped(n - 100), &line("a.npz"), 1, "checksum");
+    refused(&flipped(n - 2), &line("a.npz"), 1, "checksum");
+    refused(&flipped(100), &line("a.npz"), 1, "checksum");
+    refused(&flipped(0), &line("a.npz"), 1, "no partial sweep");
+    refused(&flipped(7), &line("a.npz"), 1, "another version");
+    refused(
+        &[&partial[..], &partial[n - 8..]].concat(),
+        &line("a.npz"),
+        1,
+        "damaged",
+    );
+    let other = line("a.npz").replace("--periods 6", "--periods 7");
+    refused(&partial, &other, 2, "periods: 6 there, 7 now");
+
+    // What a crash cut off the last block costs that block alone.
+    fs::write(at("a.npz.partial"), &partial[..n - 1]).unwrap();
+    let resumed = jointplay(folder.path(), &line("a.npz")).expect(0);
+    assert!(
+        resumed.stderr.contains("going on where"),
+        "{}",
+        resumed.stderr
+    );
+    jointplay(folder.path(), &line("b.npz")).expect(0);
+    assert!(fs::read(at("a.npz")).unwrap() == fs::read(at("b.npz")).unwrap());
+    assert_eq!(names(folder.path()), ["a.npz", "b.npz"]);
+    // A finished sweep is not computed again by mistake.
+    let again = jointplay(folder.path(), &line("a.npz")).expect(1);
+    assert!(again.stderr.contains("--force"), "{}", again.stderr);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_sweep_that_is_killed_at_any_instant_ends_in_the_same_bytes() {
+    let folder = folder();
+    let line = "sweep spcmm --vary contact.clearance=0.2mm..0.3mm:12 --periods 2 --discard 1 --threads 2 --no-exponent --out";
+    let started = std::time::Instant::now();
+    jointplay(folder.path(), &format!("{line} a.npz")).expect(0);
+    let length = started.elapsed();
+    let whole = fs::read(folder.path().join("a.npz")).unwrap();
+    crate::common::at_random_instants(length, 4, |instant| {
+        let folder = self::folder();
+        let mut child = command(folder.path(), &format!("{line} a.npz"))
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(instant);
+        child.kill().unwrap();
+        child.wait().unwrap();
+        let out = folder.path().join("a.npz");
+        if !out.exists() {
+            jointplay(folder.path(), &format!("{line} a.npz")).expect(0);
+            assert_eq!(names(folder.path()), ["a.npz"]);
+        }
+        assert!(fs::read(out).unwrap() == whole);
+    });
+}
+
+#[test]
+fn a_point_that_diverges_is_recorded_and_the_rest_goes_on() {
+    let folder = folder();
+    let line = "sweep spcmm --set solver.method=rk4 --vary solver.step=20us..10ms:2 --periods 1 --discard 0 --out a.npz";
+    let outcome = jointplay(folder.path(), line).expect(0);
+    assert!(
+        outcome.stdout.contains("2, 1 diverged"),
+        "{}",
+        outcome.stdout
+    );
+    assert!(
+        outcome
+            .stderr
+            .contains("1 section of each point: with fewer than 8 no regime"),
+        "{}",
+        outcome.stderr
+    );
+    let (arrays, _) = archive(&folder.path().join("a.npz"));
+    assert_eq!(arrays["status"].as_slice(), Some(&[0.0, 1.0][..]));
+    assert_eq!(arrays["regime"][1], -1.0);
+    let stopped = &arrays["stopped_at_s"];
+    assert!(stopped[0].is_nan() && stopped[1] >= 0.0 && stopped[1] < 2.0);
+    assert!(arrays["section_x_m"][[0, 0]].is_finite());
+    assert!(arrays["section_x_m"][[1, 0]].is_nan());
+    assert!(arrays["S1_peak_N"][1].is_nan());
+}
+
+#[test]
+fn warnings_come_from_within_the_ranges_and_each_kind_once() {
+    let folder = folder();
+    // Singular poses lie in the middle of this range and at neither end.
+    let line = "sweep spcmm --vary contact.clearance=0.01mm..0.2mm:2 --vary spcmm.slider_plane=20mm..300mm:15 --periods 1 \
+                --discard 0 --shard 30/30 --no-exponent --out a.npz";
+    let outcome = jointplay(folder.path(), line).expect(0);
+    let warnings: Vec<&str> = outcome
+        .stderr
+        .lines()
+        .filter(|l| l.contains("warning:"))
+        .collect();
+    assert_eq!(warnings.len(), 4, "{}", outcome.stderr);
+    assert!(warnings[3].contains("fewer than 8"), "{}", outcome.stderr);
+    assert!(warnings[0].contains("contact.clearance = 0.01 mm") && warnings[0].contains("Hertz"));
+    for kind in ["comes near a singular pose", "has a singular pose"] {
+        assert!(
+            outcome.stderr.matches(kind).count() == 1,
+            "{}",
+            outcome.stderr
+        );
+    }
+    assert!(
+        outcome.stderr.contains("spcmm.slider_plane = 140 mm"),
+        "{}",
+        outcome.stderr
+    );
+}
+
+#[test]
+fn bad_input_is_refused_before_anything_runs() {
+    let folder = folder();
+    let plan = "--periods 3 --discard 1 --out a.npz";
+    for (line, code, fragment) in [
+        (format!("sweep spcmm {plan}"), 2, "--vary"),
+        (
+            format!("sweep spcmm --vary contact.clearance=1mm..0.1mm:5 {plan}"),
+            2,
+            "reversed",
+        ),
+        (
+            format!("sweep spcmm --vary contact.clearance=1mm..1mm:5 {plan}"),
+            2,
+            "empty",
+        ),
+        (
+            format!("sweep spcmm --vary contact.clearance=1mm..2mm:0 {plan}"),
+            2,
+            "empty",
+        ),
+        (
+            format!("sweep spcmm --vary contact.clearance=0.1..1:5 {plan}"),
+            2,
+            "needs a unit",
+        ),
+        (
+            format!("sweep spcmm --vary contact.clearence=0.1mm..1mm:5 {plan}"),
+            2,
+            "did you mean",
+        ),
+        (
+            format!("sweep spcmm --vary spcmm.slider_plane=10mm..32mm:5 {plan}"),
+            2,
+            "the range leaves what the scene can do at spcmm.slider_plane = 10 mm",
+        ),
+        (
+            format!("sweep spcmm --vary spcmm.frequency=0.5Hz..1Hz:3 --start follow-up {plan}"),
+            2,
+            "--start cold",
+        ),
+        (
+            format!("sweep pendulum --vary contact.clearance=0.1mm..1mm:5 {plan}"),
+            2,
+            "no drive that repeats",
+        ),
+        (
+            format!(
+                "sweep spcmm --set spcmm.frequency=0Hz --vary contact.clearance=0.1mm..1mm:5 {plan}"
+            ),
+            2,
+            "no drive that repeats",
+        ),
+        (
+            "sweep spcmm --vary contact.clearance=0.1mm..1mm:5 --periods 3 --discard 3 --out a.npz"
+                .to_owned(),
+            2,
+            "--discard must be less",
+        ),
+        (
+            "sweep spcmm --vary contact.clearance=0.1mm..1mm:5 --periods 99999999999999 --discard 3 --out a.npz".to_owned(),
+            2,
+            "more than a result holds",
+        ),
+        (format!("{SMALL} --out a.csv"), 2, ".npz"),
+        (format!("{SMALL} --out no/such/folder/a.npz"), 1, "a.npz"),
+        (format!("{SMALL} --shard 4/3 --out a.npz"), 2, "--shard 4/3"),
+        (format!("{SMALL} --phase 2 --out a.npz"), 2, "--phase 2"),
+        (format!("{SMALL} --threads 0 --out a.npz"), 2, "--threads"),
+        (format!("{SMALL} --section zero --out a.npz"), 2, "phase"),
+    ] {
+        let outcome = jointplay(folder.path(), &line).expect(code);
+        assert!(
+            outcome.stderr.contains(fragment),
+            "{line}: {}",
+            outcome.stderr
+        );
+        assert!(
+            names(folder.path()).is_empty(),
+            "{line}: {:?}",
+            names(folder.path())
+        );
+    }
+}
+
+fn small(start: Start, points: usize) -> Sweep {
+    let scene = Scene::load("spcmm", &[]).unwrap();
+    let text = format!("contact.clearance=0.2mm..0.3mm:{points}");
+    let axis = Axis::parse(&scene, &text).unwrap();
+    let grid = Grid::new(&scene, vec![axis], start).unwrap();
+    let plan = Plan {
+        periods: 2,
+        discard: 1,
+        phase: 0.25,
+        exponent: true,
+    };
+    Sweep::new(scene, grid, plan).unwrap()
+}
+
+fn records(sweep: &Sweep, b: usize, steps: u32) -> Vec<u64> {
+    let mut block = sweep.begin(b);
+    while !block.is_done() {
+        block.advance(steps);
+    }
+    block
+        .records()
+        .iter()
+        .map(|value| value.to_bits())
+        .collect()
+}
+
+#[test]
+fn blocks_depend_on_no_order_and_no_neighbour() {
+    let sweep = small(Start::Cold, 3);
+    let forwards: Vec<_> = (0..3).map(|b| records(&sweep, b, 1000)).collect();
+    let backwards: Vec<_> = (0..3).rev().map(|b| records(&sweep, b, 77)).collect();
+    assert!(forwards.iter().eq(backwards.iter().rev()));
+    // A point is the same in a finer sweep that contains it.
+    let finer = small(Start::Cold, 5);
+    assert!(forwards[1] == records(&finer, 2, 1000));
+}
+
+#[test]
+fn following_continues_the_neighbour_within_fixed_blocks() {
+    let points = FOLLOW_BLOCK + 2;
+    let up = small(Start::FollowUp, points);
+    let down = small(Start::FollowDown, points);
+    assert_eq!(up.grid().blocks(), 2);
+    let cold = small(Start::Cold, points);
+    let column = |sweep: &Sweep, name: &str| {
+        let columns = sweep.layout().columns();
+        sweep
+            .layout()
+            .offset(columns.iter().position(|c| c.name == name).unwrap())
+    };
+    let length = up.layout().record_length();
+    let value = |sweep: &Sweep, records: &[u64], point: usize, name: &str| {
+        f64::from_bits(records[point * length + column(sweep, name)])
+    };
+    // The second block has two points: the first of them in the direction of following starts cold.
+    let (first, second) = (
+        records(&cold, FOLLOW_BLOCK, 999),
+        records(&cold, FOLLOW_BLOCK + 1, 999),
+    );
+    let (up_block, down_block) = (records(&up, 1, 999), records(&down, 1, 999));
+    assert!(up_block[..length] == first);
+    assert!(down_block[length..] == second);
+    for (sweep, block, followed, single) in [
+        (&up, &up_block, 1, &second),
+        (&down, &down_block, 0, &first),
+    ] {
+        // No first fall through the gaps again, hence no hard impact; the same settled section at the end.
+        let peak = value(sweep, block, followed, "S1_peak_N");
+        assert!(peak < 0.2 * value(&cold, single, 0, "S1_peak_N"), "{peak}");
+        let beta = value(sweep, block, followed, "section_beta_rad");
+        let cold_beta = value(&cold, single, 0, "section_beta_rad");
+        // After two periods the creeping of the balls has lost all but e^-9 of a difference of at most 1e-3 rad.
+        assert!((beta - cold_beta).abs() < 1e-6, "{beta} {cold_beta}");
+        assert_eq!(value(sweep, block, followed, "status"), 0.0);
+    }
+}

@@ -1,0 +1,306 @@
+//! The trade of speed for accuracy as scripts see it, and as the library measures it.
+
+use std::cell::Cell;
+use std::fs;
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+use jointplay::analysis::{
+    AnalysisError, Effort, End, Outside, Setting, WorkPrecision, presets, work_precision,
+};
+use jointplay::scene::{Preset, Scene};
+use serde_json::Value as Json;
+
+const FILES: [&str; 5] = [
+    "manifest.json",
+    "tradeoff.csv",
+    "tradeoff.json",
+    "tradeoff.png",
+    "tradeoff.svg",
+];
+
+fn command(folder: &Path, line: &str) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_jointplay"));
+    command
+        .args(line.split_whitespace())
+        .current_dir(folder)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    command
+}
+
+#[track_caller]
+fn run(folder: &Path, line: &str, code: i32) -> String {
+    let Output {
+        status,
+        stdout,
+        stderr,
+    } = command(folder, line).output().unwrap();
+    let (out, err) = (
+        String::from_utf8(stdout).unwrap(),
+        String::from_utf8(stderr).unwrap(),
+    );
+    assert_eq!(status.code(), Some(code), "{line}\n{out}\n{err}");
+    out + &err
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).unwrap();
+    let mut names: Vec<String> = entries
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    names
+}
+
+/// A scene with little to do: a rod without play.
+const SMALL: &str = "pendulum --set contact.clearance=0 --quick --quiet";
+
+#[test]
+fn the_command_writes_all_files_or_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = run(folder.path(), &format!("tradeoff {SMALL} --out found"), 0);
+    assert!(
+        out.contains("rk4") && out.contains("Settled motion"),
+        "{out}"
+    );
+    let found = folder.path().join("found");
+    assert_eq!(names(folder.path()), ["found"], "nothing is left beside");
+    assert_eq!(names(&found), FILES);
+
+    let csv = fs::read_to_string(found.join("tradeoff.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
+    assert!(rows.iter().all(|row| row.len() == rows[0].len()), "{csv}");
+    let column = |name: &str| rows[0].iter().position(|head| *head == name).unwrap();
+    for method in Setting::methods() {
+        assert!(rows.iter().any(|row| row[0] == *method), "{method}");
+    }
+    for preset in Preset::ALL {
+        let own = |row: &&Vec<&str>| row[column("preset")] == preset.word();
+        assert_eq!(rows.iter().filter(own).count(), 1, "{preset:?}");
+    }
+    let error: f64 = rows[1][column("peak_error")].parse().unwrap();
+    assert!(error >= 0.0);
+    for row in rows.iter().skip(1) {
+        let count = |name: &str| row[column(name)].parse::<f64>().unwrap_or(0.0);
+        for phase in ["impacts", "settled"] {
+            let of = |name: &str| count(&format!("{phase}_{name}"));
+            assert!(of("steps") > 0.0 && of("simulated_s") > 0.0, "{row:?}");
+            assert!(of("evaluations") >= of("steps"), "{row:?}");
+        }
+    }
+
+    let text = fs::read_to_string(found.join("tradeoff.json")).unwrap();
+    let json: Json = serde_json::from_str(&text).unwrap();
+    assert_eq!(json["points"].as_array().unwrap().len(), rows.len() - 1);
+    assert_eq!(json["meta"]["changed_parameters"]["contact.clearance"], "0");
+    assert!(json["meta"]["machine"].is_string());
+    let png = fs::read(found.join("tradeoff.png")).unwrap();
+    assert_eq!(&png[..8], b"\x89PNG\r\n\x1a\n");
+    let svg = fs::read_to_string(found.join("tradeoff.svg")).unwrap();
+    assert!(svg.contains("rosenbrock") && svg.contains("Time for a simulated second"));
+
+    // Refused before anything is measured, and left as it was.
+    let said = run(folder.path(), &format!("tradeoff {SMALL} --out found"), 1);
+    assert!(said.contains("--force"), "{said}");
+    fs::create_dir(folder.path().join("photos")).unwrap();
+    fs::write(folder.path().join("photos/holiday"), "mine").unwrap();
+    let line = format!("tradeoff {SMALL} --out photos --force");
+    run(folder.path(), &line, 1);
+    assert_eq!(names(&folder.path().join("photos")), ["holiday"]);
+}
+
+#[test]
+fn bad_input_is_answered_with_what_would_be_right() {
+    let folder = tempfile::tempdir().unwrap();
+    for (line, said) in [
+        ("tradeoff", "--all"),
+        ("tradeoff pendulm --quick", "pendulum"),
+        ("tradeoff --all", "--write"),
+        ("tradeoff pendulum --all --write .", "cannot be used with"),
+        (
+            "tradeoff pendulum --set contact.clearence=1mm",
+            "contact.clearance",
+        ),
+        ("bench --set contact.friction=-1", "contact.friction"),
+    ] {
+        let answer = run(folder.path(), line, 2);
+        assert!(answer.contains(said), "{line}: {answer}");
+    }
+    let answer = run(folder.path(), "tradeoff --all --write .", 1);
+    assert!(answer.contains("tradeoff"), "{answer}");
+    assert!(names(folder.path()).is_empty());
+}
+
+#[test]
+fn an_interrupted_measurement_writes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let child = command(folder.path(), "tradeoff chain --quiet --out found")
+        .spawn()
+        .unwrap();
+    let pid = child.id();
+    // Ctrl-C counts once the program listens for it: signal 2 is then among those it catches.
+    let listens = || {
+        let status = fs::read_to_string(format!("/proc/{pid}/status")).unwrap();
+        let caught = status.lines().find_map(|l| l.strip_prefix("SigCgt:"));
+        u64::from_str_radix(caught.unwrap().trim(), 16).unwrap() & 2 != 0
+    };
+    while !listens() {
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    let kill = Command::new("kill")
+        .args(["-INT", &pid.to_string()])
+        .status();
+    assert!(kill.unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130));
+    assert!(output.stdout.is_empty());
+    assert!(
+        names(folder.path()).is_empty(),
+        "{:?}",
+        names(folder.path())
+    );
+}
+
+/// By a clock that goes on at every look: the same on every machine.
+fn measure<T>(
+    analysis: impl FnOnce(&mut Outside) -> Result<T, AnalysisError>,
+    most_reports: u64,
+) -> Result<T, AnalysisError> {
+    let (looks, reports) = (Cell::new(0), Cell::new(0));
+    let mut clock = || {
+        looks.set(looks.get() + 1);
+        looks.get() as f64 * 1e-4
+    };
+    let mut go_on = |done: f64| {
+        assert!((0.0..=1.0).contains(&done), "{done}");
+        reports.set(reports.get() + 1);
+        if reports.get() > most_reports {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    };
+    analysis(&mut Outside::new(&mut clock, &mut go_on))
+}
+
+fn error_at(found: &WorkPrecision, method: &str, value: f64) -> f64 {
+    let own =
+        |p: &&jointplay::analysis::Point| p.setting.method == method && p.setting.value() == value;
+    let point = found.points.iter().find(own).unwrap();
+    assert_eq!(point.impacts.end, End::Reached);
+    point.errors.peak.unwrap()
+}
+
+#[test]
+fn finer_steps_and_tolerances_err_less_and_cost_more() {
+    let scene = crate::common::scene("spcmm", &[]);
+    let effort = Effort {
+        evaluations: 100_000,
+        measured: 0.0,
+        steps: &[10e-6, 1e-6],
+        tolerances: &[1e-4, 1e-8],
+        seconds: f64::INFINITY,
+    };
+    let found = measure(|outside| work_precision(&scene, &effort, outside), u64::MAX).unwrap();
+    for method in Setting::methods() {
+        let own: Vec<_> = found
+            .points
+            .iter()
+            .filter(|p| p.setting.method == *method)
+            .collect();
+        assert!(own.len() >= 2, "{method}");
+        let adaptive = own[0].setting.adaptive;
+        let [coarse, fine] = if adaptive {
+            [1e-4, 1e-8]
+        } else {
+            [10e-6, 1e-6]
+        };
+        let (coarse_error, fine_error) = (
+            error_at(&found, method, coarse),
+            error_at(&found, method, fine),
+        );
+        println!("{method}: {coarse_error:e} {fine_error:e}");
+        assert!(fine_error < 0.6 * coarse_error, "{method}");
+        let evaluations = |value: f64| {
+            let point = own.iter().find(|p| p.setting.value() == value).unwrap();
+            point.impacts.evaluations
+        };
+        assert!(evaluations(fine) > 2 * evaluations(coarse), "{method}");
+    }
+    // The reference is good enough to tell all of these apart, and the best come near it.
+    let floor = found.standard.floor.peak.unwrap();
+    assert!(floor < 1e-6, "{floor}");
+    assert!(error_at(&found, "radau5", 1e-8) < 1e-5);
+    // Somebody is on the front, and nobody is beaten there.
+    let front: Vec<_> = found.points.iter().filter(|p| p.impacts.front).collect();
+    assert!(!front.is_empty());
+    for point in &front {
+        for other in &found.points {
+            let (Some(a), Some(b)) = (point.errors.peak, other.errors.peak) else {
+                continue;
+            };
+            let slower = other.impacts.wall_s >= point.impacts.wall_s;
+            assert!(slower || b.max(floor) > a.max(floor), "{point:?} {other:?}");
+        }
+    }
+}
+
+#[test]
+fn presets_can_be_measured_on_any_scene_and_broken_off() {
+    let scene = crate::common::scene("pendulum", &[("contact.clearance", "0.5 mm")]);
+    let of = |scene: &Scene, most: u64| {
+        measure(
+            |outside| presets::measure(scene, &Preset::ALL, outside),
+            most,
+        )
+    };
+    let points = of(&scene, u64::MAX).unwrap();
+    assert_eq!(points.len(), Preset::ALL.len());
+    let errors: Vec<f64> = points.iter().map(|p| p.errors.peak.unwrap()).collect();
+    assert!(
+        errors.windows(2).all(|pair| pair[1] < pair[0]),
+        "from fast to accurate: {errors:?}"
+    );
+    for (point, preset) in points.iter().zip(Preset::ALL) {
+        assert_eq!(point.preset, Some(preset));
+        assert!(presets::Measured::of(point).impacts_ratio.is_some());
+    }
+    assert_eq!(of(&scene, 20).unwrap_err(), AnalysisError::Cancelled);
+    // The reference itself cannot be made: balls that leave their sockets.
+    let soft = crate::common::scene(
+        "pendulum",
+        &[
+            ("contact.youngs_modulus", "1 MPa"),
+            ("gravity.z", "-1000 m/s^2"),
+        ],
+    );
+    let error = of(&soft, u64::MAX).unwrap_err();
+    assert!(matches!(error, AnalysisError::Stopped(_)), "{error}");
+}
+
+#[test]
+fn the_presets_in_the_program_are_those_that_were_measured() {
+    let record = presets::record();
+    let scene = crate::common::scene("spcmm", &[]);
+    for preset in Preset::ALL {
+        let (method, value) = &record.points[preset.word()];
+        let setting = Setting::of_preset(&scene, preset).unwrap();
+        assert_eq!(
+            (method.as_str(), *value),
+            (setting.method, setting.value()),
+            "{preset:?} has changed: jointplay tradeoff --all --write ."
+        );
+        for name in jointplay::scene::BUILT_IN {
+            let measured = presets::measured(name, preset).unwrap();
+            let error = measured.peak_error.unwrap();
+            let limit = presets::limit(preset);
+            assert!(
+                error <= limit,
+                "{name}, {preset:?}: {error:e} against {limit:e}"
+            );
+        }
+    }
+    assert_eq!(presets::measured("mine", Preset::Accurate), None);
+}

@@ -1,0 +1,455 @@
+//! The chaos bench of the window, driven by role and label.
+
+use std::cell::Cell;
+use std::collections::VecDeque;
+use std::ops::ControlFlow;
+use std::rc::Rc;
+use std::sync::Arc;
+
+use eframe::egui::{self, Key, Modifiers, accesskit::Role};
+use egui_kittest::{
+    Harness, SnapshotResults,
+    kittest::{NodeT as _, Queryable as _},
+};
+use jointplay::analysis::drive::observed;
+use jointplay::analysis::task::{Job, Message, perform};
+use jointplay::app::{
+    App, AppOptions, DesktopHost, Host, Link, OpenedFile, Player, Replay, Running, Verdict,
+};
+use jointplay::scene::Scene;
+
+/// Computes at once, and is heard of as many points of a sweep as the test allows: it is neither too quick nor too slow.
+struct Held(Rc<Cell<usize>>);
+
+/// A computation of it: what it says, and of how many points still.
+struct Saying(VecDeque<Message>, Rc<Cell<usize>>);
+
+impl Host for Held {
+    fn read_dropped(&mut self, _file: Arc<dyn egui::DroppedFile + Send + Sync>) {}
+
+    fn opened(&mut self) -> Option<OpenedFile> {
+        None
+    }
+
+    fn start(&mut self, job: Job) -> Option<Box<dyn Running>> {
+        let mut said = VecDeque::new();
+        perform(&job, &mut || 0.0, &mut |message| {
+            said.push_back(message);
+            ControlFlow::Continue(())
+        });
+        Some(Box::new(Saying(said, self.0.clone())))
+    }
+}
+
+impl Running for Saying {
+    fn poll(&mut self) -> Option<Message> {
+        let Self(said, points) = self;
+        if let Message::Point(_) = said.front()? {
+            points.set(points.get().checked_sub(1)?);
+        }
+        said.pop_front()
+    }
+
+    fn cancel(&mut self) {
+        self.0.clear();
+    }
+}
+
+/// Gives the window a host that is held, and the number of points that it may still tell.
+fn hold(harness: &mut Harness<'_, App>) -> Rc<Cell<usize>> {
+    let points = Rc::new(Cell::new(0));
+    harness.state_mut().set_host(Box::new(Held(points.clone())));
+    points
+}
+
+/// The window on `scene` with some changes, paused at t = 0, its bench open.
+fn sized(
+    scene: &str,
+    changes: &[(&str, &str)],
+    size: [f32; 2],
+    theme: egui::Theme,
+) -> Harness<'static, App> {
+    let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
+    let changes: Vec<_> = changes.iter().map(own).collect();
+    let mut options = AppOptions::new(Scene::load(scene, &changes).expect("a built-in scene"));
+    options.playing = false;
+    options.theme = theme.into();
+    options.clock = crate::common::looks::<100>;
+    let mut harness = Harness::builder()
+        .with_size(size)
+        .with_theme(theme)
+        .with_step_dt(1.0 / 60.0)
+        .with_max_steps(60)
+        .wgpu()
+        .build_eframe(move |cc| App::new(cc, options).expect("the scene starts"));
+    harness
+        .state_mut()
+        .set_host(Box::new(DesktopHost::default()));
+    harness.run();
+    harness.key_press(Key::B);
+    harness.run();
+    harness
+}
+
+/// Large enough that all of the bench is on it.
+fn window(scene: &str, changes: &[(&str, &str)]) -> Harness<'static, App> {
+    sized(scene, changes, [1400.0, 1500.0], egui::Theme::Light)
+}
+
+const FAST: (&str, &str) = ("spcmm.frequency", "5 Hz");
+
+fn click(harness: &mut Harness<'_, App>, role: Role, label: &str) {
+    harness.get_by_role_and_label(role, label).click();
+    harness.step();
+    harness.step();
+}
+
+fn type_into(harness: &mut Harness<'_, App>, label: &str, text: &str) {
+    harness
+        .get_by_role_and_label(Role::TextInput, label)
+        .focus();
+    harness.step();
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::A);
+    harness.step();
+    harness
+        .get_by_role_and_label(Role::TextInput, label)
+        .type_text(text);
+    harness.step();
+}
+
+fn set_number(harness: &mut Harness<'_, App>, label: &str, number: f64) {
+    harness
+        .get_by_role_and_label(Role::SpinButton, label)
+        .set_value_accesskit(number);
+    harness.step();
+    harness.step();
+}
+
+/// Asks for a sweep of so many values from `from` to `to`.
+fn sweep(harness: &mut Harness<'_, App>, from: &str, to: &str, values: f64) {
+    type_into(harness, "From", from);
+    type_into(harness, "To", to);
+    set_number(harness, "Values", values);
+    set_number(harness, "Periods", 4.0);
+    set_number(harness, "Discard", 1.0);
+    click(harness, Role::Button, "Start sweep");
+}
+
+fn wait(harness: &mut Harness<'_, App>, mut done: impl FnMut(&App) -> bool) {
+    let begun = std::time::Instant::now();
+    while !done(harness.state()) {
+        assert!(begun.elapsed().as_secs() < 600, "no end");
+        std::thread::sleep(std::time::Duration::from_millis(20));
+        harness.run_steps(1);
+    }
+}
+
+fn come(app: &App) -> usize {
+    let swept = app.bench().swept();
+    swept.map_or(0, |swept| swept.points.iter().flatten().count())
+}
+
+#[test]
+fn a_sweep_fills_the_diagram_and_a_click_loads_the_section() {
+    let mut harness = window("spcmm", &[FAST]);
+    let points = hold(&mut harness);
+    sweep(&mut harness, "0.2 mm", "0.4", 3.0);
+    assert!(harness.state().bench().is_sweeping());
+    points.set(3);
+    harness.step();
+    assert!(!harness.state().bench().is_sweeping());
+    assert_eq!(come(harness.state()), 3);
+    harness.run_steps(3);
+    harness.get_by_label("3 of 3 values");
+    // Four periods tell no regime. The number stands first: "periodic 3" would be a period of three.
+    harness.get_by_label("3 unclear");
+
+    let bench = harness.state().bench();
+    let point = bench.swept().expect("swept").points[2].clone();
+    let point = point.expect("came");
+    assert_eq!(point.sections.len(), 3);
+    let at = bench.place(2, 1).expect("drawn");
+    // The nearest of the marks is meant, whichever lies there.
+    let value = point.sections[1];
+    harness.hover_at(at);
+    harness.step();
+    harness.drag_at(at);
+    harness.step();
+    harness.drop_at(at);
+    harness.step();
+    assert!(harness.state().loading().is_some(), "on its way");
+    assert!(!harness.state().player().is_playing());
+    harness.get_by_label_contains("Running to the chosen section…");
+    wait(&mut harness, |app| app.loading().is_none());
+
+    let player = harness.state_mut().player_mut();
+    player.set_playing(false);
+    let scene = player.simulation().scene();
+    assert!((scene.contact.clearance - 0.4e-3).abs() < 1e-15);
+    // Sections at phase 0 are at T, 2 T, …; the first was discarded, and the second kept one was clicked.
+    let steps = player.steps();
+    let log = player.log().clone();
+    let mut again = Player::new(scene).expect("starts");
+    let link = Link {
+        scene: jointplay::app::SceneText::of(scene),
+        log,
+        steps: Some(steps),
+        hash: Some(player.simulation().state_hash()),
+        ..Link::default()
+    };
+    let link = Link::parse(&link.format()).expect("a link");
+    let mut replay = Replay::new(link).expect("an instant");
+    // On the way it passes the very section of the sweep.
+    let mut passed = false;
+    let verdict = loop {
+        let verdict = replay.advance(&mut again, {
+            let mut steps = 2;
+            move || {
+                steps -= 1;
+                steps > 0
+            }
+        });
+        let found = observed(&again.frame().pose);
+        passed |= again.simulation().time() == 0.6000000000000001 && found[..6] == value;
+        if let Some(verdict) = verdict {
+            break verdict;
+        }
+    };
+    assert!(matches!(verdict, Verdict::Agrees(_)), "{verdict:?}");
+    assert!(passed, "bit by bit the section that was clicked");
+    assert!(again.simulation().time() < 0.7, "it plays from there");
+}
+
+#[test]
+fn a_sweep_of_something_else_says_so_and_a_click_asks_before_it_changes_what_is_on_show() {
+    let mut harness = window("spcmm", &[FAST]);
+    harness.get_by_label_contains("Running: spcmm, drive frequency 5 Hz");
+    sweep(&mut harness, "0.2 mm", "0.4", 3.0);
+    wait(&mut harness, |app| !app.bench().is_sweeping());
+    harness.run_steps(3);
+    harness.get_by_label_contains(
+        "clearance 0.2 mm to 0.4 mm, 3 values; 4 periods of which 1 discarded, phase 0°, cold",
+    );
+    harness.get_by_label("Of the scene on show, with its values");
+    let click_point = |harness: &mut Harness<'_, App>| {
+        let at = harness.state().bench().place(1, 1).expect("drawn");
+        harness.hover_at(at);
+        harness.step();
+        harness.drag_at(at);
+        harness.step();
+        harness.drop_at(at);
+        harness.run_steps(3);
+    };
+    // Its own parameter is no difference, another is.
+    let player = harness.state_mut().player_mut();
+    player.set("contact.clearance", "0.5 mm").expect("in range");
+    harness.run_steps(2);
+    harness.get_by_label("Of the scene on show, with its values");
+    let player = harness.state_mut().player_mut();
+    player.set("contact.friction", "0.3").expect("in range");
+    harness.run_steps(2);
+    harness.get_by_label_contains("Not of what is on show. Friction coefficient: ");
+
+    harness.state_mut().open("pendulum").expect("built in");
+    harness.run_steps(3);
+    harness.get_by_label("Not of what is on show. Scene: spcmm instead of pendulum");
+    harness.get_by_label_contains("Running: pendulum, ");
+    click_point(&mut harness);
+    assert_eq!(harness.state().loading(), None);
+    harness.get_by_label("Change what is on show?");
+    harness.get_by_label("Scene: spcmm instead of pendulum");
+    click(&mut harness, Role::Button, "Close");
+    assert_eq!(harness.state().player().scene().name, "pendulum");
+    click_point(&mut harness);
+    click(&mut harness, Role::Button, "Change and run");
+    assert!(harness.state().loading().is_some());
+    assert_eq!(harness.state().player().scene().name, "spcmm");
+}
+
+#[test]
+fn a_sweep_that_goes_on_can_be_cancelled_over_a_scene_without_a_drive() {
+    let mut harness = window("spcmm", &[FAST]);
+    let points = hold(&mut harness);
+    sweep(&mut harness, "0.1 mm", "0.9 mm", 5.0);
+    harness.state_mut().open("pendulum").expect("built in");
+    harness.run_steps(2);
+    let before = harness.get_by_label("Cancel sweep").rect();
+    points.set(2);
+    harness.run_steps(10);
+    harness.get_by_label("2 of 5 values");
+    assert_eq!(harness.get_by_label("Cancel sweep").rect(), before);
+    click(&mut harness, Role::Button, "Cancel sweep");
+    assert!(!harness.state().bench().is_sweeping());
+}
+
+#[test]
+fn a_sweep_is_cancelled_and_keeps_what_it_has() {
+    let mut harness = window("spcmm", &[FAST]);
+    let start = harness.get_by_label("Start sweep").rect();
+    let points = hold(&mut harness);
+    points.set(2);
+    sweep(&mut harness, "0.1 mm", "0.9 mm", 5.0);
+    harness.run_steps(10);
+    assert!(harness.state().bench().is_sweeping());
+    harness.get_by_label("2 of 5 values");
+    assert_eq!(harness.get_by_label("Cancel sweep").rect(), start);
+    click(&mut harness, Role::Button, "Cancel sweep");
+    assert!(!harness.state().bench().is_sweeping());
+    points.set(5);
+    harness.run_steps(10);
+    assert_eq!(come(harness.state()), 2);
+    harness.get_by_role_and_label(Role::Button, "Start sweep");
+}
+
+#[test]
+fn a_bad_range_is_explained() {
+    let mut harness = window("spcmm", &[FAST]);
+    for (from, to, words) in [
+        ("0.4 mm", "0.2 mm", "The range is reversed"),
+        ("0.1 mm", "20 mm", "below the ball radius"),
+        ("0.1 mm", "2 kg", "wrong unit"),
+    ] {
+        sweep(&mut harness, from, to, 3.0);
+        wait(&mut harness, |app| !app.bench().is_sweeping());
+        harness.run_steps(2);
+        harness.get_by_label_contains(words);
+        assert!(harness.query_by_label_contains("--vary").is_none());
+        assert_eq!(come(harness.state()), 0);
+    }
+}
+
+#[test]
+fn the_portrait_and_the_section_fill_while_the_scene_runs() {
+    let mut harness = window("spcmm", &[FAST]);
+    harness.get_by_label("Poincaré section: rate of x, m/s over x, mm");
+    let slider = harness.get_by_role_and_label(Role::Slider, "Drive phase");
+    slider.set_value_accesskit(90.0);
+    harness.run();
+    assert_eq!(harness.state().player().watch().phase(), 0.25);
+    harness.state_mut().player_mut().pacer.set_scale(1.0);
+    click(&mut harness, Role::Button, "Play");
+    wait(&mut harness, |app| {
+        app.player().watch().sections().len() >= 3
+    });
+    let player = harness.state_mut().player_mut();
+    player.set_playing(false);
+    assert!(player.watch().orbit().count() > 300);
+    let (time, _) = player.watch().sections().next().expect("taken");
+    assert!((time - 0.05).abs() < 1e-12);
+    player.set("contact.friction", "0.3").expect("in range");
+    assert_eq!(player.watch().sections().len(), 0);
+    player.run_to(1.5);
+    assert!(player.watch().sections().len() > 0);
+    click(&mut harness, Role::Button, "Reset");
+    assert_eq!(harness.state().player().watch().sections().len(), 0);
+}
+
+#[test]
+fn a_scene_without_a_drive_says_that_it_has_no_phase() {
+    let mut harness = window("pendulum", &[]);
+    harness.get_by_label_contains("No Poincaré section");
+    harness.get_by_label_contains("No sweep");
+    harness.get_by_label_contains("Phase portrait");
+    harness.state_mut().player_mut().run_to(0.1);
+    harness.run();
+    assert!(harness.state().player().watch().orbit().count() > 20);
+}
+
+#[test]
+fn a_twin_parts_from_the_run_and_leaves_it_alone() {
+    let changes = [FAST, ("contact.friction", "0")];
+    let mut harness = window("spcmm", &changes);
+    click(&mut harness, Role::CheckBox, "Twin run");
+    let player = harness.state_mut().player_mut();
+    assert!(player.twin().is_some());
+    player.run_to(0.1);
+    let hash = player.simulation().state_hash();
+    let twin = player.twin().expect("on");
+    let slope = twin.fit().expect("grows").slope;
+    assert!(slope > 0.0, "{slope}");
+    let (first, last) = (twin.distances()[0], twin.distances().last().expect("many"));
+    assert!(last[1] > 1e3 * first[1], "{first:?} {last:?}");
+    harness.run();
+    harness.get_by_label_contains("Slope ");
+
+    click(&mut harness, Role::CheckBox, "Twin run");
+    let player = harness.state_mut().player_mut();
+    assert!(player.twin().is_none());
+    player.reset().expect("starts");
+    player.run_to(0.1);
+    assert_eq!(player.simulation().state_hash(), hash, "the same bits");
+}
+
+#[test]
+fn an_ideal_mechanism_has_no_twin() {
+    let harness = window("spcmm", &[("contact.clearance", "0")]);
+    let switch = harness.get_by_role_and_label(Role::CheckBox, "Twin run");
+    assert!(switch.accesskit_node().is_disabled());
+}
+
+/// After some periods, with a sweep and a twin.
+fn used(size: [f32; 2], theme: egui::Theme) -> Harness<'static, App> {
+    let mut harness = sized("spcmm", &[FAST, ("contact.friction", "0.05")], size, theme);
+    harness
+        .state_mut()
+        .player_mut()
+        .set_twin(true)
+        .expect("starts");
+    harness.state_mut().player_mut().run_to(1.0);
+    harness.run();
+    harness
+}
+
+#[test]
+fn pictures() {
+    let mut results = SnapshotResults::new();
+    for (name, size, theme) in [
+        ("bench_wide_light", [1280.0, 800.0], egui::Theme::Light),
+        ("bench_wide_dark", [1280.0, 800.0], egui::Theme::Dark),
+        ("bench_narrow", [420.0, 800.0], egui::Theme::Light),
+        ("bench_lying", [844.0, 390.0], egui::Theme::Dark),
+    ] {
+        let mut harness = used(size, theme);
+        harness.snapshot(name);
+        results.extend_harness(&mut harness);
+    }
+    // Parted long ago, seen from near.
+    let mut harness = used([1280.0, 800.0], egui::Theme::Dark);
+    let player = harness.state_mut().player_mut();
+    player.set("contact.friction", "0").expect("in range");
+    player.run_to(1.3);
+    harness.key_press(Key::Num5);
+    harness.run();
+    harness.snapshot("bench_ghost");
+    results.extend_harness(&mut harness);
+    let mut harness = window("spcmm", &[FAST]);
+    sweep(&mut harness, "0.05 mm", "0.8 mm", 9.0);
+    wait(&mut harness, |app| !app.bench().is_sweeping());
+    harness.remove_cursor();
+    harness.run();
+    harness.snapshot("bench_sweep");
+    results.extend_harness(&mut harness);
+}
+
+#[test]
+fn every_control_of_the_bench_has_a_name() {
+    let mut harness = window("spcmm", &[FAST]);
+    harness.run();
+    let mut controls = 0;
+    for node in harness.root().children_recursive() {
+        let node = node.accesskit_node();
+        let is_control = matches!(
+            node.role(),
+            Role::Button
+                | Role::Slider
+                | Role::TextInput
+                | Role::ComboBox
+                | Role::CheckBox
+                | Role::SpinButton
+        );
+        controls += usize::from(is_control);
+        let named = node.label().is_some_and(|label| !label.trim().is_empty());
+        assert!(!is_control || named, "{:?}", node.role());
+    }
+    assert!(controls > 30, "{controls}");
+}

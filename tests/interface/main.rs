@@ -1,0 +1,11 @@
+//! The window, its frames and its parts.
+#![cfg(feature = "gui")]
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod bench_window;
+mod frames;
+mod headless_window;
+mod page;
+mod window;

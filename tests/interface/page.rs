@@ -1,0 +1,1143 @@
+//! What a web page needs of the application and the desktop has as well: links, files, fingers, small screens, reports for
+//! screen readers.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+use std::sync::Arc;
+
+use eframe::egui::{
+    self, Event, Key, Modifiers, PointerButton, Pos2, TouchDeviceId, TouchId, TouchPhase,
+    accesskit::{Live, Role},
+    pos2, vec2,
+};
+use egui_kittest::{
+    Harness, SnapshotResults,
+    kittest::{NodeT as _, Queryable as _},
+};
+use jointplay::app::{
+    App, AppOptions, CameraPose, DesktopHost, Host, Link, OpenedFile, SaveFile, Verdict, Window,
+};
+use jointplay::cli::output::Table;
+use jointplay::scene::{DEFAULT_SCENE, Scene};
+use jointplay::simulate::{Channels, Frame, Quantity, Simulation};
+
+/// What a host was asked for.
+#[derive(Default)]
+struct Calls {
+    shared: Vec<String>,
+    saved: Vec<SaveFile>,
+    announced: Vec<String>,
+    picked: usize,
+    to_open: VecDeque<OpenedFile>,
+}
+
+/// A page without a browser.
+struct Page(Rc<RefCell<Calls>>);
+
+impl Host for Page {
+    fn address(&self) -> String {
+        "https://example.org/lab/".to_owned()
+    }
+
+    fn shared(&mut self, link: &str) -> bool {
+        self.0.borrow_mut().shared.push(link.to_owned());
+        false
+    }
+
+    fn save(&mut self, files: &[SaveFile]) -> Result<String, String> {
+        self.0.borrow_mut().saved.extend_from_slice(files);
+        Ok(format!("Saved {}", files[0].name))
+    }
+
+    fn pick_file(&mut self) -> bool {
+        self.0.borrow_mut().picked += 1;
+        true
+    }
+
+    fn read_dropped(&mut self, file: Arc<dyn egui::DroppedFile + Send + Sync>) {
+        self.0.borrow_mut().to_open.push_back(OpenedFile {
+            name: file.path().display().to_string(),
+            content: file.bytes(),
+        });
+    }
+
+    fn opened(&mut self) -> Option<OpenedFile> {
+        self.0.borrow_mut().to_open.pop_front()
+    }
+
+    fn announce(&mut self, text: &str, _event: bool) {
+        self.0.borrow_mut().announced.push(text.to_owned());
+    }
+}
+
+/// A file in the hand of the mouse.
+#[derive(Debug)]
+struct Dropped(PathBuf, &'static [u8]);
+
+impl egui::DroppedFile for Dropped {
+    fn path(&self) -> &Path {
+        &self.0
+    }
+
+    fn bytes(&self) -> Result<Vec<u8>, String> {
+        Ok(self.1.to_vec())
+    }
+}
+
+fn open(options: AppOptions, size: [f32; 2]) -> (Harness<'static, App>, Rc<RefCell<Calls>>) {
+    let mut options = options;
+    options.theme = egui::Theme::Light.into();
+    options.clock = crate::common::looks::<10>;
+    let calls = Rc::new(RefCell::new(Calls::default()));
+    let page = Page(calls.clone());
+    let mut harness = Harness::builder()
+        .with_size(size)
+        .with_theme(egui::Theme::Light)
+        .with_step_dt(1.0 / 60.0)
+        .with_max_steps(60)
+        .wgpu()
+        .build_eframe(move |cc| {
+            let mut app = App::new(cc, options).expect("the scene starts");
+            app.set_host(Box::new(page));
+            app
+        });
+    harness.run_steps(3);
+    (harness, calls)
+}
+
+/// `scene` at t = 0, paused.
+fn window(scene: &str, size: [f32; 2]) -> (Harness<'static, App>, Rc<RefCell<Calls>>) {
+    let mut options = AppOptions::new(Scene::load(scene, &[]).expect("a built-in scene"));
+    options.playing = false;
+    open(options, size)
+}
+
+/// The one label whose text contains `words`; the report for screen readers may say the same.
+fn label(harness: &Harness<'_, App>, words: &str) -> bool {
+    let labels = harness
+        .query_all_by_label_contains(words)
+        .filter(|node| node.accesskit_node().role() == Role::Label);
+    labels.count() == 1
+}
+
+const LARGE: [f32; 2] = [1280.0, 800.0];
+const UPRIGHT: [f32; 2] = [390.0, 844.0];
+const LYING: [f32; 2] = [844.0, 390.0];
+/// A small phone of ten years ago, or a laptop at four times the size.
+const TINY: [f32; 2] = [320.0, 480.0];
+
+fn click(harness: &mut Harness<'_, App>, label: &str) {
+    harness.get_by_label(label).click();
+    harness.run_steps(3);
+}
+
+fn hash(harness: &Harness<'_, App>) -> u64 {
+    harness.state().player().simulation().state_hash()
+}
+
+/// Runs until the link's state is reached, or not.
+fn verdict(harness: &mut Harness<'_, App>) -> Verdict {
+    for _ in 0..600 {
+        if let Some(verdict) = harness.state().verdict() {
+            return verdict.clone();
+        }
+        harness.step();
+    }
+    panic!("no verdict after ten seconds");
+}
+
+#[test]
+fn a_copied_link_opens_the_same_state_with_the_same_bits() {
+    let (mut harness, calls) = window("spcmm", LARGE);
+    click(&mut harness, "Play");
+    harness.run_steps(30);
+    harness
+        .get_by_role_and_label(Role::Slider, "Clearance")
+        .set_value_accesskit(0.55);
+    harness.run_steps(30);
+    harness
+        .get_by_role_and_label(Role::Slider, "Friction coefficient")
+        .set_value_accesskit(0.4);
+    harness.run_steps(20);
+    click(&mut harness, "Pause");
+    click(&mut harness, "Step");
+    harness.key_press(Key::Num2);
+    harness.run();
+    click(&mut harness, "Copy link");
+    assert!(harness.state().announcement().starts_with("Link copied."));
+    let link = calls.borrow().shared.last().expect("shared").clone();
+    assert!(
+        link.starts_with("https://example.org/lab/#scene=spcmm&"),
+        "{link}"
+    );
+    assert!(link.len() < 600, "{} characters", link.len());
+
+    let options = AppOptions::from_link(&link).expect("a link");
+    assert_eq!(
+        options.scene.contact.clearance, 0.3e-3,
+        "the change came on the way"
+    );
+    let (mut copy, _) = open(options, LARGE);
+    assert_eq!(verdict(&mut copy), Verdict::Agrees(hash(&harness)));
+    copy.run();
+    assert_eq!(hash(&copy), hash(&harness));
+    let (mine, theirs) = (harness.state().player(), copy.state().player());
+    assert_eq!(mine.pacer.shown().to_bits(), theirs.pacer.shown().to_bits());
+    assert_eq!(theirs.scene().contact.friction, 0.4);
+    assert!(!theirs.is_playing());
+    let words = format!("State reproduced: hash {:016x} agrees", hash(&harness));
+    assert!(label(&copy, &words));
+    assert!(copy.state().announcement().starts_with(&words));
+    // It goes on with the same bits, and its own link is the same.
+    assert_eq!(copy.state().share_state(), harness.state().share_state());
+    for harness in [&mut harness, &mut copy] {
+        harness.state_mut().player_mut().run_to(0.1);
+    }
+    assert_eq!(hash(&copy), hash(&harness));
+    click(&mut copy, "Dismiss");
+    assert!(!label(&copy, &words));
+
+    let wrong = link
+        .replace("hash=", "hash=0000000000000000&was=")
+        .replace("&was=", "&utm_was=");
+    let (mut copy, _) = open(AppOptions::from_link(&wrong).expect("a link"), LARGE);
+    assert!(matches!(
+        verdict(&mut copy),
+        Verdict::Differs { expected: 0, .. }
+    ));
+    copy.run();
+    assert!(label(&copy, "State differs: hash"));
+}
+
+#[test]
+fn a_long_way_shows_how_far_it_is_and_can_be_stopped() {
+    let link = "?scene=spcmm&method=rk4&solver.step=1us&t=100s";
+    let options = AppOptions::from_link(link).expect("a link");
+    let (mut harness, _) = open(options, LARGE);
+    let first = harness.state().replaying().expect("on its way");
+    harness.get_by_label_contains("Reproducing the state of the link… 0 %");
+    harness.run_steps(3);
+    let then = harness.state().replaying().expect("on its way still");
+    assert!(then > first, "{first} {then}");
+    // Meanwhile nothing else moves the machine.
+    harness.key_press(Key::Space);
+    harness.key_press(Key::R);
+    harness.step();
+    assert!(harness.state().replaying().is_some_and(|now| now > first));
+    assert!(harness.state().share_state().contains("t=100s"));
+    click(&mut harness, "Stop here");
+    assert!(harness.state().replaying().is_none());
+    assert!(matches!(
+        harness.state().verdict(),
+        Some(Verdict::Failed(_))
+    ));
+    assert!(harness.state().player().simulation().time() > 0.0);
+    click(&mut harness, "Step");
+    harness.key_press(Key::R);
+    harness.run();
+    assert_eq!(harness.state().player().simulation().time(), 0.0);
+}
+
+#[test]
+fn a_bad_link_is_explained_and_the_default_scene_runs() {
+    for (link, words) in [
+        ("?scene=pendulun", "did you mean `pendulum`?"),
+        ("?c=5", "contact.clearance = 5: needs a unit"),
+        ("?scene=spcmm&spcmm.amplitude_x=500mm", "amplitude_x"),
+        ("#scene=pendulum&log=AAAA", "cut short or damaged"),
+        ("?speed=3", "unknown word"),
+        ("?follow=joint.S9", "no such part; allowed: joint.S1,"),
+    ] {
+        assert!(AppOptions::from_link(link).is_err(), "{link}");
+        let (mut harness, _) = open(AppOptions::from_link_or_default(link), LARGE);
+        assert!(label(&harness, "link: "));
+        assert!(
+            harness.state().announcement().contains(words),
+            "{link}: {}",
+            harness.state().announcement()
+        );
+        let player = harness.state().player();
+        assert_eq!(player.scene().name, DEFAULT_SCENE);
+        assert!(player.is_playing());
+        let ctx = harness.ctx.clone();
+        assert!(harness.state_mut().open_link(&ctx, "?c=2").is_err());
+    }
+    let options = AppOptions::from_link_or_default("?scene=pendulum&c=0.5mm&scale=1:10");
+    assert_eq!(
+        (options.problem, options.playing, options.time_scale),
+        (None, true, 0.1)
+    );
+    assert_eq!(options.scene.contact.clearance, 0.5e-3);
+}
+
+fn touch(harness: &Harness<'_, App>, id: u64, phase: TouchPhase, pos: Pos2) {
+    harness.event(Event::Touch {
+        device_id: TouchDeviceId(0),
+        id: TouchId(id),
+        phase,
+        pos,
+        force: None,
+    });
+    // The first finger is the pointer, too.
+    if id == 1 {
+        let button = |pressed| Event::PointerButton {
+            pos,
+            button: PointerButton::Primary,
+            pressed,
+            modifiers: Modifiers::default(),
+        };
+        match phase {
+            TouchPhase::Start => {
+                harness.event(Event::PointerMoved(pos));
+                harness.event(button(true));
+            }
+            TouchPhase::Move => harness.event(Event::PointerMoved(pos)),
+            TouchPhase::End | TouchPhase::Cancel => {
+                harness.event(button(false));
+                harness.event(Event::PointerGone);
+            }
+        }
+    }
+}
+
+fn camera(harness: &Harness<'_, App>) -> Option<CameraPose> {
+    let link = Link::parse(&harness.state().share_state()).expect("a link");
+    link.camera
+}
+
+#[test]
+fn one_finger_turns_and_two_shift_and_come_nearer() {
+    let (mut harness, _) = window("spcmm", UPRIGHT);
+    let opened = camera(&harness).expect("a link carries the camera");
+    assert!(opened.fitted.is_some(), "as the scene opens");
+    let middle = harness.get_by_label("3D view").rect().center();
+    touch(&harness, 1, TouchPhase::Start, middle);
+    harness.step();
+    for step in 1..=5 {
+        let pos = middle + vec2(12.0 * step as f32, 0.0);
+        touch(&harness, 1, TouchPhase::Move, pos);
+        harness.step();
+    }
+    touch(&harness, 1, TouchPhase::End, middle + vec2(60.0, 0.0));
+    harness.run_steps(3);
+    let turned = camera(&harness).expect("turned");
+    touch(&harness, 1, TouchPhase::Start, middle);
+    harness.step();
+    touch(&harness, 1, TouchPhase::Move, middle + vec2(30.0, 0.0));
+    harness.step();
+    touch(&harness, 1, TouchPhase::Move, middle + vec2(60.0, 0.0));
+    harness.step();
+    touch(&harness, 1, TouchPhase::End, middle + vec2(60.0, 0.0));
+    harness.run_steps(3);
+    let again = camera(&harness).expect("turned");
+    assert!((again.yaw - turned.yaw).abs() > 0.1, "{turned:?} {again:?}");
+    assert_eq!(again.target, turned.target);
+    assert_eq!(again.distance, turned.distance);
+
+    // Both fingers side by side: a shift.
+    let fingers = |harness: &Harness<'_, App>, phase, apart: f32, shift: f32| {
+        touch(harness, 1, phase, middle + vec2(shift - apart, 0.0));
+        touch(harness, 2, phase, middle + vec2(shift + apart, 0.0));
+    };
+    fingers(&harness, TouchPhase::Start, 40.0, 0.0);
+    harness.step();
+    for step in 1..=4 {
+        fingers(&harness, TouchPhase::Move, 40.0, 10.0 * step as f32);
+        harness.step();
+    }
+    let shifted = camera(&harness).expect("shifted");
+    assert_eq!((shifted.yaw, shifted.pitch), (again.yaw, again.pitch));
+    assert_ne!(shifted.target, again.target);
+    // Then apart: nearer.
+    for step in 1..=4 {
+        fingers(&harness, TouchPhase::Move, 40.0 + 10.0 * step as f32, 40.0);
+        harness.step();
+    }
+    let nearer = camera(&harness).expect("nearer");
+    assert!(
+        nearer.distance < 0.8 * shifted.distance,
+        "{shifted:?} {nearer:?}"
+    );
+    assert_eq!((nearer.yaw, nearer.pitch), (again.yaw, again.pitch));
+    // The finger that stays longer turns nothing.
+    touch(&harness, 2, TouchPhase::End, middle + vec2(120.0, 0.0));
+    harness.step();
+    touch(&harness, 1, TouchPhase::Move, middle + vec2(-90.0, 30.0));
+    harness.step();
+    touch(&harness, 1, TouchPhase::End, middle + vec2(-90.0, 30.0));
+    harness.run_steps(3);
+    let after = camera(&harness).expect("a camera");
+    assert_eq!((after.yaw, after.pitch), (again.yaw, again.pitch));
+}
+
+#[test]
+fn a_double_tap_follows_what_it_hits() {
+    let (mut harness, _) = window("spcmm", LARGE);
+    // The first touch makes the controls larger and the picture a little smaller.
+    let ground = harness.get_by_label("3D view").rect().left_bottom() + vec2(200.0, -40.0);
+    touch(&harness, 1, TouchPhase::Start, ground);
+    harness.step();
+    touch(&harness, 1, TouchPhase::End, ground);
+    harness.run_steps(60);
+    harness.key_press(Key::F);
+    harness.run();
+    // The middle of the platform, in the isometric view that the window starts with.
+    let view = harness.get_by_label("3D view").rect();
+    let platform = view.lerp_inside(vec2(0.571, 0.722));
+    harness.hover_at(platform);
+    harness.run_steps(60);
+    harness.get_by_label_contains("Angular speed");
+    harness.remove_cursor();
+    harness.run();
+    // A finger is no mouse: the second tap comes down a little beside the first.
+    for beside in [0.0, 7.0] {
+        touch(&harness, 1, TouchPhase::Start, platform + vec2(beside, 0.0));
+        harness.step();
+        touch(&harness, 1, TouchPhase::End, platform + vec2(beside, 0.0));
+        harness.step();
+    }
+    harness.run_steps(3);
+    // The link follows it, too, from where the camera is.
+    harness
+        .state_mut()
+        .plots_mut()
+        .chosen
+        .push(Quantity::Energy);
+    harness.state_mut().plots_mut().window = Window::Last(0.01);
+    harness.state_mut().player_mut().run_to(5e-3);
+    harness.run_steps(3);
+    let link = harness.state().share_state();
+    let (mut copy, _) = open(AppOptions::from_link(&link).expect("a link"), LARGE);
+    assert_eq!(verdict(&mut copy), Verdict::Agrees(hash(&harness)));
+    copy.run_steps(3);
+    assert_eq!(copy.state().share_state(), link);
+    copy.get_by_label_contains("Energy, mJ");
+    for mut harness in [harness, copy] {
+        click(&mut harness, "View options");
+        harness.get_by_label("Stop following");
+    }
+    assert!(
+        link.contains("&follow=body.platform&")
+            && link.contains("&plots=normal-force+eccentricity+energy&window=0.01s&"),
+        "{link}"
+    );
+}
+
+#[test]
+fn small_screens_have_controls_for_fingers_and_a_sheet_that_folds() {
+    for size in [UPRIGHT, LYING] {
+        let (mut harness, _) = window("spcmm", size);
+        harness.run();
+        let view = harness.get_by_label("3D view").rect();
+        assert!(
+            view.width() > 240.0 && view.height() > 200.0,
+            "{size:?}: {view:?}"
+        );
+        let mut seen = 0;
+        for name in [
+            "Reset",
+            "Play",
+            "Step",
+            "Menu",
+            "View options",
+            "Controls",
+            "Plots",
+        ] {
+            let rect = harness.get_by_role_and_label(Role::Button, name).rect();
+            assert!(rect.size().min_elem() >= 43.5, "{size:?} {name}: {rect:?}");
+            assert!(
+                rect.right() <= size[0] && rect.bottom() <= size[1],
+                "{name}: {rect:?}"
+            );
+            seen += 1;
+        }
+        for (role, name) in [
+            (Role::ComboBox, "Scene"),
+            (Role::ComboBox, "Time scale preset"),
+            (Role::Slider, "Clearance"),
+            (Role::TextInput, "Clearance"),
+        ] {
+            let rect = harness.get_by_role_and_label(role, name).rect();
+            assert!(rect.size().min_elem() >= 43.5, "{size:?} {name}: {rect:?}");
+            assert!(rect.right() <= size[0], "{size:?} {name}: {rect:?}");
+            seen += 1;
+        }
+        assert_eq!(seen, 11);
+        // Nothing that can be hit lies over another thing.
+        let rects: Vec<egui::Rect> = ["Reset", "Play", "Step", "Controls", "Plots"]
+            .map(|name| harness.get_by_role_and_label(Role::Button, name).rect())
+            .into();
+        for (i, a) in rects.iter().enumerate() {
+            for b in &rects[i + 1..] {
+                assert!(
+                    !a.shrink(1.0).intersects(b.shrink(1.0)),
+                    "{size:?}: {a:?} {b:?}"
+                );
+            }
+        }
+
+        click(&mut harness, "Controls");
+        harness.run();
+        let wide = harness.get_by_label("3D view").rect();
+        assert!(
+            wide.area() > 1.3 * view.area(),
+            "{size:?}: {view:?} {wide:?}"
+        );
+        assert!(
+            harness
+                .query_by_role_and_label(Role::Slider, "Clearance")
+                .is_none()
+        );
+        harness.key_press(Key::P);
+        harness.run();
+        harness.get_by_label("Choose plots");
+        click(&mut harness, "Menu");
+        for name in [
+            "Open…",
+            "Copy link",
+            "Picture…",
+            "Record…",
+            "Scene…",
+            "Keys",
+            "About",
+        ] {
+            harness.get_by_label(name);
+        }
+    }
+}
+
+#[test]
+fn dialogs_and_menus_stay_on_a_small_screen() {
+    let outside = |harness: &Harness<'_, App>, role: Role, size: [f32; 2]| -> Vec<String> {
+        let across = 0.0..=size[0];
+        harness
+            .query_all_by_role(role)
+            .filter(|node| {
+                let rect = node.rect();
+                !(across.contains(&rect.left()) && across.contains(&rect.right()))
+            })
+            .map(|node| format!("{:?} {:?}", node.accesskit_node().label(), node.rect()))
+            .collect()
+    };
+    for size in [UPRIGHT, LYING, TINY] {
+        let (mut harness, _) = window("spcmm", size);
+        harness.run();
+        let step = harness.get_by_role_and_label(Role::Button, "Step").rect();
+        let scale = harness.get_by_role_and_label(Role::ComboBox, "Time scale preset");
+        let scale = scale.rect();
+        assert!(
+            scale.left() >= step.right() && scale.right() <= size[0],
+            "{size:?}: {scale:?}"
+        );
+        harness.key_press(Key::Questionmark);
+        harness.run();
+        let words = harness.get_by_label("Turn the view").rect();
+        assert!(words.width() > 20.0 && words.left() > 0.0, "{words:?}");
+        let none: [String; 0] = [];
+        assert_eq!(outside(&harness, Role::Label, size), none, "{size:?}");
+        let close = harness.get_by_role_and_label(Role::Button, "Close").rect();
+        assert!(close.bottom() <= size[1], "{size:?}: {close:?}");
+        harness.key_press(Key::Escape);
+        harness.run();
+
+        // What is too far down in a menu is reached by the wheel.
+        click(&mut harness, "Menu");
+        harness.run();
+        let first = harness.get_by_label("Open…").rect();
+        assert!(first.top() >= 0.0 && first.right() <= size[0], "{first:?}");
+        harness.hover_at(harness.get_by_label("Picture…").rect().center());
+        for _ in 0..4 {
+            harness.event(Event::MouseWheel {
+                unit: egui::MouseWheelUnit::Line,
+                source: egui::MouseWheelSource::Wheel,
+                delta: vec2(0.0, -10.0),
+                phase: TouchPhase::Move,
+                modifiers: Modifiers::NONE,
+            });
+            harness.run_steps(20);
+        }
+        let about = harness.get_by_label("About").rect();
+        assert!(about.bottom() <= size[1], "{size:?}: {about:?}");
+        click(&mut harness, "About");
+        harness.get_by_label(&format!("{:016x}", hash(&harness)));
+        assert_eq!(outside(&harness, Role::Label, size), none, "{size:?}");
+    }
+}
+
+#[test]
+fn a_file_held_over_the_window_and_a_large_one_are_told() {
+    let (mut harness, calls) = window("pendulum", LARGE);
+    let picture = harness.render().expect("a picture");
+    harness
+        .input_mut()
+        .hovered_files
+        .push(egui::HoveredFile::default());
+    harness.step();
+    assert_ne!(harness.render().expect("a picture"), picture);
+    let before = hash(&harness);
+    calls.borrow_mut().to_open.push_back(OpenedFile {
+        name: "film.mp4".to_owned(),
+        content: Err(jointplay::scene::too_large()),
+    });
+    harness.step();
+    harness.run_steps(3);
+    assert!(label(&harness, "film.mp4: too large for a scene file"));
+    assert_eq!(hash(&harness), before);
+}
+
+#[test]
+fn a_link_in_an_open_window_brings_its_theme() {
+    let (mut harness, _) = window("spcmm", LARGE);
+    let ctx = harness.ctx.clone();
+    for (link, theme) in [
+        ("#scene=pendulum&theme=dark", egui::Theme::Dark),
+        // Says nothing: it stays.
+        ("#scene=pendulum", egui::Theme::Dark),
+        ("#scene=pendulum&theme=light", egui::Theme::Light),
+    ] {
+        harness.state_mut().open_link(&ctx, link).expect("a link");
+        harness.run_steps(3);
+        assert_eq!(ctx.theme(), theme, "{link}");
+    }
+}
+
+#[test]
+fn a_finger_makes_the_controls_of_a_large_window_large_as_well() {
+    let (mut harness, _) = window("spcmm", LARGE);
+    let height = |harness: &Harness<'_, App>| harness.get_by_label("Open…").rect().height();
+    assert!(height(&harness) < 30.0);
+    touch(&harness, 1, TouchPhase::Start, pos2(700.0, 300.0));
+    harness.step();
+    touch(&harness, 1, TouchPhase::End, pos2(700.0, 300.0));
+    harness.run_steps(3);
+    assert!(height(&harness) >= 43.5);
+}
+
+#[test]
+fn scene_record_and_picture_are_saved() {
+    let (mut harness, calls) = window("spcmm", LARGE);
+    let player = harness.state_mut().player_mut();
+    player
+        .set("contact.clearance", "0.45 mm")
+        .expect("in range");
+    player.run_to(12e-3);
+    harness.run();
+    click(&mut harness, "Save");
+    click(&mut harness, "Scene…");
+    let saved = calls.borrow_mut().saved.remove(0);
+    assert_eq!(
+        (saved.name.as_str(), saved.mime),
+        ("spcmm.toml", "application/toml")
+    );
+    let text = String::from_utf8(saved.bytes).expect("text");
+    let scene = Scene::parse(&text, Some("spcmm.toml"), &[]).expect("a scene");
+    assert_eq!(scene.contact.clearance, 0.45e-3);
+    let changes = [("contact.clearance".to_owned(), "0.45 mm".to_owned())];
+    let hashes = [scene, Scene::load("spcmm", &changes).expect("in range")].map(|scene| {
+        let mut simulation = Simulation::new(&scene).expect("starts");
+        simulation.advance_to(20e-3).expect("runs");
+        simulation.state_hash()
+    });
+    assert_eq!(hashes[0], hashes[1], "the same scene");
+
+    click(&mut harness, "Save");
+    click(&mut harness, "Record…");
+    let record = calls.borrow_mut().saved.remove(0);
+    assert_eq!(
+        (record.name.as_str(), record.mime),
+        ("spcmm-12.000ms.csv", "text/csv")
+    );
+    let text = String::from_utf8(record.bytes).expect("text");
+    assert!(
+        text.starts_with("t_s,S1_normal_N_min,S1_normal_N_max,"),
+        "{text:.80}"
+    );
+    let meta = calls.borrow_mut().saved.remove(0);
+    assert_eq!(meta.name, "spcmm-12.000ms.csv.meta.json");
+
+    click(&mut harness, "Save");
+    click(&mut harness, "Picture…");
+    let picture = next_file(&mut harness, &calls);
+    assert_eq!(
+        (picture.name.as_str(), picture.mime),
+        ("spcmm-12.000ms.png", "image/png")
+    );
+    let (info, rgba) = decoded(&picture);
+    let view = harness.get_by_label("3D view").rect();
+    assert_eq!(
+        (info.width, info.height),
+        (view.width().round() as u32, view.height().round() as u32)
+    );
+    let texts = &info.uncompressed_latin1_text;
+    assert!(
+        texts
+            .iter()
+            .any(|t| t.text.contains("contact.clearance = 0.45 mm"))
+    );
+    let pixels: std::collections::HashSet<&[u8]> = rgba.chunks_exact(4).collect();
+    assert!(
+        pixels.len() > 500,
+        "an empty picture has few colours: {}",
+        pixels.len()
+    );
+    // Where the button was on the screen, there is the ground.
+    let button = harness
+        .get_by_role_and_label(Role::Button, "View options")
+        .rect();
+    let at = (button.left_top() + vec2(6.0, 10.0)) - view.min;
+    let pixel = |x: f32, y: f32| {
+        let i = 4 * (y as usize * info.width as usize + x as usize);
+        [0, 1, 2].map(|c| i32::from(rgba[i + c]))
+    };
+    let (on, beside) = (pixel(at.x, at.y), pixel(at.x - 16.0, at.y));
+    let apart = (0..3).map(|c| (on[c] - beside[c]).abs()).max();
+    assert!(apart < Some(6), "{on:?} {beside:?}");
+}
+
+/// The next file that is saved.
+fn next_file(harness: &mut Harness<'_, App>, calls: &Rc<RefCell<Calls>>) -> SaveFile {
+    let begun = std::time::Instant::now();
+    while calls.borrow().saved.is_empty() {
+        assert!(begun.elapsed().as_secs() < 30, "nothing comes");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+        harness.step();
+    }
+    calls.borrow_mut().saved.remove(0)
+}
+
+/// A picture's header and its pixels.
+fn decoded(file: &SaveFile) -> (png::Info<'static>, Vec<u8>) {
+    let mut reader = png::Decoder::new(std::io::Cursor::new(file.bytes.as_slice()))
+        .read_info()
+        .expect("a PNG file");
+    let mut rgba = vec![0; reader.output_buffer_size().expect("fits in memory")];
+    reader.next_frame(&mut rgba).expect("whole");
+    (reader.info().clone(), rgba)
+}
+
+/// Mean difference of the colours of a picture of the same view at `times` the size, put together again, 0 to 255.
+fn apart(small: &(png::Info<'_>, Vec<u8>), large: &(png::Info<'_>, Vec<u8>), times: usize) -> f64 {
+    let (width, height) = (small.0.width as usize, small.0.height as usize);
+    assert_eq!(
+        (large.0.width as usize, large.0.height as usize),
+        (times * width, times * height)
+    );
+    let mut sum = 0.0;
+    for (y, x, c) in
+        (0..height).flat_map(|y| (0..width).flat_map(move |x| (0..3).map(move |c| (y, x, c))))
+    {
+        let block = (0..times * times).map(|k| {
+            let (row, column) = (times * y + k / times, times * x + k % times);
+            f64::from(large.1[4 * (row * times * width + column) + c])
+        });
+        let mean = block.sum::<f64>() / (times * times) as f64;
+        sum += (mean - f64::from(small.1[4 * (y * width + x) + c])).abs();
+    }
+    sum / (3 * width * height) as f64
+}
+
+/// Length of the ruler of the forces in the lower right corner, pixels: the longest dark line across.
+fn ruler((info, rgba): &(png::Info<'_>, Vec<u8>)) -> usize {
+    let (width, height) = (info.width as usize, info.height as usize);
+    let dark = |x: usize, y: usize| {
+        let at = 4 * (y * width + x);
+        rgba[at..at + 3].iter().all(|colour| *colour < 110)
+    };
+    let longest = |y: usize| {
+        let (mut run, mut longest) = (0, 0);
+        for x in 7 * width / 10..width {
+            run = if dark(x, y) { run + 1 } else { 0 };
+            longest = longest.max(run);
+        }
+        longest
+    };
+    (7 * height / 10..height).map(longest).max().unwrap_or(0)
+}
+
+#[test]
+fn a_picture_has_the_size_and_the_parts_that_were_chosen_and_holds_what_is_on_show() {
+    let (mut harness, calls) = window("spcmm", [900.0, 640.0]);
+    harness.state_mut().player_mut().run_to(7.85e-3);
+    harness.run();
+    let picture = |harness: &mut Harness<'_, App>, choices: &[&str]| {
+        click(harness, "Save");
+        for choice in choices {
+            click(harness, choice);
+        }
+        click(harness, "Picture…");
+        decoded(&next_file(harness, &calls))
+    };
+    let shown = harness.render().expect("a picture");
+    let view = harness.get_by_label("3D view").rect();
+    let window = picture(&mut harness, &["Whole window", "1×"]);
+    assert_eq!((window.0.width, window.0.height), (900, 640));
+    let screen = (window.0.clone(), shown.into_raw());
+    let off = apart(&screen, &window, 1);
+    assert!(off < 0.3, "the window itself: {off}");
+    // The same names, ruler and arrows, only sharper.
+    let once = picture(&mut harness, &["View only"]);
+    let twice = picture(&mut harness, &["2×"]);
+    let off = apart(&once, &twice, 2);
+    // Finer lines of the floor, and letters.
+    assert!(off < 4.5, "the view at twice the size: {off}");
+    let [short, long] = [ruler(&once), ruler(&twice)];
+    assert!(
+        short > 40 && long.abs_diff(2 * short) <= 3,
+        "ruler {short}, {long}"
+    );
+    // A little more than the view was: its buttons are left out, and the plots are below.
+    let plots = picture(&mut harness, &["View and plots", "1×"]);
+    assert_eq!(plots.0.width, once.0.width);
+    assert!(plots.0.height > once.0.height + 150);
+    let colours = |(info, rgba): &(png::Info<'_>, Vec<u8>)| {
+        let below = &rgba[4 * (info.width * once.0.height) as usize..];
+        let all: std::collections::HashSet<&[u8]> = below.chunks_exact(4).collect();
+        all.len()
+    };
+    assert!(colours(&plots) > 100, "plots: {}", colours(&plots));
+    // What was drawn beside the window has changed nothing in it.
+    assert_eq!(harness.get_by_label("3D view").rect(), view);
+
+    click(&mut harness, "Save");
+    click(&mut harness, "View only");
+    click(&mut harness, "Own size");
+    for (name, edge) in [
+        ("Width of the picture", 300.0),
+        ("Height of the picture", 777.0),
+    ] {
+        let field = harness.get_by_role_and_label(Role::SpinButton, name);
+        field.set_value_accesskit(edge);
+        harness.run_steps(2);
+    }
+    harness.get_by_label("300 × 777 pixels");
+    click(&mut harness, "Picture…");
+    let own = decoded(&next_file(&mut harness, &calls));
+    assert_eq!((own.0.width, own.0.height), (300, 777));
+
+    click(&mut harness, "Save");
+    let field = harness.get_by_role_and_label(Role::SpinButton, "Width of the picture");
+    field.set_value_accesskit(60_000.0);
+    harness.run_steps(2);
+    click(&mut harness, "Picture…");
+    harness.run_steps(4);
+    assert!(label(&harness, "60000x777 pixels: each side must be 1 to "));
+    assert!(calls.borrow().saved.is_empty());
+}
+
+#[test]
+fn on_the_desktop_a_path_is_asked_for_and_nothing_is_overwritten() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("mine.csv").display().to_string();
+    let (mut harness, _) = window("pendulum", LARGE);
+    harness
+        .state_mut()
+        .set_host(Box::new(DesktopHost::default()));
+    for again in [false, true] {
+        click(&mut harness, "Save");
+        click(&mut harness, "Record…");
+        harness
+            .get_by_role_and_label(Role::TextInput, "Path")
+            .focus();
+        harness.step();
+        harness.key_press_modifiers(Modifiers::COMMAND, Key::A);
+        harness.step();
+        harness
+            .get_by_role_and_label(Role::TextInput, "Path")
+            .type_text(&path);
+        harness.step();
+        harness.key_press(Key::Enter);
+        harness.run_steps(3);
+        let refused = label(&harness, "it is already there");
+        assert_eq!(refused, again);
+    }
+    let mut names: Vec<_> = std::fs::read_dir(folder.path())
+        .expect("the folder")
+        .map(|entry| entry.expect("an entry").file_name())
+        .collect();
+    names.sort();
+    assert_eq!(names, ["mine.csv", "mine.csv.meta.json"]);
+}
+
+#[test]
+fn a_chosen_or_dropped_file_opens_and_a_bad_one_leaves_the_running_scene() {
+    let (mut harness, calls) = window("spcmm", LARGE);
+    click(&mut harness, "Open…");
+    assert_eq!(calls.borrow().picked, 1);
+    assert!(harness.query_by_label("Path").is_none(), "the host asks");
+    let file = |name: &str, content| OpenedFile {
+        name: name.to_owned(),
+        content,
+    };
+    for (bad, words) in [
+        (Ok(b"name = [".to_vec()), "mine.toml:1"),
+        (Ok(vec![0xff, 0xfe]), "not a text file"),
+        (Err("it is gone".to_owned()), "it is gone"),
+    ] {
+        calls.borrow_mut().to_open.push_back(file("mine.toml", bad));
+        harness.run_steps(3);
+        assert!(label(&harness, words), "{words}");
+        assert_eq!(harness.state().player().scene().name, "spcmm");
+    }
+    let text = Scene::load("pendulum", &[]).expect("built in").source.text;
+    let mine = text.replace("name = \"pendulum\"", "name = \"mine\"");
+    calls
+        .borrow_mut()
+        .to_open
+        .push_back(file("mine.toml", Ok(mine.into_bytes())));
+    harness.run_steps(3);
+    assert_eq!(harness.state().player().scene().name, "mine");
+    assert!(!label(&harness, "it is gone"));
+    // The file travels in the link.
+    let options = AppOptions::from_link(&harness.state().share_state()).expect("a link");
+    assert_eq!(options.scene.name, "mine");
+
+    let dropped = Dropped(PathBuf::from("bad.toml"), b"[contact]\nclearance = 3\n");
+    harness.input_mut().dropped_files.push(Arc::new(dropped));
+    harness.run_steps(3);
+    assert!(label(&harness, "bad.toml:2"));
+    assert_eq!(harness.state().player().scene().name, "mine");
+}
+
+#[test]
+fn keys_and_tab_work_before_anything_was_clicked() {
+    let (mut harness, _) = window("spcmm", LARGE);
+    harness.key_press(Key::ArrowRight);
+    harness.step();
+    assert_eq!(harness.state().player().steps(), 1);
+    harness.key_press(Key::Tab);
+    harness.run_steps(2);
+    assert!(harness.ctx.memory(|memory| memory.focused()).is_some());
+}
+
+#[test]
+fn what_goes_on_is_told_to_who_does_not_see_it() {
+    let (mut harness, calls) = window("pendulum", LARGE);
+    assert_eq!(
+        harness.state().announcement(),
+        "Pendulum on a ball joint. Paused at the start. S1 free."
+    );
+    harness.key_press(Key::Space);
+    harness.run_steps(2);
+    harness.run_steps(120);
+    harness.key_press(Key::Space);
+    harness.run_steps(3);
+    let words = harness.state().announcement().to_owned();
+    assert!(
+        words.contains("Paused at ") && words.contains("S1 "),
+        "{words}"
+    );
+    let told = calls.borrow().announced.clone();
+    assert_eq!(told.last(), Some(&words));
+    assert!(
+        told.iter()
+            .any(|text| text.contains("Running at time scale 1:50"))
+    );
+    assert!(
+        told.iter()
+            .any(|text| text.contains("Largest normal force since the last report"))
+    );
+    assert!((4..=6).contains(&told.len()), "{told:#?}");
+    let node = harness.get_by_role_and_label(Role::Status, &words);
+    assert_eq!(node.accesskit_node().live(), Live::Polite);
+}
+
+#[test]
+fn the_about_box_names_version_state_and_adapter() {
+    let (mut harness, _) = window("pendulum", LARGE);
+    click(&mut harness, "About");
+    harness.get_by_label_contains("Drawn with ");
+    harness.get_by_label(&format!("Version {}", jointplay::VERSION));
+    harness.get_by_label(&format!("{:016x}", hash(&harness)));
+}
+
+#[test]
+fn recorded_channels_have_the_columns_of_a_run() {
+    for name in jointplay::scene::BUILT_IN {
+        let scene = Scene::load(name, &[]).expect("built in");
+        let mut frame = Frame::default();
+        Simulation::new(&scene)
+            .expect("starts")
+            .sample(0.0, &mut frame);
+        let table = Table::new(&scene, &frame);
+        for channel in Channels::of(&scene).list() {
+            // A run has friction as a vector, energies instead of their changes, and no live change.
+            let in_other_words = ["change_work_J", "kinetic_change_J", "elastic_change_J"];
+            let own = matches!(
+                channel.quantity,
+                Quantity::FrictionForce | Quantity::Clearance
+            ) || in_other_words.contains(&channel.column().as_str());
+            let there = table.names().contains(&channel.column());
+            assert_eq!(there, !own, "{name}: {}", channel.column());
+        }
+    }
+}
+
+#[test]
+fn pictures() {
+    let mut results = SnapshotResults::new();
+    for (name, size) in [("phone_upright", UPRIGHT), ("phone_lying", LYING)] {
+        let (mut harness, _) = window("spcmm", size);
+        harness.state_mut().player_mut().run_to(7.85e-3);
+        harness.run();
+        harness.snapshot(name);
+        results.extend_harness(&mut harness);
+    }
+}
+
+/// Name of the control that has the focus.
+fn focused(harness: &Harness<'_, App>) -> Option<String> {
+    let mut all = harness.root().children_recursive();
+    let node = all.find(|node| node.accesskit_node().is_focused())?;
+    node.accesskit_node().label()
+}
+
+#[test]
+fn a_menu_that_the_keyboard_opens_begins_at_its_first_entry_and_closes_behind_its_last() {
+    for (size, name, first) in [(LARGE, "Save", "Picture…"), (UPRIGHT, "Menu", "Open…")] {
+        let (mut harness, _) = window("spcmm", size);
+        let menu = harness.get_by_role_and_label(Role::Button, name);
+        menu.focus();
+        harness.run_steps(2);
+        harness.key_press(Key::Enter);
+        harness.run_steps(4);
+        let mut seen = vec![focused(&harness).expect("has the focus")];
+        assert_eq!(seen[0], first);
+        while harness.query_by_label("Record…").is_some() {
+            harness.key_press(Key::Tab);
+            harness.run_steps(2);
+            seen.push(focused(&harness).unwrap_or_default());
+            assert!(seen.len() < 30, "{seen:?}");
+        }
+        for entry in ["Picture…", "2×", "Whole window", "Record…", "Scene…"] {
+            assert!(seen.iter().any(|label| label == entry), "{entry}: {seen:?}");
+        }
+    }
+}
+
+/// Types `text` into the dialog that is open and enters it.
+fn answer(harness: &mut Harness<'_, App>, text: &str) {
+    harness
+        .get_by_role_and_label(Role::TextInput, "Path")
+        .focus();
+    harness.step();
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::A);
+    harness.step();
+    harness
+        .get_by_role_and_label(Role::TextInput, "Path")
+        .type_text(text);
+    harness.step();
+    harness.key_press(Key::Enter);
+    harness.run_steps(4);
+}
+
+#[test]
+fn the_buttons_of_a_dialog_stay_when_it_has_an_error_to_show() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("bad.toml");
+    std::fs::write(&path, "[contact]\nclearance = 3\n".repeat(20)).expect("written");
+    for size in [LARGE, LYING, TINY] {
+        let (mut harness, _) = window("spcmm", size);
+        harness
+            .state_mut()
+            .set_host(Box::new(DesktopHost::default()));
+        harness
+            .get_by_role_and_label(Role::ComboBox, "Scene")
+            .click();
+        harness.run_steps(3);
+        click(&mut harness, "Link…");
+        answer(&mut harness, &path.display().to_string());
+        harness.get_by_label_contains("bad.toml:");
+        let [open, close] =
+            ["Open", "Close"].map(|name| harness.get_by_role_and_label(Role::Button, name).rect());
+        assert!(!open.intersects(close.shrink(1.0)), "{open:?} {close:?}");
+        assert!(open.bottom() <= size[1] && (open.center().y - close.center().y).abs() < 1.0);
+        // It can be mended and entered with the mouse.
+        let field = harness.get_by_role_and_label(Role::TextInput, "Path");
+        field.focus();
+        harness.step();
+        harness.key_press_modifiers(Modifiers::COMMAND, Key::A);
+        harness.step();
+        let field = harness.get_by_role_and_label(Role::TextInput, "Path");
+        field.type_text("pendulum");
+        harness.run_steps(2);
+        harness.get_by_role_and_label(Role::Button, "Open").click();
+        harness.run_steps(3);
+        assert_eq!(harness.state().player().scene().name, "pendulum");
+        assert!(harness.query_by_label("Path").is_none());
+    }
+}
+
+/// What a click on `Copy link` puts on the clipboard.
+fn copied(harness: &mut Harness<'_, App>) -> String {
+    harness.get_by_label("Copy link").click();
+    for _ in 0..3 {
+        harness.step();
+        let commands = &harness.output().platform_output.commands;
+        let text = commands.iter().find_map(|command| match command {
+            egui::OutputCommand::CopyText(text) => Some(text.clone()),
+            _ => None,
+        });
+        if let Some(text) = text {
+            return text;
+        }
+    }
+    panic!("nothing was copied");
+}
+
+#[test]
+fn a_link_of_the_window_opens_in_every_form_and_brings_the_camera() {
+    let (mut harness, _) = window("spcmm", LARGE);
+    harness.state_mut().player_mut().run_to(9e-3);
+    harness.run();
+    let bare = copied_from(&mut harness, "");
+    assert!(bare.starts_with("#scene=spcmm&"), "{bare}");
+    let page = "https://example.org/lab/";
+    let whole = copied_from(&mut harness, page);
+    assert_eq!(whole, format!("{page}{bare}"));
+    let pairs = bare.trim_start_matches('#');
+    let here = (hash(&harness), camera(&harness));
+    assert!(here.1.is_some());
+    for link in [
+        whole.clone(),
+        bare.clone(),
+        format!("?{pairs}"),
+        pairs.to_owned(),
+        format!("{page}?{pairs}"),
+    ] {
+        assert!(AppOptions::from_link(&link).is_ok(), "{link}");
+        for pasted in [false, true] {
+            let (mut other, _) = window("pendulum", LARGE);
+            other.state_mut().set_host(Box::new(DesktopHost::default()));
+            if !pasted {
+                click(&mut other, "Open…");
+                answer(&mut other, &link);
+            } else if link == pairs {
+                // Without a sign of a link before it, text is left alone only where it has no pairs.
+                other.event(Event::Paste("some words".to_owned()));
+                other.run_steps(2);
+                assert_eq!(other.state().player().scene().name, "pendulum");
+                continue;
+            } else {
+                other.event(Event::Paste(link.clone()));
+                other.run_steps(2);
+            }
+            assert_eq!(verdict(&mut other), Verdict::Agrees(here.0), "{link}");
+            assert_eq!((hash(&other), camera(&other)), here, "{link}");
+        }
+    }
+    // On a screen of another shape everything is in sight again.
+    let (mut phone, _) = open(AppOptions::from_link(&whole).expect("a link"), UPRIGHT);
+    verdict(&mut phone);
+    phone.run();
+    let there = camera(&phone).expect("a camera");
+    assert!(there.fitted.is_some_and(|aspect| aspect < 1.5), "{there:?}");
+    assert_ne!(Some(there), here.1);
+}
+
+fn copied_from(harness: &mut Harness<'_, App>, page: &str) -> String {
+    let host = DesktopHost::new(page.to_owned());
+    harness.state_mut().set_host(Box::new(host));
+    copied(harness)
+}

@@ -1,0 +1,1120 @@
+//! The window, driven by role and label as a person with a screen reader would.
+
+use eframe::egui::{self, Key, Modifiers, accesskit::Role};
+use egui_kittest::{
+    Harness, SnapshotResults,
+    kittest::{NodeT as _, Queryable as _},
+};
+use jointplay::app::{App, AppOptions};
+use jointplay::scene::Scene;
+use jointplay::simulate::Quantity;
+
+#[path = "../common/pixels.rs"]
+mod pixels;
+use pixels::{Picture, top};
+
+/// The wide window on `scene` at t = 0, paused.
+fn window(scene: &str) -> Harness<'static, App> {
+    sized(scene, [1280.0, 800.0], egui::Theme::Light)
+}
+
+fn sized(scene: &str, size: [f32; 2], theme: egui::Theme) -> Harness<'static, App> {
+    let mut options = AppOptions::new(Scene::load(scene, &[]).expect("a built-in scene"));
+    options.playing = false;
+    options.theme = theme.into();
+    options.clock = crate::common::looks::<10>;
+    let mut harness = Harness::builder()
+        .with_size(size)
+        .with_theme(theme)
+        .with_step_dt(1.0 / 60.0)
+        .with_max_steps(60)
+        .wgpu()
+        .build_eframe(move |cc| App::new(cc, options).expect("the scene starts"));
+    harness.run();
+    harness
+}
+
+fn time(harness: &Harness<'_, App>) -> f64 {
+    harness.state().player().simulation().time()
+}
+
+fn shown(harness: &Harness<'_, App>) -> f64 {
+    harness.state().player().pacer.shown()
+}
+
+fn clearance(harness: &Harness<'_, App>) -> f64 {
+    harness
+        .state()
+        .player()
+        .simulation()
+        .scene()
+        .contact
+        .clearance
+}
+
+/// Largest normal force since the reset, N.
+fn hardest(harness: &Harness<'_, App>) -> f64 {
+    let statistics = harness.state().player().simulation().statistics();
+    statistics.peak_normal.iter().copied().fold(0.0, f64::max)
+}
+
+fn click(harness: &mut Harness<'_, App>, label: &str) {
+    harness.get_by_role_and_label(Role::Button, label).click();
+    harness.step();
+    harness.step();
+}
+
+/// Replaces what stands in a text field and presses Enter.
+fn type_into(harness: &mut Harness<'_, App>, label: &str, text: &str) {
+    harness
+        .get_by_role_and_label(Role::TextInput, label)
+        .focus();
+    harness.step();
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::A);
+    harness.step();
+    harness
+        .get_by_role_and_label(Role::TextInput, label)
+        .type_text(text);
+    harness.step();
+    harness.key_press(Key::Enter);
+    harness.step();
+    harness.step();
+}
+
+#[test]
+fn the_clearance_slider_changes_when_the_balls_hit() {
+    // A free fall through 0.3 mm takes 7.8 ms, through 0.5 mm 10.1 ms.
+    let mut harness = window("spcmm");
+    harness.state_mut().player_mut().run_to(9.0e-3);
+    assert!(
+        hardest(&harness) > 100.0,
+        "at 0.3 mm all three joints have been hit by 9 ms"
+    );
+
+    let slider = harness.get_by_role_and_label(Role::Slider, "Clearance");
+    assert!(
+        (slider
+            .accesskit_node()
+            .numeric_value()
+            .expect("a slider has a value")
+            - 0.3)
+            .abs()
+            < 1e-9
+    );
+    slider.set_value_accesskit(0.5);
+    harness.run();
+    assert!((clearance(&harness) - 0.5e-3).abs() < 1e-12);
+
+    click(&mut harness, "Reset");
+    assert_eq!(time(&harness), 0.0);
+    harness.state_mut().player_mut().run_to(9.0e-3);
+    assert!(
+        hardest(&harness) < 1.0,
+        "at 0.5 mm nothing has been hit by 9 ms"
+    );
+    harness.state_mut().player_mut().run_to(12.0e-3);
+    assert!(hardest(&harness) > 100.0);
+}
+
+#[test]
+fn a_live_change_of_clearance_reaches_the_running_joints() {
+    let mut harness = window("spcmm");
+    harness
+        .get_by_role_and_label(Role::Slider, "Clearance")
+        .set_value_accesskit(0.6);
+    harness.run();
+    harness.state_mut().player_mut().run_to(0.1);
+    for joint in &harness.state().player().frame().joints {
+        assert!(
+            (joint.clearance - 0.6e-3).abs() < 1e-9,
+            "{}",
+            joint.clearance
+        );
+    }
+}
+
+#[test]
+fn a_drag_on_the_friction_slider_moves_friction() {
+    let mut harness = window("spcmm");
+    let before = harness
+        .state()
+        .player()
+        .simulation()
+        .scene()
+        .contact
+        .friction;
+    let track = harness
+        .get_by_role_and_label(Role::Slider, "Friction coefficient")
+        .rect();
+    harness.drag_at(track.left_center() + egui::vec2(12.0, 0.0));
+    harness.step();
+    harness.hover_at(track.right_center() - egui::vec2(4.0, 0.0));
+    harness.step();
+    harness.drop_at(track.right_center() - egui::vec2(4.0, 0.0));
+    harness.run();
+    let after = harness
+        .state()
+        .player()
+        .simulation()
+        .scene()
+        .contact
+        .friction;
+    assert!(after > before, "{before} to {after}");
+}
+
+#[test]
+fn a_typed_value_takes_any_unit_and_a_bad_one_stays_to_be_mended() {
+    let mut harness = window("spcmm");
+    type_into(&mut harness, "Clearance", "500 um");
+    assert!((clearance(&harness) - 0.5e-3).abs() < 1e-12);
+    type_into(&mut harness, "Clearance", "0.4");
+    assert!(
+        (clearance(&harness) - 0.4e-3).abs() < 1e-12,
+        "a bare number takes the unit on show"
+    );
+
+    type_into(&mut harness, "Clearance", "0.4 kg");
+    assert!(
+        (clearance(&harness) - 0.4e-3).abs() < 1e-12,
+        "the running value stays"
+    );
+    let field = harness.get_by_role_and_label(Role::TextInput, "Clearance");
+    assert_eq!(
+        field.value().as_deref(),
+        Some("0.4 kg"),
+        "what was typed is not lost"
+    );
+    harness.get_by_label_contains("wrong unit");
+
+    type_into(&mut harness, "Clearance", "0.2 mm");
+    assert!((clearance(&harness) - 0.2e-3).abs() < 1e-12);
+    assert!(
+        harness.query_by_label_contains("wrong unit").is_none(),
+        "mended, the complaint goes"
+    );
+
+    click(&mut harness, "Reset Clearance");
+    assert!(
+        (clearance(&harness) - 0.3e-3).abs() < 1e-12,
+        "back to the scene's own value"
+    );
+}
+
+#[test]
+fn play_pause_and_the_space_bar() {
+    let mut harness = window("spcmm");
+    assert_eq!(time(&harness), 0.0);
+    click(&mut harness, "Play");
+    harness.run_steps(20);
+    assert!(harness.state().player().is_playing());
+    let playing = shown(&harness);
+    assert!(playing > 0.0);
+
+    click(&mut harness, "Pause");
+    let paused = shown(&harness);
+    harness.run_steps(10);
+    assert_eq!(shown(&harness), paused, "paused, time stands still");
+
+    harness.key_press(Key::Space);
+    harness.step();
+    assert!(harness.state().player().is_playing());
+    harness.key_press(Key::Space);
+    harness.step();
+    assert!(!harness.state().player().is_playing());
+}
+
+#[test]
+fn a_single_step_is_one_step_of_the_solver() {
+    let mut harness = window("spcmm");
+    for expected in 1..=3 {
+        click(&mut harness, "Step");
+        assert_eq!(
+            harness.state().player().simulation().statistics().steps,
+            expected
+        );
+        assert_eq!(shown(&harness), time(&harness));
+    }
+    harness.key_press(Key::ArrowRight);
+    harness.step();
+    assert_eq!(harness.state().player().simulation().statistics().steps, 4);
+}
+
+#[test]
+fn reset_goes_back_to_the_same_bits() {
+    let mut harness = window("spcmm");
+    let start = harness.state().player().simulation().state_hash();
+    harness.state_mut().player_mut().run_to(10.0e-3);
+    assert_ne!(harness.state().player().simulation().state_hash(), start);
+    harness.key_press(Key::R);
+    harness.run();
+    assert_eq!(harness.state().player().simulation().state_hash(), start);
+    assert_eq!(shown(&harness), 0.0);
+}
+
+#[test]
+fn the_time_scale_sets_how_fast_simulated_time_passes() {
+    let mut harness = window("spcmm");
+    harness
+        .get_by_role_and_label(Role::Slider, "Time scale")
+        .set_value_accesskit(1e-3);
+    harness.step();
+    click(&mut harness, "Play");
+    let before = shown(&harness);
+    harness.run_steps(30);
+    let passed = shown(&harness) - before;
+    assert!((passed - 30.0 / 60.0 * 1e-3).abs() < 1e-9, "{passed}");
+
+    harness.key_press(Key::Minus);
+    harness.step();
+    assert!((harness.state().player().pacer.scale() - 1e-4).abs() < 1e-12);
+    harness.key_press(Key::ArrowUp);
+    harness.step();
+    assert!((harness.state().player().pacer.scale() - 1e-3).abs() < 1e-12);
+}
+
+#[test]
+fn slow_motion_moves_in_every_frame_within_one_step() {
+    let mut harness = window("spcmm");
+    harness.state_mut().player_mut().run_to(7.85e-3);
+    harness.state_mut().player_mut().pacer.set_scale(1e-4);
+    harness.state_mut().player_mut().set_playing(true);
+    let mut last = harness.state().player().frame().pose.position;
+    let mut distinct = 0;
+    for _ in 0..30 {
+        harness.step();
+        let now = harness.state().player().frame().pose.position;
+        distinct += usize::from(now != last);
+        last = now;
+    }
+    assert!(distinct >= 29, "{distinct} of 30 frames moved");
+}
+
+#[test]
+fn the_question_mark_lists_the_keys_and_escape_closes() {
+    let mut harness = window("pendulum");
+    harness.key_press(Key::Questionmark);
+    harness.run();
+    harness.get_by_label("Play or pause");
+    // Under the list the machine is out of reach.
+    harness.key_press(Key::Space);
+    harness.step();
+    assert!(!harness.state().player().is_playing());
+    harness.key_press(Key::Escape);
+    harness.run();
+    assert!(harness.query_by_label("Play or pause").is_none());
+}
+
+#[test]
+fn another_scene_opens_and_a_bad_one_leaves_the_running_one() {
+    let mut harness = window("spcmm");
+    harness
+        .get_by_role_and_label(Role::ComboBox, "Scene")
+        .click();
+    harness.run();
+    harness.get_by_label("pendulum").click();
+    harness.run();
+    assert_eq!(
+        harness.state().player().simulation().scene().name,
+        "pendulum"
+    );
+
+    click(&mut harness, "Open…");
+    type_into(&mut harness, "Path", "missing/scene.toml");
+    harness.run();
+    harness.get_by_label_contains("missing/scene.toml");
+    assert_eq!(
+        harness.state().player().simulation().scene().name,
+        "pendulum"
+    );
+}
+
+#[test]
+fn a_value_that_waits_for_the_reset_says_so() {
+    let mut harness = window("spcmm");
+    let frequency = |harness: &Harness<'_, App>| {
+        harness
+            .state()
+            .player()
+            .simulation()
+            .scene()
+            .spcmm
+            .expect("the paper's scene")
+            .frequency
+    };
+    harness.state_mut().player_mut().run_to(1e-3);
+    harness
+        .state_mut()
+        .player_mut()
+        .set("spcmm.frequency", "0.4 Hz")
+        .expect("in range");
+    let group = Scene::load("spcmm", &[])
+        .expect("built in")
+        .parameters()
+        .iter()
+        .find(|p| p.key == "spcmm.frequency")
+        .expect("in the table")
+        .group;
+    harness.get_by_label(group).click();
+    harness.run();
+    harness.get_by_label("Applies at the next reset");
+    click(&mut harness, "Reset");
+    assert!(
+        harness
+            .query_by_label("Applies at the next reset")
+            .is_none()
+    );
+    assert!((frequency(&harness) - 0.4).abs() < 1e-12);
+}
+
+#[test]
+fn low_restitution_with_the_papers_law_is_commented_on() {
+    let mut harness = window("spcmm");
+    assert!(
+        harness
+            .query_by_label_contains("right only near 1")
+            .is_none()
+    );
+    harness
+        .get_by_role_and_label(Role::Slider, "Restitution")
+        .set_value_accesskit(0.3);
+    harness.run();
+    let comments = harness.query_all_by_label_contains("right only near 1");
+    assert!(comments.count() > 0);
+}
+
+#[test]
+fn the_divergence_guard_says_what_happened_and_a_reset_helps() {
+    let mut harness = window("spcmm");
+    let player = harness.state_mut().player_mut();
+    player.set("solver.method", "rk4").expect("a method");
+    player.set("solver.step", "1 ms").expect("in range");
+    player.run_to(0.5);
+    assert!(
+        player.stopped().is_some(),
+        "steps ten times longer than an impact cannot hold"
+    );
+    harness.run();
+    harness.get_by_label_contains("Stopped at");
+    harness
+        .state_mut()
+        .player_mut()
+        .set("solver.step", "10 us")
+        .expect("in range");
+    click(&mut harness, "Reset the run");
+    harness.run();
+    assert!(harness.query_by_label_contains("Stopped at").is_none());
+    harness.state_mut().player_mut().run_to(9e-3);
+    assert!(harness.state().player().stopped().is_none());
+}
+
+#[test]
+fn a_narrow_window_keeps_the_controls_within_reach() {
+    let mut harness = sized("spcmm", [420.0, 800.0], egui::Theme::Light);
+    for label in ["Play", "Step", "Reset"] {
+        let rect = harness.get_by_role_and_label(Role::Button, label).rect();
+        assert!(
+            rect.right() <= 420.0 && rect.bottom() <= 800.0,
+            "{label}: {rect:?}"
+        );
+    }
+    let rect = harness
+        .get_by_role_and_label(Role::Slider, "Clearance")
+        .rect();
+    assert!(rect.right() <= 420.0 && rect.bottom() <= 800.0, "{rect:?}");
+    harness
+        .get_by_role_and_label(Role::Slider, "Clearance")
+        .set_value_accesskit(0.7);
+    harness.run();
+    assert!((clearance(&harness) - 0.7e-3).abs() < 1e-12);
+}
+
+#[test]
+fn arrows_move_the_slider_that_was_dragged_and_step_again_after_a_click_elsewhere() {
+    let mut harness = window("spcmm");
+    let friction = |harness: &Harness<'_, App>| {
+        let scene = harness.state().player().simulation().scene();
+        scene.contact.friction
+    };
+    let steps = |harness: &Harness<'_, App>| harness.state().player().steps();
+    let track = harness
+        .get_by_role_and_label(Role::Slider, "Friction coefficient")
+        .rect();
+    harness.drag_at(track.center());
+    harness.step();
+    harness.drop_at(track.center());
+    harness.run();
+    let mut before = friction(&harness);
+    for (key, sign) in [
+        (Key::ArrowRight, 1.0),
+        (Key::ArrowLeft, -1.0),
+        (Key::ArrowUp, 1.0),
+        (Key::ArrowDown, -1.0),
+    ] {
+        harness.key_press(key);
+        harness.run();
+        let now = friction(&harness);
+        assert!(sign * (now - before) > 0.0, "{key:?}: {before} to {now}");
+        before = now;
+    }
+    assert_eq!(steps(&harness), 0, "the machine stands");
+    assert_eq!(harness.state().player().pacer.scale(), 0.02);
+    // A slider has no use for the space bar.
+    harness.key_press(Key::Space);
+    harness.step();
+    assert!(harness.state().player().is_playing());
+    click(&mut harness, "Pause");
+    let played = steps(&harness);
+    harness.key_press(Key::ArrowRight);
+    harness.run();
+    assert_eq!((steps(&harness), friction(&harness)), (played + 1, before));
+}
+
+#[test]
+fn keys_leave_a_field_alone_that_is_being_typed_in() {
+    let mut harness = window("spcmm");
+    harness
+        .get_by_role_and_label(Role::TextInput, "Clearance")
+        .focus();
+    harness.step();
+    harness.key_press(Key::Space);
+    harness.key_press(Key::R);
+    harness.step();
+    assert!(!harness.state().player().is_playing());
+}
+
+#[test]
+fn every_control_has_a_name() {
+    let mut harness = window("spcmm");
+    // All groups of parameters open.
+    for group in ["One joint", "Contact", "Gravity", "Solver"] {
+        if let Some(header) = harness.query_by_role_and_label(Role::Button, group) {
+            header.click();
+            harness.run();
+        }
+    }
+    let nameless: Vec<Role> = harness
+        .root()
+        .children_recursive()
+        .filter(|node| {
+            let node = node.accesskit_node();
+            matches!(
+                node.role(),
+                Role::Button
+                    | Role::Slider
+                    | Role::TextInput
+                    | Role::ComboBox
+                    | Role::CheckBox
+                    | Role::SpinButton
+            ) && node.label().is_none_or(|label| label.trim().is_empty())
+        })
+        .map(|node| node.accesskit_node().role())
+        .collect();
+    assert!(nameless.is_empty(), "{nameless:?}");
+}
+
+#[test]
+fn pictures() {
+    let mut results = SnapshotResults::new();
+    for (name, size, theme) in [
+        ("wide_light", [1280.0, 800.0], egui::Theme::Light),
+        ("wide_dark", [1280.0, 800.0], egui::Theme::Dark),
+        ("narrow_light", [420.0, 800.0], egui::Theme::Light),
+    ] {
+        let mut harness = sized("spcmm", size, theme);
+        harness.state_mut().player_mut().run_to(7.85e-3);
+        harness.run();
+        harness.snapshot(name);
+        results.extend_harness(&mut harness);
+    }
+}
+
+#[test]
+#[ignore = "writes pictures to look at, to $JOINTPLAY_LOOK"]
+fn look() {
+    let Ok(folder) = std::env::var("JOINTPLAY_LOOK") else {
+        return;
+    };
+    let save = |harness: &mut Harness<'_, App>, name: &str| {
+        harness
+            .render()
+            .expect("drawn")
+            .save(format!("{folder}/{name}.png"))
+            .expect("written");
+    };
+    let mut h = sized("spcmm", [1280.0, 800.0], egui::Theme::Light);
+    h.state_mut().player_mut().set_playing(true);
+    h.run_steps(100);
+    h.state_mut().player_mut().set_playing(false);
+    h.run();
+    save(&mut h, "played");
+    h.key_press(Key::Num5);
+    h.run();
+    save(&mut h, "closeup");
+    h.key_press(Key::Questionmark);
+    h.run();
+    save(&mut h, "keys");
+    h.key_press(Key::Escape);
+    h.run();
+    for group in ["Contact", "Solver", "One joint"] {
+        h.get_by_role_and_label(Role::DisclosureTriangle, group)
+            .click();
+        h.run();
+    }
+    type_into(&mut h, "Clearance", "0.4 kg");
+    h.get_by_role_and_label(Role::Slider, "Restitution")
+        .set_value_accesskit(0.3);
+    h.state_mut()
+        .player_mut()
+        .set("spcmm.frequency", "0.4 Hz")
+        .expect("ok");
+    h.run();
+    save(&mut h, "groups");
+    let mut h = sized("spcmm", [1280.0, 800.0], egui::Theme::Dark);
+    h.state_mut().player_mut().pacer.set_scale(1.0);
+    h.state_mut().player_mut().set_playing(true);
+    h.run_steps(60);
+    h.get_by_label("View options").click();
+    h.run_steps(5);
+    save(&mut h, "playing");
+    let player = h.state_mut().player_mut();
+    player.set("solver.method", "rk4").expect("a method");
+    player.set("solver.step", "1 ms").expect("in range");
+    player.run_to(2.5);
+    h.run();
+    save(&mut h, "stopped");
+    h.state_mut()
+        .report("mine.toml:2: contact.clearance = 3: needs a unit".to_owned());
+    h.get_by_role_and_label(Role::Button, "Save").click();
+    h.run_steps(5);
+    save(&mut h, "save_menu");
+    let mut h = sized("slider-crank", [420.0, 800.0], egui::Theme::Dark);
+    h.state_mut().player_mut().run_to(0.05);
+    h.get_by_role_and_label(Role::Button, "Plots").click();
+    h.run();
+    save(&mut h, "narrow_dark");
+    h.state_mut()
+        .report("mine.toml:2: contact.clearance = 3: needs a unit".to_owned());
+    h.get_by_label("Menu").click();
+    h.run_steps(5);
+    save(&mut h, "narrow_menu");
+}
+
+#[test]
+fn a_settled_run_says_so_beside_the_picture_and_a_swinging_one_never() {
+    let mut harness = window("spcmm");
+    let player = harness.state_mut().player_mut();
+    player.pacer.set_scale(1.0);
+    player.run_to(9e-3);
+    player.set_playing(true);
+    harness.step();
+    assert!(harness.query_by_label("Settled: R restarts").is_none());
+
+    // Stepping must not depend on how fast this machine is.
+    harness.state_mut().player_mut().run_to(0.5);
+    let places = |harness: &Harness<'_, App>| {
+        ["Step", "3D view", "Time scale preset"].map(|label| harness.get_by_label(label).rect())
+    };
+    harness.step();
+    assert!(harness.query_by_label("Settled: R restarts").is_none());
+    let paused = places(&harness);
+    harness.state_mut().player_mut().set_playing(true);
+    harness.step();
+    let words = harness.get_by_label("Settled: R restarts").rect();
+    assert!(!words.intersects(harness.get_by_label("3D view").rect()));
+    assert_eq!(places(&harness), paused, "nothing gives way for it");
+
+    for (scene, times) in [("pendulum", [1.0, 2.0]), ("chain", [0.7, 1.0])] {
+        let mut harness = window(scene);
+        for time in times {
+            harness.state_mut().player_mut().run_to(time);
+            harness.state_mut().player_mut().set_playing(true);
+            harness.step();
+            assert!(
+                harness.query_by_label("Settled: R restarts").is_none(),
+                "{scene} swings at {time} s"
+            );
+        }
+    }
+}
+
+/// Pixels in the colour of normal forces, left of the legend in the 3D view.
+fn orange(harness: &mut Harness<'_, App>) -> usize {
+    let view = harness.get_by_label("3D view").rect();
+    let picture = harness.render().expect("drawn");
+    let mut found = 0;
+    for y in view.top() as u32..view.bottom() as u32 {
+        for x in view.left() as u32..(view.right() - 200.0) as u32 {
+            let [r, g, b, _] = picture.get_pixel(x, y).0.map(u32::from);
+            // Less yellow than a rod, less red than the probe and the X axis.
+            let hue = (25..52).contains(&(100 * g / r.max(1))) && 100 * b < 25 * r;
+            found += usize::from(r > 110 && hue);
+        }
+    }
+    found
+}
+
+#[test]
+fn an_arrow_is_a_force_of_the_instant_on_show_and_a_peak_is_marked_apart() {
+    let mut harness = window("spcmm");
+    harness.state_mut().player_mut().run_to(7.0e-3);
+    harness.run();
+    assert_eq!(orange(&mut harness), 0, "nothing has touched yet");
+    harness.state_mut().player_mut().run_to(9.0e-3);
+    harness.run();
+    let player = harness.state().player();
+    assert!(
+        player
+            .frame()
+            .joints
+            .iter()
+            .all(|joint| joint.normal_force.norm() == 0.0)
+    );
+    let marked = orange(&mut harness);
+    assert!(marked > 100, "three joints were hit: {marked}");
+    // It stands for as long as nobody plays.
+    harness.run_steps(120);
+    assert_eq!(orange(&mut harness), marked);
+
+    harness.get_by_label("View options").click();
+    harness.run();
+    harness
+        .get_by_role_and_label(Role::CheckBox, "Peaks")
+        .click();
+    harness.run();
+    harness.key_press(Key::Escape);
+    harness.run();
+    assert_eq!(orange(&mut harness), 0, "no arrow without a force");
+}
+
+#[test]
+fn after_a_reset_or_a_step_back_no_force_is_on_show_that_is_yet_to_come() {
+    let mut harness = window("spcmm");
+    harness.state_mut().player_mut().run_to(9.0e-3);
+    harness.run();
+    assert!(orange(&mut harness) > 100);
+    harness.key_press(Key::R);
+    harness.run();
+    assert_eq!(orange(&mut harness), 0);
+
+    harness.state_mut().player_mut().run_to(7.79e-3);
+    harness.run();
+    let mut steps = 0;
+    while hardest(&harness) < 400.0 {
+        harness.key_press(Key::ArrowRight);
+        harness.step();
+        steps += 1;
+        assert!(steps < 64);
+    }
+    assert!(orange(&mut harness) > 100);
+    for _ in 0..steps {
+        harness.key_press(Key::ArrowLeft);
+        harness.step();
+    }
+    harness.run();
+    assert!(hardest(&harness) < 1.0);
+    assert_eq!(orange(&mut harness), 0);
+}
+
+#[test]
+fn a_tooltip_of_a_control_leaves_the_picture_alone_and_gives_way_to_a_dialog() {
+    let mut harness = window("spcmm");
+    let slider = harness
+        .get_by_role_and_label(Role::Slider, "Clearance")
+        .rect();
+    harness.hover_at(slider.center());
+    harness.run_steps(60);
+    let range = |harness: &Harness<'_, App>| {
+        harness
+            .query_by_label_contains("Key contact.clearance")
+            .map(|label| label.rect())
+    };
+    let tooltip = range(&harness).expect("a tooltip");
+    let view = harness.get_by_label("3D view").rect();
+    assert!(tooltip.right() < view.left(), "{tooltip:?} over {view:?}");
+    assert!(
+        tooltip.top() > slider.bottom(),
+        "{tooltip:?} over {slider:?}"
+    );
+    harness.key_press(Key::Questionmark);
+    harness.run_steps(10);
+    harness.get_by_label("Play or pause");
+    assert!(
+        range(&harness).is_none(),
+        "it stays open over the list of keys"
+    );
+}
+
+#[test]
+fn the_left_arrow_takes_a_single_step_back() {
+    let mut harness = window("spcmm");
+    harness.state_mut().player_mut().set_playing(false);
+    harness.run();
+    let start = time(&harness);
+    harness.key_press(Key::ArrowRight);
+    harness.run();
+    assert!(time(&harness) > start);
+    harness.key_press(Key::ArrowLeft);
+    harness.run();
+    assert_eq!(time(&harness), start);
+}
+
+#[test]
+fn hovering_names_a_part_and_a_double_click_follows_it() {
+    let mut harness = window("spcmm");
+    // The middle of the platform, in the isometric view that the window starts with.
+    let view = harness.get_by_label("3D view").rect();
+    let platform = view.lerp_inside(egui::vec2(0.571, 0.722));
+    harness.hover_at(platform);
+    harness.run_steps(60);
+    harness.get_by_label("Double-click to follow");
+    harness.get_by_label_contains("Angular speed");
+
+    for _ in 0..2 {
+        harness.drag_at(platform);
+        harness.drop_at(platform);
+        harness.step();
+    }
+    harness.remove_cursor();
+    harness.run();
+    harness.get_by_label("View options").click();
+    harness.run();
+    harness.get_by_label("Stop following").click();
+    harness.run();
+    assert!(harness.query_by_label("Stop following").is_none());
+}
+
+#[test]
+fn the_chosen_plots_are_shown_with_their_units() {
+    let mut harness = window("spcmm");
+    harness.get_by_label("Normal force, N");
+    assert!(harness.query_by_label("Energy, mJ").is_none());
+    harness.get_by_label("Choose plots").click();
+    harness.run();
+    harness
+        .get_by_role_and_label(Role::CheckBox, "Energy, mJ")
+        .click();
+    harness.run();
+    harness.key_press(Key::Escape);
+    harness.run();
+    harness.get_by_role_and_label(Role::Label, "Energy, mJ");
+}
+
+#[test]
+fn the_accuracy_of_the_running_scene_stands_beside_the_controls() {
+    let mut harness = window("spcmm");
+    harness.get_by_label("Accuracy");
+    harness.get_by_label("not measured yet");
+    // What runs has its name, chosen by it or not.
+    let preset = |harness: &Harness<'_, App>| {
+        let choice = harness.get_by_role_and_label(Role::ComboBox, "Preset");
+        choice.value().map(|name| name.to_string())
+    };
+    assert_eq!(preset(&harness).as_deref(), Some("real-time"));
+    // Nothing has been hit yet, and the rows about impacts say so.
+    harness.get_by_label("none yet");
+    harness.get_by_label("No doubts about this run so far");
+    assert_eq!(harness.query_all_by_label("—").count(), 2);
+    harness.state_mut().player_mut().run_to(9e-3);
+    harness.run();
+    harness.get_by_label("Energy residual");
+    let player = harness.state().player();
+    let impact = *player.simulation().impacts().next_back().expect("hit");
+    assert!(impact.steps >= 10, "{impact:?}");
+    let joint = &player.scene().ball_joints[impact.joint].name;
+    let disturbed = if impact.disturbed {
+        "disturbed"
+    } else {
+        "undisturbed"
+    };
+    harness.get_by_label(&format!("{joint}, {disturbed}"));
+    harness.get_by_label(&impact.steps.to_string());
+    harness.get_by_label_contains(", asked 0.9");
+    // A coarse step shows in the count, and real stepping is measured.
+    let player = harness.state_mut().player_mut();
+    player.set("solver.method", "rk4").expect("a method");
+    player.set("solver.step", "20 us").expect("in range");
+    player.reset().expect("starts");
+    player.run_to(9e-3);
+    let impact = *player.simulation().impacts().next_back().expect("hit");
+    assert!(impact.steps < 10, "{impact:?}");
+    player.set_playing(true);
+    harness.run_steps(20);
+    assert_eq!(preset(&harness).as_deref(), Some("own choice"));
+    assert!(harness.query_by_label("not measured yet").is_none());
+}
+
+#[test]
+fn the_energy_balance_is_stacked_from_both_sides() {
+    let mut harness = window("spcmm");
+    let plots = harness.state_mut().plots_mut();
+    plots.chosen = vec![Quantity::EnergyBalance];
+    plots.window = jointplay::app::Window::Everything;
+    harness.state_mut().player_mut().run_to(0.05);
+    harness.run();
+    harness.get_by_label("Energy balance, mJ");
+    harness.snapshot("energy_balance");
+}
+
+#[test]
+fn a_preset_is_measured_beside_the_running_scene() {
+    let mut harness = window("pendulum");
+    harness
+        .state_mut()
+        .set_host(Box::new(jointplay::app::DesktopHost::default()));
+    // As it comes, the scene was measured for the program.
+    assert!(harness.query_by_label("not measured").is_none());
+    let player = harness.state_mut().player_mut();
+    player.set("contact.clearance", "0.2 mm").expect("in range");
+    player.set("solver.preset", "preview").expect("a preset");
+    harness.run_steps(2);
+    let unknown = |harness: &Harness<'_, App>| harness.query_all_by_label("not measured").count();
+    assert_eq!(unknown(&harness), 2);
+    click(&mut harness, "Measure preset");
+    let begun = std::time::Instant::now();
+    while unknown(&harness) > 0 {
+        assert!(begun.elapsed().as_secs() < 600, "no answer");
+        std::thread::sleep(std::time::Duration::from_millis(50));
+        harness.run_steps(1);
+    }
+    harness.get_by_label("Peak force error");
+    // What is measured belongs to these values.
+    let player = harness.state_mut().player_mut();
+    player.set("contact.clearance", "0.3 mm").expect("in range");
+    player.set("contact.friction", "0.3").expect("in range");
+    harness.run_steps(2);
+    assert_eq!(unknown(&harness), 2);
+}
+
+/// Colours of the first three curves in the light theme.
+const CURVES: [[u8; 3]; 3] = [[0x00, 0x72, 0xB2], [0xD5, 0x5E, 0x00], [0x00, 0x8F, 0x68]];
+
+fn picture(harness: &mut Harness<'_, App>) -> Picture {
+    let image = harness.render().expect("drawn");
+    Picture::new(image.width(), image.into_raw())
+}
+
+const WHITE: [u8; 3] = [255; 3];
+
+/// Pixels around the place of a value in the plot of the normal force, from `top` N down to a little above zero, and the
+/// row of the value.
+fn spike(harness: &mut Harness<'_, App>, time: f64, force: f64, top: f64) -> ([usize; 4], usize) {
+    let plots = harness.state_mut().plots_mut();
+    let place = |force| {
+        let place = plots.place(Quantity::NormalForce, time, force);
+        place.expect("shown")
+    };
+    let (high, at, zero) = (place(top).y as usize, place(force), place(0.0).y as usize);
+    let area = [at.x as usize - 3, high, at.x as usize + 4, zero - 4];
+    (area, at.y as usize)
+}
+
+#[test]
+fn plotted_peaks_are_those_of_the_run() {
+    for size in [[1200.0, 740.0], [900.0, 560.0], [1600.0, 1000.0]] {
+        let mut harness = sized("spcmm", size, egui::Theme::Light);
+        // All three strike within a tenth of a millisecond: 621, 561 and 533 N (`tests/physics/reference.rs`).
+        harness.state_mut().player_mut().run_to(9e-3);
+        harness.run();
+        let player = harness.state().player();
+        let statistics = player.simulation().statistics().clone();
+        let most = statistics.peak_normal.iter().copied().fold(0.0, f64::max);
+        let drawn = picture(&mut harness);
+        for (joint, colour) in CURVES.into_iter().enumerate() {
+            let (time, force) = (statistics.peak_time[joint], statistics.peak_normal[joint]);
+            let (area, row) = spike(&mut harness, time, force, 1.04 * most);
+            let highest = top(&drawn.covered(area, colour, WHITE)).expect("every joint is seen");
+            assert!(
+                highest.abs_diff(row) <= 1,
+                "{size:?}: {force} N of joint {joint} in row {highest}, not {row}"
+            );
+        }
+        // In the midst of an impact: the newest of it is the highest, and nothing is drawn beyond it.
+        let player = harness.state_mut().player_mut();
+        player.run_to(14.94e-3);
+        let shown = player.pacer.shown();
+        let force = player.frame().joints[0].normal_force.norm();
+        assert!(force > 300.0, "{force}");
+        harness.run();
+        let drawn = picture(&mut harness);
+        let (area, row) = spike(&mut harness, shown, force, 1.2 * force);
+        let highest = top(&drawn.covered(area, CURVES[0], WHITE)).expect("drawn");
+        assert!(
+            highest.abs_diff(row) <= 1,
+            "{size:?}: {force} N in row {highest}, not {row}"
+        );
+        let beyond = [area[0] + 5, area[1], area[0] + 60, area[3] + 6];
+        for colour in CURVES {
+            assert_eq!(drawn.covered(beyond, colour, WHITE), []);
+        }
+    }
+}
+
+#[test]
+fn a_low_plot_keeps_its_numbers() {
+    for height in [740.0, 470.0, 400.0, 320.0] {
+        let mut harness = sized("spcmm", [1000.0, height], egui::Theme::Light);
+        if height < 500.0 {
+            // In the sheet of a low window.
+            harness.key_press(Key::P);
+        }
+        harness.state_mut().player_mut().run_to(9e-3);
+        harness.run();
+        let plots = harness.state_mut().plots_mut();
+        let row = |force| plots.place(Quantity::NormalForce, 0.0, force);
+        let (Some(zero), Some(above)) = (row(0.0), row(600.0)) else {
+            panic!("{height}: no plot");
+        };
+        let drawn = picture(&mut harness);
+        // Numbers stand to the left of the plot: rows that have ink in them, in how many pieces.
+        let inked = |y: usize| {
+            let left = zero.x as usize;
+            (left - 36..left - 3).any(|x| drawn.at(x, y).into_iter().all(|part| part < 150))
+        };
+        let rows: Vec<bool> = (above.y as usize - 8..(zero.y as usize + 8).min(height as usize))
+            .map(inked)
+            .collect();
+        let pieces = rows.windows(2).filter(|pair| !pair[0] && pair[1]).count();
+        assert!(pieces >= 2, "{height}: {pieces} numbers");
+    }
+}
+
+#[test]
+fn the_clearance_of_the_past_stays_where_it_was() {
+    let mut harness = window("spcmm");
+    let player = harness.state_mut().player_mut();
+    player.run_to(0.02);
+    player.set("contact.clearance", "0.6 mm").expect("in range");
+    player.run_to(0.05);
+    harness.run();
+    let drawn = picture(&mut harness);
+    // Dashed in the colour of weak text: how much of it there is in a row, from one time to another.
+    let dashes = |harness: &mut Harness<'_, App>, from: f64, to: f64, clearance: f64| {
+        let plots = harness.state_mut().plots_mut();
+        let place = |time| plots.place(Quantity::Eccentricity, time, clearance);
+        let (left, right) = (place(from).expect("shown"), place(to).expect("shown"));
+        let row = left.y.floor() as usize;
+        let area = [left.x as usize, row - 1, right.x as usize, row + 2];
+        let found = drawn.coloured(area, [0x57, 0x64, 0x70], 70).len() as f32;
+        found / (right.x - left.x)
+    };
+    for (clearance, past, since) in [(0.3e-3, true, false), (0.6e-3, false, true)] {
+        let before = dashes(&mut harness, 1e-3, 0.018, clearance);
+        let after = dashes(&mut harness, 0.025, 0.049, clearance);
+        assert_eq!(
+            (before > 0.3, after > 0.3),
+            (past, since),
+            "{clearance}: {before} {after}"
+        );
+    }
+}
+
+#[test]
+fn units_are_printed_alike_everywhere() {
+    let mut harness = window("spcmm");
+    for group in ["Solver", "Gravity", "Contact"] {
+        harness.get_by_label(group).click();
+        harness.run();
+    }
+    let field = harness.get_by_role_and_label(Role::TextInput, "Gravity along X");
+    assert_eq!(field.value().as_deref(), Some("9.81 m/s²"));
+    type_into(&mut harness, "Gravity along X", "9.7 m/s²");
+    type_into(&mut harness, "Gravity along Y", "1 kg");
+    let nodes = harness.root().children_recursive();
+    let texts = nodes.flat_map(|node| {
+        let node = node.accesskit_node();
+        [node.label(), node.value()].map(|text| text.map(|text| text.to_string()))
+    });
+    let plain: Vec<String> = texts
+        .flatten()
+        .filter(|text| {
+            text.contains("^2")
+                || text
+                    .split(|c: char| !c.is_alphabetic())
+                    .any(|w| w == "um" || w == "us")
+        })
+        .collect();
+    assert!(plain.is_empty(), "{plain:?}");
+}
+
+/// Role, name and place of every control, in their order; the button that plays or pauses is the same one.
+fn places(harness: &Harness<'_, App>) -> Vec<(Role, String, [f64; 4])> {
+    let all = harness.root().children_recursive();
+    all.filter_map(|node| {
+        let node = node.accesskit_node();
+        let rect = node.bounding_box()?;
+        let rect = [rect.x0, rect.y0, rect.x1, rect.y1];
+        let label = node.label().filter(|label| !label.trim().is_empty())?;
+        let name = match label.as_str() {
+            "Pause" => "Play".to_owned(),
+            other => other.to_owned(),
+        };
+        let is_control = matches!(
+            node.role(),
+            Role::Button
+                | Role::Slider
+                | Role::TextInput
+                | Role::ComboBox
+                | Role::CheckBox
+                | Role::RadioButton
+                | Role::SpinButton
+                | Role::DisclosureTriangle
+                | Role::Image
+        );
+        is_control.then_some((node.role(), name, rect))
+    })
+    .collect()
+}
+
+/// Runs and plays the scene on show and looks at every place on the way.
+fn nothing_moves(harness: &mut Harness<'_, App>, what: &str) {
+    harness.state_mut().player_mut().set_playing(false);
+    harness.run_steps(4);
+    let before = places(harness);
+    assert!(before.len() > 10, "{what}: {}", before.len());
+    for time in [9e-3, 0.12] {
+        let player = harness.state_mut().player_mut();
+        player.run_to(time);
+        player.pacer.set_scale(0.5);
+        player.set_playing(true);
+        harness.run_steps(2);
+        let now = places(harness);
+        for (was, is) in before.iter().zip(&now) {
+            assert_eq!(was, is, "{what} at {time} s");
+        }
+        assert_eq!(before.len(), now.len(), "{what} at {time} s");
+        harness.state_mut().player_mut().set_playing(false);
+    }
+}
+
+#[test]
+fn nothing_moves_while_a_scene_plays() {
+    for size in [
+        [1280.0, 800.0],
+        [900.0, 640.0],
+        [390.0, 844.0],
+        [844.0, 390.0],
+        [320.0, 480.0],
+    ] {
+        let mut options = AppOptions::new(Scene::load("spcmm", &[]).expect("built in"));
+        options.playing = false;
+        let mut harness = Harness::builder()
+            .with_size(size)
+            .with_step_dt(1.0 / 60.0)
+            .build_eframe(move |cc| App::new(cc, options).expect("the scene starts"));
+        harness.state_mut().player_mut().pacer.set_scale(0.5);
+        for scene in jointplay::scene::BUILT_IN {
+            harness.state_mut().open(scene).expect("built in");
+            nothing_moves(&mut harness, &format!("{scene} in {size:?}"));
+        }
+        // The bench with a twin, and a run that raises doubts.
+        harness.key_press(Key::B);
+        harness.state_mut().open("spcmm").expect("built in");
+        let player = harness.state_mut().player_mut();
+        player.set("solver.method", "rk4").expect("a method");
+        player.set("solver.step", "40 us").expect("in range");
+        player.set_twin(true).expect("starts");
+        nothing_moves(&mut harness, &format!("doubts in {size:?}"));
+        let doubts = harness.state().player().simulation().doubts();
+        assert!(!doubts.is_empty());
+    }
+}

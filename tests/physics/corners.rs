@@ -1,0 +1,38 @@
+//! Corners of the friction law are events: a step ends at each, and what slides is on the piece that it holds.
+
+use crate::common::{frame_now, simulation};
+use jointplay::contact::Slip;
+
+#[test]
+fn settled_sliding_holds_its_piece_and_corners_cost_few_rejections() {
+    for method in ["radau5", "automatic"] {
+        let mut simulation = simulation(
+            "spcmm",
+            &[("solver.method", method), ("solver.tolerance", "1e-5")],
+        );
+        // Joints slide about slip_speed_high between 1.1 s and 1.3 s.
+        simulation.advance_to(1.1).unwrap();
+        let before = simulation.statistics().clone();
+        while simulation.time() < 1.35 {
+            simulation.step().unwrap();
+            let frame = frame_now(&mut simulation);
+            for (j, joint) in frame.joints.iter().enumerate() {
+                let memory = simulation.contact_memory(j);
+                assert!(memory.active && memory.slip != Slip::Whole, "{method}");
+                let c = simulation.mechanism().contacts.coefficients(j);
+                let beyond = c.beyond(memory.slip, joint.slip_speed);
+                assert!(beyond < 1e-2 * c.slip_high, "{method}, {j}: {beyond:e}");
+            }
+        }
+        let after = simulation.statistics();
+        let corners = after.corners - before.corners;
+        let rejected = after.rejected - before.rejected;
+        println!(
+            "{method}: {corners} corners, {rejected} rejected, {} steps, {} evaluations",
+            after.steps - before.steps,
+            after.evaluations - before.evaluations
+        );
+        assert!(corners >= 10, "{method}: {corners}");
+        assert!(rejected < 2 * corners, "{method}: {rejected}");
+    }
+}

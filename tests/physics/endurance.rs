@@ -1,0 +1,388 @@
+//! A thousand simulated seconds, and a minute of parameters that change with every frame.
+
+use std::fmt::Write;
+
+use crate::common::invariants::{fault, finite};
+use crate::common::{frame_now, scene};
+use jointplay::scene::Mat3;
+use jointplay::simulate::{Frame, Simulation};
+
+/// Numbers from a seed (xorshift64*), so that every run of a test is the same.
+struct Numbers(u64);
+
+impl Numbers {
+    fn next(&mut self) -> f64 {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        (self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn below(&mut self, count: usize) -> usize {
+        (self.next() * count as f64) as usize
+    }
+}
+
+/// One frame's change: a key and its value.
+fn change(numbers: &mut Numbers, simulation: &Simulation) -> (String, String) {
+    let joints = &simulation.running_scene().ball_joints;
+    let joint = numbers.below(2 * joints.len());
+    let of = match joints.get(joint) {
+        Some(joint) => format!("joint.{}", joint.name),
+        None => "contact".to_owned(),
+    };
+    let x = numbers.next();
+    match numbers.below(3) {
+        // 0.01 mm to 3 mm.
+        0 => (
+            format!("{of}.clearance"),
+            format!("{:e} mm", 0.01 * 300_f64.powf(x)),
+        ),
+        1 => (format!("{of}.friction"), format!("{:e}", 1.5 * x)),
+        _ => (format!("{of}.restitution"), format!("{x:e}")),
+    }
+}
+
+/// Steps one frame further and looks.
+fn frame_on(simulation: &mut Simulation, target: f64, frame: &mut Frame) {
+    simulation.advance_to(target).unwrap();
+    simulation.sample(target, frame);
+    assert!(finite(frame), "t = {target}");
+    let now = frame_now(simulation);
+    let scene = simulation.running_scene().clone();
+    assert_eq!(fault(&now, &scene, "tree"), None, "t = {target}");
+}
+
+/// `frames` frames of a sixtieth of a second at `pace` simulated seconds a second.
+fn random_changes(name: &str, preset: &str, seed: u64, frames: usize, pace: f64) {
+    let mut numbers = Numbers(seed);
+    let changes = [("solver.preset", preset)];
+    let mut simulation = Simulation::new(&scene(name, &changes)).unwrap();
+    let mut frame = Frame::default();
+    let mut shown = 0.0;
+    let (mut restored, mut n) = (0, 0);
+    while n < frames {
+        let (key, value) = change(&mut numbers, &simulation);
+        simulation.set(&key, &value).unwrap();
+        match numbers.below(120) {
+            // A pause: frames are drawn, time stands still.
+            0 => {
+                let hash = simulation.state_hash();
+                for _ in 0..5 {
+                    simulation.sample(shown, &mut frame);
+                }
+                assert_eq!(simulation.state_hash(), hash);
+            }
+            // Forward, back, and forward again the same way, also in a simulation that came from elsewhere.
+            1 => {
+                let snapshot = simulation.snapshot();
+                let mut way = Vec::new();
+                let play = |simulation: &mut Simulation, way: &[(String, String)]| {
+                    for (n, (key, value)) in way.iter().enumerate() {
+                        simulation.set(key, value).unwrap();
+                        simulation
+                            .advance_to(shown + (n + 1) as f64 * pace / 60.0)
+                            .unwrap();
+                    }
+                    simulation.state_hash()
+                };
+                for _ in 0..5 {
+                    way.push(change(&mut numbers, &simulation));
+                }
+                let first = play(&mut simulation, &way);
+                simulation.restore(&snapshot).unwrap();
+                assert_eq!(
+                    play(&mut simulation, &way),
+                    first,
+                    "seed {seed}, t = {shown}"
+                );
+                let mut other = Simulation::new(&scene(name, &[])).unwrap();
+                other.restore(&snapshot).unwrap();
+                assert_eq!(
+                    play(&mut other, &way),
+                    first,
+                    "elsewhere, seed {seed}, t = {shown}"
+                );
+                simulation.restore(&snapshot).unwrap();
+                restored += 1;
+            }
+            _ => {}
+        }
+        shown += pace / 60.0;
+        frame_on(&mut simulation, shown, &mut frame);
+        n += 1;
+    }
+    let statistics = simulation.statistics();
+    println!(
+        "{name}, {preset}, seed {seed}: {frames} frames, {shown:.2} s, {} steps, {} evaluations, {} impacts, {restored} restored",
+        statistics.steps,
+        statistics.evaluations,
+        statistics.impacts.iter().sum::<u64>()
+    );
+    assert!(restored > 5);
+}
+
+/// The window's default pace: 1:50.
+const SLOW_MOTION: f64 = 0.02;
+
+#[test]
+fn a_minute_of_changes_with_every_frame_in_slow_motion() {
+    for (name, preset, seed) in [
+        ("spcmm", "preview", 1),
+        ("spcmm", "real-time", 2),
+        ("spcmm", "accurate", 3),
+        ("pendulum", "real-time", 4),
+        ("slider-crank", "preview", 5),
+        ("slider-crank-driven", "real-time", 6),
+    ] {
+        random_changes(name, preset, seed, 3600, SLOW_MOTION);
+    }
+}
+
+#[test]
+fn a_minute_of_changes_with_every_frame_of_the_default_scene() {
+    random_changes("spcmm", "real-time", 7, 3600, 1.0);
+}
+
+#[test]
+#[ignore = "minutes"]
+fn minutes_of_changes_with_every_frame_in_real_time() {
+    for seed in 11..14 {
+        for name in ["spcmm", "pendulum"] {
+            for preset in ["preview", "real-time"] {
+                random_changes(name, preset, seed, 3600, 1.0);
+            }
+        }
+    }
+}
+
+/// Largest residual of the energy balance with `preview` and with `real-time`, of the energy exchanged.
+const RESIDUAL: [f64; 2] = [2e-3, 1e-4];
+
+/// What a long run showed at the same phase of every period, against the third period.
+#[derive(Debug, Default)]
+struct Drift {
+    /// Simulated time, s.
+    time: f64,
+    steps: u64,
+    /// Contacts begun after the third period.
+    contacts: u64,
+    /// Largest distance between ball and socket of an ideal joint, m.
+    open: f64,
+    /// Largest departure of an orientation from a rotation.
+    skew: f64,
+    /// Energy that came or went, of the largest kinetic energy.
+    energy: f64,
+    /// Change of a normal force, of the largest.
+    force: f64,
+    /// Residual of the energy balance at the end, of the energy exchanged.
+    residual: f64,
+}
+
+/// A long run: scene, changes, period (s), and what may come and go in it.
+struct Long {
+    scene: &'static str,
+    what: &'static str,
+    changes: &'static crate::common::Changes<'static>,
+    period: f64,
+    /// Largest change of energy, and a tenth of that of a force, with `preview` and with `real-time`; none where contacts do not settle.
+    limits: [Option<f64>; 2],
+}
+
+const SPCMM_PERIOD: f64 = 2.0;
+const CRANK_PERIOD: f64 = std::f64::consts::PI / 3.0;
+const IDEAL: (&str, &str) = ("contact.clearance", "0");
+/// Of a function of time alone.
+const ROUNDING: [Option<f64>; 2] = [Some(1e-9); 2];
+const SETTLED: [Option<f64>; 2] = [Some(0.02), Some(1e-3)];
+
+fn long(
+    scene: &'static str,
+    what: &'static str,
+    changes: &'static crate::common::Changes<'static>,
+    period: f64,
+    limits: [Option<f64>; 2],
+) -> Long {
+    Long {
+        scene,
+        what,
+        changes,
+        period,
+        limits,
+    }
+}
+
+/// Cheap enough for every run of the tests, with the preset that is asked for settled motion.
+fn short_list() -> [Long; 3] {
+    [
+        long("spcmm", "as it is", &[], SPCMM_PERIOD, SETTLED),
+        long("spcmm", "ideal", &[IDEAL], SPCMM_PERIOD, ROUNDING),
+        long(
+            "slider-crank-driven",
+            "ideal",
+            &[IDEAL],
+            CRANK_PERIOD,
+            ROUNDING,
+        ),
+    ]
+}
+
+fn long_list() -> Vec<Long> {
+    let one_ideal = &[("joint.S1.clearance", "0")];
+    let mut list = Vec::from(short_list());
+    list.push(long(
+        "spcmm",
+        "one joint ideal",
+        one_ideal,
+        SPCMM_PERIOD,
+        SETTLED,
+    ));
+    list.push(long(
+        "slider-crank-driven",
+        "as it is",
+        &[],
+        CRANK_PERIOD,
+        [None; 2],
+    ));
+    list.push(long("pendulum", "as it is", &[], 1.0, [None; 2]));
+    list.push(long(
+        "slider-crank",
+        "free, ideal",
+        &[IDEAL],
+        1.0,
+        [None; 2],
+    ));
+    list
+}
+
+const FAST: [&str; 2] = ["preview", "real-time"];
+
+/// Runs at least `duration`, looks twice a period, and compares the ends of the periods.
+fn long_run(of: &Long, preset: usize, duration: f64) -> Drift {
+    let changes = [of.changes, &[("solver.preset", FAST[preset])]].concat();
+    let mut simulation = Simulation::new(&scene(of.scene, &changes)).unwrap();
+    let mut drift = Drift::default();
+    let mut kinetic = 0.0_f64;
+    let mut frame = Frame::default();
+    let mut first: Option<(Frame, u64)> = None;
+    let halves = 2 * (duration / of.period).ceil() as u32;
+    let contacts = |simulation: &Simulation| simulation.statistics().impacts.iter().sum::<u64>();
+    for n in 1..=halves {
+        let now = f64::from(n) * 0.5 * of.period;
+        simulation.advance_to(now).unwrap();
+        simulation.sample(now, &mut frame);
+        assert!(finite(&frame));
+        // At the step's end: inside it the interpolated state may lie in the wall by as much as the tolerance allows.
+        let end = frame_now(&mut simulation);
+        let running = simulation.running_scene();
+        assert_eq!(fault(&end, running, "tree"), None);
+        kinetic = kinetic.max(frame.kinetic);
+        for (joint, of_scene) in frame.joints.iter().zip(&running.ball_joints) {
+            if of_scene.contact.clearance == 0.0 {
+                drift.open = drift.open.max(joint.eccentricity.norm());
+            }
+        }
+        for body in &frame.bodies {
+            let turned = body.rotation.tr_mul(&body.rotation) - Mat3::identity();
+            drift.skew = drift.skew.max(turned.amax());
+        }
+        if n % 2 == 1 || n < 6 {
+            continue;
+        }
+        let Some((first, _)) = &first else {
+            first = Some((frame.clone(), contacts(&simulation)));
+            continue;
+        };
+        let gain = frame.kinetic + frame.potential - first.kinetic - first.potential;
+        drift.energy = drift.energy.max(gain.abs() / kinetic);
+        let force = |frame: &Frame, j: usize| frame.joints[j].normal_force.norm();
+        let joints = 0..frame.joints.len();
+        let most = joints.clone().map(|j| force(first, j)).fold(0.0, f64::max);
+        for j in joints {
+            let change = (force(&frame, j) - force(first, j)).abs() / most;
+            drift.force = drift.force.max(change);
+        }
+    }
+    let begun = first.map_or(0, |(_, begun)| begun);
+    drift.contacts = contacts(&simulation) - begun;
+    drift.steps = simulation.statistics().steps;
+    drift.time = simulation.time();
+    drift.residual = simulation.ledger().unwrap().relative_residual().abs();
+    println!("{} {changes:?}: {drift:?}", of.scene);
+    drift
+}
+
+fn holds(of: &Long, preset: usize, drift: &Drift) {
+    let what = format!("{} {}, {}", of.scene, of.what, FAST[preset]);
+    assert!(drift.open < 1e-12, "{what}: open by {:e} m", drift.open);
+    assert!(
+        drift.skew < 1e-12,
+        "{what}: orientation off by {:e}",
+        drift.skew
+    );
+    assert!(
+        drift.residual < RESIDUAL[preset],
+        "{what}: residual {:e}",
+        drift.residual
+    );
+    if let Some(limit) = of.limits[preset] {
+        assert!(drift.energy < limit, "{what}: energy {:e}", drift.energy);
+        assert!(
+            drift.force < 10.0 * limit,
+            "{what}: force {:e}",
+            drift.force
+        );
+    }
+}
+
+#[test]
+fn a_thousand_settled_seconds_drift_nowhere() {
+    for of in short_list() {
+        let drift = long_run(&of, 1, 1000.0);
+        holds(&of, 1, &drift);
+        assert_eq!(drift.contacts, 0, "{} {}: settled", of.scene, of.what);
+    }
+}
+
+#[test]
+#[ignore = "minutes; writes the long runs to docs/extremes.md"]
+fn write_a_thousand_seconds_of_every_kind() {
+    let mut page = String::from(
+        "\n## 1000 simulated seconds\n\n\
+         Written by `cargo test --test physics -- --ignored endurance::write`. Largest changes from the end of the third period to the end\n\
+         of any later one: energy as part of the largest kinetic energy, normal force as part of the largest. The energy residual is that of\n\
+         the balance over the whole run, of the energy exchanged. The free mechanisms have no period: their energy is taken every\n\
+         second. The pendulum swings down.\n\n\
+         | Scene | Preset | Steps | Contacts begun later | Ideal joints open by, m | Orientations off by | Energy | Energy residual | Normal force |\n\
+         |---|---|---|---|---|---|---|---|---|\n",
+    );
+    for of in long_list() {
+        for preset in 0..FAST.len() {
+            let d = long_run(&of, preset, 1000.0);
+            let force = match of.scene {
+                "pendulum" | "slider-crank" => "-".to_owned(),
+                _ => format!("{:.1e}", d.force),
+            };
+            let _ = writeln!(
+                page,
+                "| {}, {} | {} | {} | {} | {:.1e} | {:.1e} | {:.1e} | {:.1e} | {force} |",
+                of.scene,
+                of.what,
+                FAST[preset],
+                d.steps,
+                d.contacts,
+                d.open,
+                d.skew,
+                d.energy,
+                d.residual
+            );
+            holds(&of, preset, &d);
+        }
+    }
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/extremes.md");
+    let kept = std::fs::read_to_string(&path).unwrap();
+    let at = kept
+        .find("\n## 1000 simulated seconds\n")
+        .unwrap_or(kept.len());
+    std::fs::write(path, kept[..at].to_owned() + &page).unwrap();
+}

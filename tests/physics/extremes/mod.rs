@@ -1,0 +1,196 @@
+//! Every extreme that a scene may ask for, with every preset or method, ends in an outcome with a name.
+
+mod outcome;
+mod rows;
+
+use std::fmt::Write;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use crate::common::METHODS;
+use outcome::{Outcome, run};
+use rows::{Columns, Row, rows};
+
+/// Without a result for so long a call hangs.
+const DEAD: Duration = Duration::from_secs(600);
+const FORMS: [&str; 2] = ["tree", "lagrange"];
+const PRESETS: [&str; 4] = ["preview", "real-time", "accurate", "reference"];
+
+impl Columns {
+    fn words(self) -> &'static [&'static str] {
+        match self {
+            Self::Presets => &PRESETS,
+            Self::Methods => &METHODS,
+        }
+    }
+}
+
+/// Outcomes of a row: each formulation's in order of its columns.
+type Outcomes = [Vec<Outcome>; 2];
+
+/// Outcomes of every row.
+fn table(rows: Vec<Row>) -> Vec<(Row, Outcomes)> {
+    let cells: Vec<(usize, usize, &str)> = rows
+        .iter()
+        .enumerate()
+        .flat_map(|(r, row)| {
+            let words = row.columns.words();
+            (0..FORMS.len()).flat_map(move |f| words.iter().map(move |word| (r, f, *word)))
+        })
+        .collect();
+    let (rows, cells) = (Arc::new(rows), Arc::new(cells));
+    let next = Arc::new(Mutex::new(0));
+    let (send, receive) = channel();
+    for _ in 0..2 {
+        let (rows, cells, next, send) = (rows.clone(), cells.clone(), next.clone(), send.clone());
+        std::thread::spawn(move || {
+            loop {
+                let cell = {
+                    let mut next = next.lock().unwrap();
+                    *next += 1;
+                    *next - 1
+                };
+                let Some(&(row, form, word)) = cells.get(cell) else {
+                    return;
+                };
+                let run = || run(&rows[row], FORMS[form], word);
+                let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(run))
+                    .unwrap_or_else(|_| Outcome::Wrong("panic".to_owned()));
+                if send.send((cell, outcome)).is_err() {
+                    return;
+                }
+            }
+        });
+    }
+    drop(send);
+    let mut outcomes = vec![None; cells.len()];
+    loop {
+        match receive.recv_timeout(DEAD) {
+            Ok((cell, outcome)) => outcomes[cell] = Some(outcome),
+            Err(RecvTimeoutError::Disconnected) => break,
+            Err(RecvTimeoutError::Timeout) => {
+                let open = outcomes.iter().position(Option::is_none).unwrap();
+                let (row, form, word) = cells[open];
+                let row = &rows[row];
+                panic!(
+                    "hangs: {}, {}, {}, {word}",
+                    row.scene, row.what, FORMS[form]
+                );
+            }
+        }
+    }
+    let mut outcomes = outcomes.into_iter().map(Option::unwrap);
+    let Ok(rows) = Arc::try_unwrap(rows) else {
+        panic!("a thread still holds the rows")
+    };
+    let mut with = |row: Row| {
+        let mut take = || outcomes.by_ref().take(row.columns.words().len()).collect();
+        let of_forms = [take(), take()];
+        (row, of_forms)
+    };
+    rows.into_iter().map(&mut with).collect()
+}
+
+const HEAD: &str = "# Stable at the extremes
+
+What becomes of a scene at the ends of what may be asked for, with every preset, or with every method where the row is about
+step or tolerance, and both formulations: the first impacts of each row. `cargo test --test physics extremes::` runs the table and checks
+it; with `-- --ignored write_the_page` it writes this page.
+
+- **runs**: to the end. Every number is finite, orientations are rotations, ideal joints are closed to 1e-9 m (`lagrange`, which
+  only stabilises them: 1 mm), no ball is deeper in its wall than a tenth of its radius, a ball in the wall that moves deeper
+  meets a force, and where nothing drives the scene its energy does not grow.
+- **slow**: the same, slower than asked, and the pacer says so, from which the window shows the speed that it reached. Asked is
+  slow motion of 1:10 on a machine that does 50 000 evaluations of the equations a second, half as many with `lagrange`.
+- **doubtful**: the program marks the result as not to be trusted and says why (`doubts` in the summary of `run`).
+- **stopped**: the divergence guard ended it, says why, and keeps the last good state.
+- **refused**: it does not start, and says why.
+";
+/// What another test writes below the tables.
+const LONG_RUN: &str = "\n## 1000 simulated seconds\n";
+
+fn page(table: &[(Row, Outcomes)]) -> String {
+    let mut page = String::from(HEAD);
+    for (columns, about) in [
+        (Columns::Presets, "every preset"),
+        (Columns::Methods, "every method"),
+    ] {
+        let rows = || table.iter().filter(move |(row, _)| row.columns == columns);
+        for (f, form) in FORMS.iter().enumerate() {
+            let words = columns.words();
+            let line = "---|".repeat(words.len());
+            let words = words.join(" | ");
+            let _ = write!(
+                page,
+                "\n## With {about}, formulation `{form}`\n\n| Scene | Extreme | {words} |\n|---|---|{line}\n"
+            );
+            for (row, outcomes) in rows() {
+                let words: Vec<&str> = outcomes[f].iter().map(Outcome::word).collect();
+                let words = words.join(" | ");
+                let _ = writeln!(page, "| {} | {} | {words} |", row.scene, row.what);
+            }
+        }
+    }
+    page.push_str("\n## Why\n\nThe first that says so of each row and outcome.\n\n");
+    for (row, outcomes) in table {
+        let mut said: Vec<&str> = Vec::new();
+        for (f, form) in FORMS.iter().enumerate() {
+            for (outcome, column) in outcomes[f].iter().zip(row.columns.words()) {
+                if outcome.reason().is_empty() || said.contains(&outcome.word()) {
+                    continue;
+                }
+                said.push(outcome.word());
+                let (what, word, why) = (&row.what, outcome.word(), outcome.reason());
+                let why = why.lines().next().unwrap_or_default();
+                let _ = writeln!(
+                    page,
+                    "- {}, {what}, {form}, {column}: **{word}**: {why}",
+                    row.scene
+                );
+            }
+        }
+    }
+    page
+}
+
+fn page_path() -> std::path::PathBuf {
+    std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/extremes.md")
+}
+
+/// The page as it is kept: the tables, and the rest.
+fn kept() -> (String, String) {
+    let kept = std::fs::read_to_string(page_path()).unwrap_or_default();
+    let at = kept.find(LONG_RUN).unwrap_or(kept.len());
+    (kept[..at].to_owned(), kept[at..].to_owned())
+}
+
+#[test]
+#[ignore = "writes docs/extremes.md"]
+fn write_the_page() {
+    let page = page(&table(rows())) + &kept().1;
+    std::fs::write(page_path(), page).unwrap();
+}
+
+#[test]
+fn every_extreme_ends_in_a_named_outcome() {
+    let table = table(rows());
+    let mut wrong = 0;
+    for (row, outcomes) in &table {
+        for (f, form) in FORMS.iter().enumerate() {
+            for (outcome, column) in outcomes[f].iter().zip(row.columns.words()) {
+                if !outcome.reason().is_empty() {
+                    let (word, why) = (outcome.word(), outcome.reason());
+                    let what = &row.what;
+                    println!("{word}: {}, {what}, {form}, {column}: {why}", row.scene);
+                }
+                wrong += u32::from(matches!(outcome, Outcome::Wrong(_)));
+            }
+        }
+    }
+    assert_eq!(wrong, 0, "outcomes that must not be");
+    assert!(
+        kept().0 == page(&table),
+        "cargo test --test physics -- --ignored extremes::write_the_page"
+    );
+}

@@ -1,0 +1,241 @@
+//! What cannot go on stops, says where, when and what to try, and leaves the last good state.
+
+use crate::common::{frame_now, parse, run_until, scene, simulation};
+use jointplay::scene::built_in_text;
+use jointplay::simulate::{Simulation, Stopped};
+
+/// Steps until the guard speaks.
+fn run_to_stop(simulation: &mut Simulation) -> Stopped {
+    while simulation.time() < 10.0 {
+        if let Err(stopped) = simulation.step() {
+            return stopped;
+        }
+    }
+    panic!("went on to 10 s");
+}
+
+/// The state is the last good one, it can be shown, and another try leaves it as it is.
+fn still_good(simulation: &mut Simulation, stopped: &Stopped) {
+    assert_eq!(simulation.time(), stopped.time);
+    let hash = simulation.state_hash();
+    assert!(simulation.state().iter().all(|x| x.is_finite()));
+    for time in [simulation.step_start(), simulation.time()] {
+        let mut frame = jointplay::simulate::Frame::default();
+        simulation.sample(time, &mut frame);
+        let text = format!("{frame:?}");
+        assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
+    }
+    for _ in 0..3 {
+        let again = simulation.step().unwrap_err();
+        assert_eq!(again.time, stopped.time);
+        assert_eq!(simulation.state_hash(), hash);
+        // A step that is cut short by a row of output may succeed where the whole one cannot, but never leaves a bad state.
+        let end = simulation.time() + simulation.scene().solver.step.max(0.005);
+        assert!(simulation.step_until(end).is_err());
+        assert_eq!(simulation.state_hash(), hash);
+    }
+    assert_eq!(frame_now(simulation).time, stopped.time);
+}
+
+#[test]
+fn a_step_far_too_long_for_the_contact_is_stopped_with_advice() {
+    for name in ["spcmm", "pendulum", "chain"] {
+        for method in ["semi-implicit-euler", "rk4"] {
+            let mut simulation = simulation(
+                name,
+                &[
+                    ("solver.method", method),
+                    ("solver.step", "10 ms"),
+                    ("contact.youngs_modulus", "1000 GPa"),
+                ],
+            );
+            let stopped = run_to_stop(&mut simulation);
+            println!("{name}, {method}: {stopped}");
+            let text = stopped.to_string();
+            let scene = simulation.scene();
+            let joints = scene
+                .ball_joints
+                .iter()
+                .map(|j| format!("ball joint {}", j.name));
+            let bodies = scene.bodies.iter().map(|b| format!("body {}", b.name));
+            assert!(
+                joints.chain(bodies).any(|named| text.contains(&named)),
+                "{text}"
+            );
+            assert!(text.contains(&format!("{:.6e} s", stopped.time)), "{text}");
+            assert!(stopped.advice.contains("solver.step"), "{text}");
+            assert!(
+                stopped.advice.contains("solver.method = automatic"),
+                "{text}"
+            );
+            still_good(&mut simulation, &stopped);
+            // The advice helps from a reset.
+            simulation.set("solver.method", "automatic").unwrap();
+            simulation.reset().unwrap();
+            simulation.advance_to(0.02).unwrap();
+        }
+    }
+}
+
+#[test]
+fn advice_taken_in_mid_run_lets_it_go_on() {
+    let mut simulation = simulation(
+        "pendulum",
+        &[("solver.method", "rk4"), ("solver.step", "10 ms")],
+    );
+    let stopped = run_to_stop(&mut simulation);
+    simulation.set("solver.step", "1 us").unwrap();
+    for _ in 0..100 {
+        simulation.step().unwrap();
+    }
+    assert!(simulation.time() > stopped.time);
+}
+
+fn start_error(scene: &jointplay::scene::Scene) -> String {
+    match Simulation::new(scene) {
+        Ok(_) => panic!("started"),
+        Err(error) => error.to_string(),
+    }
+}
+
+#[test]
+fn ideal_ball_joints_that_do_not_close_are_named() {
+    let text = built_in_text("slider-crank").unwrap();
+    let moved = text.replace("position = \"200 mm\"", "position = \"205 mm\"");
+    assert_ne!(moved, text);
+    let ideal = parse(&moved, &[("contact.clearance", "0")]);
+    let error = start_error(&ideal);
+    println!("{error}");
+    assert!(
+        error.contains("ball joint C") && error.contains("5 mm apart as given"),
+        "{error}"
+    );
+    // With play it is outside its socket all the same.
+    let error = start_error(&parse(&moved, &[]));
+    println!("{error}");
+    assert!(
+        error.contains("ball joint C") && error.contains("clearance"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_trajectory_that_the_rods_cannot_reach_names_slider_and_time() {
+    for form in ["tree", "lagrange"] {
+        let changes = [("spcmm.amplitude_x", "100 mm"), ("formulation", form)];
+        let error = start_error(&scene("spcmm", &changes));
+        println!("{error}");
+        assert!(error.starts_with("slider "), "{error}");
+        assert!(error.contains(": rod too short at t = "), "{error}");
+        assert!(
+            error.contains("needs 0.2") && error.contains("has 0.2000 m"),
+            "{error}"
+        );
+    }
+    // A live change of it waits, and a reset that cannot start leaves the run as it is.
+    let mut simulation = simulation("spcmm", &[]);
+    simulation.advance_to(0.01).unwrap();
+    let hash = simulation.state_hash();
+    simulation.set("spcmm.amplitude_x", "100 mm").unwrap();
+    assert!(simulation.reset().is_err());
+    assert_eq!(simulation.state_hash(), hash);
+    simulation.step().unwrap();
+}
+
+#[test]
+fn ideal_joints_that_repeat_one_another_share_the_load() {
+    let text = built_in_text("pendulum").unwrap();
+    // A second ball joint at the same place: three rows that say what three others say.
+    let twice = format!(
+        "{text}\n[[ball_joint]]\nname = \"S2\"\nsocket = {{ body = \"world\", at = [0, 0, 0] }}\n\
+         ball = {{ body = \"rod\", at = \"0 0 100 mm\" }}\nopening = [0, -1, 0]\n"
+    );
+    for form in ["tree", "lagrange"] {
+        let changes = [("contact.clearance", "0"), ("formulation", form)];
+        let mut double = Simulation::new(&parse(&twice, &changes)).unwrap();
+        let mut single = Simulation::new(&parse(text, &changes)).unwrap();
+        run_until(&mut double, 0.1);
+        run_until(&mut single, 0.1);
+        let (two, one) = (frame_now(&mut double), frame_now(&mut single));
+        assert!((two.bodies[0].position - one.bodies[0].position).norm() < 1e-7);
+        for joint in &two.joints {
+            let half = joint.normal_force - one.joints[0].normal_force * 0.5;
+            assert!(half.norm() < 1e-5, "{form}: {half}");
+        }
+        let one = [changes[0], ("joint.S2.clearance", "0.3 mm"), changes[1]];
+        Simulation::new(&parse(&twice, &one)).unwrap();
+    }
+}
+
+#[test]
+fn a_start_in_a_singular_pose_is_refused() {
+    // The slider plane level with the hinges: the rods cannot hold the platform.
+    for plane in ["175 mm", "174.9999999 mm", "175.000000001 mm"] {
+        for clearance in ["0", "0.3 mm"] {
+            let changes = [
+                ("spcmm.slider_plane", plane),
+                ("contact.clearance", clearance),
+            ];
+            let error = start_error(&scene("spcmm", &changes));
+            assert!(error.contains("singular pose"), "{error}");
+        }
+    }
+    simulation("spcmm", &[("spcmm.slider_plane", "174.99 mm")]);
+}
+
+#[test]
+fn a_drive_beyond_all_measure_stops_the_adaptive_method_too() {
+    let text = built_in_text("slider-crank-driven").unwrap();
+    let wild = text.replace("velocity = \"6 rad/s\"", "velocity = \"300000 rad/s\"");
+    assert_ne!(wild, text);
+    let mut simulation = Simulation::new(&parse(&wild, &[])).unwrap();
+    let stopped = run_to_stop(&mut simulation);
+    println!("{stopped}");
+    let text = stopped.to_string();
+    assert!(
+        text.contains("body crank") || text.contains("ball joint C"),
+        "{text}"
+    );
+    assert!(stopped.advice.contains("slower drives"), "{text}");
+    still_good(&mut simulation, &stopped);
+}
+
+#[test]
+fn loops_that_pass_a_singular_pose_say_so() {
+    // Inside the range of slider planes in which the Jacobian changes its sign.
+    let changes = [("contact.clearance", "0"), ("spcmm.slider_plane", "165 mm")];
+    let mut simulation = simulation("spcmm", &changes);
+    let stopped = run_to_stop(&mut simulation);
+    println!("{stopped}");
+    assert!(stopped.what.contains("loops"), "{stopped}");
+    assert!(stopped.advice.contains("clearance"), "{stopped}");
+    assert!((stopped.time - 0.074).abs() < 2e-3);
+    // Deeper in the range a step may jump over the pose onto another branch: its sign gives it away.
+    let deeper = [("contact.clearance", "0"), ("spcmm.slider_plane", "170 mm")];
+    let stopped = run_to_stop(&mut self::simulation("spcmm", &deeper));
+    assert!(stopped.what.contains("singular pose"), "{stopped}");
+    let hash = simulation.state_hash();
+    assert!(simulation.step().is_err());
+    assert_eq!(simulation.state_hash(), hash);
+}
+
+#[test]
+fn the_other_form_stops_before_a_singular_pose_too() {
+    let changes = [
+        ("formulation", "lagrange"),
+        ("contact.clearance", "0"),
+        ("spcmm.slider_plane", "162 mm"),
+        ("spcmm.frequency", "5 Hz"),
+    ];
+    let mut simulation = simulation("spcmm", &changes);
+    let stopped = run_to_stop(&mut simulation);
+    println!("{stopped}");
+    assert!(stopped.what.contains("singular pose"), "{stopped}");
+    assert!(stopped.advice.contains("clearance"), "{stopped}");
+    // Where the tree form stops, and not by creeping closer until no number is left.
+    assert!((stopped.time - 1.066e-3).abs() < 2e-6, "{stopped}");
+    assert!(simulation.statistics().steps < 1000);
+    assert!(simulation.ledger().unwrap().drive_work.is_finite());
+    let text = format!("{:?}", frame_now(&mut simulation));
+    assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
+}

@@ -1,0 +1,365 @@
+//! The energy ledger: every joule is accounted for, and keeping it changes nothing.
+
+use crate::common::{Changes, METHODS, SCENES, run_until, simulation};
+use jointplay::simulate::{Frame, Ledger, Simulation};
+
+/// What the ledger promises of the preset `accurate`, of the energy exchanged.
+const PROMISE: f64 = 1e-4;
+
+/// Steps on for `time`; the last step is cut.
+fn go_on(simulation: &mut Simulation, time: f64) {
+    let end = simulation.time() + time;
+    run_until(simulation, end);
+}
+
+fn ledger(simulation: &Simulation) -> Ledger {
+    *simulation.ledger().unwrap()
+}
+
+/// The ledger of a built-in scene after `duration`.
+fn after(name: &str, changes: &Changes, duration: f64) -> Ledger {
+    let mut simulation = simulation(name, changes);
+    run_until(&mut simulation, duration);
+    let ledger = ledger(&simulation);
+    let residual = ledger.relative_residual();
+    println!("{name} {changes:?}: residual {residual:.1e} of {ledger:?}");
+    ledger
+}
+
+/// That the ledger balances to `bound`, and that it would not without any of the terms that `has` names.
+fn balances(case: &str, ledger: &Ledger, bound: f64, has: &[&str]) {
+    let residual = ledger.relative_residual().abs();
+    assert!(residual < bound, "{case}: {residual:e}, {ledger:?}");
+    assert!(ledger.exchanged > 0.0, "{case}");
+    let terms = [
+        ("drive", ledger.drive_work),
+        ("gravity", ledger.gravity_work),
+        ("kinetic", ledger.kinetic_change),
+        ("elastic", ledger.elastic_change),
+        ("restitution", ledger.restitution_loss),
+        ("friction", ledger.friction_loss),
+        ("clearance", ledger.clearance_work),
+        ("change", ledger.change_work),
+    ];
+    for (name, value) in terms {
+        if has.contains(&name) {
+            let without = (ledger.residual().abs() - value.abs()).abs() / ledger.exchanged;
+            assert!(without > 2.0 * bound, "{case}: {name} is only {value:e} J");
+        }
+    }
+}
+
+#[test]
+fn the_default_scene_balances_over_a_second() {
+    let accurate = ("solver.preset", "accurate");
+    let ledger = after("spcmm", &[accurate], 1.0);
+    let terms = ["drive", "gravity", "restitution", "friction"];
+    balances("spcmm", &ledger, PROMISE, &terms);
+    // Stored in the contacts by the weight that they carry.
+    assert!(ledger.elastic_change > 1e-7);
+    // During the impacts the stored energy weighs, too.
+    let mut simulation = simulation("spcmm", &[accurate]);
+    let mut largest: f64 = 0.0;
+    while simulation.time() < 0.02 {
+        simulation.step().unwrap();
+        let ledger = *simulation.ledger().unwrap();
+        largest = largest.max(ledger.elastic_change);
+        assert!(ledger.relative_residual().abs() < PROMISE);
+    }
+    assert!(largest > 1e-3 * simulation.ledger().unwrap().exchanged);
+}
+
+#[test]
+fn every_built_in_scene_balances() {
+    for name in SCENES {
+        let terms: &[&str] = match name {
+            "slider-crank-driven" => &["drive", "gravity", "kinetic", "friction"],
+            "spcmm" => &["gravity", "friction"],
+            _ => &["gravity", "kinetic", "friction"],
+        };
+        let ledger = after(name, &[], 0.3);
+        balances(name, &ledger, PROMISE, terms);
+        assert!(ledger.restitution_loss > 0.0);
+        assert_eq!((ledger.clearance_work, ledger.change_work), (0.0, 0.0));
+        let driven = ["spcmm", "slider-crank-driven"].contains(&name);
+        assert_eq!(ledger.drive_work == 0.0, !driven, "{name}");
+    }
+}
+
+#[test]
+fn every_law_friction_and_formulation_balances() {
+    let surface = ("contact.friction_velocity", "surface");
+    let centres = ("contact.friction_velocity", "centres");
+    let weak = ("contact.restitution", "0.3");
+    let dead = ("contact.restitution", "0");
+    let law = |name| ("contact.normal_law", name);
+    let lagrange = ("formulation", "lagrange");
+    let strong = ("contact.friction", "1");
+    let lossy: &[&str] = &["restitution", "friction"];
+    let cases: [(&str, &Changes, &[&str]); 12] = [
+        ("spcmm", &[surface], lossy),
+        ("spcmm", &[centres, strong], lossy),
+        ("spcmm", &[("contact.friction", "0")], &["restitution"]),
+        ("spcmm", &[law("hertz")], &["friction"]),
+        ("spcmm", &[law("gonthier"), weak], lossy),
+        ("spcmm", &[law("flores"), weak], lossy),
+        // The cut of the force at 0 takes part in its loss.
+        ("spcmm", &[law("hunt-crossley"), dead], lossy),
+        ("spcmm", &[lagrange], lossy),
+        ("slider-crank-driven", &[lagrange], &["drive"]),
+        ("slider-crank", &[centres, strong], &["friction"]),
+        ("pendulum", &[centres, strong], &["friction"]),
+        ("chain", &[law("gonthier"), weak], lossy),
+    ];
+    for (name, changes, terms) in cases {
+        let duration = if changes.contains(&lagrange) {
+            0.05
+        } else {
+            0.2
+        };
+        let ledger = after(name, changes, duration);
+        balances(&format!("{name} {changes:?}"), &ledger, PROMISE, terms);
+        if changes.contains(&law("hertz")) {
+            assert!(ledger.restitution_loss.abs() < 1e-12);
+        }
+        if changes.contains(&("contact.friction", "0")) {
+            assert_eq!(ledger.friction_loss, 0.0);
+        }
+    }
+}
+
+#[test]
+fn ideal_and_partly_ideal_mechanisms_balance() {
+    let ideal = ("contact.clearance", "0");
+    let fast = ("spcmm.frequency", "4 Hz");
+    let lagrange = ("formulation", "lagrange");
+    // Pure kinematics is integrated from the ends of its steps: a sixth-order quadrature of some fifty a period.
+    let cases: [(&str, &Changes, f64); 9] = [
+        ("spcmm", &[ideal], 1e-8),
+        ("spcmm", &[ideal, fast], 1e-6),
+        ("spcmm", &[ideal, lagrange], PROMISE),
+        ("spcmm", &[("joint.S2.clearance", "0")], PROMISE),
+        (
+            "spcmm",
+            &[("joint.S1.clearance", "0"), ("joint.S3.clearance", "0")],
+            PROMISE,
+        ),
+        ("slider-crank", &[ideal], PROMISE),
+        ("slider-crank", &[ideal, lagrange], PROMISE),
+        (
+            "slider-crank-driven",
+            &[("joint.C.clearance", "0")],
+            PROMISE,
+        ),
+        ("pendulum", &[ideal], PROMISE),
+    ];
+    for (name, changes, bound) in cases {
+        // A third of a drive's period: the works do not come back to zero.
+        let ledger = after(name, changes, 0.31);
+        let terms: &[&str] = if name == "spcmm" {
+            &["drive", "gravity"]
+        } else {
+            &["gravity", "kinetic"]
+        };
+        balances(&format!("{name} {changes:?}"), &ledger, bound, terms);
+    }
+}
+
+#[test]
+fn every_method_keeps_a_ledger() {
+    for name in ["spcmm", "pendulum"] {
+        for method in METHODS {
+            // At 10 us a fixed step resolves an impact to a per cent, its energy to some parts in a thousand.
+            let bound = match method {
+                "semi-implicit-euler" => 5e-3,
+                // Damps what its step does not resolve: the energy of impacts that it swallows is its error.
+                "imex-euler" => 4e-2,
+                "rk4" | "rosenbrock" => 5e-4,
+                _ => PROMISE,
+            };
+            let ledger = after(name, &[("solver.method", method)], 0.1);
+            balances(&format!("{name}, {method}"), &ledger, bound, &["gravity"]);
+        }
+    }
+}
+
+#[test]
+fn the_residual_is_the_error_of_the_integration() {
+    let residual = |method: &str, step: &str| {
+        let changes = [("solver.method", method), ("solver.step", step)];
+        after("pendulum", &changes, 0.02).relative_residual().abs()
+    };
+    let (coarse, fine) = (residual("rk4", "8 us"), residual("rk4", "1 us"));
+    assert!(fine < 0.1 * coarse, "{coarse:e} {fine:e}");
+    let at = |tolerance: &str| {
+        let changes = [("solver.tolerance", tolerance), ("solver.method", "dopri5")];
+        after("spcmm", &changes, 0.03).relative_residual().abs()
+    };
+    let (loose, tight) = (at("1e-4"), at("1e-9"));
+    assert!(tight < 1e-2 * loose && tight < 1e-6, "{loose:e} {tight:e}");
+}
+
+#[test]
+fn live_changes_are_booked() {
+    for method in ["automatic", "rk4"] {
+        // Fixed steps that keep up with the hard impacts at the end.
+        let changes = [("solver.method", method), ("solver.step", "2 us")];
+        let mut simulation = simulation("spcmm", &changes);
+        let bound = if method == "rk4" { 5e-4 } else { PROMISE };
+        simulation.advance_to(0.4).unwrap();
+        // Settled: the balls stand against their walls, which close now.
+        simulation.set("contact.clearance", "0.29 mm").unwrap();
+        go_on(&mut simulation, 2e-3);
+        let under_way = ledger(&simulation);
+        assert!(under_way.clearance_work != 0.0);
+        go_on(&mut simulation, 18e-3);
+        let arrived = ledger(&simulation);
+        let case = format!("{method}, after a ramp");
+        balances(&case, &arrived, PROMISE, &["clearance"]);
+        // A softer contact under the same penetration holds less; a stiffer one more.
+        simulation.set("contact.youngs_modulus", "50 GPa").unwrap();
+        let softer = ledger(&simulation);
+        assert!(softer.change_work < 0.0);
+        assert!((softer.residual() - arrived.residual()).abs() < 1e-15);
+        simulation.set("contact.youngs_modulus", "400 GPa").unwrap();
+        simulation.set("gravity.x", "-9.81 m/s^2").unwrap();
+        // Sticking is too stiff for a fixed step in the hard impacts that follow, and its ledger would say so.
+        simulation.set("contact.friction", "0").unwrap();
+        let stiffer = ledger(&simulation);
+        let jump = stiffer.elastic_change - softer.elastic_change;
+        assert!((stiffer.change_work - softer.change_work - jump).abs() < 1e-15);
+        assert!((stiffer.residual() - arrived.residual()).abs() < 1e-15);
+        go_on(&mut simulation, 30e-3);
+        // A wider play lets go.
+        simulation.set("contact.clearance", "0.6 mm").unwrap();
+        go_on(&mut simulation, 30e-3);
+        let case = format!("{method}, after all changes");
+        balances(&case, &ledger(&simulation), bound, &["restitution"]);
+    }
+}
+
+#[test]
+fn a_contact_under_load_books_what_softening_releases() {
+    // Soft enough that the stored energy is no trifle.
+    let mut simulation = simulation("pendulum", &[("contact.youngs_modulus", "1 GPa")]);
+    simulation.advance_to(0.3).unwrap();
+    let before = ledger(&simulation);
+    simulation.set("contact.youngs_modulus", "100 GPa").unwrap();
+    simulation.advance_to(0.32).unwrap();
+    let after = ledger(&simulation);
+    println!("{before:?}\n{after:?}");
+    balances("stiffened", &after, PROMISE, &["change"]);
+}
+
+#[test]
+fn keeping_it_changes_no_bit() {
+    let off = ("solver.energy_ledger", "off");
+    for name in SCENES {
+        for method in METHODS {
+            for more in [
+                vec![],
+                vec![("contact.clearance", "0")],
+                vec![("formulation", "lagrange")],
+            ] {
+                let mut changes = vec![("solver.method", method)];
+                changes.extend(more);
+                let mut with = simulation(name, &changes);
+                changes.push(off);
+                let mut without = simulation(name, &changes);
+                assert!(with.ledger().is_some() && without.ledger().is_none());
+                let end = 0.012;
+                for simulation in [&mut with, &mut without] {
+                    simulation.advance_to(0.009).unwrap();
+                    simulation.set("contact.friction", "0.1").unwrap();
+                    simulation.set("contact.clearance", "0.28 mm").unwrap();
+                    run_until(simulation, end);
+                }
+                assert_eq!(
+                    with.state_hash(),
+                    without.state_hash(),
+                    "{name} {changes:?}"
+                );
+                assert_eq!(with.state(), without.state());
+                assert_eq!(
+                    with.statistics(),
+                    without.statistics(),
+                    "{name} {changes:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn it_is_part_of_snapshots_and_starts_anew_at_a_reset() {
+    for (name, changes) in [
+        ("spcmm", vec![]),
+        ("spcmm", vec![("contact.clearance", "0")]),
+        ("pendulum", vec![("solver.method", "rk4")]),
+    ] {
+        let mut simulation = simulation(name, &changes);
+        assert_eq!(ledger(&simulation), Ledger::default());
+        simulation.advance_to(0.05).unwrap();
+        let (snapshot, here) = (simulation.snapshot(), ledger(&simulation));
+        simulation.advance_to(0.1).unwrap();
+        let there = ledger(&simulation);
+        assert_ne!(here, there);
+        simulation.restore(&snapshot).unwrap();
+        assert_eq!(ledger(&simulation), here);
+        simulation.advance_to(0.1).unwrap();
+        assert_eq!(ledger(&simulation), there, "{name}");
+        simulation.reset().unwrap();
+        assert_eq!(ledger(&simulation), Ledger::default());
+        simulation.advance_to(0.05).unwrap();
+        assert_eq!(ledger(&simulation), here, "{name}");
+    }
+    // The switch waits for a reset.
+    let mut simulation = simulation("pendulum", &[]);
+    simulation.set("solver.energy_ledger", "off").unwrap();
+    simulation.step().unwrap();
+    assert!(simulation.ledger().is_some());
+    simulation.reset().unwrap();
+    assert!(simulation.ledger().is_none());
+}
+
+#[test]
+fn frames_inside_a_step_balance_too() {
+    for (name, changes, until) in [
+        ("spcmm", vec![], 0.4),
+        ("spcmm", vec![("contact.clearance", "0")], 0.4),
+        ("spcmm", vec![("joint.S2.clearance", "0")], 0.05),
+        ("spcmm", vec![("solver.method", "dopri5")], 0.02),
+        ("pendulum", vec![("solver.method", "rk4")], 0.02),
+    ] {
+        let bound = if changes == [("solver.method", "rk4")] {
+            1e-3
+        } else {
+            PROMISE
+        };
+        let mut simulation = simulation(name, &changes);
+        let mut frame = Frame::default();
+        simulation.sample(0.0, &mut frame);
+        let (kinetic, elastic) = (frame.kinetic, frame.elastic);
+        let mut worst: f64 = 0.0;
+        while simulation.time() < until {
+            simulation.step().unwrap();
+            let (from, to) = (simulation.step_start(), simulation.time());
+            for part in [0.0, 0.1, 0.4, 0.8, 1.0] {
+                simulation.sample(from + part * (to - from), &mut frame);
+                let ledger = frame.ledger.unwrap();
+                // What the row says of the energies is what its ledger says.
+                let off = ledger.kinetic_change + ledger.elastic_change
+                    - (frame.kinetic - kinetic + frame.elastic - elastic);
+                assert!(off.abs() < 1e-12, "{name}: {off:e}");
+                worst = worst.max(ledger.residual().abs());
+            }
+            assert_eq!(frame.ledger, simulation.ledger().copied());
+        }
+        let exchanged = ledger(&simulation).exchanged;
+        println!("{name} {changes:?}: {:.1e}", worst / exchanged);
+        assert!(
+            worst < bound * exchanged,
+            "{name} {changes:?}: {worst:e} of {exchanged:e}"
+        );
+    }
+}

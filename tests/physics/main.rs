@@ -1,0 +1,27 @@
+//! The mechanics: numbers, energy, contacts, methods, what stops and what is doubted.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod corners;
+mod determinism;
+mod double_crossing;
+mod doubts;
+mod endurance;
+mod energy;
+mod extremes;
+mod guard;
+mod imex;
+mod impact;
+mod independent;
+mod known_systems;
+mod ledger;
+mod live_changes;
+mod order;
+mod pays_only;
+mod planar_loops;
+mod properties;
+mod reference;
+mod restitution;
+mod settled;
+mod twin;

@@ -1,0 +1,149 @@
+//! Each stepper shows its order on smooth motions of the mechanisms themselves.
+
+use crate::common::{run_until, scene, simulation, slope};
+use jointplay::integrate::{
+    DormandPrince, ImexEuler, RungeKutta4, SemiImplicitEuler, Stepper, System,
+};
+use jointplay::mechanism::Mechanism;
+
+/// Largest difference of two states relative to the scales of their components.
+fn distance(a: &[f64], b: &[f64], scale: &[f64]) -> f64 {
+    let parts = a.iter().zip(b).zip(scale);
+    parts
+        .map(|((a, b), s)| (a - b).abs() / s)
+        .fold(0.0, f64::max)
+}
+
+/// State of `mechanism` after `steps` equal steps over `duration`.
+fn equal_steps<S: Stepper>(
+    mechanism: &mut Mechanism,
+    mut stepper: S,
+    start: &[f64],
+    duration: f64,
+    steps: u32,
+) -> Vec<f64> {
+    let n = start.len();
+    let (mut y, mut end) = (start.to_vec(), vec![0.0; n]);
+    let (mut k, mut k_end) = (vec![0.0; n], vec![0.0; n]);
+    let h = duration / f64::from(steps);
+    for i in 0..steps {
+        let t = f64::from(i) * h;
+        mechanism.derivative(t, &y, &mut k);
+        stepper.attempt(mechanism, t, h, &y, &k, &mut end, &mut k_end);
+        std::mem::swap(&mut y, &mut end);
+    }
+    y
+}
+
+/// The same with the method that is implicit in the contacts.
+fn equal_imex_steps(m: &mut Mechanism, start: &[f64], duration: f64, steps: u32) -> Vec<f64> {
+    let mut stepper = ImexEuler::new(start.len());
+    let (mut y, mut end) = (start.to_vec(), start.to_vec());
+    let h = duration / f64::from(steps);
+    for i in 0..steps {
+        stepper.attempt(m, f64::from(i) * h, h, &y, &mut end);
+        std::mem::swap(&mut y, &mut end);
+    }
+    y
+}
+
+/// The platform with its rods, all contacts open, flung into a tumble: nine coupled coordinates, no event.
+#[test]
+fn slopes_of_the_error_are_the_orders() {
+    const DURATION: f64 = 0.32;
+    let scene = scene("spcmm", &[]);
+    let mut mechanism = Mechanism::new(&scene).unwrap();
+    let mut start = mechanism.start().unwrap();
+    let n = start.len();
+    for (rate, i) in start[mechanism.positions()..]
+        .iter_mut()
+        .zip([0, 0, 0, 6, -9, 5, 20, -15, 10])
+    {
+        *rate += 0.25 * f64::from(i);
+    }
+    let scale = mechanism.scale().to_vec();
+    let exact = equal_steps(
+        &mut mechanism,
+        DormandPrince::new(n),
+        &start,
+        DURATION,
+        4000,
+    );
+    let mut order = |name: &str, steps: [u32; 4], expected: f64, tolerance: f64| {
+        let points: Vec<(f64, f64)> = steps
+            .iter()
+            .map(|&steps| {
+                let m = &mut mechanism;
+                let y = match name {
+                    "semi-implicit-euler" => {
+                        equal_steps(m, SemiImplicitEuler::new(n), &start, DURATION, steps)
+                    }
+                    "imex-euler" => equal_imex_steps(m, &start, DURATION, steps),
+                    "rk4" => equal_steps(m, RungeKutta4::new(n), &start, DURATION, steps),
+                    _ => equal_steps(m, DormandPrince::new(n), &start, DURATION, steps),
+                };
+                (DURATION / f64::from(steps), distance(&y, &exact, &scale))
+            })
+            .collect();
+        let found = slope(&points);
+        println!("{name}: order {found:.3}, {points:?}");
+        assert!((found - expected).abs() < tolerance, "{name}: {found}");
+    };
+    // The next order of the error still shows at these steps: a few hundredths of the slope.
+    order("semi-implicit-euler", [160, 320, 640, 1280], 1.0, 0.05);
+    order("imex-euler", [160, 320, 640, 1280], 1.0, 0.05);
+    order("rk4", [40, 80, 160, 320], 4.0, 0.2);
+    order("dopri5", [40, 80, 160, 320], 5.0, 0.3);
+}
+
+/// Error at `end` of the free slider-crank with ideal joints (loops projected back at every step), and steps.
+fn projected(changes: &[(&str, &str)], exact: Option<&[f64]>) -> (f64, Vec<f64>, u64) {
+    const END: f64 = 0.24;
+    let ideal = [("joint.B.clearance", "0"), ("joint.C.clearance", "0")];
+    let mut simulation = simulation("slider-crank", &[&ideal, changes].concat());
+    run_until(&mut simulation, END);
+    let y = simulation.state().to_vec();
+    let scale = simulation.mechanism().scale().to_vec();
+    let error = exact.map_or(0.0, |exact| distance(&y, exact, &scale));
+    (error, y, simulation.statistics().steps)
+}
+
+#[test]
+fn projection_keeps_the_order_of_fixed_steps() {
+    let (_, exact, _) = projected(&[("solver.tolerance", "1e-13")], None);
+    for (method, steps, expected, tolerance) in [
+        (
+            "semi-implicit-euler",
+            [2000.0, 1000.0, 500.0, 250.0],
+            1.0,
+            0.1,
+        ),
+        ("rk4", [8000.0, 4000.0, 2000.0, 1000.0], 4.0, 0.3),
+    ] {
+        let points = steps.map(|step| {
+            let changes = [
+                ("solver.method", method),
+                ("solver.step", &format!("{step} us")),
+            ];
+            (step, projected(&changes, Some(&exact)).0)
+        });
+        let found = slope(&points);
+        println!("{method}, projected: order {found:.3}, {points:?}");
+        assert!((found - expected).abs() < tolerance, "{method}: {found}");
+    }
+}
+
+#[test]
+fn error_of_the_adaptive_method_follows_its_tolerance() {
+    let (_, exact, _) = projected(&[("solver.tolerance", "1e-13")], None);
+    let runs = ["1e-8", "1e-9", "1e-10", "1e-11"].map(|tolerance| {
+        let (error, _, steps) = projected(&[("solver.tolerance", tolerance)], Some(&exact));
+        (tolerance.parse::<f64>().unwrap(), error, steps as f64)
+    });
+    let by_tolerance = slope(&runs.map(|(tolerance, error, _)| (tolerance, error)));
+    let by_steps = slope(&runs.map(|(_, error, steps)| (1.0 / steps, error)));
+    println!("dopri5: error ~ tolerance^{by_tolerance:.3}, ~ step^{by_steps:.3}, {runs:?}");
+    // Error per step is held: with order 5 of the result and 4 of the estimate, exponent 1.
+    assert!((by_tolerance - 1.0).abs() < 0.15, "{by_tolerance}");
+    assert!((by_steps - 5.0).abs() < 0.75, "{by_steps}");
+}

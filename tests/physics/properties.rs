@@ -1,0 +1,359 @@
+//! Any values of the one parameter table: in their ranges a scene starts or says why not, outside of them every key says what
+//! is allowed. `PROPTEST_CASES` asks for more cases than every run of the tests makes, `PROPTEST_RNG_SEED` for others.
+
+use crate::common::METHODS;
+use crate::common::invariants::finite;
+use jointplay::scene::{
+    BUILT_IN, Doubt as SceneDoubt, Kind, Parameter, Scene, Scope, Value, table,
+};
+use jointplay::simulate::{Doubt, Frame, Simulation};
+use proptest::prelude::*;
+use proptest::test_runner::{RngSeed, TestCaseError};
+
+/// Steps that every start is followed by, and evaluations after which they have cost enough.
+const STEPS: u32 = 8;
+const MOST_EVALUATIONS: u64 = 3000;
+/// More links start just the same, and cost time.
+const MOST_LINKS: u64 = 12;
+
+/// The same cases every time, unless the environment asks for others.
+fn config(cases: u32) -> ProptestConfig {
+    let asked = |name| std::env::var_os(name).is_some();
+    let usual = ProptestConfig {
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    };
+    if asked("PROPTEST_CASES") || asked("PROPTEST_RNG_SEED") {
+        return usual;
+    }
+    ProptestConfig {
+        cases,
+        rng_seed: RngSeed::Fixed(1),
+        ..usual
+    }
+}
+
+/// Values in a row's range, its ends among them; wide ranges evenly in their decades.
+fn values(parameter: &'static Parameter) -> BoxedStrategy<Value> {
+    match parameter.kind {
+        Kind::Number { min, max, .. } => {
+            // Where the range begins at 0 or below, small values have decades of their own.
+            let least = if min > 0.0 { min } else { 1e-9 };
+            let decades = (least.ln()..max.ln()).prop_map(move |x| x.exp().clamp(min, max));
+            let negative = decades.clone().prop_map(move |x| (-x).max(min));
+            prop_oneof![
+                1 => Just(min),
+                1 => Just(max),
+                1 => Just(0.0_f64.clamp(min, max)),
+                3 => min..=max,
+                4 => decades,
+                1 => negative,
+            ]
+            .prop_map(Value::Number)
+            .boxed()
+        }
+        Kind::Count { min, max } => (min..=max.min(MOST_LINKS)).prop_map(Value::Count).boxed(),
+        Kind::Choice(words) => proptest::sample::select(words)
+            .prop_map(Value::Choice)
+            .boxed(),
+    }
+}
+
+/// Any row of the table.
+fn rows() -> impl Strategy<Value = &'static Parameter> {
+    (0..table().len()).prop_map(|row| &table()[row])
+}
+
+/// A row of the table that `scene` has, as a key: of all joints, or of one of them.
+fn key(scene: &Scene, parameter: &Parameter, joint: usize) -> String {
+    // Twice in three of all.
+    let joints = &scene.ball_joints;
+    match parameter.key.strip_prefix("contact.") {
+        Some(part) if joint.is_multiple_of(3) => {
+            format!("joint.{}.{part}", joints[joint / 3 % joints.len()].name)
+        }
+        _ => parameter.key.to_owned(),
+    }
+}
+
+/// A built-in scene, and changes in its keys' ranges.
+fn changed_scenes() -> impl Strategy<Value = (&'static str, Vec<(String, String)>)> {
+    let of_scene = |name: &'static str| {
+        let scene = Scene::load(name, &[]).unwrap();
+        let rows: Vec<BoxedStrategy<(&'static Parameter, Value)>> = scene
+            .parameters()
+            .into_iter()
+            .map(|row| values(row).prop_map(move |value| (row, value)).boxed())
+            .collect();
+        let change = proptest::strategy::Union::new(rows);
+        proptest::collection::vec((change, any::<usize>()), 1..=8).prop_map(move |changes| {
+            let write = |((row, value), joint): ((&'static Parameter, Value), usize)| {
+                (key(&scene, row, joint), row.write(&value))
+            };
+            (name, changes.into_iter().map(write).collect::<Vec<_>>())
+        })
+    };
+    proptest::sample::select(&BUILT_IN[..]).prop_flat_map(of_scene)
+}
+
+fn fail(what: impl Into<String>) -> TestCaseError {
+    TestCaseError::fail(what.into())
+}
+
+/// An error in words for a person, about one of `changes`.
+fn is_clear(words: &str, changes: &[(String, String)]) -> Result<(), TestCaseError> {
+    prop_assert!(!words.contains("NaN") && words.len() < 2000, "{words}");
+    let part = |key: &str| key.rsplit('.').next().unwrap_or_default().to_owned();
+    prop_assert!(
+        changes.iter().any(|(key, _)| words.contains(&part(key))),
+        "names no key: {words}"
+    );
+    Ok(())
+}
+
+/// A scene with some joints ideal, some loose, with any method and formulation: what a run of it says of itself must agree.
+#[derive(Clone, Debug)]
+struct Mixed {
+    scene: &'static str,
+    changes: Vec<(String, String)>,
+}
+
+fn mixed() -> impl Strategy<Value = Mixed> {
+    let word = proptest::sample::select;
+    (
+        word(&BUILT_IN[..]),
+        word(&METHODS[..]),
+        word(&["tree", "lagrange"][..]),
+        word(&["start", "largest"][..]),
+        word(&["5 us", "10 us", "25 us", "100 us"][..]),
+        1e-7..5e-5_f64,
+        proptest::collection::vec(proptest::option::weighted(0.7, 0.02..0.4_f64), 3),
+    )
+        .prop_map(|(scene, method, form, approach, step, tolerance, joints)| {
+            let mut changes = vec![
+                ("solver.method".to_owned(), method.to_owned()),
+                ("formulation".to_owned(), form.to_owned()),
+                ("contact.approach_speed".to_owned(), approach.to_owned()),
+                ("solver.step".to_owned(), step.to_owned()),
+                ("solver.tolerance".to_owned(), format!("{tolerance:e}")),
+            ];
+            if scene == "chain" {
+                changes.push(("chain.links".to_owned(), "3".to_owned()));
+            }
+            let names = Scene::load(scene, &changes).unwrap().ball_joints;
+            for (joint, clearance) in names.iter().zip(&joints) {
+                let key = format!("joint.{}.clearance", joint.name);
+                let value = clearance.map_or("0".to_owned(), |c| format!("{c:.4} mm"));
+                changes.push((key, value));
+            }
+            Mixed { scene, changes }
+        })
+}
+
+/// How far a peak found from the ends of steps may be below the largest of many rows, and above: at a loose tolerance the cubic through
+/// both ends of a step and the method's own interpolant differ.
+const BELOW: f64 = 0.02;
+const ABOVE: f64 = 0.06;
+
+/// Rows within every step.
+const ROWS: u32 = 6;
+
+proptest! {
+    #![proptest_config(config(32))]
+
+    #[test]
+    fn summary_rows_and_impacts_agree(mixed in mixed()) {
+        let scene = match Scene::load(mixed.scene, &mixed.changes) {
+            Ok(scene) => scene,
+            Err(error) => return is_clear(&error.to_string(), &mixed.changes),
+        };
+        let (Ok(mut plain), Ok(mut sampled)) = (Simulation::new(&scene), Simulation::new(&scene)) else {
+            return Ok(());
+        };
+        let joints = scene.ball_joints.len();
+        let mut frame = Frame::default();
+        let (mut rows, mut impacts) = (vec![0.0_f64; joints], Vec::new());
+        while plain.time() < 0.012 && plain.step().is_ok() {
+            sampled.step().map_err(|stopped| fail(stopped.to_string()))?;
+            let (from, to) = (sampled.step_start(), sampled.time());
+            for n in 0..=ROWS {
+                let time = from + (to - from) * f64::from(n) / f64::from(ROWS);
+                sampled.sample(time, &mut frame);
+                for (row, report) in rows.iter_mut().zip(&frame.joints) {
+                    *row = row.max(report.normal_force.norm());
+                }
+            }
+            sampled.take_impacts(&mut impacts);
+        }
+        prop_assert_eq!(plain.state_hash(), sampled.state_hash());
+        let statistics = plain.statistics();
+        let unresolved = |doubt: &Doubt| matches!(doubt, Doubt::Unresolved { .. } | Doubt::Scene(SceneDoubt::Step { .. }));
+        // What happens within a step that is longer than an impact is a matter of interpolation, and marked.
+        let resolved = !plain.doubts().iter().any(unresolved);
+        for (j, joint) in scene.ball_joints.iter().enumerate() {
+            let (row, name) = (rows[j], &joint.name);
+            // What a run prints after its rows, and what a sweep, which has none, prints.
+            let (printed, found) = (sampled.peak(j).0, statistics.peak_normal[j]);
+            prop_assert!(printed >= row, "{}: {} below the rows' {}", name, printed, row);
+            let agrees = found >= row * (1.0 - BELOW) - 1.0 && found <= row * (1.0 + ABOVE) + 1.0;
+            prop_assert!(!resolved || agrees, "{}: {}, rows {}", name, found, row);
+            prop_assert!((0.0..=plain.time()).contains(&statistics.peak_time[j]));
+            let own = || impacts.iter().filter(move |impact| impact.joint == j);
+            prop_assert!(own().count() as u64 <= statistics.impacts[j], "{}", name);
+            prop_assert!(joint.contact.clearance > 0.0 || own().count() == 0, "{}", name);
+            let chi = jointplay::contact::damping_factor(joint.contact.normal_law, joint.contact.restitution);
+            let largest = joint.contact.approach_speed == jointplay::contact::ApproachSpeed::Largest;
+            for impact in own() {
+                prop_assert!(impact.peak <= found * (1.0 + 1e-12), "{:?} beyond {}", impact, found);
+                prop_assert!(impact.start < impact.end && impact.end <= plain.time(), "{:?}", impact);
+                prop_assert!(impact.damping <= statistics.damping[j], "{:?}", impact);
+                prop_assert!(!largest || impact.damping <= chi * (1.0 + 2e-6), "{:?}", impact);
+            }
+        }
+        let ledger = (plain.ledger().copied(), sampled.ledger().copied());
+        prop_assert_eq!(ledger.0, ledger.1);
+    }
+}
+
+proptest! {
+    #![proptest_config(config(400))]
+
+    #[test]
+    fn any_values_in_range_start_or_are_refused_and_stay_finite((name, changes) in changed_scenes()) {
+        let scene = match Scene::load(name, &changes) {
+            Ok(scene) => scene,
+            Err(error) => return is_clear(&error.to_string(), &changes),
+        };
+        for (key, text) in &changes {
+            let last = changes.iter().rfind(|(other, _)| other == key);
+            let beaten = key.starts_with("contact.") || key.starts_with("solver.");
+            if !beaten && last.is_some_and(|(_, other)| other == text) {
+                let row = scene.parameter(key).map_err(|error| fail(error.to_string()))?;
+                let value = scene.get(key).map_err(|error| fail(error.to_string()))?;
+                prop_assert_eq!(row.read(text), Ok(value), "{} = {}", key, text);
+            }
+        }
+        prop_assert!(scene.warnings().iter().all(|warning| warning.ends_with('.')));
+        let mut simulation = match Simulation::new(&scene) {
+            Ok(simulation) => simulation,
+            Err(error) => return is_clear(&error.located(&scene).to_string(), &changes),
+        };
+        let mut frame = Frame::default();
+        simulation.sample(0.0, &mut frame);
+        prop_assert!(finite(&frame), "not finite at the start");
+        for _ in 0..STEPS {
+            let before = simulation.time();
+            match simulation.step() {
+                Ok(()) => prop_assert!(simulation.time() > before),
+                Err(stopped) => {
+                    prop_assert_eq!(simulation.time(), before);
+                    prop_assert!(!stopped.to_string().contains("NaN"), "{}", stopped);
+                }
+            }
+            let inside = 0.5 * (simulation.step_start() + simulation.time());
+            for time in [inside, simulation.time()] {
+                simulation.sample(time, &mut frame);
+                prop_assert!(finite(&frame), "not finite at t = {time:e}");
+            }
+            if simulation.time() == before || simulation.statistics().evaluations > MOST_EVALUATIONS {
+                break;
+            }
+        }
+        let words: Vec<String> = simulation.doubts().iter().map(ToString::to_string).collect();
+        prop_assert!(words.iter().all(|doubt| doubt.ends_with('.') && !doubt.contains("NaN")), "{words:?}");
+    }
+
+    #[test]
+    fn any_changes_of_a_running_scene_are_taken_or_refused_and_stay_finite((name, changes) in changed_scenes()) {
+        let mut simulation = Simulation::new(&Scene::load(name, &[]).unwrap()).unwrap();
+        // Somewhere in the first impacts.
+        simulation.advance_to(8e-3).map_err(|stopped| fail(stopped.to_string()))?;
+        let mut frame = Frame::default();
+        for (key, value) in &changes {
+            let hash = simulation.state_hash();
+            if let Err(error) = simulation.set(key, value) {
+                is_clear(&error.to_string(), &changes)?;
+                prop_assert_eq!(simulation.state_hash(), hash, "changed by what it refused");
+            }
+            for _ in 0..2 {
+                let stopped = simulation.step().is_err();
+                for time in [simulation.step_start(), simulation.time()] {
+                    simulation.sample(time, &mut frame);
+                    prop_assert!(finite(&frame), "not finite at t = {time:e} after {key} = {value}");
+                }
+                if stopped {
+                    return Ok(());
+                }
+            }
+        }
+        // What waited for a reset takes effect, or says why not; what ran goes on.
+        let time = simulation.time();
+        let scene = simulation.scene().clone();
+        match simulation.reset() {
+            Ok(()) => prop_assert_eq!(simulation.time(), 0.0),
+            Err(error) => {
+                prop_assert_eq!(simulation.time(), time);
+                is_clear(&error.located(&scene).to_string(), &changes)?;
+            }
+        }
+    }
+
+    #[test]
+    fn every_value_goes_through_text_and_back(
+        (row, value) in rows().prop_flat_map(|row| values(row).prop_map(move |value| (row, value)))
+    ) {
+        let written = row.write(&value);
+        prop_assert_eq!(row.read(&written), Ok(value.clone()), "{}", written);
+        prop_assert!(row.check(&value).is_ok());
+        let spcmm = Scene::load(if row.scope == Scope::Chain { "chain" } else { "spcmm" }, &[]).unwrap();
+        let mut scene = spcmm;
+        match scene.set_value(row.key, &value) {
+            Ok(_) => {
+                prop_assert_eq!(scene.get(row.key).unwrap(), value);
+                // What was recorded makes the same scene from its text.
+                let again = Scene::load(&scene.name, &scene.changes).unwrap();
+                prop_assert_eq!(again.get(row.key).unwrap(), scene.get(row.key).unwrap());
+            }
+            Err(error) => prop_assert!(error.to_string().contains(row.key), "{}", error),
+        }
+    }
+
+    #[test]
+    fn a_value_out_of_range_names_key_value_range_and_unit(
+        row in rows(), above in any::<bool>(), beyond in 1e-6..10.0_f64
+    ) {
+        let outside = match row.kind {
+            Kind::Number { min, max, .. } => {
+                let edge = if above { max } else { min };
+                let size = edge.abs().max(1e-9) * beyond;
+                Value::Number(if above { edge + size } else { edge - size })
+            }
+            Kind::Count { min, max } => Value::Count(if above { max + 1 + beyond as u64 } else { min - 1 }),
+            Kind::Choice(_) => return Ok(()),
+        };
+        prop_assert!(row.check(&outside).is_err());
+        let written = row.write(&outside);
+        let mut scene = Scene::load(if row.scope == Scope::Chain { "chain" } else { "spcmm" }, &[]).unwrap();
+        let before = scene.clone();
+        let words = scene.set(row.key, &written).unwrap_err().to_string();
+        prop_assert!(words.starts_with(&format!("{} = {written}: ", row.key)), "{}", words);
+        prop_assert!(words.contains(&row.range()), "{}", words);
+        prop_assert!(words.contains(&row.units()), "{}", words);
+        prop_assert_eq!(scene.changes, before.changes);
+    }
+
+    #[test]
+    fn any_text_as_a_value_is_read_or_refused(row in rows(), text in "\\PC{0,24}") {
+        if let Err(words) = row.read(&text) {
+            prop_assert!(words.contains(&row.range()) || words.contains("allowed"), "{}", words);
+        }
+    }
+
+    #[test]
+    fn any_text_as_a_key_is_known_or_refused(text in "[a-z._]{0,30}|\\PC{0,24}") {
+        let mut scene = Scene::load("spcmm", &[]).unwrap();
+        if let Err(error) = scene.set(&text, "1") {
+            prop_assert!(!error.to_string().is_empty());
+        }
+    }
+}

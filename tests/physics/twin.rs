@@ -1,0 +1,180 @@
+//! A state moved by hand, and what twin runs of a mechanism tell.
+
+use crate::common::{Changes, frame_now, run_until, scene, simulation};
+use jointplay::analysis::drive::{drive_period, observed};
+use jointplay::analysis::point::{Plan, PointResult, PointRun};
+use jointplay::analysis::regime::Regime;
+use jointplay::simulate::Simulation;
+
+/// State with coordinate `i` moved by `by` and nothing else.
+fn moved(simulation: &mut Simulation, i: usize, by: f64) {
+    let mut offset = vec![0.0; simulation.state().len()];
+    offset[i] = by;
+    simulation.displace(&offset);
+}
+
+#[test]
+fn a_displaced_state_goes_on_from_where_it_was_put() {
+    let mut simulation = simulation("spcmm", &[]);
+    run_until(&mut simulation, 0.005);
+    let before = frame_now(&mut simulation);
+    // The first coordinate of the tree is the free platform's x.
+    moved(&mut simulation, 0, 1e-5);
+    let after = frame_now(&mut simulation);
+    assert_eq!(after.time, before.time);
+    let shift = after.pose.position - before.pose.position;
+    assert!((shift.x - 1e-5).abs() < 1e-15 && shift.yz().norm() < 1e-15);
+    for (a, b) in before.joints.iter().zip(&after.joints) {
+        assert!(((b.eccentricity - a.eccentricity).x - 1e-5).abs() < 1e-14);
+    }
+    let norm =
+        |simulation: &Simulation| simulation.state()[3..7].iter().map(|q| q * q).sum::<f64>();
+    moved(&mut simulation, 4, 1e-3);
+    assert!((norm(&simulation) - 1.0).abs() < 1e-15);
+    run_until(&mut simulation, 0.02);
+}
+
+#[test]
+fn contacts_follow_the_displacement_and_keep_their_memory() {
+    let mut simulation = simulation("spcmm", &[]);
+    run_until(&mut simulation, 1.0);
+    let memory = |simulation: &Simulation| [0, 1, 2].map(|j| simulation.contact_memory(j));
+    let (settled, hash) = (memory(&simulation), simulation.state_hash());
+    assert!(settled.iter().all(|m| m.active));
+    let impacts = simulation.statistics().impacts.clone();
+    // Nothing moved: nothing changed.
+    let none = vec![0.0; simulation.state().len()];
+    simulation.displace(&none);
+    assert_eq!(simulation.state_hash(), hash);
+    // The balls hang, X points down: 50 um up lifts them off their walls, and 50 um down puts them back.
+    moved(&mut simulation, 0, -5e-5);
+    assert!(memory(&simulation).iter().all(|m| !m.active));
+    moved(&mut simulation, 0, 5e-5);
+    let floor = simulation.running_scene().contact.impact_speed_floor;
+    for m in memory(&simulation) {
+        assert!(m.active && m.approach_speed >= floor);
+    }
+    assert_eq!(simulation.statistics().impacts, impacts);
+    // A tenth of a nanometre deeper the contacts are the same ones.
+    let before = memory(&simulation);
+    moved(&mut simulation, 0, 1e-10);
+    assert_eq!(memory(&simulation), before);
+    run_until(&mut simulation, 1.01);
+}
+
+#[test]
+fn ideal_joints_stay_closed_under_a_displacement() {
+    let mut simulation = simulation("slider-crank", &[]);
+    run_until(&mut simulation, 0.05);
+    let offset: Vec<f64> = (0..simulation.state().len())
+        .map(|i| 1e-4 * (i as f64).sin())
+        .collect();
+    simulation.displace(&offset);
+    let frame = frame_now(&mut simulation);
+    assert!(frame.joints[0].eccentricity.norm() < 1e-12);
+    run_until(&mut simulation, 0.06);
+}
+
+fn point(name: &str, changes: &Changes, periods: usize, discard: usize) -> PointResult {
+    let scene = scene(name, changes);
+    let plan = Plan {
+        periods,
+        discard,
+        phase: 0.0,
+        exponent: true,
+    };
+    let mut run = PointRun::cold(&scene, plan, drive_period(&scene).unwrap()).unwrap();
+    while !run.is_done() {
+        run.step().unwrap();
+    }
+    run.finish().0
+}
+
+/// A settled ball creeps through its socket like an overdamped pendulum of length c: its load N pulls it back with N / c
+/// per metre, and friction resists with cf N / (v_theta - v_a) per speed. A deviation fades at (v_theta - v_a) / (c cf).
+#[test]
+fn settled_creeping_has_the_exponent_of_an_overdamped_pendulum() {
+    for (clearance, friction) in [(3e-4, 0.15), (3e-4, 0.3), (1.5e-4, 0.2)] {
+        let (c, cf) = (format!("{clearance} m"), friction.to_string());
+        let changes = [
+            ("contact.clearance", c.as_str()),
+            ("contact.friction", cf.as_str()),
+        ];
+        let result = point("spcmm", &changes, 14, 4);
+        let exponent = result.evidence.exponent.as_ref().unwrap();
+        let predicted = -(1e-4 - 1e-6) / (clearance * friction);
+        // The load is not constant over a period, and the three balls are coupled by the platform.
+        let ratio = exponent.value / predicted;
+        assert!(
+            (0.9..1.15).contains(&ratio),
+            "{} for {predicted}",
+            exponent.value
+        );
+        assert!(
+            exponent.standard_error < 0.02 * exponent.value.abs(),
+            "{}",
+            exponent.standard_error
+        );
+        assert_eq!(result.regime, Regime::Periodic(1));
+        assert_eq!(exponent.running.len(), 10);
+    }
+}
+
+/// Without friction nothing stops the balls from swinging in their sockets.
+#[test]
+fn a_frictionless_mechanism_is_chaotic() {
+    let result = point("spcmm", &[("contact.friction", "0")], 12, 2);
+    let exponent = result.evidence.exponent.as_ref().unwrap();
+    assert_eq!(result.regime, Regime::Chaotic);
+    assert!(exponent.value > 1.0, "{}", exponent.value);
+    assert_eq!(result.evidence.distinct, result.evidence.sections);
+}
+
+#[test]
+fn an_ideal_mechanism_repeats_exactly_and_has_no_neighbours() {
+    let result = point("spcmm", &[("contact.clearance", "0")], 10, 1);
+    assert_eq!(result.regime, Regime::Periodic(1));
+    assert!(result.evidence.exponent.is_none());
+    let (largest, _) = result.probe.unwrap();
+    assert!(largest < 1e-9, "{largest}");
+    let reaction = result.joints[1].peak;
+    assert!(reaction > 8.5687 && reaction < 12.0, "{reaction}");
+}
+
+/// The twin never disturbs the run it follows.
+#[test]
+fn sections_are_those_of_the_run_without_a_twin() {
+    let scene = scene("spcmm", &[]);
+    let period = drive_period(&scene).unwrap();
+    let sections = |exponent: bool| {
+        let plan = Plan {
+            periods: 3,
+            discard: 1,
+            phase: 0.0,
+            exponent,
+        };
+        let mut run = PointRun::cold(&scene, plan, period).unwrap();
+        while !run.is_done() {
+            run.step().unwrap();
+        }
+        run.finish().0.sections
+    };
+    let plain = sections(false);
+    assert_eq!(plain, sections(true));
+    // And they lie at the drive phase: the machine stands where it stands at 6 s.
+    let mut simulation = Simulation::new(&scene).unwrap();
+    for end in [2.0, 4.0, 6.0] {
+        run_until(&mut simulation, end);
+    }
+    assert_eq!(&plain[12..], observed(&frame_now(&mut simulation).pose));
+}
+
+#[test]
+fn drives_tell_their_common_period() {
+    assert_eq!(drive_period(&scene("spcmm", &[])), Ok(2.0));
+    let crank = drive_period(&scene("slider-crank-driven", &[])).unwrap();
+    assert!((crank - std::f64::consts::TAU / 6.0).abs() < 1e-15);
+    for without in ["pendulum", "chain", "slider-crank"] {
+        assert!(drive_period(&scene(without, &[])).is_err(), "{without}");
+    }
+}

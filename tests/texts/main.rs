@@ -1,0 +1,6 @@
+//! What is read: scene files, documents, the sources themselves.
+
+mod documents;
+mod house;
+mod scene_corpus;
+mod scene_errors;

@@ -1,0 +1,271 @@
+//! The corpus of the fuzz target, the built-in scenes, and thousands of mutations of both: no panic, and errors that say where.
+
+#[path = "../fuzz/check.rs"]
+mod fuzz;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use fuzz::{Fate, check};
+use jointplay::scene::{BUILT_IN, built_in_text};
+
+/// Mutations of each text of the corpus, and of each built-in scene; times `SCENE_MUTATIONS`, a number in the environment.
+const MUTATIONS: u64 = 40;
+const MUTATIONS_OF_BUILT_IN: u64 = 200;
+
+/// Changes that a mutated text comes with now and then, some of them right.
+const CHANGES: [&str; 16] = [
+    "contact.clearance=0",
+    "contact.clearance=0.5mm",
+    "contact.clearance=1e400 mm",
+    "contact.restitution=0",
+    "contact.normal_law=flores",
+    "contact.friction=10",
+    "joint.S1.clearance=0",
+    "joint..clearance=1 mm",
+    "joint.\u{1b}]0;.x=1",
+    "chain.links=4096",
+    "chain.links=-1",
+    "solver.method=radau5",
+    "solver.method=imex-euler",
+    "solver.method=rk4",
+    "spcmm.frequency=50 Hz",
+    "\u{202e}=\u{9b}",
+];
+
+/// What tends to break readers.
+const TOKENS: [&str; 40] = [
+    "0",
+    "-0",
+    "1",
+    "-1",
+    "1e-308",
+    "1e308",
+    "1e400",
+    "nan",
+    "-inf",
+    "9223372036854775807",
+    "0x7fffffffffffffff",
+    "true",
+    "\"\"",
+    "\"nan m\"",
+    "\"1e400 mm\"",
+    "\"0 0 0\"",
+    "\"1 2\"",
+    "\"1 2 3 4 mm\"",
+    "\"\u{b5}m\"",
+    "\"1 m m\"",
+    "[]",
+    "[[]]",
+    "{}",
+    "[0, 0]",
+    "[0, 0, 0]",
+    "[\"0\", 0, 0]",
+    "[1e308, 1e308, 1e308]",
+    "{ axis = [0, 0, 0], angle = \"1 rad\" }",
+    "=",
+    "[",
+    "]",
+    "\"",
+    "'''",
+    "#",
+    ".",
+    "\n",
+    "\u{0}",
+    "\u{feff}",
+    "world",
+    "1979-05-27",
+];
+
+struct Numbers(u64);
+
+impl Numbers {
+    fn next(&mut self) -> usize {
+        self.0 ^= self.0 >> 12;
+        self.0 ^= self.0 << 25;
+        self.0 ^= self.0 >> 27;
+        (self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 33) as usize
+    }
+
+    fn below(&mut self, count: usize) -> usize {
+        self.next() % count.max(1)
+    }
+}
+
+/// Byte ranges of words, numbers, texts and signs.
+fn tokens(bytes: &[u8]) -> Vec<(usize, usize)> {
+    let mut tokens = Vec::new();
+    let mut i = 0;
+    while i < bytes.len() {
+        let start = i;
+        let wordy = |b: u8| b.is_ascii_alphanumeric() || b"_.-+".contains(&b);
+        if bytes[i] == b'"' {
+            i += 1;
+            while i < bytes.len() && bytes[i] != b'"' && bytes[i] != b'\n' {
+                i += 1;
+            }
+            i = (i + 1).min(bytes.len());
+        } else if wordy(bytes[i]) {
+            while i < bytes.len() && wordy(bytes[i]) {
+                i += 1;
+            }
+        } else {
+            i += 1;
+            if bytes[start].is_ascii_whitespace() {
+                continue;
+            }
+        }
+        tokens.push((start, i));
+    }
+    tokens
+}
+
+/// Breaks `text` in one or two ways.
+fn mutate(text: &[u8], numbers: &mut Numbers) -> Vec<u8> {
+    let mut bytes = text.to_vec();
+    for _ in 0..=numbers.below(2) {
+        let places = tokens(&bytes);
+        if places.is_empty() {
+            break;
+        }
+        let (from, to) = places[numbers.below(places.len())];
+        let (other_from, other_to) = places[numbers.below(places.len())];
+        let lines: Vec<&[u8]> = bytes.split_inclusive(|b| *b == b'\n').collect();
+        let line = numbers.below(lines.len());
+        match numbers.below(12) {
+            0 => {
+                let at = numbers.below(bytes.len());
+                bytes[at] ^= 1 << numbers.below(8);
+            }
+            1 => bytes.truncate(numbers.below(bytes.len())),
+            2 => {
+                let other = bytes[other_from..other_to].to_vec();
+                bytes.splice(from..to, other);
+            }
+            3 | 4 => {
+                let token = TOKENS[numbers.below(TOKENS.len())];
+                bytes.splice(from..to, token.bytes());
+            }
+            5 => {
+                bytes.drain(from..to);
+            }
+            6 => {
+                let mut kept = lines;
+                kept.remove(line);
+                bytes = kept.concat();
+            }
+            7 => {
+                let mut more = lines.clone();
+                more.insert(numbers.below(lines.len()), lines[line]);
+                bytes = more.concat();
+            }
+            // The likeliest to remain a scene: another digit, sign or power of ten.
+            _ => {
+                let digits: Vec<usize> = (0..bytes.len())
+                    .filter(|&i| bytes[i].is_ascii_digit())
+                    .collect();
+                let Some(&at) = digits.get(numbers.below(digits.len())) else {
+                    continue;
+                };
+                let other = ["0", "1", "9", "-1", "1e3", "1e-3", "0.0"][numbers.below(7)];
+                bytes.splice(at..=at, other.bytes());
+            }
+        }
+    }
+    if numbers.below(3) == 0 {
+        let change = CHANGES[numbers.below(CHANGES.len())];
+        bytes.extend(format!("\n#set {change}\n").into_bytes());
+    }
+    bytes
+}
+
+/// Name and bytes of every file of the corpus.
+fn corpus() -> Vec<(String, Vec<u8>)> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fuzz/corpus");
+    let entries = std::fs::read_dir(folder).unwrap();
+    let mut paths: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
+    paths.sort();
+    let read = |path: std::path::PathBuf| {
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        (name, std::fs::read(path).unwrap())
+    };
+    paths.into_iter().map(read).collect()
+}
+
+/// Checks, and names the text of a panic.
+fn survives(what: &str, bytes: &[u8]) -> Fate {
+    std::panic::catch_unwind(|| check(bytes)).unwrap_or_else(|_| {
+        panic!(
+            "{what} breaks the reader:\n{}",
+            String::from_utf8_lossy(bytes)
+        )
+    })
+}
+
+#[test]
+fn the_corpus_ends_as_its_names_say() {
+    let corpus = corpus();
+    assert!(corpus.len() > 30);
+    let mut wrong = Vec::new();
+    for (name, bytes) in &corpus {
+        let expected = match name.split('-').next() {
+            Some("good") => Fate::Starts,
+            Some("stuck") => Fate::NoStart,
+            Some("bytes") => Fate::NoText,
+            _ => Fate::Refused,
+        };
+        let fate = survives(name, bytes);
+        if fate != expected {
+            wrong.push(format!("{name}: {fate:?}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+fn mutations_of_the_corpus_break_nothing() {
+    let times = std::env::var("SCENE_MUTATIONS").ok();
+    let times = times.map_or(1, |times| times.parse::<u64>().expect("a number"));
+    let mut seeds: Vec<(String, Vec<u8>, u64)> = corpus()
+        .into_iter()
+        .map(|(name, bytes)| (name, bytes, MUTATIONS))
+        .collect();
+    for name in BUILT_IN {
+        let text = built_in_text(name).unwrap();
+        assert_eq!(survives(name, text.as_bytes()), Fate::Starts);
+        seeds.push((
+            name.to_owned(),
+            text.as_bytes().to_vec(),
+            MUTATIONS_OF_BUILT_IN,
+        ));
+    }
+    let next = AtomicUsize::new(0);
+    let fates = std::sync::Mutex::new(BTreeMap::<String, u64>::new());
+    std::thread::scope(|scope| {
+        for _ in 0..2 {
+            scope.spawn(|| {
+                while let Some((name, bytes, count)) =
+                    seeds.get(next.fetch_add(1, Ordering::Relaxed))
+                {
+                    for seed in 1..=*count * times {
+                        let mutated = mutate(bytes, &mut Numbers(seed));
+                        let fate = survives(&format!("{name}, mutation {seed}"), &mutated);
+                        *fates
+                            .lock()
+                            .unwrap()
+                            .entry(format!("{fate:?}"))
+                            .or_default() += 1;
+                    }
+                }
+            });
+        }
+    });
+    let fates = fates.into_inner().unwrap();
+    println!("{fates:?}");
+    // Mutations that only ever fail to parse would look at nothing.
+    assert!(
+        fates["Refused"] > 1000 && fates["Starts"] > 200,
+        "{fates:?}"
+    );
+}
