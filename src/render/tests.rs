@@ -479,7 +479,7 @@ fn every_standard_view_shows_what_moves() {
                 println!("{name} {time} {preset:?}: {seen} of {possible}");
                 assert!(possible > 300, "{name} {preset:?}: {possible}");
                 assert!(
-                    seen as f64 > 0.6 * possible as f64,
+                    seen as f64 > 0.8 * possible as f64,
                     "{name} at {time} s, {preset:?}: {seen} of {possible} pixels of what moves are seen"
                 );
             }

@@ -29,8 +29,10 @@ pub struct SceneView {
     floor: f32,
     /// Greatest outer radius of each drawn socket, m: where its carrier begins.
     pub(super) room: Vec<f32>,
-    /// Points of the moving parts, m: what a fixed part that is in the way hides.
+    /// Points of the moving parts at the start, m: what a fixed part that is in the way hides.
     watched: Vec<Vec3>,
+    /// Ball joints at the start.
+    at_start: Vec<DrawnJoint>,
 }
 
 /// One picture: everything [`SceneView::build`] reads.
@@ -93,6 +95,7 @@ impl SceneView {
         Self {
             room,
             watched,
+            at_start: joints,
             parts,
             plates: plates.into(),
             joint_names: scene
@@ -163,12 +166,12 @@ impl SceneView {
     /// Opacity of part `index` from `eye`: a fixed part before much of what moves is seen through. It follows from the
     /// first frame, so that it changes with the point of view alone.
     pub(super) fn opacity(&self, index: usize, eye: Vec3) -> f32 {
-        const HIDES: [f32; 2] = [0.03, 0.12];
+        const HIDES: [f32; 2] = [0.05, 0.16];
         const LEAST: f32 = 0.22;
         if self.parts[index].body.is_some() || self.watched.is_empty() {
             return 1.0;
         }
-        let solid = self.parts[index].place(&Frame::default(), &[]);
+        let solid = self.parts[index].place(&Frame::default(), &self.at_start);
         let hidden = |point: &&Vec3| {
             let to_point = **point - eye;
             let ray = Ray::new(eye, to_point.normalize_or_zero());
