@@ -166,7 +166,7 @@ impl SceneView {
     /// Opacity of part `index` from `eye`: a fixed part before much of what moves is seen through. It follows from the
     /// first frame, so that it changes with the point of view alone.
     pub(super) fn opacity(&self, index: usize, eye: Vec3) -> f32 {
-        const HIDES: [f32; 2] = [0.03, 0.12];
+        const HIDES: [f32; 2] = [0.05, 0.16];
         const LEAST: f32 = 0.22;
         if self.parts[index].body.is_some() || self.watched.is_empty() {
             return 1.0;
