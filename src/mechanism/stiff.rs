@@ -373,9 +373,10 @@ mod tests {
             ];
             let (mut m, y) = resting(&changes, remembered);
             let (t, nq) = (0.0, m.positions());
-            m.linearise(t, &y);
+            m.measure(t, &y);
             let rises = m.contacts.gaps().iter().all(|gap| gap.rate > remembered);
             assert_eq!(rises, remembered < 1e-6);
+            m.linearise(t, &y);
             let stiff = m.stiff.take().unwrap();
             let n = stiff.n;
             let (mut plus, mut minus) = (vec![0.0; y.len()], vec![0.0; y.len()]);
