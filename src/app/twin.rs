@@ -35,6 +35,9 @@ pub struct Twin {
     /// Every so manyth step is kept.
     stride: u64,
     steps: u64,
+    /// Time to which the run has come, s, and its state there: the twin meets it when that is on show.
+    goal: f64,
+    goal_state: Vec<f64>,
     ended: Option<String>,
 }
 
@@ -54,32 +57,42 @@ impl Twin {
             distances: Vec::with_capacity(KEPT),
             stride: 1,
             steps: 0,
+            goal: run.time(),
+            goal_state: run.state().to_vec(),
             ended: None,
         };
-        twin.measure(run);
+        twin.measure();
         twin.place(run.time());
         Ok(twin)
     }
 
-    /// Brings the twin to the time of `run`, which has just taken a step.
+    /// Takes in where `run` is, which has just taken a step; the twin has come to where it was before.
     pub fn follow(&mut self, run: &Simulation) {
-        if self.ended.is_some() {
-            return;
-        }
-        while self.simulation.time() < run.time() {
-            if let Err(stopped) = self.simulation.step_until(run.time()) {
+        self.come_to(self.goal);
+        self.goal = run.time();
+        self.goal_state.copy_from_slice(run.state());
+    }
+
+    /// Steps until `time`, s, lies within the latest step.
+    fn come_to(&mut self, time: f64) {
+        while self.ended.is_none() && self.simulation.time() < time.min(self.goal) {
+            if let Err(stopped) = self.simulation.step_until(self.goal) {
                 self.ended = Some(stopped.to_string());
                 return;
             }
-        }
-        self.steps += 1;
-        if self.steps.is_multiple_of(self.stride) {
-            self.measure(run);
+            if self.simulation.time() == self.goal {
+                self.steps += 1;
+                if self.steps.is_multiple_of(self.stride) {
+                    self.measure();
+                }
+            }
         }
     }
 
-    fn measure(&mut self, run: &Simulation) {
-        let distance = scaled_distance(run.state(), self.simulation.state(), run.scales());
+    /// Records how far it is from the run.
+    fn measure(&mut self) {
+        let scales = self.simulation.scales();
+        let distance = scaled_distance(&self.goal_state, self.simulation.state(), scales);
         if self.distances.len() == KEPT {
             let mut keep = false;
             self.distances.retain(|_| {
@@ -90,12 +103,13 @@ impl Twin {
         }
         // Two motions that have become one to the last bit have no logarithm.
         if distance > 0.0 && distance.is_finite() {
-            self.distances.push([run.time(), distance]);
+            self.distances.push([self.goal, distance]);
         }
     }
 
-    /// Puts the state at `time`, s, or the nearest within the latest step, in [`Self::frame`].
+    /// Puts the state at `time`, s, in [`Self::frame`]; the start, where that is later; where it ended.
     pub fn place(&mut self, time: f64) {
+        self.come_to(time);
         self.simulation.sample(time, &mut self.frame);
     }
 
@@ -176,8 +190,14 @@ mod tests {
         assert!((start[1] / DISPLACEMENT - 1.0).abs() < 1e-6, "{start:?}");
         for _ in 0..3 * KEPT {
             run.step().expect("runs");
+            let start = run.step_start();
             twin.follow(&run);
-            assert_eq!(twin.simulation.time(), run.time());
+            // Whatever instant of the step is on show, the twin is there.
+            for part in [0.3, 0.9, 1.0] {
+                let time = start + part * (run.time() - start);
+                twin.place(time);
+                assert_eq!(twin.frame().time, time);
+            }
         }
         assert!(twin.distances().len() <= KEPT && twin.stride > 1);
         assert!(twin.distances().is_sorted_by(|a, b| a[0] < b[0]));
