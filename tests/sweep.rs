@@ -344,7 +344,8 @@ fn warnings_come_from_within_the_ranges_and_each_kind_once() {
         .lines()
         .filter(|l| l.contains("warning:"))
         .collect();
-    assert_eq!(warnings.len(), 3, "{}", outcome.stderr);
+    assert_eq!(warnings.len(), 4, "{}", outcome.stderr);
+    assert!(warnings[3].contains("1 section of each point"));
     assert!(warnings[0].contains("contact.clearance = 0.01 mm") && warnings[0].contains("Hertz"));
     for kind in ["comes near a singular pose", "has a singular pose"] {
         assert!(
