@@ -270,7 +270,7 @@ fn record_csv(player: &Player) -> String {
     text.push('\n');
     for (time, values) in player.history().rows(ROWS) {
         let _ = write!(text, "{time:.9e}");
-        for (least, greatest) in values {
+        for (least, greatest) in values.iter().take(player.channels().len()) {
             let _ = write!(text, ",{least:.7e},{greatest:.7e}");
         }
         text.push('\n');

@@ -12,7 +12,8 @@ use super::watch::Watch;
 use crate::analysis::section::Schedule;
 use crate::scene::{Scene, SceneError, Value};
 use crate::simulate::{
-    Channels, Effect, Frame, History, Mark, Pacer, Peak, Simulation, Snapshot, StartError, Stopped,
+    Channels, Effect, Frame, History, Mark, Pacer, Peak, RECORDED_JOINTS, Simulation, Snapshot,
+    StartError, Stopped,
 };
 
 /// Narrowest bin of the record, s: shorter than any step that resolves an impact.
@@ -52,6 +53,7 @@ pub struct Player {
     /// Since the frame before.
     passed: Vec<Peak>,
     channels: Channels,
+    /// Of the channels, and behind them the clearance of each recorded ball joint.
     history: History,
     recorded: Frame,
     values: Vec<f64>,
@@ -116,7 +118,7 @@ impl Player {
             coming: Vec::new(),
             passed: Vec::new(),
             unchanged: None,
-            history: History::new(channels.len(), FINEST_BIN),
+            history: record_of(scene, &channels),
             channels,
             recorded: Frame::default(),
             values: Vec::new(),
@@ -162,6 +164,11 @@ impl Player {
     /// Which channels are recorded.
     pub fn channels(&self) -> &Channels {
         &self.channels
+    }
+
+    /// Where the record has the clearances of the ball joints, as they were in force.
+    pub fn clearances(&self) -> std::ops::Range<usize> {
+        self.channels.len()..self.history.channels()
     }
 
     /// The recorded past.
@@ -375,7 +382,7 @@ impl Player {
         self.restart_twin();
         let channels = Channels::of(self.simulation.running_scene());
         if channels.list() != self.channels.list() {
-            self.history = History::new(channels.len(), FINEST_BIN);
+            self.history = record_of(self.simulation.running_scene(), &channels);
             self.channels = channels;
         }
         self.start_record();
@@ -569,6 +576,8 @@ impl Player {
         let mut frame = std::mem::take(&mut self.recorded);
         self.run_at(time).sample(time, &mut frame);
         self.channels.read(&frame, &mut self.values);
+        let joints = frame.joints.iter().take(self.clearances().len());
+        self.values.extend(joints.map(|joint| joint.clearance));
         for (joint, peak) in self.coming.iter().enumerate() {
             // The peak of the step is that of its cubic, not of the interpolated state.
             if peak.normal > 0.0
@@ -650,6 +659,12 @@ impl Player {
         self.record(self.simulation.time());
         self.show_latest();
     }
+}
+
+/// An empty record of `channels` and of the clearances.
+fn record_of(scene: &Scene, channels: &Channels) -> History {
+    let joints = scene.ball_joints.len().min(RECORDED_JOINTS);
+    History::new(channels.len() + joints, FINEST_BIN)
 }
 
 /// Instants of `schedule` up to `now`, s.
@@ -825,8 +840,13 @@ mod tests {
         }
         assert!(frames > 5, "{frames}");
         assert_eq!(player.frame().joints[0].clearance, 0.6e-3);
-        let clearances = recorded(&player, Quantity::Clearance, 1.0);
-        assert!(clearances[0][1] < 0.31e-3);
+        let mut clearances = Vec::new();
+        let channel = player.clearances().start;
+        player
+            .history()
+            .bins(channel, 0.0, 1.0, 400, &mut clearances);
+        let (first, last) = (clearances[0], clearances[clearances.len() - 1]);
+        assert!((first.greatest - 0.3e-3).abs() < 1e-9 && (last.greatest - 0.6e-3).abs() < 1e-9);
     }
 
     #[test]

@@ -224,8 +224,7 @@ impl Plots {
         self.levels.clear();
         if quantity == Quantity::Eccentricity {
             // As they were: today's value says nothing about the past.
-            let channels = player.channels().list().iter().enumerate();
-            for (index, _) in channels.filter(|(_, c)| c.quantity == Quantity::Clearance) {
+            for index in player.clearances() {
                 let mut trace = Trace {
                     colour: faint,
                     ..Trace::default()
@@ -244,10 +243,7 @@ impl Plots {
         };
         let from_zero = matches!(
             quantity,
-            Quantity::NormalForce
-                | Quantity::FrictionForce
-                | Quantity::Eccentricity
-                | Quantity::Clearance
+            Quantity::NormalForce | Quantity::FrictionForce | Quantity::Eccentricity
         );
         let values = if bands.is_empty() {
             extremes(self.traces.iter().chain(&self.levels), size)

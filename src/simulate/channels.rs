@@ -25,21 +25,11 @@ pub enum Quantity {
     Energy,
     EnergyBalance,
     ProbeError,
-    Clearance,
 }
-
-/// Of these each recorded joint has a channel, in this order.
-const OF_JOINTS: [Quantity; 5] = [
-    Quantity::NormalForce,
-    Quantity::FrictionForce,
-    Quantity::Eccentricity,
-    Quantity::Penetration,
-    Quantity::Clearance,
-];
 
 impl Quantity {
     /// All of them, in the order in which a list shows them.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 15] = [
         Self::NormalForce,
         Self::FrictionForce,
         Self::Eccentricity,
@@ -55,7 +45,6 @@ impl Quantity {
         Self::Energy,
         Self::EnergyBalance,
         Self::ProbeError,
-        Self::Clearance,
     ];
 
     /// Members of [`Self::EnergyBalance`]: kinetic and elastic change equal the works given by drives, gravity, clearance
@@ -82,7 +71,6 @@ impl Quantity {
             Self::FrictionForce => "Friction force",
             Self::Eccentricity => "Eccentricity",
             Self::Penetration => "Penetration",
-            Self::Clearance => "Clearance",
             Self::Position => "Position",
             Self::Angles => "Angles",
             Self::Velocity => "Velocity",
@@ -102,9 +90,7 @@ impl Quantity {
         match self {
             Self::NormalForce | Self::FrictionForce | Self::ActuatorForce => ("N", 1.0),
             Self::ActuatorTorque => ("N m", 1.0),
-            Self::Eccentricity | Self::Clearance | Self::Position | Self::ProbeError => {
-                ("mm", 1e-3)
-            }
+            Self::Eccentricity | Self::Position | Self::ProbeError => ("mm", 1e-3),
             Self::Penetration => ("µm", 1e-6),
             Self::Angles => ("mrad", 1e-3),
             Self::Velocity => ("m/s", 1.0),
@@ -127,10 +113,6 @@ impl Quantity {
             }
             Self::Penetration => {
                 "How deep each ball presses into its socket; below zero there is a gap."
-            }
-            Self::Clearance => {
-                "Clearance of each joint as it is in force; one that is made smaller than the ball's eccentricity closes \
-                 gradually."
             }
             Self::Position => "Origin of the output body in world axes.",
             Self::Angles => "Angles α, β, γ of the output body.",
@@ -175,7 +157,6 @@ impl Channel {
             Quantity::FrictionForce => format!("{member}_friction_N"),
             Quantity::Eccentricity => format!("{member}_eccentricity_m"),
             Quantity::Penetration => format!("{member}_penetration_m"),
-            Quantity::Clearance => format!("{member}_clearance_m"),
             Quantity::Position => format!("{member}_m"),
             Quantity::Angles => format!("{angle}_rad"),
             Quantity::Velocity => format!("v{member}_m_s"),
@@ -222,8 +203,8 @@ impl Channels {
             });
         };
         for joint in scene.ball_joints.iter().take(joints) {
-            for quantity in OF_JOINTS {
-                add(quantity, &joint.name);
+            for quantity in &Quantity::ALL[..4] {
+                add(*quantity, &joint.name);
             }
         }
         for (quantity, members) in [
@@ -284,7 +265,7 @@ impl Channels {
 
     /// Index of the normal force of ball joint `joint`, if it is recorded.
     pub fn normal_force(&self, joint: usize) -> Option<usize> {
-        (joint < self.joints).then_some(OF_JOINTS.len() * joint)
+        (joint < self.joints).then_some(4 * joint)
     }
 
     /// Reads every channel from `frame` into `out`, SI units.
@@ -296,7 +277,6 @@ impl Channels {
                 report.friction_force.norm(),
                 report.eccentricity.norm(),
                 report.penetration,
-                report.clearance,
             ]);
         }
         let pose = &frame.pose;
