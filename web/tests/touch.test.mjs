@@ -64,8 +64,10 @@ test('a menu that is longer than the screen scrolls under a finger', async () =>
     const size = { width: 844, height: 390 };
     const lab = await open('play=0', { backend, size, context: { hasTouch: true } });
     await lab.tap('Button', 'Menu');
-    const [x, y] = middle(await lab.find('Button', 'Record…'));
-    await lab.fingers([0, 40, 90, 140, 190].map((up) => [x, y - up]));
+    const [x, y] = middle(await lab.find('Button', 'Picture…'));
+    for (let swipe = 0; swipe < 3; swipe += 1) {
+        await lab.fingers([0, 30, 60, 90, 120].map((up) => [x, y - up]));
+    }
     const reached = async () => (await lab.find('Button', 'About')).rect[3] <= size.height;
     await lab.until(reached, 'the end of the menu stays outside');
     await lab.still();
