@@ -7,10 +7,14 @@ use crate::contact::{self, FrictionLaw, NormalLaw};
 use crate::integrate::Method;
 use std::collections::BTreeMap;
 
-/// Fewer fixed steps than this do not resolve an impact; twice as many do.
-const LEAST_STEPS: f64 = 5.0;
-/// The same for the implicit Euler method in the contacts, whose own damping takes as much of an impact as a step is of it.
-const LEAST_IMPLICIT_STEPS: f64 = 40.0;
+/// Fewer fixed steps than this lose much of an impact; twice as many resolve it. The implicit Euler method in the contacts
+/// needs more: its own damping takes as much of an impact as a step is of it.
+pub fn least_impact_steps(method: Method) -> u64 {
+    match method {
+        Method::ImexEuler => 40,
+        _ => 5,
+    }
+}
 
 /// Loosest tolerance at which impacts keep their energy to a few per cent.
 const LOOSEST: f64 = 1e-3;
@@ -114,10 +118,7 @@ impl Scene {
             .min_by(|a, b| (a.1.0 / a.1.1).total_cmp(&(b.1.0 / b.1.1)))?;
         let (impact, friction) = duration;
         let duration = impact / friction;
-        let steps = match self.solver.method {
-            Method::ImexEuler => LEAST_IMPLICIT_STEPS,
-            _ => LEAST_STEPS,
-        };
+        let steps = least_impact_steps(self.solver.method) as f64;
         if self.solver.step <= duration / steps {
             return None;
         }

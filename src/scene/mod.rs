@@ -21,6 +21,7 @@ mod units;
 mod words;
 mod write;
 
+pub use check::least_impact_steps;
 pub use doubt::Doubt;
 pub use error::SceneError;
 pub use load::*;

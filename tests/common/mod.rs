@@ -98,3 +98,18 @@ pub fn looks<const MICROSECONDS: u32>() -> f64 {
     LOOKS.set(LOOKS.get() + 1);
     f64::from(LOOKS.get()) * f64::from(MICROSECONDS) * 1e-6
 }
+
+/// Mean size of every contact force over a span, N, sampled at a thousand instants.
+pub fn mean_forces(simulation: &mut Simulation, from: f64, to: f64) -> Vec<f64> {
+    let mut frame = Frame::default();
+    let mut sums = vec![0.0; simulation.scene().ball_joints.len()];
+    for n in 0..=1000 {
+        let t = from + (to - from) * f64::from(n) / 1000.0;
+        simulation.advance_to(t).unwrap();
+        simulation.sample(t, &mut frame);
+        for (sum, joint) in sums.iter_mut().zip(&frame.joints) {
+            *sum += (joint.normal_force + joint.friction_force).norm() / 1001.0;
+        }
+    }
+    sums
+}

@@ -1,23 +1,8 @@
 //! The method that is implicit in the contacts alone: stable and right on settled contacts at steps that resolve no impact,
 //! and it creates no energy.
 
-use crate::common::{frame_now, scene, simulation, slope};
+use crate::common::{frame_now, mean_forces, scene, simulation, slope};
 use jointplay::simulate::{Frame, Simulation};
-
-/// Mean size of every contact force over a span, sampled at a thousand instants.
-fn mean_forces(simulation: &mut Simulation, from: f64, to: f64) -> Vec<f64> {
-    let mut frame = Frame::default();
-    let mut sums = vec![0.0; simulation.scene().ball_joints.len()];
-    for n in 0..=1000 {
-        let t = from + (to - from) * f64::from(n) / 1000.0;
-        simulation.advance_to(t).unwrap();
-        simulation.sample(t, &mut frame);
-        for (sum, joint) in sums.iter_mut().zip(&frame.joints) {
-            *sum += (joint.normal_force + joint.friction_force).norm() / 1001.0;
-        }
-    }
-    sums
-}
 
 #[test]
 fn settled_forces_are_right_within_a_per_cent_at_steps_far_beyond_the_contacts_period() {

@@ -1,22 +1,7 @@
 //! The implicit methods on settled contacts: same forces as the explicit one, in far fewer steps, resumable bit by bit.
 
-use crate::common::simulation;
-use jointplay::simulate::{Frame, Simulation};
-
-/// Mean size of every contact force over a span, sampled at a thousand instants.
-fn mean_forces(simulation: &mut Simulation, from: f64, to: f64) -> Vec<f64> {
-    let mut frame = Frame::default();
-    let mut sums = vec![0.0; simulation.scene().ball_joints.len()];
-    for n in 0..=1000 {
-        let t = from + (to - from) * f64::from(n) / 1000.0;
-        simulation.advance_to(t).unwrap();
-        simulation.sample(t, &mut frame);
-        for (sum, joint) in sums.iter_mut().zip(&frame.joints) {
-            *sum += (joint.normal_force + joint.friction_force).norm() / 1001.0;
-        }
-    }
-    sums
-}
+use crate::common::{mean_forces, simulation};
+use jointplay::simulate::Simulation;
 
 #[test]
 fn settled_forces_are_those_of_a_converged_explicit_run() {

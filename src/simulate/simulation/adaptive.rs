@@ -252,18 +252,8 @@ impl Simulation {
 
     /// Gap of joint `j` on the interpolant of the attempted step, times `sign`.
     fn signed_gap(&mut self, j: usize, theta: f64, h: f64, sign: f64) -> SignedGap {
-        let Self {
-            mechanism,
-            stepper,
-            state,
-            y_end,
-            k_end,
-            scratch_y,
-            ..
-        } = self;
-        stepper.interpolate(theta, h, &state.y, &state.k, y_end, k_end, scratch_y);
-        mechanism.measure(state.t + theta * h, scratch_y);
-        let gap = &mechanism.contacts.gaps()[j];
+        self.measure_at(theta, h);
+        let gap = &self.mechanism.contacts.gaps()[j];
         SignedGap {
             theta,
             gap: sign * gap.penetration,

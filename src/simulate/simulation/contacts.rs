@@ -3,22 +3,9 @@
 use super::search::NEAR_PEAK;
 use super::{Simulation, State};
 use crate::contact::{Coefficients, Pace};
-use crate::integrate::Method;
 use crate::mechanism::{Memory, Switching};
+use crate::scene::least_impact_steps;
 use crate::simulate::peaks::Course;
-
-/// Fewer fixed steps than this do not resolve an impact.
-const LEAST_STEPS: u64 = 5;
-/// The same for the implicit Euler method in the contacts, whose own damping takes as much of an impact as a step is of it.
-const LEAST_IMPLICIT_STEPS: u64 = 40;
-
-/// Fewer fixed steps than this lose much of an impact.
-pub(super) fn least_steps(method: Method) -> u64 {
-    match method {
-        Method::ImexEuler => LEAST_IMPLICIT_STEPS,
-        _ => LEAST_STEPS,
-    }
-}
 
 /// What the end of a step changed in the contacts' memory.
 #[derive(Clone, Copy)]
@@ -63,7 +50,7 @@ impl Simulation {
             strongest,
             ..
         } = self;
-        let least = least_steps(running.solver.method);
+        let least = least_impact_steps(running.solver.method);
         let immediate = mechanism.contacts.switching == Switching::Immediate;
         let mut switched = Switched {
             contacts: false,

@@ -196,7 +196,7 @@ impl Simulation {
     }
 
     /// Measures the interpolant of the attempted step.
-    fn measure_at(&mut self, theta: f64, h: f64) {
+    pub(super) fn measure_at(&mut self, theta: f64, h: f64) {
         let Self {
             mechanism,
             stepper,

@@ -1,9 +1,9 @@
 //! What speaks against a result: what the scene asks for, and what the run met.
 
 use super::Simulation;
-use super::contacts::least_steps;
 use crate::contact::settled_penetration;
 use crate::integrate::Method;
+use crate::scene::least_impact_steps;
 use crate::simulate::{Doubt, Joints, Ledger, Work};
 
 /// Part of a joint's contacts that may be slower than the floor.
@@ -45,7 +45,7 @@ impl Simulation {
             joints,
             short: statistics.coarse[j],
             contacts: statistics.impacts[j],
-            steps: least_steps(self.running.solver.method),
+            steps: least_impact_steps(self.running.solver.method),
         }));
         let floored = self.worst(MOST_FLOORED, |j| part(&statistics.floored, j));
         doubts.extend(floored.map(|(joints, j)| Doubt::Floored {
