@@ -124,6 +124,11 @@ impl Accuracy {
         let said = player.warnings();
         let doubts = player.simulation().doubts().into_iter();
         let mut doubts: Vec<String> = doubts.map(|doubt| doubt.to_string()).collect();
+        let none = if doubts.is_empty() {
+            "No doubts about this run so far"
+        } else {
+            "No doubts but those beside the controls"
+        };
         doubts.retain(|doubt| !said.contains(doubt));
         reserved(ui, "doubts", DOUBTS, |ui| {
             let small = |words: &str| RichText::new(words).small();
@@ -134,7 +139,7 @@ impl Accuracy {
                 ui.label(small(&value::typeset(doubt)).color(ui.visuals().warn_fg_color));
             }
             if doubts.is_empty() && self.problem.is_none() {
-                ui.label(small("No doubts about this run so far").weak())
+                ui.label(small(none).weak())
                     .on_hover_text("Here stands why the numbers are not to be trusted, if anything speaks against them");
             }
         });

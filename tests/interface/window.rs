@@ -950,6 +950,22 @@ fn plotted_peaks_are_those_of_the_run() {
 }
 
 #[test]
+fn a_doubt_that_stands_beside_a_slider_is_not_denied_below() {
+    let mut harness = window("spcmm");
+    harness.get_by_label("No doubts about this run so far");
+    let player = harness.state_mut().player_mut();
+    player.set("contact.restitution", "0.4").expect("in range");
+    harness.run_steps(3);
+    harness.get_by_label_contains("restitution 0.4 with lankarani-nikravesh");
+    harness.get_by_label("No doubts but those beside the controls");
+    assert!(
+        harness
+            .query_by_label("No doubts about this run so far")
+            .is_none()
+    );
+}
+
+#[test]
 fn a_low_plot_keeps_its_numbers() {
     for height in [740.0, 470.0, 400.0, 320.0] {
         let mut harness = sized("spcmm", [1000.0, height], egui::Theme::Light);
