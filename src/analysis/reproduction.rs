@@ -3,13 +3,13 @@
 mod findings;
 mod record;
 
-pub use findings::Findings;
+pub use findings::{Combination, Findings, Report};
 use record::row;
 pub use record::{COLUMNS, Row, Swathe, Traced, regime_word};
 
 use super::grid::{Axis, Grid, RangeError, Start};
 use super::paper::chaos::Loop;
-use super::paper::{CASES, Case, DURATION, SAMPLING};
+use super::paper::{BY_CLEARANCE, CASES, Case, DURATION, SAMPLING};
 use super::point::{Plan, resolution};
 use super::response::{COORDINATES, Look, Response, ResponseError, respond_seen};
 use super::sweep::{Sweep, SweepError};
@@ -22,6 +22,62 @@ pub const PERIOD: f64 = 2.0;
 const CURVE_POINTS: usize = 800;
 /// Indices of x and beta among the coordinates.
 const PICKED: [usize; 2] = [0, 4];
+
+/// Changes to the default scene under which the paper's runs are made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Variant {
+    /// Begins the names of its files.
+    pub prefix: &'static str,
+    /// What it is.
+    pub title: &'static str,
+    /// Keys and values.
+    pub changes: &'static [(&'static str, &'static str)],
+}
+
+const AS_PRINTED: (&str, &str) = ("contact.friction_velocity", "printed");
+
+/// The contract of this program: friction reads the velocity of the centres, (15)-(16).
+pub const CORRECTED: Variant = Variant {
+    prefix: "",
+    title: "as corrected",
+    changes: &[],
+};
+
+/// Friction reads the velocities of (13) as printed.
+pub const PRINTED: Variant = Variant {
+    prefix: "printed_",
+    title: "(13) as printed",
+    changes: &[AS_PRINTED],
+};
+
+/// (13) as printed together with what else the paper prints wrongly or leaves out. (19) as printed has the elastic force over
+/// four times the approach speed in m/s, 3.2 times that of a steel ball in the first impacts, and next to no damping.
+pub const COMBINATIONS: [Variant; 4] = [
+    Variant {
+        prefix: "printed_a1_16mm_",
+        title: "and a1 = 16 mm",
+        changes: &[AS_PRINTED, ("spcmm.slider_plane", "16 mm")],
+    },
+    Variant {
+        prefix: "printed_a1_24mm_",
+        title: "and a1 = 24 mm",
+        changes: &[AS_PRINTED, ("spcmm.slider_plane", "24 mm")],
+    },
+    Variant {
+        prefix: "printed_a1_36mm_",
+        title: "and a1 = 36 mm",
+        changes: &[AS_PRINTED, ("spcmm.slider_plane", "36 mm")],
+    },
+    Variant {
+        prefix: "printed_eq19_",
+        title: "and (19) as printed, as its first impacts have it: 3.2 K, no damping",
+        changes: &[
+            AS_PRINTED,
+            ("contact.youngs_modulus", "660 GPa"),
+            ("contact.normal_law", "hertz"),
+        ],
+    },
+];
 
 /// How much is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -98,11 +154,19 @@ impl From<SweepError> for ReproductionError {
 /// What there is to do.
 pub struct Work {
     extent: Extent,
-    runs: Vec<(String, Case, Scene)>,
-    /// Scenes of settled curves, in the order of [`CASES`].
-    curves: Vec<(Case, Scene)>,
+    runs: Vec<RunOf>,
+    /// Scenes of settled curves, of each variant in the order of [`CASES`].
+    curves: Vec<(Variant, Case, Scene)>,
     swathes: Vec<Swathe>,
     jobs: Vec<Job>,
+}
+
+/// A run of section 4.2.
+struct RunOf {
+    variant: Variant,
+    name: String,
+    case: Case,
+    scene: Scene,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -124,13 +188,15 @@ pub enum Outcome {
 
 const SCENE: &str = "spcmm";
 
-fn scene(case: Case, more: &[(&str, &str)]) -> Result<Scene, SceneError> {
+fn scene(variant: Variant, case: Case, more: &[(&str, &str)]) -> Result<Scene, SceneError> {
     let mut changes = case.changes();
-    changes.extend(more.iter().map(|&(k, v)| (k.to_owned(), v.to_owned())));
+    let all = variant.changes.iter().chain(more);
+    changes.extend(all.map(|&(k, v)| (k.to_owned(), v.to_owned())));
     Scene::load(SCENE, &changes)
 }
 
 fn swathe(
+    variant: Variant,
     name: &'static str,
     case: Case,
     vary: &[String],
@@ -138,7 +204,7 @@ fn swathe(
     (periods, discard): (usize, usize),
     exponent: bool,
 ) -> Result<Swathe, ReproductionError> {
-    let scene = scene(case, &[])?;
+    let scene = scene(variant, case, &[])?;
     let axes = vary.iter().map(|text| Axis::parse(&scene, text));
     let grid = Grid::new(&scene, axes.collect::<Result<Vec<_>, _>>()?, start)?;
     let plan = Plan {
@@ -148,6 +214,7 @@ fn swathe(
         exponent,
     };
     Ok(Swathe {
+        variant,
         name,
         sweep: Sweep::new(scene, grid, plan)?,
         records: Vec::new(),
@@ -161,18 +228,35 @@ impl Work {
     /// An extent that no sweep can have.
     pub fn new(extent: Extent) -> Result<Self, ReproductionError> {
         let mut runs = Vec::new();
-        for case in CASES {
-            runs.push((file_name(case), case, scene(case, &[])?));
-        }
+        let mut run = |variant: Variant, name: String, case: Case, more: &[(&str, &str)]| {
+            let scene = scene(variant, case, more)?;
+            let name = format!("{}{name}", variant.prefix);
+            runs.push(RunOf {
+                variant,
+                name,
+                case,
+                scene,
+            });
+            Ok::<_, SceneError>(())
+        };
         let nominal = CASES[0];
-        runs.push((
-            "lagrange".to_owned(),
-            nominal,
-            scene(nominal, &[("formulation", "lagrange")])?,
-        ));
-        let ideal = scene(nominal, &[("contact.clearance", "0")])?;
-        runs.push(("ideal".to_owned(), nominal, ideal));
-        let curves = CASES.iter().map(|&case| Ok((case, scene(case, &[])?)));
+        for variant in [CORRECTED, PRINTED] {
+            for case in CASES {
+                run(variant, file_name(case), case, &[])?;
+            }
+            let multipliers = [("formulation", "lagrange")];
+            run(variant, "lagrange".to_owned(), nominal, &multipliers)?;
+        }
+        for variant in COMBINATIONS {
+            for case in BY_CLEARANCE {
+                run(variant, file_name(case), case, &[])?;
+            }
+        }
+        let closed = [("contact.clearance", "0")];
+        run(CORRECTED, "ideal".to_owned(), nominal, &closed)?;
+        let both = [CORRECTED, PRINTED].into_iter();
+        let curves = both
+            .flat_map(|variant| CASES.map(|case| Ok((variant, case, scene(variant, case, &[])?))));
         let curves = curves.collect::<Result<Vec<_>, SceneError>>()?;
         let clearance = |n: usize| vec![format!("contact.clearance=0.01mm..1mm:{n}")];
         let friction = |n: usize| vec![format!("contact.friction=0.01..0.4:{n}")];
@@ -197,12 +281,15 @@ impl Work {
             ("friction_cold", &f, cold, sweep_of, true),
             ("map", &map, cold, extent.map_periods, true),
         ];
-        let swathes = swathes
-            .into_iter()
-            .map(|(name, vary, start, periods, exponent)| {
-                swathe(name, nominal, vary, start, periods, exponent)
-            })
-            .collect::<Result<Vec<_>, _>>()?;
+        let of = |variant, &(name, vary, start, periods, exponent): &(_, &Vec<String>, _, _, _)| {
+            swathe(variant, name, nominal, vary, start, periods, exponent)
+        };
+        let both = [CORRECTED, PRINTED].into_iter();
+        let all = both.flat_map(|variant| swathes.iter().map(move |s| (variant, s)));
+        let all = all.chain(COMBINATIONS.map(|variant| (variant, &swathes[0])));
+        let swathes = all
+            .map(|(variant, s)| of(variant, s))
+            .collect::<Result<Vec<_>, ReproductionError>>()?;
         // Blocks that take longest come first, so that no thread is left with one at the end.
         let mut jobs: Vec<Job> = Vec::new();
         for (s, swathe) in swathes.iter().enumerate() {
@@ -266,7 +353,7 @@ impl Work {
         };
         match self.jobs[job] {
             Job::Run(n) => {
-                let (name, _, scene) = &self.runs[n];
+                let RunOf { name, scene, .. } = &self.runs[n];
                 let mut rows = Vec::new();
                 let see = |look: &Look| rows.push(row(look));
                 let response = respond_seen(scene, DURATION, SAMPLING, see, go_on);
@@ -274,7 +361,7 @@ impl Work {
                 Ok(Outcome::Run(Box::new((response, rows))))
             }
             Job::Curve(n) => {
-                let (case, scene) = &self.curves[n];
+                let (_, case, scene) = &self.curves[n];
                 let curve = curve(*case, scene, self.extent.settle, go_on);
                 Ok(Outcome::Curve(
                     curve.map_err(|e| failed("settled curve", e))?,
@@ -289,7 +376,10 @@ impl Work {
                     block.advance(2048);
                     let now = block.current().map_or(0.0, |run| run.taken() as f64 / all);
                     if !go_on(share * (block.finished().len() as f64 + now)) {
-                        return Err(failed(self.swathes[s].name, ResponseError::Cancelled));
+                        return Err(failed(
+                            &self.swathes[s].file_name(),
+                            ResponseError::Cancelled,
+                        ));
                     }
                 }
                 Ok(Outcome::Block(block.records()))
@@ -301,23 +391,29 @@ impl Work {
     ///
     /// # Panics
     /// If there is not one outcome for each job.
-    pub fn gather(mut self, outcomes: Vec<Outcome>) -> Findings {
+    pub fn gather(mut self, outcomes: Vec<Outcome>) -> Report {
         assert_eq!(outcomes.len(), self.jobs.len(), "an outcome a job");
         let mut runs = Vec::new();
         let mut curves = Vec::new();
         for (job, outcome) in self.jobs.iter().zip(outcomes) {
             match (job, outcome) {
                 (Job::Run(n), Outcome::Run(found)) => {
-                    let (name, case, _) = &self.runs[*n];
+                    let RunOf {
+                        variant,
+                        name,
+                        case,
+                        ..
+                    } = &self.runs[*n];
                     let (response, rows) = *found;
-                    runs.push(Traced {
+                    let run = Traced {
                         name: name.clone(),
                         case: *case,
                         response,
                         rows,
-                    });
+                    };
+                    runs.push((*variant, run));
                 }
-                (Job::Curve(_), Outcome::Curve(curve)) => curves.push(curve),
+                (Job::Curve(n), Outcome::Curve(curve)) => curves.push((self.curves[*n].0, curve)),
                 // Blocks of a sweep come in order of their points.
                 (Job::Block(s, _), Outcome::Block(records)) => {
                     self.swathes[*s].records.extend(records);
@@ -325,18 +421,45 @@ impl Work {
                 _ => unreachable!("a job has an outcome of its kind"),
             }
         }
-        let ideal = runs.pop().expect("the last run is the ideal one");
-        let lagrange = runs.pop().expect("the last but one has multipliers");
-        let nominal = &self.runs[0].2;
+        let (_, ideal) = runs.pop().expect("the last run is the ideal one");
+        let nominal = &self.runs[0].scene;
         let all = resolution(nominal, nominal.solver.tolerance);
-        Findings {
-            extent: self.extent,
-            runs,
-            lagrange,
-            ideal,
-            curves,
-            swathes: self.swathes,
-            resolution: PICKED.map(|i| all[i]),
+        let resolution = PICKED.map(|i| all[i]);
+        let mut runs_of = |variant: Variant| -> Vec<Traced> {
+            let own = runs.extract_if(.., |(of, _)| *of == variant);
+            own.map(|(_, run)| run).collect()
+        };
+        let mut swathes_of = |variant: Variant| -> Vec<Swathe> {
+            let own = self.swathes.extract_if(.., |s| s.variant == variant);
+            own.collect()
+        };
+        let mut findings = |variant: Variant| {
+            let mut runs = runs_of(variant);
+            let own = curves.extract_if(.., |(of, _)| *of == variant);
+            Findings {
+                extent: self.extent,
+                variant,
+                lagrange: runs
+                    .pop()
+                    .expect("the last run of a variant has multipliers"),
+                runs,
+                ideal: ideal.clone(),
+                curves: own.map(|(_, curve)| curve).collect(),
+                swathes: swathes_of(variant),
+                resolution,
+            }
+        };
+        let (corrected, printed) = (findings(CORRECTED), findings(PRINTED));
+        Report {
+            corrected,
+            printed,
+            combinations: COMBINATIONS
+                .map(|variant| Combination {
+                    variant,
+                    runs: runs_of(variant),
+                    sections: swathes_of(variant).remove(0),
+                })
+                .into(),
         }
     }
 }

@@ -104,8 +104,12 @@ pub struct Coefficients {
     pub speed_floor: f64,
     /// Ball radius r, m.
     pub ball_radius: f64,
-    /// Friction reads the surfaces' relative velocity, not the centres'.
-    pub surface: bool,
+    /// Which relative velocity friction reads.
+    pub friction_velocity: FrictionVelocity,
+    /// Clearance c > 0 just now, m.
+    pub clearance: f64,
+    /// Its rate while it is on its way to a new value, m/s.
+    pub clearance_rate: f64,
     /// The damping term divides by the largest rate of the contact so far, not by the one at its start.
     pub largest: bool,
 }
@@ -124,9 +128,17 @@ impl Coefficients {
             slip_high: parameters.slip_speed_high,
             speed_floor: parameters.impact_speed_floor,
             ball_radius: parameters.ball_radius,
-            surface: parameters.friction_velocity == FrictionVelocity::Surface,
+            friction_velocity: parameters.friction_velocity,
+            clearance,
+            clearance_rate: 0.0,
             largest: parameters.approach_speed == ApproachSpeed::Largest,
         }
+    }
+
+    /// Takes over a clearance on its way, and the stiffness that goes with it.
+    pub fn move_clearance(&mut self, parameters: &Parameters, clearance: f64, rate: f64) {
+        self.stiffness = hertz_stiffness(parameters, clearance);
+        (self.clearance, self.clearance_rate) = (clearance, rate);
     }
 
     /// Normal force F_N >= 0, N (19), for penetration (m), its rate (m/s) and the approach speed delta_dot0 (m/s).
@@ -137,15 +149,6 @@ impl Coefficients {
         }
         let elastic = self.stiffness * penetration * penetration.sqrt();
         (elastic * (1.0 + self.damping * rate / approach_speed)).max(0.0)
-    }
-
-    /// Energy stored by the elastic part, 2/5 K delta^2.5, J.
-    #[inline]
-    pub fn elastic_energy(&self, penetration: f64) -> f64 {
-        if penetration <= 0.0 {
-            return 0.0;
-        }
-        0.4 * self.stiffness * penetration * penetration * penetration.sqrt()
     }
 
     /// F_T / F_N: Coulomb coefficient times the dynamic correction cd of (21), for a sliding speed in m/s.

@@ -1,15 +1,22 @@
 //! Contact of a ball in its socket: pure functions of gap, rates and parameters. SI units, f64.
 
 mod approach;
+mod force;
 mod law;
+mod memory;
 mod slip;
 
 pub use approach::Pace;
+pub use force::{Force, Separation, Slope, Stiffness};
 pub use law::{
     Coefficients, damping_factor, hertz_stiffness, impact_duration, restitution_given,
     settled_penetration,
 };
+pub use memory::Memory;
 pub use slip::Slip;
+
+type Vec3 = nalgebra::Vector3<f64>;
+type Mat3 = nalgebra::Matrix3<f64>;
 
 /// Normal-force law of a contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,6 +49,9 @@ pub enum FrictionVelocity {
     Centres,
     /// Relative velocity of the two material points in contact.
     Surface,
+    /// Relative velocity of the two geometric points of contact, paper eq. (13) as printed: (1 - c/|e|) times that of the
+    /// centres. Not objective; to compare with the paper.
+    Printed,
 }
 
 /// Which speed the damping term of the normal force divides by.

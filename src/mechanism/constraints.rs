@@ -1,8 +1,7 @@
 //! Ideal ball joints in tree coordinates: three rows each, (45), solved for their multipliers, and the projection that
 //! keeps closed loops closed.
 
-use super::kinematics::Kinematics;
-use super::model::{BallJoint, BodyIndex, Model};
+use super::model::{BodyIndex, Model};
 use super::rows::RowSystem;
 use super::tree::{Tree, visit_columns};
 use crate::scene::Vec3;
@@ -269,11 +268,7 @@ impl Constraints {
     pub fn correct(&mut self, model: &Model, tree: &Tree, t: f64, q: &[f64], vdot: &mut [f64]) {
         self.factor(model, tree, t, q);
         for k in 0..self.joints.len() {
-            let bias = relative(
-                &model.joints[self.joints[k]],
-                &tree.motion,
-                Kinematics::point_acceleration,
-            );
+            let bias = model.joints[self.joints[k]].opening_acceleration(&tree.motion);
             let residual = bias + self.apply(model, k, vdot);
             for i in 0..3 {
                 self.multipliers[3 * k + i] = -residual[i];
@@ -306,7 +301,7 @@ impl Constraints {
             tree.forward(model, t, y);
             let mut largest: f64 = 0.0;
             for (k, &j) in self.joints.iter().enumerate() {
-                let e = eccentricity(&model.joints[j], &tree.motion);
+                let e = model.joints[j].eccentricity(&tree.motion);
                 largest = largest.max(e.norm());
                 for i in 0..3 {
                     self.multipliers[3 * k + i] = -e[i];
@@ -334,7 +329,7 @@ impl Constraints {
         }
         self.prepare(model, tree, t, &y[..model.nq], &gravity);
         for (k, &j) in self.joints.iter().enumerate() {
-            let rate = opening_rate(&model.joints[j], &tree.motion);
+            let rate = model.joints[j].opening_rate(&tree.motion);
             for i in 0..3 {
                 self.multipliers[3 * k + i] = -rate[i];
             }
@@ -360,27 +355,4 @@ impl Constraints {
         self.step = scratch;
         self.factor(model, tree, t, q);
     }
-}
-
-/// Z_j - Z_i, m.
-pub fn eccentricity(joint: &BallJoint, motion: &[Kinematics]) -> Vec3 {
-    let at =
-        |a: &super::model::Anchor| motion[a.body].position + motion[a.body].rotation * a.offset;
-    at(&joint.ball) - at(&joint.socket)
-}
-
-/// d(Z_j - Z_i)/dt, m/s.
-pub fn opening_rate(joint: &BallJoint, motion: &[Kinematics]) -> Vec3 {
-    relative(joint, motion, Kinematics::point_velocity)
-}
-
-/// Ball's minus socket's `rate` at the centres.
-fn relative(
-    joint: &BallJoint,
-    motion: &[Kinematics],
-    rate: fn(&Kinematics, &Vec3) -> Vec3,
-) -> Vec3 {
-    let at =
-        |a: &super::model::Anchor| rate(&motion[a.body], &(motion[a.body].rotation * a.offset));
-    at(&joint.ball) - at(&joint.socket)
 }

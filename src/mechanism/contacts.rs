@@ -2,37 +2,8 @@
 
 use super::kinematics::{Kinematics, Wrench};
 use super::model::{BallJoint, Model};
-use crate::contact::{Coefficients, Pace, Parameters, Slip};
+use crate::contact::{Coefficients, Force, Memory, Parameters, Separation, Slope, Stiffness};
 use crate::scene::{Scene, Vec3};
-
-/// What a contact remembers between steps: part of the state.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Memory {
-    /// In contact.
-    pub active: bool,
-    /// What the damping term divides by: delta_dot0 of this contact, or its largest rate so far, not below the scene's floor,
-    /// m/s; 0 while free.
-    pub approach_speed: f64,
-    /// The floor was used: this contact rebounds higher than asked.
-    pub floored: bool,
-    /// Piece of the friction law in force.
-    pub slip: Slip,
-    /// Piece of the rule for the approach speed in force.
-    pub pace: Pace,
-}
-
-impl Memory {
-    /// What the damping term divides by where the penetration grows at `rate`, m/s. Until a contact has a memory it is the
-    /// rate itself.
-    #[inline]
-    pub fn approach(&self, c: &Coefficients, rate: f64) -> f64 {
-        if self.active {
-            c.approach(self.pace, self.approach_speed, rate)
-        } else {
-            rate.max(c.speed_floor)
-        }
-    }
-}
 
 /// A clearance on its way to a new value.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -89,10 +60,16 @@ pub struct Gap {
     pub slip_speed: f64,
 }
 
+impl Gap {
+    /// Contact force on the ball where its normal is `n`, N.
+    pub fn force_on_ball(&self, n: &Vec3) -> Vec3 {
+        n * -self.normal_force + self.friction
+    }
+}
+
 struct Joint {
     joint: BallJoint,
     coefficients: Coefficients,
-    clearance: f64,
 }
 
 /// All ball joints of a scene.
@@ -114,8 +91,6 @@ pub struct Contacts {
     pub apart: bool,
     /// A sliding speed or a penetration rate may have been beyond its piece of the law since this was last cleared.
     pub strayed: bool,
-    /// Of the latest evaluation, s.
-    time: f64,
 }
 
 impl Contacts {
@@ -129,7 +104,6 @@ impl Contacts {
             .map(|(&joint, p)| Joint {
                 joint,
                 coefficients: Coefficients::new(p, p.clearance),
-                clearance: p.clearance,
             })
             .collect();
         let n = joints.len();
@@ -146,7 +120,6 @@ impl Contacts {
             any_ramp: false,
             apart: false,
             strayed: false,
-            time: 0.0,
         }
     }
 
@@ -187,7 +160,7 @@ impl Contacts {
 
     /// Clearance of joint `i` in force at the latest evaluation, m.
     pub fn clearance(&self, i: usize) -> f64 {
-        self.joints[i].clearance
+        self.joints[i].coefficients.clearance
     }
 
     /// Clearances under way.
@@ -204,7 +177,6 @@ impl Contacts {
     /// New parameters for joint `i` from now on; `clearance` is the one in force now.
     pub fn set_parameters(&mut self, i: usize, parameters: &Parameters, clearance: f64) {
         self.parameters[i] = *parameters;
-        self.joints[i].clearance = clearance;
         self.joints[i].coefficients = Coefficients::new(parameters, clearance);
     }
 
@@ -216,25 +188,11 @@ impl Contacts {
         }
         for i in 0..self.joints.len() {
             if let Some(ramp) = self.ramps[i] {
-                let clearance = ramp.at(t).0;
-                self.joints[i].clearance = clearance;
-                self.joints[i].coefficients.stiffness =
-                    crate::contact::hertz_stiffness(&self.parameters[i], clearance);
+                let (clearance, rate) = ramp.at(t);
+                self.joints[i]
+                    .coefficients
+                    .move_clearance(&self.parameters[i], clearance, rate);
             }
-        }
-    }
-
-    /// Rate of the clearance of joint `i` at the latest evaluation, m/s.
-    pub fn clearance_rate(&self, i: usize) -> f64 {
-        self.clearance_rate_at(i, self.time)
-    }
-
-    #[inline]
-    fn clearance_rate_at(&self, i: usize, t: f64) -> f64 {
-        if self.any_ramp {
-            self.ramps[i].map_or(0.0, |r| r.at(t).1)
-        } else {
-            0.0
         }
     }
 
@@ -244,155 +202,146 @@ impl Contacts {
             return;
         }
         self.update_ramps(t);
-        self.time = t;
         self.evaluations += 1;
-        for i in 0..self.joints.len() {
-            let Joint {
+        for (
+            i,
+            Joint {
                 joint,
                 coefficients,
-                clearance,
-            } = &self.joints[i];
+            },
+        ) in self.joints.iter().enumerate()
+        {
             if joint.ideal.is_some() {
                 continue;
             }
             let (ball, socket) = (&motion[joint.ball.body], &motion[joint.socket.body]);
             let arm_ball = ball.rotation * joint.ball.offset;
             let arm_socket = socket.rotation * joint.socket.offset;
-            let centre_velocity = (ball.velocity + ball.angular_velocity.cross(&arm_ball))
-                - (socket.velocity + socket.angular_velocity.cross(&arm_socket));
+            let velocity = ball.point_velocity(&arm_ball) - socket.point_velocity(&arm_socket);
             let e = (ball.position + arm_ball) - (socket.position + arm_socket);
             let gap = &mut self.gaps[i];
-            gap.eccentricity = e;
-            gap.eccentricity_rate = centre_velocity;
-            gap.normal_force = 0.0;
-            gap.friction = Vec3::zeros();
-            gap.slip_speed = 0.0;
-            let square = e.norm_squared();
-            let memory = &self.memory[i];
-            let touches = match self.switching {
-                Switching::Located => memory.active,
-                Switching::Immediate => square > clearance * clearance,
+            *gap = Gap {
+                eccentricity: e,
+                eccentricity_rate: velocity,
+                ..Gap::default()
             };
-            if !touches || square <= clearance * clearance {
+            let clearance = coefficients.clearance;
+            let memory = &self.memory[i];
+            let free = self.switching == Switching::Located && !memory.active;
+            if free || e.norm_squared() <= clearance * clearance {
                 continue;
             }
-            let distance = square.sqrt();
-            let n = e / distance;
-            let rate = n.dot(&centre_velocity)
-                - if self.any_ramp {
-                    self.ramps[i].map_or(0.0, |r| r.at(t).1)
-                } else {
-                    0.0
-                };
-            let penetration = distance - clearance;
-            let approach = memory.approach(coefficients, rate);
-            // A rising rate may pass its largest value in any step.
-            if memory.pace == Pace::Rising
-                || (memory.pace == Pace::Held && rate > memory.approach_speed)
-            {
-                self.strayed = true;
-            }
-            let normal_force = coefficients.normal_force(penetration, rate, approach);
-            gap.normal_force = normal_force;
-            if normal_force == 0.0 {
-                continue;
-            }
-            let mut force = n * -normal_force;
-            let to_surface = n * coefficients.ball_radius;
-            let socket_radius = coefficients.ball_radius + clearance;
-            if coefficients.friction > 0.0 {
+            let at = coefficients.separation(&e, &velocity);
+            let force = coefficients.force(memory, &at, || {
                 self.friction_evaluations += 1;
-                let relative = if coefficients.surface {
-                    centre_velocity + ball.angular_velocity.cross(&to_surface)
-                        - socket.angular_velocity.cross(&(n * socket_radius))
-                } else {
-                    centre_velocity
-                };
-                let slip = relative - n * n.dot(&relative);
-                let speed = slip.norm();
-                gap.slip_speed = speed;
-                if memory.slip != Slip::Whole && coefficients.beyond(memory.slip, speed) > 0.0 {
-                    self.strayed = true;
-                }
-                let per_speed = coefficients.friction_per_speed(memory.slip, speed);
-                if per_speed != 0.0 {
-                    let friction = slip * (-per_speed * normal_force);
-                    gap.friction = friction;
-                    force += friction;
-                }
+                let (ball, socket) = (&ball.angular_velocity, &socket.angular_velocity);
+                coefficients.friction_reads(&at.normal, &velocity, ball, socket)
+            });
+            self.strayed |= coefficients.leaves_piece(memory, &at, &force);
+            gap.normal_force = force.normal;
+            gap.friction = force.friction;
+            gap.slip_speed = force.slip_speed;
+            if force.normal == 0.0 {
+                continue;
             }
-            let on_ball = &mut wrench[joint.ball.body];
-            on_ball.force += force;
-            on_ball.torque += (arm_ball + to_surface).cross(&force);
-            let on_socket = &mut wrench[joint.socket.body];
-            on_socket.force -= force;
-            on_socket.torque -= (arm_socket + n * socket_radius).cross(&force);
+            let on_ball = at.normal * -force.normal + force.friction;
+            let radius = coefficients.ball_radius;
+            let ball = &mut wrench[joint.ball.body];
+            ball.force += on_ball;
+            ball.torque += (arm_ball + at.normal * radius).cross(&on_ball);
+            let socket = &mut wrench[joint.socket.body];
+            socket.force -= on_ball;
+            socket.torque -= (arm_socket + at.normal * (radius + clearance)).cross(&on_ball);
         }
     }
 
     /// Gap geometry alone (no force) at `t`: eccentricity, its rate, normal, penetration and its rate.
     pub fn measure(&mut self, t: f64, motion: &[Kinematics]) {
         self.update_ramps(t);
-        self.time = t;
-        for i in 0..self.joints.len() {
-            let joint = &self.joints[i].joint;
-            let (ball, socket) = (&motion[joint.ball.body], &motion[joint.socket.body]);
-            let arm_ball = ball.rotation * joint.ball.offset;
-            let arm_socket = socket.rotation * joint.socket.offset;
-            let gap = &mut self.gaps[i];
-            gap.eccentricity = (ball.position + arm_ball) - (socket.position + arm_socket);
-            gap.eccentricity_rate = (ball.velocity + ball.angular_velocity.cross(&arm_ball))
-                - (socket.velocity + socket.angular_velocity.cross(&arm_socket));
+        for (Joint { joint, .. }, gap) in self.joints.iter().zip(&mut self.gaps) {
+            gap.eccentricity = joint.eccentricity(motion);
+            gap.eccentricity_rate = joint.opening_rate(motion);
         }
-        self.finish(t);
+        self.finish();
     }
 
-    /// Sliding speed of joint `i` in the motion last measured, m/s.
-    pub fn slip_speed(&self, i: usize, motion: &[Kinematics]) -> f64 {
+    /// Where the ball of joint `i`, off the centre, was at the latest evaluation.
+    #[inline]
+    pub fn separation(&self, i: usize) -> Separation {
+        let gap = &self.gaps[i];
+        let c = &self.joints[i].coefficients;
+        c.separation(&gap.eccentricity, &gap.eccentricity_rate)
+    }
+
+    /// Relative velocity that friction reads at the contact of joint `i` with the normal `n`, m/s.
+    pub fn friction_reads(&self, i: usize, n: &Vec3, motion: &[Kinematics]) -> Vec3 {
         let Joint {
             joint,
             coefficients,
-            clearance,
         } = &self.joints[i];
+        let spin = |body: usize| &motion[body].angular_velocity;
+        let (ball, socket) = (spin(joint.ball.body), spin(joint.socket.body));
+        coefficients.friction_reads(n, &self.gaps[i].eccentricity_rate, ball, socket)
+    }
+
+    /// Sliding speed of joint `i`, off the centre, in the motion last measured, m/s.
+    pub fn slip_speed(&self, i: usize, motion: &[Kinematics]) -> f64 {
+        let at = self.separation(i);
+        let read = self.friction_reads(i, &at.normal, motion);
+        self.joints[i].coefficients.sliding(&at, &read).norm()
+    }
+
+    /// Derivatives of the force of joint `i` at the latest evaluation; `None` where it carries none.
+    pub fn linearise(&self, i: usize, motion: &[Kinematics]) -> Option<Stiffness> {
         let gap = &self.gaps[i];
-        let n = gap.normal;
-        let mut relative = gap.eccentricity_rate;
-        if coefficients.surface {
-            let radius = coefficients.ball_radius;
-            relative += motion[joint.ball.body]
-                .angular_velocity
-                .cross(&(n * radius))
-                - motion[joint.socket.body]
-                    .angular_velocity
-                    .cross(&(n * (radius + clearance)));
+        if gap.normal_force <= 0.0 {
+            return None;
         }
-        (relative - n * n.dot(&relative)).norm()
+        let at = self.separation(i);
+        let read = self.friction_reads(i, &at.normal, motion);
+        let force = Force {
+            normal: gap.normal_force,
+            friction: gap.friction,
+            slip_speed: gap.slip_speed,
+        };
+        let (c, memory) = (&self.joints[i].coefficients, &self.memory[i]);
+        Some(c.linearise(
+            memory,
+            &at,
+            &gap.eccentricity_rate,
+            &read,
+            &force,
+            Slope::Tangent,
+        ))
     }
 
     /// Completes normal, penetration and rate of every gap from the eccentricities of the latest evaluation.
-    pub fn finish(&mut self, t: f64) {
-        for i in 0..self.joints.len() {
-            let clearance_rate = self.clearance_rate_at(i, t);
-            let ideal = self.joints[i].joint.ideal.is_some();
-            let clearance = self.joints[i].clearance;
-            let gap = &mut self.gaps[i];
+    pub fn finish(&mut self) {
+        for (
+            Joint {
+                joint,
+                coefficients,
+            },
+            gap,
+        ) in self.joints.iter().zip(&mut self.gaps)
+        {
             let distance = gap.eccentricity.norm();
             gap.normal = if distance > 0.0 {
                 gap.eccentricity / distance
             } else {
                 Vec3::zeros()
             };
-            if ideal {
+            if joint.ideal.is_some() {
                 (gap.penetration, gap.rate) = (0.0, 0.0);
             } else {
-                gap.penetration = distance - clearance;
+                gap.penetration = distance - coefficients.clearance;
                 // A ball at rest at the centre leaves it in the direction in which it moves.
                 let opening = if distance > 0.0 {
                     gap.normal.dot(&gap.eccentricity_rate)
                 } else {
                     gap.eccentricity_rate.norm()
                 };
-                gap.rate = opening - clearance_rate;
+                gap.rate = opening - coefficients.clearance_rate;
             }
         }
     }

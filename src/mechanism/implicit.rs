@@ -8,11 +8,11 @@
 
 use super::MechanismError;
 use super::bounds::Cost;
-use super::contact_stiffness::{Column, collect_columns};
+use super::columns::{Column, collect_columns};
 use super::contacts::{Contacts, Switching};
 use super::kinematics::Kinematics;
 use super::model::Model;
-use crate::contact::{Coefficients, Slip};
+use crate::contact::{Coefficients, Memory, Pace, Slope};
 use crate::scene::{Mat3, Vec3};
 
 /// Most Newton iterations, and the change of a force against the largest at which they end.
@@ -31,16 +31,11 @@ pub const TURNS: usize = 4;
 struct Touch {
     joint: usize,
     law: Coefficients,
-    slip: Slip,
-    approach: f64,
-    /// A larger rate takes the place of `approach`.
-    follows: bool,
-    clearance: f64,
-    clearance_rate: f64,
+    memory: Memory,
     /// Without contact forces: eccentricity (m), its rate and the velocity that friction reads (m/s).
     eccentricity: Vec3,
     rate: Vec3,
-    relative: Vec3,
+    read: Vec3,
     /// Velocities that the contacts add: of the centres, and of what friction reads, m/s.
     added: Vec3,
     slipping: Vec3,
@@ -58,54 +53,26 @@ impl Touch {
     fn evaluate(&mut self, h: f64) {
         let eccentricity = self.eccentricity + self.added * h;
         let rate = self.rate + self.added;
-        let distance = eccentricity.norm();
+        let read = self.read + self.slipping;
         self.force = Vec3::zeros();
         self.impedance = Mat3::zeros();
         self.resistance = Mat3::zeros();
-        let penetration = distance - self.clearance;
-        if penetration <= 0.0 {
+        let at = self.law.separation(&eccentricity, &rate);
+        if at.penetration <= 0.0 {
             return;
         }
-        let n = eccentricity / distance;
-        self.normal = n;
-        let deepening = n.dot(&rate) - self.clearance_rate;
-        let c = &self.law;
-        let rising = self.follows && deepening > self.approach;
-        let approach = if rising { deepening } else { self.approach };
-        let normal_force = c.normal_force(penetration, deepening, approach);
-        if normal_force <= 0.0 {
+        self.normal = at.normal;
+        let force = self.law.force(&self.memory, &at, || read);
+        if force.normal <= 0.0 {
             return;
         }
-        let root = penetration.sqrt();
-        let stiffness = c.stiffness * root;
-        let by_penetration = 1.5 * stiffness * (1.0 + c.damping * deepening / approach);
-        let by_rate = if rising {
-            0.0
-        } else {
-            stiffness * penetration * c.damping / approach
-        };
-        let tangent = Mat3::identity() - n * n.transpose();
-        let turning = tangent * (h / distance);
-        let rise = n * (h * by_penetration + by_rate) + turning * rate * by_rate;
-        self.force = n * -normal_force;
-        self.impedance = -n * rise.transpose() - turning * normal_force;
-        if c.friction > 0.0 {
-            let relative = self.relative + self.slipping;
-            let sliding = tangent * relative;
-            let speed = sliding.norm();
-            let per_speed = c.friction_per_speed(self.slip, speed);
-            let resisting = per_speed * normal_force;
-            self.force -= sliding * resisting;
-            let turned = turning * n.dot(&relative) + n * (turning * relative).transpose();
-            self.impedance += turned * resisting - sliding * (rise * per_speed).transpose();
-            self.resistance = tangent * -resisting;
-            // Full friction by its secant, which brings sliding to rest within a step and cannot reverse it; the ramp by its
-            // slope.
-            if speed > 0.0 && speed < c.slip_high {
-                let slope = c.friction_per_speed_slope(self.slip, speed) / speed;
-                self.resistance -= sliding * sliding.transpose() * (slope * normal_force);
-            }
-        }
+        let slope = Slope::Secant;
+        let stiffness = self
+            .law
+            .linearise(&self.memory, &at, &rate, &read, &force, slope);
+        self.force = at.normal * -force.normal + force.friction;
+        self.impedance = stiffness.by_displacement * h + stiffness.by_rate;
+        self.resistance = stiffness.by_slip;
     }
 }
 
@@ -211,18 +178,17 @@ impl ImplicitContacts {
             self.touches.push(Touch {
                 joint: j,
                 law,
-                slip: memory.slip,
-                approach: if memory.active {
-                    memory.approach_speed
+                memory: if memory.active {
+                    memory
                 } else {
-                    gap.rate.max(law.speed_floor)
+                    Memory {
+                        pace: Pace::Held,
+                        ..Memory::begun(&law, gap.rate)
+                    }
                 },
-                follows: law.largest && memory.active,
-                clearance: contacts.clearance(j),
-                clearance_rate: contacts.clearance_rate(j),
                 eccentricity: gap.eccentricity,
                 rate: gap.eccentricity_rate,
-                relative: gap.eccentricity_rate,
+                read: gap.eccentricity_rate,
                 added: Vec3::zeros(),
                 slipping: Vec3::zeros(),
                 arm: gap.normal,
@@ -248,15 +214,8 @@ impl ImplicitContacts {
             let (j, n) = (touch.joint, touch.normal);
             let joint = &model.joints[j];
             touch.arm = n;
-            if touch.law.surface && touch.law.friction > 0.0 {
-                let (ball, socket) = (&motion[joint.ball.body], &motion[joint.socket.body]);
-                let radius = touch.law.ball_radius;
-                touch.relative = touch.rate + ball.angular_velocity.cross(&(n * radius))
-                    - socket
-                        .angular_velocity
-                        .cross(&(n * (radius + touch.clearance)));
-            }
-            collect_columns(&mut self.columns[j], contacts, motion, joint, j, &n, &visit);
+            touch.read = contacts.friction_reads(j, &n, motion);
+            collect_columns(&mut self.columns[j], &touch.law, motion, joint, &n, &visit);
         }
     }
 
@@ -334,7 +293,7 @@ impl ImplicitContacts {
         for i in 0..m {
             let touch = &self.touches[i];
             let columns = &self.columns[touch.joint];
-            let surface = touch.law.surface && touch.law.friction > 0.0;
+            let surface = touch.law.reads_surfaces() && touch.law.friction > 0.0;
             for j in i.saturating_sub(self.reach)..=(i + self.reach).min(m - 1) {
                 let other = self.touches[j].joint;
                 let (first, end) = self.ranges[other];

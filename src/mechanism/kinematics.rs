@@ -1,6 +1,6 @@
 //! Motion of bodies: from coordinates to poses, velocities and accelerations of the centroids. World axes.
 
-use super::model::{Body, Model, Motion};
+use super::model::{Anchor, BallJoint, Body, Model, Motion};
 use super::spcmm::Ideal;
 use crate::scene::{Mat3, Quat, Vec3};
 
@@ -55,6 +55,30 @@ impl Kinematics {
             + self
                 .angular_velocity
                 .cross(&self.angular_velocity.cross(arm))
+    }
+}
+
+impl BallJoint {
+    /// e = Z_j - Z_i, m (5).
+    pub fn eccentricity(&self, motion: &[Kinematics]) -> Vec3 {
+        let at = |a: &Anchor| motion[a.body].position + motion[a.body].rotation * a.offset;
+        at(&self.ball) - at(&self.socket)
+    }
+
+    /// de/dt, m/s.
+    pub fn opening_rate(&self, motion: &[Kinematics]) -> Vec3 {
+        self.relative(motion, Kinematics::point_velocity)
+    }
+
+    /// d2e/dt2, m/s^2.
+    pub fn opening_acceleration(&self, motion: &[Kinematics]) -> Vec3 {
+        self.relative(motion, Kinematics::point_acceleration)
+    }
+
+    /// Ball's minus socket's `rate` at the centres.
+    fn relative(&self, motion: &[Kinematics], rate: fn(&Kinematics, &Vec3) -> Vec3) -> Vec3 {
+        let at = |a: &Anchor| rate(&motion[a.body], &(motion[a.body].rotation * a.offset));
+        at(&self.ball) - at(&self.socket)
     }
 }
 

@@ -4,8 +4,8 @@
 //! three constraint rows (ideal) or one contact force (clearance). A scene pays only for what it has.
 
 mod bounds;
+mod columns;
 mod constraints;
-mod contact_stiffness;
 mod contacts;
 mod factor;
 mod implicit;
@@ -23,7 +23,7 @@ mod summary;
 mod systems;
 mod tree;
 
-pub use contacts::{Contacts, Gap, Memory, Ramp, Switching};
+pub use contacts::{Contacts, Gap, Ramp, Switching};
 pub use jet::Jet;
 pub use kinematics::{Kinematics, Wrench};
 pub use power::Powers;

@@ -129,37 +129,19 @@ impl Mechanism {
             if joint.ideal.is_some() {
                 continue;
             }
-            let gap = &self.contacts.gaps()[j];
-            let clearance = self.contacts.clearance(j);
-            let e = gap.eccentricity;
-            let square = e.norm_squared();
-            if square <= clearance * clearance {
+            let (gap, c) = (&self.contacts.gaps()[j], self.contacts.coefficients(j));
+            if gap.eccentricity.norm_squared() <= c.clearance * c.clearance {
                 continue;
             }
-            let distance = square.sqrt();
-            let n = e / distance;
-            let penetration = distance - clearance;
-            let closing = self.contacts.clearance_rate(j);
-            let rate = n.dot(&gap.eccentricity_rate) - closing;
-            let c = self.contacts.coefficients(j);
-            let root = penetration.sqrt();
-            let elastic = c.stiffness * penetration * root;
-            powers.restitution += (gap.normal_force - elastic) * rate;
-            if closing != 0.0 {
-                // K ~ sqrt((r + c) / c).
-                let slope =
-                    0.5 * c.stiffness * (1.0 / (c.ball_radius + clearance) - 1.0 / clearance);
-                let stiffening = 0.4 * slope * closing * penetration * penetration * root;
-                powers.clearance += stiffening - gap.normal_force * closing;
-            }
+            let at = self.contacts.separation(j);
+            powers.restitution += c.restitution_power(&at, gap.normal_force);
+            powers.clearance += c.clearance_power(&at, gap.normal_force);
             if gap.friction != Vec3::zeros() {
-                let (ball, socket) = (&motion[joint.ball.body], &motion[joint.socket.body]);
-                let relative = gap.eccentricity_rate
-                    + ball.angular_velocity.cross(&(n * c.ball_radius))
-                    - socket
-                        .angular_velocity
-                        .cross(&(n * (c.ball_radius + clearance)));
-                powers.friction -= gap.friction.dot(&relative);
+                let spin = |body: usize| &motion[body].angular_velocity;
+                let (ball, socket) = (spin(joint.ball.body), spin(joint.socket.body));
+                let velocity = &gap.eccentricity_rate;
+                let surfaces = c.surface_velocity(&at.normal, velocity, ball, socket);
+                powers.friction -= gap.friction.dot(&surfaces);
             }
         }
         powers

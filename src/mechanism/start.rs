@@ -1,6 +1,6 @@
 //! How a mechanism starts: assembled from the scene's values, with what that moved, and the rank of its constraints.
 
-use super::constraints::{Constraints, eccentricity, opening_rate};
+use super::constraints::Constraints;
 use super::kinematics::{self, Kinematics};
 use super::lagrange::Lagrange;
 use super::model::{self, Model, Motion};
@@ -79,7 +79,7 @@ impl Mechanism {
         }
         tree.forward(model, T, &y);
         let guess = tree.motion.clone();
-        let distance = |j: usize| eccentricity(&model.joints[j], &guess).norm();
+        let distance = |j: usize| model.joints[j].eccentricity(&guess).norm();
         for j in 0..model.joints.len() {
             let d = distance(j);
             let joint = || self.joint_names[j].clone();
@@ -172,7 +172,7 @@ impl Mechanism {
     fn check_speeds(&self, tree: &mut Tree, y: &[f64]) -> Result<(), MechanismError> {
         tree.forward(&self.model, 0.0, y);
         for &j in &self.model.ideal_joints {
-            let rate = opening_rate(&self.model.joints[j], &tree.motion);
+            let rate = self.model.joints[j].opening_rate(&tree.motion);
             if !(rate.norm() <= HELD) {
                 let joint = self.joint_names[j].clone();
                 return Err(MechanismError::Torn { joint, rate });
@@ -201,7 +201,7 @@ impl Mechanism {
         let name = |j: usize| self.joint_names[j].clone();
         tree.forward(model, T, &again);
         let open = |&j: &usize| {
-            let gap = eccentricity(&model.joints[j], &tree.motion);
+            let gap = model.joints[j].eccentricity(&tree.motion);
             (gap.norm() > CLOSED).then(|| (name(j), gap))
         };
         let stays = if at_rest {
@@ -210,7 +210,7 @@ impl Mechanism {
             Vec::new()
         };
         tree.forward(model, T, guess);
-        let given = |j: usize| eccentricity(&model.joints[j], &tree.motion).norm();
+        let given = |j: usize| model.joints[j].eccentricity(&tree.motion).norm();
         let given = joints.iter().map(|&j| (j, given(j)));
         let (joint, given) = given.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default();
         MechanismError::NoClosure {

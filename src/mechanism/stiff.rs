@@ -5,13 +5,14 @@
 //! (s I - J) (x_q, x_v) = (b_q, b_v) becomes (s I - M^-1 D - M^-1 K / s) x_v = b_v + M^-1 K T^+ b_q / s,
 //! x_q = (b_q + T x_v) / s, where T maps velocities to position rates.
 
-use super::contact_stiffness::{Column, Stiffness, collect_columns, linearise_contact};
+use super::columns::{Column, collect_columns};
 use super::contacts::Contacts;
 use super::kinematics::Kinematics;
 use super::lagrange::Lagrange;
 use super::lu::Lu;
 use super::model::{Model, Motion};
 use super::tree::Tree;
+use crate::contact::Stiffness;
 use crate::scene::Vec3;
 use nalgebra::Complex;
 
@@ -92,43 +93,36 @@ impl Stiff {
         self.time_derivative.fill(0.0);
         self.empty = true;
         for (j, joint) in model.joints.iter().enumerate() {
-            let Some(stiffness) = linearise_contact(contacts, motion, joint, j) else {
+            let Some(stiffness) = contacts.linearise(j, motion) else {
                 continue;
             };
             self.empty = false;
-            collect_columns(
-                &mut self.columns,
-                contacts,
-                motion,
-                joint,
-                j,
-                &stiffness.n,
-                &visit,
-            );
-            self.add(&stiffness, contacts.coefficients(j).surface);
-            self.add_drift(&stiffness, j);
+            let c = contacts.coefficients(j);
+            let n = contacts.separation(j).normal;
+            collect_columns(&mut self.columns, c, motion, joint, &n, &visit);
+            let on_ball = contacts.gaps()[j].force_on_ball(&n);
+            self.add(&stiffness, &on_ball, c.reads_surfaces());
+            self.add_drift(&stiffness, &on_ball, j);
         }
     }
 
     /// Takes how the contacts move with time alone from a motion with all coordinates at rest.
     pub fn observe_drift(&mut self, model: &Model, motion: &[Kinematics]) {
-        for (j, joint) in model.joints.iter().enumerate() {
-            let (ball, socket) = (&motion[joint.ball.body], &motion[joint.socket.body]);
-            let arm_ball = ball.rotation * joint.ball.offset;
-            let arm_socket = socket.rotation * joint.socket.offset;
-            self.drift[j] = Drift {
-                eccentricity: ball.point_velocity(&arm_ball) - socket.point_velocity(&arm_socket),
-                rate: ball.point_acceleration(&arm_ball) - socket.point_acceleration(&arm_socket),
+        for (drift, joint) in self.drift.iter_mut().zip(&model.joints) {
+            *drift = Drift {
+                eccentricity: joint.opening_rate(motion),
+                rate: joint.opening_acceleration(motion),
             };
         }
     }
 
     /// dQ_k/dt of one contact. The sliding of driven bodies' surfaces by their turning is not stiff and left out.
-    fn add_drift(&mut self, s: &Stiffness, j: usize) {
+    fn add_drift(&mut self, s: &Stiffness, on_ball: &Vec3, j: usize) {
         let drift = self.drift[j];
-        let force = s.by_displacement * drift.eccentricity + (s.by_rate + s.by_slip) * drift.rate
-            - s.by_clearance;
-        let lever = (s.normal * drift.eccentricity).cross(&s.force);
+        let force = s.by_displacement * drift.eccentricity
+            + (s.by_rate + s.by_slip) * drift.rate
+            + s.by_clearance;
+        let lever = (s.normal * drift.eccentricity).cross(on_ball);
         let positions = self.time_derivative.len() - self.n;
         for k in &self.columns {
             self.time_derivative[positions + k.coordinate] +=
@@ -137,18 +131,14 @@ impl Stiff {
     }
 
     /// Adds one contact: dQ_k = surface_k . dF + (F x turn_k) . dn.
-    fn add(&mut self, s: &Stiffness, slips_by_surface: bool) {
+    fn add(&mut self, s: &Stiffness, on_ball: &Vec3, reads_surfaces: bool) {
         let n = self.n;
         for l in &self.columns {
             let force_q = s.by_displacement * l.centre;
             let normal_q = s.normal * l.centre;
-            let slip = if slips_by_surface {
-                l.surface
-            } else {
-                l.centre
-            };
+            let slip = if reads_surfaces { l.surface } else { l.centre };
             let force_v = s.by_rate * l.centre + s.by_slip * slip;
-            let lever = normal_q.cross(&s.force);
+            let lever = normal_q.cross(on_ball);
             for k in &self.columns {
                 let at = l.coordinate * n + k.coordinate;
                 self.by_position[at] += k.surface.dot(&force_q) + k.turn.dot(&lever);
@@ -327,8 +317,9 @@ fn spin_of(q: &[f64], d: &[f64]) -> [f64; 3] {
 
 #[cfg(test)]
 mod tests {
+    use crate::contact::Memory;
     use crate::integrate::{StiffSystem, System};
-    use crate::mechanism::{Mechanism, Memory};
+    use crate::mechanism::Mechanism;
     use crate::scene::Scene;
 
     /// The default scene with its platform lowered until every ball rests 0.2 um deep in its wall and creeps along it.
@@ -363,6 +354,7 @@ mod tests {
         // With the last, the rate is the largest so far: the damping term does not answer to it.
         for (surface, approach, remembered) in [
             ("centres", "start", 1e-3),
+            ("printed", "start", 1e-3),
             ("surface", "start", 1e-3),
             ("surface", "largest", 1e-3),
             ("surface", "largest", 1e-9),

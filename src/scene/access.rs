@@ -7,7 +7,11 @@ use super::*;
 use crate::contact::{self, ApproachSpeed, FrictionLaw, FrictionVelocity, NormalLaw};
 use crate::integrate::Method;
 
-const VELOCITIES: [FrictionVelocity; 2] = [FrictionVelocity::Centres, FrictionVelocity::Surface];
+const VELOCITIES: [FrictionVelocity; 3] = [
+    FrictionVelocity::Centres,
+    FrictionVelocity::Surface,
+    FrictionVelocity::Printed,
+];
 const APPROACHES: [ApproachSpeed; 2] = [ApproachSpeed::Start, ApproachSpeed::Largest];
 const NORMALS: [NormalLaw; 5] = [
     NormalLaw::LankaraniNikravesh,

@@ -3,7 +3,7 @@
 use super::access::contact_value;
 use super::error::{line_text, place_of};
 use super::*;
-use crate::contact::{self, FrictionLaw, NormalLaw};
+use crate::contact::{self, FrictionLaw, FrictionVelocity, NormalLaw};
 use crate::integrate::Method;
 use std::collections::BTreeMap;
 
@@ -81,6 +81,15 @@ impl Scene {
                     restitution: contact.restitution,
                 });
             }
+            if contact.clearance > 0.0
+                && contact.friction_velocity == FrictionVelocity::Printed
+                && contact.friction_law != FrictionLaw::None
+                && contact.friction > 0.0
+            {
+                doubts.push(Doubt::PrintedFriction {
+                    joints: joints.clone(),
+                });
+            }
             if contact.clearance > 0.0 && contact.clearance <= 1e-5 {
                 doubts.push(Doubt::Clearance {
                     joints,
@@ -156,7 +165,7 @@ impl Scene {
             normal += at_centre;
             let turning = match c.friction_velocity {
                 contact::FrictionVelocity::Surface => c.ball_radius * c.ball_radius / moments.min(),
-                contact::FrictionVelocity::Centres => 0.0,
+                contact::FrictionVelocity::Centres | contact::FrictionVelocity::Printed => 0.0,
             };
             sliding += at_centre + turning;
         }

@@ -49,6 +49,11 @@ pub enum Doubt {
         /// The loosest that will do.
         loosest: f64,
     },
+    /// Friction that reads the velocities of (13) as printed.
+    PrintedFriction {
+        /// Names of the joints.
+        joints: String,
+    },
     /// More ball joints differ from one another than are listed.
     MoreJoints,
 }
@@ -80,6 +85,11 @@ impl fmt::Display for Doubt {
                  (radius {}), which Hertz's theory assumes.",
                 format_quantity(*clearance, "mm"),
                 format_quantity(*ball_radius, "mm")
+            ),
+            Self::PrintedFriction { joints } => write!(
+                f,
+                "{joints}: friction_velocity printed is there to compare with the paper: it reads (1 - c/e) of the centres' \
+                 velocity, so that friction vanishes where sliding is slow. surface is what the contact feels."
             ),
             Self::Step {
                 joint,

@@ -9,7 +9,7 @@ pub fn table() -> &'static [Parameter] {
 }
 
 /// Words of `contact.friction_velocity`, `contact.normal_law`, … in the order of the menus.
-pub(super) const FRICTION_VELOCITIES: [&str; 2] = ["centres", "surface"];
+pub(super) const FRICTION_VELOCITIES: [&str; 3] = ["centres", "surface", "printed"];
 pub(super) const APPROACH_SPEEDS: [&str; 2] = ["start", "largest"];
 pub(super) const NORMAL_LAWS: [&str; 5] = [
     "lankarani-nikravesh",
@@ -219,8 +219,10 @@ static TABLE: [Parameter; 28] = [
         Value::Choice("surface"),
         "Which sliding velocity friction reads. centres is the paper's: the relative velocity of the two centres, \
          which leaves out the turning of the ball. surface is what the contact feels: the relative velocity of the \
-         two touching points.",
-        "Paper eqs. (15), (16) for centres; (13), (14) with the bodies' rotation for surface",
+         two touching points. printed takes the points of (13) as printed, which do not turn with their bodies: \
+         (1 - c/e) times centres, next to nothing in a gap that is large against the penetration. It is there to compare \
+         with the paper.",
+        "Paper eqs. (15), (16) for centres; (13), (14) with the bodies' rotation for surface; (13) alone for printed",
     ),
     contact(
         "contact.slip_speed_low",

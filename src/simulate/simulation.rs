@@ -19,8 +19,9 @@ use super::ledger::Account;
 use super::peaks::{Approach, Recent};
 use super::stepper::AnyStepper;
 use super::{Frame, NotUnique, Peak, StartError, Statistics, Stopped};
+use crate::contact::Memory;
 use crate::integrate::{Controller, System};
-use crate::mechanism::{Mechanism, MechanismError, Memory, Ramp, Switching};
+use crate::mechanism::{Mechanism, MechanismError, Ramp, Switching};
 use crate::scene::Scene;
 use automatic::{Choice, controller_of, prepare_implicit};
 pub use automatic::{LARGEST_DENSE, LARGEST_IMPLICIT};
@@ -231,13 +232,8 @@ impl Simulation {
             if self.mechanism.contacts.has_clearance(j)
                 && self.mechanism.contacts.gaps()[j].penetration > 0.0
             {
-                let approach_speed = self.mechanism.contacts.coefficients(j).speed_floor;
-                self.state.memory[j] = Memory {
-                    active: true,
-                    approach_speed,
-                    floored: true,
-                    ..Memory::default()
-                };
+                let coefficients = self.mechanism.contacts.coefficients(j);
+                self.state.memory[j] = Memory::begun(coefficients, f64::NEG_INFINITY);
                 self.state.statistics.impacts[j] += 1;
                 self.state.statistics.floored[j] += 1;
             }
@@ -257,7 +253,7 @@ impl Simulation {
         let evaluations = mechanism.evaluations;
         mechanism.derivative(state.t, &state.y, &mut state.k);
         mechanism.evaluations = evaluations;
-        mechanism.contacts.finish(state.t);
+        mechanism.contacts.finish();
         store_gaps(mechanism, &mut state.gaps);
         self.stepper.invalidate();
         // Forces jump here: a parabola through both sides would have a peak that never was.
@@ -430,7 +426,7 @@ impl Simulation {
             store_gaps(mechanism, gaps_end);
         } else if !stepper.ends_with_derivative() || mechanism.projects() {
             mechanism.derivative(t_end, y_end, k_end);
-            mechanism.contacts.finish(t_end);
+            mechanism.contacts.finish();
             store_gaps(mechanism, gaps_end);
         }
         state.statistics.evaluations += mechanism.evaluations - evaluations;

@@ -712,7 +712,13 @@ fn what_nohup_started_outlives_its_terminal() {
 fn interrupted_run(times: &str, interrupt: &dyn Fn(&std::process::Child)) {
     let folder = folder();
     let line = format!("run pendulum --duration {times} --out a.json --summary json");
-    let child = start_and_listen(&mut command(folder.path(), &line));
+    // Under nohup this program ignores SIGHUP, and what it starts would, too.
+    let mut command = Command::new("env");
+    command.args(["--default-signal=HUP", env!("CARGO_BIN_EXE_jointplay")]);
+    command
+        .args(line.split_whitespace())
+        .current_dir(folder.path());
+    let child = start_and_listen(&mut command);
     interrupt(&child);
     let output = child.wait_with_output().unwrap();
     assert_eq!(

@@ -36,3 +36,49 @@ fn settled_sliding_holds_its_piece_and_corners_cost_few_rejections() {
         assert!(rejected < 2 * corners, "{method}: {rejected}");
     }
 }
+
+#[test]
+fn methods_agree_where_friction_reads_a_part_of_the_velocity() {
+    // Printed friction has corners of its own, at |e|/delta times the speeds of the others.
+    let printed = ("contact.friction_velocity", "printed");
+    let end = 0.02;
+    let run = |method: &str, tolerance: &str, formulation: &str| {
+        let mut simulation = simulation(
+            "spcmm",
+            &[
+                printed,
+                ("solver.method", method),
+                ("solver.tolerance", tolerance),
+                ("formulation", formulation),
+            ],
+        );
+        while simulation.time() < end {
+            simulation.step_until(end).unwrap();
+            let frame = frame_now(&mut simulation);
+            for (j, joint) in frame.joints.iter().enumerate() {
+                let memory = simulation.contact_memory(j);
+                let c = simulation.mechanism().contacts.coefficients(j);
+                if memory.active && memory.slip != Slip::Whole && joint.slip_speed > 0.0 {
+                    let beyond = c.beyond(memory.slip, joint.slip_speed);
+                    assert!(beyond < 1e-2 * c.slip_high, "{method}, {j}: {beyond:e}");
+                }
+            }
+        }
+        let corners = simulation.statistics().corners;
+        let position = frame_now(&mut simulation).pose.position;
+        (position, corners)
+    };
+    let (reference, corners) = run("dopri5", "1e-11", "tree");
+    assert!(corners >= 6, "{corners}");
+    for (method, tolerance, formulation, bound) in [
+        ("dopri5", "1e-10", "lagrange", 1e-7),
+        ("radau5", "1e-9", "tree", 1e-7),
+        ("automatic", "1e-8", "tree", 1e-7),
+        ("rosenbrock", "1e-8", "tree", 1e-6),
+    ] {
+        let (position, _) = run(method, tolerance, formulation);
+        let off = (position - reference).norm();
+        println!("{method} {tolerance} {formulation}: {off:e} m, {corners} corners");
+        assert!(off < bound, "{method} {formulation}: {off:e}");
+    }
+}

@@ -1,16 +1,38 @@
 //! Everything that was found, and what the paper's statements come to with it.
 
 use super::record::{Row, Swathe, Traced};
-use super::{Extent, PICKED};
+use super::{Extent, PICKED, Variant};
 use crate::analysis::paper::chaos::{Found, Loop};
 use crate::analysis::paper::curves::{Curves, Sample};
 use crate::analysis::paper::{self, BY_CLEARANCE, BY_FRICTION, Case, Statement};
 use crate::analysis::response::Response;
 
 /// Everything that was found.
+pub struct Report {
+    /// With the model of this program.
+    pub corrected: Findings,
+    /// With friction that reads (13) as printed.
+    pub printed: Findings,
+    /// The latter with a second change each.
+    pub combinations: Vec<Combination>,
+}
+
+/// What (13) as printed gives together with a second change.
+pub struct Combination {
+    /// The changes.
+    pub variant: Variant,
+    /// Runs of [`BY_CLEARANCE`].
+    pub runs: Vec<Traced>,
+    /// Their sections.
+    pub sections: Swathe,
+}
+
+/// Everything that was found with one model.
 pub struct Findings {
     /// How much was computed.
     pub extent: Extent,
+    /// The model.
+    pub variant: Variant,
     /// The paper's runs, in the order of [`paper::CASES`].
     pub runs: Vec<Traced>,
     /// The first of them with all bodies and multipliers, and with ideal joints.

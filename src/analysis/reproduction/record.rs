@@ -1,6 +1,6 @@
 //! What a run and a sweep of the report leave behind.
 
-use super::PICKED;
+use super::{PICKED, Variant};
 use crate::analysis::paper::Case;
 use crate::analysis::paper::chaos::Swept;
 use crate::analysis::regime::Regime;
@@ -74,7 +74,9 @@ pub struct Traced {
 /// A sweep with the records of all its points.
 #[derive(Clone, Debug)]
 pub struct Swathe {
-    /// Name in files.
+    /// The model.
+    pub variant: Variant,
+    /// What it is in words of a file's name.
     pub name: &'static str,
     /// What was swept.
     pub sweep: Sweep,
@@ -83,6 +85,11 @@ pub struct Swathe {
 }
 
 impl Swathe {
+    /// Name in files.
+    pub fn file_name(&self) -> String {
+        format!("{}{}", self.variant.prefix, self.name)
+    }
+
     /// Values of the array called `name`, those of a point together; empty if there is none.
     pub fn values(&self, name: &str) -> Vec<f64> {
         let layout = self.sweep.layout();

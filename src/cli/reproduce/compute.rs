@@ -8,7 +8,7 @@ use indicatif::ProgressBar;
 
 use super::interrupted;
 use super::kept::Kept;
-use crate::analysis::reproduction::{Findings, Outcome, ReproductionError, Work};
+use crate::analysis::reproduction::{Outcome, Report, ReproductionError, Work};
 use crate::analysis::response::ResponseError;
 use crate::cli::{Failure, interrupt};
 
@@ -22,7 +22,7 @@ pub(super) fn compute(
     kept: &mut Kept,
     threads: usize,
     bar: &ProgressBar,
-) -> Result<Findings, Failure> {
+) -> Result<Report, Failure> {
     let mut outcomes: Vec<Option<Outcome>> = (0..work.jobs()).map(|_| None).collect();
     for (job, outcome) in kept.found(&work)? {
         outcomes[job] = Some(outcome);

@@ -8,7 +8,7 @@ use serde_json::{Map, Value as Json, json};
 
 use super::text::{self, Compared};
 use crate::analysis::paper::Case;
-use crate::analysis::reproduction::{COLUMNS, Findings, Swathe, Traced};
+use crate::analysis::reproduction::{COLUMNS, Findings, Report, Swathe, Traced};
 use crate::cli::Failure;
 use crate::cli::output::significant;
 use crate::cli::sweep::{Archive, Source, meta};
@@ -18,18 +18,41 @@ use crate::files::Folder;
 ///
 /// # Errors
 /// The file system.
-pub(super) fn write(folder: &Folder, found: &Findings) -> Result<(), Failure> {
-    let put = |name: String, content: &[u8]| folder.write(&format!("data/{name}"), content);
-    put("numbers.csv".to_owned(), numbers(found).as_bytes())?;
-    put("statements.csv".to_owned(), statements(found).as_bytes())?;
-    for run in found.runs.iter().chain([&found.lagrange, &found.ideal]) {
+pub(super) fn write(folder: &Folder, report: &Report) -> Result<(), Failure> {
+    let put = |name: String, content: &[u8]| -> Result<(), Failure> {
+        Ok(folder.write(&format!("data/{name}"), content)?)
+    };
+    let put_run = |run: &Traced| {
         put(format!("{}.csv", run.name), samples(run).as_bytes())?;
-        put(format!("{}.npz", run.name), &rows(run, found)?)?;
-    }
-    put("settled_curves.csv".to_owned(), curves(found).as_bytes())?;
-    for swathe in &found.swathes {
+        put(format!("{}.npz", run.name), &rows(run, report)?)
+    };
+    let put_sweep = |swathe: &Swathe| {
         archive(folder, swathe)?;
-        put(format!("{}.csv", swathe.name), points(swathe).as_bytes())?;
+        put(
+            format!("{}.csv", swathe.file_name()),
+            points(swathe).as_bytes(),
+        )
+    };
+    put_run(&report.corrected.ideal)?;
+    for found in [&report.corrected, &report.printed] {
+        let prefix = found.variant.prefix;
+        put(format!("{prefix}numbers.csv"), numbers(found).as_bytes())?;
+        put(
+            format!("{prefix}statements.csv"),
+            statements(found).as_bytes(),
+        )?;
+        put(
+            format!("{prefix}settled_curves.csv"),
+            curves(found).as_bytes(),
+        )?;
+        for run in found.runs.iter().chain([&found.lagrange]) {
+            put_run(run)?;
+        }
+        found.swathes.iter().try_for_each(put_sweep)?;
+    }
+    for combination in &report.combinations {
+        combination.runs.iter().try_for_each(put_run)?;
+        put_sweep(&combination.sections)?;
     }
     Ok(())
 }
@@ -116,8 +139,8 @@ fn cell(value: f64) -> String {
 }
 
 /// A run at every instant that was looked at.
-fn rows(run: &Traced, found: &Findings) -> Result<Vec<u8>, Failure> {
-    let mut meta = super::meta(found)?;
+fn rows(run: &Traced, report: &Report) -> Result<Vec<u8>, Failure> {
+    let mut meta = super::meta(report)?;
     meta.insert("run".into(), json!(run.name));
     meta.insert("clearance_mm".into(), json!(run.case.clearance));
     meta.insert("friction".into(), json!(run.case.friction));
@@ -208,6 +231,6 @@ fn archive(folder: &Folder, swathe: &Swathe) -> Result<(), Failure> {
         records: &swathe.records,
         length: swathe.sweep.layout().record_length(),
     };
-    let target = folder.file(&format!("data/{}.npz", swathe.name))?;
+    let target = folder.file(&format!("data/{}.npz", swathe.file_name()))?;
     Archive::of_sweep(meta, &swathe.sweep, None).write(target, &mut source)
 }

@@ -2,7 +2,7 @@
 
 use crate::analysis::paper::chaos::{Loop, Swept};
 use crate::analysis::paper::{BY_CLEARANCE, BY_FRICTION, CASES, Case};
-use crate::analysis::reproduction::{Findings, Row, Swathe, Traced, regime_word};
+use crate::analysis::reproduction::{Findings, Row, Swathe, Traced, Variant, regime_word};
 use crate::chart::{Axis, Chart, Colour, Level, Map, Marker, PALETTE, Scale, Series, Sheet};
 
 /// Width of a sheet, height of a row of charts, pixels.
@@ -27,8 +27,8 @@ const PROBE: Shown = Shown(12, "Probe error", "µm", 1e-6);
 const FORCE: Shown = Shown(7, "Contact force", "N", 1.0);
 
 /// Every figure by name, in the order of the page.
-pub(super) fn all(found: &Findings) -> Vec<(&'static str, Sheet)> {
-    let mut out = Vec::new();
+pub(super) fn all(found: &Findings) -> Vec<(String, Sheet)> {
+    let mut out: Vec<(&str, Sheet)> = Vec::new();
     let kinds = [
         ["figure-05", "figure-06", "figure-07"],
         ["figure-11", "figure-12", "figure-13"],
@@ -90,7 +90,14 @@ pub(super) fn all(found: &Findings) -> Vec<(&'static str, Sheet)> {
     }
     out.push(("map", map(found)));
     out.push(("probe", probe(found)));
-    out
+    out.into_iter()
+        .map(|(name, sheet)| (picture_name(found.variant, name), sheet))
+        .collect()
+}
+
+/// Name of the picture of a figure in files and on the page.
+pub(super) fn picture_name(variant: Variant, name: &str) -> String {
+    format!("{}{name}", variant.prefix.replace('_', "-"))
 }
 
 /// What tells a run of a series from the others.

@@ -30,7 +30,12 @@ impl Kept {
         let part = |swathe: &crate::analysis::reproduction::Swathe| {
             let blocks: Vec<usize> = (0..swathe.sweep.grid().blocks()).collect();
             let settings = meta(&swathe.sweep)?;
-            Partial::open(&folder.join(swathe.name), &settings, &swathe.sweep, &blocks)
+            Partial::open(
+                &folder.join(swathe.file_name()),
+                &settings,
+                &swathe.sweep,
+                &blocks,
+            )
         };
         let parts = work.swathes().iter().map(part);
         let parts = parts.collect::<Result<_, Failure>>()?;

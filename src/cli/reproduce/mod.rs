@@ -5,6 +5,7 @@ mod data;
 mod figures;
 mod kept;
 mod page;
+mod scatter;
 mod sections;
 mod text;
 
@@ -18,7 +19,7 @@ use self::kept::Kept;
 use super::args::ReproduceArguments;
 use super::{Failure, interrupt, print, progress, warn};
 use crate::analysis::paper::{Agreement, Verdict};
-use crate::analysis::reproduction::{Extent, Findings, Work};
+use crate::analysis::reproduction::{Extent, Findings, Report, Work};
 use crate::files::Folder;
 
 /// Does what `reproduce` asks.
@@ -78,11 +79,13 @@ pub fn into_folder(out: &Path, extent: Extent, threads: usize) -> Result<(), Fai
 /// Writes all files into `folder`; what made them.
 fn fill(
     folder: &Folder,
-    found: &Findings,
+    report: &Report,
     kept: &Kept,
 ) -> Result<serde_json::Map<String, Json>, Failure> {
-    data::write(folder, found)?;
-    let drawn = figures::all(found);
+    data::write(folder, report)?;
+    let drawn = [&report.corrected, &report.printed]
+        .map(figures::all)
+        .concat();
     let mut pictures = Vec::new();
     for (name, sheet) in &drawn {
         if interrupt::asked() {
@@ -93,24 +96,24 @@ fn fill(
         folder.write(&format!("plots/{name}.svg"), svg.as_bytes())?;
         let png = sheet.png(1.5).map_err(drawing)?;
         folder.write(&format!("plots/{name}.png"), &png)?;
-        pictures.push(((*name).to_owned(), svg));
+        pictures.push((name.clone(), svg));
     }
-    let page = page::page(found, &pictures)?;
+    let page = page::page(report, &pictures)?;
     folder.write("index.html", page.as_bytes())?;
-    meta(found)
+    meta(report)
 }
 
 /// What made the report.
-fn meta(found: &Findings) -> Result<serde_json::Map<String, Json>, Failure> {
-    let scene = found.swathe("clearance_cold").sweep.scene();
+fn meta(report: &Report) -> Result<serde_json::Map<String, Json>, Failure> {
+    let scene = report.corrected.swathe("clearance_cold").sweep.scene();
     let mut meta = super::provenance::meta(scene)?;
-    meta.insert("command".into(), json!(command(found)));
-    meta.insert("simulated_s".into(), json!(text::simulated(found)));
+    meta.insert("command".into(), json!(command(report)));
+    meta.insert("simulated_s".into(), json!(text::simulated(report)));
     Ok(meta)
 }
 
-fn command(found: &Findings) -> &'static str {
-    if found.extent == Extent::FULL {
+fn command(report: &Report) -> &'static str {
+    if report.corrected.extent == Extent::FULL {
         "jointplay reproduce --out report/"
     } else {
         "jointplay reproduce --out report/ --quick"
@@ -127,33 +130,58 @@ fn interrupted(kept: &Kept) -> Failure {
     )
 }
 
+/// How many of the paper's numbers and statements a model agrees with.
+#[derive(Clone, Copy, Debug)]
+struct Score {
+    numbers: usize,
+    agree: usize,
+    near: usize,
+    statements: usize,
+    confirmed: usize,
+}
+
+impl Score {
+    fn of(found: &Findings) -> Self {
+        let statements = found.statements();
+        let compared = crate::analysis::paper::compare(&found.responses());
+        let with = |agreement| {
+            let of = compared.iter().filter(|c| c.agreement() == agreement);
+            of.count()
+        };
+        Self {
+            numbers: compared.len(),
+            agree: with(Agreement::Agrees),
+            near: with(Agreement::Near),
+            confirmed: statements
+                .iter()
+                .filter(|s| s.verdict == Verdict::Confirmed)
+                .count(),
+            statements: statements.len(),
+        }
+    }
+}
+
 /// What was found, in a few lines.
-fn summary(found: &Findings, out: &Path, wall: f64) -> String {
-    let statements = found.statements();
-    let confirmed = statements
-        .iter()
-        .filter(|s| s.verdict == Verdict::Confirmed)
-        .count();
-    let compared = crate::analysis::paper::compare(&found.responses());
-    let with = |agreement| {
-        compared
-            .iter()
-            .filter(|c| c.agreement() == agreement)
-            .count()
-    };
+fn summary(report: &Report, out: &Path, wall: f64) -> String {
+    let (corrected, printed) = (Score::of(&report.corrected), Score::of(&report.printed));
     format!(
         "Numbers           {} of {} agree within 10 %, {} more within a factor of 2, {} differ\n\
-         Statements        {confirmed} of {} confirmed\n\
+         Statements        {} of {} confirmed\n\
+         (13) as printed   {} numbers agree within 10 %, {} more within a factor of 2; {} statements confirmed\n\
          Simulated         {:.0} s\n\
          Wall time         {wall:.1} s\n\
          Written           {}\n\
          Version           jointplay {}\n",
-        with(Agreement::Agrees),
-        compared.len(),
-        with(Agreement::Near),
-        with(Agreement::Differs),
-        statements.len(),
-        text::simulated(found),
+        corrected.agree,
+        corrected.numbers,
+        corrected.near,
+        corrected.numbers - corrected.agree - corrected.near,
+        corrected.confirmed,
+        corrected.statements,
+        printed.agree,
+        printed.near,
+        printed.confirmed,
+        text::simulated(report),
         out.join("index.html").display(),
         crate::VERSION
     )

@@ -2,18 +2,19 @@
 
 use std::fmt::Write as _;
 
+use super::figures::picture_name;
 use super::sections::{Entry, SECTIONS};
 use super::text::{self, Compared, typeset};
-use super::{command, meta};
+use super::{command, meta, scatter};
 use crate::analysis::paper::chaos::word;
 use crate::analysis::paper::{Agreement, Quantity, Statement, VERIFICATION, Verdict};
-use crate::analysis::reproduction::{Extent, Findings, PERIOD};
+use crate::analysis::reproduction::{CORRECTED, Extent, Findings, PERIOD, Report, Variant};
 use crate::cli::Failure;
 use crate::cli::output::significant;
 
 const STYLE: &str = include_str!("page.css");
 
-fn escape(text: &str) -> String {
+pub(super) fn escape(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")
@@ -28,7 +29,8 @@ const SHORTENED: &str = "<p class=\"notice\">This is a quick report: few values 
 ///
 /// # Errors
 /// A scene without the keys that every scene has.
-pub(super) fn page(found: &Findings, pictures: &[(String, String)]) -> Result<String, Failure> {
+pub(super) fn page(report: &Report, pictures: &[(String, String)]) -> Result<String, Failure> {
+    let found = &report.corrected;
     let compared = text::compared(found);
     let statements = found.statements();
     let mut out = String::with_capacity(1 << 20);
@@ -45,17 +47,35 @@ pub(super) fn page(found: &Findings, pictures: &[(String, String)]) -> Result<St
     }
     contents(&mut out);
     caveats(&mut out);
-    for (id, title, entries) in SECTIONS {
-        let _ = writeln!(out, "<h2 id=\"{id}\">{title}</h2>");
-        for entry in entries {
-            figure(&mut out, entry, pictures);
-            after(&mut out, entry, &compared, found);
-        }
-    }
+    figures(&mut out, found, pictures);
+    scatter::section(&mut out, report);
+    let _ = writeln!(
+        out,
+        "<h2 id=\"printed\">The same figures with equation (13) as printed</h2>"
+    );
+    figures(&mut out, &report.printed, pictures);
     statement_table(&mut out, &statements);
-    provenance(&mut out, found)?;
+    provenance(&mut out, report)?;
     out.push_str("</main>\n</body>\n</html>\n");
     Ok(out)
+}
+
+/// Every figure of a model, section by section, with the tables that belong to it.
+fn figures(out: &mut String, found: &Findings, pictures: &[(String, String)]) {
+    let compared = text::compared(found);
+    let (level, of) = if found.variant == CORRECTED {
+        (2, "")
+    } else {
+        (3, ", (13) as printed")
+    };
+    for (id, title, entries) in SECTIONS {
+        let id = picture_name(found.variant, id);
+        let _ = writeln!(out, "<h{level} id=\"{id}\">{title}{of}</h{level}>");
+        for entry in entries {
+            figure(out, entry, found.variant, pictures);
+            after(out, entry, &compared, found);
+        }
+    }
 }
 
 fn header(out: &mut String, compared: &[Compared], statements: &[Statement]) {
@@ -99,7 +119,8 @@ fn contents(out: &mut String) {
         out.push_str("</ol></li>\n");
     }
     out.push_str(
-        "<li><a href=\"#statements\">Statements, one by one</a></li>\n<li><a href=\"#provenance\">How this was made</a></li>\n</ol></nav>\n",
+        "<li><a href=\"#scatter\">The scatter: is it equation (13) as printed?</a></li>\n<li><a href=\"#printed\">The same figures with equation (13) as \
+         printed</a></li>\n<li><a href=\"#statements\">Statements, one by one</a></li>\n<li><a href=\"#provenance\">How this was made</a></li>\n</ol></nav>\n",
     );
 }
 
@@ -123,7 +144,13 @@ fn caveats(out: &mut String) {
     );
 }
 
-fn figure(out: &mut String, (_, name, heading, caption): &Entry, pictures: &[(String, String)]) {
+fn figure(
+    out: &mut String,
+    (_, name, heading, caption): &Entry,
+    variant: Variant,
+    pictures: &[(String, String)],
+) {
+    let name = &picture_name(variant, name);
     let svg = pictures
         .iter()
         .find(|(of, _)| of == name)
@@ -157,7 +184,7 @@ pub(super) fn shown(value: f64) -> String {
 }
 
 /// Stands where there is no number.
-const NONE: &str = "\u{2013}";
+pub(super) const NONE: &str = "\u{2013}";
 
 /// Two decimals, and two digits of what is small.
 fn ratio(value: f64) -> String {
@@ -196,7 +223,7 @@ fn after(out: &mut String, entry: &Entry, compared: &[Compared], found: &Finding
     }
 }
 
-fn open(out: &mut String, heads: &[(&str, bool)]) {
+pub(super) fn open(out: &mut String, heads: &[(&str, bool)]) {
     out.push_str("<div class=\"scroll\"><table>\n<thead><tr>");
     for (head, number) in heads {
         let class = if *number { " class=\"n\"" } else { "" };
@@ -205,9 +232,9 @@ fn open(out: &mut String, heads: &[(&str, bool)]) {
     out.push_str("</tr></thead>\n<tbody>\n");
 }
 
-const CLOSE: &str = "</tbody></table></div>\n";
+pub(super) const CLOSE: &str = "</tbody></table></div>\n";
 
-fn number(text: &str) -> String {
+pub(super) fn number(text: &str) -> String {
     format!("<td class=\"n\">{text}</td>")
 }
 
@@ -481,33 +508,34 @@ fn capital(text: &str) -> String {
     }
 }
 
-fn provenance(out: &mut String, found: &Findings) -> Result<(), Failure> {
-    let meta = meta(found)?;
+fn provenance(out: &mut String, report: &Report) -> Result<(), Failure> {
+    let meta = meta(report)?;
     let value = |key: &str| {
         let value = meta.get(key).cloned().unwrap_or_default();
         value
             .as_str()
             .map_or_else(|| value.to_string(), str::to_owned)
     };
-    let e = &found.extent;
+    let e = &report.corrected.extent;
     let _ = write!(
         out,
         "<h2 id=\"provenance\">How this was made</h2>\n<pre>{}</pre>\n\
          <p>Jointplay {}, scene <code>{}</code>, {} formulation but where another is named, method {} at a tolerance of {}. {} simulated seconds \
          altogether: the paper's runs over {} s; settled curves after {} periods; {} periods of each run of Figures 19 and 22, {} of them discarded; {} \
-         clearances and {} frictions in three ways, {} periods each, {} discarded; a map of {} by {} points, {} periods each, {} discarded. A period takes {} s.</p>\n\
+         clearances and {} frictions in three ways, {} periods each, {} discarded; a map of {} by {} points, {} periods each, {} discarded; all that twice, with \
+         <code>contact.friction_velocity=printed</code> the second time. A period takes {} s.</p>\n\
          <p>The same program gives the same bytes on any number of threads. All numbers of this page are in <code>data/</code>: \
          <a href=\"data/numbers.csv\">the comparison</a>, <a href=\"data/statements.csv\">the statements</a>, the runs (every 1 ms as CSV, at every \
          instant that was looked at as NumPy archives), and the sweeps with all sections, in the form that <code>jointplay sweep</code> writes.</p>\n\
          <p>The paper: Y. Sheng and X. Chen on the dynamics and chaos of a spatial parallel coordinate measuring mechanism with several spherical \
          clearance joints. Captions and statements are in words of our own.</p>\n",
-        command(found),
+        command(report),
         value("version"),
         value("scene"),
         value("formulation"),
         value("method"),
         value("tolerance"),
-        text::simulated(found),
+        text::simulated(report),
         crate::analysis::paper::DURATION,
         e.settle,
         e.runs.0,

@@ -1,7 +1,7 @@
 //! What page and data files say alike.
 
 use crate::analysis::paper::{Case, Verdict, compare};
-use crate::analysis::reproduction::{Findings, PERIOD};
+use crate::analysis::reproduction::{Findings, PERIOD, Report, Swathe};
 
 /// A number of the paper beside the same of this program, SI units.
 pub(super) struct Compared {
@@ -92,14 +92,21 @@ pub(super) fn verdict(verdict: Verdict) -> &'static str {
 }
 
 /// Simulated time of all runs together, without twins, s.
-pub(super) fn simulated(found: &Findings) -> f64 {
-    let runs = (found.runs.len() + 2) as f64 * crate::analysis::paper::DURATION;
-    let curves = found.curves.len() as f64 * PERIOD * (found.extent.settle + 2) as f64;
-    let sweeps = found
-        .swathes
-        .iter()
-        .map(|swathe| PERIOD * (swathe.sweep.plan().periods * swathe.sweep.grid().points()) as f64);
-    runs + curves + sweeps.sum::<f64>()
+pub(super) fn simulated(report: &Report) -> f64 {
+    let of_runs = |count: usize| count as f64 * crate::analysis::paper::DURATION;
+    let of_sweep = |swathe: &Swathe| {
+        PERIOD * (swathe.sweep.plan().periods * swathe.sweep.grid().points()) as f64
+    };
+    let of_findings = |found: &Findings| {
+        let curves = found.curves.len() as f64 * PERIOD * (found.extent.settle + 2) as f64;
+        of_runs(found.runs.len() + 1) + curves + found.swathes.iter().map(of_sweep).sum::<f64>()
+    };
+    let combinations = report.combinations.iter();
+    let combinations = combinations.map(|c| of_runs(c.runs.len()) + of_sweep(&c.sections));
+    of_runs(1)
+        + of_findings(&report.corrected)
+        + of_findings(&report.printed)
+        + combinations.sum::<f64>()
 }
 
 #[cfg(test)]

@@ -81,7 +81,7 @@ impl Simulation {
         // A step cut short says nothing against the longer one.
         state.h_next = if cut { state.h_next.max(next) } else { next };
         let contact_began = std::mem::take(&mut state.contact_began);
-        self.finish_gaps(t_end);
+        self.finish_gaps();
         let event = self.first_event(h);
         let corner = self.first_corner(h);
         self.corner = None;
@@ -121,7 +121,7 @@ impl Simulation {
                 self.state.contact_began = contact_began;
                 return None;
             }
-            self.finish_gaps(t_end);
+            self.finish_gaps();
         } else if contact_began {
             self.state.h_contact = h.max(1e-9);
         }
@@ -144,8 +144,8 @@ impl Simulation {
         )
     }
 
-    pub(super) fn finish_gaps(&mut self, t_end: f64) {
-        self.mechanism.contacts.finish(t_end);
+    pub(super) fn finish_gaps(&mut self) {
+        self.mechanism.contacts.finish();
         store_gaps(&self.mechanism, &mut self.gaps_end);
     }
 

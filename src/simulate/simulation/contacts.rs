@@ -2,8 +2,9 @@
 
 use super::search::NEAR_PEAK;
 use super::{Simulation, State};
+use crate::contact::Memory;
 use crate::contact::{Coefficients, Pace};
-use crate::mechanism::{Memory, Switching};
+use crate::mechanism::Switching;
 use crate::scene::least_impact_steps;
 use crate::simulate::peaks::Course;
 
@@ -102,30 +103,25 @@ impl Simulation {
                 } else {
                     end.rate
                 };
-                let floor = coefficients.speed_floor;
                 let time = state.t0 + theta * h;
                 let asked = running.ball_joints[j].contact.restitution;
                 let among_others = state.memory.iter().any(|m| m.active);
                 state
                     .impacts
                     .begin(j, time, rate, asked, coefficients, among_others);
-                let mut approach_speed = rate.max(floor);
+                let mut memory = Memory::begun(coefficients, rate);
                 // A located one begins where the step ends.
                 if immediate {
                     if coefficients.largest {
-                        approach_speed = approach_speed.max(course.fastest(theta).0);
+                        memory.approach_speed = memory.approach_speed.max(course.fastest(theta).0);
                     }
-                    let (force, _) = course.strongest(coefficients, approach_speed);
-                    state.follow(j, &course, coefficients, force, approach_speed, theta);
+                    let remembered = memory.approach_speed;
+                    let (force, _) = course.strongest(coefficients, remembered);
+                    state.follow(j, &course, coefficients, force, remembered, theta);
                 }
-                state.memory[j] = Memory {
-                    active: true,
-                    approach_speed,
-                    floored: rate < floor,
-                    ..Memory::default()
-                };
+                state.memory[j] = memory;
                 state.statistics.impacts[j] += 1;
-                state.statistics.floored[j] += u64::from(rate < floor);
+                state.statistics.floored[j] += u64::from(memory.floored);
                 peaks[j].impacts += 1;
                 peaks[j].approach_speed = peaks[j].approach_speed.max(rate);
                 state.contact_began = true;

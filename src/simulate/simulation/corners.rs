@@ -2,9 +2,8 @@
 //! of the rule for its approach speed, and the step ends where its sliding speed or its penetration rate leaves that piece.
 
 use super::Simulation;
-use crate::contact::{Pace, Slip};
+use crate::contact::{Memory, Pace, Slip};
 use crate::integrate::{Method, System, find_root};
-use crate::mechanism::Memory;
 
 /// Parts of a step at whose ends the sliding speed is looked at.
 const PARTS: u32 = 4;
@@ -255,7 +254,7 @@ impl Simulation {
         y_end.copy_from_slice(scratch_y);
         stepper.truncate(theta);
         mechanism.derivative(t_end, y_end, k_end);
-        self.finish_gaps(t_end);
+        self.finish_gaps();
     }
 
     /// How far joint `j` slides beyond its piece on the interpolant of the attempted step, and its sliding speed, m/s.

@@ -1,9 +1,8 @@
 //! A state moved by hand: what a twin run and its renormalisation need.
 
 use super::Simulation;
-use crate::contact::{Pace, Slip};
+use crate::contact::{Memory, Pace, Slip};
 use crate::integrate::System;
-use crate::mechanism::Memory;
 
 impl Simulation {
     /// Adds `offset` to coordinates and velocities (as [`Self::state`] orders them) and goes on from there: quaternions
@@ -32,15 +31,9 @@ impl Simulation {
                 continue;
             }
             state.memory[j] = if touching {
-                let floor = mechanism.contacts.coefficients(j).speed_floor;
                 state.contact_began = true;
                 state.h_next = state.h_next.min(state.h_contact);
-                Memory {
-                    active: true,
-                    approach_speed: gap.rate.max(floor),
-                    floored: gap.rate < floor,
-                    ..Memory::default()
-                }
+                Memory::begun(mechanism.contacts.coefficients(j), gap.rate)
             } else {
                 Memory::default()
             };

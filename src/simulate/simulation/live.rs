@@ -2,7 +2,8 @@
 
 use super::automatic::{Choice, controller_of, prepare_implicit};
 use super::{CLEARANCE_SPEED, Simulation, switching_of};
-use crate::mechanism::{Memory, Ramp};
+use crate::contact::Memory;
+use crate::mechanism::Ramp;
 use crate::scene::{Scene, SceneError};
 use crate::simulate::Effect;
 use crate::simulate::stepper::AnyStepper;

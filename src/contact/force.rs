@@ -1,0 +1,369 @@
+//! Where the laws meet the geometry: the force between a ball and the wall of its socket, and how it answers to
+//! displacement and velocity. Everything that needs a contact force or its derivatives reads it here.
+
+use super::{Coefficients, FrictionVelocity, Mat3, Memory, Slip, Vec3};
+
+/// Where a ball is in its socket, and how fast it moves there.
+#[derive(Clone, Copy, Debug)]
+pub struct Separation {
+    /// |e|, m.
+    pub distance: f64,
+    /// n = e / |e| (8).
+    pub normal: Vec3,
+    /// delta = |e| - c, m (10).
+    pub penetration: f64,
+    /// d(delta)/dt, m/s.
+    pub rate: f64,
+}
+
+/// Force on a ball and what decided it.
+#[derive(Clone, Copy, Debug)]
+pub struct Force {
+    /// F_N, N (19).
+    pub normal: f64,
+    /// F_T on the ball, N (20).
+    pub friction: Vec3,
+    /// |v_t| that the friction law read, m/s; 0 where it read none.
+    pub slip_speed: f64,
+}
+
+/// How full friction enters derivatives; its ramp always does by its tangent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Slope {
+    /// As it is.
+    Tangent,
+    /// By F_T / v_t, which brings sliding to rest within a step and cannot reverse it.
+    Secant,
+}
+
+/// Derivatives of a contact's force on the ball, and of its normal.
+#[derive(Clone, Copy, Debug)]
+pub struct Stiffness {
+    /// dF/de, N/m.
+    pub by_displacement: Mat3,
+    /// Part of dF that follows the centres' relative velocity through the penetration rate, N s/m.
+    pub by_rate: Mat3,
+    /// Part of dF that follows the velocity [`Coefficients::friction_reads`], N s/m.
+    pub by_slip: Mat3,
+    /// dF/dt at a fixed eccentricity, by a clearance under way, N/s.
+    pub by_clearance: Vec3,
+    /// dn/de, 1/m.
+    pub normal: Mat3,
+}
+
+impl Coefficients {
+    /// Separation of a ball at the eccentricity e != 0 (m) that moves at de/dt (m/s).
+    #[inline]
+    pub fn separation(&self, eccentricity: &Vec3, velocity: &Vec3) -> Separation {
+        let distance = eccentricity.norm();
+        let normal = eccentricity / distance;
+        Separation {
+            distance,
+            normal,
+            penetration: distance - self.clearance,
+            rate: normal.dot(velocity) - self.clearance_rate,
+        }
+    }
+
+    /// Velocity of the ball's point of contact against the socket's, m/s, from de/dt and the angular velocities of both.
+    #[inline]
+    pub fn surface_velocity(
+        &self,
+        normal: &Vec3,
+        velocity: &Vec3,
+        ball: &Vec3,
+        socket: &Vec3,
+    ) -> Vec3 {
+        let radius = self.ball_radius;
+        velocity + ball.cross(&(normal * radius))
+            - socket.cross(&(normal * (radius + self.clearance)))
+    }
+
+    /// Relative velocity that friction reads, not yet projected onto the tangent plane, m/s; arguments as
+    /// [`Self::surface_velocity`].
+    #[inline]
+    pub fn friction_reads(
+        &self,
+        normal: &Vec3,
+        velocity: &Vec3,
+        ball: &Vec3,
+        socket: &Vec3,
+    ) -> Vec3 {
+        match self.friction_velocity {
+            FrictionVelocity::Centres | FrictionVelocity::Printed => *velocity,
+            FrictionVelocity::Surface => self.surface_velocity(normal, velocity, ball, socket),
+        }
+    }
+
+    /// Whether that is the velocity of the surfaces and not of the centres.
+    pub fn reads_surfaces(&self) -> bool {
+        self.friction_velocity == FrictionVelocity::Surface
+    }
+
+    /// Part of that velocity's projection that is v_t: all of it, or (1 - c/|e|) where (13) is read as printed.
+    #[inline]
+    fn share(&self, gap: &Separation) -> f64 {
+        match self.friction_velocity {
+            FrictionVelocity::Centres | FrictionVelocity::Surface => 1.0,
+            FrictionVelocity::Printed => gap.penetration / gap.distance,
+        }
+    }
+
+    /// Sliding velocity v_t, m/s, from the velocity that friction reads.
+    #[inline]
+    pub fn sliding(&self, gap: &Separation, read: &Vec3) -> Vec3 {
+        let tangential = read - gap.normal * gap.normal.dot(read);
+        match self.friction_velocity {
+            FrictionVelocity::Centres | FrictionVelocity::Surface => tangential,
+            FrictionVelocity::Printed => tangential * self.share(gap),
+        }
+    }
+
+    /// Force on a ball that touches; `read` gives the velocity that friction reads, and is asked only where there is friction.
+    #[inline]
+    pub fn force(&self, memory: &Memory, gap: &Separation, read: impl FnOnce() -> Vec3) -> Force {
+        let approach = memory.approach(self, gap.rate);
+        let mut force = Force {
+            normal: self.normal_force(gap.penetration, gap.rate, approach),
+            friction: Vec3::zeros(),
+            slip_speed: 0.0,
+        };
+        if force.normal > 0.0 && self.friction > 0.0 {
+            let sliding = self.sliding(gap, &read());
+            force.slip_speed = sliding.norm();
+            let per_speed = self.friction_per_speed(memory.slip, force.slip_speed);
+            if per_speed != 0.0 {
+                force.friction = sliding * (-per_speed * force.normal);
+            }
+        }
+        force
+    }
+
+    /// Derivatives of `force` = [`Self::force`] > 0 there.
+    pub fn linearise(
+        &self,
+        memory: &Memory,
+        gap: &Separation,
+        velocity: &Vec3,
+        read: &Vec3,
+        force: &Force,
+        slope: Slope,
+    ) -> Stiffness {
+        let Separation {
+            distance,
+            normal: n,
+            penetration,
+            rate,
+        } = *gap;
+        let approach = memory.approach(self, rate);
+        let tangent = Mat3::identity() - n * n.transpose();
+        let turning = tangent / distance;
+        let root = penetration.sqrt();
+        let by_penetration = 1.5 * self.stiffness * root * (1.0 + self.damping * rate / approach);
+        let by_rate = if memory.follows(self, rate) {
+            0.0
+        } else {
+            self.stiffness * penetration * root * self.damping / approach
+        };
+        // F = -F_N (n + p v_t), p the friction per normal force and speed.
+        let mut along = -n;
+        let mut by_displacement = turning * -force.normal;
+        let mut by_slip = Mat3::zeros();
+        let mut by_clearance = Vec3::zeros();
+        if self.friction > 0.0 {
+            let speed = force.slip_speed;
+            let per_speed = self.friction_per_speed(memory.slip, speed);
+            let sliding = self.sliding(gap, read);
+            along -= sliding * per_speed;
+            // dF/dv_t
+            let mut resistance = Mat3::identity() * (-per_speed * force.normal);
+            if speed > 0.0 && !(slope == Slope::Secant && speed >= self.slip_high) {
+                let slope = self.friction_per_speed_slope(memory.slip, speed) / speed;
+                resistance -= sliding * sliding.transpose() * (slope * force.normal);
+            }
+            // v_t = s (1 - n n') w, and the tangent plane turns with n: dv_t = -s ((n . w) dn + n (w . dn)).
+            let share = self.share(gap);
+            let turned = turning * n.dot(read) + n * (turning * read).transpose();
+            by_displacement -= resistance * turned * share;
+            by_slip = resistance * tangent * share;
+            if self.friction_velocity == FrictionVelocity::Printed {
+                // s = 1 - c/|e|.
+                let swept = resistance * (tangent * read) / distance;
+                by_displacement += swept * n.transpose() * (self.clearance / distance);
+                by_clearance -= swept * self.clearance_rate;
+            }
+        }
+        by_clearance -= along * (by_penetration * self.clearance_rate);
+        // d(delta_dot)/de = (1 - n n') e_dot / |e|.
+        by_displacement += along * (n * by_penetration + turning * velocity * by_rate).transpose();
+        Stiffness {
+            by_displacement,
+            by_rate: along * (n * by_rate).transpose(),
+            by_slip,
+            by_clearance,
+            normal: turning,
+        }
+    }
+
+    /// How far a contact is beyond the pieces of the laws that its memory holds, if at all: a step that did so is searched for corners.
+    #[inline]
+    pub fn leaves_piece(&self, memory: &Memory, gap: &Separation, force: &Force) -> bool {
+        memory.may_turn(gap.rate)
+            || (force.normal > 0.0
+                && self.friction > 0.0
+                && memory.slip != Slip::Whole
+                && self.beyond(memory.slip, force.slip_speed) > 0.0)
+    }
+
+    /// Energy stored by the elastic part, 2/5 K delta^2.5, J.
+    #[inline]
+    pub fn elastic_energy(&self, penetration: f64) -> f64 {
+        if penetration <= 0.0 {
+            return 0.0;
+        }
+        0.4 * self.stiffness * penetration * penetration * penetration.sqrt()
+    }
+
+    /// Power that the damping part of `force` takes, W: (F_N - K delta^1.5) d(delta)/dt.
+    #[inline]
+    pub fn restitution_power(&self, gap: &Separation, force: f64) -> f64 {
+        let elastic = self.stiffness * gap.penetration * gap.penetration.sqrt();
+        (force - elastic) * gap.rate
+    }
+
+    /// Power that a clearance on its way gives, W: -F_N dc/dt + 2/5 dK/dt delta^2.5.
+    #[inline]
+    pub fn clearance_power(&self, gap: &Separation, force: f64) -> f64 {
+        if self.clearance_rate == 0.0 {
+            return 0.0;
+        }
+        // K ~ sqrt((r + c) / c).
+        let by_clearance = 0.5 * (1.0 / (self.ball_radius + self.clearance) - 1.0 / self.clearance);
+        let stiffening = by_clearance * self.elastic_energy(gap.penetration);
+        (stiffening - force) * self.clearance_rate
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::{Pace, Parameters};
+
+    const VELOCITIES: [FrictionVelocity; 3] = [
+        FrictionVelocity::Centres,
+        FrictionVelocity::Surface,
+        FrictionVelocity::Printed,
+    ];
+
+    /// A ball pressed 2 µm into its wall that slides at `speed` m/s and goes on sinking at 5 mm/s, its clearance on its way.
+    fn pressed(friction_velocity: FrictionVelocity, speed: f64) -> (Coefficients, Vec3, Vec3) {
+        let parameters = Parameters {
+            friction_velocity,
+            ..Parameters::default()
+        };
+        let mut c = Coefficients::new(&parameters, 3e-4);
+        c.move_clearance(&parameters, 3e-4, -2e-3);
+        let n = Vec3::new(2.0, -1.0, 2.0) / 3.0;
+        let t = Vec3::new(1.0, 2.0, 0.0) / libm::sqrt(5.0);
+        (c, n * (3e-4 + 2e-6), n * 5e-3 + t * speed)
+    }
+
+    fn memory(slip: Slip, pace: Pace) -> Memory {
+        Memory {
+            active: true,
+            approach_speed: 4e-3,
+            slip,
+            pace,
+            ..Memory::default()
+        }
+    }
+
+    const BALL: Vec3 = Vec3::new(0.3, -0.2, 0.5);
+    const SOCKET: Vec3 = Vec3::new(-0.1, 0.4, 0.2);
+
+    /// Force on the ball. The surfaces' turning is kept at the normal `n0`: its change with the arms is not stiff and left out of
+    /// the derivatives.
+    fn on_ball(c: &Coefficients, memory: &Memory, e: &Vec3, v: &Vec3, n0: &Vec3) -> Vec3 {
+        let at = c.separation(e, v);
+        let force = c.force(memory, &at, || c.friction_reads(n0, v, &BALL, &SOCKET));
+        at.normal * -force.normal + force.friction
+    }
+
+    #[test]
+    fn derivatives_are_those_of_central_differences() {
+        for friction_velocity in VELOCITIES {
+            for (slip, speed) in [(Slip::Ramp, 3e-5), (Slip::Full, 0.04), (Slip::Whole, 0.04)] {
+                for pace in [Pace::Held, Pace::Rising] {
+                    // With the printed velocity so little counts that it takes more to get there.
+                    let speed = match friction_velocity {
+                        FrictionVelocity::Printed => speed * 150.0,
+                        _ => speed,
+                    };
+                    let (c, e, v) = pressed(friction_velocity, speed);
+                    let memory = memory(slip, pace);
+                    let at = c.separation(&e, &v);
+                    let read = c.friction_reads(&at.normal, &v, &BALL, &SOCKET);
+                    let force = c.force(&memory, &at, || read);
+                    assert!(force.normal > 1.0 && force.friction.norm() > 0.01 * force.normal);
+                    let s = c.linearise(&memory, &at, &v, &read, &force, Slope::Tangent);
+                    let by_velocity = s.by_rate + s.by_slip;
+                    let n = at.normal;
+                    for k in 0..3 {
+                        let unit = Vec3::ith(k, 1.0);
+                        let d = 1e-11;
+                        let difference = (on_ball(&c, &memory, &(e + unit * d), &v, &n)
+                            - on_ball(&c, &memory, &(e - unit * d), &v, &n))
+                            / (2.0 * d);
+                        let got: Vec3 = s.by_displacement.column(k).into();
+                        let off = (got - difference).norm() / s.by_displacement.norm();
+                        assert!(
+                            off < 1e-5,
+                            "{friction_velocity:?} {slip:?} {pace:?} e{k}: {off:e}"
+                        );
+                        let d = 1e-8 * speed;
+                        let difference = (on_ball(&c, &memory, &e, &(v + unit * d), &n)
+                            - on_ball(&c, &memory, &e, &(v - unit * d), &n))
+                            / (2.0 * d);
+                        let got: Vec3 = by_velocity.column(k).into();
+                        let off = (got - difference).norm() / by_velocity.norm();
+                        assert!(
+                            off < 1e-5,
+                            "{friction_velocity:?} {slip:?} {pace:?} v{k}: {off:e}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_printed_velocity_is_that_of_the_points_that_follow_the_normal() {
+        let (c, e, v) = pressed(FrictionVelocity::Printed, 0.2);
+        let at = c.separation(&e, &v);
+        // (13): V_j + r dn/dt against V_i + R dn/dt.
+        let turning = (v - at.normal * at.normal.dot(&v)) / at.distance;
+        let (r, socket) = (c.ball_radius, c.ball_radius + c.clearance);
+        let printed = v + turning * r - turning * socket;
+        let tangential = printed - at.normal * at.normal.dot(&printed);
+        let got = c.sliding(&at, &c.friction_reads(&at.normal, &v, &BALL, &SOCKET));
+        assert!((got - tangential).norm() < 1e-12 * 0.2);
+        // Its dead band ends where the centres move at v_a |e| / delta.
+        let ends = c.slip_low * at.distance / at.penetration;
+        for (part, sticks) in [(0.999, true), (1.001, false)] {
+            let slow = tangential.normalize() * (part * ends);
+            let force = c.force(&memory(Slip::Whole, Pace::Whole), &at, || slow);
+            assert_eq!(force.friction == Vec3::zeros(), sticks, "{part}");
+        }
+    }
+
+    #[test]
+    fn the_secant_of_full_friction_cannot_reverse_sliding() {
+        let (c, e, v) = pressed(FrictionVelocity::Centres, 0.04);
+        let memory = memory(Slip::Whole, Pace::Whole);
+        let at = c.separation(&e, &v);
+        let force = c.force(&memory, &at, || v);
+        let s = c.linearise(&memory, &at, &v, &v, &force, Slope::Secant);
+        let sliding = c.sliding(&at, &v);
+        assert!((s.by_slip * sliding - force.friction).norm() < 1e-12 * force.friction.norm());
+    }
+}

@@ -1,0 +1,57 @@
+//! What a contact remembers between steps: part of the state.
+
+use super::{Coefficients, Pace, Slip};
+
+/// Contact memory of one joint.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Memory {
+    /// In contact.
+    pub active: bool,
+    /// What the damping term divides by: delta_dot0 of this contact, or its largest rate so far, not below the scene's floor,
+    /// m/s; 0 while free.
+    pub approach_speed: f64,
+    /// The floor was used: this contact rebounds higher than asked.
+    pub floored: bool,
+    /// Piece of the friction law in force.
+    pub slip: Slip,
+    /// Piece of the rule for the approach speed in force.
+    pub pace: Pace,
+}
+
+impl Memory {
+    /// Of a contact that begins at `rate` (m/s).
+    pub fn begun(c: &Coefficients, rate: f64) -> Self {
+        Self {
+            active: true,
+            approach_speed: rate.max(c.speed_floor),
+            floored: rate < c.speed_floor,
+            ..Self::default()
+        }
+    }
+
+    /// What the damping term divides by where the penetration grows at `rate`, m/s. Until a contact has a memory it is the
+    /// rate itself.
+    #[inline]
+    pub fn approach(&self, c: &Coefficients, rate: f64) -> f64 {
+        if self.active {
+            c.approach(self.pace, self.approach_speed, rate)
+        } else {
+            rate.max(c.speed_floor)
+        }
+    }
+
+    /// Whether that is the rate itself, so that the damping term does not answer to it.
+    pub(super) fn follows(&self, c: &Coefficients, rate: f64) -> bool {
+        self.active && c.approach_follows(self.pace, self.approach_speed, rate)
+    }
+
+    /// Whether the rate may pass from one piece of the rule to the next. A rising one may pass its largest value in any step.
+    #[inline]
+    pub(super) fn may_turn(&self, rate: f64) -> bool {
+        match self.pace {
+            Pace::Whole => false,
+            Pace::Held => rate > self.approach_speed,
+            Pace::Rising => true,
+        }
+    }
+}

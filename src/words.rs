@@ -1,0 +1,47 @@
+//! Enums that files and people name by words.
+
+/// An enum each of whose variants has a word.
+pub trait Words: Copy + 'static {
+    /// The words, in the order of menus.
+    const WORDS: &'static [&'static str];
+
+    /// Word of this variant.
+    fn word(self) -> &'static str;
+
+    /// Variant of a word.
+    fn of_word(word: &str) -> Option<Self>;
+}
+
+/// Gives an enum `ALL`, `word` and [`Words`]. A variant without a word does not compile.
+macro_rules! words {
+    ($name:ident { $($variant:ident => $word:literal),+ $(,)? }) => {
+        impl $name {
+            /// Every variant, in the order of menus.
+            pub const ALL: [Self; [$($word),+].len()] = [$(Self::$variant),+];
+
+            /// Word of this variant in files and menus.
+            pub const fn word(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $word),+
+                }
+            }
+        }
+
+        impl $crate::words::Words for $name {
+            const WORDS: &'static [&'static str] = &[$($word),+];
+
+            fn word(self) -> &'static str {
+                self.word()
+            }
+
+            fn of_word(word: &str) -> Option<Self> {
+                match word {
+                    $($word => Some(Self::$variant),)+
+                    _ => None,
+                }
+            }
+        }
+    };
+}
+
+pub(crate) use words;
