@@ -4,8 +4,9 @@
 //! `cargo bench --bench physics`; figures are ratios of one run or of one machine, never absolute promises.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use jointplay::contact::Memory;
 use jointplay::integrate::System;
-use jointplay::mechanism::Mechanism;
+use jointplay::mechanism::{Mechanism, Touching};
 use jointplay::scene::Scene;
 use jointplay::simulate::Simulation;
 use large::scene_text;
@@ -32,9 +33,9 @@ fn evaluation(c: &mut Criterion, label: &str, scene: &Scene, time: f64) {
     let t = simulation.time();
     let y = simulation.state().to_vec();
     let mut mechanism = Mechanism::new(scene).expect("a built-in scene starts");
-    for j in 0..mechanism.contacts.len() {
-        mechanism.contacts.memory_mut()[j] = simulation.contact_memory(j);
-    }
+    let joints = 0..mechanism.contacts.len();
+    let memory: Vec<_> = joints.map(|j| simulation.contact_memory(j)).collect();
+    let mut mechanism = mechanism.evaluator(Touching::Located(&memory));
     let mut dy = vec![0.0; y.len()];
     c.bench_function(&format!("{label}: new instant"), |b| {
         let mut n = 0.0;
@@ -156,6 +157,8 @@ fn chain(c: &mut Criterion) {
         let y = simulation.state().to_vec();
         let t = simulation.time();
         let mut mechanism = Mechanism::new(&scene).expect("a built-in scene starts");
+        let memory = vec![Memory::default(); mechanism.contacts.len()];
+        let mut mechanism = mechanism.evaluator(Touching::Located(&memory));
         let mut dy = vec![0.0; y.len()];
         group.throughput(criterion::Throughput::Elements(links));
         group.bench_with_input(BenchmarkId::from_parameter(links), &links, |b, _| {

@@ -27,3 +27,4 @@ pub mod simulate;
 #[cfg(feature = "gui")]
 pub mod view;
 pub mod web;
+mod words;

@@ -12,11 +12,12 @@ pub trait Words: Copy + 'static {
     fn of_word(word: &str) -> Option<Self>;
 }
 
-/// Gives an enum `ALL`, `word` and [`Words`]. A variant without a word does not compile.
+/// Gives an enum `ALL`, `word`, [`Words`], and its word where it is printed or serialised. A variant without a word does not compile.
 macro_rules! words {
     ($name:ident { $($variant:ident => $word:literal),+ $(,)? }) => {
         impl $name {
             /// Every variant, in the order of menus.
+            #[allow(dead_code, reason = "some enums of the file format are never listed")]
             pub const ALL: [Self; [$($word),+].len()] = [$(Self::$variant),+];
 
             /// Word of this variant in files and menus.
@@ -39,6 +40,18 @@ macro_rules! words {
                     $($word => Some(Self::$variant),)+
                     _ => None,
                 }
+            }
+        }
+
+        impl std::fmt::Display for $name {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.pad(self.word())
+            }
+        }
+
+        impl serde::Serialize for $name {
+            fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                serializer.serialize_str(self.word())
             }
         }
     };

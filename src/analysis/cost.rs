@@ -1,9 +1,9 @@
 //! What each part of the model costs: the same scene with more and less of it.
 
 use super::stretch::time_to;
-use super::{AnalysisError, Effort, Outside, Setting};
-use crate::integrate::System;
-use crate::mechanism::Mechanism;
+use super::{AnalysisError, Effort, RunContext, Setting};
+use crate::integrate::System as _;
+use crate::mechanism::{Mechanism, Touching};
 use crate::scene::{Preset, Scene};
 
 /// Preset of the runs.
@@ -91,23 +91,26 @@ pub struct PartCost {
 ///
 /// # Errors
 /// As [`super::work_precision`].
-pub fn model_costs(effort: &Effort, outside: &mut Outside) -> Result<Vec<PartCost>, AnalysisError> {
+pub fn model_costs(
+    effort: &Effort,
+    context: &mut RunContext,
+) -> Result<Vec<PartCost>, AnalysisError> {
     let parts = PARTS.iter().enumerate();
     parts
-        .map(|(n, part)| one(part, effort, &mut outside.part(n, PARTS.len())))
+        .map(|(n, part)| one(part, effort, &mut context.part(n, PARTS.len())))
         .collect()
 }
 
-fn one(part: &Part, effort: &Effort, outside: &mut Outside) -> Result<PartCost, AnalysisError> {
+fn one(part: &Part, effort: &Effort, context: &mut RunContext) -> Result<PartCost, AnalysisError> {
     let owned = |(key, value): &(&str, &str)| ((*key).to_owned(), (*value).to_owned());
     let changes: Vec<(String, String)> = part.changes.iter().map(owned).collect();
     let scene = Scene::load(part.scene, &changes)?;
-    let setting = Setting::of_preset(&scene, PRESET)?;
+    let setting = Setting::of_preset(PRESET);
     let mut simulation = setting.start(&scene)?;
     // Its number of evaluations, to its end whatever that takes: the times below end with it.
     while simulation.time() < part.span {
         simulation.step_until(part.span)?;
-        outside.go_on(0.0)?;
+        context.go_on(0.0)?;
     }
     let evaluations = simulation.statistics().evaluations;
     let seconds = time_to(
@@ -117,12 +120,12 @@ fn one(part: &Part, effort: &Effort, outside: &mut Outside) -> Result<PartCost, 
             seconds: f64::INFINITY,
             ..*effort
         },
-        outside,
+        context,
         |_| setting.start(&scene),
     )?;
     Ok(PartCost {
         part: *part,
-        evaluation_s: evaluation(&setting, &scene, part.loaded, outside)?,
+        evaluation_s: evaluation(&setting, &scene, part.loaded, context)?,
         cost: seconds / part.span,
         evaluations,
     })
@@ -133,7 +136,7 @@ fn evaluation(
     setting: &Setting,
     scene: &Scene,
     loaded: f64,
-    outside: &mut Outside,
+    context: &mut RunContext,
 ) -> Result<f64, AnalysisError> {
     let mut simulation = setting.start(scene)?;
     simulation.advance_to(loaded)?;
@@ -142,22 +145,22 @@ fn evaluation(
         Mechanism::new(simulation.running_scene()).map_err(crate::simulate::StartError)?;
     // Its rank is known from its start.
     mechanism.start().map_err(crate::simulate::StartError)?;
-    for j in 0..mechanism.contacts.len() {
-        mechanism.contacts.memory_mut()[j] = simulation.contact_memory(j);
-    }
+    let joints = 0..mechanism.contacts.len();
+    let memory: Vec<_> = joints.map(|j| simulation.contact_memory(j)).collect();
+    let mut mechanism = mechanism.evaluator(Touching::Located(&memory));
     let mut dy = vec![0.0; y.len()];
     let mut shortest = f64::INFINITY;
     let mut instant = 0.0;
     for _ in 0..BATCHES {
-        let before = outside.now();
+        let before = context.now();
         for _ in 0..BATCH {
             // The drives are computed anew only at a new instant.
             instant += 1e-15;
             mechanism.derivative(t + instant, std::hint::black_box(y), &mut dy);
             std::hint::black_box(&mut dy);
         }
-        shortest = shortest.min(outside.now() - before);
-        outside.go_on(1.0)?;
+        shortest = shortest.min(context.now() - before);
+        context.go_on(1.0)?;
     }
     Ok(shortest / f64::from(BATCH))
 }

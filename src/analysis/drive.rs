@@ -1,6 +1,6 @@
 //! The period of a scene's drives, and a running scene as an [`Orbit`].
 
-use super::section::Orbit;
+use super::orbit::Orbit;
 use crate::scene::{Drive, JointKind, Scene};
 use crate::simulate::{Frame, Pose, Simulation, StartError, Stopped};
 

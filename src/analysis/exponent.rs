@@ -4,7 +4,7 @@
 //! to it whenever it has grown or shrunk by more than a factor; the exponent is the sum of the logarithms of these
 //! factors over the time.
 
-use super::section::Orbit;
+use super::orbit::Orbit;
 
 /// The twin is brought back to its separation once that has changed by more than this factor.
 const RENORMALISE_AT: f64 = 4.0;

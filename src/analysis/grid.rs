@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use crate::scene::{Kind, Scene, SceneError, Value};
+use crate::scene::{Kind, Scene, SceneError, Value, ValueError};
 
 /// Points that `follow` joins into one block: each block starts cold at its first point, so that neither threads nor
 /// shards decide what continues from what.
@@ -32,14 +32,14 @@ pub enum RangeError {
         error: Box<SceneError>,
     },
     /// An end that is no value of the parameter.
-    #[error("--vary {text}: {end}: {message}")]
+    #[error("--vary {text}: {end}: {error}")]
     End {
         /// As written.
         text: String,
         /// The end at fault.
         end: String,
         /// What is wrong and what is allowed.
-        message: String,
+        error: ValueError,
     },
     /// A parameter of words.
     #[error("--vary {text}: {key} is no number; only numbers can be varied")]
@@ -131,10 +131,10 @@ impl Axis {
         }
         let read = |end: &str| match parameter.read(end) {
             Ok(value) => Ok(value),
-            Err(message) => Err(RangeError::End {
+            Err(error) => Err(RangeError::End {
                 text: own(),
                 end: end.to_owned(),
-                message,
+                error,
             }),
         };
         let (first, last, whole) = match (parameter.kind, read(from)?, read(to)?) {

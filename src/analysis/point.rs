@@ -1,8 +1,9 @@
 //! One point of a sweep: a scene through its periods, and what is told of it.
 
 use super::drive::{Machine, MachineError, OBSERVABLES};
+use super::orbit::Orbit;
 use super::regime::{Evidence, Regime, classify};
-use super::section::{Orbit, Schedule, Watch};
+use super::section::{Schedule, Watch};
 use crate::scene::{Scene, Value};
 use crate::simulate::{Effect, Peak};
 

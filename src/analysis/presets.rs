@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 use serde::{Deserialize, Serialize};
 
 use super::work_precision::{Yardstick, measure as measure_point};
-use super::{AnalysisError, Effort, Outside, Point, Setting, Standard, WorkPrecision};
+use super::{AnalysisError, Effort, Point, ReferenceSolution, RunContext, Setting, WorkPrecision};
 use crate::scene::{Preset, Scene};
 
 /// What `jointplay tradeoff --all --write` measured.
@@ -104,17 +104,21 @@ pub fn choose(found: &[WorkPrecision], limit: f64) -> Option<Setting> {
 pub fn measure(
     scene: &Scene,
     presets: &[Preset],
-    outside: &mut Outside,
+    context: &mut RunContext,
 ) -> Result<Vec<Point>, AnalysisError> {
     let effort = Effort::QUICK;
     let parts = presets.len() + 2;
-    let standard = Standard::new(scene, &mut outside.part(0, parts))?;
-    let yardstick = Yardstick::new(&standard, &effort, &mut outside.part(1, parts))?;
+    let reference = ReferenceSolution::new(scene, &mut context.part(0, parts))?;
+    let yardstick = Yardstick::new(&reference, &effort, &mut context.part(1, parts))?;
     let mut points = Vec::with_capacity(presets.len());
     for (n, preset) in presets.iter().enumerate() {
-        let setting = Setting::of_preset(scene, *preset)?;
-        let mut point =
-            measure_point(&standard, setting, &effort, &mut outside.part(n + 2, parts))?;
+        let setting = Setting::of_preset(*preset);
+        let mut point = measure_point(
+            &reference,
+            setting,
+            &effort,
+            &mut context.part(n + 2, parts),
+        )?;
         point.preset = Some(*preset);
         yardstick.divide(&mut point);
         points.push(point);

@@ -1,7 +1,7 @@
 //! How far the program gets: three spans of the default scene, each with what is asked of it.
 
 use super::stretch::{stretch, time_to};
-use super::{AnalysisError, Effort, End, Outside, Setting, Standard};
+use super::{AnalysisError, Effort, End, ReferenceSolution, RunContext, Setting};
 use crate::scene::Scene;
 use crate::simulate::{Frame, Simulation, Snapshot};
 
@@ -92,7 +92,7 @@ impl Reach {
 ///
 /// # Errors
 /// As [`super::work_precision`].
-pub fn reach(scene: &Scene, outside: &mut Outside) -> Result<Vec<Reach>, AnalysisError> {
+pub fn reach(scene: &Scene, context: &mut RunContext) -> Result<Vec<Reach>, AnalysisError> {
     let goals = Goal::ALL.iter().enumerate();
     goals
         .map(|(n, goal)| {
@@ -100,23 +100,23 @@ pub fn reach(scene: &Scene, outside: &mut Outside) -> Result<Vec<Reach>, Analysi
             if *goal == Goal::Ideal {
                 scene.set("contact.clearance", "0")?;
             }
-            one(&scene, *goal, &mut outside.part(n, Goal::ALL.len()))
+            one(&scene, *goal, &mut context.part(n, Goal::ALL.len()))
         })
         .collect()
 }
 
-fn one(scene: &Scene, goal: Goal, outside: &mut Outside) -> Result<Reach, AnalysisError> {
-    let setting = Setting::automatic(scene, TOLERANCE)?;
-    let yardstick = Setting::yardstick(scene)?;
+fn one(scene: &Scene, goal: Goal, context: &mut RunContext) -> Result<Reach, AnalysisError> {
+    let setting = Setting::automatic(TOLERANCE);
+    let yardstick = Setting::yardstick();
     let integrates = !setting.start(scene)?.mechanism().is_kinematic();
     let effort = Effort {
         measured: 0.5,
         ..Effort::REFERENCE
     };
     let (from, to) = goal.span();
-    let speed = |setting: &Setting, outside: &mut Outside| {
-        let start = snapshot_at(setting, scene, from, outside)?;
-        let seconds = time_to(to, &effort, outside, |_| {
+    let speed = |setting: &Setting, context: &mut RunContext| {
+        let start = snapshot_at(setting, scene, from, context)?;
+        let seconds = time_to(to, &effort, context, |_| {
             let mut simulation = setting.start(scene)?;
             simulation.restore(&start)?;
             Ok(simulation)
@@ -124,22 +124,22 @@ fn one(scene: &Scene, goal: Goal, outside: &mut Outside) -> Result<Reach, Analys
         Ok::<_, AnalysisError>((to - from) / seconds)
     };
     // Before and after, so that a machine that turns busy in between slows both.
-    let first = speed(&setting, &mut outside.part(0, 4))?;
+    let first = speed(&setting, &mut context.part(0, 4))?;
     let yardstick = if integrates {
-        Some(speed(&yardstick, &mut outside.part(1, 4))?)
+        Some(speed(&yardstick, &mut context.part(1, 4))?)
     } else {
         None
     };
-    let second = speed(&setting, &mut outside.part(2, 4))?;
-    let mut last = outside.part(3, 4);
+    let second = speed(&setting, &mut context.part(2, 4))?;
+    let mut last = context.part(3, 4);
     let error = match goal {
         Goal::FirstSecond => {
-            let standard = Standard::new(scene, &mut last)?;
-            let (_, errors, _) = standard.impacts_of(&setting, &effort, &mut last)?;
+            let reference = ReferenceSolution::new(scene, &mut last)?;
+            let (_, errors, _) = reference.impacts_of(&setting, &effort, &mut last)?;
             errors.peak
         }
         Goal::Settled => {
-            let converged = Setting::reference(scene, CONVERGED)?;
+            let converged = Setting::reference(CONVERGED);
             let expected = mean_forces(&converged, scene, from, to, &mut last)?;
             let means = mean_forces(&setting, scene, from, to, &mut last)?;
             let pairs = means.iter().zip(&expected);
@@ -163,16 +163,16 @@ fn snapshot_at(
     setting: &Setting,
     scene: &Scene,
     time: f64,
-    outside: &mut Outside,
+    context: &mut RunContext,
 ) -> Result<Snapshot, AnalysisError> {
-    Ok(run_to(setting, scene, time, outside, |_| {})?.snapshot())
+    Ok(run_to(setting, scene, time, context, |_| {})?.snapshot())
 }
 
 fn run_to(
     setting: &Setting,
     scene: &Scene,
     end: f64,
-    outside: &mut Outside,
+    context: &mut RunContext,
     mut seen: impl FnMut(&mut Simulation),
 ) -> Result<Simulation, AnalysisError> {
     let mut simulation = setting.start(scene)?;
@@ -180,7 +180,7 @@ fn run_to(
         &mut simulation,
         end,
         &Effort::REFERENCE,
-        outside,
+        context,
         |simulation| {
             seen(simulation);
             false
@@ -205,13 +205,13 @@ fn mean_forces(
     scene: &Scene,
     from: f64,
     to: f64,
-    outside: &mut Outside,
+    context: &mut RunContext,
 ) -> Result<Vec<f64>, AnalysisError> {
     let mut means = vec![0.0; scene.ball_joints.len()];
     let mut frame = Frame::default();
     let mut next = 0;
     let instant = |n: u32| from + (to - from) * (f64::from(n) + 0.5) / f64::from(SAMPLES);
-    run_to(setting, scene, to, outside, |simulation| {
+    run_to(setting, scene, to, context, |simulation| {
         while next < SAMPLES && instant(next) <= simulation.time() {
             simulation.sample(instant(next), &mut frame);
             for (mean, joint) in means.iter_mut().zip(&frame.joints) {

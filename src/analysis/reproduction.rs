@@ -5,7 +5,7 @@ mod record;
 
 pub use findings::{Combination, Findings, Report};
 use record::row;
-pub use record::{COLUMNS, Row, Swathe, Traced, regime_word};
+pub use record::{COLUMNS, Row, SweepData, Traced, regime_word};
 
 use super::grid::{Axis, Grid, RangeError, Start};
 use super::paper::chaos::Loop;
@@ -52,12 +52,7 @@ pub const PRINTED: Variant = Variant {
 
 /// (13) as printed together with what else the paper prints wrongly or leaves out. (19) as printed has the elastic force over
 /// four times the approach speed in m/s, 3.2 times that of a steel ball in the first impacts, and next to no damping.
-pub const COMBINATIONS: [Variant; 4] = [
-    Variant {
-        prefix: "printed_a1_16mm_",
-        title: "and a1 = 16 mm",
-        changes: &[AS_PRINTED, ("spcmm.slider_plane", "16 mm")],
-    },
+pub const COMBINATIONS: [Variant; 3] = [
     Variant {
         prefix: "printed_a1_24mm_",
         title: "and a1 = 24 mm",
@@ -112,7 +107,7 @@ impl Extent {
         runs: (14, 4),
         values: [5, 4],
         sweep: (12, 4),
-        map: [3, 4],
+        map: [2, 3],
         map_periods: (12, 4),
     };
 }
@@ -157,7 +152,7 @@ pub struct Work {
     runs: Vec<RunOf>,
     /// Scenes of settled curves, of each variant in the order of [`CASES`].
     curves: Vec<(Variant, Case, Scene)>,
-    swathes: Vec<Swathe>,
+    sweeps: Vec<SweepData>,
     jobs: Vec<Job>,
 }
 
@@ -195,7 +190,7 @@ fn scene(variant: Variant, case: Case, more: &[(&str, &str)]) -> Result<Scene, S
     Scene::load(SCENE, &changes)
 }
 
-fn swathe(
+fn sweep_data(
     variant: Variant,
     name: &'static str,
     case: Case,
@@ -203,7 +198,7 @@ fn swathe(
     start: Start,
     (periods, discard): (usize, usize),
     exponent: bool,
-) -> Result<Swathe, ReproductionError> {
+) -> Result<SweepData, ReproductionError> {
     let scene = scene(variant, case, &[])?;
     let axes = vary.iter().map(|text| Axis::parse(&scene, text));
     let grid = Grid::new(&scene, axes.collect::<Result<Vec<_>, _>>()?, start)?;
@@ -213,7 +208,7 @@ fn swathe(
         phase: 0.0,
         exponent,
     };
-    Ok(Swathe {
+    Ok(SweepData {
         variant,
         name,
         sweep: Sweep::new(scene, grid, plan)?,
@@ -270,7 +265,7 @@ impl Work {
         let (up, down, cold) = (Start::FollowUp, Start::FollowDown, Start::Cold);
         let (c, f) = (clearance(c), friction(f));
         let (runs_of, sweep_of) = (extent.runs, extent.sweep);
-        let swathes = [
+        let sweeps = [
             ("runs_by_clearance", &cases[0], cold, runs_of, true),
             ("runs_by_friction", &cases[1], cold, runs_of, true),
             ("clearance_up", &c, up, sweep_of, false),
@@ -282,18 +277,18 @@ impl Work {
             ("map", &map, cold, extent.map_periods, true),
         ];
         let of = |variant, &(name, vary, start, periods, exponent): &(_, &Vec<String>, _, _, _)| {
-            swathe(variant, name, nominal, vary, start, periods, exponent)
+            sweep_data(variant, name, nominal, vary, start, periods, exponent)
         };
         let both = [CORRECTED, PRINTED].into_iter();
-        let all = both.flat_map(|variant| swathes.iter().map(move |s| (variant, s)));
-        let all = all.chain(COMBINATIONS.map(|variant| (variant, &swathes[0])));
-        let swathes = all
+        let all = both.flat_map(|variant| sweeps.iter().map(move |s| (variant, s)));
+        let all = all.chain(COMBINATIONS.map(|variant| (variant, &sweeps[0])));
+        let sweeps = all
             .map(|(variant, s)| of(variant, s))
             .collect::<Result<Vec<_>, ReproductionError>>()?;
         // Blocks that take longest come first, so that no thread is left with one at the end.
         let mut jobs: Vec<Job> = Vec::new();
-        for (s, swathe) in swathes.iter().enumerate() {
-            jobs.extend((0..swathe.sweep.grid().blocks()).map(|b| Job::Block(s, b)));
+        for (s, data) in sweeps.iter().enumerate() {
+            jobs.extend((0..data.sweep.grid().blocks()).map(|b| Job::Block(s, b)));
         }
         jobs.extend((0..curves.len()).map(Job::Curve));
         jobs.extend((0..runs.len()).map(Job::Run));
@@ -301,7 +296,7 @@ impl Work {
             extent,
             runs,
             curves,
-            swathes,
+            sweeps,
             jobs,
         })
     }
@@ -312,8 +307,8 @@ impl Work {
     }
 
     /// Its sweeps, without records.
-    pub fn swathes(&self) -> &[Swathe] {
-        &self.swathes
+    pub fn sweeps(&self) -> &[SweepData] {
+        &self.sweeps
     }
 
     /// Number of the sweep and of its block that job `job` computes, if it does.
@@ -330,7 +325,7 @@ impl Work {
             Job::Run(_) => DURATION,
             Job::Curve(_) => PERIOD * (self.extent.settle + 2) as f64,
             Job::Block(s, b) => {
-                let sweep = &self.swathes[s].sweep;
+                let sweep = &self.sweeps[s].sweep;
                 let twin = if sweep.plan().exponent { 2.0 } else { 1.0 };
                 let points = sweep.grid().block(b).len();
                 PERIOD * twin * (sweep.plan().periods * points) as f64
@@ -368,7 +363,7 @@ impl Work {
                 ))
             }
             Job::Block(s, b) => {
-                let sweep = &self.swathes[s].sweep;
+                let sweep = &self.sweeps[s].sweep;
                 let all = sweep.plan().periods as f64;
                 let share = self.length(job) / sweep.grid().block(b).len() as f64;
                 let mut block = sweep.begin(b);
@@ -377,7 +372,7 @@ impl Work {
                     let now = block.current().map_or(0.0, |run| run.taken() as f64 / all);
                     if !go_on(share * (block.finished().len() as f64 + now)) {
                         return Err(failed(
-                            &self.swathes[s].file_name(),
+                            &self.sweeps[s].file_name(),
                             ResponseError::Cancelled,
                         ));
                     }
@@ -416,7 +411,7 @@ impl Work {
                 (Job::Curve(n), Outcome::Curve(curve)) => curves.push((self.curves[*n].0, curve)),
                 // Blocks of a sweep come in order of their points.
                 (Job::Block(s, _), Outcome::Block(records)) => {
-                    self.swathes[*s].records.extend(records);
+                    self.sweeps[*s].records.extend(records);
                 }
                 _ => unreachable!("a job has an outcome of its kind"),
             }
@@ -429,8 +424,8 @@ impl Work {
             let own = runs.extract_if(.., |(of, _)| *of == variant);
             own.map(|(_, run)| run).collect()
         };
-        let mut swathes_of = |variant: Variant| -> Vec<Swathe> {
-            let own = self.swathes.extract_if(.., |s| s.variant == variant);
+        let mut sweeps_of = |variant: Variant| -> Vec<SweepData> {
+            let own = self.sweeps.extract_if(.., |s| s.variant == variant);
             own.collect()
         };
         let mut findings = |variant: Variant| {
@@ -445,7 +440,7 @@ impl Work {
                 runs,
                 ideal: ideal.clone(),
                 curves: own.map(|(_, curve)| curve).collect(),
-                swathes: swathes_of(variant),
+                sweeps: sweeps_of(variant),
                 resolution,
             }
         };
@@ -457,7 +452,7 @@ impl Work {
                 .map(|variant| Combination {
                     variant,
                     runs: runs_of(variant),
-                    sections: swathes_of(variant).remove(0),
+                    sections: sweeps_of(variant).remove(0),
                 })
                 .into(),
         }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{AnalysisError, Outside};
+use super::{AnalysisError, RunContext};
 use crate::simulate::Simulation;
 
 /// Steps between two looks at the clock, the cap, and whether to go on.
@@ -71,10 +71,10 @@ pub(super) fn stretch(
     simulation: &mut Simulation,
     end: f64,
     effort: &Effort,
-    outside: &mut Outside,
+    context: &mut RunContext,
     mut seen: impl FnMut(&mut Simulation) -> bool,
 ) -> Result<End, AnalysisError> {
-    timed_stretch(simulation, end, effort, outside, &mut Vec::new(), &mut seen)
+    timed_stretch(simulation, end, effort, context, &mut Vec::new(), &mut seen)
 }
 
 /// The same; `pieces` keeps the shortest time that each piece has taken so far, s.
@@ -82,16 +82,16 @@ fn timed_stretch(
     simulation: &mut Simulation,
     end: f64,
     effort: &Effort,
-    outside: &mut Outside,
+    context: &mut RunContext,
     pieces: &mut Vec<f64>,
     seen: &mut impl FnMut(&mut Simulation) -> bool,
 ) -> Result<End, AnalysisError> {
     let most = simulation.statistics().evaluations + effort.evaluations;
-    let deadline = outside.now() + effort.seconds;
+    let deadline = context.now() + effort.seconds;
     for piece in 0.. {
-        let before = outside.now();
+        let before = context.now();
         let outcome = some_steps(simulation, end, seen);
-        let now = outside.now();
+        let now = context.now();
         match pieces.get_mut(piece) {
             Some(shortest) => *shortest = shortest.min(now - before),
             None => pieces.push(now - before),
@@ -101,7 +101,7 @@ fn timed_stretch(
             Ok(false) => {}
             Err(stopped) => return Ok(End::Stopped(stopped.to_string())),
         }
-        outside.go_on(0.0)?;
+        context.go_on(0.0)?;
         if simulation.statistics().evaluations > most || now > deadline {
             return Ok(End::Capped);
         }
@@ -132,23 +132,23 @@ fn some_steps(
 pub(super) fn time_to(
     end: f64,
     effort: &Effort,
-    outside: &mut Outside,
-    mut start: impl FnMut(&mut Outside) -> Result<Simulation, AnalysisError>,
+    context: &mut RunContext,
+    mut start: impl FnMut(&mut RunContext) -> Result<Simulation, AnalysisError>,
 ) -> Result<f64, AnalysisError> {
     let mut pieces = Vec::new();
     let mut measured = 0.0;
     for run in 0..MOST_RUNS {
-        let mut simulation = start(outside)?;
-        let before = outside.now();
+        let mut simulation = start(context)?;
+        let before = context.now();
         timed_stretch(
             &mut simulation,
             end,
             effort,
-            outside,
+            context,
             &mut pieces,
             &mut |_| false,
         )?;
-        measured += outside.now() - before;
+        measured += context.now() - before;
         let long = measured >= LONG * effort.measured && run > 0;
         if long || (measured >= effort.measured && run + 1 >= FEWEST_RUNS) {
             break;
@@ -174,8 +174,8 @@ mod tests {
         let mut clock = || 0.0;
         let mut simulation = Simulation::new(&scene).expect("starts");
         let mut go_on = |_: f64| ControlFlow::Continue(());
-        let mut outside = Outside::new(&mut clock, &mut go_on);
-        let end = stretch(&mut simulation, 1.0, &small, &mut outside, |_| false);
+        let mut context = RunContext::new(&mut clock, &mut go_on);
+        let end = stretch(&mut simulation, 1.0, &small, &mut context, |_| false);
         assert_eq!(end, Ok(End::Capped));
         let evaluations = simulation.statistics().evaluations;
         assert!((501..1500).contains(&evaluations), "{evaluations}");
@@ -189,8 +189,8 @@ mod tests {
                 ControlFlow::Continue(())
             }
         };
-        let mut outside = Outside::new(&mut clock, &mut stop);
-        let end = stretch(&mut simulation, 1.0, &Effort::FULL, &mut outside, |_| false);
+        let mut context = RunContext::new(&mut clock, &mut stop);
+        let end = stretch(&mut simulation, 1.0, &Effort::FULL, &mut context, |_| false);
         assert_eq!(end, Err(AnalysisError::Cancelled));
     }
 
@@ -205,14 +205,14 @@ mod tests {
             time
         };
         let mut go_on = |_: f64| ControlFlow::Continue(());
-        let mut outside = Outside::new(&mut clock, &mut go_on);
+        let mut context = RunContext::new(&mut clock, &mut go_on);
         let effort = Effort {
             measured: 1e6,
             seconds: 1e9,
             ..Effort::QUICK
         };
         let mut steps = 0;
-        let seconds = time_to(5e-3, &effort, &mut outside, |_| {
+        let seconds = time_to(5e-3, &effort, &mut context, |_| {
             let mut simulation = Simulation::new(&scene)?;
             while simulation.step_until(5e-3).is_ok() && simulation.time() < 5e-3 {}
             steps = simulation.statistics().steps;

@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 use super::drive::drive_period;
 use super::grid::{Axis, Grid, Start};
 use super::point::{Plan, PointResult};
+use super::source::{Failure, SceneSource};
 use super::sweep::{BlockRun, Sweep};
-use super::task::{Failure, Message, SceneSource};
 
 /// Steps of a simulation between two looks at whether to go on.
 const STEPS: u32 = 400;
@@ -80,10 +80,20 @@ pub struct SweptPoint {
     pub probe: Option<(f64, f64)>,
 }
 
+/// What a sweep says on its way.
+pub(super) enum SweepMessage {
+    /// Fraction done, 0 to 1.
+    Progress(f64),
+    /// The ranges that can be; points follow.
+    Ranges(Vec<Range>),
+    /// A point.
+    Point(Box<SweptPoint>),
+}
+
 /// Computes a sweep point by point, the coarse outline first where points do not follow each other.
 pub(super) fn run(
     task: &SweepTask,
-    tell: &mut dyn FnMut(Message) -> ControlFlow<()>,
+    tell: &mut dyn FnMut(SweepMessage) -> ControlFlow<()>,
 ) -> Result<(), Failure> {
     let mut say = |message| match tell(message) {
         ControlFlow::Continue(()) => Ok(()),
@@ -121,7 +131,7 @@ pub(super) fn run(
         )));
     }
     let sweep = Sweep::new(scene, grid, plan).map_err(said)?;
-    say(Message::Ranges(ranges))?;
+    say(SweepMessage::Ranges(ranges))?;
     let blocks = sweep.grid().blocks();
     let mut through = 0;
     for b in coarse_first(blocks) {
@@ -130,13 +140,13 @@ pub(super) fn run(
             block.advance();
             if let Some(point) = block.latest() {
                 through += 1;
-                say(Message::Point(Box::new(point)))?;
+                say(SweepMessage::Point(Box::new(point)))?;
             }
             let part = block
                 .run
                 .current()
                 .map_or(0.0, |run| run.taken() as f64 / task.periods as f64);
-            say(Message::Progress(
+            say(SweepMessage::Progress(
                 (through as f64 + part) / sweep.grid().points() as f64,
             ))?;
         }
@@ -274,7 +284,7 @@ fn tell_result(point: &mut SweptPoint, result: &PointResult) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::task::{Job, perform};
+    use crate::analysis::task::{Job, Message, perform};
     use crate::scene::Scene;
 
     fn task(vary: &[&str]) -> SweepTask {

@@ -4,40 +4,11 @@ use std::ops::ControlFlow;
 
 use serde::{Deserialize, Serialize};
 
+use super::RunContext;
 use super::presets::{self, Measured};
-use super::swept::{self, Range, SweepTask, SweptPoint};
-use super::{AnalysisError, Outside};
-use crate::scene::{Preset, Scene, SceneError};
-
-/// A scene as it travels: text and changes, from which it is read again.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct SceneSource {
-    /// The TOML text.
-    pub text: String,
-    /// Its file, for messages.
-    pub file: Option<String>,
-    /// Changed parameters, as a user writes them.
-    pub changes: Vec<(String, String)>,
-}
-
-impl SceneSource {
-    /// What `scene` was read from.
-    pub fn of(scene: &Scene) -> Self {
-        Self {
-            text: scene.source.text.clone(),
-            file: scene.source.file.clone(),
-            changes: scene.changes.clone(),
-        }
-    }
-
-    /// The scene.
-    ///
-    /// # Errors
-    /// As [`Scene::parse`].
-    pub fn scene(&self) -> Result<Scene, SceneError> {
-        Scene::parse(&self.text, self.file.as_deref(), &self.changes)
-    }
-}
+use super::source::{Failure, SceneSource};
+use super::swept::{self, Range, SweepMessage, SweepTask, SweptPoint};
+use crate::scene::Preset;
 
 /// What is to be computed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -70,6 +41,16 @@ pub enum Message {
     Failed(String),
 }
 
+impl From<SweepMessage> for Message {
+    fn from(message: SweepMessage) -> Self {
+        match message {
+            SweepMessage::Progress(done) => Self::Progress(done),
+            SweepMessage::Ranges(ranges) => Self::Ranges(ranges),
+            SweepMessage::Point(point) => Self::Point(point),
+        }
+    }
+}
+
 /// Computes `job`. `clock` gives seconds from any start; `tell` takes each message and may break off.
 /// The last message is [`Message::Done`] or [`Message::Failed`], unless it was broken off.
 pub fn perform(
@@ -79,7 +60,7 @@ pub fn perform(
 ) {
     let outcome = match job {
         Job::Presets { scene, presets } => measure_presets(scene, presets, clock, tell),
-        Job::Sweep(task) => swept::run(task, tell),
+        Job::Sweep(task) => swept::run(task, &mut |message| tell(message.into())),
     };
     let last = match outcome {
         Ok(()) => Message::Done,
@@ -88,26 +69,6 @@ pub fn perform(
     };
     // Nothing follows that could be broken off.
     let _ = tell(last);
-}
-
-pub(super) enum Failure {
-    Cancelled,
-    Said(String),
-}
-
-impl From<AnalysisError> for Failure {
-    fn from(error: AnalysisError) -> Self {
-        match error {
-            AnalysisError::Cancelled => Self::Cancelled,
-            other => Self::Said(other.to_string()),
-        }
-    }
-}
-
-impl From<SceneError> for Failure {
-    fn from(error: SceneError) -> Self {
-        Self::Said(error.to_string())
-    }
 }
 
 fn measure_presets(
@@ -125,7 +86,7 @@ fn measure_presets(
         })
         .collect::<Result<_, _>>()?;
     let mut progress = |done| tell(Message::Progress(done));
-    let points = presets::measure(&scene, &presets, &mut Outside::new(clock, &mut progress))?;
+    let points = presets::measure(&scene, &presets, &mut RunContext::new(clock, &mut progress))?;
     let measured = points.iter().map(Measured::of);
     let message = Message::Presets(words.iter().cloned().zip(measured).collect());
     match tell(message) {
@@ -137,6 +98,7 @@ fn measure_presets(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Scene;
 
     fn job(changes: &[(&str, &str)], presets: &[&str]) -> Job {
         let own = |&(k, v): &(&str, &str)| (k.to_owned(), v.to_owned());

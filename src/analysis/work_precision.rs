@@ -2,9 +2,10 @@
 
 use serde::Serialize;
 
-use super::standard::Work;
+use super::reference_solution::Work;
 use super::stretch::time_to;
-use super::{AnalysisError, Effort, End, Errors, Outside, Setting, Standard, front};
+use super::{AnalysisError, Effort, End, Errors, ReferenceSolution, RunContext, Setting, front};
+use crate::integrate::Method;
 use crate::scene::{Preset, Scene};
 
 /// What a run did over the first impacts, or in settled motion.
@@ -48,7 +49,6 @@ pub struct Point {
     /// Method, step, tolerance.
     pub setting: Setting,
     /// The preset that stands for it.
-    #[serde(serialize_with = "as_word")]
     pub preset: Option<Preset>,
     /// The first impacts.
     pub impacts: Phase,
@@ -58,21 +58,11 @@ pub struct Point {
     pub errors: Errors,
 }
 
-fn as_word<S: serde::Serializer>(
-    preset: &Option<Preset>,
-    serializer: S,
-) -> Result<S::Ok, S::Error> {
-    match preset {
-        Some(preset) => serializer.serialize_str(preset.word()),
-        None => serializer.serialize_none(),
-    }
-}
-
 /// All points of a scene.
 #[derive(Clone, Debug)]
 pub struct WorkPrecision {
     /// What they are measured against.
-    pub standard: Standard,
+    pub reference: ReferenceSolution,
     /// In the order of the methods, each from coarse to fine.
     pub points: Vec<Point>,
 }
@@ -108,41 +98,41 @@ impl WorkPrecision {
 /// Runs every method over its steps or tolerances, and the presets.
 ///
 /// # Errors
-/// A scene that has no reference ([`Standard::new`]); [`Outside`]'s no.
+/// A scene that has no reference ([`ReferenceSolution::new`]); [`RunContext`]'s no.
 pub fn work_precision(
     scene: &Scene,
     effort: &Effort,
-    outside: &mut Outside,
+    context: &mut RunContext,
 ) -> Result<WorkPrecision, AnalysisError> {
-    let settings = grid(scene, effort)?;
+    let settings = grid(effort)?;
     let parts = settings.len() + 3;
-    let standard = Standard::new(scene, &mut outside.part(0, parts))?;
+    let reference = ReferenceSolution::new(scene, &mut context.part(0, parts))?;
     let mut points = Vec::with_capacity(settings.len());
-    let mut yardstick = Yardstick::new(&standard, effort, &mut outside.part(1, parts))?;
+    let mut yardstick = Yardstick::new(&reference, effort, &mut context.part(1, parts))?;
     for (n, (setting, preset)) in settings.into_iter().enumerate() {
-        let mut part = outside.part(2 + n, parts);
-        let mut point = measure(&standard, setting, effort, &mut part)?;
+        let mut part = context.part(2 + n, parts);
+        let mut point = measure(&reference, setting, effort, &mut part)?;
         point.preset = preset;
         points.push(point);
     }
     // What else the machine did while the points ran slows the yardstick as little as them.
-    yardstick.again(&standard, effort, &mut outside.part(parts - 1, parts))?;
+    yardstick.again(&reference, effort, &mut context.part(parts - 1, parts))?;
     for point in &mut points {
         yardstick.divide(point);
     }
-    mark_fronts(&mut points, &standard.floor);
-    Ok(WorkPrecision { standard, points })
+    mark_fronts(&mut points, &reference.floor);
+    Ok(WorkPrecision { reference, points })
 }
 
 /// Every method at its values, the presets among them.
-fn grid(scene: &Scene, effort: &Effort) -> Result<Vec<(Setting, Option<Preset>)>, AnalysisError> {
+fn grid(effort: &Effort) -> Result<Vec<(Setting, Option<Preset>)>, AnalysisError> {
     let mut presets = Vec::new();
     for preset in Preset::ALL {
-        presets.push((Setting::of_preset(scene, preset)?, preset));
+        presets.push((Setting::of_preset(preset), preset));
     }
     let mut settings = Vec::new();
-    for method in Setting::methods() {
-        let probe = Setting::new(scene, method, effort.tolerances[0])?;
+    for method in Method::ALL {
+        let probe = Setting::new(method, effort.tolerances[0]);
         let mut values = if probe.adaptive {
             effort.tolerances.to_vec()
         } else {
@@ -150,15 +140,15 @@ fn grid(scene: &Scene, effort: &Effort) -> Result<Vec<(Setting, Option<Preset>)>
         };
         let own = presets
             .iter()
-            .filter(|(setting, _)| setting.method == *method);
+            .filter(|(setting, _)| setting.method == method);
         values.extend(own.map(|(setting, _)| setting.value()));
         values.sort_by(|a, b| b.total_cmp(a));
         values.dedup();
         for value in values {
-            let setting = Setting::new(scene, method, value)?;
+            let setting = Setting::new(method, value);
             let same = presets
                 .iter()
-                .find(|(own, _)| own.method == *method && own.value() == value);
+                .find(|(own, _)| own.method == method && own.value() == value);
             settings.push((setting, same.map(|(_, preset)| *preset)));
         }
     }
@@ -167,12 +157,12 @@ fn grid(scene: &Scene, effort: &Effort) -> Result<Vec<(Setting, Option<Preset>)>
 
 /// Runs one setting against `standard`: errors, work and time, without ratios and fronts.
 pub(super) fn measure(
-    standard: &Standard,
+    reference: &ReferenceSolution,
     setting: Setting,
     effort: &Effort,
-    outside: &mut Outside,
+    context: &mut RunContext,
 ) -> Result<Point, AnalysisError> {
-    let (end, mut errors, work) = match standard.impacts_of(&setting, effort, outside) {
+    let (end, mut errors, work) = match reference.impacts_of(&setting, effort, context) {
         Ok(found) => found,
         // A method may refuse a scene, say one too large for its matrices.
         Err(AnalysisError::Start(refused)) => {
@@ -180,7 +170,7 @@ pub(super) fn measure(
             return Ok(Point {
                 setting,
                 preset: None,
-                impacts: phase(end, standard.span, None, &Work::default()),
+                impacts: phase(end, reference.span, None, &Work::default()),
                 settled: None,
                 errors: Errors::default(),
             });
@@ -188,20 +178,20 @@ pub(super) fn measure(
         Err(error) => return Err(error),
     };
     let wall = match end {
-        End::Reached => Some(time_to(standard.span, effort, outside, |_| {
-            standard.start(&setting)
+        End::Reached => Some(time_to(reference.span, effort, context, |_| {
+            reference.start(&setting)
         })?),
         _ => None,
     };
-    let impacts = phase(end, standard.span, wall, &work);
+    let impacts = phase(end, reference.span, wall, &work);
     let mut settled = None;
-    if let Some((end, error, work)) = standard.settled_of(&setting, effort, outside)?
-        && let Some(span) = &standard.settled
+    if let Some((end, error, work)) = reference.settled_of(&setting, effort, context)?
+        && let Some(span) = &reference.settled
     {
         errors.settled = error;
         let wall = match end {
-            End::Reached => Some(time_to(span.to, effort, outside, |outside| {
-                Ok(standard.resume(span, &setting, effort, outside)?.1)
+            End::Reached => Some(time_to(span.to, effort, context, |context| {
+                Ok(reference.resume(span, &setting, effort, context)?.1)
             })?),
             _ => None,
         };
@@ -238,26 +228,26 @@ pub(super) struct Yardstick {
 
 impl Yardstick {
     pub(super) fn new(
-        standard: &Standard,
+        reference: &ReferenceSolution,
         effort: &Effort,
-        outside: &mut Outside,
+        context: &mut RunContext,
     ) -> Result<Self, AnalysisError> {
         let mut yardstick = Self {
-            setting: Setting::yardstick(standard.scene())?,
+            setting: Setting::yardstick(),
             impacts: None,
             settled: None,
         };
-        yardstick.again(standard, effort, outside)?;
+        yardstick.again(reference, effort, context)?;
         Ok(yardstick)
     }
 
     pub(super) fn again(
         &mut self,
-        standard: &Standard,
+        reference: &ReferenceSolution,
         effort: &Effort,
-        outside: &mut Outside,
+        context: &mut RunContext,
     ) -> Result<(), AnalysisError> {
-        let point = measure(standard, self.setting, effort, outside)?;
+        let point = measure(reference, self.setting, effort, context)?;
         let shorter = |a: Option<f64>, b: Option<f64>| match (a, b) {
             (Some(a), Some(b)) => Some(a.min(b)),
             (a, b) => a.or(b),

@@ -7,7 +7,8 @@ use super::layout::reserved;
 use super::player::Player;
 use super::value;
 use crate::analysis::presets::{self, Measured};
-use crate::analysis::task::{Job, Message, SceneSource};
+use crate::analysis::source::SceneSource;
+use crate::analysis::task::{Job, Message};
 use crate::scene::Preset;
 use crate::simulate::Impact;
 

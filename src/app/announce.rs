@@ -81,7 +81,7 @@ fn sentences(player: &Player, news: &str, strongest: Option<(usize, f64, f64)>) 
     parts.push(format!("{}.", scene.title));
     let time = duration(player.pacer.shown());
     parts.push(if let Some(stopped) = player.stopped() {
-        format!("The run has stopped at {time}: {}.", stopped.what)
+        format!("The run has stopped at {time}: {}.", stopped.fault)
     } else if player.is_playing() {
         let scale = value::time_scale(player.pacer.scale());
         format!("Running at time scale {scale}, {time}.")

@@ -6,6 +6,7 @@ mod divergence;
 mod plane;
 mod portrait;
 mod sweep;
+mod swept;
 
 use eframe::egui::{CollapsingHeader, RichText, Ui};
 
@@ -15,7 +16,7 @@ use super::player::Player;
 use coordinate::Coordinate;
 use portrait::Portrait;
 use sweep::Sweep;
-pub use sweep::Swept;
+pub use swept::Swept;
 
 /// The panel.
 #[derive(Default)]

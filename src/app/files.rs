@@ -11,7 +11,7 @@ use super::player::Player;
 use super::replay::Verdict;
 use super::share::{Link, SceneText, is_link, shown};
 use super::{App, Notice};
-use crate::scene::{Scene, Value};
+use crate::scene::Scene;
 
 /// Rows of a saved record.
 const ROWS: usize = 1000;
@@ -281,10 +281,6 @@ fn record_csv(player: &Player) -> String {
 /// What made the record.
 fn meta(player: &Player) -> String {
     let scene = player.scene();
-    let word = |key: &str| match scene.get(key) {
-        Ok(Value::Choice(word)) => word,
-        _ => "-",
-    };
     let changed: Map<String, serde_json::Value> = scene
         .changes
         .iter()
@@ -304,8 +300,8 @@ fn meta(player: &Player) -> String {
         "scene": scene.name,
         "scene_file": scene.source.file,
         "changed_parameters": changed,
-        "formulation": word("formulation"),
-        "method": word("solver.method"),
+        "formulation": scene.formulation,
+        "method": scene.solver.method,
         "step_s": scene.solver.step,
         "tolerance": scene.solver.tolerance,
         "time_s": player.pacer.shown(),

@@ -2,8 +2,8 @@
 
 use super::player::Player;
 use crate::analysis::section::Schedule;
+use crate::analysis::source::SceneSource;
 use crate::analysis::swept::SweptPoint;
-use crate::analysis::task::SceneSource;
 
 /// One point on the way: what is set there and where its steps end.
 #[derive(Clone, Debug, PartialEq)]

@@ -10,6 +10,8 @@ mod bench;
 mod canvas;
 mod controls;
 mod curve;
+#[cfg(not(target_arch = "wasm32"))]
+mod desktop;
 mod dialogs;
 mod files;
 mod header;
@@ -50,11 +52,11 @@ use accuracy::Accuracy;
 use announce::Announcer;
 use bench::Bench;
 use controls::Controls;
+#[cfg(not(target_arch = "wasm32"))]
+pub use desktop::DesktopHost;
 use dialogs::{Answer, Dialog};
 #[cfg(not(target_arch = "wasm32"))]
 pub use headless::{Headless, HeadlessError, Overlay, UiFrame};
-#[cfg(not(target_arch = "wasm32"))]
-pub use host::DesktopHost;
 pub use host::{Host, NoHost, OpenedFile, Running, SaveFile};
 use keys::Action;
 use layout::Sheet;

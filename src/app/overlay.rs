@@ -4,7 +4,6 @@
 use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, pos2, vec2};
 
 use super::value;
-use super::viewport::lower_right;
 use crate::scene::{Scene, format_quantity_digits};
 use crate::simulate::{ContactState, Frame};
 use crate::view::{Colour, DrawList, Label, LabelKind, Legend, Palette, Scaling, Theme};
@@ -240,4 +239,9 @@ pub fn legend(painter: &Painter, rect: Rect, scale: f32, legend: &Legend, theme:
         }
         at.y = placed.min.y - 1.0;
     }
+}
+
+/// Lower right corner, `margin` points away from both edges.
+pub(super) fn lower_right(rect: Rect, margin: f32) -> Pos2 {
+    pos2(rect.max.x - margin, rect.max.y - margin)
 }

@@ -95,6 +95,12 @@ const LEAST_MEASURED: f64 = 1e-3;
 /// Most instants recorded of one long step.
 const MOST_RECORDED: f64 = 64.0;
 
+/// What the interface says of a scene.
+fn sentences(scene: &Scene) -> Vec<String> {
+    let warnings = scene.warnings().into_iter();
+    warnings.map(|warning| warning.to_string()).collect()
+}
+
 impl Player {
     /// Starts `scene` at t = 0, paused.
     ///
@@ -110,7 +116,7 @@ impl Player {
             pacer: Pacer::default(),
             clock: wall,
             original,
-            warnings: scene.warnings(),
+            warnings: sentences(scene),
             playing: false,
             stopped: None,
             frame: Frame::default(),
@@ -451,7 +457,7 @@ impl Player {
     }
 
     fn after_change(&mut self) {
-        self.warnings = self.wanted().warnings();
+        self.warnings = sentences(self.wanted());
         self.past.clear();
         self.watch
             .begin(self.simulation.running_scene(), self.simulation.time());

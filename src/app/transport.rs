@@ -226,8 +226,8 @@ pub fn banner(ui: &mut Ui, player: &Player) -> Option<Asked> {
                         .strong()
                         .color(colour),
                 );
-                ui.label(&stopped.what);
-                ui.label(&stopped.advice);
+                ui.label(stopped.fault.to_string());
+                ui.label(stopped.advice.to_string());
                 if ui.button("Reset the run").clicked() {
                     asked = Some(Asked::Reset);
                 }

@@ -83,10 +83,7 @@ fn is_about_the_way(key: &str) -> bool {
 
 /// Method with its tolerance, or its fixed step.
 pub fn solver(scene: &Scene) -> String {
-    let method = match scene.get("solver.method") {
-        Ok(Value::Choice(word)) => word,
-        _ => "",
-    };
+    let method = scene.solver.method;
     if scene.solver.method.is_adaptive() {
         format!("{method} {}", power_of_ten(scene.solver.tolerance))
     } else {

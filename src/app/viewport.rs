@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use eframe::egui::{
     self, Checkbox, PointerButton, Pos2, Rect, RectAlign, RichText, Role, Sense, Slider, Tooltip,
-    Ui, WidgetInfo, pos2, vec2,
+    Ui, WidgetInfo, vec2,
 };
 use glam::{Vec2, Vec3};
 
@@ -606,9 +606,4 @@ fn describe(ui: &mut Ui, player: &Player, picked: Picked) {
         Picked::Fixed(_) => {}
     }
     ui.label(RichText::new("Double-click to follow").small().weak());
-}
-
-/// Lower right corner, `margin` points away from both edges.
-pub(super) fn lower_right(rect: Rect, margin: f32) -> Pos2 {
-    pos2(rect.max.x - margin, rect.max.y - margin)
 }

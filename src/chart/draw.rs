@@ -1,10 +1,11 @@
 //! From a description to SVG, by `plotters`.
 
-use plotters::coord::Shift;
-use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
 use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
+use plotters::style::text_anchor::{HPos, VPos};
 
+use super::ink::{
+    Canvas, FAINT, FINE, INK, Plot, SheetError, TEXT, failed, fine, rgb, style, write,
+};
 use super::labels::{Area, arrange};
 use super::ticks::Ruler;
 use super::{Chart, Colour, Marker, Series};
@@ -26,17 +27,10 @@ pub struct Sheet {
     pub note: String,
 }
 
-/// Why there is no picture.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("cannot draw the chart: {0}")]
-pub struct SheetError(pub(super) String);
-
-/// The drawing library counts in whole numbers: so many of them are a pixel.
-pub(super) const FINE: u32 = 4;
 /// Sizes of text, pixels.
 const TITLE: f64 = 16.0;
 const HEADING: f64 = 14.0;
-pub(super) const TEXT: f64 = 12.0;
+
 /// Height of a row of the legend, length of its sample, gap between entries, pixels.
 const ROW: f64 = 20.0;
 const SAMPLE: f64 = 26.0;
@@ -47,61 +41,8 @@ const LINE: f64 = 1.6;
 /// Width of a letter over the size of the text, on average, generously.
 const LETTER: f64 = 0.51;
 
-pub(super) const INK: Colour = (30, 30, 30);
-pub(super) const FAINT: Colour = (110, 110, 110);
 const GRID: Colour = (214, 214, 214);
 const FINE_GRID: Colour = (238, 238, 238);
-
-pub(super) type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-pub(super) type Plot<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<Ruler, Ruler>>;
-
-impl Ranged for Ruler {
-    type FormatOption = DefaultFormatting;
-    type ValueType = f64;
-
-    fn map(&self, place: &f64, (first, last): (i32, i32)) -> i32 {
-        let theta = (place - self.from) / (self.to - self.from);
-        first + (f64::from(last - first) * theta).round() as i32
-    }
-
-    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
-        if hint.weight().allow_light_points() {
-            self.minor.clone()
-        } else {
-            self.ticks.clone()
-        }
-    }
-
-    fn range(&self) -> std::ops::Range<f64> {
-        self.from..self.to
-    }
-}
-
-pub(super) fn fine(pixels: f64) -> i32 {
-    (pixels * f64::from(FINE)).round() as i32
-}
-
-pub(super) fn rgb((r, g, b): Colour) -> RGBColor {
-    RGBColor(r, g, b)
-}
-
-pub(super) fn failed(error: impl std::fmt::Display) -> SheetError {
-    SheetError(error.to_string())
-}
-
-pub(super) fn style(
-    size: f64,
-    colour: Colour,
-    horizontal: HPos,
-    vertical: VPos,
-) -> TextStyle<'static> {
-    // The library takes the height of a line; the size of the letters is that over 1.24.
-    TextStyle {
-        font: ("sans-serif", 1.24 * size * f64::from(FINE)).into_font(),
-        color: rgb(colour).to_backend_color(),
-        pos: Pos::new(horizontal, vertical),
-    }
-}
 
 impl Sheet {
     /// The picture as SVG; the same description gives the same bytes.
@@ -195,17 +136,6 @@ fn text_width(text: &str, size: f64) -> f64 {
 
 fn entry_width(series: &Series) -> f64 {
     SAMPLE + 6.0 + text_width(&series.label, TEXT) + GAP
-}
-
-pub(super) fn write(
-    root: &Canvas,
-    text: &str,
-    (x, y): (f64, f64),
-    style: &TextStyle,
-) -> Result<(), SheetError> {
-    let at = (fine(x), fine(y));
-    root.draw(&Text::new(text.to_owned(), at, style.clone()))
-        .map_err(failed)
 }
 
 fn draw_legend(root: &Canvas, row: &[&Series], width: f64, y: f64) -> Result<(), SheetError> {

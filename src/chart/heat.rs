@@ -2,7 +2,7 @@
 
 use plotters::prelude::*;
 
-use super::draw::{
+use super::ink::{
     Canvas, FAINT, FINE, INK, Plot, SheetError, TEXT, failed, fine, rgb, style, write,
 };
 use super::ticks::Ruler;

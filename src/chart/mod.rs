@@ -4,12 +4,14 @@
 
 mod draw;
 mod heat;
+mod ink;
 mod labels;
 mod png;
 mod thin;
 mod ticks;
 
-pub use draw::{Sheet, SheetError};
+pub use draw::Sheet;
+pub use ink::SheetError;
 
 /// A colour, red, green, blue.
 pub type Colour = (u8, u8, u8);

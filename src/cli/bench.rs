@@ -14,8 +14,8 @@ use crate::scene::Scene;
 /// Bad changes, Ctrl-C.
 pub fn bench(arguments: &BenchArguments) -> Result<(), Failure> {
     let scene = Scene::load(DEFAULT_SCENE, &arguments.changes)?;
-    let rows = measuring::measure(arguments.quiet, Some(&scene), |outside| {
-        reach(&scene, outside)
+    let rows = measuring::measure(arguments.quiet, Some(&scene), |context| {
+        reach(&scene, context)
     })?;
     print(&text(&rows))
 }

@@ -6,11 +6,11 @@ use super::args::SceneArguments;
 use super::assembly::Start;
 use super::output::significant;
 use super::summary::count;
-use super::{Failure, load, print, provenance, start};
+use super::{Failure, load, print, start};
 use crate::contact::FrictionLaw;
 use crate::integrate::Method;
 use crate::mechanism::Summary;
-use crate::scene::{BallJoint, Formulation, JointKind, Scene, Value};
+use crate::scene::{BallJoint, Formulation, JointKind, Scene};
 use crate::simulate::{Frame, LARGEST_IMPLICIT, Simulation};
 
 /// Does what `check` asks.
@@ -87,21 +87,18 @@ fn report(
         "Equations",
         &format!(
             "{} formulation: {} velocity coordinates, {} constraint rows",
-            provenance::choice(scene, "formulation")?,
-            contents.velocity_coordinates,
-            contents.constraint_rows
+            scene.formulation, contents.velocity_coordinates, contents.constraint_rows
         ),
     );
-    line("Method", &method(scene, contents)?);
+    line("Method", &method(scene, contents));
     let (computed, left_out) = work(scene, contents);
     computed.iter().for_each(|item| line("Computed", item));
     left_out.iter().for_each(|item| line("Not computed", item));
-    scene
-        .warnings()
-        .iter()
-        .chain(&near_singular(scene))
-        .chain(&begun.warnings)
-        .for_each(|warning| line("Warning", warning));
+    let warnings = scene.warnings().into_iter().map(|w| w.to_string());
+    warnings
+        .chain(near_singular(scene).map(|near| near.to_string()))
+        .chain(begun.warnings.iter().cloned())
+        .for_each(|warning| line("Warning", &warning));
     Ok(out)
 }
 
@@ -151,24 +148,18 @@ fn ball_joint(joint: &BallJoint, force: f64, unique: bool) -> String {
             if unique { "" } else { " (not unique)" }
         );
     }
-    // Not by the joint's key: finding it among thousands each time would take their square.
-    let word = |part: &str| match joint.value(part) {
-        Some(Value::Choice(word)) => word,
-        _ => "-",
-    };
-    let friction = match word("friction_law") {
-        "none" => "no friction".to_owned(),
+    let friction = match contact.friction_law {
+        FrictionLaw::None => "no friction".to_owned(),
         law => format!(
             "friction {} ({law}, {})",
-            contact.friction,
-            word("friction_velocity")
+            contact.friction, contact.friction_velocity
         ),
     };
     format!(
         "clearance {} mm, ball radius {} mm, {}, restitution {}, {friction}",
         significant(contact.clearance * 1e3, 6),
         significant(contact.ball_radius * 1e3, 6),
-        word("normal_law"),
+        contact.normal_law,
         contact.restitution,
     )
 }
@@ -203,13 +194,13 @@ fn rows(contents: &Summary) -> String {
     }
 }
 
-fn method(scene: &Scene, contents: &Summary) -> Result<String, Failure> {
-    let word = provenance::choice(scene, "solver.method")?;
+fn method(scene: &Scene, contents: &Summary) -> String {
+    let method = scene.solver.method;
     let step = significant(scene.solver.step * 1e6, 6);
-    let explicit = scene.solver.method == Method::Automatic
+    let explicit = method == Method::Automatic
         && contents.solves_differential_equation
         && contents.velocity_coordinates > LARGEST_IMPLICIT;
-    Ok(if scene.solver.method.is_adaptive() {
+    if method.is_adaptive() {
         let alone = if explicit {
             format!(
                 "; explicit steps alone: the implicit ones take at most {LARGEST_IMPLICIT} velocity coordinates"
@@ -218,12 +209,12 @@ fn method(scene: &Scene, contents: &Summary) -> Result<String, Failure> {
             String::new()
         };
         format!(
-            "{word}, relative tolerance {}, first step {step} us{alone}",
+            "{method}, relative tolerance {}, first step {step} us{alone}",
             significant(scene.solver.tolerance, 3)
         )
     } else {
-        format!("{word}, step {step} us")
-    })
+        format!("{method}, step {step} us")
+    }
 }
 
 /// What the run will compute, and what it has no need to.
@@ -310,8 +301,33 @@ const SLOW: f64 = 0.5;
 /// Reactions above this many times the weight of all bodies mean that the mechanism is about to lose its stiffness.
 const MOST_WEIGHTS: f64 = 5.0;
 
+/// That a mechanism comes near a singular pose.
+pub(super) enum NearSingular {
+    /// It cannot pass it, s.
+    Stuck(f64),
+    /// It has this largest reaction (N) at this instant (s).
+    Loaded(f64, f64),
+}
+
+impl std::fmt::Display for NearSingular {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Stuck(time) => write!(
+                f,
+                "the ideal mechanism has a singular pose near t = {time:.3} s"
+            ),
+            Self::Loaded(largest, when) => write!(
+                f,
+                "the mechanism comes near a singular pose: with ideal joints and a slow drive a reaction reaches {} N at \
+                 t = {when:.3} s, more than {MOST_WEIGHTS} times the weight of all bodies",
+                significant(*largest, 4)
+            ),
+        }
+    }
+}
+
 /// Rods that reach do not make a good mechanism yet: near a singular pose the reactions of the ideal joints explode.
-pub(super) fn near_singular(scene: &Scene) -> Option<String> {
+pub(super) fn near_singular(scene: &Scene) -> Option<NearSingular> {
     let mut rigid = scene.clone();
     rigid.formulation = Formulation::Tree;
     let drive = rigid.spcmm.as_mut()?;
@@ -334,10 +350,7 @@ pub(super) fn near_singular(scene: &Scene) -> Option<String> {
     for k in 0..=instants {
         let time = period * f64::from(k) / f64::from(INSTANTS);
         if simulation.advance_to(time).is_err() {
-            let time = simulation.time();
-            return Some(format!(
-                "the ideal mechanism has a singular pose near t = {time:.3} s"
-            ));
+            return Some(NearSingular::Stuck(simulation.time()));
         }
         simulation.sample(time, &mut frame);
         for joint in &frame.joints {
@@ -346,11 +359,5 @@ pub(super) fn near_singular(scene: &Scene) -> Option<String> {
             }
         }
     }
-    (largest > limit).then(|| {
-        format!(
-            "the mechanism comes near a singular pose: with ideal joints and a slow drive a reaction reaches {} N at \
-             t = {when:.3} s, more than {MOST_WEIGHTS} times the weight of all bodies",
-            significant(largest, 4)
-        )
-    })
+    (largest > limit).then_some(NearSingular::Loaded(largest, when))
 }

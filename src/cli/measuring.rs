@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use super::{Failure, interrupt, progress};
-use crate::analysis::{AnalysisError, Outside};
+use crate::analysis::{AnalysisError, RunContext};
 use crate::scene::Scene;
 
 /// Parts of the progress bar.
@@ -16,7 +16,7 @@ const PARTS: f64 = 1000.0;
 pub fn measure<T>(
     quiet: bool,
     scene: Option<&Scene>,
-    analysis: impl FnOnce(&mut Outside) -> Result<T, AnalysisError>,
+    analysis: impl FnOnce(&mut RunContext) -> Result<T, AnalysisError>,
 ) -> Result<T, Failure> {
     interrupt::listen();
     let bar = progress::bar(!quiet, PARTS as u64);
@@ -29,7 +29,7 @@ pub fn measure<T>(
             ControlFlow::Continue(())
         }
     };
-    let result = analysis(&mut Outside::new(&mut clock, &mut progress));
+    let result = analysis(&mut RunContext::new(&mut clock, &mut progress));
     bar.finish_and_clear();
     result.map_err(|error| match (error, scene) {
         (AnalysisError::Cancelled, _) => Failure::new(

@@ -4,13 +4,10 @@ use serde_json::{Map, Value as Json, json};
 
 use super::Failure;
 use crate::files::PROGRAM;
-use crate::scene::{Scene, Value};
+use crate::scene::Scene;
 
 /// The common part of every output's `meta`.
-///
-/// # Errors
-/// Usage: a scene without the keys that every scene has.
-pub fn meta(scene: &Scene) -> Result<Map<String, Json>, Failure> {
+pub fn meta(scene: &Scene) -> Map<String, Json> {
     let mut meta = Map::new();
     meta.insert("program".into(), json!(PROGRAM));
     meta.insert("version".into(), json!(crate::VERSION));
@@ -23,30 +20,19 @@ pub fn meta(scene: &Scene) -> Result<Map<String, Json>, Failure> {
         .map(|(key, value)| (key.clone(), json!(value)))
         .collect();
     meta.insert("changed_parameters".into(), Json::Object(changed));
-    meta.insert("formulation".into(), json!(choice(scene, "formulation")?));
-    meta.insert("method".into(), json!(choice(scene, "solver.method")?));
+    meta.insert("formulation".into(), json!(scene.formulation));
+    meta.insert("method".into(), json!(scene.solver.method));
     meta.insert("step_s".into(), json!(scene.solver.step));
     if scene.solver.method.is_adaptive() {
         meta.insert("tolerance".into(), json!(scene.solver.tolerance));
     }
-    Ok(meta)
-}
-
-/// The word that `key` has in `scene`.
-///
-/// # Errors
-/// A key that the scene has not.
-pub fn choice(scene: &Scene, key: &str) -> Result<&'static str, Failure> {
-    match scene.get(key)? {
-        Value::Choice(word) => Ok(word),
-        Value::Number(_) | Value::Count(_) | Value::Unset => Ok("-"),
-    }
+    meta
 }
 
 /// Every parameter of `scene` with its value as a user would write it.
 ///
 /// # Errors
-/// As [`meta`].
+/// None in a scene that was read.
 #[cfg(feature = "gui")]
 pub fn parameters(scene: &Scene) -> Result<Json, Failure> {
     let mut all = Map::new();

@@ -108,9 +108,10 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         if times.is_some_and(|times| !times.reach_the_end()) {
             warn("the duration is no whole number of intervals: the last row lies before the end");
         }
-        let warnings = scene.warnings();
-        let all = warnings.iter().chain(&begun.warnings);
-        all.for_each(|warning| warn(warning));
+        let warnings = scene.warnings().into_iter().map(|w| w.to_string());
+        warnings
+            .chain(begun.warnings.iter().cloned())
+            .for_each(|warning| warn(&warning));
     }
 
     interrupt::listen();
@@ -137,8 +138,8 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let wall = stopwatch.as_secs_f64();
 
     let found = impacts.as_ref().map(ImpactsFile::impacts);
-    let mut facts = summary::json(&simulation, end.status, wall, found)?;
-    let mut text = summary::text(&simulation, end.status, wall, found)?;
+    let mut facts = summary::json(&simulation, end.status, wall, found);
+    let mut text = summary::text(&simulation, end.status, wall, found);
     begun.describe(&mut facts, &mut text);
     let fault = simulation.probe_fault();
     if let Some(fault) = &fault {
@@ -148,7 +149,10 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
             &format!("the ideal mechanism {fault}"),
         );
     }
-    facts.insert("probe_fault".into(), json!(fault));
+    facts.insert(
+        "probe_fault".into(),
+        json!(fault.map(|fault| fault.to_string())),
+    );
     facts.insert("rows".into(), json!(table.len()));
     let mut meta = facts.clone();
     // Files of the same run are the same, byte for byte: the machine's speed stays out of them.

@@ -7,7 +7,7 @@ use serde_json::{Map, Value as Json, json};
 
 use super::impacts::Restitution;
 use super::output::significant;
-use super::{Failure, provenance};
+use super::provenance;
 use crate::scene::{Preset, Scene};
 use crate::simulate::{Impact, Ledger, Simulation};
 
@@ -34,15 +34,12 @@ impl Status {
 }
 
 /// The summary as JSON: what made the run, then what it did; `impacts` where all of them were collected.
-///
-/// # Errors
-/// As [`provenance::meta`].
 pub fn json(
     simulation: &Simulation,
     status: Status,
     wall: f64,
     impacts: Option<&[Impact]>,
-) -> Result<Map<String, Json>, Failure> {
+) -> Map<String, Json> {
     let scene = simulation.scene();
     let statistics = simulation.statistics();
     let time = simulation.time();
@@ -54,7 +51,7 @@ pub fn json(
                 .collect(),
         )
     };
-    let mut summary = provenance::meta(scene)?;
+    let mut summary = provenance::meta(scene);
     let own = json!({
         "status": status.word(),
         "time_s": time,
@@ -82,7 +79,7 @@ pub fn json(
         let entry = |i: usize| Restitution::of(impacts, i).json();
         summary.insert("restitution".into(), by_joint(&entry));
     }
-    Ok(summary)
+    summary
 }
 
 /// The ledger as JSON, J; `relative_residual` is the residual over the energy exchanged.
@@ -95,6 +92,8 @@ fn energy(ledger: &Ledger) -> Json {
         "restitution_loss": ledger.restitution_loss,
         "friction_loss": ledger.friction_loss,
         "clearance_work": ledger.clearance_work,
+        "damping_loss": ledger.damping_loss,
+        "external_work": ledger.external_work,
         "change_work": ledger.change_work,
         "exchanged": ledger.exchanged,
         "residual": ledger.residual(),
@@ -103,15 +102,12 @@ fn energy(ledger: &Ledger) -> Json {
 }
 
 /// The summary as text; `impacts` where all of them were collected.
-///
-/// # Errors
-/// As [`provenance::meta`].
 pub fn text(
     simulation: &Simulation,
     status: Status,
     wall: f64,
     impacts: Option<&[Impact]>,
-) -> Result<String, Failure> {
+) -> String {
     let scene = simulation.scene();
     let statistics = simulation.statistics();
     let time = simulation.time();
@@ -126,8 +122,8 @@ pub fn text(
     }
     line("Status", status.word().to_owned());
     line("Simulated time", format!("{} s", significant(time, 9)));
-    let method = provenance::choice(scene, "solver.method")?;
-    let formulation = provenance::choice(scene, "formulation")?;
+    let method = scene.solver.method;
+    let formulation = scene.formulation;
     line("Method", format!("{method}, {formulation} formulation"));
     line(
         "Steps",
@@ -182,6 +178,11 @@ pub fn text(
                 joules(ledger.friction_loss)
             ),
         );
+        if !scene.elements.is_empty() {
+            let (given, lost) = (joules(ledger.external_work), joules(ledger.damping_loss));
+            let story = format!("loads from outside {given} J, lost in dampers {lost} J");
+            line("  elements", story);
+        }
         line(
             "  residual",
             format!(
@@ -205,7 +206,7 @@ pub fn text(
     line("Wall time", speed);
     line("State hash", hash_text(simulation.state_hash()));
     line("Version", format!("jointplay {}", crate::VERSION));
-    Ok(out)
+    out
 }
 
 /// Adds a line to a summary.
@@ -256,9 +257,9 @@ mod tests {
             let mut simulation = Simulation::new(&scene).unwrap();
             simulation.advance_to(1e-3).unwrap();
             for (wall, said) in [(1.0, slow), (1e-9, false)] {
-                let text = text(&simulation, Status::Done, wall, None).unwrap();
+                let text = text(&simulation, Status::Done, wall, None);
                 assert_eq!(text.contains("slower than"), said, "{text}");
-                let facts = json(&simulation, Status::Done, wall, None).unwrap();
+                let facts = json(&simulation, Status::Done, wall, None);
                 assert_eq!(facts["slower_than_asked"], said);
             }
         }

@@ -8,10 +8,10 @@ use super::Coefficients;
 
 /// Piece of that rule that is in force.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Pace {
+pub enum ApproachPiece {
     /// The rule as it stands: for the approach speed at the start, and for steppers that locate no corners.
     #[default]
-    Whole,
+    Unsplit,
     /// The rate is below the largest so far, which the term divides by.
     Held,
     /// The rate is the largest so far: the term is chi.
@@ -22,31 +22,31 @@ impl Coefficients {
     /// What the damping term divides by, m/s, for a contact whose memory holds `remembered` (m/s) and whose penetration grows
     /// at `rate` (m/s).
     #[inline]
-    pub fn approach(&self, pace: Pace, remembered: f64, rate: f64) -> f64 {
+    pub fn approach(&self, pace: ApproachPiece, remembered: f64, rate: f64) -> f64 {
         match pace {
-            Pace::Whole if self.largest => remembered.max(rate),
-            Pace::Whole | Pace::Held => remembered,
-            Pace::Rising => rate.max(self.speed_floor),
+            ApproachPiece::Unsplit if self.largest => remembered.max(rate),
+            ApproachPiece::Unsplit | ApproachPiece::Held => remembered,
+            ApproachPiece::Rising => rate.max(self.speed_floor),
         }
     }
 
     /// Whether that is the rate itself, so that the damping term does not answer to it.
-    pub fn approach_follows(&self, pace: Pace, remembered: f64, rate: f64) -> bool {
+    pub fn approach_follows(&self, pace: ApproachPiece, remembered: f64, rate: f64) -> bool {
         match pace {
-            Pace::Whole => self.largest && rate > remembered,
-            Pace::Held => false,
-            Pace::Rising => rate > self.speed_floor,
+            ApproachPiece::Unsplit => self.largest && rate > remembered,
+            ApproachPiece::Held => false,
+            ApproachPiece::Rising => rate > self.speed_floor,
         }
     }
 
     /// The piece on which a contact is whose memory holds `remembered`.
-    pub fn pace_at(&self, remembered: f64, rate: f64) -> Pace {
+    pub fn pace_at(&self, remembered: f64, rate: f64) -> ApproachPiece {
         if !self.largest {
-            Pace::Whole
+            ApproachPiece::Unsplit
         } else if rate >= remembered {
-            Pace::Rising
+            ApproachPiece::Rising
         } else {
-            Pace::Held
+            ApproachPiece::Held
         }
     }
 }
@@ -65,7 +65,7 @@ mod tests {
         let c = Coefficients::new(&parameters, 3e-4);
         let remembered = 0.05;
         for rate in [-0.2, 0.0, 0.01, 0.05, 0.0501, 0.4] {
-            let whole = c.approach(Pace::Whole, remembered, rate);
+            let whole = c.approach(ApproachPiece::Unsplit, remembered, rate);
             let piece = c.pace_at(remembered, rate);
             assert_eq!(c.approach(piece, remembered, rate), whole, "{rate}");
             assert!(c.damping * rate / whole <= c.damping * (1.0 + 1e-15));
@@ -74,7 +74,10 @@ mod tests {
             assert!(force <= elastic * (1.0 + c.damping) * (1.0 + 1e-12));
         }
         let start = Coefficients::new(&Parameters::default(), 3e-4);
-        assert_eq!(start.pace_at(remembered, 0.4), Pace::Whole);
-        assert_eq!(start.approach(Pace::Whole, remembered, 0.4), remembered);
+        assert_eq!(start.pace_at(remembered, 0.4), ApproachPiece::Unsplit);
+        assert_eq!(
+            start.approach(ApproachPiece::Unsplit, remembered, 0.4),
+            remembered
+        );
     }
 }

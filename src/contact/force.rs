@@ -1,7 +1,7 @@
 //! Where the laws meet the geometry: the force between a ball and the wall of its socket, and how it answers to
 //! displacement and velocity. Everything that needs a contact force or its derivatives reads it here.
 
-use super::{Coefficients, FrictionVelocity, Mat3, Memory, Slip, Vec3};
+use super::{Coefficients, FrictionPiece, FrictionVelocity, Mat3, Memory, Vec3};
 
 /// Where a ball is in its socket, and how fast it moves there.
 #[derive(Clone, Copy, Debug)]
@@ -49,6 +49,19 @@ pub struct Stiffness {
     pub by_clearance: Vec3,
     /// dn/de, 1/m.
     pub normal: Mat3,
+}
+
+impl Stiffness {
+    /// Of a force that acts between two points, whatever makes it.
+    pub fn between_points(by_displacement: Mat3, by_rate: Mat3) -> Self {
+        Self {
+            by_displacement,
+            by_rate,
+            by_slip: Mat3::zeros(),
+            by_clearance: Vec3::zeros(),
+            normal: Mat3::zeros(),
+        }
+    }
 }
 
 impl Coefficients {
@@ -131,7 +144,7 @@ impl Coefficients {
         if force.normal > 0.0 && self.friction > 0.0 {
             let sliding = self.sliding(gap, &read());
             force.slip_speed = sliding.norm();
-            let per_speed = self.friction_per_speed(memory.slip, force.slip_speed);
+            let per_speed = self.friction_per_speed(memory.friction_piece, force.slip_speed);
             if per_speed != 0.0 {
                 force.friction = sliding * (-per_speed * force.normal);
             }
@@ -172,13 +185,13 @@ impl Coefficients {
         let mut by_clearance = Vec3::zeros();
         if self.friction > 0.0 {
             let speed = force.slip_speed;
-            let per_speed = self.friction_per_speed(memory.slip, speed);
+            let per_speed = self.friction_per_speed(memory.friction_piece, speed);
             let sliding = self.sliding(gap, read);
             along -= sliding * per_speed;
             // dF/dv_t
             let mut resistance = Mat3::identity() * (-per_speed * force.normal);
             if speed > 0.0 && !(slope == Slope::Secant && speed >= self.slip_high) {
-                let slope = self.friction_per_speed_slope(memory.slip, speed) / speed;
+                let slope = self.friction_per_speed_slope(memory.friction_piece, speed) / speed;
                 resistance -= sliding * sliding.transpose() * (slope * force.normal);
             }
             // v_t = s (1 - n n') w, and the tangent plane turns with n: dv_t = -s ((n . w) dn + n (w . dn)).
@@ -211,8 +224,8 @@ impl Coefficients {
         memory.may_turn(gap.rate)
             || (force.normal > 0.0
                 && self.friction > 0.0
-                && memory.slip != Slip::Whole
-                && self.beyond(memory.slip, force.slip_speed) > 0.0)
+                && memory.friction_piece != FrictionPiece::Unsplit
+                && self.beyond(memory.friction_piece, force.slip_speed) > 0.0)
     }
 
     /// Energy stored by the elastic part, 2/5 K delta^2.5, J.
@@ -247,7 +260,7 @@ impl Coefficients {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::{Pace, Parameters};
+    use crate::contact::{ApproachPiece, Parameters};
 
     const VELOCITIES: [FrictionVelocity; 3] = [
         FrictionVelocity::Centres,
@@ -268,12 +281,12 @@ mod tests {
         (c, n * (3e-4 + 2e-6), n * 5e-3 + t * speed)
     }
 
-    fn memory(slip: Slip, pace: Pace) -> Memory {
+    fn memory(slip: FrictionPiece, pace: ApproachPiece) -> Memory {
         Memory {
             active: true,
             approach_speed: 4e-3,
-            slip,
-            pace,
+            friction_piece: slip,
+            approach_piece: pace,
             ..Memory::default()
         }
     }
@@ -292,8 +305,12 @@ mod tests {
     #[test]
     fn derivatives_are_those_of_central_differences() {
         for friction_velocity in VELOCITIES {
-            for (slip, speed) in [(Slip::Ramp, 3e-5), (Slip::Full, 0.04), (Slip::Whole, 0.04)] {
-                for pace in [Pace::Held, Pace::Rising] {
+            for (slip, speed) in [
+                (FrictionPiece::Ramp, 3e-5),
+                (FrictionPiece::Full, 0.04),
+                (FrictionPiece::Unsplit, 0.04),
+            ] {
+                for pace in [ApproachPiece::Held, ApproachPiece::Rising] {
                     // With the printed velocity so little counts that it takes more to get there.
                     let speed = match friction_velocity {
                         FrictionVelocity::Printed => speed * 150.0,
@@ -351,7 +368,11 @@ mod tests {
         let ends = c.slip_low * at.distance / at.penetration;
         for (part, sticks) in [(0.999, true), (1.001, false)] {
             let slow = tangential.normalize() * (part * ends);
-            let force = c.force(&memory(Slip::Whole, Pace::Whole), &at, || slow);
+            let force = c.force(
+                &memory(FrictionPiece::Unsplit, ApproachPiece::Unsplit),
+                &at,
+                || slow,
+            );
             assert_eq!(force.friction == Vec3::zeros(), sticks, "{part}");
         }
     }
@@ -359,7 +380,7 @@ mod tests {
     #[test]
     fn the_secant_of_full_friction_cannot_reverse_sliding() {
         let (c, e, v) = pressed(FrictionVelocity::Centres, 0.04);
-        let memory = memory(Slip::Whole, Pace::Whole);
+        let memory = memory(FrictionPiece::Unsplit, ApproachPiece::Unsplit);
         let at = c.separation(&e, &v);
         let force = c.force(&memory, &at, || v);
         let s = c.linearise(&memory, &at, &v, &v, &force, Slope::Secant);

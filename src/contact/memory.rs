@@ -1,6 +1,6 @@
 //! What a contact remembers between steps: part of the state.
 
-use super::{Coefficients, Pace, Slip};
+use super::{ApproachPiece, Coefficients, FrictionPiece};
 
 /// Contact memory of one joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -13,9 +13,9 @@ pub struct Memory {
     /// The floor was used: this contact rebounds higher than asked.
     pub floored: bool,
     /// Piece of the friction law in force.
-    pub slip: Slip,
+    pub friction_piece: FrictionPiece,
     /// Piece of the rule for the approach speed in force.
-    pub pace: Pace,
+    pub approach_piece: ApproachPiece,
 }
 
 impl Memory {
@@ -34,7 +34,7 @@ impl Memory {
     #[inline]
     pub fn approach(&self, c: &Coefficients, rate: f64) -> f64 {
         if self.active {
-            c.approach(self.pace, self.approach_speed, rate)
+            c.approach(self.approach_piece, self.approach_speed, rate)
         } else {
             rate.max(c.speed_floor)
         }
@@ -42,16 +42,16 @@ impl Memory {
 
     /// Whether that is the rate itself, so that the damping term does not answer to it.
     pub(super) fn follows(&self, c: &Coefficients, rate: f64) -> bool {
-        self.active && c.approach_follows(self.pace, self.approach_speed, rate)
+        self.active && c.approach_follows(self.approach_piece, self.approach_speed, rate)
     }
 
     /// Whether the rate may pass from one piece of the rule to the next. A rising one may pass its largest value in any step.
     #[inline]
     pub(super) fn may_turn(&self, rate: f64) -> bool {
-        match self.pace {
-            Pace::Whole => false,
-            Pace::Held => rate > self.approach_speed,
-            Pace::Rising => true,
+        match self.approach_piece {
+            ApproachPiece::Unsplit => false,
+            ApproachPiece::Held => rate > self.approach_speed,
+            ApproachPiece::Rising => true,
         }
     }
 }

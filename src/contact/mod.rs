@@ -6,14 +6,16 @@ mod law;
 mod memory;
 mod slip;
 
-pub use approach::Pace;
+pub use approach::ApproachPiece;
 pub use force::{Force, Separation, Slope, Stiffness};
 pub use law::{
     Coefficients, damping_factor, hertz_stiffness, impact_duration, restitution_given,
     settled_penetration,
 };
 pub use memory::Memory;
-pub use slip::Slip;
+pub use slip::FrictionPiece;
+
+use crate::words::words;
 
 type Vec3 = nalgebra::Vector3<f64>;
 type Mat3 = nalgebra::Matrix3<f64>;
@@ -33,6 +35,14 @@ pub enum NormalLaw {
     Gonthier,
 }
 
+words!(NormalLaw {
+    LankaraniNikravesh => "lankarani-nikravesh",
+    Hertz => "hertz",
+    HuntCrossley => "hunt-crossley",
+    Flores => "flores",
+    Gonthier => "gonthier",
+});
+
 /// Friction law of a contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrictionLaw {
@@ -41,6 +51,11 @@ pub enum FrictionLaw {
     /// No friction.
     None,
 }
+
+words!(FrictionLaw {
+    ModifiedCoulomb => "modified-coulomb",
+    None => "none",
+});
 
 /// Which sliding velocity the friction law reads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,6 +69,12 @@ pub enum FrictionVelocity {
     Printed,
 }
 
+words!(FrictionVelocity {
+    Centres => "centres",
+    Surface => "surface",
+    Printed => "printed",
+});
+
 /// Which speed the damping term of the normal force divides by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ApproachSpeed {
@@ -62,6 +83,11 @@ pub enum ApproachSpeed {
     /// The largest penetration rate of the contact so far.
     Largest,
 }
+
+words!(ApproachSpeed {
+    Start => "start",
+    Largest => "largest",
+});
 
 /// What a ball joint's contact is made of. SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,12 +7,12 @@ use super::Coefficients;
 
 /// Piece of the friction law (21) that is in force.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Slip {
+pub enum FrictionPiece {
     /// The law as it stands, corners included: for steppers that do not locate them.
     #[default]
-    Whole,
+    Unsplit,
     /// Below v_a: no friction.
-    Creep,
+    DeadBand,
     /// Between v_a and v_theta: friction rises with the speed.
     Ramp,
     /// Above v_theta: full friction.
@@ -21,38 +21,38 @@ pub enum Slip {
 
 impl Coefficients {
     /// The piece that a sliding speed (m/s) lies on.
-    pub fn slip_at(&self, speed: f64) -> Slip {
+    pub fn slip_at(&self, speed: f64) -> FrictionPiece {
         if speed >= self.slip_high {
-            Slip::Full
+            FrictionPiece::Full
         } else if speed > self.slip_low || self.slip_low == 0.0 {
-            Slip::Ramp
+            FrictionPiece::Ramp
         } else {
-            Slip::Creep
+            FrictionPiece::DeadBand
         }
     }
 
     /// How far a sliding speed is beyond the corners of `slip`, m/s: negative inside.
-    pub fn beyond(&self, slip: Slip, speed: f64) -> f64 {
+    pub fn beyond(&self, slip: FrictionPiece, speed: f64) -> f64 {
         match slip {
-            Slip::Whole => f64::NEG_INFINITY,
-            Slip::Creep => speed - self.slip_low,
-            // Without a creep range the ramp is smooth through rest.
-            Slip::Ramp if self.slip_low == 0.0 => speed - self.slip_high,
-            Slip::Ramp => (speed - self.slip_high).max(self.slip_low - speed),
-            Slip::Full => self.slip_high - speed,
+            FrictionPiece::Unsplit => f64::NEG_INFINITY,
+            FrictionPiece::DeadBand => speed - self.slip_low,
+            // Without a dead band the ramp is smooth through rest.
+            FrictionPiece::Ramp if self.slip_low == 0.0 => speed - self.slip_high,
+            FrictionPiece::Ramp => (speed - self.slip_high).max(self.slip_low - speed),
+            FrictionPiece::Full => self.slip_high - speed,
         }
     }
 
     /// Friction force over normal force and sliding velocity, s/m, of a piece continued beyond its corners: twice
     /// continuously differentiable even through rest.
-    pub fn friction_per_speed(&self, slip: Slip, speed: f64) -> f64 {
+    pub fn friction_per_speed(&self, slip: FrictionPiece, speed: f64) -> f64 {
         match slip {
-            Slip::Whole => {
+            FrictionPiece::Unsplit => {
                 let ratio = self.friction_ratio(speed);
                 if ratio > 0.0 { ratio / speed } else { 0.0 }
             }
-            Slip::Creep => 0.0,
-            Slip::Ramp => {
+            FrictionPiece::DeadBand => 0.0,
+            FrictionPiece::Ramp => {
                 let low = self.slip_low;
                 let start = if low > 0.0 {
                     low * inverse(speed, low).0
@@ -61,14 +61,14 @@ impl Coefficients {
                 };
                 self.friction / (self.slip_high - low) * (1.0 - start)
             }
-            Slip::Full => self.friction * inverse(speed, self.slip_high).0,
+            FrictionPiece::Full => self.friction * inverse(speed, self.slip_high).0,
         }
     }
 
     /// Derivative of [`Self::friction_per_speed`] by the sliding speed, s^2/m^2.
-    pub fn friction_per_speed_slope(&self, slip: Slip, speed: f64) -> f64 {
+    pub fn friction_per_speed_slope(&self, slip: FrictionPiece, speed: f64) -> f64 {
         match slip {
-            Slip::Whole => {
+            FrictionPiece::Unsplit => {
                 let (ratio, slope) = (self.friction_ratio(speed), self.friction_slope(speed));
                 if speed > 0.0 {
                     (slope - ratio / speed) / speed
@@ -76,8 +76,8 @@ impl Coefficients {
                     0.0
                 }
             }
-            Slip::Creep => 0.0,
-            Slip::Ramp => {
+            FrictionPiece::DeadBand => 0.0,
+            FrictionPiece::Ramp => {
                 let low = self.slip_low;
                 let start = if low > 0.0 {
                     low * inverse(speed, low).1
@@ -86,7 +86,7 @@ impl Coefficients {
                 };
                 -self.friction / (self.slip_high - low) * start
             }
-            Slip::Full => self.friction * inverse(speed, self.slip_high).1,
+            FrictionPiece::Full => self.friction * inverse(speed, self.slip_high).1,
         }
     }
 }
@@ -126,8 +126,8 @@ mod tests {
             assert!(c.beyond(slip, speed) <= 0.0, "{speed}");
         }
         for (below, above, corner) in [
-            (Slip::Creep, Slip::Ramp, c.slip_low),
-            (Slip::Ramp, Slip::Full, c.slip_high),
+            (FrictionPiece::DeadBand, FrictionPiece::Ramp, c.slip_low),
+            (FrictionPiece::Ramp, FrictionPiece::Full, c.slip_high),
         ] {
             let force = |slip| c.friction_per_speed(slip, corner) * corner;
             assert!((force(below) - force(above)).abs() < 1e-15);
@@ -138,7 +138,7 @@ mod tests {
     #[test]
     fn continued_pieces_are_smooth_and_their_slopes_are_right() {
         let c = coefficients();
-        for slip in [Slip::Ramp, Slip::Full] {
+        for slip in [FrictionPiece::Ramp, FrictionPiece::Full] {
             for n in 1..400 {
                 let speed = f64::from(n) * 0.5e-6;
                 let d = 1e-4 * speed;
@@ -155,13 +155,13 @@ mod tests {
     }
 
     #[test]
-    fn no_creep_range_leaves_a_ramp_that_is_smooth_through_rest() {
+    fn no_dead_band_leaves_a_ramp_that_is_smooth_through_rest() {
         let c = Coefficients {
             slip_low: 0.0,
             ..coefficients()
         };
-        assert_eq!(c.slip_at(0.0), Slip::Ramp);
-        assert!(c.beyond(Slip::Ramp, 0.0) < 0.0);
-        assert!(c.friction_per_speed(Slip::Ramp, 0.0).is_finite());
+        assert_eq!(c.slip_at(0.0), FrictionPiece::Ramp);
+        assert!(c.beyond(FrictionPiece::Ramp, 0.0) < 0.0);
+        assert!(c.friction_per_speed(FrictionPiece::Ramp, 0.0).is_finite());
     }
 }

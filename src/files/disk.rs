@@ -5,31 +5,9 @@ use std::fs::{self, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
+use super::call::Call;
 #[cfg(test)]
 pub use super::faults::Gate;
-
-/// Kinds of calls.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Call {
-    /// Makes or opens a file for writing.
-    Open,
-    /// Makes a folder.
-    Folder,
-    /// Takes a lock.
-    Lock,
-    /// Writes bytes.
-    Write,
-    /// Changes the length of a file.
-    Truncate,
-    /// Waits until bytes are on the disk.
-    Sync,
-    /// Gives another name.
-    Rename,
-    /// Swaps two names.
-    Exchange,
-    /// Takes a file or an empty folder away.
-    Remove,
-}
 
 /// Lets everything through; tests have another.
 #[cfg(not(test))]

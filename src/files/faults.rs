@@ -6,7 +6,7 @@ use std::io;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
-use super::disk::Call;
+use super::call::Call;
 
 /// What is to go wrong.
 #[derive(Clone, Copy, Debug)]

@@ -1,6 +1,7 @@
 //! Files and folders that appear whole or not at all: written beside their final name, then renamed. What a killed run leaves
 //! beside them is taken away by the next.
 
+mod call;
 mod disk;
 #[cfg(test)]
 pub mod faults;
@@ -12,7 +13,8 @@ mod target;
 #[cfg(test)]
 mod tests;
 
-pub use disk::{Call, File};
+pub use call::Call;
+pub use disk::File;
 pub use folder::{Folder, MANIFEST};
 pub use journal::{create_folders, open_or_create, remove_empty_folder, remove_file};
 pub use names::same_file;

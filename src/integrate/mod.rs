@@ -19,6 +19,8 @@ pub use radau::{Polynomial, Radau};
 pub use root::find_root;
 pub use rosenbrock::Rosenbrock;
 
+use crate::words::words;
+
 /// Time-stepping method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
@@ -37,6 +39,16 @@ pub enum Method {
     /// Dormand-Prince while accuracy sets the step, Radau IIA(5) once stability does.
     Automatic,
 }
+
+words!(Method {
+    SemiImplicitEuler => "semi-implicit-euler",
+    ImexEuler => "imex-euler",
+    RungeKutta4 => "rk4",
+    DormandPrince5 => "dopri5",
+    Rosenbrock => "rosenbrock",
+    Radau5 => "radau5",
+    Automatic => "automatic",
+});
 
 impl Method {
     /// Whether every step of it solves with the Jacobian.

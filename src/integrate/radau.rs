@@ -72,7 +72,7 @@ pub struct Radau {
     f: [Vec<f64>; 3],
     stage: Vec<f64>,
     error: Vec<f64>,
-    linearised_at: f64,
+    linearised_at: Option<f64>,
     previous: Polynomial,
     /// Iterations of the latest attempt.
     pub iterations: u32,
@@ -93,7 +93,7 @@ impl Radau {
             f: triple(),
             stage: vec![0.0; dimension],
             error: vec![0.0; dimension],
-            linearised_at: f64::NAN,
+            linearised_at: None,
             previous: Polynomial {
                 h: 0.0,
                 end: 0.0,
@@ -107,7 +107,7 @@ impl Radau {
 
     /// Forgets the Jacobian and the previous step: the state was changed by something else than a step.
     pub fn invalidate(&mut self) {
-        self.linearised_at = f64::NAN;
+        self.linearised_at = None;
         self.previous.h = 0.0;
         self.previous.contraction = 1.0;
     }
@@ -135,9 +135,9 @@ impl Radau {
         tolerance: f64,
     ) -> f64 {
         let n = y.len();
-        if self.linearised_at != t {
+        if self.linearised_at != Some(t) {
             system.linearise(t, y);
-            self.linearised_at = t;
+            self.linearised_at = Some(t);
         }
         system.factor_shifted(REAL / h);
         system.factor_shifted_pair(PAIR.0 / h, PAIR.1 / h);

@@ -92,7 +92,7 @@ pub struct Rosenbrock {
     stage: Vec<f64>,
     rate: Vec<f64>,
     /// Where the Jacobian was taken last; a rejected step keeps it.
-    linearised_at: f64,
+    linearised_at: Option<f64>,
 }
 
 impl Rosenbrock {
@@ -103,13 +103,13 @@ impl Rosenbrock {
             u: std::array::from_fn(|_| vec![0.0; dimension]),
             stage: vec![0.0; dimension],
             rate: vec![0.0; dimension],
-            linearised_at: f64::NAN,
+            linearised_at: None,
         }
     }
 
     /// Forgets the Jacobian: the state was changed by something else than a step.
     pub fn invalidate(&mut self) {
-        self.linearised_at = f64::NAN;
+        self.linearised_at = None;
     }
 
     /// As [`super::Stepper::attempt`].
@@ -124,9 +124,9 @@ impl Rosenbrock {
         k_end: &mut [f64],
     ) -> f64 {
         let n = y.len();
-        if self.linearised_at != t {
+        if self.linearised_at != Some(t) {
             system.linearise(t, y);
-            self.linearised_at = t;
+            self.linearised_at = Some(t);
         }
         system.factor_shifted(1.0 / (GAMMA * h));
         let Self {

@@ -19,6 +19,23 @@ pub const MOST_PRODUCTS: u64 = 1 << 25;
 const OF_AN_ANCESTOR: u64 = 20;
 const OF_A_PAIR: u64 = 25;
 
+/// What a limit was exceeded by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum CostOf {
+    /// The `tree` form.
+    #[error("formulation tree")]
+    Tree,
+    /// The `lagrange` form.
+    #[error("formulation lagrange")]
+    Lagrange,
+    /// Closing the joints at the start.
+    #[error("assembling the start")]
+    Assembly,
+    /// The method that is implicit in the contacts.
+    #[error("solver.method imex-euler")]
+    ImplicitContacts,
+}
+
 /// Upper bounds of what one form of the equations takes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cost {
@@ -156,11 +173,11 @@ impl Cost {
         }
     }
 
-    /// Refuses what is beyond a limit. `form`: what it is the cost of.
+    /// Refuses what is beyond a limit; it is the cost `of` this.
     ///
     /// # Errors
     /// What is needed, and the most that there may be.
-    pub fn check(&self, form: &'static str, advice: &'static str) -> Result<(), MechanismError> {
+    pub fn check(&self, of: CostOf, advice: &'static str) -> Result<(), MechanismError> {
         let (what, needed, most) = if self.entries > MOST_ENTRIES {
             ("numbers in its matrices", self.entries, MOST_ENTRIES)
         } else if self.products > MOST_PRODUCTS {
@@ -173,7 +190,7 @@ impl Cost {
             return Ok(());
         };
         Err(MechanismError::TooCostly {
-            form,
+            of,
             what,
             needed,
             most,
@@ -198,16 +215,16 @@ pub fn check(scene: &Scene, model: &Model) -> Result<(), MechanismError> {
     let advice = "choose fewer bodies and joints, or clearances for ideal ball joints on one body";
     match scene.formulation {
         Formulation::Tree if !tree.fits() && !assembles && lagrange.fits() => {
-            tree.check("formulation tree", "choose formulation = lagrange")
+            tree.check(CostOf::Tree, "choose formulation = lagrange")
         }
         Formulation::Lagrange if !lagrange.fits() && tree.fits() => {
-            lagrange.check("formulation lagrange", "choose formulation = tree")
+            lagrange.check(CostOf::Lagrange, "choose formulation = tree")
         }
-        Formulation::Tree => tree.check("formulation tree", advice),
+        Formulation::Tree => tree.check(CostOf::Tree, advice),
         Formulation::Lagrange => {
-            lagrange.check("formulation lagrange", advice)?;
+            lagrange.check(CostOf::Lagrange, advice)?;
             if assembles {
-                tree.check("assembling the start", advice)?;
+                tree.check(CostOf::Assembly, advice)?;
             }
             Ok(())
         }

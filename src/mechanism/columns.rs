@@ -1,7 +1,7 @@
 //! How each coordinate moves a contact.
 
-use super::kinematics::Kinematics;
-use super::model::BallJoint;
+use super::equations::Equations;
+use super::model::{Anchor, BallJoint, Model};
 use crate::contact::Coefficients;
 use crate::scene::Vec3;
 
@@ -18,41 +18,50 @@ pub struct Column {
     pub turn: Vec3,
 }
 
-/// How each coordinate moves the contact of `joint` with normal `n`, into `columns`.
+/// Points that a contact acts on: of the ball, then of the socket, each with the radius from there to the wall, m.
+pub fn contact_sides(joint: &BallJoint, c: &Coefficients) -> [(Anchor, f64); 2] {
+    [
+        (joint.ball, c.ball_radius),
+        (joint.socket, c.ball_radius + c.clearance),
+    ]
+}
+
+/// How each coordinate moves the first of two points against the second, and points of their bodies beyond them along `n`, into
+/// `columns`.
 pub fn collect_columns(
     columns: &mut Vec<Column>,
-    c: &Coefficients,
-    motion: &[Kinematics],
-    joint: &BallJoint,
+    model: &Model,
+    equations: &dyn Equations,
+    sides: &[(Anchor, f64); 2],
     n: &Vec3,
-    visit: &impl Fn(usize, &Vec3, &mut dyn FnMut(usize, Vec3, Vec3)),
 ) {
     columns.clear();
-    let sides = [
-        (&joint.ball, c.ball_radius, 1.0),
-        (&joint.socket, c.ball_radius + c.clearance, -1.0),
-    ];
-    for (anchor, radius, sign) in sides {
-        let m = &motion[anchor.body];
+    for ((anchor, radius), sign) in sides.iter().zip([1.0, -1.0]) {
+        let m = &equations.motion()[anchor.body];
         let centre = m.position + m.rotation * anchor.offset;
-        let to_surface = n * radius;
-        visit(anchor.body, &centre, &mut |coordinate, velocity, omega| {
-            let centre = velocity * sign;
-            let surface = (velocity + omega.cross(&to_surface)) * sign;
-            let turn = omega * (radius * sign);
-            // A coordinate above both bodies of the joint moves both.
-            if let Some(column) = columns.iter_mut().find(|c| c.coordinate == coordinate) {
-                column.centre += centre;
-                column.surface += surface;
-                column.turn += turn;
-            } else {
-                columns.push(Column {
-                    coordinate,
-                    centre,
-                    surface,
-                    turn,
-                });
-            }
-        });
+        let to_surface = n * *radius;
+        equations.visit_columns(
+            model,
+            anchor.body,
+            &centre,
+            &mut |coordinate, velocity, omega| {
+                let centre = velocity * sign;
+                let surface = (velocity + omega.cross(&to_surface)) * sign;
+                let turn = omega * (*radius * sign);
+                // A coordinate above both bodies of the joint moves both.
+                if let Some(column) = columns.iter_mut().find(|c| c.coordinate == coordinate) {
+                    column.centre += centre;
+                    column.surface += surface;
+                    column.turn += turn;
+                } else {
+                    columns.push(Column {
+                        coordinate,
+                        centre,
+                        surface,
+                        turn,
+                    });
+                }
+            },
+        );
     }
 }

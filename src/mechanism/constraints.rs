@@ -28,7 +28,7 @@ pub struct Constraints {
     step: Vec<f64>,
     square: Vec<f64>,
     /// Instant and positions of the latest factorisation.
-    time: f64,
+    time: Option<f64>,
     positions: Vec<f64>,
     /// Smallest pivot ratio of the latest factorisation.
     pub least_pivot: f64,
@@ -94,8 +94,8 @@ impl Constraints {
             } else {
                 Vec::new()
             },
-            time: f64::NAN,
-            positions: vec![f64::NAN; model.nq],
+            time: None,
+            positions: vec![0.0; model.nq],
             least_pivot: f64::INFINITY,
         }
     }
@@ -135,7 +135,7 @@ impl Constraints {
     pub fn reveal(&mut self, rank: usize) {
         let group = (0..self.rows()).map(|i| i - i % 3).collect();
         self.matrix.reveal(rank, 0, group);
-        self.time = f64::NAN;
+        self.time = None;
     }
 
     /// Whether rows are treated as dependent.
@@ -179,7 +179,7 @@ impl Constraints {
         if self.is_factored(t, q) {
             return;
         }
-        self.time = t;
+        self.time = Some(t);
         self.positions.copy_from_slice(q);
         self.jacobian.fill(0.0);
         for (k, &j) in self.joints.iter().enumerate() {
@@ -232,7 +232,7 @@ impl Constraints {
     }
 
     fn is_factored(&self, t: f64, q: &[f64]) -> bool {
-        self.time == t && self.positions == q
+        self.time == Some(t) && self.positions == q
     }
 
     /// x = J v for the rows of joint `k`.

@@ -30,13 +30,55 @@ impl Ramp {
     }
 }
 
-/// How a contact force switches on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Switching {
-    /// The memory decides; the stepper locates the instants at which it changes.
-    Located,
-    /// Penetration decides at every evaluation: for steppers that locate nothing.
-    Immediate,
+/// What decides which contacts carry a force.
+#[derive(Clone, Copy, Debug)]
+pub enum Touching<'a> {
+    /// The memory: the stepper locates the instants at which it changes.
+    Located(&'a [Memory]),
+    /// Penetration at every evaluation: for steppers that locate nothing.
+    Immediate(&'a [Memory]),
+    /// None does.
+    Nothing,
+}
+
+impl<'a> Touching<'a> {
+    /// As `memory` says where instants are `located`, by penetration elsewhere.
+    pub fn by(located: bool, memory: &'a [Memory]) -> Self {
+        if located {
+            Self::Located(memory)
+        } else {
+            Self::Immediate(memory)
+        }
+    }
+
+    /// Memory of joint `j` where it may carry a force.
+    #[inline]
+    pub(super) fn memory(self, j: usize) -> Option<&'a Memory> {
+        match self {
+            Self::Located(memory) => Some(&memory[j]).filter(|memory| memory.active),
+            Self::Immediate(memory) => Some(&memory[j]),
+            Self::Nothing => None,
+        }
+    }
+}
+
+/// Evaluations made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Of the equations of motion.
+    pub equations: u64,
+    /// Of all contacts at an instant: a scene without clearance makes none.
+    pub contacts: u64,
+    /// Of the friction of one contact: a scene without friction makes none.
+    pub friction: u64,
+}
+
+impl std::ops::AddAssign for Counts {
+    fn add_assign(&mut self, other: Self) {
+        self.equations += other.equations;
+        self.contacts += other.contacts;
+        self.friction += other.friction;
+    }
 }
 
 /// One ball joint at the latest evaluation.
@@ -77,24 +119,13 @@ pub struct Contacts {
     joints: Vec<Joint>,
     parameters: Vec<Parameters>,
     ramps: Vec<Option<Ramp>>,
-    memory: Vec<Memory>,
     gaps: Vec<Gap>,
-    /// How contact forces switch on.
-    pub switching: Switching,
-    /// Contact evaluations so far: a scene without clearance makes none.
-    pub evaluations: u64,
-    /// Evaluations of friction so far, for whatever purpose: a scene without friction makes none.
-    pub friction_evaluations: u64,
     any_ramp: bool,
     any_contact: bool,
-    /// Contacts carry no force: for [`crate::integrate::ContactSystem::derivative_apart`].
-    pub apart: bool,
-    /// A sliding speed or a penetration rate may have been beyond its piece of the law since this was last cleared.
-    pub strayed: bool,
 }
 
 impl Contacts {
-    /// Contacts of `scene`, all free.
+    /// Contacts of `scene`.
     pub fn new(scene: &Scene, model: &Model) -> Self {
         let parameters: Vec<Parameters> = scene.ball_joints.iter().map(|j| j.contact).collect();
         let joints: Vec<Joint> = model
@@ -112,14 +143,8 @@ impl Contacts {
             joints,
             parameters,
             ramps: vec![None; n],
-            memory: vec![Memory::default(); n],
             gaps: vec![Gap::default(); n],
-            switching: Switching::Located,
-            evaluations: 0,
-            friction_evaluations: 0,
             any_ramp: false,
-            apart: false,
-            strayed: false,
         }
     }
 
@@ -141,16 +166,6 @@ impl Contacts {
     /// Results of the latest evaluation.
     pub fn gaps(&self) -> &[Gap] {
         &self.gaps
-    }
-
-    /// Contact memory.
-    pub fn memory(&self) -> &[Memory] {
-        &self.memory
-    }
-
-    /// Contact memory, to change.
-    pub fn memory_mut(&mut self) -> &mut [Memory] {
-        &mut self.memory
     }
 
     /// Coefficients of joint `i`.
@@ -196,13 +211,22 @@ impl Contacts {
         }
     }
 
-    /// Gaps and forces at `t`; forces are added to `wrench` (about each body's centroid).
-    pub fn evaluate(&mut self, t: f64, motion: &[Kinematics], wrench: &mut [Wrench]) {
-        if !self.any_contact || self.apart {
-            return;
+    /// Gaps and forces at `t`; forces are added to `wrench` (about each body's centroid). Whether a sliding speed or a
+    /// penetration rate was beyond the piece of its law that the memory holds.
+    pub fn evaluate(
+        &mut self,
+        t: f64,
+        motion: &[Kinematics],
+        wrench: &mut [Wrench],
+        touching: Touching<'_>,
+        counts: &mut Counts,
+    ) -> bool {
+        if !self.any_contact || matches!(touching, Touching::Nothing) {
+            return false;
         }
         self.update_ramps(t);
-        self.evaluations += 1;
+        counts.contacts += 1;
+        let mut leaves_piece = false;
         for (
             i,
             Joint {
@@ -226,18 +250,19 @@ impl Contacts {
                 ..Gap::default()
             };
             let clearance = coefficients.clearance;
-            let memory = &self.memory[i];
-            let free = self.switching == Switching::Located && !memory.active;
-            if free || e.norm_squared() <= clearance * clearance {
+            let Some(memory) = touching.memory(i) else {
+                continue;
+            };
+            if e.norm_squared() <= clearance * clearance {
                 continue;
             }
             let at = coefficients.separation(&e, &velocity);
             let force = coefficients.force(memory, &at, || {
-                self.friction_evaluations += 1;
+                counts.friction += 1;
                 let (ball, socket) = (&ball.angular_velocity, &socket.angular_velocity);
                 coefficients.friction_reads(&at.normal, &velocity, ball, socket)
             });
-            self.strayed |= coefficients.leaves_piece(memory, &at, &force);
+            leaves_piece |= coefficients.leaves_piece(memory, &at, &force);
             gap.normal_force = force.normal;
             gap.friction = force.friction;
             gap.slip_speed = force.slip_speed;
@@ -253,6 +278,7 @@ impl Contacts {
             socket.force -= on_ball;
             socket.torque -= (arm_socket + at.normal * (radius + clearance)).cross(&on_ball);
         }
+        leaves_piece
     }
 
     /// Gap geometry alone (no force) at `t`: eccentricity, its rate, normal, penetration and its rate.
@@ -292,11 +318,14 @@ impl Contacts {
     }
 
     /// Derivatives of the force of joint `i` at the latest evaluation; `None` where it carries none.
-    pub fn linearise(&self, i: usize, motion: &[Kinematics]) -> Option<Stiffness> {
+    pub fn linearise(
+        &self,
+        i: usize,
+        motion: &[Kinematics],
+        touching: Touching<'_>,
+    ) -> Option<Stiffness> {
         let gap = &self.gaps[i];
-        if gap.normal_force <= 0.0 {
-            return None;
-        }
+        let memory = touching.memory(i).filter(|_| gap.normal_force > 0.0)?;
         let at = self.separation(i);
         let read = self.friction_reads(i, &at.normal, motion);
         let force = Force {
@@ -304,7 +333,7 @@ impl Contacts {
             friction: gap.friction,
             slip_speed: gap.slip_speed,
         };
-        let (c, memory) = (&self.joints[i].coefficients, &self.memory[i]);
+        let c = &self.joints[i].coefficients;
         Some(c.linearise(
             memory,
             &at,

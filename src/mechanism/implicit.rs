@@ -7,12 +7,12 @@
 //! those of a normal that is found anew where it turns much.
 
 use super::MechanismError;
-use super::bounds::Cost;
-use super::columns::{Column, collect_columns};
-use super::contacts::{Contacts, Switching};
-use super::kinematics::Kinematics;
+use super::bounds::{Cost, CostOf};
+use super::columns::{Column, collect_columns, contact_sides};
+use super::contacts::{Contacts, Counts, Touching};
+use super::equations::Equations;
 use super::model::Model;
-use crate::contact::{Coefficients, Memory, Pace, Slope};
+use crate::contact::{ApproachPiece, Coefficients, Memory, Slope};
 use crate::scene::{Mat3, Vec3};
 
 /// Most Newton iterations, and the change of a force against the largest at which they end.
@@ -50,7 +50,7 @@ struct Touch {
 
 impl Touch {
     /// Force and its derivatives for the velocities now added, over a step of size `h`.
-    fn evaluate(&mut self, h: f64) {
+    fn evaluate(&mut self, h: f64, counts: &mut Counts) {
         let eccentricity = self.eccentricity + self.added * h;
         let rate = self.rate + self.added;
         let read = self.read + self.slipping;
@@ -62,7 +62,10 @@ impl Touch {
             return;
         }
         self.normal = at.normal;
-        let force = self.law.force(&self.memory, &at, || read);
+        let force = self.law.force(&self.memory, &at, || {
+            counts.friction += 1;
+            read
+        });
         if force.normal <= 0.0 {
             return;
         }
@@ -134,10 +137,7 @@ impl ImplicitContacts {
         let ranges: Vec<_> = (0..joints).map(range).collect();
         let width = |&(first, end): &(usize, usize)| end - first;
         let cost = Cost::of_implicit_contacts(joints, reach, ranges.iter().map(width).sum());
-        cost.check(
-            "solver.method imex-euler",
-            "choose solver.method = automatic",
-        )?;
+        cost.check(CostOf::ImplicitContacts, "choose solver.method = automatic")?;
         Ok(Self {
             n,
             reach,
@@ -158,7 +158,7 @@ impl ImplicitContacts {
 
     /// Takes the joints that touch, from the gaps just measured where the step ends without contact forces; whether
     /// there are any.
-    pub fn gather(&mut self, model: &Model, contacts: &Contacts) -> bool {
+    pub fn gather(&mut self, model: &Model, contacts: &Contacts, touching: Touching<'_>) -> bool {
         self.touches.clear();
         self.right.clear();
         let mut near = false;
@@ -169,10 +169,9 @@ impl ImplicitContacts {
             if joint.ideal.is_some() || distance < NEAR * contacts.clearance(j) {
                 continue;
             }
-            let memory = contacts.memory()[j];
-            if contacts.switching == Switching::Located && !memory.active {
+            let Some(&memory) = touching.memory(j) else {
                 continue;
-            }
+            };
             near |= gap.penetration > 0.0;
             let law = *contacts.coefficients(j);
             self.touches.push(Touch {
@@ -182,7 +181,7 @@ impl ImplicitContacts {
                     memory
                 } else {
                     Memory {
-                        pace: Pace::Held,
+                        approach_piece: ApproachPiece::Held,
                         ..Memory::begun(&law, gap.rate)
                     }
                 },
@@ -202,26 +201,26 @@ impl ImplicitContacts {
     }
 
     /// Lays out how the coordinates move the contacts, and what slides there, for the normals found last.
-    /// `visit(body, point, f)` as in [`super::stiff::Stiff::gather`].
-    pub fn arrange(
-        &mut self,
-        model: &Model,
-        contacts: &Contacts,
-        motion: &[Kinematics],
-        visit: impl Fn(usize, &Vec3, &mut dyn FnMut(usize, Vec3, Vec3)),
-    ) {
+    pub fn arrange(&mut self, model: &Model, contacts: &Contacts, equations: &dyn Equations) {
         for touch in &mut self.touches {
             let (j, n) = (touch.joint, touch.normal);
             let joint = &model.joints[j];
             touch.arm = n;
-            touch.read = contacts.friction_reads(j, &n, motion);
-            collect_columns(&mut self.columns[j], &touch.law, motion, joint, &n, &visit);
+            touch.read = contacts.friction_reads(j, &n, equations.motion());
+            let sides = contact_sides(joint, &touch.law);
+            collect_columns(&mut self.columns[j], model, equations, &sides, &n);
         }
     }
 
-    /// Finds the forces at the end of a step of size `h`. `mobilise(range, x)` maps generalised forces within a range of
-    /// coordinates to accelerations, in place. Whether a normal turned so much that its arms must follow.
-    pub fn solve(&mut self, h: f64, mut mobilise: impl FnMut((usize, usize), &mut [f64])) -> bool {
+    /// Finds the forces at the end of a step of size `h`. Whether a normal turned so much that its arms must follow.
+    pub fn solve(
+        &mut self,
+        model: &Model,
+        h: f64,
+        equations: &mut dyn Equations,
+        counts: &mut Counts,
+    ) -> bool {
+        let within = equations.is_block_diagonal();
         for touch in &self.touches {
             let j = touch.joint;
             let (first, end) = self.ranges[j];
@@ -230,7 +229,12 @@ impl ImplicitContacts {
                 for column in &self.columns[j] {
                     self.scratch[column.coordinate] = column.surface[i];
                 }
-                mobilise((first, end), &mut self.scratch[..self.n]);
+                let x = &mut self.scratch[..self.n];
+                if within {
+                    equations.apply_inverse_mass_within(model, (first, end), x);
+                } else {
+                    equations.apply_inverse_mass(model, x);
+                }
                 for k in first..end {
                     self.weighted[j][3 * (k - first) + i] = self.scratch[k];
                 }
@@ -242,11 +246,12 @@ impl ImplicitContacts {
         let (mut worst, mut halvings) = (f64::INFINITY, 0);
         for _ in 0..ITERATIONS {
             let (mut off, mut largest) = (0.0_f64, 0.0_f64);
+            counts.contacts += 1;
             for i in 0..self.touches.len() {
                 let [added, slipping] = self.driven_by(i, h);
                 let touch = &mut self.touches[i];
                 (touch.added, touch.slipping) = (added, slipping);
-                touch.evaluate(h);
+                touch.evaluate(h, counts);
                 off = off.max((touch.force - self.right[i]).norm());
                 largest = largest.max(self.right[i].norm());
             }

@@ -58,6 +58,16 @@ impl Kinematics {
     }
 }
 
+/// omega = 2 vec(q' q*) for a quaternion of about unit length, rad/s.
+pub fn spin_of(q: &[f64], d: &[f64]) -> [f64; 3] {
+    let (w, x, y, z) = (q[0], q[1], q[2], q[3]);
+    [
+        2.0 * (-d[0] * x + d[1] * w - d[2] * z + d[3] * y),
+        2.0 * (-d[0] * y + d[1] * z + d[2] * w - d[3] * x),
+        2.0 * (-d[0] * z - d[1] * y + d[2] * x + d[3] * w),
+    ]
+}
+
 impl BallJoint {
     /// e = Z_j - Z_i, m (5).
     pub fn eccentricity(&self, motion: &[Kinematics]) -> Vec3 {
@@ -244,7 +254,7 @@ pub fn accelerate(
 
 /// Motion prescribed by time alone, computed once for each instant.
 pub struct Driven {
-    time: f64,
+    time: Option<f64>,
     /// Driven coordinates.
     pub coordinates: Vec<super::jet::Jet>,
     /// The paper's ideal mechanism, where the scene follows it.
@@ -256,7 +266,7 @@ impl Driven {
     /// For `model`; nothing is computed yet.
     pub fn new(model: &Model) -> Self {
         Self {
-            time: f64::NAN,
+            time: None,
             coordinates: vec![super::jet::Jet::default(); model.drives.len()],
             ideal: None,
             bodies: (0..model.bodies.len())
@@ -273,10 +283,10 @@ impl Driven {
     /// Moves the bodies that depend on time alone to `t`.
     #[inline]
     pub fn update(&mut self, model: &Model, t: f64, motion: &mut [Kinematics]) {
-        if t == self.time {
+        if self.time == Some(t) {
             return;
         }
-        self.time = t;
+        self.time = Some(t);
         if let Some(trajectory) = &model.trajectory {
             self.ideal = Some(trajectory.at(t));
         }

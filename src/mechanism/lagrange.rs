@@ -3,10 +3,11 @@
 //!
 //! The KKT system (55) is solved by its Schur complement J M^-1 J^T. Allocates nothing after `new`.
 
-use super::contacts::Contacts;
+use super::equations::Equations;
 use super::kinematics::{self, Driven, Kinematics, Wrench};
 use super::model::{BodyIndex, Model, Motion};
 use super::rows::RowSystem;
+use super::tree::visit_free;
 use crate::scene::{JointKind, Mat3, Scene, Vec3};
 
 /// Baumgarte parameters of the paper: Phi'' + 2 alpha Phi' + beta^2 Phi = 0, 1/s.
@@ -70,11 +71,11 @@ struct Row {
 /// Equations of motion with multipliers.
 pub struct Lagrange {
     /// Bodies, then the world.
-    pub motion: Vec<Kinematics>,
+    motion: Vec<Kinematics>,
     /// External loads of the latest evaluation.
-    pub wrench: Vec<Wrench>,
+    wrench: Vec<Wrench>,
     /// Driven coordinates.
-    pub driven: Driven,
+    driven: Driven,
     groups: Vec<Group>,
     /// Group index of each driven coordinate's row.
     driver_row: Vec<usize>,
@@ -91,9 +92,9 @@ pub struct Lagrange {
     inverse_inertia: Vec<Mat3>,
     scale: Vec<f64>,
     /// Largest constraint violation at the latest evaluation: m, or rad for orientation rows.
-    pub drift: f64,
+    drift: f64,
     /// Smallest pivot ratio of the latest factorisation.
-    pub least_pivot: f64,
+    least_pivot: f64,
 }
 
 /// The constraint rows of a scene.
@@ -259,188 +260,6 @@ impl Lagrange {
         }
     }
 
-    /// Constraint rows.
-    pub fn row_count(&self) -> usize {
-        self.rows.len()
-    }
-
-    /// Treats rows as dependent from now on, where of those of the ideal ball joints only `rank` count.
-    pub fn reveal(&mut self, rank: usize) {
-        let balls = self.ideal_row.first().copied().unwrap_or(self.rows.len());
-        let group = |&g: &usize| self.groups[g].first;
-        let group = self.group_of.iter().map(group).collect();
-        self.matrix.reveal(balls + rank, balls, group);
-    }
-
-    /// Independent rows.
-    pub fn rank(&self) -> usize {
-        self.matrix.rank()
-    }
-
-    /// Whether the reaction of the `k`-th ideal joint is unique at the latest evaluation.
-    pub fn is_reaction_unique(&self, k: usize) -> bool {
-        self.matrix.is_unique(self.ideal_row[k], 3)
-    }
-
-    /// Whether the actuator force of a driven coordinate is.
-    pub fn is_actuator_unique(&self, drive: usize) -> bool {
-        self.matrix.is_unique(self.driver_row[drive], 1)
-    }
-
-    /// Absolute scale of each component of (positions, velocities).
-    pub fn scale(&self) -> &[f64] {
-        &self.scale
-    }
-
-    /// Actuator force (N) or torque (N m) of a driven coordinate at the latest evaluation.
-    pub fn actuator(&self, drive: usize) -> f64 {
-        self.multipliers[self.driver_row[drive]]
-    }
-
-    /// Force on the ball of the `k`-th ideal joint, N.
-    pub fn reaction(&self, k: usize) -> Vec3 {
-        Vec3::from_column_slice(&self.multipliers[self.ideal_row[k]..][..3])
-    }
-
-    /// State of all bodies from their motion.
-    pub fn state_of(motion: &[Kinematics], bodies: usize) -> Vec<f64> {
-        let mut y = Vec::with_capacity(13 * bodies);
-        for m in &motion[..bodies] {
-            let q = kinematics::quaternion_of(&m.rotation);
-            y.extend(m.position.iter());
-            y.extend([q.w, q.i, q.j, q.k]);
-        }
-        for m in &motion[..bodies] {
-            y.extend(m.velocity.iter());
-            y.extend(m.angular_velocity.iter());
-        }
-        y
-    }
-
-    /// Poses and velocities at (t, y).
-    #[inline]
-    pub fn forward(&mut self, model: &Model, t: f64, y: &[f64]) {
-        self.driven.update(model, t, &mut self.motion);
-        let n = model.bodies.len();
-        let (qs, vs) = y.split_at(7 * n);
-        for b in 0..n {
-            let (q, v) = (&qs[7 * b..7 * b + 7], &vs[6 * b..6 * b + 6]);
-            let m = &mut self.motion[b];
-            m.position = Vec3::new(q[0], q[1], q[2]);
-            m.rotation = kinematics::rotation_of(&q[3..7]);
-            m.velocity = Vec3::new(v[0], v[1], v[2]);
-            m.angular_velocity = Vec3::new(v[3], v[4], v[5]);
-        }
-    }
-
-    /// dq/dt from the velocities in `y`.
-    #[inline]
-    pub fn position_rate(n: usize, y: &[f64], dq: &mut [f64]) {
-        let (qs, vs) = y.split_at(7 * n);
-        for b in 0..n {
-            dq[7 * b..7 * b + 3].copy_from_slice(&vs[6 * b..6 * b + 3]);
-            kinematics::quaternion_rate(
-                &qs[7 * b + 3..7 * b + 7],
-                &vs[6 * b + 3..6 * b + 6],
-                &mut dq[7 * b + 3..7 * b + 7],
-            );
-        }
-    }
-
-    /// Keeps quaternions at length 1.
-    pub fn normalise(n: usize, y: &mut [f64]) {
-        for b in 0..n {
-            kinematics::normalise_quaternion(&mut y[7 * b + 3..7 * b + 7]);
-        }
-    }
-
-    /// Accelerations into `vdot` for the latest [`Self::forward`]; leaves them in `motion` too.
-    pub fn accelerations(
-        &mut self,
-        model: &Model,
-        contacts: &mut Contacts,
-        gravity: &Vec3,
-        t: f64,
-        vdot: &mut [f64],
-    ) {
-        self.wrench.fill(Wrench::zero());
-        contacts.evaluate(t, &self.motion, &mut self.wrench);
-        for (b, body) in model.bodies.iter().enumerate() {
-            let m = &mut self.motion[b];
-            let load = &self.wrench[b];
-            let w_body = m.rotation.tr_mul(&m.angular_velocity);
-            let gyroscopic = w_body.cross(&(body.inertia * w_body));
-            let torque = m.rotation.tr_mul(&load.torque) - gyroscopic;
-            m.acceleration = load.force / body.mass + gravity;
-            m.angular_acceleration = m.rotation * (body.inertia_inverse * torque);
-            self.inverse_inertia[b] = m.rotation * body.inertia_inverse * m.rotation.transpose();
-        }
-        self.linearise();
-        self.matrix.clear();
-        for &(i, j) in &self.pairs {
-            let value = self.mobility(model, i, j);
-            self.matrix.add(i, j, value);
-        }
-        self.least_pivot = self.matrix.factor();
-        self.multipliers.copy_from_slice(&self.residual);
-        self.matrix.solve(&mut self.multipliers);
-        for (i, row) in self.rows.iter().enumerate() {
-            let group = &self.groups[self.group_of[i]];
-            let lambda = self.multipliers[i];
-            for (b, j) in [(group.child, &row.child), (group.parent, &row.parent)] {
-                if b < model.bodies.len() {
-                    let m = &mut self.motion[b];
-                    m.acceleration += j[0] * (lambda / model.bodies[b].mass);
-                    m.angular_acceleration += self.inverse_inertia[b] * j[1] * lambda;
-                }
-            }
-        }
-        for (b, m) in self.motion[..model.bodies.len()].iter().enumerate() {
-            vdot[6 * b..6 * b + 3].copy_from_slice(m.acceleration.as_slice());
-            vdot[6 * b + 3..6 * b + 6].copy_from_slice(m.angular_acceleration.as_slice());
-        }
-    }
-
-    /// Accelerations that generalised forces `x` cause under the constraints of the latest evaluation, in place.
-    pub fn mobilise(&mut self, model: &Model, x: &mut [f64]) {
-        for (b, body) in model.bodies.iter().enumerate() {
-            let torque = Vec3::new(x[6 * b + 3], x[6 * b + 4], x[6 * b + 5]);
-            let alpha = self.inverse_inertia[b] * torque;
-            for i in 0..3 {
-                x[6 * b + i] /= body.mass;
-                x[6 * b + 3 + i] = alpha[i];
-            }
-        }
-        let part = |x: &[f64], b: usize, at: usize| {
-            Vec3::new(x[6 * b + at], x[6 * b + at + 1], x[6 * b + at + 2])
-        };
-        for (i, row) in self.rows.iter().enumerate() {
-            let group = &self.groups[self.group_of[i]];
-            let mut sum = 0.0;
-            for (b, j) in [(group.child, &row.child), (group.parent, &row.parent)] {
-                if b < model.bodies.len() {
-                    sum += j[0].dot(&part(x, b, 0)) + j[1].dot(&part(x, b, 3));
-                }
-            }
-            self.residual[i] = -sum;
-        }
-        self.matrix.solve(&mut self.residual);
-        for (i, row) in self.rows.iter().enumerate() {
-            let group = &self.groups[self.group_of[i]];
-            let lambda = self.residual[i];
-            for (b, j) in [(group.child, &row.child), (group.parent, &row.parent)] {
-                if b < model.bodies.len() {
-                    let linear = j[0] * (lambda / model.bodies[b].mass);
-                    let angular = self.inverse_inertia[b] * j[1] * lambda;
-                    for k in 0..3 {
-                        x[6 * b + k] += linear[k];
-                        x[6 * b + 3 + k] += angular[k];
-                    }
-                }
-            }
-        }
-    }
-
     /// J_i M^-1 J_j^T.
     #[inline]
     fn mobility(&self, model: &Model, i: usize, j: usize) -> f64 {
@@ -557,6 +376,275 @@ impl Lagrange {
                     self.drift = self.drift.max(phi.abs());
                 }
             }
+        }
+    }
+}
+
+impl Equations for Lagrange {
+    fn positions(&self, model: &Model) -> usize {
+        7 * model.bodies.len()
+    }
+
+    fn velocities(&self, model: &Model) -> usize {
+        6 * model.bodies.len()
+    }
+
+    fn scale<'a>(&'a self, _: &'a Model) -> &'a [f64] {
+        &self.scale
+    }
+
+    fn reveal(&mut self, rank: usize) {
+        let balls = self.ideal_row.first().copied().unwrap_or(self.rows.len());
+        let group = |&g: &usize| self.groups[g].first;
+        let group = self.group_of.iter().map(group).collect();
+        self.matrix.reveal(balls + rank, balls, group);
+    }
+
+    fn state_of(&self, model: &Model, _: Vec<f64>, motion: &[Kinematics]) -> Vec<f64> {
+        let bodies = model.bodies.len();
+        let mut y = Vec::with_capacity(13 * bodies);
+        for m in &motion[..bodies] {
+            let q = kinematics::quaternion_of(&m.rotation);
+            y.extend(m.position.iter());
+            y.extend([q.w, q.i, q.j, q.k]);
+        }
+        for m in &motion[..bodies] {
+            y.extend(m.velocity.iter());
+            y.extend(m.angular_velocity.iter());
+        }
+        y
+    }
+
+    fn motion(&self) -> &[Kinematics] {
+        &self.motion
+    }
+
+    fn driven(&self) -> &Driven {
+        &self.driven
+    }
+
+    fn forward(&mut self, model: &Model, t: f64, y: &[f64]) {
+        self.driven.update(model, t, &mut self.motion);
+        let n = model.bodies.len();
+        let (qs, vs) = y.split_at(7 * n);
+        for b in 0..n {
+            let (q, v) = (&qs[7 * b..7 * b + 7], &vs[6 * b..6 * b + 6]);
+            let m = &mut self.motion[b];
+            m.position = Vec3::new(q[0], q[1], q[2]);
+            m.rotation = kinematics::rotation_of(&q[3..7]);
+            m.velocity = Vec3::new(v[0], v[1], v[2]);
+            m.angular_velocity = Vec3::new(v[3], v[4], v[5]);
+        }
+    }
+
+    fn loads(&mut self) -> (&[Kinematics], &mut [Wrench]) {
+        (&self.motion, &mut self.wrench)
+    }
+
+    fn accelerate(&mut self, model: &Model, gravity: &Vec3, _: f64, _: &[f64], dv: &mut [f64]) {
+        for (b, body) in model.bodies.iter().enumerate() {
+            let m = &mut self.motion[b];
+            let load = &self.wrench[b];
+            let w_body = m.rotation.tr_mul(&m.angular_velocity);
+            let gyroscopic = w_body.cross(&(body.inertia * w_body));
+            let torque = m.rotation.tr_mul(&load.torque) - gyroscopic;
+            m.acceleration = load.force / body.mass + gravity;
+            m.angular_acceleration = m.rotation * (body.inertia_inverse * torque);
+            self.inverse_inertia[b] = m.rotation * body.inertia_inverse * m.rotation.transpose();
+        }
+        self.linearise();
+        self.matrix.clear();
+        for &(i, j) in &self.pairs {
+            let value = self.mobility(model, i, j);
+            self.matrix.add(i, j, value);
+        }
+        self.least_pivot = self.matrix.factor();
+        self.multipliers.copy_from_slice(&self.residual);
+        self.matrix.solve(&mut self.multipliers);
+        for (i, row) in self.rows.iter().enumerate() {
+            let group = &self.groups[self.group_of[i]];
+            let lambda = self.multipliers[i];
+            for (b, j) in [(group.child, &row.child), (group.parent, &row.parent)] {
+                if b < model.bodies.len() {
+                    let m = &mut self.motion[b];
+                    m.acceleration += j[0] * (lambda / model.bodies[b].mass);
+                    m.angular_acceleration += self.inverse_inertia[b] * j[1] * lambda;
+                }
+            }
+        }
+        for (b, m) in self.motion[..model.bodies.len()].iter().enumerate() {
+            dv[6 * b..6 * b + 3].copy_from_slice(m.acceleration.as_slice());
+            dv[6 * b + 3..6 * b + 6].copy_from_slice(m.angular_acceleration.as_slice());
+        }
+    }
+
+    /// Nothing to do: [`Self::accelerate`] left them there.
+    fn complete_motion(&mut self, _: &Model, _: &[f64], _: &[f64]) {}
+
+    fn position_rate(&self, model: &Model, y: &[f64], dq: &mut [f64]) {
+        let n = model.bodies.len();
+        let (qs, vs) = y.split_at(7 * n);
+        for b in 0..n {
+            dq[7 * b..7 * b + 3].copy_from_slice(&vs[6 * b..6 * b + 3]);
+            kinematics::quaternion_rate(
+                &qs[7 * b + 3..7 * b + 7],
+                &vs[6 * b + 3..6 * b + 6],
+                &mut dq[7 * b + 3..7 * b + 7],
+            );
+        }
+    }
+
+    fn velocities_of(&self, model: &Model, y: &[f64], rate: &[f64], out: &mut [f64]) {
+        for b in 0..model.bodies.len() {
+            out[6 * b..6 * b + 3].copy_from_slice(&rate[7 * b..7 * b + 3]);
+            let turn = 7 * b + 3..7 * b + 7;
+            let spin = kinematics::spin_of(&y[turn.clone()], &rate[turn]);
+            out[6 * b + 3..6 * b + 6].copy_from_slice(&spin);
+        }
+    }
+
+    fn project(&mut self, model: &Model, _: f64, y: &mut [f64]) -> f64 {
+        for b in 0..model.bodies.len() {
+            kinematics::normalise_quaternion(&mut y[7 * b + 3..7 * b + 7]);
+        }
+        0.0
+    }
+
+    fn projects(&self) -> bool {
+        false
+    }
+
+    fn visit_columns(
+        &self,
+        model: &Model,
+        body: usize,
+        point: &Vec3,
+        mut visit: &mut dyn FnMut(usize, Vec3, Vec3),
+    ) {
+        if body < model.bodies.len() {
+            let arm = point - self.motion[body].position;
+            visit_free(6 * body, &arm, &mut visit);
+        }
+    }
+
+    fn apply_inverse_mass(&mut self, model: &Model, x: &mut [f64]) {
+        for (b, body) in model.bodies.iter().enumerate() {
+            let torque = Vec3::new(x[6 * b + 3], x[6 * b + 4], x[6 * b + 5]);
+            let alpha = self.inverse_inertia[b] * torque;
+            for i in 0..3 {
+                x[6 * b + i] /= body.mass;
+                x[6 * b + 3 + i] = alpha[i];
+            }
+        }
+        let part = |x: &[f64], b: usize, at: usize| {
+            Vec3::new(x[6 * b + at], x[6 * b + at + 1], x[6 * b + at + 2])
+        };
+        for (i, row) in self.rows.iter().enumerate() {
+            let group = &self.groups[self.group_of[i]];
+            let mut sum = 0.0;
+            for (b, j) in [(group.child, &row.child), (group.parent, &row.parent)] {
+                if b < model.bodies.len() {
+                    sum += j[0].dot(&part(x, b, 0)) + j[1].dot(&part(x, b, 3));
+                }
+            }
+            self.residual[i] = -sum;
+        }
+        self.matrix.solve(&mut self.residual);
+        for (i, row) in self.rows.iter().enumerate() {
+            let group = &self.groups[self.group_of[i]];
+            let lambda = self.residual[i];
+            for (b, j) in [(group.child, &row.child), (group.parent, &row.parent)] {
+                if b < model.bodies.len() {
+                    let linear = j[0] * (lambda / model.bodies[b].mass);
+                    let angular = self.inverse_inertia[b] * j[1] * lambda;
+                    for k in 0..3 {
+                        x[6 * b + k] += linear[k];
+                        x[6 * b + 3 + k] += angular[k];
+                    }
+                }
+            }
+        }
+    }
+
+    fn apply_inverse_mass_within(&mut self, model: &Model, _: (usize, usize), x: &mut [f64]) {
+        self.apply_inverse_mass(model, x);
+    }
+
+    fn is_block_diagonal(&self) -> bool {
+        false
+    }
+
+    fn motion_by_time_alone(&mut self, _: &Model, _: f64, _: &[f64]) -> Option<&[Kinematics]> {
+        None
+    }
+
+    fn rows(&self) -> usize {
+        self.rows.len()
+    }
+
+    fn rank(&self) -> usize {
+        self.matrix.rank()
+    }
+
+    fn least_pivot(&self) -> f64 {
+        self.least_pivot
+    }
+
+    fn drift(&self) -> f64 {
+        self.drift
+    }
+
+    fn is_kinematic(&self, _: &Model) -> bool {
+        false
+    }
+
+    fn is_right_handed(&mut self, _: &Model) -> bool {
+        true
+    }
+
+    fn reaction(&self, k: usize) -> Vec3 {
+        Vec3::from_column_slice(&self.multipliers[self.ideal_row[k]..][..3])
+    }
+
+    fn is_reaction_unique(&self, k: usize) -> bool {
+        self.matrix.is_unique(self.ideal_row[k], 3)
+    }
+
+    fn actuators(&mut self, _: &Model, _: &Vec3, out: &mut [f64]) {
+        for (out, &row) in out.iter_mut().zip(&self.driver_row) {
+            *out = self.multipliers[row];
+        }
+    }
+
+    fn is_actuator_unique(&mut self, _: &Model, _: &Vec3, i: usize) -> bool {
+        self.matrix.is_unique(self.driver_row[i], 1)
+    }
+
+    fn prescribes_drives(&self) -> bool {
+        false
+    }
+
+    fn drive_power(&mut self, model: &Model, _: &Vec3, _: &[f64], _: &[f64], _: bool) -> f64 {
+        let each = model.drives.iter().zip(&self.driver_row);
+        each.map(|(drive, &row)| self.multipliers[row] * rate_of(model, &self.motion, drive.body))
+            .sum()
+    }
+}
+
+/// Rate of a driven joint from the motion of the two bodies that it holds.
+fn rate_of(model: &Model, motion: &[Kinematics], b: usize) -> f64 {
+    let body = &model.bodies[b];
+    let (child, parent) = (&motion[b], &motion[body.parent]);
+    let axis = parent.rotation * body.axis;
+    match body.motion {
+        Motion::Driven { revolute: true, .. } => {
+            axis.dot(&(child.angular_velocity - parent.angular_velocity))
+        }
+        _ => {
+            // Of the point of the parent that is at the child's joint point just now.
+            let arm = child.rotation * -body.to_centroid;
+            let at = child.position + arm - parent.position;
+            axis.dot(&(child.point_velocity(&arm) - parent.point_velocity(&at)))
         }
     }
 }

@@ -7,7 +7,10 @@ mod bounds;
 mod columns;
 mod constraints;
 mod contacts;
+mod elements;
+mod equations;
 mod factor;
+mod forest;
 mod implicit;
 mod jet;
 mod kinematics;
@@ -23,17 +26,23 @@ mod summary;
 mod systems;
 mod tree;
 
-pub use contacts::{Contacts, Gap, Ramp, Switching};
+pub use bounds::CostOf;
+pub use contacts::{Contacts, Counts, Gap, Ramp, Touching};
+pub use elements::ElementReport;
 pub use jet::Jet;
 pub use kinematics::{Kinematics, Wrench};
 pub use power::Powers;
 pub use spcmm::{Ideal, Trajectory, Unreachable};
 pub use start::{Assembly, Placement};
 pub use summary::Summary;
+pub use systems::Evaluator;
 
-use crate::integrate::System;
+use std::sync::Arc;
+
 use crate::scene::{Formulation, Scene, Vec3, format_quantity_digits};
-use constraints::Constraints;
+use elements::{ForceElement, elements_of};
+use equations::Equations;
+use forest::Forest;
 use lagrange::Lagrange;
 use model::Model;
 use tree::Tree;
@@ -119,10 +128,10 @@ pub enum MechanismError {
         most: usize,
     },
     /// Equations that would take more memory or time than is allowed.
-    #[error("too large for {form}: {needed} {what}; allowed at most {most}: {advice}")]
+    #[error("too large for {of}: {needed} {what}; allowed at most {most}: {advice}")]
     TooCostly {
         /// What would take it.
-        form: &'static str,
+        of: CostOf,
         /// What it would take.
         what: &'static str,
         /// How much of it.
@@ -134,12 +143,13 @@ pub enum MechanismError {
     },
     /// A start pose in which constraints lose their independence that have it in every pose around.
     #[error(
-        "the mechanism starts in a singular pose: at {joints} directions that the ideal joints hold elsewhere coincide here, \
-         and the motion could go on in more than one way; start it beside that pose"
+        "the mechanism starts in a singular pose: at {} directions that the ideal joints hold elsewhere coincide here, \
+         and the motion could go on in more than one way; start it beside that pose",
+        .joints.join(", ")
     )]
     Branching {
         /// Names of the joints.
-        joints: String,
+        joints: Vec<String>,
     },
 }
 
@@ -179,33 +189,33 @@ fn unclosed(stays: &[(String, Vec3)]) -> String {
     )
 }
 
-enum Form {
-    Tree {
-        tree: Box<Tree>,
-        constraints: Option<Box<Constraints>>,
-    },
-    Lagrange(Box<Lagrange>),
+/// What tells the equations of one mechanism from those of another: they are equal where their states can be exchanged.
+#[derive(Clone, Debug)]
+pub struct Structure {
+    model: Arc<Model>,
+    rank: Option<usize>,
 }
 
 /// The equations of motion of one scene in one formulation.
 pub struct Mechanism {
-    model: Model,
-    form: Form,
+    model: Arc<Model>,
+    /// Independent rows of the ideal joints, where some depend on others.
+    rank: Option<usize>,
+    equations: Box<dyn Equations>,
     /// Ball joints with clearance.
     pub contacts: Contacts,
+    elements: Vec<Box<dyn ForceElement>>,
     /// World gravity, m/s^2.
     pub gravity: Vec3,
     joint_names: Vec<String>,
     /// Linearisation; made where an implicit method is chosen.
     stiff: Option<Box<stiff::Stiff>>,
     sources: power::Sources,
-    /// Instant at which motion and forces are those of the latest evaluation, s; NaN where something was measured since.
-    evaluated: f64,
+    /// Instant at which motion and forces are those of the latest evaluation, s; `None` where something was measured since.
+    evaluated: Option<f64>,
     /// Made where contacts alone are stepped implicitly.
     implicit: Option<Box<implicit::ImplicitContacts>>,
     assembly: Assembly,
-    /// Evaluations of the equations of motion so far.
-    pub evaluations: u64,
 }
 
 impl Mechanism {
@@ -214,55 +224,66 @@ impl Mechanism {
     /// # Errors
     /// A trajectory that the rods cannot reach; equations that would take too much.
     pub fn new(scene: &Scene) -> Result<Self, MechanismError> {
-        let model = Model::new(scene);
+        let model = Arc::new(Model::new(scene));
         if let Some(trajectory) = &model.trajectory {
             trajectory.check()?;
         }
         bounds::check(scene, &model)?;
         let contacts = Contacts::new(scene, &model);
-        let form = match scene.formulation {
-            Formulation::Tree => Form::Tree {
-                tree: Box::new(Tree::new(&model)),
-                constraints: (!model.ideal_joints.is_empty())
-                    .then(|| Box::new(Constraints::new(&model, &model.ideal_joints))),
-            },
-            Formulation::Lagrange => Form::Lagrange(Box::new(Lagrange::new(scene, &model))),
+        let equations: Box<dyn Equations> = match scene.formulation {
+            Formulation::Tree => Box::new(Forest::new(&model)),
+            Formulation::Lagrange => Box::new(Lagrange::new(scene, &model)),
         };
         Ok(Self {
-            sources: power::Sources::new(&model, matches!(form, Form::Tree { .. })),
-            evaluated: f64::NAN,
+            sources: power::Sources::new(&model, &*equations, scene.elements.len()),
+            elements: elements_of(scene, &model),
+            evaluated: None,
             model,
-            form,
+            rank: None,
+            equations,
             contacts,
             gravity: scene.gravity,
             joint_names: scene.ball_joints.iter().map(|j| j.name.clone()).collect(),
             stiff: None,
             implicit: None,
             assembly: Assembly::default(),
-            evaluations: 0,
         })
+    }
+
+    /// For a state of the mechanism that `structure` is of, without a start.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn resumed(scene: &Scene, structure: &Structure) -> Result<Self, MechanismError> {
+        let mut mechanism = Self::new(scene)?;
+        mechanism.rank = structure.rank;
+        if let Some(rank) = structure.rank {
+            mechanism.equations.reveal(rank);
+        }
+        Ok(mechanism)
+    }
+
+    /// What a snapshot keeps of the equations.
+    pub fn structure(&self) -> Structure {
+        Structure {
+            model: self.model.clone(),
+            rank: self.rank,
+        }
+    }
+
+    /// Whether these are the equations that `structure` is of.
+    pub fn has_structure(&self, structure: &Structure) -> bool {
+        Arc::ptr_eq(&self.model, &structure.model)
     }
 
     /// Whether positions and velocities are projected back onto constraints after a step.
     pub fn projects(&self) -> bool {
-        matches!(
-            &self.form,
-            Form::Tree {
-                constraints: Some(_),
-                ..
-            }
-        )
+        self.equations.projects()
     }
 
     /// Whether the motion is a function of time alone: as many independent constraint rows as coordinates.
     pub fn is_kinematic(&self) -> bool {
-        match &self.form {
-            Form::Tree { constraints, .. } => {
-                let rows = constraints.as_ref().filter(|c| !c.is_dependent());
-                self.model.nv == rows.map_or(0, |c| c.rows())
-            }
-            Form::Lagrange(_) => false,
-        }
+        self.equations.is_kinematic(&self.model)
     }
 
     /// Longest step of a scene that is a function of time alone, s: a fiftieth of its shortest period.
@@ -272,16 +293,7 @@ impl Mechanism {
 
     /// For a scene that is a function of time alone, on which side of a singular pose its loops are.
     pub fn is_right_handed(&mut self) -> bool {
-        if !self.is_kinematic() {
-            return true;
-        }
-        match &mut self.form {
-            Form::Tree {
-                constraints: Some(constraints),
-                ..
-            } => constraints.is_right_handed(&self.model),
-            _ => true,
-        }
+        !self.is_kinematic() || self.equations.is_right_handed(&self.model)
     }
 
     /// For a scene that is a function of time alone and knows its motion in closed form: how far its output body is from
@@ -309,41 +321,15 @@ impl Mechanism {
 
     /// After a step: orientations back to unit length, loops closed again. Returns the closure error left, m.
     pub fn project(&mut self, t: f64, y: &mut [f64]) -> f64 {
-        self.evaluated = f64::NAN;
-        let Self { model, form, .. } = self;
-        match form {
-            Form::Tree { tree, constraints } => {
-                Tree::normalise(model, y);
-                constraints
-                    .as_mut()
-                    .map_or(0.0, |c| c.project(model, tree, t, y))
-            }
-            Form::Lagrange(_) => {
-                Lagrange::normalise(model.bodies.len(), y);
-                0.0
-            }
-        }
+        self.evaluated = None;
+        self.equations.project(&self.model, t, y)
     }
 
     /// Poses, velocities and gaps at (t, y), without forces.
     pub fn measure(&mut self, t: f64, y: &[f64]) {
-        self.evaluated = f64::NAN;
-        let Self {
-            model,
-            form,
-            contacts,
-            ..
-        } = self;
-        match form {
-            Form::Tree { tree, .. } => {
-                tree.forward(model, t, y);
-                contacts.measure(t, &tree.motion);
-            }
-            Form::Lagrange(lagrange) => {
-                lagrange.forward(model, t, y);
-                contacts.measure(t, &lagrange.motion);
-            }
-        }
+        self.evaluated = None;
+        self.equations.forward(&self.model, t, y);
+        self.contacts.measure(t, self.equations.motion());
     }
 
     /// Sliding speed of ball joint `j` in the motion last measured, m/s.
@@ -351,69 +337,48 @@ impl Mechanism {
         self.contacts.slip_speed(j, self.motion())
     }
 
-    /// Everything at (t, y): derivative into `dy`, true accelerations in [`Self::motion`], gaps of all joints,
-    /// reactions and actuator forces.
-    pub fn evaluate_fully(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
-        self.derivative(t, y, dy);
-        self.evaluated = f64::NAN;
-        let nq = self.positions();
-        let Self {
-            model,
-            form,
-            contacts,
-            ..
-        } = self;
-        if let Form::Tree { tree, .. } = form {
-            tree.accelerate(model, y, &dy[nq..]);
-        }
-        // Forces stay those of the derivative; only the geometry of ideal joints is missing.
-        let motion = match form {
-            Form::Tree { tree, .. } => &tree.motion,
-            Form::Lagrange(lagrange) => &lagrange.motion,
-        };
-        contacts.measure(t, motion);
+    /// Number of components of a state: positions, then velocities.
+    pub fn dimension(&self) -> usize {
+        self.positions() + self.equations.velocities(&self.model)
+    }
+
+    /// Number of positions.
+    pub fn positions(&self) -> usize {
+        self.equations.positions(&self.model)
+    }
+
+    /// Absolute scale of each component of a state.
+    pub fn scale(&self) -> &[f64] {
+        self.equations.scale(&self.model)
+    }
+
+    /// Rates of the positions from the velocities in `y`, into the front of `dy`.
+    pub fn position_rate(&self, y: &[f64], dy: &mut [f64]) {
+        let dq = &mut dy[..self.positions()];
+        self.equations.position_rate(&self.model, y, dq);
     }
 
     /// Motion of the centroid frames at the latest evaluation; the last entry is the world.
     pub fn motion(&self) -> &[Kinematics] {
-        match &self.form {
-            Form::Tree { tree, .. } => &tree.motion,
-            Form::Lagrange(lagrange) => &lagrange.motion,
-        }
+        self.equations.motion()
     }
 
     /// The paper's ideal mechanism at the latest instant, where the scene follows it.
     pub fn ideal(&self) -> Option<&Ideal> {
-        match &self.form {
-            Form::Tree { tree, .. } => tree.driven.ideal.as_ref(),
-            Form::Lagrange(lagrange) => lagrange.driven.ideal.as_ref(),
-        }
+        self.equations.driven().ideal.as_ref()
     }
 
     /// Force of the constraint on the ball of joint `j` at the latest evaluation, N; `None` where it has clearance.
     pub fn reaction(&self, j: usize) -> Option<Vec3> {
         let k = self.model.joints[j].ideal?;
-        match &self.form {
-            Form::Tree { constraints, .. } => constraints.as_ref().map(|c| c.reaction(k)),
-            Form::Lagrange(lagrange) => Some(lagrange.reaction(k)),
-        }
+        Some(self.equations.reaction(k))
     }
 
     /// Whether the reaction of joint `j` is the only one that fits the motion, at the latest evaluation. Where ideal joints
     /// hold a direction that others hold already, [`Self::reaction`] is the one of least squares over all ideal joints.
     pub fn is_reaction_unique(&self, j: usize) -> bool {
-        self.model.joints[j].ideal.is_none_or(|k| match &self.form {
-            Form::Tree { constraints, .. } => constraints.as_ref().is_none_or(|c| c.is_unique(k)),
-            Form::Lagrange(lagrange) => lagrange.is_reaction_unique(k),
-        })
-    }
-
-    /// Independent rows among those of the ideal joints' constraints (in `lagrange`, of all joints').
-    pub fn rank(&self) -> usize {
-        match &self.form {
-            Form::Tree { constraints, .. } => constraints.as_ref().map_or(0, |c| c.rank()),
-            Form::Lagrange(lagrange) => lagrange.rank(),
-        }
+        let ideal = self.model.joints[j].ideal;
+        ideal.is_none_or(|k| self.equations.is_reaction_unique(k))
     }
 
     /// Whether a ball joint is ideal: [`Self::reaction`] is then another at every evaluation.
@@ -423,21 +388,13 @@ impl Mechanism {
 
     /// Largest constraint violation at the latest evaluation of the `lagrange` form, m or rad; 0 in the `tree` form.
     pub fn constraint_drift(&self) -> f64 {
-        match &self.form {
-            Form::Tree { .. } => 0.0,
-            Form::Lagrange(lagrange) => lagrange.drift,
-        }
+        self.equations.drift()
     }
 
     /// Smallest pivot ratio of the constraint matrix at the latest evaluation: near rounding level where rows depend on
     /// one another. Infinite without constraints.
     pub fn least_pivot(&self) -> f64 {
-        match &self.form {
-            Form::Tree { constraints, .. } => constraints
-                .as_ref()
-                .map_or(f64::INFINITY, |c| c.least_pivot),
-            Form::Lagrange(lagrange) => lagrange.least_pivot,
-        }
+        self.equations.least_pivot()
     }
 
     /// Number of driven coordinates.
@@ -450,35 +407,9 @@ impl Mechanism {
         self.model.drives[i].body
     }
 
-    /// Force (N) or torque (N m) of every actuator after [`Self::evaluate_fully`], positive along the joint's axis.
+    /// Force (N) or torque (N m) of every actuator after [`Evaluator::evaluate_fully`], positive along the joint's axis.
     pub fn actuators(&mut self, out: &mut [f64]) {
-        let Self {
-            model,
-            form,
-            gravity,
-            ..
-        } = self;
-        match form {
-            Form::Lagrange(lagrange) => {
-                for (i, out) in out.iter_mut().enumerate() {
-                    *out = lagrange.actuator(i);
-                }
-            }
-            Form::Tree { tree, constraints } => {
-                if let Some(constraints) = constraints {
-                    load_reactions(model, tree, |k| constraints.reaction(k));
-                }
-                let Tree { motion, wrench, .. } = &mut **tree;
-                power::inverse_dynamics(
-                    model,
-                    motion,
-                    wrench,
-                    gravity,
-                    |_| true,
-                    |drive, force| out[drive] = force,
-                );
-            }
-        }
+        self.equations.actuators(&self.model, &self.gravity, out);
     }
 
     /// Kinetic energy and gravitational potential (zero at the world origin) at the latest evaluation, J.
@@ -492,6 +423,18 @@ impl Mechanism {
         (kinetic, potential)
     }
 
+    /// Energy stored in springs at the latest evaluation, J.
+    pub fn energy_in_elements(&self) -> f64 {
+        let motion = self.equations.motion();
+        self.elements.iter().map(|e| e.stored(motion)).sum()
+    }
+
+    /// What the force elements do at `t`, that of the latest evaluation, in the order of the scene.
+    pub fn element_reports(&self, t: f64) -> impl Iterator<Item = ElementReport> {
+        let motion = self.equations.motion();
+        self.elements.iter().map(move |e| e.report(t, motion))
+    }
+
     /// Origin of body `b`'s scene frame from its centroid, body axes, m.
     pub fn frame_origin(&self, b: usize) -> Vec3 {
         self.model.bodies[b].origin
@@ -501,11 +444,11 @@ impl Mechanism {
     pub fn prepare_linearisation(&mut self) {
         if self.stiff.is_none() {
             let (dimension, positions) = (self.dimension(), self.positions());
-            let joints = self.contacts.len();
+            let couplings = self.contacts.len() + self.elements.len();
             self.stiff = Some(Box::new(stiff::Stiff::new(
                 dimension - positions,
                 dimension,
-                joints,
+                couplings,
             )));
         }
     }
@@ -517,13 +460,7 @@ impl Mechanism {
     pub fn prepare_implicit_contacts(&mut self) -> Result<(), MechanismError> {
         if self.implicit.is_none() {
             let velocities = self.dimension() - self.positions();
-            let blocks = matches!(
-                &self.form,
-                Form::Tree {
-                    constraints: None,
-                    ..
-                }
-            );
+            let blocks = self.equations.is_block_diagonal();
             let contacts = implicit::ImplicitContacts::new(&self.model, velocities, blocks)?;
             self.implicit = Some(Box::new(contacts));
         }
@@ -533,20 +470,5 @@ impl Mechanism {
     /// What the scene contains, what will be computed and what not.
     pub fn summary(&self) -> Summary {
         Summary::new(self)
-    }
-}
-
-/// Adds reactions of the ideal joints, by their order, to the loads on the bodies.
-fn load_reactions(model: &Model, tree: &mut Tree, reaction: impl Fn(usize) -> Vec3) {
-    let mut load = |anchor: &model::Anchor, force: Vec3| {
-        let arm = tree.motion[anchor.body].rotation * anchor.offset;
-        let w = &mut tree.wrench[anchor.body];
-        w.force += force;
-        w.torque += arm.cross(&force);
-    };
-    for (k, &j) in model.ideal_joints.iter().enumerate() {
-        let force = reaction(k);
-        load(&model.joints[j].ball, force);
-        load(&model.joints[j].socket, -force);
     }
 }

@@ -4,7 +4,7 @@ use super::factor::{NONE, Pattern};
 use super::jet::Jet;
 use super::spcmm::Trajectory;
 use crate::contact;
-use crate::scene::{Drive, JointKind, JointStart, Mat3, Quat, Scene, StartRule, Vec3};
+use crate::scene::{Attachment, Drive, JointKind, JointStart, Mat3, Quat, Scene, StartRule, Vec3};
 
 /// Index that stands for the world among bodies: one past the last.
 pub type BodyIndex = usize;
@@ -237,22 +237,28 @@ impl Model {
             ));
         }
         model.number_coordinates(scene, &root);
-        let anchor = |a: &crate::scene::Attachment| Anchor {
-            body: a.body.unwrap_or(world),
-            offset: a.body.map_or(a.point, |b| a.point - scene.bodies[b].centre),
-        };
         for (index, joint) in scene.ball_joints.iter().enumerate() {
             let ideal = (joint.contact.clearance == 0.0).then(|| {
                 model.ideal_joints.push(index);
                 model.ideal_joints.len() - 1
             });
             model.joints.push(BallJoint {
-                socket: anchor(&joint.socket),
-                ball: anchor(&joint.ball),
+                socket: model.anchor(scene, &joint.socket),
+                ball: model.anchor(scene, &joint.ball),
                 ideal,
             });
         }
         model
+    }
+
+    /// A point of `scene`.
+    pub fn anchor(&self, scene: &Scene, point: &Attachment) -> Anchor {
+        Anchor {
+            body: point.body.unwrap_or(self.bodies.len()),
+            offset: point
+                .body
+                .map_or(point.point, |b| point.point - scene.bodies[b].centre),
+        }
     }
 
     /// Numbers coordinates tree by tree, so that each tree's are contiguous, and lays out the start and the scales.

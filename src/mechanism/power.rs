@@ -1,10 +1,10 @@
 //! Powers of what gives and takes energy, each from the force that does it and the velocity of the point where it acts.
 //! Allocates nothing.
 
+use super::Mechanism;
+use super::equations::Equations;
 use super::kinematics::{Kinematics, Wrench};
 use super::model::{Model, Motion};
-use super::{Form, Mechanism, load_reactions};
-use crate::integrate::System;
 use crate::scene::Vec3;
 
 /// Powers at one instant, or their integrals over a time (then J).
@@ -18,6 +18,10 @@ pub struct Powers {
     pub friction: f64,
     /// Given by clearances on their way, W: -F_N dc/dt + 2/5 dK/dt delta^2.5.
     pub clearance: f64,
+    /// Taken by the dampers of force elements, W.
+    pub damping: f64,
+    /// Given by loads from outside, W.
+    pub external: f64,
 }
 
 impl Powers {
@@ -27,6 +31,8 @@ impl Powers {
         self.restitution += weight * other.restitution;
         self.friction += weight * other.friction;
         self.clearance += weight * other.clearance;
+        self.damping += weight * other.damping;
+        self.external += weight * other.external;
     }
 }
 
@@ -39,8 +45,8 @@ pub(super) struct Sources {
 }
 
 impl Sources {
-    /// Of a scene in the `tree` form, or in the other one.
-    pub(super) fn new(model: &Model, tree: bool) -> Self {
+    /// Of a scene and its equations.
+    pub(super) fn new(model: &Model, equations: &dyn Equations, elements: usize) -> Self {
         let n = model.bodies.len();
         let drives = !model.drives.is_empty();
         let contacts = model.joints.iter().any(|joint| joint.ideal.is_none());
@@ -51,9 +57,9 @@ impl Sources {
             moved[b] = moved[body.parent] || matches!(body.motion, Motion::Driven { .. });
             free_rider |= moved[b] && !body.driven_only;
         }
-        let prescribed = tree && !free_rider && model.ideal_joints.is_empty();
+        let prescribed = equations.prescribes_drives() && !free_rider;
         Self {
-            none: !drives && !contacts,
+            none: !drives && !contacts && elements == 0,
             forces_suffice: !drives || prescribed,
         }
     }
@@ -67,59 +73,31 @@ impl Mechanism {
 
     /// Whether motion and forces of the latest evaluation are those at `t`.
     pub fn is_evaluated_at(&self, t: f64) -> bool {
-        self.evaluated == t
+        self.evaluated == Some(t)
     }
 
     /// What was evaluated last is not to be read any more.
     pub fn forget_evaluation(&mut self) {
-        self.evaluated = f64::NAN;
+        self.evaluated = None;
     }
 
-    /// Powers at (t, y) with the contact memory in force. `dy` holds the derivative there if the latest evaluation was at
-    /// this instant, and is scratch otherwise. Counts as no evaluation.
-    pub fn powers(&mut self, t: f64, y: &[f64], dy: &mut [f64]) -> Powers {
-        if self.sources.none {
-            return Powers::default();
-        }
-        if !self.is_evaluated_at(t) {
-            let counts = (self.evaluations, self.contacts.evaluations);
-            if self.sources.forces_suffice {
-                self.load(t, y);
-            } else {
-                self.derivative(t, y, dy);
-            }
-            (self.evaluations, self.contacts.evaluations) = counts;
-        }
+    /// Powers at the latest evaluation, whose derivative is `dy` where accelerations enter.
+    pub(super) fn powers_of_latest(&mut self, t: f64, y: &[f64], dy: &[f64]) -> Powers {
         let mut powers = self.contact_powers();
+        for element in &self.elements {
+            let own = element.powers(t, self.equations.motion());
+            powers.damping += own.dissipated;
+            powers.external += own.supplied;
+        }
         if !self.model.drives.is_empty() {
-            powers.drive = self.drive_power(y, dy);
+            let dv = &dy[self.positions()..];
+            let all = !self.sources.forces_suffice;
+            let (model, gravity) = (&self.model, &self.gravity);
+            powers.drive = self.equations.drive_power(model, gravity, y, dv, all);
             // The loads were changed, and the accelerations may have been.
-            self.evaluated = f64::NAN;
+            self.evaluated = None;
         }
         powers
-    }
-
-    /// Motion and contact forces at (t, y), no accelerations.
-    fn load(&mut self, t: f64, y: &[f64]) {
-        let Self {
-            model,
-            form,
-            contacts,
-            ..
-        } = self;
-        match form {
-            Form::Tree { tree, .. } => {
-                tree.forward(model, t, y);
-                tree.load(t, contacts);
-            }
-            Form::Lagrange(lagrange) => {
-                lagrange.forward(model, t, y);
-                lagrange.wrench.fill(Wrench::zero());
-                contacts.evaluate(t, &lagrange.motion, &mut lagrange.wrench);
-            }
-        }
-        // No accelerations.
-        self.evaluated = f64::NAN;
     }
 
     fn contact_powers(&self) -> Powers {
@@ -145,64 +123,6 @@ impl Mechanism {
             }
         }
         powers
-    }
-
-    /// Sum of actuator force times rate after an evaluation at `y` with the derivative `dy`. Changes the loads.
-    fn drive_power(&mut self, y: &[f64], dy: &[f64]) -> f64 {
-        let Self {
-            model,
-            form,
-            gravity,
-            sources,
-            ..
-        } = self;
-        let mut power = 0.0;
-        match form {
-            Form::Tree { tree, constraints } => {
-                let all = !sources.forces_suffice;
-                if all {
-                    tree.accelerate(model, y, &dy[model.nq..]);
-                    if let Some(constraints) = constraints {
-                        load_reactions(model, tree, |k| constraints.reaction(k));
-                    }
-                }
-                let rates = &tree.driven.coordinates;
-                // Where forces suffice, all that hangs on a drive depends on time alone.
-                let moved = |b: usize| all || model.bodies[b].driven_only;
-                inverse_dynamics(
-                    model,
-                    &tree.motion,
-                    &mut tree.wrench,
-                    gravity,
-                    moved,
-                    |drive, force| power += force * rates[drive].rate,
-                );
-            }
-            Form::Lagrange(lagrange) => {
-                for (i, drive) in model.drives.iter().enumerate() {
-                    power += lagrange.actuator(i) * rate_of(model, &lagrange.motion, drive.body);
-                }
-            }
-        }
-        power
-    }
-}
-
-/// Rate of a driven joint from the motion of the two bodies that it holds.
-fn rate_of(model: &Model, motion: &[Kinematics], b: usize) -> f64 {
-    let body = &model.bodies[b];
-    let (child, parent) = (&motion[b], &motion[body.parent]);
-    let axis = parent.rotation * body.axis;
-    match body.motion {
-        Motion::Driven { revolute: true, .. } => {
-            axis.dot(&(child.angular_velocity - parent.angular_velocity))
-        }
-        _ => {
-            // Of the point of the parent that is at the child's joint point just now.
-            let arm = child.rotation * -body.to_centroid;
-            let at = child.position + arm - parent.position;
-            axis.dot(&(child.point_velocity(&arm) - parent.point_velocity(&at)))
-        }
     }
 }
 

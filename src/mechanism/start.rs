@@ -2,11 +2,10 @@
 
 use super::constraints::Constraints;
 use super::kinematics::{self, Kinematics};
-use super::lagrange::Lagrange;
 use super::model::{self, Model, Motion};
 use super::spcmm::Trajectory;
 use super::tree::Tree;
-use super::{Form, Mechanism, MechanismError, OPEN_AS_GIVEN, load_reactions, power};
+use super::{Mechanism, MechanismError, OPEN_AS_GIVEN};
 use crate::scene::{StartRule, Vec3};
 
 /// Smallest pivot ratio at which a start still has its velocities to three digits.
@@ -121,20 +120,11 @@ impl Mechanism {
             self.check_speeds(&mut tree, &y)?;
         }
         self.assembly = assembly;
-        match &mut self.form {
-            Form::Tree { constraints, .. } => {
-                if let (Some(constraints), Some(rank)) = (constraints, rank) {
-                    constraints.reveal(rank);
-                }
-            }
-            Form::Lagrange(lagrange) => {
-                if let Some(rank) = rank {
-                    lagrange.reveal(rank);
-                }
-                y = Lagrange::state_of(&tree.motion, self.model.bodies.len());
-            }
+        self.rank = rank;
+        if let Some(rank) = rank {
+            self.equations.reveal(rank);
         }
-        Ok(y)
+        Ok(self.equations.state_of(&self.model, y, &tree.motion))
     }
 
     /// Closes the joints of `constraints` from the guess in `y`.
@@ -245,52 +235,16 @@ impl Mechanism {
             factor_at(model, &mut constraints, tree, T, y);
             let names = model.ideal_joints.iter().enumerate();
             let shared = names.filter(|&(k, _)| !constraints.is_unique(k));
-            let names: Vec<&str> = shared.map(|(_, &j)| &*self.joint_names[j]).collect();
             MechanismError::Branching {
-                joints: names.join(", "),
+                joints: shared.map(|(_, &j)| self.joint_names[j].clone()).collect(),
             }
         })
     }
 
     /// Whether the force of actuator `i` is the only one that fits the motion, at the latest evaluation.
     pub fn is_actuator_unique(&mut self, i: usize) -> bool {
-        let Self {
-            model,
-            form,
-            gravity,
-            ..
-        } = self;
-        match form {
-            Form::Lagrange(lagrange) => lagrange.is_actuator_unique(i),
-            Form::Tree { tree, constraints } => {
-                let Some(constraints) = constraints else {
-                    return true;
-                };
-                let mut force_under = |multipliers: Option<&[f64]>| {
-                    tree.wrench.fill(kinematics::Wrench::zero());
-                    if let Some(multipliers) = multipliers {
-                        load_reactions(model, tree, |k| {
-                            Vec3::from_column_slice(&multipliers[3 * k..3 * k + 3])
-                        });
-                    }
-                    let mut force = 0.0;
-                    let Tree { motion, wrench, .. } = &mut **tree;
-                    let found = |drive, value| {
-                        if drive == i {
-                            force = value;
-                        }
-                    };
-                    power::inverse_dynamics(model, motion, wrench, gravity, |_| true, found);
-                    force
-                };
-                let without = force_under(None);
-                constraints.system().idle_multipliers().all(|null| {
-                    let largest = null.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-                    // Of a lever arm of a metre a millionth of it is rounding.
-                    (force_under(Some(null)) - without).abs() <= 1e-6 * largest
-                })
-            }
-        }
+        self.equations
+            .is_actuator_unique(&self.model, &self.gravity, i)
     }
 }
 

@@ -5,13 +5,13 @@
 //! (s I - J) (x_q, x_v) = (b_q, b_v) becomes (s I - M^-1 D - M^-1 K / s) x_v = b_v + M^-1 K T^+ b_q / s,
 //! x_q = (b_q + T x_v) / s, where T maps velocities to position rates.
 
-use super::columns::{Column, collect_columns};
-use super::contacts::Contacts;
+use super::columns::{Column, collect_columns, contact_sides};
+use super::contacts::{Contacts, Touching};
+use super::elements::ForceElement;
+use super::equations::Equations;
 use super::kinematics::Kinematics;
-use super::lagrange::Lagrange;
 use super::lu::Lu;
-use super::model::{Model, Motion};
-use super::tree::Tree;
+use super::model::{BallJoint, Model};
 use crate::contact::Stiffness;
 use crate::scene::Vec3;
 use nalgebra::Complex;
@@ -52,8 +52,8 @@ pub struct Stiff {
 }
 
 impl Stiff {
-    /// For `velocities` velocity coordinates in a state of `dimension`, with `joints` ball joints.
-    pub fn new(velocities: usize, dimension: usize, joints: usize) -> Self {
+    /// For `velocities` velocity coordinates in a state of `dimension`, with as many `couplings` by ball joints and elements.
+    pub fn new(velocities: usize, dimension: usize, couplings: usize) -> Self {
         let n = velocities;
         Self {
             n,
@@ -63,7 +63,7 @@ impl Stiff {
             lu_pair: Lu::new(n),
             columns: Vec::with_capacity(n),
             time_derivative: vec![0.0; dimension],
-            drift: vec![Drift::default(); joints],
+            drift: vec![Drift::default(); couplings],
             derivative: vec![0.0; dimension],
             y: vec![0.0; dimension],
             shift: 1.0,
@@ -77,42 +77,70 @@ impl Stiff {
         }
     }
 
-    /// Generalised stiffness and damping of all contacts, from gaps and forces of the evaluation just made at `y`.
-    /// `visit(body, point, f)` calls f(coordinate, point velocity, angular velocity) for the coordinates that move a body.
+    /// Generalised stiffness and damping of all contacts and elements, from gaps and forces of the evaluation just made at `y`.
     pub fn gather(
         &mut self,
         model: &Model,
         contacts: &Contacts,
-        motion: &[Kinematics],
+        elements: &[Box<dyn ForceElement>],
+        touching: Touching<'_>,
+        equations: &dyn Equations,
         y: &[f64],
-        visit: impl Fn(usize, &Vec3, &mut dyn FnMut(usize, Vec3, Vec3)),
     ) {
+        let motion = equations.motion();
         self.y.copy_from_slice(y);
         self.by_position.fill(0.0);
         self.by_velocity.fill(0.0);
         self.time_derivative.fill(0.0);
         self.empty = true;
         for (j, joint) in model.joints.iter().enumerate() {
-            let Some(stiffness) = contacts.linearise(j, motion) else {
+            let Some(stiffness) = contacts.linearise(j, motion, touching) else {
                 continue;
             };
             self.empty = false;
             let c = contacts.coefficients(j);
             let n = contacts.separation(j).normal;
-            collect_columns(&mut self.columns, c, motion, joint, &n, &visit);
+            let sides = contact_sides(joint, c);
+            collect_columns(&mut self.columns, model, equations, &sides, &n);
             let on_ball = contacts.gaps()[j].force_on_ball(&n);
             self.add(&stiffness, &on_ball, c.reads_surfaces());
             self.add_drift(&stiffness, &on_ball, j);
         }
+        for (i, element) in elements.iter().enumerate() {
+            let Some((ends, coupling)) = element.coupling(motion) else {
+                continue;
+            };
+            self.empty = false;
+            let sides = [(ends[1], 0.0), (ends[0], 0.0)];
+            let nowhere = Vec3::zeros();
+            collect_columns(&mut self.columns, model, equations, &sides, &nowhere);
+            let stiffness = Stiffness::between_points(coupling.by_displacement, coupling.by_rate);
+            self.add(&stiffness, &nowhere, false);
+            self.add_drift(&stiffness, &nowhere, model.joints.len() + i);
+        }
     }
 
     /// Takes how the contacts move with time alone from a motion with all coordinates at rest.
-    pub fn observe_drift(&mut self, model: &Model, motion: &[Kinematics]) {
-        for (drift, joint) in self.drift.iter_mut().zip(&model.joints) {
-            *drift = Drift {
+    pub fn observe_drift(
+        &mut self,
+        model: &Model,
+        elements: &[Box<dyn ForceElement>],
+        motion: &[Kinematics],
+    ) {
+        let of_joints = model.joints.iter().copied().map(Some);
+        let ends = elements.iter().map(|element| element.coupling(motion));
+        let of_elements = ends.map(|found| {
+            found.map(|([from, to], _)| BallJoint {
+                socket: from,
+                ball: to,
+                ideal: None,
+            })
+        });
+        for (drift, joint) in self.drift.iter_mut().zip(of_joints.chain(of_elements)) {
+            *drift = joint.map_or_else(Drift::default, |joint| Drift {
                 eccentricity: joint.opening_rate(motion),
                 rate: joint.opening_acceleration(motion),
-            };
+            });
         }
     }
 
@@ -147,19 +175,19 @@ impl Stiff {
         }
     }
 
-    /// Turns forces into accelerations: `mobilise` maps generalised forces to accelerations in place.
-    pub fn mobilise(&mut self, mut mobilise: impl FnMut(&mut [f64])) {
+    /// Turns forces into accelerations.
+    pub fn apply_inverse_mass(&mut self, model: &Model, equations: &mut dyn Equations) {
         if self.empty {
             return;
         }
         for column in self.by_position.chunks_exact_mut(self.n) {
-            mobilise(column);
+            equations.apply_inverse_mass(model, column);
         }
         for column in self.by_velocity.chunks_exact_mut(self.n) {
-            mobilise(column);
+            equations.apply_inverse_mass(model, column);
         }
         let positions = self.time_derivative.len() - self.n;
-        mobilise(&mut self.time_derivative[positions..]);
+        equations.apply_inverse_mass(model, &mut self.time_derivative[positions..]);
     }
 
     /// Prepares to solve with a real shift s: factors s I - M^-1 D - M^-1 K / s.
@@ -197,15 +225,15 @@ impl Stiff {
         }
     }
 
-    /// Solves (s I - J) x = b in place; `map` goes between position rates and velocities.
-    pub fn solve(&mut self, b: &mut [f64], map: &impl Map) {
+    /// Solves (s I - J) x = b in place.
+    pub fn solve(&mut self, b: &mut [f64], equations: &dyn Equations, model: &Model) {
         let positions = b.len() - self.n;
         let (b_q, b_v) = b.split_at_mut(positions);
         let s = self.shift;
         if self.empty {
             b_v.iter_mut().for_each(|x| *x /= s);
         } else {
-            map.velocities(&self.y, b_q, &mut self.scratch);
+            equations.velocities_of(model, &self.y, b_q, &mut self.scratch);
             for (column, x) in self.by_position.chunks_exact(self.n).zip(&self.scratch) {
                 let x = x / s;
                 for (b, a) in b_v.iter_mut().zip(column) {
@@ -215,14 +243,20 @@ impl Stiff {
             self.lu.solve(b_v);
         }
         self.y[positions..].copy_from_slice(b_v);
-        map.rates(&self.y, &mut self.rate);
+        equations.position_rate(model, &self.y, &mut self.rate);
         for (x, r) in b_q.iter_mut().zip(&self.rate) {
             *x = (*x + r) / s;
         }
     }
 
     /// As [`Self::solve`] with the complex shift, for `re` + i `im`.
-    pub fn solve_pair(&mut self, re: &mut [f64], im: &mut [f64], map: &impl Map) {
+    pub fn solve_pair(
+        &mut self,
+        re: &mut [f64],
+        im: &mut [f64],
+        equations: &dyn Equations,
+        model: &Model,
+    ) {
         let (n, positions) = (self.n, re.len() - self.n);
         let inverse = self.shift_pair.inv();
         let (re_q, re_v) = re.split_at_mut(positions);
@@ -233,8 +267,8 @@ impl Stiff {
         if self.empty {
             self.pair.iter_mut().for_each(|x| *x *= inverse);
         } else {
-            map.velocities(&self.y, re_q, &mut self.scratch);
-            map.velocities(&self.y, im_q, &mut self.scratch_im);
+            equations.velocities_of(model, &self.y, re_q, &mut self.scratch);
+            equations.velocities_of(model, &self.y, im_q, &mut self.scratch_im);
             for (j, column) in self.by_position.chunks_exact(n).enumerate() {
                 let x = inverse * Complex::new(self.scratch[j], self.scratch_im[j]);
                 for (b, a) in self.pair.iter_mut().zip(column) {
@@ -247,9 +281,9 @@ impl Stiff {
             (re_v[i], im_v[i]) = (self.pair[i].re, self.pair[i].im);
         }
         self.y[positions..].copy_from_slice(re_v);
-        map.rates(&self.y, &mut self.rate);
+        equations.position_rate(model, &self.y, &mut self.rate);
         self.y[positions..].copy_from_slice(im_v);
-        map.rates(&self.y, &mut self.rate_im);
+        equations.position_rate(model, &self.y, &mut self.rate_im);
         for i in 0..positions {
             let x = inverse * Complex::new(re_q[i] + self.rate[i], im_q[i] + self.rate_im[i]);
             (re_q[i], im_q[i]) = (x.re, x.im);
@@ -257,74 +291,16 @@ impl Stiff {
     }
 }
 
-/// The two directions between position rates and velocities, at the positions in `y`.
-pub trait Map {
-    /// T^+: velocities from position rates.
-    fn velocities(&self, y: &[f64], rate: &[f64], out: &mut [f64]);
-    /// T: position rates from the velocities in `y`.
-    fn rates(&self, y: &[f64], out: &mut [f64]);
-}
-
-/// [`Map`] of the tree coordinates.
-pub struct TreeMap<'a>(pub &'a Model);
-
-impl Map for TreeMap<'_> {
-    fn velocities(&self, y: &[f64], rate: &[f64], out: &mut [f64]) {
-        for body in &self.0.bodies {
-            match body.motion {
-                Motion::Free { q, v } => {
-                    out[v..v + 3].copy_from_slice(&rate[q..q + 3]);
-                    out[v + 3..v + 6]
-                        .copy_from_slice(&spin_of(&y[q + 3..q + 7], &rate[q + 3..q + 7]));
-                }
-                Motion::Revolute { q, v } | Motion::Prismatic { q, v } => out[v] = rate[q],
-                Motion::Fixed | Motion::Driven { .. } => {}
-            }
-        }
-    }
-
-    fn rates(&self, y: &[f64], out: &mut [f64]) {
-        Tree::position_rate(self.0, y, out);
-    }
-}
-
-/// [`Map`] of body coordinates, for this many bodies.
-pub struct BodyMap(pub usize);
-
-impl Map for BodyMap {
-    fn velocities(&self, y: &[f64], rate: &[f64], out: &mut [f64]) {
-        for b in 0..self.0 {
-            out[6 * b..6 * b + 3].copy_from_slice(&rate[7 * b..7 * b + 3]);
-            let spin = spin_of(&y[7 * b + 3..7 * b + 7], &rate[7 * b + 3..7 * b + 7]);
-            out[6 * b + 3..6 * b + 6].copy_from_slice(&spin);
-        }
-    }
-
-    fn rates(&self, y: &[f64], out: &mut [f64]) {
-        Lagrange::position_rate(self.0, y, out);
-    }
-}
-
-/// omega = 2 vec(q' q*) for a quaternion of about unit length.
-fn spin_of(q: &[f64], d: &[f64]) -> [f64; 3] {
-    let (w, x, y, z) = (q[0], q[1], q[2], q[3]);
-    [
-        2.0 * (-d[0] * x + d[1] * w - d[2] * z + d[3] * y),
-        2.0 * (-d[0] * y + d[1] * z + d[2] * w - d[3] * x),
-        2.0 * (-d[0] * z - d[1] * y + d[2] * x + d[3] * w),
-    ]
-}
-
 #[cfg(test)]
 mod tests {
     use crate::contact::Memory;
     use crate::integrate::{StiffSystem, System};
-    use crate::mechanism::Mechanism;
+    use crate::mechanism::{Mechanism, Touching};
     use crate::scene::Scene;
 
     /// The default scene with its platform lowered until every ball rests 0.2 um deep in its wall and creeps along it.
     /// The memory of each contact holds `remembered`, m/s.
-    fn resting(changes: &[(&str, &str)], remembered: f64) -> (Mechanism, Vec<f64>) {
+    fn resting(changes: &[(&str, &str)], remembered: f64) -> (Mechanism, Vec<f64>, [Memory; 3]) {
         let changes: Vec<(String, String)> = changes
             .iter()
             .map(|(k, v)| ((*k).to_owned(), (*v).to_owned()))
@@ -338,15 +314,13 @@ mod tests {
         for (i, slip) in [2e-7, 3e-5, -4e-5].iter().enumerate() {
             y[v + i] += slip;
         }
-        for memory in mechanism.contacts.memory_mut() {
-            *memory = Memory {
-                active: true,
-                approach_speed: remembered,
-                floored: true,
-                ..Memory::default()
-            };
-        }
-        (mechanism, y)
+        let memory = Memory {
+            active: true,
+            approach_speed: remembered,
+            floored: true,
+            ..Memory::default()
+        };
+        (mechanism, y, [memory; 3])
     }
 
     #[test]
@@ -363,12 +337,13 @@ mod tests {
                 ("contact.friction_velocity", surface),
                 ("contact.approach_speed", approach),
             ];
-            let (mut m, y) = resting(&changes, remembered);
+            let (mut m, y, memory) = resting(&changes, remembered);
             let (t, nq) = (0.0, m.positions());
             m.measure(t, &y);
             let rises = m.contacts.gaps().iter().all(|gap| gap.rate > remembered);
             assert_eq!(rises, remembered < 1e-6);
-            m.linearise(t, &y);
+            let touching = Touching::Located(&memory);
+            m.evaluator(touching).linearise(t, &y);
             let stiff = m.stiff.take().unwrap();
             let n = stiff.n;
             let (mut plus, mut minus) = (vec![0.0; y.len()], vec![0.0; y.len()]);
@@ -393,7 +368,7 @@ mod tests {
                     let mut step = vec![0.0; n];
                     step[l] = sign * 1e-10;
                     crate::mechanism::Tree::displace(&m.model, &mut z, &step);
-                    m.derivative(t, &z, out);
+                    m.evaluator(touching).derivative(t, &z, out);
                 };
                 moved(1.0, &mut plus);
                 moved(-1.0, &mut minus);
@@ -408,7 +383,7 @@ mod tests {
                 let mut faster = |sign: f64, out: &mut [f64]| {
                     let mut z = y.clone();
                     z[nq + l] += sign * 1e-8;
-                    m.derivative(t, &z, out);
+                    m.evaluator(touching).derivative(t, &z, out);
                 };
                 faster(1.0, &mut plus);
                 faster(-1.0, &mut minus);
@@ -421,8 +396,9 @@ mod tests {
                     1e-8,
                 );
             }
-            m.derivative(t + 1e-9, &y, &mut plus);
-            m.derivative(t - 1e-9, &y, &mut minus);
+            let mut evaluator = m.evaluator(touching);
+            evaluator.derivative(t + 1e-9, &y, &mut plus);
+            evaluator.derivative(t - 1e-9, &y, &mut minus);
             compare(
                 "ft",
                 &stiff.time_derivative[nq..],

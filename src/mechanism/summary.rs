@@ -1,6 +1,6 @@
 //! What a scene contains and what will be computed for it.
 
-use super::{Form, Mechanism};
+use super::Mechanism;
 
 /// Counts for `jointplay check` and for tests that a scene pays only for what it has.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -36,18 +36,9 @@ pub struct Summary {
 impl Summary {
     pub(super) fn new(mechanism: &Mechanism) -> Self {
         let model = &mechanism.model;
-        let (velocity_coordinates, position_coordinates, constraint_rows) = match &mechanism.form {
-            Form::Tree { constraints, .. } => (
-                model.nv,
-                model.nq,
-                constraints.as_ref().map_or(0, |c| c.rows()),
-            ),
-            Form::Lagrange(l) => (
-                6 * model.bodies.len(),
-                7 * model.bodies.len(),
-                l.row_count(),
-            ),
-        };
+        let equations = &mechanism.equations;
+        let velocity_coordinates = equations.velocities(model);
+        let (constraint_rows, rank) = (equations.rows(), equations.rank());
         let contacts: Vec<usize> = (0..model.joints.len())
             .filter(|&j| mechanism.contacts.has_clearance(j))
             .collect();
@@ -56,10 +47,10 @@ impl Summary {
             driven_bodies: model.bodies.iter().filter(|b| b.driven_only).count(),
             drives: model.drives.len(),
             velocity_coordinates,
-            position_coordinates,
+            position_coordinates: equations.positions(model),
             constraint_rows,
-            dependent_rows: constraint_rows - mechanism.rank(),
-            degrees_of_freedom: velocity_coordinates.saturating_sub(mechanism.rank()),
+            dependent_rows: constraint_rows - rank,
+            degrees_of_freedom: velocity_coordinates.saturating_sub(rank),
             ideal_joints: model.ideal_joints.len(),
             frictional_contacts: contacts
                 .iter()

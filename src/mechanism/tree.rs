@@ -3,7 +3,6 @@
 //! Mass matrix by composite rigid bodies, bias by one pass outward and one inward (Featherstone 2008, chapters 5 and 6),
 //! in world axes with each body's own centroid as reference. Allocates nothing after `new`.
 
-use super::contacts::Contacts;
 use super::kinematics::{self, Driven, Kinematics, Wrench};
 use super::model::{Model, Motion};
 use crate::scene::{Mat3, Vec3};
@@ -133,13 +132,6 @@ impl Tree {
                 }
             };
         }
-    }
-
-    /// Contact forces of the latest [`Self::forward`] as loads on the bodies.
-    #[inline]
-    pub fn load(&mut self, t: f64, contacts: &mut Contacts) {
-        self.wrench.fill(Wrench::zero());
-        contacts.evaluate(t, &self.motion, &mut self.wrench);
     }
 
     /// Mass matrices, factored, and generalised forces (loads, gravity, bias) into `out`.

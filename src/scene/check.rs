@@ -1,6 +1,5 @@
 //! What must hold between the parameters of a scene, and what is allowed but doubtful.
 
-use super::access::contact_value;
 use super::error::{line_text, place_of};
 use super::*;
 use crate::contact::{self, FrictionLaw, FrictionVelocity, NormalLaw};
@@ -40,25 +39,24 @@ impl Scene {
         Ok(())
     }
 
-    /// Choices that are allowed but may not mean what the user expects, one sentence each: [`Self::doubts`], and what
-    /// makes a run slow.
-    pub fn warnings(&self) -> Vec<String> {
+    /// Choices that are allowed but may not mean what the user expects: [`Self::doubts`], and what makes a run slow.
+    pub fn warnings(&self) -> Vec<Warning> {
         let doubts = self.doubts().into_iter();
-        let mut warnings: Vec<String> = doubts.map(|doubt| doubt.to_string()).collect();
+        let mut warnings: Vec<Warning> = doubts.map(Warning::Doubt).collect();
         let doubts = warnings.len();
         for (joints, contact) in self.contact_groups() {
             if warnings.len() - doubts >= MOST_LISTED {
-                warnings.push(Doubt::MoreJoints.to_string());
+                warnings.push(Warning::Doubt(Doubt::MoreJoints));
                 break;
             }
             if contact.clearance > 0.0
                 && contact.slip_speed_high < 1e-6
                 && contact.friction_law == FrictionLaw::ModifiedCoulomb
             {
-                warnings.push(format!(
-                    "{joints}: slip_speed_high {} makes friction very stiff; expect small steps.",
-                    format_quantity(contact.slip_speed_high, "mm/s")
-                ));
+                warnings.push(Warning::StiffFriction {
+                    joints,
+                    slip_speed_high: contact.slip_speed_high,
+                });
             }
         }
         warnings
@@ -347,9 +345,7 @@ fn check_contact(contact: &contact::Parameters) -> Result<(), ([&'static str; 2]
     }
     let divides = matches!(contact.normal_law, NormalLaw::Flores | NormalLaw::Gonthier);
     if divides && contact.restitution == 0.0 {
-        let Value::Choice(law) = contact_value(contact, "normal_law") else {
-            unreachable!("a law is a choice")
-        };
+        let law = contact.normal_law;
         return Err((
             ["restitution", "normal_law"],
             format!(

@@ -3,6 +3,7 @@
 use super::error::{brief, line_text, nearest, place_of};
 use super::units::{QuantityError, parse_quantity};
 use super::{Dimension, SceneError, Vec3, find};
+use crate::words::Words;
 use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -206,7 +207,13 @@ impl<'d> Node<'d> {
         let value = read.map_err(|error| self.error(error.to_string()))?;
         let moves = !matches!(
             dimension,
-            Dimension::Mass | Dimension::Inertia | Dimension::Stress
+            Dimension::Mass
+                | Dimension::Inertia
+                | Dimension::Stress
+                | Dimension::Force
+                | Dimension::Torque
+                | Dimension::Stiffness
+                | Dimension::Damping
         );
         if moves && value.abs() > MAX_SI {
             let limit = super::format_quantity(MAX_SI, super::si_unit(dimension));
@@ -228,14 +235,14 @@ impl<'d> Node<'d> {
         )))
     }
 
-    /// One of some words, as its place among them.
-    pub fn choice(&self, words: &[&str]) -> Result<usize, SceneError> {
+    /// One of the words of an enum.
+    pub fn word<T: Words>(&self) -> Result<T, SceneError> {
         let text = self.text()?;
-        words.iter().position(|word| *word == text).ok_or_else(|| {
-            let near = nearest(text, words.iter().copied());
+        T::of_word(text).ok_or_else(|| {
+            let near = nearest(text, T::WORDS.iter().copied());
             self.error(format!(
                 "is not one of the choices{near}; allowed {}",
-                words.join(", ")
+                T::WORDS.join(", ")
             ))
         })
     }
@@ -350,7 +357,7 @@ impl<'d> Node<'d> {
 
     /// Checks the choice that the key `name` of a table makes, if it is there: it decides which other keys there may be, so
     /// a wrong word is to be named before any of these.
-    pub fn check_choice(&self, path: &str, name: &str, words: &[&str]) -> Result<(), SceneError> {
+    pub fn check_word<T: Words>(&self, path: &str, name: &str) -> Result<(), SceneError> {
         let table = self.value.get_ref().as_table();
         let Some(value) = table.and_then(|table| table.get(name)) else {
             return Ok(());
@@ -360,7 +367,7 @@ impl<'d> Node<'d> {
             key: format!("{path}.{name}"),
             value,
         };
-        node.choice(words).map(|_| ())
+        node.word::<T>().map(|_| ())
     }
 
     /// Text of the `name` key of a table, for the paths of its keys; the array index where there is none yet.
@@ -379,7 +386,7 @@ impl<'d> Node<'d> {
         // A count and a pure number may stand bare; text and bare numbers read alike.
         parameter
             .read(self.scalar()?)
-            .map_err(|message| self.error(message))
+            .map_err(|error| self.error(error.to_string()))
     }
 }
 

@@ -2,7 +2,6 @@
 
 use std::fmt;
 
-use super::access::normal_law_word;
 use super::format_quantity;
 use crate::contact::{self, NormalLaw};
 
@@ -72,7 +71,7 @@ impl fmt::Display for Doubt {
                 f,
                 "{joints}: restitution {restitution} with {}, which is right only near 1 (asked for 0, it gives about \
                  {:.2}); flores or gonthier suit low restitution.",
-                normal_law_word(*law),
+                law.word(),
                 contact::restitution_given(contact::damping_factor(*law, 0.0))
             ),
             Self::Clearance {
@@ -121,6 +120,59 @@ impl fmt::Display for Doubt {
             Self::Tolerance { tolerance, loosest } => write!(
                 f,
                 "solver.tolerance {tolerance:e}: impacts may gain or lose much of their energy; use {loosest:e} or less."
+            ),
+        }
+    }
+}
+
+/// What a person should know before a run: why its result is not to be trusted, or what makes it slow. Its `Display` is a
+/// sentence.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Warning {
+    /// Speaks against the result.
+    Doubt(Doubt),
+    /// A ramp of friction that asks for small steps.
+    StiffFriction {
+        /// Names of the joints.
+        joints: String,
+        /// `slip_speed_high`, m/s.
+        slip_speed_high: f64,
+    },
+}
+
+/// What kind a warning is of: another one of the same kind differs in numbers and names alone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct WarningKind(Option<std::mem::Discriminant<Doubt>>);
+
+impl Warning {
+    /// Its kind.
+    pub fn kind(&self) -> WarningKind {
+        WarningKind(match self {
+            Self::Doubt(doubt) => Some(std::mem::discriminant(doubt)),
+            Self::StiffFriction { .. } => None,
+        })
+    }
+
+    /// Whether it goes away with other `[solver]` settings.
+    pub fn is_about_solver(&self) -> bool {
+        matches!(
+            self,
+            Self::Doubt(Doubt::Step { .. } | Doubt::Tolerance { .. })
+        )
+    }
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Doubt(doubt) => doubt.fmt(f),
+            Self::StiffFriction {
+                joints,
+                slip_speed_high,
+            } => write!(
+                f,
+                "{joints}: slip_speed_high {} makes friction very stiff; expect small steps.",
+                format_quantity(*slip_speed_high, "mm/s")
             ),
         }
     }

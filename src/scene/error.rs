@@ -1,6 +1,6 @@
 //! Errors in scenes and parameters: file, line, column, key, value, range, unit.
 
-use super::words::{visible, visible_line};
+use super::visible::{visible, visible_line};
 use std::fmt;
 
 /// What is wrong with a scene or a parameter value, in a form a person can act on.
@@ -147,4 +147,20 @@ pub(super) fn nearest_parameter<'a>(
         Some(key) => format!(" (did you mean `{key}`?)"),
         None => near,
     }
+}
+
+/// "No such body", with the nearest name and all names.
+pub(super) fn no_body<'a>(wanted: &str, names: impl Iterator<Item = &'a str> + Clone) -> String {
+    let near = nearest(wanted, names.clone());
+    let listed: Vec<&str> = names.clone().take(12).collect();
+    let more = if names.count() > listed.len() {
+        ", …"
+    } else {
+        ""
+    };
+    format!(
+        "no body `{}`{near}; bodies: {}{more}",
+        brief(wanted),
+        listed.join(", ")
+    )
 }

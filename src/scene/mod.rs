@@ -7,7 +7,9 @@ mod chain;
 mod check;
 mod document;
 mod doubt;
+mod elements;
 mod error;
+mod field;
 mod load;
 mod model;
 mod parameters;
@@ -18,18 +20,19 @@ mod table;
 #[cfg(test)]
 mod tests;
 mod units;
-mod words;
+mod visible;
 mod write;
 
 pub use check::least_impact_steps;
-pub use doubt::Doubt;
+pub use doubt::{Doubt, Warning, WarningKind};
+pub use elements::{ELEMENT_KINDS, Element, ElementKind, ElementNumber, element_table};
 pub use error::SceneError;
 pub use load::*;
 pub use model::*;
 pub use parameters::*;
 pub use table::table;
 pub use units::*;
-pub use words::{visible, visible_line};
+pub use visible::{visible, visible_line};
 
 use table::find;
 

@@ -1,7 +1,9 @@
 //! What a scene is, typed and in SI units. `read.rs` makes one from a file, `parameters.rs` changes one by key.
 
+use crate::words::words;
 use std::collections::BTreeMap;
 
+use super::Element;
 use crate::contact;
 use crate::integrate::Method;
 
@@ -48,6 +50,8 @@ pub struct Scene {
     pub joints: Vec<Joint>,
     /// The cut joints.
     pub ball_joints: Vec<BallJoint>,
+    /// Force elements: springs, outside loads.
+    pub elements: Vec<Element>,
     /// Shapes that do not move (rails, frame), world axes.
     pub fixed_shapes: Vec<Shape>,
     /// Text the scene was read from, and where: a reset reads it again with the changes.
@@ -66,6 +70,11 @@ pub enum StartRule {
     /// that follow from the drives.
     Ideal,
 }
+
+words!(StartRule {
+    AsGiven => "as-given",
+    Ideal => "ideal",
+});
 
 /// Where a scene's text came from.
 #[derive(Clone, Debug, Default)]
@@ -88,6 +97,11 @@ pub enum Formulation {
     Lagrange,
 }
 
+words!(Formulation {
+    Tree => "tree",
+    Lagrange => "lagrange",
+});
+
 /// Named point on the front of speed against accuracy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Preset {
@@ -100,6 +114,13 @@ pub enum Preset {
     /// To measure the others against.
     Reference,
 }
+
+words!(Preset {
+    Preview => "preview",
+    RealTime => "real-time",
+    Accurate => "accurate",
+    Reference => "reference",
+});
 
 /// Stepper settings. An explicit method, step or tolerance beats the preset.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -117,19 +138,6 @@ pub struct Solver {
 }
 
 impl Preset {
-    /// All of them, from fast to accurate.
-    pub const ALL: [Self; 4] = [
-        Self::Preview,
-        Self::RealTime,
-        Self::Accurate,
-        Self::Reference,
-    ];
-
-    /// Word of `solver.preset`.
-    pub fn word(self) -> &'static str {
-        super::table::PRESETS[self as usize]
-    }
-
     /// Method, step (s) and tolerance of the preset, chosen by measurement (`docs/tradeoff.md`).
     pub fn point(self) -> (Method, f64, f64) {
         match self {
@@ -182,6 +190,15 @@ pub enum SignedAxis {
     PlusZ,
     MinusZ,
 }
+
+words!(SignedAxis {
+    PlusX => "+x",
+    MinusX => "-x",
+    PlusY => "+y",
+    MinusY => "-y",
+    PlusZ => "+z",
+    MinusZ => "-z",
+});
 
 impl SignedAxis {
     /// Unit vector, world axes.
@@ -245,6 +262,17 @@ pub enum Role {
     Rail,
     Frame,
 }
+
+words!(Role {
+    Slider => "slider",
+    DrivingRod => "driving-rod",
+    DrivenRod => "driven-rod",
+    Platform => "platform",
+    Pin => "pin",
+    Probe => "probe",
+    Rail => "rail",
+    Frame => "frame",
+});
 
 /// A drawn shape in its body's frame (or the world's).
 #[derive(Clone, Debug, PartialEq)]
@@ -349,6 +377,13 @@ pub enum JointKind {
     /// Six degrees of freedom.
     Free,
 }
+
+words!(JointKind {
+    Fixed => "fixed",
+    Prismatic => "prismatic",
+    Revolute => "revolute",
+    Free => "free",
+});
 
 /// Start of a joint.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,8 +1,9 @@
 //! The one table of scene parameters: files, `--set`, sliders, tooltips and the reference page are made from it.
 
 use super::error::nearest;
+use super::field::Access;
 use super::table::table;
-use super::units::{exact_quantity, format_quantity, parse_quantity, unit_names};
+use super::units::{QuantityError, exact_quantity, format_quantity, parse_quantity, unit_names};
 
 /// A parameter's value in SI units.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,6 +43,14 @@ pub enum Dimension {
     Acceleration,
     /// Hz
     Frequency,
+    /// N
+    Force,
+    /// N m
+    Torque,
+    /// N/m
+    Stiffness,
+    /// N s/m
+    Damping,
 }
 
 /// What kind of value a parameter takes.
@@ -103,6 +112,8 @@ impl Scope {
 pub struct Parameter {
     /// Key, e.g. `contact.clearance`.
     pub key: &'static str,
+    /// Where a scene keeps its value.
+    pub(super) access: Access,
     /// Sentence-case name for the interface, e.g. "Clearance".
     pub label: &'static str,
     /// Heading it stands under, e.g. "Contact".
@@ -119,6 +130,39 @@ pub struct Parameter {
     pub help: &'static str,
     /// Which equation it enters, e.g. "paper eqs. (9), (10)".
     pub equation: &'static str,
+}
+
+/// Why a text or a value is none for a parameter.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{fault}; {allowed}")]
+pub struct ValueError {
+    /// What is wrong.
+    pub fault: ValueFault,
+    /// What is allowed, in words.
+    pub allowed: String,
+}
+
+/// What is wrong with a value.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ValueFault {
+    /// No quantity of the right dimension.
+    #[error("{0}")]
+    Quantity(#[from] QuantityError),
+    /// Out of range.
+    #[error("out of range")]
+    OutOfRange,
+    /// No whole number.
+    #[error("is not a whole number")]
+    NotWhole,
+    /// None of the choices; the nearest, as errors say it.
+    #[error("is not one of the choices{nearest}")]
+    NoChoice {
+        /// In brackets, or nothing.
+        nearest: String,
+    },
+    /// A number for a choice, or the like.
+    #[error("is of the wrong kind")]
+    WrongKind,
 }
 
 impl Parameter {
@@ -184,41 +228,35 @@ impl Parameter {
     ///
     /// # Errors
     /// What is wrong and what is allowed, without the key.
-    pub fn read(&self, text: &str) -> Result<Value, String> {
+    pub fn read(&self, text: &str) -> Result<Value, ValueError> {
         let text = text.trim();
         let value = match self.kind {
             Kind::Number { dimension, .. } => {
-                let number = parse_quantity(text, dimension)
-                    .map_err(|error| format!("{error}; allowed {}", self.range()))?;
+                let number = parse_quantity(text, dimension).map_err(|error| ValueError {
+                    fault: error.into(),
+                    // The error has said the units.
+                    allowed: format!("allowed {}", self.range()),
+                })?;
                 Value::Number(number)
             }
             Kind::Count { .. } => match text.parse::<u64>() {
                 Ok(count) => Value::Count(count),
-                Err(_) => {
-                    let whole = text.parse::<i128>().is_ok();
-                    let what = if whole {
-                        "out of range"
-                    } else {
-                        "is not a whole number"
-                    };
-                    return Err(format!("{what}; {}", self.allowed()));
+                Err(_) if text.parse::<i128>().is_ok() => {
+                    return Err(self.refuse(ValueFault::OutOfRange));
                 }
+                Err(_) => return Err(self.refuse(ValueFault::NotWhole)),
             },
             Kind::Choice(words) => {
                 // "+x" is also what "x" means.
                 let word = text.to_lowercase();
-                match words.iter().find(|choice| {
+                let found = words.iter().find(|choice| {
                     **choice == word || choice.strip_prefix('+') == Some(word.as_str())
-                }) {
-                    Some(choice) => Value::Choice(choice),
-                    None => {
-                        return Err(format!(
-                            "is not one of the choices{}; {}",
-                            nearest(text, words.iter().copied()),
-                            self.allowed()
-                        ));
-                    }
-                }
+                });
+                let Some(choice) = found else {
+                    let nearest = nearest(text, words.iter().copied());
+                    return Err(self.refuse(ValueFault::NoChoice { nearest }));
+                };
+                Value::Choice(choice)
             }
         };
         self.check(&value)?;
@@ -229,17 +267,24 @@ impl Parameter {
     ///
     /// # Errors
     /// What is wrong and what is allowed, without the key.
-    pub fn check(&self, value: &Value) -> Result<(), String> {
+    pub fn check(&self, value: &Value) -> Result<(), ValueError> {
         let fine = match (self.kind, value) {
             (Kind::Number { min, max, .. }, Value::Number(number)) => (min..=max).contains(number),
             (Kind::Count { min, max }, Value::Count(count)) => (min..=max).contains(count),
             (Kind::Choice(words), Value::Choice(word)) => words.contains(word),
-            _ => return Err(format!("is of the wrong kind; {}", self.allowed())),
+            _ => return Err(self.refuse(ValueFault::WrongKind)),
         };
         if fine {
             Ok(())
         } else {
-            Err(format!("out of range; {}", self.allowed()))
+            Err(self.refuse(ValueFault::OutOfRange))
+        }
+    }
+
+    fn refuse(&self, fault: ValueFault) -> ValueError {
+        ValueError {
+            fault,
+            allowed: self.allowed(),
         }
     }
 

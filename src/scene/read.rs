@@ -1,7 +1,8 @@
 //! A scene from its TOML text: settings first, then bodies, joints and ball joints.
 
 use super::document::{Document, Node, Section};
-use super::error::{brief, nearest, place_of};
+use super::elements::read_element;
+use super::error::{no_body, place_of};
 use super::read_bodies::{read_body, read_shape};
 use super::read_joints::{BallJointText, JointText, read_ball_joint, read_joint, sort_forest};
 use super::*;
@@ -10,7 +11,7 @@ use std::path::Path;
 use toml::de::DeTable;
 
 /// Keys at the top of a file.
-const TOP: [&str; 16] = [
+const TOP: [&str; 18] = [
     "name",
     "title",
     "description",
@@ -27,6 +28,8 @@ const TOP: [&str; 16] = [
     "joint",
     "ball_joint",
     "fixed_shape",
+    "spring",
+    "load",
 ];
 
 /// Keys of `[spcmm]` that are no parameters: the file's bodies are built to these dimensions.
@@ -128,14 +131,8 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
         Some(node) => node.name()?.to_owned(),
         None => visible_line(stem.unwrap_or("scene")).into_owned(),
     };
-    let start = match top
-        .get("start")
-        .map(|node| node.choice(&["as-given", "ideal"]))
-        .transpose()?
-    {
-        Some(1) => StartRule::Ideal,
-        _ => StartRule::AsGiven,
-    };
+    let start = top.get("start").map(|node| node.word()).transpose()?;
+    let start: StartRule = start.unwrap_or_default();
     let spcmm = match top.get("spcmm") {
         None => None,
         Some(node) => {
@@ -210,6 +207,7 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
         bodies: Vec::new(),
         joints: Vec::new(),
         ball_joints: Vec::new(),
+        elements: Vec::new(),
         fixed_shapes: Vec::new(),
         source: Source {
             file: document.file.map(str::to_owned),
@@ -258,13 +256,13 @@ fn read_parameters<'d>(top: &Section<'d>, scene: &mut Scene) -> Result<Places<'d
             .filter(|parameter| parameter.key != "solver.preset")
     };
     for parameter in others() {
-        write(scene, parameter.key, &default_of(parameter, &sections));
+        scene.write(parameter, &default_of(parameter, &sections));
     }
     for parameter in preset.chain(others()) {
         let Some(node) = find_node(parameter.key) else {
             continue;
         };
-        write(scene, parameter.key, &node.parameter(parameter.key)?);
+        scene.write(parameter, &node.parameter(parameter.key)?);
         places.insert(parameter.key.to_owned(), node);
     }
     Ok(places)
@@ -276,19 +274,6 @@ fn default_of(parameter: &Parameter, sections: &BTreeMap<&str, Section<'_>>) -> 
         Value::Number(0.0)
     } else {
         parameter.default.clone()
-    }
-}
-
-fn write(scene: &mut Scene, key: &'static str, value: &Value) {
-    let there = match find(key).map(|parameter| parameter.scope) {
-        Some(Scope::Spcmm) => scene.spcmm.is_some(),
-        Some(Scope::Chain) => scene.chain.is_some(),
-        _ => true,
-    };
-    match key.strip_prefix("contact.") {
-        Some(part) => scene.set_contact(part, value),
-        None if there => scene.write(key, value),
-        None => {}
     }
 }
 
@@ -355,6 +340,14 @@ fn read_mechanism<'d>(
         scene.ball_joints.push(joint);
         places.extend(own);
     }
+    let mut element_names = Names::default();
+    for kind in &ELEMENT_KINDS {
+        for node in list(kind.section, MOST_ELEMENTS, "force elements")? {
+            let (element, section) = read_element(&node, kind, scene, &by_name)?;
+            element_names.add(&section, kind.section, &element.name)?;
+            scene.elements.push(element);
+        }
+    }
     for node in list("fixed_shape", MOST_SHAPES, "shapes")? {
         let shape = read_shape(&node, scene.spcmm.as_ref())?;
         scene.fixed_shapes.push(shape);
@@ -417,22 +410,6 @@ fn read_output(
         .transpose()?;
     scene.output = Output { body, probe };
     Ok(())
-}
-
-/// "No such body", with the nearest name and all names.
-pub(super) fn no_body<'a>(wanted: &str, names: impl Iterator<Item = &'a str> + Clone) -> String {
-    let near = nearest(wanted, names.clone());
-    let listed: Vec<&str> = names.clone().take(12).collect();
-    let more = if names.count() > listed.len() {
-        ", …"
-    } else {
-        ""
-    };
-    format!(
-        "no body `{}`{near}; bodies: {}{more}",
-        brief(wanted),
-        listed.join(", ")
-    )
 }
 
 /// Names seen so far, with where they stand in the text: no two may be equal.

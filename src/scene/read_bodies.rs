@@ -2,30 +2,27 @@
 
 use super::document::{Node, Section};
 use super::*;
+use crate::words::words;
 
-/// Words of [`Role`], in its order.
-const ROLE_WORDS: [&str; 8] = [
-    "slider",
-    "driving-rod",
-    "driven-rod",
-    "platform",
-    "pin",
-    "probe",
-    "rail",
-    "frame",
-];
-const ROLES: [Role; 8] = [
-    Role::Slider,
-    Role::DrivingRod,
-    Role::DrivenRod,
-    Role::Platform,
-    Role::Pin,
-    Role::Probe,
-    Role::Rail,
-    Role::Frame,
-];
+/// Forms of a shape.
+#[derive(Clone, Copy, PartialEq)]
+enum Form {
+    Capsule,
+    Cylinder,
+    Cone,
+    Box,
+    Sphere,
+    Plate,
+}
 
-const FORMS: [&str; 6] = ["capsule", "cylinder", "cone", "box", "sphere", "plate"];
+words!(Form {
+    Capsule => "capsule",
+    Cylinder => "cylinder",
+    Cone => "cone",
+    Box => "box",
+    Sphere => "sphere",
+    Plate => "plate",
+});
 
 /// Largest mass, kg, and inertia, kg m^2, that a file may give: beyond them only typing slips lie.
 const MAX_MASS: f64 = 1e9;
@@ -126,19 +123,19 @@ pub(super) fn read_shape(node: &Node<'_>, spcmm: Option<&Spcmm>) -> Result<Shape
         "thickness",
     ];
     known.extend(spcmm.map(|_| "at_slider_plane"));
-    node.check_choice(&node.key, "role", &ROLE_WORDS)?;
-    node.check_choice(&node.key, "form", &FORMS)?;
+    node.check_word::<Role>(&node.key, "role")?;
+    node.check_word::<Form>(&node.key, "form")?;
     let section = node.section(&known)?;
     let role_node = section.require("role", "\"frame\"")?;
-    let role = ROLES[role_node.choice(&ROLE_WORDS)?];
+    let role = role_node.word::<Role>()?;
     let form_node = section.require("form", "\"capsule\"")?;
-    let form = FORMS[form_node.choice(&FORMS)?];
+    let form = form_node.word::<Form>()?;
 
     let needs: &[&str] = match form {
-        "box" => &["centre", "size"],
-        "sphere" => &["centre", "radius"],
-        "plate" => &["corners", "thickness"],
-        _ => &["from", "to", "radius"],
+        Form::Box => &["centre", "size"],
+        Form::Sphere => &["centre", "radius"],
+        Form::Plate => &["corners", "thickness"],
+        Form::Capsule | Form::Cylinder | Form::Cone => &["from", "to", "radius"],
     };
     for name in [
         "from",
@@ -175,7 +172,7 @@ pub(super) fn read_shape(node: &Node<'_>, spcmm: Option<&Spcmm>) -> Result<Shape
             .positive(Dimension::Length, 1000.0, "m")
     };
     let geometry = match form {
-        "box" => {
+        Form::Box => {
             let node = section.require("size", "\"10 20 30 mm\"")?;
             let size = node.vector(Dimension::Length)?;
             if size.min() <= 0.0 {
@@ -186,11 +183,11 @@ pub(super) fn read_shape(node: &Node<'_>, spcmm: Option<&Spcmm>) -> Result<Shape
                 size,
             }
         }
-        "sphere" => Geometry::Sphere {
+        Form::Sphere => Geometry::Sphere {
             centre: point("centre")?,
             radius: size("radius")?,
         },
-        "plate" => {
+        Form::Plate => {
             let node =
                 section.require("corners", "[\"0 0 0 mm\", \"10 0 0 mm\", \"0 10 0 mm\"]")?;
             let corners = node
@@ -209,14 +206,14 @@ pub(super) fn read_shape(node: &Node<'_>, spcmm: Option<&Spcmm>) -> Result<Shape
                 thickness: size("thickness")?,
             }
         }
-        _ => {
+        Form::Capsule | Form::Cylinder | Form::Cone => {
             let (from, to, radius) = (point("from")?, point("to")?, size("radius")?);
-            if from == to && form != "capsule" {
+            if from == to && form != Form::Capsule {
                 return Err(section.error("to", format!("a {form} needs two different ends")));
             }
             match form {
-                "capsule" => Geometry::Capsule { from, to, radius },
-                "cylinder" => Geometry::Cylinder { from, to, radius },
+                Form::Capsule => Geometry::Capsule { from, to, radius },
+                Form::Cylinder => Geometry::Cylinder { from, to, radius },
                 _ => Geometry::Cone { from, to, radius },
             }
         }

@@ -1,15 +1,26 @@
 //! Tree joints and ball joints of a scene file, and the forest they make.
 
-use super::access::set_contact_value;
 use super::document::{Node, Section};
-use super::read::no_body;
-use super::table::contact_part;
+use super::error::no_body;
+use super::table::contact_rows;
 use super::*;
+use crate::words::words;
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 
-const LAWS: [&str; 3] = ["spcmm", "constant", "harmonic"];
-const KINDS: [&str; 4] = ["fixed", "prismatic", "revolute", "free"];
+/// Laws of a drive.
+#[derive(Clone, Copy)]
+enum Law {
+    Spcmm,
+    Constant,
+    Harmonic,
+}
+
+words!(Law {
+    Spcmm => "spcmm",
+    Constant => "constant",
+    Harmonic => "harmonic",
+});
 
 /// Highest frequency of a harmonic drive, Hz.
 const FASTEST_DRIVE: f64 = 1e4;
@@ -49,15 +60,10 @@ pub(super) fn read_joint<'d>(
         "start",
     ];
     let title = node.title("joint");
-    node.check_choice(&title, "kind", &KINDS)?;
+    node.check_word::<JointKind>(&title, "kind")?;
     let section = node.section_as(title, &known)?;
     let name = section.require("name", "\"P1\"")?.name()?.to_owned();
-    let kind = match KINDS[section.require("kind", "\"revolute\"")?.choice(&KINDS)?] {
-        "fixed" => JointKind::Fixed,
-        "prismatic" => JointKind::Prismatic,
-        "revolute" => JointKind::Revolute,
-        _ => JointKind::Free,
-    };
+    let kind: JointKind = section.require("kind", "\"revolute\"")?.word()?;
     let child_node = section.require("child", "\"rod\"")?;
     let place = |node: &Node<'_>, also| {
         let wanted = node.text()?;
@@ -198,10 +204,10 @@ fn read_drive(
         "frequency",
         "phase",
     ];
-    node.check_choice(&node.key, "law", &LAWS)?;
+    node.check_word::<Law>(&node.key, "law")?;
     let law = node.section(&all)?.require("law", "\"constant\"")?;
-    Ok(match law.choice(&LAWS)? {
-        0 => {
+    Ok(match law.word::<Law>()? {
+        Law::Spcmm => {
             let section = node.section(&["law", "slider"])?;
             if kind != JointKind::Prismatic {
                 return Err(law.error("the law spcmm drives prismatic joints only"));
@@ -219,7 +225,7 @@ fn read_drive(
                 }
             }
         }
-        1 => {
+        Law::Constant => {
             let section = node.section(&["law", "position", "velocity"])?;
             let like = match kind {
                 JointKind::Revolute => "\"6 rad/s\"",
@@ -232,7 +238,7 @@ fn read_drive(
                 velocity: section.require("velocity", like)?.quantity(rate)?,
             }
         }
-        _ => {
+        Law::Harmonic => {
             let section = node.section(&["law", "mean", "amplitude", "frequency", "phase"])?;
             let like = match kind {
                 JointKind::Revolute => "\"10 deg\"",
@@ -450,6 +456,32 @@ pub(super) fn sort_forest(
     ))
 }
 
+/// A point on a body or the world, under `key`; `bodies` maps names to places in the sorted scene.
+pub(super) fn read_attachment(
+    section: &Section<'_>,
+    key: &str,
+    scene: &Scene,
+    bodies: &BTreeMap<String, usize>,
+) -> Result<Attachment, SceneError> {
+    let part = section
+        .require(key, "{ body = \"rod\", at = \"0 0 100 mm\" }")?
+        .section(&["body", "at"])?;
+    let body_node = part.require("body", "\"rod\"")?;
+    let wanted = body_node.text()?;
+    let body = match (wanted, bodies.get(wanted)) {
+        ("world", _) => None,
+        (_, Some(&index)) => Some(index),
+        (_, None) => {
+            let names = scene.bodies.iter().map(|body| body.name.as_str());
+            return Err(body_node.error(no_body(wanted, std::iter::once("world").chain(names))));
+        }
+    };
+    let point = part
+        .get("at")
+        .map_or(Ok(Vec3::zeros()), |node| node.vector(Dimension::Length))?;
+    Ok(Attachment { body, point })
+}
+
 /// One `[[ball_joint]]`; `bodies` maps names to places in the sorted scene.
 pub(super) fn read_ball_joint<'d>(
     node: &Node<'d>,
@@ -462,28 +494,7 @@ pub(super) fn read_ball_joint<'d>(
         .collect();
     let section = node.section_as(node.title("joint"), &known)?;
     let name = section.require("name", "\"S1\"")?.name()?.to_owned();
-    let attachment = |key: &str| {
-        let part = section
-            .require(key, "{ body = \"rod\", at = \"0 0 100 mm\" }")?
-            .section(&["body", "at"])?;
-        let body_node = part.require("body", "\"rod\"")?;
-        let body = match body_node.text()? {
-            "world" => None,
-            wanted => match bodies.get(wanted) {
-                Some(&index) => Some(index),
-                None => {
-                    let names = scene.bodies.iter().map(|body| body.name.as_str());
-                    return Err(
-                        body_node.error(no_body(wanted, std::iter::once("world").chain(names)))
-                    );
-                }
-            },
-        };
-        let point = part
-            .get("at")
-            .map_or(Ok(Vec3::zeros()), |node| node.vector(Dimension::Length))?;
-        Ok(Attachment { body, point })
-    };
+    let attachment = |key: &str| read_attachment(&section, key, scene, bodies);
     let (socket, ball) = (attachment("socket")?, attachment("ball")?);
     if socket.body == ball.body {
         return Err(section.error(
@@ -512,7 +523,7 @@ pub(super) fn read_ball_joint<'d>(
 
 /// Keys of `[contact]`, which a joint may have for itself.
 pub(super) fn contact_parts() -> impl Iterator<Item = &'static str> {
-    table().iter().filter_map(contact_part)
+    contact_rows().map(|(part, _)| part)
 }
 
 /// Gives `joint` what `section` says of its contact alone; where that stands, by parameter.
@@ -524,10 +535,10 @@ pub(super) fn read_own_contact<'d>(
     joint: &mut BallJoint,
 ) -> Result<BTreeMap<String, Node<'d>>, SceneError> {
     let mut places = BTreeMap::new();
-    for part in contact_parts() {
+    for (part, field) in contact_rows() {
         if let Some(node) = section.get(part) {
             let value = node.parameter(&format!("contact.{part}"))?;
-            set_contact_value(&mut joint.contact, part, &value);
+            (field.set)(&mut joint.contact, &value);
             joint.overrides.push(part);
             places.insert(format!("joint.{}.{part}", joint.name), node);
         }

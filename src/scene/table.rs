@@ -1,6 +1,10 @@
 //! The rows of the parameter table.
 
-use super::{Dimension, Kind, Parameter, Scope, Value};
+use super::field::{Access, Field, Held, SWITCH, field, optional_field};
+use super::{Dimension, Formulation, Kind, Parameter, Preset, Scene, Scope, SignedAxis, Value};
+use crate::contact::{self, ApproachSpeed, FrictionLaw, FrictionVelocity, NormalLaw};
+use crate::integrate::Method;
+use crate::words::Words;
 use Dimension as D;
 
 /// Every parameter there is, in the order the interface shows.
@@ -8,34 +12,10 @@ pub fn table() -> &'static [Parameter] {
     &TABLE
 }
 
-/// Words of `contact.friction_velocity`, `contact.normal_law`, … in the order of the menus.
-pub(super) const FRICTION_VELOCITIES: [&str; 3] = ["centres", "surface", "printed"];
-pub(super) const APPROACH_SPEEDS: [&str; 2] = ["start", "largest"];
-pub(super) const NORMAL_LAWS: [&str; 5] = [
-    "lankarani-nikravesh",
-    "hertz",
-    "hunt-crossley",
-    "flores",
-    "gonthier",
-];
-pub(super) const FRICTION_LAWS: [&str; 2] = ["modified-coulomb", "none"];
-pub(super) const FORMULATIONS: [&str; 2] = ["tree", "lagrange"];
-pub(super) const METHODS: [&str; 7] = [
-    "semi-implicit-euler",
-    "imex-euler",
-    "rk4",
-    "dopri5",
-    "rosenbrock",
-    "radau5",
-    "automatic",
-];
-pub(super) const PRESETS: [&str; 4] = ["preview", "real-time", "accurate", "reference"];
-pub(super) const SWITCHES: [&str; 2] = ["on", "off"];
-pub(super) const AXES: [&str; 6] = ["+x", "-x", "+y", "-y", "+z", "-z"];
-
 /// A row that takes effect at once; the functions below change that where it is otherwise.
 const fn row(
     key: &'static str,
+    access: Access,
     label: &'static str,
     group: &'static str,
     kind: Kind,
@@ -46,6 +26,7 @@ const fn row(
 ) -> Parameter {
     Parameter {
         key,
+        access,
         label,
         group,
         kind,
@@ -59,6 +40,7 @@ const fn row(
 
 const fn contact(
     key: &'static str,
+    field: Field<contact::Parameters>,
     label: &'static str,
     kind: Kind,
     default: Value,
@@ -67,6 +49,7 @@ const fn contact(
 ) -> Parameter {
     row(
         key,
+        Access::Contact(field),
         label,
         "Contact",
         kind,
@@ -79,6 +62,7 @@ const fn contact(
 
 const fn drive(
     key: &'static str,
+    field: Field<Scene>,
     label: &'static str,
     kind: Kind,
     default: Value,
@@ -87,6 +71,7 @@ const fn drive(
 ) -> Parameter {
     at_reset(row(
         key,
+        Access::Scene(field),
         label,
         "Drive",
         kind,
@@ -138,6 +123,7 @@ const fn logarithmic(
 
 const fn gravity(
     key: &'static str,
+    field: Field<Scene>,
     label: &'static str,
     default: f64,
     help: &'static str,
@@ -145,6 +131,7 @@ const fn gravity(
     let kind = number(D::Acceleration, -1000.0, 1000.0, "m/s^2", (-20.0, 20.0));
     row(
         key,
+        Access::Scene(field),
         label,
         "Gravity",
         kind,
@@ -158,6 +145,7 @@ const fn gravity(
 static TABLE: [Parameter; 28] = [
     contact(
         "contact.clearance",
+        field!(clearance),
         "Clearance",
         number(D::Length, 0.0, 1.0, "mm", (0.0, 1e-3)),
         Value::Number(0.3e-3),
@@ -168,6 +156,7 @@ static TABLE: [Parameter; 28] = [
     ),
     contact(
         "contact.friction",
+        field!(friction),
         "Friction coefficient",
         number(D::None, 0.0, 10.0, "", (0.0, 1.0)),
         Value::Number(0.15),
@@ -177,6 +166,7 @@ static TABLE: [Parameter; 28] = [
     ),
     contact(
         "contact.restitution",
+        field!(restitution),
         "Restitution",
         number(D::None, 0.0, 1.0, "", (0.0, 1.0)),
         Value::Number(0.9),
@@ -187,6 +177,7 @@ static TABLE: [Parameter; 28] = [
     ),
     contact(
         "contact.youngs_modulus",
+        field!(youngs_modulus),
         "Young's modulus",
         logarithmic(D::Stress, 1e6, 1e12, "GPa", (1e9, 1e12)),
         Value::Number(206e9),
@@ -196,6 +187,7 @@ static TABLE: [Parameter; 28] = [
     ),
     contact(
         "contact.poisson_ratio",
+        field!(poisson_ratio),
         "Poisson's ratio",
         number(D::None, 0.0, 0.499, "", (0.0, 0.499)),
         Value::Number(0.3),
@@ -205,6 +197,7 @@ static TABLE: [Parameter; 28] = [
     ),
     contact(
         "contact.ball_radius",
+        field!(ball_radius),
         "Ball radius",
         logarithmic(D::Length, 1e-4, 1.0, "mm", (1e-3, 0.1)),
         Value::Number(0.010),
@@ -214,8 +207,9 @@ static TABLE: [Parameter; 28] = [
     ),
     contact(
         "contact.friction_velocity",
+        field!(friction_velocity),
         "Friction velocity",
-        Kind::Choice(&FRICTION_VELOCITIES),
+        Kind::Choice(FrictionVelocity::WORDS),
         Value::Choice("surface"),
         "Which sliding velocity friction reads. centres is the paper's: the relative velocity of the two centres, \
          which leaves out the turning of the ball. surface is what the contact feels: the relative velocity of the \
@@ -226,6 +220,7 @@ static TABLE: [Parameter; 28] = [
     ),
     contact(
         "contact.slip_speed_low",
+        field!(slip_speed_low),
         "Low slip speed",
         logarithmic(D::Speed, 0.0, 1.0, "mm/s", (1e-7, 1e-3)),
         Value::Number(1e-6),
@@ -235,6 +230,7 @@ static TABLE: [Parameter; 28] = [
     ),
     contact(
         "contact.slip_speed_high",
+        field!(slip_speed_high),
         "High slip speed",
         logarithmic(D::Speed, 1e-9, 10.0, "mm/s", (1e-5, 1e-1)),
         Value::Number(1e-4),
@@ -244,6 +240,7 @@ static TABLE: [Parameter; 28] = [
     ),
     contact(
         "contact.impact_speed_floor",
+        field!(impact_speed_floor),
         "Impact speed floor",
         logarithmic(D::Speed, 1e-9, 10.0, "mm/s", (1e-5, 0.1)),
         Value::Number(1e-3),
@@ -253,8 +250,9 @@ static TABLE: [Parameter; 28] = [
     ),
     contact(
         "contact.approach_speed",
+        field!(approach_speed),
         "Approach speed",
-        Kind::Choice(&APPROACH_SPEEDS),
+        Kind::Choice(ApproachSpeed::WORDS),
         Value::Choice("start"),
         "Which speed the damping term divides by. start is the paper's: the penetration rate at which the contact began. A \
          joint that touches softly and is then hit by its neighbour is damped many times too strongly by it. largest is \
@@ -264,8 +262,9 @@ static TABLE: [Parameter; 28] = [
     ),
     contact(
         "contact.normal_law",
+        field!(normal_law),
         "Normal law",
-        Kind::Choice(&NORMAL_LAWS),
+        Kind::Choice(NormalLaw::WORDS),
         Value::Choice("lankarani-nikravesh"),
         "Normal force as a function of penetration and its rate. lankarani-nikravesh is the paper's; hertz is \
          elastic; hunt-crossley, flores and gonthier differ in their damping, and flores and gonthier suit low \
@@ -274,8 +273,9 @@ static TABLE: [Parameter; 28] = [
     ),
     contact(
         "contact.friction_law",
+        field!(friction_law),
         "Friction law",
-        Kind::Choice(&FRICTION_LAWS),
+        Kind::Choice(FrictionLaw::WORDS),
         Value::Choice("modified-coulomb"),
         "Friction force as a function of normal force and sliding velocity. modified-coulomb rises linearly between \
          the two slip speeds; none leaves friction out.",
@@ -283,24 +283,28 @@ static TABLE: [Parameter; 28] = [
     ),
     gravity(
         "gravity.x",
+        field!(gravity.x),
         "Gravity along X",
         0.0,
         "World X component of gravity. In the paper's machine X points down: +9.81 m/s^2. A file that gives any component has 0 for the others.",
     ),
     gravity(
         "gravity.y",
+        field!(gravity.y),
         "Gravity along Y",
         0.0,
         "World Y component of gravity. A file that gives any component has 0 for the others.",
     ),
     gravity(
         "gravity.z",
+        field!(gravity.z),
         "Gravity along Z",
         -9.81,
         "World Z component of gravity: -9.81 m/s^2 where Z points up. A file that gives any component has 0 for the others.",
     ),
     drive(
         "spcmm.slider_plane",
+        optional_field!(spcmm.slider_plane),
         "Slider plane",
         number(D::Length, -1.0, 1.0, "mm", (0.0, 0.1)),
         Value::Number(0.032),
@@ -311,6 +315,7 @@ static TABLE: [Parameter; 28] = [
     ),
     drive(
         "spcmm.amplitude_x",
+        optional_field!(spcmm.amplitude_x),
         "Amplitude of x",
         number(D::Length, 0.0, 1.0, "mm", (0.0, 0.05)),
         Value::Number(0.025),
@@ -319,6 +324,7 @@ static TABLE: [Parameter; 28] = [
     ),
     drive(
         "spcmm.amplitude_beta",
+        optional_field!(spcmm.amplitude_beta),
         "Amplitude of beta",
         number(D::Angle, 0.0, 1.0, "rad", (0.0, 0.1)),
         Value::Number(0.025),
@@ -327,6 +333,7 @@ static TABLE: [Parameter; 28] = [
     ),
     drive(
         "spcmm.frequency",
+        optional_field!(spcmm.frequency),
         "Drive frequency",
         number(D::Frequency, 0.0, 50.0, "Hz", (0.0, 5.0)),
         Value::Number(0.5),
@@ -336,6 +343,17 @@ static TABLE: [Parameter; 28] = [
     ),
     at_reset(row(
         "chain.links",
+        Access::Scene(Field {
+            get: |scene| {
+                let links = scene.chain.map(|chain| Value::Count(chain.links as u64));
+                links.unwrap_or(Value::Unset)
+            },
+            set: |scene, value| {
+                if let (Some(chain), Value::Count(links)) = (&mut scene.chain, value) {
+                    chain.links = usize::try_from(*links).expect("the table allows a few thousand");
+                }
+            },
+        }),
         "Links",
         "Chain",
         Kind::Count { min: 1, max: 4096 },
@@ -347,9 +365,10 @@ static TABLE: [Parameter; 28] = [
     )),
     at_reset(row(
         "formulation",
+        Access::Scene(field!(formulation)),
         "Formulation",
         "Solver",
-        Kind::Choice(&FORMULATIONS),
+        Kind::Choice(Formulation::WORDS),
         Value::Choice("tree"),
         Scope::Every,
         "Equations of motion. tree uses as few coordinates as there are freedoms once the ball joints are cut. \
@@ -359,9 +378,10 @@ static TABLE: [Parameter; 28] = [
     )),
     row(
         "solver.method",
+        Access::Scene(field!(solver.method)),
         "Method",
         "Solver",
-        Kind::Choice(&METHODS),
+        Kind::Choice(Method::WORDS),
         Value::Choice("automatic"),
         Scope::Every,
         "Time stepper. semi-implicit-euler (order 1), imex-euler (order 1, implicit in the contacts, so \
@@ -374,6 +394,7 @@ static TABLE: [Parameter; 28] = [
     ),
     row(
         "solver.step",
+        Access::Scene(field!(solver.step)),
         "Step",
         "Solver",
         logarithmic(D::Time, 1e-7, 1e-2, "us", (1e-6, 1e-3)),
@@ -385,6 +406,7 @@ static TABLE: [Parameter; 28] = [
     ),
     row(
         "solver.tolerance",
+        Access::Scene(field!(solver.tolerance)),
         "Tolerance",
         "Solver",
         logarithmic(D::None, 1e-13, 1e-2, "", (1e-12, 1e-3)),
@@ -396,9 +418,13 @@ static TABLE: [Parameter; 28] = [
     ),
     row(
         "solver.preset",
+        Access::Scene(Field {
+            get: |scene| scene.solver.preset.map_or(Value::Unset, Held::to_value),
+            set: |scene, value| scene.apply_preset(Held::of_value(value)),
+        }),
         "Preset",
         "Solver",
-        Kind::Choice(&PRESETS),
+        Kind::Choice(Preset::WORDS),
         Value::Unset,
         Scope::Every,
         "Method, step and tolerance by name: preview (automatic, 1e-4), real-time (automatic, 1e-6), \
@@ -407,9 +433,10 @@ static TABLE: [Parameter; 28] = [
     ),
     at_reset(row(
         "solver.energy_ledger",
+        Access::Scene(field!(solver.energy_ledger)),
         "Energy ledger",
         "Solver",
-        Kind::Choice(&SWITCHES),
+        Kind::Choice(&SWITCH),
         Value::Choice("on"),
         Scope::Every,
         "Keeps count of where the energy comes from and where it goes: drives, gravity, contacts, losses, and the \
@@ -418,9 +445,10 @@ static TABLE: [Parameter; 28] = [
     )),
     row(
         "view.down",
+        Access::Scene(field!(view.down)),
         "Down on screen",
         "View",
-        Kind::Choice(&AXES),
+        Kind::Choice(SignedAxis::WORDS),
         Value::Choice("-z"),
         Scope::Every,
         "World axis that points down on the screen. It moves the camera only; gravity has its own keys.",
@@ -435,5 +463,16 @@ pub(super) fn find(key: &str) -> Option<&'static Parameter> {
 
 /// Last part of a contact key: `clearance` of `contact.clearance`.
 pub(super) fn contact_part(parameter: &'static Parameter) -> Option<&'static str> {
-    parameter.key.strip_prefix("contact.")
+    match parameter.access {
+        Access::Contact(_) => parameter.key.strip_prefix("contact."),
+        Access::Scene(_) => None,
+    }
+}
+
+/// Rows of `[contact]`, which a joint may have for itself: last part of the key, and the field.
+pub(super) fn contact_rows() -> impl Iterator<Item = (&'static str, Field<contact::Parameters>)> {
+    TABLE.iter().filter_map(|parameter| match parameter.access {
+        Access::Contact(field) => Some((parameter.key.strip_prefix("contact.")?, field)),
+        Access::Scene(_) => None,
+    })
 }

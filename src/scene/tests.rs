@@ -318,7 +318,10 @@ fn doubtful_choices_are_warned_of() {
     assert!(changed("spcmm", &[]).warnings().is_empty());
     let warnings = changed("spcmm", &[("contact.restitution", "0.3")]).warnings();
     assert!(
-        warnings.len() == 1 && warnings[0].contains("S1, S2, S3: restitution 0.3"),
+        warnings.len() == 1
+            && warnings[0]
+                .to_string()
+                .contains("S1, S2, S3: restitution 0.3"),
         "{warnings:?}"
     );
     let fine = [
@@ -328,7 +331,7 @@ fn doubtful_choices_are_warned_of() {
     assert!(changed("spcmm", &fine).warnings().is_empty());
     let warnings = changed("spcmm", &[("joint.S2.clearance", "0.01 mm")]).warnings();
     assert!(
-        warnings.len() == 1 && warnings[0].starts_with("S2: clearance 0.01 mm"),
+        warnings.len() == 1 && warnings[0].to_string().starts_with("S2: clearance 0.01 mm"),
         "{warnings:?}"
     );
     assert!(
@@ -337,7 +340,11 @@ fn doubtful_choices_are_warned_of() {
             .is_empty()
     );
     let coarse = [("solver.method", "rk4"), ("solver.step", "50 us")];
-    assert!(changed("spcmm", &coarse).warnings()[0].contains("50 us"));
+    assert!(
+        changed("spcmm", &coarse).warnings()[0]
+            .to_string()
+            .contains("50 us")
+    );
 }
 
 #[test]

@@ -46,7 +46,7 @@ use Scale::{Decimal, Ratio};
 type Unit = (&'static str, Scale);
 
 /// Every dimension with its name and its units; the first unit is the SI one.
-const UNITS: [(Dimension, &str, &[Unit]); 11] = [
+const UNITS: [(Dimension, &str, &[Unit]); 15] = [
     (
         Dimension::Length,
         "length",
@@ -150,6 +150,44 @@ const UNITS: [(Dimension, &str, &[Unit]); 11] = [
             ("mHz", Decimal(-3)),
             ("kHz", Decimal(3)),
             ("1/s", Decimal(0)),
+        ],
+    ),
+    (
+        Dimension::Force,
+        "force",
+        &[
+            ("N", Decimal(0)),
+            ("mN", Decimal(-3)),
+            ("kN", Decimal(3)),
+            ("MN", Decimal(6)),
+        ],
+    ),
+    (
+        Dimension::Torque,
+        "torque",
+        &[
+            ("N m", Decimal(0)),
+            ("N mm", Decimal(-3)),
+            ("kN m", Decimal(3)),
+        ],
+    ),
+    (
+        Dimension::Stiffness,
+        "stiffness",
+        &[
+            ("N/m", Decimal(0)),
+            ("N/mm", Decimal(3)),
+            ("kN/m", Decimal(3)),
+            ("kN/mm", Decimal(6)),
+        ],
+    ),
+    (
+        Dimension::Damping,
+        "damping",
+        &[
+            ("N s/m", Decimal(0)),
+            ("N s/mm", Decimal(3)),
+            ("kN s/m", Decimal(3)),
         ],
     ),
     (Dimension::None, "pure number", &[]),

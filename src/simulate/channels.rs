@@ -1,6 +1,6 @@
 //! Which quantities of a simulation are recorded for the plots, in which order, and how they are read from a frame.
 
-use super::Frame;
+use super::{Frame, Ledger};
 use crate::scene::{JointKind, Scene, Vec3};
 
 /// Ball joints, and drives, that are recorded; in a longer chain the rest would cost more memory than they tell.
@@ -27,6 +27,9 @@ pub enum Quantity {
     ProbeError,
 }
 
+/// How a term of the balance is read, J.
+type Take = fn(&Ledger) -> f64;
+
 impl Quantity {
     /// All of them, in the order in which a list shows them.
     pub const ALL: [Self; 15] = [
@@ -47,22 +50,27 @@ impl Quantity {
         Self::ProbeError,
     ];
 
-    /// Members of [`Self::EnergyBalance`]: kinetic and elastic change equal the works given by drives, gravity, clearance
-    /// and changes, less the losses by restitution and friction, plus the residual.
-    pub const BALANCE: [&str; 9] = [
-        "drives",
-        "gravity",
-        "clearance",
-        "changes",
-        "restitution",
-        "friction",
-        "kinetic",
-        "elastic",
-        "residual",
+    /// Members of [`Self::EnergyBalance`]: kinetic and elastic change equal the works given by drives, gravity, clearance,
+    /// changes and loads from outside, less the losses by restitution, friction and dampers, plus the residual.
+    const BALANCE: [(&str, Take); 11] = [
+        ("drives", |ledger| ledger.drive_work),
+        ("gravity", |ledger| ledger.gravity_work),
+        ("clearance", |ledger| ledger.clearance_work),
+        ("changes", |ledger| ledger.change_work),
+        ("external", |ledger| ledger.external_work),
+        ("restitution", |ledger| ledger.restitution_loss),
+        ("friction", |ledger| ledger.friction_loss),
+        ("damping", |ledger| ledger.damping_loss),
+        ("kinetic", |ledger| ledger.kinetic_change),
+        ("elastic", |ledger| ledger.elastic_change),
+        ("residual", Ledger::residual),
     ];
 
-    /// Those of [`Self::BALANCE`] that take energy, or hold it; the others give. All together cancel.
-    pub const TAKES: [&str; 4] = ["restitution", "friction", "kinetic", "elastic"];
+    /// Those that a scene without force elements has not.
+    const OF_ELEMENTS: [&str; 2] = ["external", "damping"];
+
+    /// Those of the balance that take energy, or hold it; the others give. All together cancel.
+    pub const TAKES: [&str; 5] = ["restitution", "friction", "damping", "kinetic", "elastic"];
 
     /// Sentence-case name.
     pub fn label(self) -> &'static str {
@@ -124,9 +132,9 @@ impl Quantity {
             Self::ActuatorTorque => "Torque that each driven hinge needs, positive about its axis.",
             Self::Energy => "Kinetic, potential and elastic energy of the whole mechanism.",
             Self::EnergyBalance => {
-                "Since the start: work of drives, gravity, moving clearances and changed parameters, loss by restitution \
-                 and friction, change of kinetic and elastic energy, and the residual, which is the error of the \
-                 integration."
+                "Since the start: work of drives, gravity, moving clearances, changed parameters and loads from outside, loss \
+                 by restitution, friction and dampers, change of kinetic and elastic energy, and the residual, which is the \
+                 error of the integration."
             }
             Self::ProbeError => "Probe tip minus the tip of the ideal mechanism at the same time.",
         }
@@ -169,7 +177,7 @@ impl Channel {
             Quantity::EnergyBalance => match member {
                 "drives" => "drive_work_J".to_owned(),
                 "changes" => "change_work_J".to_owned(),
-                "restitution" | "friction" => format!("{member}_loss_J"),
+                "restitution" | "friction" | "damping" => format!("{member}_loss_J"),
                 "kinetic" | "elastic" => format!("{member}_change_J"),
                 "residual" => "energy_residual_J".to_owned(),
                 other => format!("{other}_work_J"),
@@ -187,6 +195,13 @@ pub struct Channels {
     drives: usize,
     probe: bool,
     balance: bool,
+    elements: bool,
+}
+
+/// Members of the energy balance of a scene, with force `elements` or without.
+fn balance_of(elements: bool) -> impl Iterator<Item = (&'static str, Take)> {
+    let all = Quantity::BALANCE.into_iter();
+    all.filter(move |(member, _)| elements || !Quantity::OF_ELEMENTS.contains(member))
 }
 
 impl Channels {
@@ -227,9 +242,9 @@ impl Channels {
             };
             add(quantity, &joint.name);
         }
-        let balance = scene.solver.energy_ledger;
+        let (balance, elements) = (scene.solver.energy_ledger, !scene.elements.is_empty());
         if balance {
-            for member in Quantity::BALANCE {
+            for (member, _) in balance_of(elements) {
                 add(Quantity::EnergyBalance, member);
             }
         }
@@ -245,6 +260,7 @@ impl Channels {
             drives: driven().count(),
             probe,
             balance,
+            elements,
         }
     }
 
@@ -294,17 +310,7 @@ impl Channels {
         out.extend(frame.actuators.iter().take(self.drives));
         if self.balance {
             let ledger = frame.ledger.unwrap_or_default();
-            out.extend([
-                ledger.drive_work,
-                ledger.gravity_work,
-                ledger.clearance_work,
-                ledger.change_work,
-                ledger.restitution_loss,
-                ledger.friction_loss,
-                ledger.kinetic_change,
-                ledger.elastic_change,
-                ledger.residual(),
-            ]);
+            out.extend(balance_of(self.elements).map(|(_, take)| take(&ledger)));
         }
         if self.probe {
             out.extend(frame.probe_error.unwrap_or(Vec3::repeat(f64::NAN)).iter());

@@ -33,6 +33,8 @@ pub enum Work {
     Friction,
     Clearance,
     Changes,
+    Damping,
+    External,
 }
 
 impl Work {
@@ -44,6 +46,8 @@ impl Work {
             Self::Friction => "loss by friction",
             Self::Clearance => "work of moving clearances",
             Self::Changes => "work of changed parameters",
+            Self::Damping => "loss in dampers",
+            Self::External => "work of loads from outside",
         }
     }
 }

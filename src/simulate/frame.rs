@@ -1,6 +1,7 @@
 //! One instant of a simulation as plain data: what the outputs write and the view draws.
 
 use super::Ledger;
+pub use crate::mechanism::ElementReport;
 use crate::scene::{Mat3, Vec3};
 
 /// Everything that is reported about one instant. SI units, world axes.
@@ -12,6 +13,8 @@ pub struct Frame {
     pub bodies: Vec<BodyMotion>,
     /// Ball joints in scene order.
     pub joints: Vec<JointReport>,
+    /// Force elements in scene order.
+    pub elements: Vec<ElementReport>,
     /// Driven joints in scene order: actuator force, N (or torque, N m), positive along the joint axis's positive sense.
     pub actuators: Vec<f64>,
     /// The output body.
@@ -20,7 +23,7 @@ pub struct Frame {
     pub kinetic: f64,
     /// Gravitational plus elastic energy, J; gravity's zero is the world origin.
     pub potential: f64,
-    /// The elastic part of `potential`: energy stored in the contacts, J.
+    /// The elastic part of `potential`: energy stored in contacts and springs, J.
     pub elastic: f64,
     /// Probe tip minus the tip of the ideal mechanism at the same time, m; `None` where the scene has no
     /// probe, or the ideal mechanism does not get here.

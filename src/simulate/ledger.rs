@@ -12,7 +12,7 @@ pub struct Ledger {
     pub gravity_work: f64,
     /// Change of the kinetic energy of all bodies.
     pub kinetic_change: f64,
-    /// Change of the elastic energy in the contacts.
+    /// Change of the elastic energy in contacts and springs.
     pub elastic_change: f64,
     /// Taken by the damping part of the normal forces, the cut at 0 included.
     pub restitution_loss: f64,
@@ -21,6 +21,10 @@ pub struct Ledger {
     pub friction_loss: f64,
     /// Given by clearances on their way to a new value.
     pub clearance_work: f64,
+    /// Taken by the dampers of force elements.
+    pub damping_loss: f64,
+    /// Given by loads from outside.
+    pub external_work: f64,
     /// Put into the contacts by changed parameters: jumps of their elastic energy.
     pub change_work: f64,
     /// Energy exchanged: half the sum, over all steps, of the sizes of all terms, for each joule leaves one and arrives at
@@ -31,8 +35,12 @@ pub struct Ledger {
 impl Ledger {
     /// Energy that nothing accounts for, J: positive where it came from nowhere.
     pub fn residual(&self) -> f64 {
-        let given = self.drive_work + self.gravity_work + self.clearance_work + self.change_work;
-        let taken = self.restitution_loss + self.friction_loss;
+        let given = self.drive_work
+            + self.gravity_work
+            + self.clearance_work
+            + self.change_work
+            + self.external_work;
+        let taken = self.restitution_loss + self.friction_loss + self.damping_loss;
         self.kinetic_change + self.elastic_change - (given - taken)
     }
 
@@ -234,7 +242,9 @@ fn entered(ledger: &Ledger, start: &Energies, end: Energies, works: &Powers) -> 
         + elastic.abs()
         + works.restitution.abs()
         + works.friction.abs()
-        + works.clearance.abs();
+        + works.clearance.abs()
+        + works.damping.abs()
+        + works.external.abs();
     Ledger {
         drive_work: ledger.drive_work + works.drive,
         gravity_work: ledger.gravity_work + gravity,
@@ -243,6 +253,8 @@ fn entered(ledger: &Ledger, start: &Energies, end: Energies, works: &Powers) -> 
         restitution_loss: ledger.restitution_loss + works.restitution,
         friction_loss: ledger.friction_loss + works.friction,
         clearance_work: ledger.clearance_work + works.clearance,
+        damping_loss: ledger.damping_loss + works.damping,
+        external_work: ledger.external_work + works.external,
         change_work: ledger.change_work,
         exchanged: ledger.exchanged + 0.5 * moved,
     }

@@ -5,7 +5,6 @@ mod channels;
 mod doubt;
 mod frame;
 mod history;
-mod ideal;
 mod impacts;
 mod ledger;
 mod pace;
@@ -13,6 +12,7 @@ mod peaks;
 mod report;
 mod simulation;
 mod stepper;
+mod stopped;
 
 pub use angles::angles_of;
 pub use channels::*;
@@ -22,9 +22,13 @@ pub use history::{Bin, History, Mark};
 pub use impacts::Impact;
 pub use ledger::Ledger;
 pub use pace::{LARGEST_BUDGET, LONGEST_FRAME, Pacer, SCALE_RANGE};
+pub use simulation::ideal::ProbeFault;
 pub use simulation::{CLEARANCE_SPEED, LARGEST_DENSE, LARGEST_IMPLICIT, Simulation};
+pub use stopped::{StopAdvice, StopFault, Stopped};
 
-use crate::mechanism::MechanismError;
+use std::sync::Arc;
+
+use crate::mechanism::{CostOf, Counts, MechanismError, Structure};
 use crate::scene::{Scene, SceneError};
 
 /// The longest run, s: at its end a double still tells instants 0.1 ns apart.
@@ -58,28 +62,22 @@ impl StartError {
             }
             MechanismError::TooLarge { .. } | MechanismError::TooCostly { .. } => {
                 let keys = ["solver.method", "chain.links", "formulation"];
-                let of_form = matches!(self.0, MechanismError::TooCostly { form, .. } if form.starts_with(keys[2]));
+                let of_form = matches!(
+                    self.0,
+                    MechanismError::TooCostly {
+                        of: CostOf::Tree | CostOf::Lagrange,
+                        ..
+                    }
+                );
                 let title = if of_form { keys[2] } else { keys[0] };
                 (title.to_owned(), keys.map(str::to_owned).to_vec())
             }
             MechanismError::Branching { joints } => {
-                one(joints.split(", ").next().unwrap_or(""), &["clearance"])
+                one(joints.first().map_or("", String::as_str), &["clearance"])
             }
         };
         scene.start_error(&title, &keys, self.to_string())
     }
-}
-
-/// Why a simulation stopped: the divergence guard. The state is the last good one.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("stopped at t = {time:.6e} s: {what}; {advice}")]
-pub struct Stopped {
-    /// Time of the last good state, s.
-    pub time: f64,
-    /// Which body or joint, and what it did.
-    pub what: String,
-    /// What to try.
-    pub advice: String,
 }
 
 /// When a changed parameter takes effect.
@@ -108,6 +106,10 @@ pub struct Statistics {
     pub steps: u64,
     /// Evaluations of the equations of motion.
     pub evaluations: u64,
+    /// Evaluations of all contacts at an instant; 0 in a scene without clearance.
+    pub contact_evaluations: u64,
+    /// Evaluations of the friction of one contact; 0 in a scene without friction.
+    pub friction_evaluations: u64,
     /// Rejected steps.
     pub rejected: u64,
     /// Steps that ended at a corner of the friction law.
@@ -135,11 +137,36 @@ pub struct Statistics {
     pub constraint_drift: f64,
 }
 
+impl Statistics {
+    fn new(joints: usize) -> Self {
+        Self {
+            impacts: vec![0; joints],
+            floored: vec![0; joints],
+            coarse: vec![0; joints],
+            peak_normal: vec![0.0; joints],
+            peak_time: vec![0.0; joints],
+            last_separation: vec![f64::NAN; joints],
+            damping: vec![0.0; joints],
+            damping_time: vec![0.0; joints],
+            ..Self::default()
+        }
+    }
+
+    fn count(&mut self, counts: Counts) {
+        self.evaluations += counts.equations;
+        self.contact_evaluations += counts.contacts;
+        self.friction_evaluations += counts.friction;
+    }
+}
+
 impl PartialEq for Statistics {
     /// Bit by bit, so that "no separation yet" equals itself.
     fn eq(&self, other: &Self) -> bool {
         let bits = |v: &[f64]| v.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
-        let counts = |s: &Self| (s.steps, s.evaluations, s.rejected, s.corners);
+        let counts = |s: &Self| {
+            let evaluations = (s.evaluations, s.contact_evaluations, s.friction_evaluations);
+            (s.steps, evaluations, s.rejected, s.corners)
+        };
         counts(self) == counts(other)
             && self.impacts == other.impacts
             && self.floored == other.floored
@@ -157,11 +184,12 @@ impl PartialEq for Statistics {
 /// The whole state of a simulation: restoring it resumes with the same bits.
 #[derive(Debug, Clone)]
 pub struct Snapshot {
-    scene: Scene,
-    running: Scene,
+    scene: Arc<Scene>,
+    running: Arc<Scene>,
+    structure: Structure,
     state: simulation::State,
     polynomial: Option<crate::integrate::Polynomial>,
-    ideal: Option<Box<ideal::Kept>>,
+    ideal: Option<Box<simulation::ideal::Kept>>,
     peaks: Vec<Peak>,
     right_handed: bool,
 }

@@ -1,6 +1,6 @@
 //! Peaks in continuous time: the largest force between two steps, from the cubic through penetration and rate at both ends.
 
-use crate::contact::{Coefficients, Pace};
+use crate::contact::{ApproachPiece, Coefficients};
 
 /// Penetration and its rate at one instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -133,14 +133,14 @@ impl Course {
     /// Largest ratio of the damping to the elastic force from `from` to the end of the step, and where. It grows with the rate.
     pub(super) fn most_damped(&self, c: &Coefficients, remembered: f64, from: f64) -> (f64, f64) {
         let (rate, theta) = self.fastest(from);
-        let approach = c.approach(Pace::Whole, remembered, rate);
+        let approach = c.approach(ApproachPiece::Unsplit, remembered, rate);
         (c.damping * rate / approach, theta)
     }
 
     /// Larger normal force of both ends and where: (N, theta).
     pub(super) fn stronger_end(&self, c: &Coefficients, approach_speed: f64) -> (f64, f64) {
         let force = |at: &Approach| {
-            let approach = c.approach(Pace::Whole, approach_speed, at.rate);
+            let approach = c.approach(ApproachPiece::Unsplit, approach_speed, at.rate);
             c.normal_force(at.penetration, at.rate, approach)
         };
         let (f0, f1) = (force(&self.start), force(&self.end));
@@ -151,12 +151,12 @@ impl Course {
     pub(super) fn strongest(&self, c: &Coefficients, approach_speed: f64) -> (f64, f64) {
         let force = |theta: f64| {
             let (p, v, _) = self.at(theta);
-            c.normal_force(p, v, c.approach(Pace::Whole, approach_speed, v))
+            c.normal_force(p, v, c.approach(ApproachPiece::Unsplit, approach_speed, v))
         };
         // Sign of dF/dt, F = K p^1.5 (1 + chi v / v0): 1.5 v (1 + chi v / v0) + p chi a / v0; where v0 is v, that of v.
         let slope = |theta: f64| {
             let (p, v, a) = self.at(theta);
-            if p <= 0.0 || c.approach_follows(Pace::Whole, approach_speed, v) {
+            if p <= 0.0 || c.approach_follows(ApproachPiece::Unsplit, approach_speed, v) {
                 return v;
             }
             let chi = c.damping / approach_speed;

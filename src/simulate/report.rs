@@ -2,11 +2,18 @@
 
 use super::angles::pose_of;
 use super::frame::{BodyMotion, ContactState, Frame, JointReport};
+use crate::contact::Memory;
 use crate::mechanism::Mechanism;
 use crate::scene::{Scene, Vec3};
 
-/// Fills `out` after [`Mechanism::evaluate_fully`] at `time`.
-pub(super) fn fill(mechanism: &mut Mechanism, scene: &Scene, time: f64, out: &mut Frame) {
+/// Fills `out` after [`Evaluator::evaluate_fully`](crate::mechanism::Evaluator::evaluate_fully) at `time` with this contact `memory`.
+pub(super) fn fill(
+    mechanism: &mut Mechanism,
+    scene: &Scene,
+    memory: &[Memory],
+    time: f64,
+    out: &mut Frame,
+) {
     out.time = time;
     out.bodies.clear();
     for (b, m) in mechanism.motion()[..scene.bodies.len()].iter().enumerate() {
@@ -24,7 +31,7 @@ pub(super) fn fill(mechanism: &mut Mechanism, scene: &Scene, time: f64, out: &mu
     out.joints.clear();
     out.elastic = 0.0;
     for (j, joint) in scene.ball_joints.iter().enumerate() {
-        let report = joint_report(mechanism, joint, j);
+        let report = joint_report(mechanism, joint, &memory[j], j);
         if mechanism.contacts.has_clearance(j) {
             out.elastic += mechanism
                 .contacts
@@ -33,6 +40,9 @@ pub(super) fn fill(mechanism: &mut Mechanism, scene: &Scene, time: f64, out: &mu
         }
         out.joints.push(report);
     }
+    out.elastic += mechanism.energy_in_elements();
+    out.elements.clear();
+    out.elements.extend(mechanism.element_reports(time));
     let (kinetic, gravitational) = mechanism.energies();
     out.kinetic = kinetic;
     out.potential = gravitational + out.elastic;
@@ -41,7 +51,12 @@ pub(super) fn fill(mechanism: &mut Mechanism, scene: &Scene, time: f64, out: &mu
     mechanism.actuators(&mut out.actuators);
 }
 
-fn joint_report(mechanism: &Mechanism, joint: &crate::scene::BallJoint, j: usize) -> JointReport {
+fn joint_report(
+    mechanism: &Mechanism,
+    joint: &crate::scene::BallJoint,
+    memory: &Memory,
+    j: usize,
+) -> JointReport {
     let motion = mechanism.motion();
     let centre = |a: &crate::scene::Attachment| match a.body {
         None => a.point,
@@ -73,7 +88,7 @@ fn joint_report(mechanism: &Mechanism, joint: &crate::scene::BallJoint, j: usize
     }
     report.normal_force = gap.normal * -gap.normal_force;
     report.friction_force = gap.friction;
-    report.state = if !contacts.memory()[j].active && gap.normal_force == 0.0 {
+    report.state = if !memory.active && gap.normal_force == 0.0 {
         ContactState::Free
     } else if gap.slip_speed < coefficients.slip_high {
         ContactState::Stick

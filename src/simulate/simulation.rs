@@ -8,24 +8,27 @@ mod displace;
 mod doubts;
 mod energy;
 mod guard;
+pub mod ideal;
 mod live;
 mod sample;
 mod search;
 mod snapshot;
 
-use super::ideal::Reference;
+use std::sync::Arc;
+
 use super::impacts::{Impact, Impacts};
 use super::ledger::Account;
 use super::peaks::{Approach, Recent};
 use super::stepper::AnyStepper;
-use super::{Frame, NotUnique, Peak, StartError, Statistics, Stopped};
+use super::{Frame, NotUnique, Peak, StartError, Statistics, StopAdvice, StopFault, Stopped};
 use crate::contact::Memory;
-use crate::integrate::{Controller, System};
-use crate::mechanism::{Mechanism, MechanismError, Ramp, Switching};
+use crate::integrate::{Controller, System as _};
+use crate::mechanism::{Counts, Mechanism, MechanismError, Ramp, Touching};
 use crate::scene::Scene;
 use automatic::{Choice, controller_of, prepare_implicit};
 pub use automatic::{LARGEST_DENSE, LARGEST_IMPLICIT};
 use corners::Piece;
+use ideal::{ProbeFault, Reference};
 
 /// Speed at which the clearance closes when a jump would put a ball inside its socket wall, m/s: an impact at this speed
 /// is of the order of the settled forces.
@@ -41,69 +44,99 @@ const FIRST_CONTACT_STEP: f64 = 1e-5;
 /// Loops that are open by more than this after projection have come apart, m.
 const OPEN_LOOP: f64 = 1e-7;
 
-/// Advice where closed loops cannot stay closed.
-const DEPENDENT: &str = "the ideal joints are (nearly) dependent here: keep clear of this pose, or give a joint a clearance";
-
 /// A scene in motion.
 ///
 /// The same scene and the same calls give the same bits.
 pub struct Simulation {
     /// With changes that wait for a reset.
-    scene: Scene,
+    scene: Arc<Scene>,
     /// As it runs.
-    running: Scene,
+    running: Arc<Scene>,
     mechanism: Mechanism,
     stepper: AnyStepper,
     state: State,
+    /// What the probe is compared with.
+    reference: Reference,
     peaks: Vec<Peak>,
-    /// Largest force that a sample met and when, by joint: no part of the state, which sampling does not change.
-    sampled: Vec<(f64, f64)>,
-    /// Scratch of the step's end.
-    y_end: Vec<f64>,
-    k_end: Vec<f64>,
-    scratch_y: Vec<f64>,
-    scratch_k: Vec<f64>,
-    gaps_end: Vec<Approach>,
     /// On which side of singular poses a scene that is a function of time alone started.
     right_handed: bool,
-    /// Joint whose contact starts or ends at the end of the step being taken.
+    /// Largest force that a sample met and when, by joint: no part of the state, which sampling does not change.
+    sampled: Vec<(f64, f64)>,
+    attempt: Attempt,
+    scratch_y: Vec<f64>,
+    scratch_k: Vec<f64>,
+    scratch_memory: Vec<Memory>,
+}
+
+/// The end of a step, and what goes with it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Instant {
+    t: f64,
+    /// Coordinates, then velocities.
+    y: Vec<f64>,
+    /// Their derivative.
+    k: Vec<f64>,
+    gaps: Vec<Approach>,
+    /// Contact memory in force over the step that begins here.
+    memory: Vec<Memory>,
+}
+
+impl Instant {
+    fn new(y: Vec<f64>, joints: usize) -> Self {
+        Self {
+            t: 0.0,
+            k: vec![0.0; y.len()],
+            gaps: vec![Approach::default(); joints],
+            memory: vec![Memory::default(); joints],
+            y,
+        }
+    }
+
+    /// Takes over another of the same scene without allocating.
+    fn copy_from(&mut self, other: &Self) {
+        self.t = other.t;
+        self.y.copy_from_slice(&other.y);
+        self.k.copy_from_slice(&other.k);
+        self.gaps.copy_from_slice(&other.gaps);
+        self.memory.copy_from_slice(&other.memory);
+    }
+}
+
+/// The step being taken.
+struct Attempt {
+    end: Instant,
+    /// Joint whose contact starts or ends at its end.
     located: Option<usize>,
     /// Joint that goes onto another piece of a law there.
     corner: Option<(usize, Piece)>,
-    /// The step being taken was begun again on another piece.
+    /// It was begun again on another piece.
     turned: bool,
-    scratch_memory: Vec<Memory>,
-    /// What the probe is compared with.
-    pub(super) reference: Reference,
-    /// The step just accepted may hold the largest force of a contact.
+    /// A contact was beyond the piece of a law that its memory holds.
+    left_piece: bool,
+    /// It may hold the largest force of a contact.
     near_peak: bool,
-    /// Largest normal force of each joint that was in contact over the step just accepted, N, and at which part of it.
+    /// Largest normal force of each joint that was in contact over it, N, and at which part of it.
     strongest: Vec<(f64, f64)>,
+    /// Evaluations that it took so far.
+    counts: Counts,
 }
 
 /// What a snapshot copies.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct State {
-    /// Start of the latest step.
-    t0: f64,
-    y0: Vec<f64>,
-    k0: Vec<f64>,
-    gaps0: Vec<Approach>,
-    /// Contact memory that was in force during the latest step.
-    memory0: Vec<Memory>,
-    /// Now.
-    t: f64,
-    y: Vec<f64>,
-    k: Vec<f64>,
-    gaps: Vec<Approach>,
-    memory: Vec<Memory>,
-    /// Steps since the contact under way began.
-    contact_steps: Vec<u64>,
+    /// The physical state, and the start of the latest step, inside which samples lie.
+    now: Instant,
+    before: Instant,
+    /// Clearances on their way, and in force.
     ramps: Vec<Option<Ramp>>,
-    /// Clearances in force.
     clearances: Vec<f64>,
-    /// Reactions of the ideal joints at the latest two instants, for their peaks between steps.
-    reactions: Vec<Recent>,
+    control: Control,
+    record: Record,
+}
+
+/// How the next step is chosen: no part of the physical state.
+#[derive(Clone, Debug, PartialEq)]
+struct Control {
     /// Next step of an adaptive method.
     h_next: f64,
     /// Step that worked after the latest contact began.
@@ -121,32 +154,23 @@ pub(super) struct State {
     /// Fixed steps are counted from here, so that times do not accumulate rounding.
     grid_origin: f64,
     grid_count: u64,
+}
+
+/// What is known of the run so far.
+#[derive(Clone, Debug, PartialEq)]
+struct Record {
     account: Account,
     impacts: Impacts,
     statistics: Statistics,
+    /// Reactions of the ideal joints at the latest two instants, for their peaks between steps.
+    reactions: Vec<Recent>,
+    /// Steps since the contact under way began.
+    contact_steps: Vec<u64>,
 }
 
-impl State {
-    /// At t = 0 with the coordinates and velocities `y`.
-    fn new(scene: &Scene, mechanism: &Mechanism, y: Vec<f64>) -> Self {
-        let (n, joints) = (y.len(), mechanism.contacts.len());
+impl Control {
+    fn new(scene: &Scene) -> Self {
         Self {
-            t0: 0.0,
-            y0: y.clone(),
-            k0: vec![0.0; n],
-            gaps0: vec![Approach::default(); joints],
-            memory0: vec![Memory::default(); joints],
-            t: 0.0,
-            y,
-            k: vec![0.0; n],
-            gaps: vec![Approach::default(); joints],
-            memory: vec![Memory::default(); joints],
-            contact_steps: vec![0; joints],
-            ramps: vec![None; joints],
-            clearances: (0..joints)
-                .map(|j| mechanism.contacts.clearance(j))
-                .collect(),
-            reactions: vec![Recent::default(); joints],
             h_next: scene.solver.step.min(LONGEST_STEP),
             h_contact: FIRST_CONTACT_STEP,
             contact_began: false,
@@ -157,20 +181,38 @@ impl State {
             controller: controller_of(scene.solver.method, false),
             grid_origin: 0.0,
             grid_count: 0,
-            account: Account::default(),
-            impacts: Impacts::new(joints),
-            statistics: Statistics {
-                impacts: vec![0; joints],
-                floored: vec![0; joints],
-                coarse: vec![0; joints],
-                peak_normal: vec![0.0; joints],
-                peak_time: vec![0.0; joints],
-                last_separation: vec![f64::NAN; joints],
-                damping: vec![0.0; joints],
-                damping_time: vec![0.0; joints],
-                ..Statistics::default()
+        }
+    }
+}
+
+impl State {
+    /// At t = 0 with the coordinates and velocities `y`.
+    fn new(scene: &Scene, mechanism: &Mechanism, y: Vec<f64>) -> Self {
+        let joints = mechanism.contacts.len();
+        let now = Instant::new(y, joints);
+        Self {
+            before: now.clone(),
+            now,
+            ramps: vec![None; joints],
+            clearances: (0..joints)
+                .map(|j| mechanism.contacts.clearance(j))
+                .collect(),
+            control: Control::new(scene),
+            record: Record {
+                account: Account::default(),
+                impacts: Impacts::new(joints),
+                statistics: Statistics::new(joints),
+                reactions: vec![Recent::default(); joints],
+                contact_steps: vec![0; joints],
             },
         }
+    }
+
+    /// Forgets the step before.
+    fn begin_anew(&mut self) {
+        self.before.copy_from(&self.now);
+        self.control.grid_origin = self.now.t;
+        self.control.grid_count = 0;
     }
 }
 
@@ -184,7 +226,7 @@ impl Simulation {
         let y = mechanism.start()?;
         prepare_implicit(&mut mechanism, scene.solver.method)?;
         let state = State::new(scene, &mechanism, y);
-        let mut simulation = Self::assembled(scene, mechanism, state);
+        let mut simulation = Self::assembled(&Arc::new(scene.clone()), mechanism, state);
         simulation.begin_contacts_at_start();
         simulation.refresh();
         simulation.right_handed = simulation.mechanism.is_right_handed();
@@ -198,44 +240,50 @@ impl Simulation {
     }
 
     /// With the equations of `scene` set up and `state` taken as it is.
-    fn assembled(scene: &Scene, mut mechanism: Mechanism, state: State) -> Self {
-        let (n, joints) = (state.y.len(), state.gaps.len());
-        mechanism.contacts.switching = switching_of(scene);
+    fn assembled(scene: &Arc<Scene>, mechanism: Mechanism, state: State) -> Self {
+        let (n, joints) = (state.now.y.len(), state.now.gaps.len());
         Self {
             scene: scene.clone(),
             running: scene.clone(),
             stepper: AnyStepper::new(scene.solver.method, n),
-            state,
+            reference: Reference::of(scene),
             peaks: vec![Peak::default(); joints],
+            right_handed: true,
             sampled: vec![(0.0, 0.0); joints],
-            y_end: vec![0.0; n],
-            k_end: vec![0.0; n],
+            attempt: Attempt {
+                end: Instant::new(vec![0.0; n], joints),
+                located: None,
+                corner: None,
+                turned: false,
+                left_piece: false,
+                near_peak: false,
+                strongest: vec![(0.0, 0.0); joints],
+                counts: Counts::default(),
+            },
             scratch_y: vec![0.0; n],
             scratch_k: vec![0.0; n],
-            gaps_end: vec![Approach::default(); joints],
-            right_handed: true,
-            located: None,
-            corner: None,
-            turned: false,
             scratch_memory: vec![Memory::default(); joints],
-            reference: Reference::of(scene),
-            near_peak: false,
-            strongest: vec![(0.0, 0.0); joints],
+            state,
             mechanism,
         }
     }
 
+    /// Whether the method locates the instants at which contacts begin and end.
+    fn locates(&self) -> bool {
+        self.running.solver.method.is_adaptive()
+    }
+
     /// Contacts that exist at the start take the floor as their approach speed: nothing tells how they began.
     fn begin_contacts_at_start(&mut self) {
-        self.mechanism.measure(self.state.t, &self.state.y);
-        for j in 0..self.state.memory.len() {
+        self.mechanism.measure(self.state.now.t, &self.state.now.y);
+        for j in 0..self.state.now.memory.len() {
             if self.mechanism.contacts.has_clearance(j)
                 && self.mechanism.contacts.gaps()[j].penetration > 0.0
             {
                 let coefficients = self.mechanism.contacts.coefficients(j);
-                self.state.memory[j] = Memory::begun(coefficients, f64::NEG_INFINITY);
-                self.state.statistics.impacts[j] += 1;
-                self.state.statistics.floored[j] += 1;
+                self.state.now.memory[j] = Memory::begun(coefficients, f64::NEG_INFINITY);
+                self.state.record.statistics.impacts[j] += 1;
+                self.state.record.statistics.floored[j] += 1;
             }
         }
     }
@@ -243,28 +291,20 @@ impl Simulation {
     /// Recomputes derivative and gaps of the current state after anything but a step changed it; forgets the step before.
     fn refresh(&mut self) {
         self.hold_pieces(true);
+        let located = self.locates();
         let Self {
             mechanism, state, ..
         } = self;
-        mechanism
-            .contacts
-            .memory_mut()
-            .copy_from_slice(&state.memory);
-        let evaluations = mechanism.evaluations;
-        mechanism.derivative(state.t, &state.y, &mut state.k);
-        mechanism.evaluations = evaluations;
+        let State { now, .. } = state;
+        let touching = Touching::by(located, &now.memory);
+        let mut evaluator = mechanism.evaluator(touching);
+        evaluator.derivative(now.t, &now.y, &mut now.k);
         mechanism.contacts.finish();
-        store_gaps(mechanism, &mut state.gaps);
+        store_gaps(mechanism, &mut now.gaps);
         self.stepper.invalidate();
         // Forces jump here: a parabola through both sides would have a peak that never was.
-        state.reactions.fill(Recent::default());
-        state.t0 = state.t;
-        state.y0.copy_from_slice(&state.y);
-        state.k0.copy_from_slice(&state.k);
-        state.gaps0.copy_from_slice(&state.gaps);
-        state.memory0.copy_from_slice(&state.memory);
-        state.grid_origin = state.t;
-        state.grid_count = 0;
+        state.record.reactions.fill(Recent::default());
+        state.begin_anew();
     }
 
     /// The scene with every change, those that wait for a reset included.
@@ -284,17 +324,17 @@ impl Simulation {
 
     /// Time of the latest state, s.
     pub fn time(&self) -> f64 {
-        self.state.t
+        self.state.now.t
     }
 
     /// Time at the start of the latest step, s: [`Self::sample`] accepts times from here to [`Self::time`].
     pub fn step_start(&self) -> f64 {
-        self.state.t0
+        self.state.before.t
     }
 
     /// Counters since the last reset.
     pub fn statistics(&self) -> &Statistics {
-        &self.state.statistics
+        &self.state.record.statistics
     }
 
     /// One accepted step.
@@ -310,7 +350,7 @@ impl Simulation {
     /// # Errors
     /// As [`Self::step`].
     pub fn step_until(&mut self, end: f64) -> Result<(), Stopped> {
-        if self.state.t >= end {
+        if self.state.now.t >= end {
             return Ok(());
         }
         self.advance(end)
@@ -321,7 +361,7 @@ impl Simulation {
     /// # Errors
     /// As [`Self::step`].
     pub fn advance_to(&mut self, time: f64) -> Result<(), Stopped> {
-        while self.state.t < time {
+        while self.state.now.t < time {
             self.step()?;
         }
         Ok(())
@@ -342,61 +382,99 @@ impl Simulation {
     }
 
     fn fixed_step(&mut self, limit: f64) -> Result<(), Stopped> {
+        let step = self.running.solver.step;
+        let control = &self.state.control;
+        let mut t_end = control.grid_origin + (control.grid_count + 1) as f64 * step;
+        if t_end >= limit - 1e-6 * step {
+            t_end = limit;
+        }
+        let h = t_end - self.state.now.t;
+        self.attempt.counts = Counts::default();
+        self.try_step(h);
+        self.accept(t_end, h)?;
+        let control = &mut self.state.control;
+        if t_end == limit {
+            // The next grid begins where this one was cut.
+            control.grid_origin = t_end;
+            control.grid_count = 0;
+        } else {
+            control.grid_count += 1;
+        }
+        Ok(())
+    }
+
+    /// Tries a step of size `h` from the present state; returns the error against the scales.
+    fn try_step(&mut self, h: f64) -> f64 {
+        let located = self.locates();
         let Self {
             mechanism,
             stepper,
             state,
-            y_end,
-            k_end,
+            attempt,
+            running,
             ..
         } = self;
-        let evaluations = mechanism.evaluations;
-        mechanism
-            .contacts
-            .memory_mut()
-            .copy_from_slice(&state.memory);
-        let (t, step) = (state.t, self.running.solver.step);
-        let mut t_end = state.grid_origin + (state.grid_count + 1) as f64 * step;
-        if t_end >= limit - 1e-6 * step {
-            t_end = limit;
-        }
-        let h = t_end - t;
-        let tolerance = self.running.solver.tolerance;
-        stepper.attempt(mechanism, t, h, &state.y, &state.k, y_end, k_end, tolerance);
-        self.accept(t_end, h, evaluations)?;
-        if t_end == limit {
-            // The next grid begins where this one was cut.
-            self.state.grid_origin = t_end;
-            self.state.grid_count = 0;
-        } else {
-            self.state.grid_count += 1;
-        }
-        Ok(())
+        let Instant {
+            t, y, k, memory, ..
+        } = &state.now;
+        let mut evaluator = mechanism.evaluator(Touching::by(located, memory));
+        let end = &mut attempt.end;
+        let tolerance = running.solver.tolerance;
+        let error = stepper.attempt(
+            &mut evaluator,
+            *t,
+            h,
+            y,
+            k,
+            &mut end.y,
+            &mut end.k,
+            tolerance,
+        );
+        attempt.left_piece = evaluator.left_piece;
+        attempt.counts += evaluator.counts;
+        error
+    }
+
+    /// Derivative at the end of the step being taken, which ends at `t_end`, and the gaps there.
+    fn evaluate_end(&mut self, t_end: f64) {
+        let located = self.locates();
+        let Self {
+            mechanism,
+            state,
+            attempt,
+            ..
+        } = self;
+        let end = &mut attempt.end;
+        let mut evaluator = mechanism.evaluator(Touching::by(located, &state.now.memory));
+        evaluator.derivative(t_end, &end.y, &mut end.k);
+        attempt.counts += evaluator.counts;
+        self.finish_gaps();
+    }
+
+    /// Gaps at the end of the step being taken, from the latest evaluation.
+    fn finish_gaps(&mut self) {
+        self.mechanism.contacts.finish();
+        store_gaps(&self.mechanism, &mut self.attempt.end.gaps);
     }
 
     /// A step of a scene whose motion is a function of time alone: predict, close the loops, read the reactions. Where
     /// that fails it comes closer in shorter steps, so that the last good state is next to the bad one.
     fn kinematic_step(&mut self, limit: f64) -> Result<(), Stopped> {
-        let t = self.state.t;
+        let t = self.state.now.t;
         let mut step = self.mechanism.kinematic_step().min(LONGEST_STEP);
         loop {
-            let Self {
-                mechanism,
-                state,
-                y_end,
-                scratch_k,
-                ..
-            } = self;
-            let evaluations = mechanism.evaluations;
             let t_end = if t + step >= limit - 1e-6 * step {
                 limit
             } else {
                 t + step
             };
-            mechanism.predict(t_end - t, &state.y, &state.k, scratch_k, y_end);
-            match self.accept(t_end, t_end - t, evaluations) {
+            let (now, end) = (&self.state.now, &mut self.attempt.end);
+            self.mechanism
+                .predict(t_end - t, &now.y, &now.k, &mut self.scratch_k, &mut end.y);
+            self.attempt.counts = Counts::default();
+            match self.accept(t_end, t_end - t) {
                 Err(_) if step > SHORTEST_KINEMATIC_STEP => {
-                    self.state.statistics.rejected += 1;
+                    self.state.record.statistics.rejected += 1;
                     step *= 0.25;
                 }
                 result => return result,
@@ -405,110 +483,90 @@ impl Simulation {
     }
 
     /// Makes the attempted step count: projection, guard, contact memory, peaks.
-    fn accept(&mut self, t_end: f64, h: f64, evaluations: u64) -> Result<(), Stopped> {
-        let Self {
-            mechanism,
-            stepper,
-            state,
-            y_end,
-            k_end,
-            gaps_end,
-            ..
-        } = self;
-        let open = mechanism.project(t_end, y_end);
-        if stepper.differs_rates() {
+    fn accept(&mut self, t_end: f64, h: f64) -> Result<(), Stopped> {
+        let open = self.mechanism.project(t_end, &mut self.attempt.end.y);
+        let mean_rates = self.stepper.has_mean_rates();
+        if mean_rates {
             // Forces at its end are those of a contact that may be long over by the next: the step's own mean tells more.
-            mechanism.measure(t_end, y_end);
-            mechanism.position_rate(t_end, y_end, k_end);
-            for i in mechanism.positions()..y_end.len() {
-                k_end[i] = (y_end[i] - state.y[i]) / h;
+            let (mechanism, now) = (&mut self.mechanism, &self.state.now);
+            let Instant { y, k, .. } = &mut self.attempt.end;
+            mechanism.measure(t_end, y);
+            mechanism.position_rate(y, k);
+            for i in mechanism.positions()..y.len() {
+                k[i] = (y[i] - now.y[i]) / h;
             }
-            store_gaps(mechanism, gaps_end);
-        } else if !stepper.ends_with_derivative() || mechanism.projects() {
-            mechanism.derivative(t_end, y_end, k_end);
-            mechanism.contacts.finish();
-            store_gaps(mechanism, gaps_end);
+            store_gaps(mechanism, &mut self.attempt.end.gaps);
+        } else if !self.stepper.ends_with_derivative() || self.mechanism.projects() {
+            self.evaluate_end(t_end);
         }
-        state.statistics.evaluations += mechanism.evaluations - evaluations;
+        self.state.record.statistics.count(self.attempt.counts);
         // The loops may close again behind the pose, on another branch.
-        let passed = mechanism.is_right_handed() != self.right_handed
-            || mechanism.distance_from_ideal() > OTHER_BRANCH;
-        let objection = if passed {
-            Some("the loops through the ideal ball joints pass a singular pose".to_owned())
+        let passed = self.mechanism.is_right_handed() != self.right_handed
+            || self.mechanism.distance_from_ideal() > OTHER_BRANCH;
+        let fault = if passed {
+            Some(StopFault::SingularLoops)
         } else {
             self.objection(open, h)
         };
-        if let Some(what) = objection {
+        if let Some(fault) = fault {
             let solver = &self.running.solver;
             let advice = if passed || open.is_nan() || open > OPEN_LOOP {
-                DEPENDENT.to_owned()
+                StopAdvice::Dependent
             } else if solver.method.is_adaptive() {
-                // Its steps are as short as they need to be: the motion itself is beyond the model.
-                format!(
-                    "try slower drives, a stiffer contact, or a tighter solver.tolerance (now {:e})",
-                    solver.tolerance
-                )
+                StopAdvice::GentlerMotion {
+                    tolerance: solver.tolerance,
+                }
             } else {
-                format!(
-                    "try a smaller solver.step (now {:e} s) or solver.method = automatic, or else a stiffer contact",
-                    solver.step
-                )
+                StopAdvice::ShorterStep { step: solver.step }
             };
-            return Err(self.stopped(&what, advice));
+            return Err(self.stopped(fault, advice));
         }
-        let Self {
-            mechanism,
-            state,
-            y_end,
-            k_end,
-            gaps_end,
+        let State {
+            now,
+            before,
+            record,
             ..
-        } = self;
-        state.t0 = state.t;
-        std::mem::swap(&mut state.y0, &mut state.y);
-        std::mem::swap(&mut state.k0, &mut state.k);
-        std::mem::swap(&mut state.gaps0, &mut state.gaps);
-        state.memory0.copy_from_slice(&state.memory);
-        state.t = t_end;
-        std::mem::swap(&mut state.y, y_end);
-        std::mem::swap(&mut state.k, k_end);
-        std::mem::swap(&mut state.gaps, gaps_end);
-        state.statistics.steps += 1;
-        state.statistics.constraint_drift = state
-            .statistics
-            .constraint_drift
-            .max(mechanism.constraint_drift());
-        let differs = self.stepper.differs_rates();
-        let located = self.mechanism.contacts.switching == Switching::Located;
+        } = &mut self.state;
+        std::mem::swap(before, now);
+        std::mem::swap(now, &mut self.attempt.end);
+        now.t = t_end;
+        now.memory.copy_from_slice(&before.memory);
+        let statistics = &mut record.statistics;
+        statistics.steps += 1;
+        let drift = self.mechanism.constraint_drift();
+        statistics.constraint_drift = statistics.constraint_drift.max(drift);
+        let located = self.locates();
         if located {
             self.track_reactions();
         }
         self.find_strongest(h);
         let switched = self.switch_contacts(h);
         self.track_peaks(h);
-        let again = (differs && self.mechanism.has_reactions()) || (!differs && switched.forces);
+        let again =
+            (mean_rates && self.mechanism.has_reactions()) || (!mean_rates && switched.forces);
         if !again && !located {
             self.track_reactions();
         }
         self.book_step(h, switched.contacts || switched.forces);
         self.pass_corner();
-        let Self {
-            mechanism,
-            state,
-            scratch_k,
-            ..
-        } = self;
-        let rate = if differs { scratch_k } else { &mut state.k };
         // The force now divides by the approach speed just found. Where no step needs the derivative at its end, the reactions of
         // ideal joints do.
         if again {
-            mechanism
-                .contacts
-                .memory_mut()
-                .copy_from_slice(&state.memory);
-            mechanism.derivative(state.t, &state.y, rate);
+            let Self {
+                mechanism,
+                state,
+                scratch_k,
+                ..
+            } = self;
+            let Instant {
+                t, y, k, memory, ..
+            } = &mut state.now;
+            let rate = if mean_rates { scratch_k } else { k };
+            let mut evaluator = mechanism.evaluator(Touching::by(located, memory));
+            evaluator.derivative(*t, y, rate);
+            let counts = evaluator.counts;
             mechanism.forget_evaluation();
-            state.statistics.evaluations += 1;
+            state.record.statistics.count(counts);
             if !located {
                 self.track_reactions();
             }
@@ -517,33 +575,33 @@ impl Simulation {
         Ok(())
     }
 
-    fn stopped(&self, what: &str, advice: String) -> Stopped {
-        let advice = if self.mechanism.least_pivot() < 1e-12 {
-            DEPENDENT.to_owned()
-        } else {
-            advice
-        };
+    fn stopped(&self, fault: StopFault, advice: StopAdvice) -> Stopped {
+        let dependent = self.mechanism.least_pivot() < 1e-12;
         Stopped {
-            time: self.state.t,
-            what: what.to_owned(),
-            advice,
+            time: self.state.now.t,
+            fault,
+            advice: if dependent {
+                StopAdvice::Dependent
+            } else {
+                advice
+            },
         }
     }
 
     /// Why there is nothing, or nothing any more, that the probe could be compared with: the ideal mechanism does not start,
     /// or came to where it cannot go on.
-    pub fn probe_fault(&self) -> Option<String> {
+    pub fn probe_fault(&self) -> Option<ProbeFault> {
         self.reference.fault()
     }
 
     /// Forces at the latest state that the motion does not fix.
     pub fn not_unique(&mut self) -> NotUnique {
-        self.sample(self.state.t, &mut Frame::default());
+        self.sample(self.state.now.t, &mut Frame::default());
         let Self {
             mechanism, state, ..
         } = self;
         NotUnique {
-            reactions: (0..state.gaps.len())
+            reactions: (0..state.now.gaps.len())
                 .filter(|&j| !mechanism.is_reaction_unique(j))
                 .collect(),
             actuators: (0..mechanism.drives())
@@ -561,13 +619,13 @@ impl Simulation {
 
     /// The latest finished impacts, at most 64, the oldest first.
     pub fn impacts(&self) -> impl ExactSizeIterator<Item = &Impact> + DoubleEndedIterator {
-        self.state.impacts.latest()
+        self.state.record.impacts.latest()
     }
 
     /// Appends to `out` the impacts that finished since the last call. None is lost if it is called after every step;
     /// otherwise only the latest 64 (more where there are more ball joints) are sure to be there.
     pub fn take_impacts(&mut self, out: &mut Vec<Impact>) {
-        self.state.impacts.hand_out(out);
+        self.state.record.impacts.hand_out(out);
     }
 
     /// Back to t = 0 with the parameters as they are now, those that wait for a reset included.
@@ -581,20 +639,12 @@ impl Simulation {
 
     /// Coordinates, then velocities, as the formulation orders them.
     pub fn state(&self) -> &[f64] {
-        &self.state.y
+        &self.state.now.y
     }
 
     /// Contact memory of ball joint `j`: whether it is in contact, with which approach speed.
     pub fn contact_memory(&self, j: usize) -> Memory {
-        self.state.memory[j]
-    }
-}
-
-fn switching_of(scene: &Scene) -> Switching {
-    if scene.solver.method.is_adaptive() {
-        Switching::Located
-    } else {
-        Switching::Immediate
+        self.state.now.memory[j]
     }
 }
 

@@ -141,7 +141,7 @@ impl AnyStepper {
     }
 
     /// Whether rates are differences of the states at both ends of a step: no step needs a derivative at its end.
-    pub(super) fn differs_rates(&self) -> bool {
+    pub(super) fn has_mean_rates(&self) -> bool {
         matches!(self, Self::ImexEuler(_))
     }
 

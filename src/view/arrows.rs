@@ -2,8 +2,8 @@
 
 use glam::Vec3;
 
-use super::build::{bar, push_label};
 use super::drawn::DrawnJoint;
+use super::instances::{bar, push_label};
 use super::theme::Material;
 use super::{
     Camera, Colour, DrawList, LabelKind, Layer, Legend, Line, Mark, Mesh, Palette, Scaling, Shot,

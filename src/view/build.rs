@@ -2,18 +2,20 @@
 
 use std::sync::Arc;
 
-use glam::{Mat3, Quat, Vec2, Vec3, Vec4};
+use glam::{Mat3, Quat, Vec3, Vec4};
 use parry3d::query::Ray;
 
 use super::arrows::{ARROW_LENGTH, push_arrow, push_forces};
+use super::cast::{cast, room};
+use super::coil::push_coil;
 use super::drawn::{self, BarKind, DrawnJoint, Part, Solid};
-use super::pick::cast;
+use super::instances::{bar, placed, push_label};
 use super::theme::Material;
 use super::{
-    Background, Bounds, Camera, Colour, DrawList, Floor, Instance, Label, LabelKind, Layer, Light,
-    Line, Mesh, MeshData, Palette, PeakMarks, ViewOptions, to_f32,
+    Background, Bounds, Camera, DrawList, Floor, Instance, LabelKind, Layer, Light, Line, Mesh,
+    MeshData, Palette, Shot, ViewOptions, to_f32,
 };
-use crate::scene::{Scene, SignedAxis};
+use crate::scene::{Role, Scene, SignedAxis};
 use crate::simulate::Frame;
 
 /// What the view keeps of a scene: made once for each scene, and again when its bodies or shapes change.
@@ -35,31 +37,12 @@ pub struct SceneView {
     at_start: Vec<DrawnJoint>,
 }
 
-/// One picture: everything [`SceneView::build`] reads.
-#[derive(Clone, Copy)]
-pub struct Shot<'a> {
-    /// The scene as it runs.
-    pub scene: &'a Scene,
-    /// The instant.
-    pub frame: &'a Frame,
-    /// Peaks that are over.
-    pub marks: &'a PeakMarks,
-    /// Choices.
-    pub options: &'a ViewOptions,
-    /// Point of view.
-    pub camera: &'a Camera,
-    /// Trail of the probe tip, oldest point first, m, world axes.
-    pub trail: &'a [Vec3],
-    /// Size of the picture, physical pixels.
-    pub size: [u32; 2],
-    /// Physical pixels per point of the interface; 1 without one. Scales lines and the triad.
-    pub pixels_per_point: f32,
-}
-
 /// Least edge of a picture that has room for the triad, points.
 const SMALLEST_WITH_TRIAD: f32 = 200.0;
 /// Radius of the light about a joint that was hit, in radii of its socket.
 const HALO: f32 = 1.7;
+/// Radius of a drawn spring, in radii of the scene.
+const COIL: f32 = 0.025;
 
 impl SceneView {
     /// Prepares the meshes and bounds of `scene`; `frame` is any frame of it, best the first.
@@ -79,7 +62,7 @@ impl SceneView {
             None if lowest.is_finite() => lowest + 0.15 * bounds.radius,
             None => bounds.radius,
         };
-        let room = drawn::room(scene, &parts, frame, &joints);
+        let room = room(scene, &parts, frame, &joints);
         let moving = parts.iter().filter(|part| part.body.is_some());
         let mut watched = Vec::new();
         for part in moving {
@@ -282,6 +265,14 @@ impl SceneView {
         out.sockets
             .sort_by(|a, b| distance(b).total_cmp(&distance(a)));
 
+        for (element, report) in scene.elements.iter().zip(&frame.elements) {
+            if element.points.len() == 2 {
+                let [from, to] = report.points.map(|point| to_f32(&point));
+                let (radius, width) = (COIL * self.bounds.radius, 2.2 * shot.pixels_per_point);
+                let colour = palette.material(Role::Pin).colour;
+                push_coil(from, to, radius, width, colour, &mut out.lines);
+            }
+        }
         push_forces(shot, &joints, &palette, out);
         if options.trail {
             push_trail(shot, &palette, &mut out.lines);
@@ -508,32 +499,6 @@ fn magnification_text(drawn: f32, asked: f32) -> String {
     }
 }
 
-/// Instance of a mesh under the linear map `linear`, then moved to `at`.
-fn placed(linear: Mat3, at: Vec3, material: Material) -> Instance {
-    let row = |i: usize| [linear.x_axis[i], linear.y_axis[i], linear.z_axis[i], at[i]];
-    Instance {
-        world_from_mesh: [row(0), row(1), row(2)],
-        colour: material.colour.0,
-        roughness: material.roughness,
-        metal: material.metal,
-        inner_radius: 0.0,
-        pad: 0.0,
-    }
-}
-
-/// A bar mesh (axis z from 0 to 1) from `from` along `along`.
-pub(super) fn bar(from: Vec3, along: Vec3, radius: f32, material: Material) -> Instance {
-    let turn = Mat3::from_quat(Quat::from_rotation_arc(
-        Vec3::Z,
-        along.normalize_or(Vec3::Z),
-    ));
-    placed(
-        turn * Mat3::from_diagonal(Vec3::new(radius, radius, along.length())),
-        from,
-        material,
-    )
-}
-
 fn push_solid(layer: &mut Layer, solid: &Solid<'_>, material: Material) {
     let ball =
         |centre, radius: f32| placed(Mat3::from_diagonal(Vec3::splat(radius)), centre, material);
@@ -593,26 +558,4 @@ fn push_trail(shot: &Shot<'_>, palette: &Palette, lines: &mut Vec<Line>) {
         from_colour: colour(i),
         to_colour: colour(i + 1),
     }));
-}
-
-pub(super) fn push_label(
-    out: &mut DrawList,
-    text: &Arc<str>,
-    kind: LabelKind,
-    anchor: Vec3,
-    colour: Colour,
-) {
-    let Some(pixel) = out.eye.project(anchor, out.size) else {
-        return;
-    };
-    let size = Vec2::new(out.size[0] as f32, out.size[1] as f32);
-    if pixel.cmpge(Vec2::ZERO).all() && pixel.cmple(size).all() {
-        out.labels.push(Label {
-            text: text.clone(),
-            kind,
-            anchor,
-            pixel,
-            colour,
-        });
-    }
 }

@@ -9,7 +9,6 @@ use std::sync::Arc;
 use glam::{Mat3, Vec3};
 use parry3d::shape::ConvexPolyhedron;
 
-use super::pick::distance;
 use super::{Mesh, MeshData, to_f32};
 use crate::scene::{Geometry, Role, Scene, Shape};
 use crate::simulate::{BodyMotion, Frame};
@@ -294,26 +293,6 @@ fn plate(corners: &[Vec3], thickness: f32) -> Option<MeshData> {
         face(&[a - half, b - half, b + half, a + half], out);
     }
     Some(mesh)
-}
-
-/// Outer radius, m, to which the socket of each ball joint may grow before it cuts into what carries it, `joints` drawn
-/// without magnification. What it touches already, or what is cut at its outer face, is no limit.
-pub(super) fn room(
-    scene: &Scene,
-    parts: &[Part],
-    frame: &Frame,
-    joints: &[DrawnJoint],
-) -> Vec<f32> {
-    let room_of = |(i, joint): (usize, &DrawnJoint)| {
-        let body = scene.ball_joints[i].socket.body;
-        parts
-            .iter()
-            .filter(|part| part.body == body && !part.reaches_socket(i))
-            .filter_map(|part| distance(&part.place(frame, joints), joint.socket_centre))
-            .filter(|&distance| distance > joint.outer)
-            .fold(f32::INFINITY, f32::min)
-    };
-    joints.iter().enumerate().map(room_of).collect()
 }
 
 /// Magnification that is drawn where `asked` is wanted: no socket may outgrow [`LARGEST_SOCKET`] ball radii, nor its

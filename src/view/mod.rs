@@ -12,18 +12,22 @@
 mod arrows;
 mod build;
 mod camera;
+mod cast;
+mod coil;
 mod draw_list;
 mod drawn;
 #[cfg(test)]
 pub(crate) mod fixture;
+mod instances;
 mod options;
 mod peaks;
 mod pick;
+mod shot;
 #[cfg(test)]
 mod tests;
 mod theme;
 
-pub use build::{SceneView, Shot};
+pub use build::SceneView;
 pub use camera::{Camera, Preset};
 pub use draw_list::{
     Background, DrawList, Eye, Floor, Instance, Label, LabelKind, Layer, Legend, Light, Line, Mesh,
@@ -32,6 +36,7 @@ pub use draw_list::{
 pub use options::{ArrowOptions, Scaling, ViewOptions};
 pub use peaks::{Mark, PeakMarks, SEEN};
 pub use pick::{Hit, Picked};
+pub use shot::Shot;
 pub use theme::{Colour, Palette, Theme};
 
 /// A physics vector as the view's.

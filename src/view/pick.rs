@@ -1,11 +1,10 @@
 //! What lies under the cursor: a ray against the shapes that are drawn.
 
-use glam::{Quat, Vec2, Vec3};
-use parry3d::math::Pose as ParryPose;
-use parry3d::query::{Ray, RayCast};
-use parry3d::shape::{Ball, Capsule, Cone, Cuboid, Cylinder, Shape};
+use glam::{Vec2, Vec3};
+use parry3d::query::Ray;
 
-use super::drawn::{self, BarKind, Pose, Solid};
+use super::cast::{cast, cast_ball};
+use super::drawn;
 use super::{SceneView, Shot};
 use crate::simulate::Frame;
 
@@ -82,73 +81,4 @@ impl SceneView {
             Picked::Fixed(_) => None,
         }
     }
-}
-
-/// Distance along `ray` to the solid.
-pub(super) fn cast(solid: &Solid<'_>, ray: &Ray) -> Option<f32> {
-    with_shape(solid, |shape, pose| {
-        shape.cast_ray(pose, ray, f32::MAX, true)
-    })?
-}
-
-/// Distance from `point` to the solid, 0 within it.
-pub(super) fn distance(solid: &Solid<'_>, point: Vec3) -> Option<f32> {
-    with_shape(solid, |shape, pose| {
-        shape.distance_to_point(pose, point, true)
-    })
-}
-
-/// Asks something of the solid's shape where it stands; `None` where there is none.
-fn with_shape<T>(solid: &Solid<'_>, ask: impl FnOnce(&dyn Shape, &ParryPose) -> T) -> Option<T> {
-    // A broken frame must not reach parry's iterations.
-    let mut finite = true;
-    solid.extent(|centre, radius| finite &= centre.is_finite() && radius.is_finite());
-    if !finite {
-        return None;
-    }
-    Some(match *solid {
-        Solid::Bar {
-            from,
-            to,
-            radius,
-            kind,
-            ..
-        } => {
-            let half = from.distance(to) / 2.0;
-            if half == 0.0 {
-                return None;
-            }
-            // parry's bars stand along Y.
-            let turn = Quat::from_rotation_arc(Vec3::Y, (to - from).normalize_or(Vec3::Y));
-            let pose = ParryPose::from_parts((from + to) / 2.0, turn);
-            match kind {
-                BarKind::Capsule => ask(&Capsule::new_y(half, radius), &pose),
-                BarKind::Cylinder => ask(&Cylinder::new(half, radius), &pose),
-                BarKind::Cone => ask(&Cone::new(half, radius), &pose),
-            }
-        }
-        Solid::Box {
-            centre,
-            size,
-            rotation,
-        } => {
-            let pose = ParryPose::from_parts(centre, Quat::from_mat3(&rotation));
-            ask(&Cuboid::new(size / 2.0), &pose)
-        }
-        Solid::Ball { centre, radius } => {
-            ask(&Ball::new(radius), &ParryPose::from_translation(centre))
-        }
-        Solid::Plate {
-            hull,
-            pose: Pose { position, rotation },
-            ..
-        } => {
-            let pose = ParryPose::from_parts(position, Quat::from_mat3(&rotation));
-            ask(hull?, &pose)
-        }
-    })
-}
-
-fn cast_ball(centre: Vec3, radius: f32, ray: &Ray) -> Option<f32> {
-    Ball::new(radius).cast_ray(&ParryPose::from_translation(centre), ray, f32::MAX, true)
 }

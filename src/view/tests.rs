@@ -186,7 +186,7 @@ fn a_magnified_socket_cuts_into_nothing_that_carries_it() {
                 let ball = scene.ball_joints[i].ball.body;
                 for part in view.parts.iter().filter(|part| part.body != ball) {
                     let solid = part.place(&frame, &joints);
-                    let Some(distance) = pick::distance(&solid, joint.socket_centre) else {
+                    let Some(distance) = super::cast::distance(&solid, joint.socket_centre) else {
                         continue;
                     };
                     // What carries a socket as small as it comes touches it, and a bar ends at its outer face.

@@ -7,8 +7,9 @@ use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
 use jointplay::analysis::{
-    AnalysisError, Effort, End, Outside, Setting, WorkPrecision, presets, work_precision,
+    AnalysisError, Effort, End, RunContext, Setting, WorkPrecision, presets, work_precision,
 };
+use jointplay::integrate::Method;
 use jointplay::scene::{Preset, Scene};
 use serde_json::Value as Json;
 
@@ -73,8 +74,8 @@ fn the_command_writes_all_files_or_none() {
     let rows: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
     assert!(rows.iter().all(|row| row.len() == rows[0].len()), "{csv}");
     let column = |name: &str| rows[0].iter().position(|head| *head == name).unwrap();
-    for method in Setting::methods() {
-        assert!(rows.iter().any(|row| row[0] == *method), "{method}");
+    for method in Method::ALL {
+        assert!(rows.iter().any(|row| row[0] == method.word()), "{method}");
     }
     for preset in Preset::ALL {
         let own = |row: &&Vec<&str>| row[column("preset")] == preset.word();
@@ -165,7 +166,7 @@ fn an_interrupted_measurement_writes_nothing() {
 
 /// By a clock that goes on at every look: the same on every machine.
 fn measure<T>(
-    analysis: impl FnOnce(&mut Outside) -> Result<T, AnalysisError>,
+    analysis: impl FnOnce(&mut RunContext) -> Result<T, AnalysisError>,
     most_reports: u64,
 ) -> Result<T, AnalysisError> {
     let (looks, reports) = (Cell::new(0), Cell::new(0));
@@ -182,10 +183,10 @@ fn measure<T>(
             ControlFlow::Continue(())
         }
     };
-    analysis(&mut Outside::new(&mut clock, &mut go_on))
+    analysis(&mut RunContext::new(&mut clock, &mut go_on))
 }
 
-fn error_at(found: &WorkPrecision, method: &str, value: f64) -> f64 {
+fn error_at(found: &WorkPrecision, method: Method, value: f64) -> f64 {
     let own =
         |p: &&jointplay::analysis::Point| p.setting.method == method && p.setting.value() == value;
     let point = found.points.iter().find(own).unwrap();
@@ -203,12 +204,12 @@ fn finer_steps_and_tolerances_err_less_and_cost_more() {
         tolerances: &[1e-4, 1e-8],
         seconds: f64::INFINITY,
     };
-    let found = measure(|outside| work_precision(&scene, &effort, outside), u64::MAX).unwrap();
-    for method in Setting::methods() {
+    let found = measure(|context| work_precision(&scene, &effort, context), u64::MAX).unwrap();
+    for method in Method::ALL {
         let own: Vec<_> = found
             .points
             .iter()
-            .filter(|p| p.setting.method == *method)
+            .filter(|p| p.setting.method == method)
             .collect();
         assert!(own.len() >= 2, "{method}");
         let adaptive = own[0].setting.adaptive;
@@ -230,9 +231,9 @@ fn finer_steps_and_tolerances_err_less_and_cost_more() {
         assert!(evaluations(fine) > 2 * evaluations(coarse), "{method}");
     }
     // The reference is good enough to tell all of these apart, and the best come near it.
-    let floor = found.standard.floor.peak.unwrap();
+    let floor = found.reference.floor.peak.unwrap();
     assert!(floor < 1e-6, "{floor}");
-    assert!(error_at(&found, "radau5", 1e-8) < 1e-5);
+    assert!(error_at(&found, Method::Radau5, 1e-8) < 1e-5);
     // Somebody is on the front, and nobody is beaten there.
     let front: Vec<_> = found.points.iter().filter(|p| p.impacts.front).collect();
     assert!(!front.is_empty());
@@ -252,7 +253,7 @@ fn presets_can_be_measured_on_any_scene_and_broken_off() {
     let scene = crate::common::scene("pendulum", &[("contact.clearance", "0.5 mm")]);
     let of = |scene: &Scene, most: u64| {
         measure(
-            |outside| presets::measure(scene, &Preset::ALL, outside),
+            |context| presets::measure(scene, &Preset::ALL, context),
             most,
         )
     };
@@ -283,13 +284,12 @@ fn presets_can_be_measured_on_any_scene_and_broken_off() {
 #[test]
 fn the_presets_in_the_program_are_those_that_were_measured() {
     let record = presets::record();
-    let scene = crate::common::scene("spcmm", &[]);
     for preset in Preset::ALL {
         let (method, value) = &record.points[preset.word()];
-        let setting = Setting::of_preset(&scene, preset).unwrap();
+        let setting = Setting::of_preset(preset);
         assert_eq!(
             (method.as_str(), *value),
-            (setting.method, setting.value()),
+            (setting.method.word(), setting.value()),
             "{preset:?} has changed: jointplay tradeoff --all --write ."
         );
         for name in jointplay::scene::BUILT_IN {

@@ -77,8 +77,9 @@ pub fn check(bytes: &[u8]) -> Fate {
             return Fate::Refused;
         }
     };
-    for words in scene.warnings().iter().chain([&scene.title, &scene.name]) {
-        assert_eq!(visible(words), *words);
+    let warnings = scene.warnings().into_iter().map(|w| w.to_string());
+    for words in warnings.chain([scene.title.clone(), scene.name.clone()]) {
+        assert_eq!(visible(&words), *words);
     }
     for parameter in scene.parameters() {
         let value = scene.get(parameter.key).expect("its own key");

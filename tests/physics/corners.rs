@@ -1,7 +1,7 @@
 //! Corners of the friction law are events: a step ends at each, and what slides is on the piece that it holds.
 
 use crate::common::{frame_now, simulation};
-use jointplay::contact::Slip;
+use jointplay::contact::FrictionPiece;
 
 #[test]
 fn settled_sliding_holds_its_piece_and_corners_cost_few_rejections() {
@@ -18,9 +18,12 @@ fn settled_sliding_holds_its_piece_and_corners_cost_few_rejections() {
             let frame = frame_now(&mut simulation);
             for (j, joint) in frame.joints.iter().enumerate() {
                 let memory = simulation.contact_memory(j);
-                assert!(memory.active && memory.slip != Slip::Whole, "{method}");
+                assert!(
+                    memory.active && memory.friction_piece != FrictionPiece::Unsplit,
+                    "{method}"
+                );
                 let c = simulation.mechanism().contacts.coefficients(j);
-                let beyond = c.beyond(memory.slip, joint.slip_speed);
+                let beyond = c.beyond(memory.friction_piece, joint.slip_speed);
                 assert!(beyond < 1e-2 * c.slip_high, "{method}, {j}: {beyond:e}");
             }
         }
@@ -58,8 +61,11 @@ fn methods_agree_where_friction_reads_a_part_of_the_velocity() {
             for (j, joint) in frame.joints.iter().enumerate() {
                 let memory = simulation.contact_memory(j);
                 let c = simulation.mechanism().contacts.coefficients(j);
-                if memory.active && memory.slip != Slip::Whole && joint.slip_speed > 0.0 {
-                    let beyond = c.beyond(memory.slip, joint.slip_speed);
+                if memory.active
+                    && memory.friction_piece != FrictionPiece::Unsplit
+                    && joint.slip_speed > 0.0
+                {
+                    let beyond = c.beyond(memory.friction_piece, joint.slip_speed);
                     assert!(beyond < 1e-2 * c.slip_high, "{method}, {j}: {beyond:e}");
                 }
             }

@@ -63,9 +63,12 @@ fn a_step_far_too_long_for_the_contact_is_stopped_with_advice() {
                 "{text}"
             );
             assert!(text.contains(&format!("{:.6e} s", stopped.time)), "{text}");
-            assert!(stopped.advice.contains("solver.step"), "{text}");
+            assert!(stopped.advice.to_string().contains("solver.step"), "{text}");
             assert!(
-                stopped.advice.contains("solver.method = automatic"),
+                stopped
+                    .advice
+                    .to_string()
+                    .contains("solver.method = automatic"),
                 "{text}"
             );
             still_good(&mut simulation, &stopped);
@@ -196,7 +199,10 @@ fn a_drive_beyond_all_measure_stops_the_adaptive_method_too() {
         text.contains("body crank") || text.contains("ball joint C"),
         "{text}"
     );
-    assert!(stopped.advice.contains("slower drives"), "{text}");
+    assert!(
+        stopped.advice.to_string().contains("slower drives"),
+        "{text}"
+    );
     still_good(&mut simulation, &stopped);
 }
 
@@ -207,13 +213,19 @@ fn loops_that_pass_a_singular_pose_say_so() {
     let mut simulation = simulation("spcmm", &changes);
     let stopped = run_to_stop(&mut simulation);
     println!("{stopped}");
-    assert!(stopped.what.contains("loops"), "{stopped}");
-    assert!(stopped.advice.contains("clearance"), "{stopped}");
+    assert!(stopped.fault.to_string().contains("loops"), "{stopped}");
+    assert!(
+        stopped.advice.to_string().contains("clearance"),
+        "{stopped}"
+    );
     assert!((stopped.time - 0.074).abs() < 2e-3);
     // Deeper in the range a step may jump over the pose onto another branch: its sign gives it away.
     let deeper = [("contact.clearance", "0"), ("spcmm.slider_plane", "170 mm")];
     let stopped = run_to_stop(&mut self::simulation("spcmm", &deeper));
-    assert!(stopped.what.contains("singular pose"), "{stopped}");
+    assert!(
+        stopped.fault.to_string().contains("singular pose"),
+        "{stopped}"
+    );
     let hash = simulation.state_hash();
     assert!(simulation.step().is_err());
     assert_eq!(simulation.state_hash(), hash);
@@ -230,8 +242,14 @@ fn the_other_form_stops_before_a_singular_pose_too() {
     let mut simulation = simulation("spcmm", &changes);
     let stopped = run_to_stop(&mut simulation);
     println!("{stopped}");
-    assert!(stopped.what.contains("singular pose"), "{stopped}");
-    assert!(stopped.advice.contains("clearance"), "{stopped}");
+    assert!(
+        stopped.fault.to_string().contains("singular pose"),
+        "{stopped}"
+    );
+    assert!(
+        stopped.advice.to_string().contains("clearance"),
+        "{stopped}"
+    );
     // Where the tree form stops, and not by creeping closer until no number is left.
     assert!((stopped.time - 1.066e-3).abs() < 2e-6, "{stopped}");
     assert!(simulation.statistics().steps < 1000);

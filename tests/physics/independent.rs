@@ -9,7 +9,7 @@ use crate::common::{Changes, run_until, scene};
 use diffsol::{NalgebraLU, NalgebraMat, OdeBuilder, OdeSolverMethod, OdeSolverStopReason, Vector};
 use jointplay::contact::Memory;
 use jointplay::integrate::System;
-use jointplay::mechanism::Mechanism;
+use jointplay::mechanism::{Mechanism, Touching};
 use jointplay::simulate::Simulation;
 
 type M = NalgebraMat<f64>;
@@ -164,6 +164,7 @@ where
 /// The program's equations under another's solver.
 struct Borrowed {
     mechanism: RefCell<Mechanism>,
+    memory: RefCell<Vec<Memory>>,
     speed_floor: f64,
 }
 
@@ -172,6 +173,7 @@ impl Borrowed {
         let scene = scene(name, changes);
         Self {
             mechanism: RefCell::new(Mechanism::new(&scene).unwrap()),
+            memory: RefCell::new(vec![Memory::default(); scene.ball_joints.len()]),
             speed_floor: scene.contact.impact_speed_floor,
         }
     }
@@ -183,7 +185,10 @@ impl Equations for Borrowed {
     }
 
     fn derivative(&self, t: f64, y: &[f64], dy: &mut [f64]) {
-        self.mechanism.borrow_mut().derivative(t, y, dy);
+        let memory = self.memory.borrow();
+        let mut mechanism = self.mechanism.borrow_mut();
+        let mut evaluator = mechanism.evaluator(Touching::Located(&memory));
+        evaluator.derivative(t, y, dy);
     }
 
     fn gaps(&self, t: f64, y: &[f64]) -> Vec<(f64, f64)> {
@@ -194,9 +199,8 @@ impl Equations for Borrowed {
     }
 
     fn forces(&self, t: f64, y: &[f64]) -> Vec<f64> {
-        let mut mechanism = self.mechanism.borrow_mut();
-        mechanism.derivative(t, y, &mut vec![0.0; y.len()]);
-        mechanism.contacts.finish();
+        self.derivative(t, y, &mut vec![0.0; y.len()]);
+        let mechanism = self.mechanism.borrow();
         let gaps = mechanism.contacts.gaps().iter();
         gaps.map(|gap| gap.normal_force).collect()
     }
@@ -206,8 +210,7 @@ impl Equations for Borrowed {
     }
 
     fn remember(&self, contacts: &[Option<f64>]) {
-        let mut mechanism = self.mechanism.borrow_mut();
-        for (memory, speed) in mechanism.contacts.memory_mut().iter_mut().zip(contacts) {
+        for (memory, speed) in self.memory.borrow_mut().iter_mut().zip(contacts) {
             *memory = Memory {
                 active: speed.is_some(),
                 approach_speed: speed.unwrap_or(0.0),

@@ -1,8 +1,9 @@
 //! Sections, exponents and regimes of systems whose answers are known, through the same code as those of mechanisms.
 
 use jointplay::analysis::exponent::Exponent;
+use jointplay::analysis::orbit::Orbit;
 use jointplay::analysis::regime::{Evidence, Regime, classify};
-use jointplay::analysis::section::{Orbit, Schedule, Watch};
+use jointplay::analysis::section::{Schedule, Watch};
 use jointplay::integrate::{Controller, DormandPrince, RungeKutta4, Stepper, System};
 
 /// A map of the line or the circle, x' = f(x).

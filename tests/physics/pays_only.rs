@@ -20,11 +20,8 @@ fn rigid_scenes_evaluate_no_contact() {
                 simulation.step().unwrap();
             }
             let frame = frame_now(&mut simulation);
-            assert_eq!(
-                simulation.mechanism().contacts.evaluations,
-                0,
-                "{name}, {form}"
-            );
+            let evaluations = simulation.statistics().contact_evaluations;
+            assert_eq!(evaluations, 0, "{name}, {form}");
             assert!(frame.joints.iter().all(|j| j.state == ContactState::Ideal));
             let summary = simulation.mechanism().summary();
             assert_eq!((summary.contacts, summary.frictional_contacts), (0, 0));
@@ -33,7 +30,7 @@ fn rigid_scenes_evaluate_no_contact() {
         // With play there are evaluations to count.
         let mut simulation = simulation(name, &[]);
         simulation.step().unwrap();
-        assert!(simulation.mechanism().contacts.evaluations > 0, "{name}");
+        assert!(simulation.statistics().contact_evaluations > 0, "{name}");
     }
 }
 
@@ -82,9 +79,9 @@ fn frictionless_scenes_evaluate_no_friction() {
         while simulation.time() < 0.011 {
             simulation.step().unwrap();
         }
-        let contacts = &simulation.mechanism().contacts;
-        assert!(contacts.evaluations > 0, "{changes:?}");
-        contacts.friction_evaluations
+        let statistics = simulation.statistics();
+        assert!(statistics.contact_evaluations > 0, "{changes:?}");
+        statistics.friction_evaluations
     };
     for change in [("contact.friction_law", "none"), ("contact.friction", "0")] {
         let summary = summary("spcmm", &[change]);

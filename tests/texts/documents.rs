@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use jointplay::scene::{Scene, Vec3, reference_page, unit_table};
+use jointplay::scene::{Scene, Vec3, element_table, reference_page, unit_table};
 use jointplay::simulate::{Frame, Simulation};
 
 fn root() -> PathBuf {
@@ -37,6 +37,7 @@ fn example(number: usize) -> String {
 fn the_page_of_scenes_lists_the_units_that_are_read() {
     let page = read("docs/scene-format.md");
     assert!(page.contains(&unit_table()), "{}", unit_table());
+    assert!(page.contains(&element_table()), "{}", element_table());
     for unit in ["µm", "kg·m²", "60 rpm", "15°"] {
         assert!(page.contains(unit), "{unit}");
     }
@@ -44,7 +45,7 @@ fn the_page_of_scenes_lists_the_units_that_are_read() {
 
 #[test]
 fn hinges_that_are_not_parallel_stand_where_the_page_says() {
-    let scene = Scene::parse(&example(1), None, &[]).expect("the example loads");
+    let scene = Scene::parse(&example(2), None, &[]).expect("the example loads");
     let mut simulation = Simulation::new(&scene).expect("the example starts");
     let mut frame = Frame::default();
     simulation.sample(0.0, &mut frame);
@@ -73,7 +74,7 @@ fn hinges_that_are_not_parallel_stand_where_the_page_says() {
 
 #[test]
 fn the_example_of_the_scene_format_runs() {
-    let example = &example(2);
+    let example = &example(3);
     let scene = Scene::parse(example, None, &[]).expect("the example loads");
     let mut simulation = Simulation::new(&scene).expect("the example starts");
     simulation.advance_to(0.02).expect("the example runs");
@@ -137,4 +138,23 @@ fn documents_name_files_that_exist() {
             }
         }
     }
+}
+
+#[test]
+fn the_mass_on_a_spring_of_the_page_swings_about_its_rest() {
+    let scene = Scene::parse(&example(1), None, &[]).expect("the example loads");
+    let mut simulation = Simulation::new(&scene).expect("the example starts");
+    let mut frame = Frame::default();
+    simulation.sample(0.0, &mut frame);
+    // 105 mm long at the start: 5 N against a weight of 4.905 N.
+    assert!(
+        (frame.elements[0].force.z - 5.0).abs() < 1e-12,
+        "{:?}",
+        frame.elements[0]
+    );
+    assert!((frame.bodies[0].acceleration.z - (5.0 - 4.905) / 0.5).abs() < 1e-9);
+    simulation.advance_to(2.0).expect("the example runs");
+    let ledger = simulation.ledger().expect("is kept");
+    assert!(ledger.damping_loss > 0.0 && ledger.external_work != 0.0);
+    assert!(ledger.relative_residual().abs() < 1e-5, "{ledger:?}");
 }

@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 /// Floors from the ground up; modules of one floor know nothing of each other.
-const FLOORS: [&[&str]; 9] = [
+const FLOORS: [&[&str]; 10] = [
+    &["words"],
     &["contact", "files", "integrate"],
     &["scene"],
     &["mechanism"],

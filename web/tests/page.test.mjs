@@ -76,8 +76,14 @@ for (const backend of ['webgl', 'webgpu']) {
 test('what it draws changes while it plays', async () => {
     const lab = await open('theme=light&scale=1:1', { backend: 'webgl' });
     const view = { x: 320, y: 60, width: 460, height: 200 };
+    // Two pictures of known phases: a whole period of 2 s apart they would be the same.
+    await lab.runTo(0.1);
     const first = crop(await lab.pixels(), view);
-    await lab.until(async () => (await lab.state()).time_s > 0.3, 'time does not pass');
+    await lab.click('Button', 'Play');
+    await lab.until(async () => (await lab.state()).shown_s > 0.5, 'time does not pass');
+    await lab.click('Button', 'Pause');
+    const { shown_s: shown } = await lab.state();
+    assert.ok(shown < 1.8, `paused at ${shown} s`);
     assert.ok(difference(first, crop(await lab.pixels(), view)) > 0.0005);
     await lab.close();
 });

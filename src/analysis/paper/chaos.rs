@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::words::digits;
+use super::words::{digits, range};
 use super::{Case, Statement, Verdict, verdict};
 
 /// Amplitudes of x (m) and of beta (rad) in trajectory (59).
@@ -69,12 +69,6 @@ pub struct Found {
     pub sweeps: [Vec<Swept>; 2],
     /// What two sections must differ by in x (m) and beta (rad) to be different.
     pub resolution: [f64; 2],
-}
-
-pub(super) fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
-    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
-        (a.min(v), b.max(v))
-    })
 }
 
 /// Largest distance of two loops of `loops` at equal phases over the amplitude, in a coordinate and its rate.

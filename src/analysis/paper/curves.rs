@@ -41,7 +41,7 @@ fn amplitude(column: usize) -> f64 {
 fn apart(curves: &[&[Sample]], column: usize, from: f64) -> f64 {
     let instants = curves.iter().map(|c| c.len()).min().unwrap_or(0);
     let at = |k: usize| {
-        let (least, most) = super::chaos::range(curves.iter().map(|c| c[k][column]));
+        let (least, most) = super::words::range(curves.iter().map(|c| c[k][column]));
         (most - least) / amplitude(column)
     };
     let late = (0..instants).filter(|&k| curves[0][k][0] >= from);

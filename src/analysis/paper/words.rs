@@ -210,7 +210,7 @@ fn no_rule(responses: &[&Response; 3]) -> Statement {
 
 /// Largest less smallest.
 fn extent(values: [f64; 3]) -> f64 {
-    let (least, most) = super::chaos::range(values.into_iter());
+    let (least, most) = range(values.into_iter());
     most - least
 }
 
@@ -245,6 +245,13 @@ fn main_influence(by_clearance: &[&Response; 3], by_friction: &[&Response; 3]) -
             "by {friction:.0} N over the frictions, by {clearance:.0} N over the clearances"
         ),
     }
+}
+
+/// Least and largest.
+pub(super) fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
+        (a.min(v), b.max(v))
+    })
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Everything that was found, and what the paper's statements come to with it.
 
-use super::record::{Row, Swathe, Traced};
+use super::record::{Row, SweepData, Traced};
 use super::{Extent, PICKED, Variant};
 use crate::analysis::paper::chaos::{Found, Loop};
 use crate::analysis::paper::curves::{Curves, Sample};
@@ -24,7 +24,7 @@ pub struct Combination {
     /// Runs of [`BY_CLEARANCE`].
     pub runs: Vec<Traced>,
     /// Their sections.
-    pub sections: Swathe,
+    pub sections: SweepData,
 }
 
 /// Everything that was found with one model.
@@ -41,8 +41,8 @@ pub struct Findings {
     pub ideal: Traced,
     /// Settled curves, in the order of [`paper::CASES`].
     pub curves: Vec<Loop>,
-    /// Sweeps: [`Findings::swathe`] finds one by name.
-    pub swathes: Vec<Swathe>,
+    /// Sweeps: [`Findings::data`] finds one by name.
+    pub sweeps: Vec<SweepData>,
     /// What two sections must differ by in x (m) and beta (rad) to be different.
     pub resolution: [f64; 2],
 }
@@ -52,8 +52,8 @@ impl Findings {
     ///
     /// # Panics
     /// If there is none.
-    pub fn swathe(&self, name: &str) -> &Swathe {
-        let found = self.swathes.iter().find(|s| s.name == name);
+    pub fn sweep_data(&self, name: &str) -> &SweepData {
+        let found = self.sweeps.iter().find(|s| s.name == name);
         found.expect("named as in Work::new")
     }
 
@@ -79,7 +79,7 @@ impl Findings {
     /// What the statements of section 4.3 rest on.
     pub fn chaos(&self) -> Found {
         let mm = 1e3;
-        let swept = |name, factor| self.swathe(name).swept(factor);
+        let swept = |name, factor| self.sweep_data(name).swept(factor);
         Found {
             loops: [self.loops(BY_CLEARANCE), self.loops(BY_FRICTION)],
             runs: [

@@ -73,7 +73,7 @@ pub struct Traced {
 
 /// A sweep with the records of all its points.
 #[derive(Clone, Debug)]
-pub struct Swathe {
+pub struct SweepData {
     /// The model.
     pub variant: Variant,
     /// What it is in words of a file's name.
@@ -84,7 +84,7 @@ pub struct Swathe {
     pub records: Vec<f64>,
 }
 
-impl Swathe {
+impl SweepData {
     /// Name in files.
     pub fn file_name(&self) -> String {
         format!("{}{}", self.variant.prefix, self.name)

@@ -6,7 +6,7 @@ use egui_plot::{HLine, LineStyle, PlotPoint, PlotPoints, PlotTransform, Points, 
 use super::coordinate::Coordinate;
 use super::plane::{Axis, plane};
 use super::portrait::title;
-use super::sweep::Swept;
+use super::swept::Swept;
 use crate::analysis::swept::SweptPoint;
 use crate::app::{theme, value};
 use crate::scene::{table, to_display};

@@ -4,77 +4,24 @@ use eframe::egui::{Button, ComboBox, DragValue, ProgressBar, RichText, TextEdit,
 
 use super::coordinate::Coordinate;
 use super::diagram::Diagram;
+use super::swept::{Swept, start_word};
 use crate::analysis::grid::Start;
 use crate::analysis::point::LOOSEST_FOR_EXPONENT;
-use crate::analysis::swept::{Range, SweepTask, SweptPoint};
-use crate::analysis::task::{Job, Message, SceneSource};
+use crate::analysis::source::SceneSource;
+use crate::analysis::swept::SweepTask;
+use crate::analysis::task::{Job, Message};
 use crate::app::host::{Host, Running};
 use crate::app::layout::reserved;
 use crate::app::load::Load;
 use crate::app::player::Player;
 use crate::app::value;
-use crate::scene::{Kind, Parameter, Scene, Value, table};
+use crate::scene::{Kind, Parameter, Value};
 
 /// Parameter that is varied at first, and its range.
 const FIRST: (&str, &str, &str) = ("contact.clearance", "0.01 mm", "1 mm");
 
 /// Width of the button that starts and ends a sweep, points: it stays where it is.
 const GO: f32 = 120.0;
-
-/// A sweep that was started, and what came of it.
-pub struct Swept {
-    /// What was asked for.
-    pub task: SweepTask,
-    /// The varied parameter.
-    pub range: Range,
-    /// Points by their number; `None` where one is still to come.
-    pub points: Vec<Option<SweptPoint>>,
-    /// The scene that it was made of, without what varies.
-    scene: Option<Scene>,
-}
-
-impl Swept {
-    /// What it was made of: scene, changed parameters, range, periods.
-    fn caption(&self) -> String {
-        let Self { task, range, .. } = self;
-        let varied = [range.key.clone()];
-        let scene = self.scene.as_ref();
-        let scene = scene.map_or_else(String::new, |scene| value::scene_line(scene, &varied));
-        let parameter = table().iter().find(|parameter| parameter.key == range.key);
-        let label = parameter.map_or_else(|| range.key.clone(), |p| p.label.to_lowercase());
-        let end = |si| match parameter.map(|p| (p, &p.kind)) {
-            Some((_, Kind::Count { .. })) | None => value::number(si, 6),
-            Some((parameter, _)) => parameter.show(&Value::Number(si)),
-        };
-        format!(
-            "{scene}; {label} {} to {}, {} values; {} periods of which {} discarded, phase {}°, {} start",
-            end(range.from),
-            end(range.to),
-            range.count,
-            task.periods,
-            task.discard,
-            value::number(360.0 * task.phase, 4),
-            start_word(task.start),
-        )
-    }
-
-    /// What stands against its being of the scene on show, a phrase each.
-    fn differences(&self, player: &Player) -> Vec<String> {
-        let varied = [self.range.key.clone()];
-        let scene = self.scene.as_ref();
-        scene.map_or_else(Vec::new, |scene| {
-            value::differences(scene, player.wanted(), &varied)
-        })
-    }
-}
-
-fn start_word(start: Start) -> &'static str {
-    match start {
-        Start::Cold => "cold",
-        Start::FollowUp => "follow upwards",
-        Start::FollowDown => "follow downwards",
-    }
-}
 
 /// What the next sweep is to be.
 struct Settings {

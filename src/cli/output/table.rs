@@ -84,6 +84,8 @@ const LEDGER: [&str; 6] = [
     "clearance_work_J",
     "energy_residual_J",
 ];
+/// Added to the ledger where a scene has force elements.
+const LEDGER_OF_ELEMENTS: [&str; 2] = ["damping_loss_J", "external_work_J"];
 const PROBE: [&str; 3] = ["probe_error_x_m", "probe_error_y_m", "probe_error_z_m"];
 
 impl Table {
@@ -115,6 +117,12 @@ impl Table {
         let ledger = first.ledger.is_some();
         if ledger {
             names.extend(fixed(&LEDGER));
+        }
+        for element in &scene.elements {
+            names.extend(["x", "y", "z"].map(|axis| format!("{}_force_{axis}_N", element.name)));
+        }
+        if ledger && !scene.elements.is_empty() {
+            names.extend(fixed(&LEDGER_OF_ELEMENTS));
         }
         Self {
             rows: Rows::new(names.len()),
@@ -243,6 +251,15 @@ impl Table {
                 ledger.clearance_work,
                 ledger.residual(),
             ]);
+        }
+        for element in &frame.elements {
+            values.extend(element.force.iter());
+        }
+        if let Some(ledger) = frame
+            .ledger
+            .filter(|_| self.ledger && !frame.elements.is_empty())
+        {
+            values.extend([ledger.damping_loss, ledger.external_work]);
         }
     }
 }

@@ -86,7 +86,9 @@ pub fn render(arguments: &RenderArguments) -> Result<(), Failure> {
     interrupt::listen();
     let folder = Folder::claim(&arguments.out, arguments.force)?;
     if !arguments.quiet {
-        scene.warnings().iter().for_each(|warning| warn(warning));
+        for warning in scene.warnings() {
+            warn(&warning.to_string());
+        }
     }
     if let Some(reference) = common_reference(&scene, &times, &view, arguments)? {
         studio.fix_arrow_scale(reference);
@@ -102,7 +104,7 @@ pub(super) fn fill(
     times: &Times,
     arguments: &RenderArguments,
 ) -> Result<(), Failure> {
-    let meta = provenance::meta(scene)?;
+    let meta = provenance::meta(scene);
     let bar = progress::bar(!arguments.quiet, times.instants.len() as u64);
     let labels = labels(&meta);
     let labels: Vec<(&str, &str)> = labels

@@ -8,7 +8,7 @@ use serde_json::{Map, Value as Json, json};
 
 use super::text::{self, Compared};
 use crate::analysis::paper::Case;
-use crate::analysis::reproduction::{COLUMNS, Findings, Report, Swathe, Traced};
+use crate::analysis::reproduction::{COLUMNS, Findings, Report, SweepData, Traced};
 use crate::cli::Failure;
 use crate::cli::output::significant;
 use crate::cli::sweep::{Archive, Source, meta};
@@ -26,12 +26,9 @@ pub(super) fn write(folder: &Folder, report: &Report) -> Result<(), Failure> {
         put(format!("{}.csv", run.name), samples(run).as_bytes())?;
         put(format!("{}.npz", run.name), &rows(run, report)?)
     };
-    let put_sweep = |swathe: &Swathe| {
-        archive(folder, swathe)?;
-        put(
-            format!("{}.csv", swathe.file_name()),
-            points(swathe).as_bytes(),
-        )
+    let put_sweep = |data: &SweepData| {
+        archive(folder, data)?;
+        put(format!("{}.csv", data.file_name()), points(data).as_bytes())
     };
     put_run(&report.corrected.ideal)?;
     for found in [&report.corrected, &report.printed] {
@@ -48,7 +45,7 @@ pub(super) fn write(folder: &Folder, report: &Report) -> Result<(), Failure> {
         for run in found.runs.iter().chain([&found.lagrange]) {
             put_run(run)?;
         }
-        found.swathes.iter().try_for_each(put_sweep)?;
+        found.sweeps.iter().try_for_each(put_sweep)?;
     }
     for combination in &report.combinations {
         combination.runs.iter().try_for_each(put_run)?;
@@ -140,7 +137,7 @@ fn cell(value: f64) -> String {
 
 /// A run at every instant that was looked at.
 fn rows(run: &Traced, report: &Report) -> Result<Vec<u8>, Failure> {
-    let mut meta = super::meta(report)?;
+    let mut meta = super::meta(report);
     meta.insert("run".into(), json!(run.name));
     meta.insert("clearance_mm".into(), json!(run.case.clearance));
     meta.insert("friction".into(), json!(run.case.friction));
@@ -183,14 +180,14 @@ fn curves(found: &Findings) -> String {
 }
 
 /// One row a point of a sweep, without its sections.
-fn points(swathe: &Swathe) -> String {
-    let layout = swathe.sweep.layout();
-    let grid = swathe.sweep.grid();
+fn points(data: &SweepData) -> String {
+    let layout = data.sweep.layout();
+    let grid = data.sweep.grid();
     let single: Vec<_> = layout.columns().iter().filter(|c| !c.per_section).collect();
     let axes = grid.axes().iter().map(|a| a.key().to_owned());
     let mut names: Vec<String> = axes.collect();
     names.extend(single.iter().map(|c| c.name.clone()));
-    let columns: Vec<Vec<f64>> = single.iter().map(|c| swathe.values(&c.name)).collect();
+    let columns: Vec<Vec<f64>> = single.iter().map(|c| data.values(&c.name)).collect();
     let mut out = names.join(",");
     out.push('\n');
     for point in 0..grid.points() {
@@ -225,12 +222,12 @@ impl Source for Records<'_> {
 }
 
 /// A sweep in the form that `sweep` writes.
-fn archive(folder: &Folder, swathe: &Swathe) -> Result<(), Failure> {
-    let meta: Map<String, Json> = meta(&swathe.sweep)?;
+fn archive(folder: &Folder, data: &SweepData) -> Result<(), Failure> {
+    let meta: Map<String, Json> = meta(&data.sweep);
     let mut source = Records {
-        records: &swathe.records,
-        length: swathe.sweep.layout().record_length(),
+        records: &data.records,
+        length: data.sweep.layout().record_length(),
     };
-    let target = folder.file(&format!("data/{}.npz", swathe.file_name()))?;
-    Archive::of_sweep(meta, &swathe.sweep, None).write(target, &mut source)
+    let target = folder.file(&format!("data/{}.npz", data.file_name()))?;
+    Archive::of_sweep(meta, &data.sweep, None).write(target, &mut source)
 }

@@ -2,7 +2,7 @@
 
 use crate::analysis::paper::chaos::{Loop, Swept};
 use crate::analysis::paper::{BY_CLEARANCE, BY_FRICTION, CASES, Case};
-use crate::analysis::reproduction::{Findings, Row, Swathe, Traced, Variant, regime_word};
+use crate::analysis::reproduction::{Findings, Row, SweepData, Traced, Variant, regime_word};
 use crate::chart::{Axis, Chart, Colour, Level, Map, Marker, PALETTE, Scale, Series, Sheet};
 
 /// Width of a sheet, height of a row of charts, pixels.
@@ -332,8 +332,8 @@ fn portraits(found: &Findings, cases: [Case; 3], which: usize) -> Sheet {
 }
 
 fn sections(found: &Findings, which: usize) -> Sheet {
-    let swathe = found.swathe(["runs_by_clearance", "runs_by_friction"][which]);
-    let kept = swathe.sweep.layout().kept();
+    let data = found.sweep_data(["runs_by_clearance", "runs_by_friction"][which]);
+    let kept = data.sweep.layout().kept();
     let names = [
         ["section_x_m", "section_vx_m_s"],
         ["section_beta_rad", "section_beta_rate_rad_s"],
@@ -341,7 +341,7 @@ fn sections(found: &Findings, which: usize) -> Sheet {
     let cases = [BY_CLEARANCE, BY_FRICTION][which];
     let charts = (0..2).map(|c| {
         let (value, unit, rate, rate_unit) = PHASES[c];
-        let [values, rates] = names[c].map(|name| swathe.values(name));
+        let [values, rates] = names[c].map(|name| data.values(name));
         let series = cases.iter().enumerate().map(|(n, &case)| {
             let part = n * kept..(n + 1) * kept;
             let pairs = values[part.clone()].iter().zip(&rates[part]);
@@ -384,7 +384,7 @@ fn swept(found: &Findings, which: usize) -> [Vec<Swept>; 3] {
         ["clearance_cold", "clearance_up", "clearance_down"],
         ["friction_cold", "friction_up", "friction_down"],
     ];
-    names[which].map(|name| found.swathe(name).swept([1e3, 1.0][which]))
+    names[which].map(|name| found.sweep_data(name).swept([1e3, 1.0][which]))
 }
 
 fn bifurcation(found: &Findings, which: usize) -> Sheet {
@@ -449,14 +449,14 @@ fn bifurcation(found: &Findings, which: usize) -> Sheet {
 const LEAST_EXPONENT: f64 = -10.0;
 
 fn exponent(found: &Findings, which: usize) -> Sheet {
-    let swathe = found.swathe(["clearance_cold", "friction_cold"][which]);
-    let points = swathe.swept([1e3, 1.0][which]);
+    let data = found.sweep_data(["clearance_cold", "friction_cold"][which]);
+    let points = data.swept([1e3, 1.0][which]);
     let along = points.iter().map(|p| (p.value, p.exponent.0)).collect();
     let (kept, running) = (
-        swathe.sweep.layout().kept(),
-        swathe.values("exponent_running_per_s"),
+        data.sweep.layout().kept(),
+        data.values("exponent_running_per_s"),
     );
-    let discard = swathe.sweep.plan().discard;
+    let discard = data.sweep.plan().discard;
     let legible: Vec<usize> = (0..points.len())
         .filter(|&k| points[k].exponent.0 > LEAST_EXPONENT)
         .collect();
@@ -509,8 +509,8 @@ fn exponent(found: &Findings, which: usize) -> Sheet {
 }
 
 fn map(found: &Findings) -> Sheet {
-    let swathe: &Swathe = found.swathe("map");
-    let axes = swathe.sweep.grid().axes();
+    let data: &SweepData = found.sweep_data("map");
+    let axes = data.sweep.grid().axes();
     let (ys, xs): (Vec<f64>, Vec<f64>) = (
         axes[0].values().collect(),
         axes[1].values().map(|v| v * 1e3).collect(),
@@ -528,7 +528,7 @@ fn map(found: &Findings) -> Sheet {
         }),
         ..Chart::default()
     };
-    let regimes = swathe.values("regime");
+    let regimes = data.values("regime");
     let mut codes: Vec<i64> = regimes.iter().map(|r| *r as i64).collect();
     codes.sort_unstable();
     codes.dedup();
@@ -539,10 +539,10 @@ fn map(found: &Findings) -> Sheet {
     let joints = &found.runs[0].response.joints;
     let peaks: Vec<Vec<f64>> = joints
         .iter()
-        .map(|j| swathe.values(&format!("{j}_peak_N")))
+        .map(|j| data.values(&format!("{j}_peak_N")))
         .collect();
     let hardest = (0..regimes.len()).map(|k| peaks.iter().map(|p| p[k]).fold(f64::NAN, f64::max));
-    let exponents = swathe.values("exponent_per_s").into_iter();
+    let exponents = data.values("exponent_per_s").into_iter();
     // Grey where a disturbance grows.
     let memory = exponents
         .map(|e| if e < 0.0 { -1.0 / e } else { f64::NAN })
@@ -561,7 +561,7 @@ fn map(found: &Findings) -> Sheet {
         ),
         chart(
             "Largest probe error, settled",
-            swathe.values("probe_error_max_um"),
+            data.values("probe_error_max_um"),
             axis("", "µm"),
             Vec::new(),
         ),
@@ -576,13 +576,13 @@ fn map(found: &Findings) -> Sheet {
 }
 
 fn probe(found: &Findings) -> Sheet {
-    let swathe = found.swathe("clearance_cold");
-    let values: Vec<f64> = swathe.swept(1e3).iter().map(|p| p.value).collect();
+    let data = found.sweep_data("clearance_cold");
+    let values: Vec<f64> = data.swept(1e3).iter().map(|p| p.value).collect();
     let along = |name: &str| {
         values
             .iter()
             .copied()
-            .zip(swathe.values(name))
+            .zip(data.values(name))
             .collect::<Vec<_>>()
     };
     let against = Chart {

@@ -27,17 +27,17 @@ impl Kept {
         let folder = PathBuf::from(name);
         create_folders(&folder)
             .map_err(|e| Failure::io(format!("cannot write {}: {e}", folder.display())))?;
-        let part = |swathe: &crate::analysis::reproduction::Swathe| {
-            let blocks: Vec<usize> = (0..swathe.sweep.grid().blocks()).collect();
-            let settings = meta(&swathe.sweep)?;
+        let part = |data: &crate::analysis::reproduction::SweepData| {
+            let blocks: Vec<usize> = (0..data.sweep.grid().blocks()).collect();
+            let settings = meta(&data.sweep);
             Partial::open(
-                &folder.join(swathe.file_name()),
+                &folder.join(data.file_name()),
                 &settings,
-                &swathe.sweep,
+                &data.sweep,
                 &blocks,
             )
         };
-        let parts = work.swathes().iter().map(part);
+        let parts = work.sweeps().iter().map(part);
         let parts = parts.collect::<Result<_, Failure>>()?;
         Ok(Self { folder, parts })
     }

@@ -3,6 +3,7 @@
 mod compute;
 mod data;
 mod figures;
+mod html;
 mod kept;
 mod page;
 mod scatter;
@@ -98,18 +99,18 @@ fn fill(
         folder.write(&format!("plots/{name}.png"), &png)?;
         pictures.push((name.clone(), svg));
     }
-    let page = page::page(report, &pictures)?;
+    let page = page::page(report, &pictures);
     folder.write("index.html", page.as_bytes())?;
-    meta(report)
+    Ok(meta(report))
 }
 
 /// What made the report.
-fn meta(report: &Report) -> Result<serde_json::Map<String, Json>, Failure> {
-    let scene = report.corrected.swathe("clearance_cold").sweep.scene();
-    let mut meta = super::provenance::meta(scene)?;
+fn meta(report: &Report) -> serde_json::Map<String, Json> {
+    let scene = report.corrected.sweep_data("clearance_cold").sweep.scene();
+    let mut meta = super::provenance::meta(scene);
     meta.insert("command".into(), json!(command(report)));
     meta.insert("simulated_s".into(), json!(text::simulated(report)));
-    Ok(meta)
+    meta
 }
 
 fn command(report: &Report) -> &'static str {

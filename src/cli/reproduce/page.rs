@@ -3,22 +3,16 @@
 use std::fmt::Write as _;
 
 use super::figures::picture_name;
+use super::html::{CLOSE, NONE, escape, number, open, shown};
 use super::sections::{Entry, SECTIONS};
 use super::text::{self, Compared, typeset};
 use super::{command, meta, scatter};
 use crate::analysis::paper::chaos::word;
 use crate::analysis::paper::{Agreement, Quantity, Statement, VERIFICATION, Verdict};
 use crate::analysis::reproduction::{CORRECTED, Extent, Findings, PERIOD, Report, Variant};
-use crate::cli::Failure;
 use crate::cli::output::significant;
 
 const STYLE: &str = include_str!("page.css");
-
-pub(super) fn escape(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-}
 
 /// Stands above a report that is not the whole one.
 const SHORTENED: &str = "<p class=\"notice\">This is a quick report: few values and few periods, which shows that everything works. \
@@ -26,10 +20,7 @@ const SHORTENED: &str = "<p class=\"notice\">This is a quick report: few values 
     <code>jointplay reproduce --out report/</code> computes.</p>\n";
 
 /// The whole page.
-///
-/// # Errors
-/// A scene without the keys that every scene has.
-pub(super) fn page(report: &Report, pictures: &[(String, String)]) -> Result<String, Failure> {
+pub(super) fn page(report: &Report, pictures: &[(String, String)]) -> String {
     let found = &report.corrected;
     let compared = text::compared(found);
     let statements = found.statements();
@@ -55,9 +46,9 @@ pub(super) fn page(report: &Report, pictures: &[(String, String)]) -> Result<Str
     );
     figures(&mut out, &report.printed, pictures);
     statement_table(&mut out, &statements);
-    provenance(&mut out, report)?;
+    provenance(&mut out, report);
     out.push_str("</main>\n</body>\n</html>\n");
-    Ok(out)
+    out
 }
 
 /// Every figure of a model, section by section, with the tables that belong to it.
@@ -178,14 +169,6 @@ fn badge(agreement: &str) -> String {
     format!("<span class=\"{class}\">{agreement}</span>")
 }
 
-/// Four digits: what a reader takes in.
-pub(super) fn shown(value: f64) -> String {
-    typeset(&significant(value, 4))
-}
-
-/// Stands where there is no number.
-pub(super) const NONE: &str = "\u{2013}";
-
 /// Two decimals, and two digits of what is small.
 fn ratio(value: f64) -> String {
     if value < 0.1 {
@@ -221,21 +204,6 @@ fn after(out: &mut String, entry: &Entry, compared: &[Compared], found: &Finding
         "probe" => probe(out, found),
         _ => {}
     }
-}
-
-pub(super) fn open(out: &mut String, heads: &[(&str, bool)]) {
-    out.push_str("<div class=\"scroll\"><table>\n<thead><tr>");
-    for (head, number) in heads {
-        let class = if *number { " class=\"n\"" } else { "" };
-        let _ = write!(out, "<th{class}>{head}</th>");
-    }
-    out.push_str("</tr></thead>\n<tbody>\n");
-}
-
-pub(super) const CLOSE: &str = "</tbody></table></div>\n";
-
-pub(super) fn number(text: &str) -> String {
-    format!("<td class=\"n\">{text}</td>")
 }
 
 fn table_of(out: &mut String, rows: &[&Compared]) {
@@ -409,7 +377,7 @@ fn branches(out: &mut String, found: &Findings, which: usize) {
         ["clearance_cold", "clearance_up", "clearance_down"],
         ["friction_cold", "friction_up", "friction_down"],
     ][which];
-    let all = names.map(|name| found.swathe(name).swept(1.0));
+    let all = names.map(|name| found.sweep_data(name).swept(1.0));
     let most = |other: usize, c: usize| {
         let pairs = all[0].iter().zip(&all[other]);
         pairs
@@ -438,12 +406,12 @@ fn branches(out: &mut String, found: &Findings, which: usize) {
 }
 
 fn probe(out: &mut String, found: &Findings) {
-    let swathe = found.swathe("clearance_cold");
+    let data = found.sweep_data("clearance_cold");
     let (largest, rms) = (
-        swathe.values("probe_error_max_um"),
-        swathe.values("probe_error_rms_um"),
+        data.values("probe_error_max_um"),
+        data.values("probe_error_rms_um"),
     );
-    let points = swathe.swept(1e3);
+    let points = data.swept(1e3);
     open(
         out,
         &[
@@ -508,8 +476,8 @@ fn capital(text: &str) -> String {
     }
 }
 
-fn provenance(out: &mut String, report: &Report) -> Result<(), Failure> {
-    let meta = meta(report)?;
+fn provenance(out: &mut String, report: &Report) {
+    let meta = meta(report);
     let value = |key: &str| {
         let value = meta.get(key).cloned().unwrap_or_default();
         value
@@ -550,7 +518,6 @@ fn provenance(out: &mut String, report: &Report) -> Result<(), Failure> {
         e.map_periods.1,
         PERIOD
     );
-    Ok(())
 }
 
 #[cfg(test)]

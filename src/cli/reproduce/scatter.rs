@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::Score;
-use super::page::{CLOSE, NONE, escape, number, open, shown};
+use super::html::{CLOSE, NONE, escape, number, open, shown};
 use super::text::{self, typeset};
 use crate::analysis::paper::chaos::{Swept, word};
 use crate::analysis::paper::{BY_CLEARANCE, Case, PUBLISHED, Quantity, Statement, Verdict};
@@ -40,7 +40,7 @@ fn models(report: &Report) -> Vec<Model<'_>> {
     let mut out = Vec::new();
     for found in [&report.corrected, &report.printed] {
         let runs = BY_CLEARANCE.iter().filter_map(|&case| found.run(case));
-        let sections = found.swathe("runs_by_clearance").swept(1e3);
+        let sections = found.sweep_data("runs_by_clearance").swept(1e3);
         out.push((found.variant.title, runs.collect(), sections));
     }
     for combination in &report.combinations {
@@ -158,7 +158,7 @@ fn sweeps(out: &mut String, report: &Report) {
         ("friction_cold", "friction, 0.01 to 0.4"),
     ] {
         for found in [&report.corrected, &report.printed] {
-            let points = found.swathe(name).swept(1.0);
+            let points = found.sweep_data(name).swept(1.0);
             let (regimes, exponents) = swept(&points);
             let widest = |c: usize| points.iter().map(|p| p.spread(c)).fold(0.0, f64::max) * 1e6;
             let _ = writeln!(

@@ -1,7 +1,7 @@
 //! What page and data files say alike.
 
 use crate::analysis::paper::{Case, Verdict, compare};
-use crate::analysis::reproduction::{Findings, PERIOD, Report, Swathe};
+use crate::analysis::reproduction::{Findings, PERIOD, Report, SweepData};
 
 /// A number of the paper beside the same of this program, SI units.
 pub(super) struct Compared {
@@ -94,12 +94,11 @@ pub(super) fn verdict(verdict: Verdict) -> &'static str {
 /// Simulated time of all runs together, without twins, s.
 pub(super) fn simulated(report: &Report) -> f64 {
     let of_runs = |count: usize| count as f64 * crate::analysis::paper::DURATION;
-    let of_sweep = |swathe: &Swathe| {
-        PERIOD * (swathe.sweep.plan().periods * swathe.sweep.grid().points()) as f64
-    };
+    let of_sweep =
+        |data: &SweepData| PERIOD * (data.sweep.plan().periods * data.sweep.grid().points()) as f64;
     let of_findings = |found: &Findings| {
         let curves = found.curves.len() as f64 * PERIOD * (found.extent.settle + 2) as f64;
-        of_runs(found.runs.len() + 1) + curves + found.swathes.iter().map(of_sweep).sum::<f64>()
+        of_runs(found.runs.len() + 1) + curves + found.sweeps.iter().map(of_sweep).sum::<f64>()
     };
     let combinations = report.combinations.iter();
     let combinations = combinations.map(|c| of_runs(c.runs.len()) + of_sweep(&c.sections));

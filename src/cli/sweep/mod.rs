@@ -20,7 +20,7 @@ use serde_json::{Map, Value as Json, json};
 
 use self::options::Shard;
 use super::args::{SummaryForm, SweepArguments};
-use super::check::near_singular;
+use super::check::{NearSingular, near_singular};
 use super::summary::count;
 use super::{Failure, interrupt, load, print, progress, warn};
 use crate::analysis::drive::drive_period;
@@ -30,6 +30,7 @@ use crate::analysis::point::{LOOSEST_FOR_EXPONENT, Plan};
 use crate::analysis::regime::{FEWEST, Regime};
 use crate::analysis::sweep::Sweep;
 use crate::files::Target;
+use crate::scene::WarningKind;
 
 /// Steps between two looks for Ctrl-C.
 const STEPS_BETWEEN_LOOKS: u32 = 4096;
@@ -46,7 +47,7 @@ pub fn sweep(arguments: &SweepArguments) -> Result<(), Failure> {
         Some(text) => Some(options::shard(text)?),
         None => None,
     };
-    let archive = Archive::of_sweep(meta(&sweep)?, &sweep, shard.as_ref());
+    let archive = Archive::of_sweep(meta(&sweep), &sweep, shard.as_ref());
     let blocks: Vec<usize> = (0..sweep.grid().blocks())
         .filter(|&b| shard.as_ref().is_none_or(|shard| shard.has(b)))
         .collect();
@@ -122,10 +123,10 @@ fn read(arguments: &SweepArguments) -> Result<Sweep, Failure> {
 }
 
 /// What made the result: the same for the whole sweep and every shard of it.
-pub(super) fn meta(sweep: &Sweep) -> Result<Map<String, Json>, Failure> {
+pub(super) fn meta(sweep: &Sweep) -> Map<String, Json> {
     let scene = sweep.scene();
     let (grid, plan) = (sweep.grid(), sweep.plan());
-    let mut meta = super::provenance::meta(scene)?;
+    let mut meta = super::provenance::meta(scene);
     let axes = grid.axes().iter().map(|axis| {
         json!({
             "key": axis.key(),
@@ -172,11 +173,18 @@ pub(super) fn meta(sweep: &Sweep) -> Result<Map<String, Json>, Failure> {
     if let Json::Object(own) = own {
         meta.extend(own);
     }
-    Ok(meta)
+    meta
 }
 
 /// Most points whose warnings are asked for, spread over the ranges: it must not take long.
 const MOST_WARNED: usize = 64;
+
+/// What kind a warning is of: another one of the same kind says nothing new.
+#[derive(PartialEq, Eq, Hash)]
+enum Kind {
+    Scene(WarningKind),
+    Singular(std::mem::Discriminant<NearSingular>),
+}
 
 /// Warnings of the scene along the ranges, each kind with the first point that has it, and of the sweep itself.
 fn warnings(sweep: &Sweep) -> Vec<String> {
@@ -188,10 +196,14 @@ fn warnings(sweep: &Sweep) -> Vec<String> {
         let Ok(scene) = sweep.grid().scene(sweep.scene(), point) else {
             continue;
         };
-        for warning in scene.warnings().into_iter().chain(near_singular(&scene)) {
-            // The same sentence with other numbers says nothing new.
-            let words: String = warning.chars().filter(|c| c.is_alphabetic()).collect();
-            if kinds.insert(words) {
+        let of_scene = scene.warnings().into_iter();
+        let of_scene = of_scene.map(|warning| (Kind::Scene(warning.kind()), warning.to_string()));
+        let singular = near_singular(&scene).map(|near| {
+            let kind = Kind::Singular(std::mem::discriminant(&near));
+            (kind, near.to_string())
+        });
+        for (kind, warning) in of_scene.chain(singular) {
+            if kinds.insert(kind) {
                 all.push(format!("at {}: {warning}", sweep.describe(point)));
             }
         }

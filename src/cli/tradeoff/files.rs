@@ -50,7 +50,7 @@ pub(super) fn fill(
 ) -> Result<Map<String, Json>, Failure> {
     let sheet = picture(found, false, &machine::name());
     let drawing = |error: crate::chart::SheetError| Failure::io(error.to_string());
-    let mut meta = provenance::meta(scene)?;
+    let mut meta = provenance::meta(scene);
     // Every method had its turn, whatever the scene asks for.
     for key in ["method", "step_s", "tolerance"] {
         meta.shift_remove(key);
@@ -76,14 +76,14 @@ pub(super) fn fill(
 
 /// What the points are measured against.
 fn reference(found: &WorkPrecision) -> Result<Json, Failure> {
-    let standard = &found.standard;
-    let names: Vec<&str> = standard
+    let reference = &found.reference;
+    let names: Vec<&str> = reference
         .scene()
         .ball_joints
         .iter()
         .map(|j| j.name.as_str())
         .collect();
-    let slots: Vec<Json> = standard
+    let slots: Vec<Json> = reference
         .slots
         .iter()
         .map(|slot| {
@@ -93,20 +93,20 @@ fn reference(found: &WorkPrecision) -> Result<Json, Failure> {
             })
         })
         .collect();
-    let settled = standard.settled.as_ref().map(|span| {
+    let settled = reference.settled.as_ref().map(|span| {
         let means = names.iter().zip(&span.means);
         let means = means.map(|(name, mean)| ((*name).to_owned(), json!(mean)));
         json!({"from_s": span.from, "to_s": span.to, "mean_force_N": Json::Object(means.collect())})
     });
-    let floor = serde_json::to_value(standard.floor).map_err(|e| Failure::io(e.to_string()))?;
+    let floor = serde_json::to_value(reference.floor).map_err(|e| Failure::io(e.to_string()))?;
     Ok(json!({
-        "method": standard.setting.method,
-        "tolerance": standard.setting.tolerance,
+        "method": reference.setting.method,
+        "tolerance": reference.setting.tolerance,
         "change_at_half_the_tolerance": floor,
-        "impacts": standard.impacts,
-        "impacts_span_s": standard.span,
+        "impacts": reference.impacts,
+        "impacts_span_s": reference.span,
         "peaks": slots,
-        "position_at_s": standard.instant,
+        "position_at_s": reference.instant,
         "settled": settled,
     }))
 }
@@ -128,7 +128,7 @@ fn csv(found: &WorkPrecision) -> String {
         let (setting, impacts, errors) = (&point.setting, &point.impacts, &point.errors);
         let settled = point.settled.as_ref();
         let cells: [String; COLUMNS.len()] = [
-            setting.method.to_owned(),
+            setting.method.word().to_owned(),
             significant(setting.step_s, 12),
             if setting.adaptive {
                 significant(setting.tolerance, 12)

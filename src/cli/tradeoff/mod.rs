@@ -50,12 +50,9 @@ fn one(name: &OsStr, arguments: &TradeoffArguments, effort: &Effort) -> Result<(
     };
     if !arguments.quiet {
         // What it says of the solver does not matter here: every method has its turn.
-        let about_solver = |warning: &&String| warning.starts_with("solver.");
-        let warnings = scene.warnings();
-        warnings
-            .iter()
-            .filter(|w| !about_solver(w))
-            .for_each(|w| warn(w));
+        for warning in scene.warnings().iter().filter(|w| !w.is_about_solver()) {
+            warn(&warning.to_string());
+        }
     }
     let found = measure(&scene, effort, arguments.quiet)?;
     print(&words::text(&found))?;
@@ -68,8 +65,8 @@ fn one(name: &OsStr, arguments: &TradeoffArguments, effort: &Effort) -> Result<(
 }
 
 fn measure(scene: &Scene, effort: &Effort, quiet: bool) -> Result<WorkPrecision, Failure> {
-    measuring::measure(quiet, Some(scene), |outside| {
-        work_precision(scene, effort, outside)
+    measuring::measure(quiet, Some(scene), |context| {
+        work_precision(scene, effort, context)
     })
 }
 
@@ -80,7 +77,7 @@ fn all(root: &Path, quiet: bool, effort: &Effort) -> Result<(), Failure> {
     for name in BUILT_IN {
         found.push(measure(&Scene::load(name, &[])?, effort, quiet)?);
     }
-    let costs = measuring::measure(quiet, None, |outside| model_costs(effort, outside))?;
+    let costs = measuring::measure(quiet, None, |context| model_costs(effort, context))?;
     targets.write(&found, &costs)?;
     for found in &found {
         print(&words::text(found))?;

@@ -5,7 +5,7 @@ use std::io::Write as _;
 use std::path::Path;
 
 use super::picture::{is_yardstick, picture};
-use super::words::{cost_ratios, end, error, standard, times, value};
+use super::words::{cost_ratios, end, error, reference, times, value};
 use crate::analysis::presets::{Measured, Record, choose, limit};
 use crate::analysis::{PartCost, Point, Setting, WorkPrecision};
 use crate::cli::{Failure, machine};
@@ -104,13 +104,16 @@ fn record(found: &[WorkPrecision], machine: &str) -> Record {
         for preset in Preset::ALL {
             if let Some(point) = found.preset(preset) {
                 measured.insert(preset.word().to_owned(), Measured::of(point));
-                let setting = (point.setting.method.to_owned(), point.setting.value());
+                let setting = (
+                    point.setting.method.word().to_owned(),
+                    point.setting.value(),
+                );
                 record.points.insert(preset.word().to_owned(), setting);
             }
         }
         record
             .scenes
-            .insert(found.standard.scene().name.clone(), measured);
+            .insert(found.reference.scene().name.clone(), measured);
     }
     record
 }
@@ -169,11 +172,11 @@ fn page(found: &[WorkPrecision], costs: &[PartCost], machine: &str) -> String {
         }
     }
     for found in found {
-        let name = &found.standard.scene().name;
+        let name = &found.reference.scene().name;
         line("");
         line(&scene_heading(name));
         line("");
-        for (label, value) in standard(&found.standard) {
+        for (label, value) in reference(&found.reference) {
             line(&format!("- {label}: {value}"));
         }
         line("");
@@ -257,7 +260,7 @@ fn preset_row(found: &WorkPrecision, point: &Point, preset: Preset) -> String {
     };
     format!(
         "| {} | {} | {} | {held} |",
-        found.standard.scene().name,
+        found.reference.scene().name,
         preset.word(),
         figures(found, point)
     )
@@ -265,7 +268,7 @@ fn preset_row(found: &WorkPrecision, point: &Point, preset: Preset) -> String {
 
 /// Ratios and errors of a point as cells.
 fn figures(found: &WorkPrecision, point: &Point) -> String {
-    let floor = &found.standard.floor;
+    let floor = &found.reference.floor;
     let ratio = |ended: &str, ratio| {
         if ended.is_empty() {
             times(ratio)

@@ -1,8 +1,9 @@
 //! The work-precision diagram of a scene.
 
 use super::words::value;
-use crate::analysis::{Phase, Point, Setting, WorkPrecision};
+use crate::analysis::{Phase, Point, WorkPrecision};
 use crate::chart::{Axis, Chart, Label, Level, Marker, PALETTE, Scale, Series, Sheet};
+use crate::integrate::Method;
 
 /// Width of one diagram and height of the page, pixels.
 const WIDTH: u32 = 560;
@@ -28,13 +29,13 @@ type View = fn(&Point) -> Option<(&Phase, f64)>;
 /// Error against time, both phases side by side. `relative`: times over that of Runge-Kutta 4 at 10 microseconds, which mean
 /// something on other machines, too.
 pub(super) fn picture(found: &WorkPrecision, relative: bool, machine: &str) -> Sheet {
-    let floor = &found.standard.floor;
+    let floor = &found.reference.floor;
     let impacts: View = |point| Some((&point.impacts, point.errors.peak?));
     let settled: View = |point| Some((point.settled.as_ref()?, point.errors.settled?));
     let mut charts = vec![diagram(
         found,
         relative,
-        if found.standard.impacts == 0 {
+        if found.reference.impacts == 0 {
             "Reactions"
         } else {
             "First impacts"
@@ -43,7 +44,7 @@ pub(super) fn picture(found: &WorkPrecision, relative: bool, machine: &str) -> S
         impacts,
         floor.peak,
     )];
-    if found.standard.settled.is_some() {
+    if found.reference.settled.is_some() {
         charts.push(diagram(
             found,
             relative,
@@ -55,7 +56,7 @@ pub(super) fn picture(found: &WorkPrecision, relative: bool, machine: &str) -> S
     }
     let columns = charts.len();
     Sheet {
-        title: format!("{}: what accuracy costs", found.standard.scene().name),
+        title: format!("{}: what accuracy costs", found.reference.scene().name),
         size: (WIDTH * columns.max(2) as u32, HEIGHT),
         charts,
         columns,
@@ -84,14 +85,14 @@ fn diagram(
         (error <= WORST).then_some((cost, error))
     };
     let mut series = Vec::new();
-    for (n, method) in Setting::methods().iter().enumerate() {
-        let own = found.points.iter().filter(|p| p.setting.method == *method);
+    for (n, method) in Method::ALL.into_iter().enumerate() {
+        let own = found.points.iter().filter(|p| p.setting.method == method);
         // A gap where a point has no place: the line does not cross it.
         let points = own
             .map(|p| place(p).unwrap_or((f64::NAN, f64::NAN)))
             .collect();
         series.push(Series {
-            label: (*method).to_owned(),
+            label: method.word().to_owned(),
             points,
             colour: PALETTE[n % PALETTE.len()],
             line: true,
@@ -161,5 +162,5 @@ fn diagram(
 
 /// Whether it is Runge-Kutta 4 at 10 microseconds.
 pub(super) fn is_yardstick(point: &Point) -> bool {
-    point.setting.method == "rk4" && point.setting.step_s == 10e-6
+    point.setting.method == Method::RungeKutta4 && point.setting.step_s == 10e-6
 }

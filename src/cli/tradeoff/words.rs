@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::analysis::{End, PartCost, Phase, Point, Setting, Standard, WorkPrecision};
+use crate::analysis::{End, PartCost, Phase, Point, ReferenceSolution, Setting, WorkPrecision};
 use crate::cli::machine;
 use crate::cli::output::significant;
 use crate::scene::format_quantity;
@@ -59,21 +59,21 @@ pub(super) fn end(phase: &Phase) -> &'static str {
 }
 
 /// What the errors are measured against, a line each.
-pub(super) fn standard(standard: &Standard) -> Vec<(&'static str, String)> {
+pub(super) fn reference(reference: &ReferenceSolution) -> Vec<(&'static str, String)> {
     let ms = |time: f64| format!("{} ms", significant(1e3 * time, 5));
-    let floor = &standard.floor;
-    let names: Vec<&str> = standard
+    let floor = &reference.floor;
+    let names: Vec<&str> = reference
         .slots
         .iter()
-        .map(|slot| joint(standard, slot.joint))
+        .map(|slot| joint(reference, slot.joint))
         .collect();
     let mut lines = vec![
         (
             "Reference",
             format!(
                 "{} at {:e}; at half of it the peaks change by {}, the position by {} m, settled forces by {}",
-                standard.setting.method,
-                standard.setting.tolerance,
+                reference.setting.method,
+                reference.setting.tolerance,
                 exponent(floor.peak.unwrap_or(0.0)),
                 exponent(floor.position_m.unwrap_or(0.0)),
                 floor.settled.map_or_else(|| "-".to_owned(), exponent),
@@ -81,17 +81,17 @@ pub(super) fn standard(standard: &Standard) -> Vec<(&'static str, String)> {
         ),
         (
             "First impacts",
-            if standard.impacts == 0 {
+            if reference.impacts == 0 {
                 format!(
                     "none: the largest reactions of {} within {}",
                     names.join(", "),
-                    ms(standard.span)
+                    ms(reference.span)
                 )
             } else {
                 format!(
                     "{} within {}: {}",
-                    standard.impacts,
-                    ms(standard.span),
+                    reference.impacts,
+                    ms(reference.span),
                     names.join(", ")
                 )
             },
@@ -99,14 +99,14 @@ pub(super) fn standard(standard: &Standard) -> Vec<(&'static str, String)> {
     ];
     lines.push((
         "Position",
-        match standard.instant_impact {
-            0 => format!("at {}", ms(standard.instant)),
-            n => format!("at impact {n}, {}", ms(standard.instant)),
+        match reference.instant_impact {
+            0 => format!("at {}", ms(reference.instant)),
+            n => format!("at impact {n}, {}", ms(reference.instant)),
         },
     ));
     lines.push((
         "Settled",
-        match &standard.settled {
+        match &reference.settled {
             Some(span) => format!("mean contact forces from {} to {}, all methods from the same state", ms(span.from), ms(span.to)),
             None => "its contacts do not stay closed for 150 ms within the first 1.2 s: nothing to average".to_owned(),
         },
@@ -114,8 +114,8 @@ pub(super) fn standard(standard: &Standard) -> Vec<(&'static str, String)> {
     lines
 }
 
-fn joint(standard: &Standard, index: usize) -> &str {
-    let joint = standard.scene().ball_joints.get(index);
+fn joint(reference: &ReferenceSolution, index: usize) -> &str {
+    let joint = reference.scene().ball_joints.get(index);
     joint.map_or("-", |joint| joint.name.as_str())
 }
 
@@ -126,12 +126,12 @@ pub(super) fn text(found: &WorkPrecision) -> String {
         // Writing to a String cannot fail.
         let _ = writeln!(out, "{label:<18}{value}");
     };
-    line("Scene", &found.standard.scene().name);
-    for (key, value) in &found.standard.scene().changes {
+    line("Scene", &found.reference.scene().name);
+    for (key, value) in &found.reference.scene().changes {
         line("  changed", &format!("{key} = {value}"));
     }
     line("Machine", &machine::name());
-    for (label, value) in standard(&found.standard) {
+    for (label, value) in reference(&found.reference) {
         line(label, &value);
     }
     line("Speed", "simulated seconds in a second of stepping");
@@ -140,7 +140,7 @@ pub(super) fn text(found: &WorkPrecision) -> String {
     out.push('\n');
     out.push_str("First impacts\n");
     out.push_str(&grid(&impacts(found)));
-    if found.standard.settled.is_some() {
+    if found.reference.settled.is_some() {
         out.push_str("\nSettled motion\n");
         out.push_str(&grid(&settled(found)));
     }
@@ -160,7 +160,7 @@ pub(super) fn text(found: &WorkPrecision) -> String {
 
 fn named(point: &Point) -> [String; 3] {
     [
-        point.setting.method.to_owned(),
+        point.setting.method.word().to_owned(),
         value(&point.setting),
         point.preset.map_or("", |preset| preset.word()).to_owned(),
     ]
@@ -181,7 +181,7 @@ fn mark(phase: &Phase) -> String {
 }
 
 fn impacts(found: &WorkPrecision) -> Vec<Vec<String>> {
-    let floor = &found.standard.floor;
+    let floor = &found.reference.floor;
     let head = [
         "method",
         "value",
@@ -229,7 +229,7 @@ fn settled(found: &WorkPrecision) -> Vec<Vec<String>> {
         };
         let mut row = named(point).to_vec();
         row.extend(speeds(phase));
-        row.push(error(point.errors.settled, found.standard.floor.settled));
+        row.push(error(point.errors.settled, found.reference.floor.settled));
         row.push(mark(phase));
         rows.push(row);
     }

@@ -2,15 +2,16 @@
 
 use super::automatic::HELD_BY_STABILITY;
 use super::corners::Piece;
-use super::{LONGEST_STEP, Simulation, store_gaps};
+use super::{LONGEST_STEP, Simulation};
 use crate::integrate::{Method, find_root};
-use crate::simulate::Stopped;
+use crate::mechanism::Counts;
 use crate::simulate::peaks::Approach;
+use crate::simulate::{StopAdvice, StopFault, Stopped};
 
 /// Shortest step of an adaptive method, s.
 const SHORTEST_STEP: f64 = 1e-14;
 
-/// A gap at one instant of a step, positive where the contact is in the other state than its memory says.
+/// A gap at one instant of a step, positive where it contradicts the recorded contact state.
 #[derive(Clone, Copy)]
 struct SignedGap {
     /// Fraction of the step.
@@ -24,34 +25,29 @@ struct SignedGap {
 impl Simulation {
     /// A step whose size follows the error estimate, cut at the first contact start or end inside it.
     pub(super) fn adaptive_step(&mut self, limit: f64) -> Result<(), Stopped> {
-        let before = self.mechanism.evaluations;
-        let contacts = self.mechanism.contacts.memory_mut();
-        contacts.copy_from_slice(&self.state.memory);
-        self.stepper.choose(self.state.implicit);
-        self.mechanism.contacts.strayed = false;
-        self.turned = false;
+        self.stepper.choose(self.state.control.implicit);
+        self.attempt.turned = false;
+        self.attempt.counts = Counts::default();
         let (t_end, h) = loop {
             if let Some(step) = self.attempt_adaptive(limit) {
                 break step;
             }
-            self.state.statistics.rejected += 1;
-            let shortest = SHORTEST_STEP.max(4.0 * f64::EPSILON * self.state.t);
-            if !(self.state.h_next >= shortest) {
-                self.state.statistics.evaluations += self.mechanism.evaluations - before;
-                self.state.h_next = self.running.solver.step;
-                let what = "the step size that the tolerance asks for fell below 1e-14 s";
+            self.state.record.statistics.rejected += 1;
+            let shortest = SHORTEST_STEP.max(4.0 * f64::EPSILON * self.state.now.t);
+            if !(self.state.control.h_next >= shortest) {
+                self.state.record.statistics.count(self.attempt.counts);
+                self.state.control.h_next = self.running.solver.step;
                 let tolerance = self.running.solver.tolerance;
-                let advice = format!(
-                    "try a looser solver.tolerance (now {tolerance:e}) or a softer or heavier scene"
-                );
-                return Err(self.stopped(what, advice));
+                let advice = StopAdvice::LooserTolerance { tolerance };
+                return Err(self.stopped(StopFault::ShortStep, advice));
             }
         };
-        let stiffness = self.stepper.stiffness(h, &self.y_end, &self.k_end);
-        let evaluations = self.mechanism.evaluations - before;
-        self.accept(t_end, h, before)?;
+        let end = &self.attempt.end;
+        let stiffness = self.stepper.stiffness(h, &end.y, &end.k);
+        let evaluations = self.attempt.counts.equations;
+        self.accept(t_end, h)?;
         if stiffness > HELD_BY_STABILITY {
-            self.state.statistics.held_time += h;
+            self.state.record.statistics.held_time += h;
         }
         if self.running.solver.method == Method::Automatic {
             self.vote(h, stiffness, evaluations);
@@ -61,9 +57,9 @@ impl Simulation {
 
     /// One try of a step with its event; `None` where it has to be repeated with the smaller `h_next` that it left.
     fn attempt_adaptive(&mut self, limit: f64) -> Option<(f64, f64)> {
-        let t = self.state.t;
+        let t = self.state.now.t;
         let tolerance = self.running.solver.tolerance;
-        let asked = self.state.h_next;
+        let asked = self.state.control.h_next;
         let mut h = asked.min(LONGEST_STEP);
         let mut t_end = t + h;
         let cut = t_end >= limit - 1e-6 * h;
@@ -71,44 +67,45 @@ impl Simulation {
             t_end = limit;
             h = limit - t;
         }
-        let error = self.attempt(h) / tolerance;
+        let error = self.try_step(h) / tolerance;
         let state = &mut self.state;
         if !(error <= 1.0) {
-            state.h_next = h * state.controller.after_reject(error);
+            state.control.h_next = h * state.control.controller.after_reject(error);
             return None;
         }
-        let next = h * state.controller.after_accept(error);
+        let next = h * state.control.controller.after_accept(error);
         // A step cut short says nothing against the longer one.
-        state.h_next = if cut { state.h_next.max(next) } else { next };
-        let contact_began = std::mem::take(&mut state.contact_began);
+        state.control.h_next = if cut {
+            state.control.h_next.max(next)
+        } else {
+            next
+        };
+        let contact_began = std::mem::take(&mut state.control.contact_began);
         self.finish_gaps();
         let event = self.first_event(h);
         let corner = self.first_corner(h);
-        self.corner = None;
+        self.attempt.corner = None;
         let corner = corner.filter(|corner| event.is_none_or(|theta| corner.theta < theta));
         if let Some(corner) = &corner
             && corner.is_at_start()
-            && !self.turned
+            && !self.attempt.turned
         {
             // One more try on the other piece; it may well lead back here, and then this one is as good.
-            self.turned = true;
-            corner.next.put(&mut self.state.memory[corner.joint]);
-            corner
-                .next
-                .put(&mut self.mechanism.contacts.memory_mut()[corner.joint]);
+            self.attempt.turned = true;
+            corner.next.put(&mut self.state.now.memory[corner.joint]);
             self.stepper.invalidate();
-            self.state.h_next = asked;
-            self.state.contact_began = contact_began;
+            self.state.control.h_next = asked;
+            self.state.control.contact_began = contact_began;
             return None;
         }
         let corner = corner.filter(|corner| !corner.is_at_start());
         if let Some(corner) = corner {
             // The whole step worked; where the rate stops rising, soon after a beginning contact, says nothing against it.
-            if contact_began && matches!(corner.next, Piece::Pace(_)) {
-                self.state.h_contact = h.max(1e-9);
+            if contact_began && matches!(corner.next, Piece::Approach(_)) {
+                self.state.control.h_contact = h.max(1e-9);
             }
-            self.located = None;
-            self.corner = Some((corner.joint, corner.next));
+            self.attempt.located = None;
+            self.attempt.corner = Some((corner.joint, corner.next));
             t_end = t + corner.theta * h;
             self.end_at(corner.theta, t_end, h);
             h *= corner.theta;
@@ -116,45 +113,24 @@ impl Simulation {
             // The step is taken again, shorter, so that its end carries the method's error and not the interpolant's.
             t_end = t + theta * h;
             h *= theta;
-            if !self.attempt(h).is_finite() {
-                self.state.h_next = 0.5 * h;
-                self.state.contact_began = contact_began;
+            if !self.try_step(h).is_finite() {
+                self.state.control.h_next = 0.5 * h;
+                self.state.control.contact_began = contact_began;
                 return None;
             }
             self.finish_gaps();
         } else if contact_began {
-            self.state.h_contact = h.max(1e-9);
+            self.state.control.h_contact = h.max(1e-9);
         }
         Some((t_end, h))
-    }
-
-    /// Tries a step of size `h` from the current state; returns the error against the scales.
-    fn attempt(&mut self, h: f64) -> f64 {
-        let Self {
-            mechanism,
-            stepper,
-            state,
-            y_end,
-            k_end,
-            ..
-        } = self;
-        let tolerance = self.running.solver.tolerance;
-        stepper.attempt(
-            mechanism, state.t, h, &state.y, &state.k, y_end, k_end, tolerance,
-        )
-    }
-
-    pub(super) fn finish_gaps(&mut self) {
-        self.mechanism.contacts.finish();
-        store_gaps(&self.mechanism, &mut self.gaps_end);
     }
 
     /// Fraction of the step just attempted at which the first contact starts or ends, if one does; that joint is put
     /// down in `located`.
     fn first_event(&mut self, h: f64) -> Option<f64> {
         let mut first: Option<f64> = None;
-        self.located = None;
-        for j in 0..self.gaps_end.len() {
+        self.attempt.located = None;
+        for j in 0..self.attempt.end.gaps.len() {
             if !self.mechanism.contacts.has_clearance(j) {
                 continue;
             }
@@ -163,7 +139,7 @@ impl Simulation {
             };
             if first.is_none_or(|earliest| theta < earliest) {
                 first = Some(theta);
-                self.located = Some(j);
+                self.attempt.located = Some(j);
             }
         }
         first
@@ -171,9 +147,9 @@ impl Simulation {
 
     /// Where joint `j` leaves the state that its memory says, as a fraction of the step just attempted.
     fn event_of(&mut self, j: usize, h: f64) -> Option<f64> {
-        let (start, end) = (self.state.gaps[j], self.gaps_end[j]);
-        // Positive where the contact is in the other state than its memory says.
-        let sign = if self.state.memory[j].active {
+        let (start, end) = (self.state.now.gaps[j], self.attempt.end.gaps[j]);
+        // Positive where the gap contradicts the recorded contact state.
+        let sign = if self.state.now.memory[j].active {
             -1.0
         } else {
             1.0

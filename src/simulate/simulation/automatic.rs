@@ -1,7 +1,7 @@
 //! Which method of the automatic pair steps: the explicit one through impacts, the implicit one once contacts settled.
 
 use super::Simulation;
-use crate::integrate::{Controller, Method, System};
+use crate::integrate::{Controller, Method};
 use crate::mechanism::{Mechanism, MechanismError};
 
 /// h |lambda| beyond which an explicit step is held by stability.
@@ -47,20 +47,20 @@ pub(super) struct Choice {
 impl Simulation {
     /// Which method of the automatic pair takes the next step, after one of size `h` that took so many evaluations.
     pub(super) fn vote(&mut self, h: f64, stiffness: f64, evaluations: u64) {
-        let velocities = self.state.y.len() - self.mechanism.positions();
+        let velocities = self.state.now.y.len() - self.mechanism.positions();
         let state = &mut self.state;
-        let choice = &mut state.choice;
-        if state.contact_began {
+        let choice = &mut state.control.choice;
+        if state.control.contact_began {
             choice.since_contact = 0;
             choice.held = 0;
             // An impact is short and not stiff: the explicit method resolves it at less cost.
-            if state.implicit && state.memory.iter().any(|m| m.active && !m.floored) {
-                state.implicit = false;
-                state.controller = controller_of(Method::Automatic, false);
+            if state.control.implicit && state.now.memory.iter().any(|m| m.active && !m.floored) {
+                state.control.implicit = false;
+                state.control.controller = controller_of(Method::Automatic, false);
             }
             return;
         }
-        if state.implicit {
+        if state.control.implicit {
             choice.progress += h;
             let algebra = (velocities * velocities) as f64 / SQUARE_OF_AN_EVALUATION;
             choice.cost += evaluations as f64 + algebra;
@@ -68,9 +68,9 @@ impl Simulation {
             if choice.steps >= TRIAL_STEPS {
                 let explicit = choice.h_explicit / EXPLICIT_EVALUATIONS;
                 if choice.progress < WORTH_IT * explicit * choice.cost {
-                    state.implicit = false;
-                    state.controller = controller_of(Method::Automatic, false);
-                    state.h_next = choice.h_explicit;
+                    state.control.implicit = false;
+                    state.control.controller = controller_of(Method::Automatic, false);
+                    state.control.h_next = choice.h_explicit;
                     let turn = EXPLICIT_TURN << choice.failures.min(8);
                     choice.wait = turn.min(LONGEST_TURN);
                     choice.failures += 1;
@@ -92,9 +92,9 @@ impl Simulation {
             return;
         }
         let settled = choice.held >= HELD_STEPS || choice.since_contact >= SETTLED_STEPS;
-        if settled && velocities <= LARGEST_IMPLICIT && state.memory.iter().any(|m| m.active) {
-            state.implicit = true;
-            state.controller = controller_of(Method::Automatic, true);
+        if settled && velocities <= LARGEST_IMPLICIT && state.now.memory.iter().any(|m| m.active) {
+            state.control.implicit = true;
+            state.control.controller = controller_of(Method::Automatic, true);
             *choice = Choice {
                 h_explicit: h,
                 failures: choice.failures,

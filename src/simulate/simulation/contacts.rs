@@ -3,8 +3,7 @@
 use super::search::NEAR_PEAK;
 use super::{Simulation, State};
 use crate::contact::Memory;
-use crate::contact::{Coefficients, Pace};
-use crate::mechanism::Switching;
+use crate::contact::{ApproachPiece, Coefficients};
 use crate::scene::least_impact_steps;
 use crate::simulate::peaks::Course;
 
@@ -30,10 +29,11 @@ impl State {
         from: f64,
     ) {
         let (damping, theta) = course.most_damped(c, remembered, from);
-        self.impacts.follow(j, course, force, damping);
-        if damping > self.statistics.damping[j] {
-            self.statistics.damping[j] = damping;
-            self.statistics.damping_time[j] = self.t0 + theta * (self.t - self.t0);
+        self.record.impacts.follow(j, course, force, damping);
+        if damping > self.record.statistics.damping[j] {
+            self.record.statistics.damping[j] = damping;
+            self.record.statistics.damping_time[j] =
+                self.before.t + theta * (self.now.t - self.before.t);
         }
     }
 }
@@ -41,51 +41,52 @@ impl State {
 impl Simulation {
     /// Starts and ends contacts whose penetration changed sign over the step just accepted.
     pub(super) fn switch_contacts(&mut self, h: f64) -> Switched {
-        let located = self.located.take();
+        let located = self.attempt.located.take();
+        let immediate = !self.locates();
         let fixed = !self.running.solver.method.is_adaptive();
         let Self {
             mechanism,
             running,
             state,
             peaks,
-            strongest,
+            attempt,
             ..
         } = self;
+        let strongest = &attempt.strongest;
         let least = least_impact_steps(running.solver.method);
-        let immediate = mechanism.contacts.switching == Switching::Immediate;
         let mut switched = Switched {
             contacts: false,
             forces: false,
         };
-        for j in 0..state.gaps.len() {
+        for j in 0..state.now.gaps.len() {
             if !mechanism.contacts.has_clearance(j) {
                 continue;
             }
-            let (start, end) = (state.gaps0[j], state.gaps[j]);
+            let (start, end) = (state.before.gaps[j], state.now.gaps[j]);
             let coefficients = mechanism.contacts.coefficients(j);
-            if state.memory[j].active {
+            if state.now.memory[j].active {
                 let course = Course::new(start, end, h);
-                let remembered = state.memory[j].approach_speed;
+                let remembered = state.now.memory[j].approach_speed;
                 state.follow(j, &course, coefficients, strongest[j].0, remembered, 0.0);
             }
             // A located switch ends within rounding of the wall, on either side; but the step taken again may show that a
             // ball that was about to separate turned around before.
-            let turned = state.memory[j].active && end.penetration > 0.0 && end.rate > 0.0;
+            let turned = state.now.memory[j].active && end.penetration > 0.0 && end.rate > 0.0;
             let touching = if located == Some(j) {
-                !state.memory[j].active || turned
+                !state.now.memory[j].active || turned
             } else {
                 end.penetration > 0.0
             };
-            state.contact_steps[j] += 1;
-            if touching == state.memory[j].active {
+            state.record.contact_steps[j] += 1;
+            if touching == state.now.memory[j].active {
                 if touching && coefficients.largest {
-                    let whole = state.memory[j].pace == Pace::Whole;
+                    let whole = state.now.memory[j].approach_piece == ApproachPiece::Unsplit;
                     let fastest = if whole {
                         Course::new(start, end, h).fastest(0.0).0
                     } else {
                         end.rate
                     };
-                    let memory = &mut state.memory[j];
+                    let memory = &mut state.now.memory[j];
                     switched.forces |= whole && fastest > memory.approach_speed.max(end.rate);
                     memory.approach_speed = memory.approach_speed.max(fastest);
                 }
@@ -93,7 +94,7 @@ impl Simulation {
             }
             switched.contacts = true;
             switched.forces |= immediate;
-            let steps = std::mem::replace(&mut state.contact_steps[j], 0);
+            let steps = std::mem::replace(&mut state.record.contact_steps[j], 0);
             if touching {
                 let course = Course::new(start, end, h);
                 let crosses = start.penetration < 0.0 && end.penetration > 0.0;
@@ -103,10 +104,11 @@ impl Simulation {
                 } else {
                     end.rate
                 };
-                let time = state.t0 + theta * h;
+                let time = state.before.t + theta * h;
                 let asked = running.ball_joints[j].contact.restitution;
-                let among_others = state.memory.iter().any(|m| m.active);
+                let among_others = state.now.memory.iter().any(|m| m.active);
                 state
+                    .record
                     .impacts
                     .begin(j, time, rate, asked, coefficients, among_others);
                 let mut memory = Memory::begun(coefficients, rate);
@@ -119,27 +121,27 @@ impl Simulation {
                     let (force, _) = course.strongest(coefficients, remembered);
                     state.follow(j, &course, coefficients, force, remembered, theta);
                 }
-                state.memory[j] = memory;
-                state.statistics.impacts[j] += 1;
-                state.statistics.floored[j] += u64::from(memory.floored);
+                state.now.memory[j] = memory;
+                state.record.statistics.impacts[j] += 1;
+                state.record.statistics.floored[j] += u64::from(memory.floored);
                 peaks[j].impacts += 1;
                 peaks[j].approach_speed = peaks[j].approach_speed.max(rate);
-                state.contact_began = true;
-                state.h_next = state.h_next.min(state.h_contact);
+                state.control.contact_began = true;
+                state.control.h_next = state.control.h_next.min(state.control.h_contact);
             } else {
                 let crosses = start.penetration > 0.0 && end.penetration < 0.0;
                 let (time, rate) = if crosses && located != Some(j) {
                     let course = Course::new(start, end, h);
                     let theta = course.crossing();
-                    (state.t0 + theta * h, course.at(theta).1)
+                    (state.before.t + theta * h, course.at(theta).1)
                 } else {
-                    (state.t, end.rate)
+                    (state.now.t, end.rate)
                 };
-                state.impacts.end(j, time, rate);
+                state.record.impacts.end(j, time, rate);
                 let coarse = fixed && steps < least;
-                state.statistics.coarse[j] += u64::from(coarse);
-                state.memory[j] = Memory::default();
-                state.statistics.last_separation[j] = state.t;
+                state.record.statistics.coarse[j] += u64::from(coarse);
+                state.now.memory[j] = Memory::default();
+                state.record.statistics.last_separation[j] = state.now.t;
             }
         }
         switched
@@ -147,40 +149,39 @@ impl Simulation {
 
     /// Largest contact forces of the step just accepted, in continuous time.
     pub(super) fn track_peaks(&mut self, h: f64) {
+        let immediate = !self.locates();
         let Self {
             mechanism,
             state,
             peaks,
-            near_peak,
-            strongest,
+            attempt,
             ..
         } = self;
-        let immediate = mechanism.contacts.switching == Switching::Immediate;
-        for j in 0..state.gaps.len() {
+        for j in 0..state.now.gaps.len() {
             if !mechanism.contacts.has_clearance(j) {
                 continue;
             }
-            let (start, end) = (state.gaps0[j], state.gaps[j]);
+            let (start, end) = (state.before.gaps[j], state.now.gaps[j]);
             let grazes = immediate && start.rate > 0.0 && end.rate < 0.0;
             if start.penetration <= 0.0 && end.penetration <= 0.0 && !grazes {
                 continue;
             }
             let mut coefficients = *mechanism.contacts.coefficients(j);
             let course = Course::new(start, end, h);
-            let (force, theta) = if state.memory0[j].active {
-                strongest[j]
-            } else if state.memory[j].active {
-                course.strongest(&coefficients, state.memory[j].approach_speed)
+            let (force, theta) = if state.before.memory[j].active {
+                attempt.strongest[j]
+            } else if state.now.memory[j].active {
+                course.strongest(&coefficients, state.now.memory[j].approach_speed)
             } else {
                 // It came and went within the step, without a memory: its approach speed was the rate at each instant.
                 coefficients.largest = true;
                 course.strongest(&coefficients, coefficients.speed_floor)
             };
-            let time = state.t0 + theta * h;
-            *near_peak |= force > NEAR_PEAK * state.statistics.peak_normal[j];
-            if force > state.statistics.peak_normal[j] {
-                state.statistics.peak_normal[j] = force;
-                state.statistics.peak_time[j] = time;
+            let time = state.before.t + theta * h;
+            attempt.near_peak |= force > NEAR_PEAK * state.record.statistics.peak_normal[j];
+            if force > state.record.statistics.peak_normal[j] {
+                state.record.statistics.peak_normal[j] = force;
+                state.record.statistics.peak_time[j] = time;
             }
             if force > peaks[j].normal {
                 let gap = &mechanism.contacts.gaps()[j];

@@ -2,8 +2,8 @@
 //! of the rule for its approach speed, and the step ends where its sliding speed or its penetration rate leaves that piece.
 
 use super::Simulation;
-use crate::contact::{Memory, Pace, Slip};
-use crate::integrate::{Method, System, find_root};
+use crate::contact::{ApproachPiece, FrictionPiece, Memory};
+use crate::integrate::{Method, find_root};
 
 /// Parts of a step at whose ends the sliding speed is looked at.
 const PARTS: u32 = 4;
@@ -32,17 +32,17 @@ pub(super) struct Corner {
 #[derive(Clone, Copy)]
 pub(super) enum Piece {
     /// Of the friction law.
-    Slip(Slip),
+    Friction(FrictionPiece),
     /// Of the rule for the approach speed.
-    Pace(Pace),
+    Approach(ApproachPiece),
 }
 
 impl Piece {
     /// Puts a contact onto it.
     pub(super) fn put(self, memory: &mut Memory) {
         match self {
-            Self::Slip(slip) => memory.slip = slip,
-            Self::Pace(pace) => memory.pace = pace,
+            Self::Friction(piece) => memory.friction_piece = piece,
+            Self::Approach(piece) => memory.approach_piece = piece,
         }
     }
 }
@@ -65,11 +65,12 @@ impl Simulation {
     /// Puts every touching joint on the pieces of the laws on which it is now; those that hold some already keep
     /// them unless `anew`. Where corners are not located, all follow the whole laws.
     pub(super) fn hold_pieces(&mut self, anew: bool) {
-        let holds = self.locates_corners() && !self.state.chatters;
-        let keeps = |slip: Slip| slip != Slip::Whole && !anew;
+        let holds = self.locates_corners() && !self.state.control.chatters;
+        let keeps = |slip: FrictionPiece| slip != FrictionPiece::Unsplit && !anew;
         if !holds {
-            for memory in &mut self.state.memory {
-                (memory.slip, memory.pace) = (Slip::Whole, Pace::Whole);
+            for memory in &mut self.state.now.memory {
+                (memory.friction_piece, memory.approach_piece) =
+                    (FrictionPiece::Unsplit, ApproachPiece::Unsplit);
             }
             return;
         }
@@ -77,28 +78,39 @@ impl Simulation {
             mechanism, state, ..
         } = self;
         // A rate that was held below the largest so far has passed it only at a corner; one that rose may have stopped.
-        for (j, memory) in state.memory.iter_mut().enumerate() {
+        for (j, memory) in state.now.memory.iter_mut().enumerate() {
             let c = mechanism.contacts.coefficients(j);
-            if memory.pace == Pace::Rising && state.gaps[j].rate < memory.approach_speed {
-                memory.pace = Pace::Held;
-            } else if memory.active && c.largest && memory.pace == Pace::Whole && !anew {
-                memory.pace = c.pace_at(memory.approach_speed, state.gaps[j].rate);
+            if memory.approach_piece == ApproachPiece::Rising
+                && state.now.gaps[j].rate < memory.approach_speed
+            {
+                memory.approach_piece = ApproachPiece::Held;
+            } else if memory.active
+                && c.largest
+                && memory.approach_piece == ApproachPiece::Unsplit
+                && !anew
+            {
+                memory.approach_piece = c.pace_at(memory.approach_speed, state.now.gaps[j].rate);
             }
         }
-        if state.memory.iter().all(|m| !m.active || keeps(m.slip)) {
+        if state
+            .now
+            .memory
+            .iter()
+            .all(|m| !m.active || keeps(m.friction_piece))
+        {
             return;
         }
-        mechanism.measure(state.t, &state.y);
-        for (j, memory) in state.memory.iter_mut().enumerate() {
+        mechanism.measure(state.now.t, &state.now.y);
+        for (j, memory) in state.now.memory.iter_mut().enumerate() {
             let c = mechanism.contacts.coefficients(j);
             if !memory.active {
-                memory.slip = Slip::Whole;
-            } else if !keeps(memory.slip) {
+                memory.friction_piece = FrictionPiece::Unsplit;
+            } else if !keeps(memory.friction_piece) {
                 let speed = mechanism.slip_speed(j);
-                memory.slip = c.slip_at(speed);
+                memory.friction_piece = c.slip_at(speed);
                 if anew {
                     let rate = mechanism.contacts.gaps()[j].rate;
-                    memory.pace = c.pace_at(memory.approach_speed, rate);
+                    memory.approach_piece = c.pace_at(memory.approach_speed, rate);
                 }
             }
         }
@@ -106,12 +118,12 @@ impl Simulation {
 
     /// First corner of the laws inside the step just attempted.
     pub(super) fn first_corner(&mut self, h: f64) -> Option<Corner> {
-        if !std::mem::take(&mut self.mechanism.contacts.strayed) {
+        if !self.attempt.left_piece {
             return None;
         }
         let mut first: Option<Corner> = None;
-        for j in 0..self.state.memory.len() {
-            let memory = self.state.memory[j];
+        for j in 0..self.state.now.memory.len() {
+            let memory = self.state.now.memory[j];
             let mut take = |corner: Option<(f64, Piece)>| {
                 let earliest = first.as_ref().map_or(f64::INFINITY, |corner| corner.theta);
                 if let Some((theta, next)) = corner.filter(|(theta, _)| *theta < earliest) {
@@ -122,13 +134,13 @@ impl Simulation {
                     });
                 }
             };
-            if memory.slip != Slip::Whole {
+            if memory.friction_piece != FrictionPiece::Unsplit {
                 take(self.corner_of(j, h));
             }
-            match memory.pace {
-                Pace::Whole => {}
-                Pace::Held => take(self.overtaking(j, h)),
-                Pace::Rising => take(self.level(j, h)),
+            match memory.approach_piece {
+                ApproachPiece::Unsplit => {}
+                ApproachPiece::Held => take(self.overtaking(j, h)),
+                ApproachPiece::Rising => take(self.level(j, h)),
             }
         }
         first
@@ -136,8 +148,8 @@ impl Simulation {
 
     /// Where the penetration rate of joint `j` passes the largest so far.
     fn overtaking(&mut self, j: usize, h: f64) -> Option<(f64, Piece)> {
-        let most = self.state.memory[j].approach_speed * (1.0 + NO_FASTER);
-        let mut left = (0.0, self.state.gaps[j].rate - most);
+        let most = self.state.now.memory[j].approach_speed * (1.0 + NO_FASTER);
+        let mut left = (0.0, self.state.now.gaps[j].rate - most);
         for n in 1..=PARTS {
             let theta = f64::from(n) / f64::from(PARTS);
             let right = (theta, self.rate_at(j, theta, h) - most);
@@ -149,7 +161,7 @@ impl Simulation {
                 } else {
                     left.0
                 };
-                return Some((at, Piece::Pace(Pace::Rising)));
+                return Some((at, Piece::Approach(ApproachPiece::Rising)));
             }
             left = right;
         }
@@ -159,7 +171,7 @@ impl Simulation {
     /// Where the penetration rate of joint `j`, the largest so far, stops rising.
     fn level(&mut self, j: usize, h: f64) -> Option<(f64, Piece)> {
         const GOLDEN: f64 = 0.618_033_988_749_894_9;
-        let mut before = self.state.gaps[j].rate;
+        let mut before = self.state.now.gaps[j].rate;
         for n in 1..=PARTS {
             let end = f64::from(n) / f64::from(PARTS);
             let rate = self.rate_at(j, end, h);
@@ -183,7 +195,7 @@ impl Simulation {
             }
             let at = 0.5 * (a + b);
             let at = if at < LEVEL_AT_START { 0.0 } else { at };
-            return Some((at, Piece::Pace(Pace::Held)));
+            return Some((at, Piece::Approach(ApproachPiece::Held)));
         }
         None
     }
@@ -196,17 +208,17 @@ impl Simulation {
 
     /// Measures the interpolant of the attempted step.
     pub(super) fn measure_at(&mut self, theta: f64, h: f64) {
-        let Self {
-            mechanism,
-            stepper,
-            state,
-            y_end,
-            k_end,
-            scratch_y,
-            ..
-        } = self;
-        stepper.interpolate(theta, h, &state.y, &state.k, y_end, k_end, scratch_y);
-        mechanism.measure(state.t + theta * h, scratch_y);
+        self.interpolate_attempt(theta, h);
+        let time = self.state.now.t + theta * h;
+        self.mechanism.measure(time, &self.scratch_y);
+    }
+
+    /// State at the part `theta` of the attempted step, of size `h`, into the scratch state.
+    fn interpolate_attempt(&mut self, theta: f64, h: f64) {
+        let (now, end) = (&self.state.now, &self.attempt.end);
+        let scratch = &mut self.scratch_y;
+        self.stepper
+            .interpolate(theta, h, &now.y, &now.k, &end.y, &end.k, scratch);
     }
 
     /// Where the sliding speed of joint `j` leaves its piece, as a fraction of the step just attempted, and for which piece.
@@ -226,12 +238,14 @@ impl Simulation {
                 };
                 let (_, speed) = self.beyond(j, at.max(AT_START), h);
                 let c = self.mechanism.contacts.coefficients(j);
-                let next = match self.state.memory[j].slip {
-                    Slip::Ramp if speed > 0.5 * (c.slip_low + c.slip_high) => Slip::Full,
-                    Slip::Ramp => Slip::Creep,
-                    _ => Slip::Ramp,
+                let next = match self.state.now.memory[j].friction_piece {
+                    FrictionPiece::Ramp if speed > 0.5 * (c.slip_low + c.slip_high) => {
+                        FrictionPiece::Full
+                    }
+                    FrictionPiece::Ramp => FrictionPiece::DeadBand,
+                    _ => FrictionPiece::Ramp,
                 };
-                return Some((at, Piece::Slip(next)));
+                return Some((at, Piece::Friction(next)));
             }
             left = right;
         }
@@ -241,27 +255,17 @@ impl Simulation {
     /// Lets the step just attempted end at a corner. Unlike a beginning contact it is not taken again: its end would be
     /// off the corner by the tolerance, which is not small against the ramp, and slide back at once.
     pub(super) fn end_at(&mut self, theta: f64, t_end: f64, h: f64) {
-        let Self {
-            mechanism,
-            stepper,
-            state,
-            y_end,
-            k_end,
-            scratch_y,
-            ..
-        } = self;
-        stepper.interpolate(theta, h, &state.y, &state.k, y_end, k_end, scratch_y);
-        y_end.copy_from_slice(scratch_y);
-        stepper.truncate(theta);
-        mechanism.derivative(t_end, y_end, k_end);
-        self.finish_gaps();
+        self.interpolate_attempt(theta, h);
+        self.attempt.end.y.copy_from_slice(&self.scratch_y);
+        self.stepper.truncate(theta);
+        self.evaluate_end(t_end);
     }
 
     /// How far joint `j` slides beyond its piece on the interpolant of the attempted step, and its sliding speed, m/s.
     fn beyond(&mut self, j: usize, theta: f64, h: f64) -> (f64, f64) {
         self.measure_at(theta, h);
         let speed = self.mechanism.slip_speed(j);
-        let slip = self.state.memory[j].slip;
+        let slip = self.state.now.memory[j].friction_piece;
         let c = self.mechanism.contacts.coefficients(j);
         (c.beyond(slip, speed), speed)
     }
@@ -270,16 +274,16 @@ impl Simulation {
     /// where corners follow one another with hardly a step between.
     pub(super) fn pass_corner(&mut self) {
         let state = &mut self.state;
-        if let Some((j, next)) = self.corner.take() {
-            if state.memory[j].active {
-                next.put(&mut state.memory[j]);
+        if let Some((j, next)) = self.attempt.corner.take() {
+            if state.now.memory[j].active {
+                next.put(&mut state.now.memory[j]);
             }
-            state.statistics.corners += 1;
-            state.chatter += CORNER;
-            state.chatters |= state.chatter >= MOST_CHATTER;
+            state.record.statistics.corners += 1;
+            state.control.chatter += CORNER;
+            state.control.chatters |= state.control.chatter >= MOST_CHATTER;
         } else {
-            state.chatter = state.chatter.saturating_sub(1);
-            state.chatters &= state.chatter > 0;
+            state.control.chatter = state.control.chatter.saturating_sub(1);
+            state.control.chatters &= state.control.chatter > 0;
         }
         self.hold_pieces(false);
     }

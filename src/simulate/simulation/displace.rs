@@ -1,8 +1,7 @@
 //! A state moved by hand: what a twin run and its renormalisation need.
 
 use super::Simulation;
-use crate::contact::{Memory, Pace, Slip};
-use crate::integrate::System;
+use crate::contact::{ApproachPiece, FrictionPiece, Memory};
 
 impl Simulation {
     /// Adds `offset` to coordinates and velocities (as [`Self::state`] orders them) and goes on from there: quaternions
@@ -14,25 +13,28 @@ impl Simulation {
         let Self {
             mechanism, state, ..
         } = self;
-        for (y, offset) in state.y.iter_mut().zip(offset) {
+        for (y, offset) in state.now.y.iter_mut().zip(offset) {
             *y += offset;
         }
-        mechanism.project(state.t, &mut state.y);
-        mechanism.measure(state.t, &state.y);
-        for j in 0..state.memory.len() {
+        mechanism.project(state.now.t, &mut state.now.y);
+        mechanism.measure(state.now.t, &state.now.y);
+        for j in 0..state.now.memory.len() {
             if !mechanism.contacts.has_clearance(j) {
                 continue;
             }
             // The offset may lie beyond a corner of the laws.
-            (state.memory[j].slip, state.memory[j].pace) = (Slip::Whole, Pace::Whole);
+            (
+                state.now.memory[j].friction_piece,
+                state.now.memory[j].approach_piece,
+            ) = (FrictionPiece::Unsplit, ApproachPiece::Unsplit);
             let gap = mechanism.contacts.gaps()[j];
             let touching = gap.penetration > 0.0;
-            if touching == state.memory[j].active {
+            if touching == state.now.memory[j].active {
                 continue;
             }
-            state.memory[j] = if touching {
-                state.contact_began = true;
-                state.h_next = state.h_next.min(state.h_contact);
+            state.now.memory[j] = if touching {
+                state.control.contact_began = true;
+                state.control.h_next = state.control.h_next.min(state.control.h_contact);
                 Memory::begun(mechanism.contacts.coefficients(j), gap.rate)
             } else {
                 Memory::default()

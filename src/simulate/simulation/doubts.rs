@@ -85,7 +85,7 @@ impl Simulation {
         let clearances = self.running.ball_joints.iter().map(|j| j.contact.clearance);
         let least = clearances.filter(|c| *c > 0.0).fold(DRIFT, f64::min);
         let mass: f64 = self.running.bodies.iter().map(|body| body.mass).sum();
-        let energy = self.state.account.energy() + mass * (least / CREEP) * (least / CREEP);
+        let energy = self.state.record.account.energy() + mass * (least / CREEP) * (least / CREEP);
         if !(residual.abs() > ROUNDING * energy) {
             return None;
         }
@@ -99,6 +99,8 @@ impl Simulation {
             (Work::Restitution, ledger.restitution_loss),
             (Work::Friction, ledger.friction_loss),
             (Work::Clearance, ledger.clearance_work),
+            (Work::Damping, ledger.damping_loss),
+            (Work::External, ledger.external_work),
             (Work::Changes, ledger.change_work),
         ];
         let least = works
@@ -120,7 +122,7 @@ impl Simulation {
     /// energy settled contacts lose.
     fn stability_doubt(&self) -> Option<Doubt> {
         let solver = &self.running.solver;
-        let share = self.statistics().held_time / self.state.t;
+        let share = self.statistics().held_time / self.state.now.t;
         let loose = solver.method == Method::DormandPrince5 && solver.tolerance > LOOSEST_HELD;
         (loose && share > MOST_HELD).then_some(Doubt::Held {
             share,

@@ -1,7 +1,7 @@
 //! Keeps the energy ledger: powers at a few instants of each accepted step.
 
 use super::{Simulation, State};
-use crate::mechanism::{Mechanism, Powers};
+use crate::mechanism::{Mechanism, Powers, Touching};
 use crate::simulate::ledger::{Account, Energies};
 use crate::simulate::{Frame, Ledger};
 
@@ -16,7 +16,7 @@ const MIDDLE: [f64; 1] = [0.5];
 impl Simulation {
     /// Energy moved since the start (the last reset); `None` where `solver.energy_ledger` is off.
     pub fn ledger(&self) -> Option<&Ledger> {
-        let account = &self.state.account;
+        let account = &self.state.record.account;
         account.on.then(|| account.ledger())
     }
 
@@ -26,7 +26,7 @@ impl Simulation {
             mechanism, state, ..
         } = self;
         let energies = energies(mechanism, state);
-        state.account = Account::start(self.running.solver.energy_ledger, energies);
+        state.record.account = Account::start(self.running.solver.energy_ledger, energies);
     }
 
     /// Books what a live change did to the energies; everything was just evaluated.
@@ -34,46 +34,49 @@ impl Simulation {
         let Self {
             mechanism, state, ..
         } = self;
-        if state.account.on {
+        if state.record.account.on {
             let energies = energies(mechanism, state);
-            state.account.book_change(energies);
+            state.record.account.book_change(energies);
         }
     }
 
     /// Books the step just accepted, of size `h`. The contact memory in force is still that of the step; `switched` where
     /// another has been found for its end.
     pub(super) fn book_step(&mut self, h: f64, switched: bool) {
-        if !self.state.account.on {
+        if !self.state.record.account.on {
             return;
         }
+        let located = self.locates();
         let Self {
             mechanism,
             state,
             scratch_k,
             ..
         } = self;
-        if !mechanism.is_evaluated_at(state.t) {
-            mechanism.measure(state.t, &state.y);
+        if !mechanism.is_evaluated_at(state.now.t) {
+            mechanism.measure(state.now.t, &state.now.y);
         }
         let energies = energies(mechanism, state);
         if mechanism.has_powers() {
-            scratch_k.copy_from_slice(&state.k);
-            let end = mechanism.powers(state.t, &state.y, scratch_k);
+            let now = &state.now;
+            scratch_k.copy_from_slice(&now.k);
+            let mut evaluator = mechanism.evaluator(Touching::by(located, &state.before.memory));
+            let end = evaluator.powers(now.t, &now.y, scratch_k);
             self.lay_out_course(h, end);
-            self.state.account.powers = (!switched).then_some(end);
+            self.state.record.account.powers = (!switched).then_some(end);
         }
-        self.state.account.book(h, energies);
+        self.state.record.account.book(h, energies);
     }
 
     /// Finds the instants from which the works of the step just accepted are integrated; at its end the powers are `end`.
     fn lay_out_course(&mut self, h: f64, end: Powers) {
-        let (from, to) = (self.state.t0, self.state.t);
+        let (from, to) = (self.state.before.t, self.state.now.t);
         let kinematic = self.mechanism.is_kinematic();
         if kinematic {
-            let past = &mut self.state.account.past;
+            let past = &mut self.state.record.account.past;
             past.push_apart(to, end, SHORTEST_PAST * h);
             if past.len() > PAST_ENDS {
-                self.state.account.course = past.seen_from(from, h);
+                self.state.record.account.course = past.seen_from(from, h);
                 return;
             }
         }
@@ -82,23 +85,24 @@ impl Simulation {
         } else {
             self.stepper.interior()
         };
-        self.state.account.course.clear();
+        self.state.record.account.course.clear();
         // A collocation method has its own quadrature, which leaves the start out.
         if interior.len() == 1 {
-            let start = self.state.account.powers;
+            let start = self.state.record.account.powers;
             let start = start.unwrap_or_else(|| self.powers_within(0.0, h));
-            self.state.account.course.push(0.0, start);
+            self.state.record.account.course.push(0.0, start);
         }
         for &theta in interior {
             let powers = self.powers_within(theta, h);
-            self.state.account.course.push(theta, powers);
+            self.state.record.account.course.push(theta, powers);
         }
-        self.state.account.course.push(1.0, end);
+        self.state.record.account.course.push(1.0, end);
     }
 
     /// Powers at the part `theta` of the step just accepted.
     fn powers_within(&mut self, theta: f64, h: f64) -> Powers {
         self.interpolate(theta, h);
+        let located = self.locates();
         let Self {
             mechanism,
             state,
@@ -107,13 +111,15 @@ impl Simulation {
             ..
         } = self;
         mechanism.forget_evaluation();
-        mechanism.powers(state.t0 + theta * h, scratch_y, scratch_k)
+        let mut evaluator = mechanism.evaluator(Touching::by(located, &state.before.memory));
+        evaluator.powers(state.before.t + theta * h, scratch_y, scratch_k)
     }
 
     /// Ledger at the instant of `frame`, within the latest step.
     pub(super) fn ledger_of(&self, frame: &Frame) -> Option<Ledger> {
-        let State { account, t0, t, .. } = &self.state;
-        if frame.time >= *t {
+        let account = &self.state.record.account;
+        let (from, to) = (self.state.before.t, self.state.now.t);
+        if frame.time >= to {
             return self.ledger().copied();
         }
         let energies = Energies {
@@ -121,10 +127,10 @@ impl Simulation {
             gravitational: frame.potential - frame.elastic,
             elastic: frame.elastic,
         };
-        let h = t - t0;
+        let h = to - from;
         account
             .on
-            .then(|| account.within((frame.time - t0) / h, h, energies))
+            .then(|| account.within((frame.time - from) / h, h, energies))
     }
 }
 
@@ -132,17 +138,17 @@ impl Simulation {
 fn energies(mechanism: &Mechanism, state: &State) -> Energies {
     let (kinetic, gravitational) = mechanism.energies();
     let contacts = &mechanism.contacts;
-    let elastic = (0..contacts.len())
+    let in_contacts: f64 = (0..contacts.len())
         .filter(|&j| contacts.has_clearance(j))
         .map(|j| {
             contacts
                 .coefficients(j)
-                .elastic_energy(state.gaps[j].penetration)
+                .elastic_energy(state.now.gaps[j].penetration)
         })
         .sum();
     Energies {
         kinetic,
         gravitational,
-        elastic,
+        elastic: in_contacts + mechanism.energy_in_elements(),
     }
 }

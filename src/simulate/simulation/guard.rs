@@ -2,6 +2,7 @@
 
 use super::{OPEN_LOOP, Simulation};
 use crate::scene::Formulation;
+use crate::simulate::StopFault;
 
 /// Speed beyond which a state is absurd, m/s and rad/s.
 const ABSURD_SPEED: f64 = 1e6;
@@ -16,57 +17,55 @@ const LEAST_PIVOT: f64 = 1e-12;
 
 impl Simulation {
     /// What is wrong with the step of size `h` just attempted, if anything.
-    pub(super) fn objection(&self, open: f64, h: f64) -> Option<String> {
+    pub(super) fn objection(&self, open: f64, h: f64) -> Option<StopFault> {
         if !(open <= OPEN_LOOP) {
-            return Some(format!(
-                "the loops through the ideal ball joints came apart by {open:.1e} m"
-            ));
+            return Some(StopFault::OpenLoops { open });
         }
         let drift = self.mechanism.constraint_drift();
         if !(drift <= MOST_DRIFT) {
-            return Some(format!(
-                "the constraints of the lagrange form are off by {drift:.1e} m"
-            ));
+            return Some(StopFault::Drift { drift });
         }
         if self.running.formulation == Formulation::Lagrange
             && !(self.mechanism.least_pivot() >= LEAST_PIVOT)
         {
-            return Some("the constraints pass a singular pose".to_owned());
+            return Some(StopFault::SingularConstraints);
         }
-        for j in 0..self.gaps_end.len() {
+        for j in 0..self.attempt.end.gaps.len() {
             if !self.mechanism.contacts.has_clearance(j) {
                 continue;
             }
-            let penetration = self.gaps_end[j].penetration;
+            let penetration = self.attempt.end.gaps[j].penetration;
             let radius = self.mechanism.contacts.coefficients(j).ball_radius;
             if !(penetration <= LEFT_SOCKET * radius) {
-                let name = &self.running.ball_joints[j].name;
-                return Some(format!(
-                    "ball joint {name}: the ball is {penetration:.3e} m inside its socket wall, more than a tenth of its radius"
-                ));
+                return Some(StopFault::LeftSocket {
+                    joint: self.running.ball_joints[j].name.clone(),
+                    penetration,
+                });
             }
             if !self.running.solver.method.is_adaptive()
                 && let Some(times) = self.energy_of_overshoot(j, h)
             {
-                let name = &self.running.ball_joints[j].name;
-                return Some(format!(
-                    "ball joint {name}: one step put the ball {penetration:.3e} m inside its socket wall, \
-                     with {times:.1} times the energy that it can have arrived with"
-                ));
+                return Some(StopFault::Overshoot {
+                    joint: self.running.ball_joints[j].name.clone(),
+                    penetration,
+                    times,
+                });
             }
         }
         for (m, body) in self.mechanism.motion().iter().zip(&self.running.bodies) {
             let (v, w) = (m.velocity.norm(), m.angular_velocity.norm());
             let sane = v <= ABSURD_SPEED && w <= ABSURD_SPEED;
             if !(sane && m.position.iter().all(|x| x.is_finite())) {
-                return Some(format!(
-                    "body {}: speed {v:.3e} m/s, angular speed {w:.3e} rad/s",
-                    body.name
-                ));
+                return Some(StopFault::AbsurdSpeed {
+                    body: body.name.clone(),
+                    speed: v,
+                    angular_speed: w,
+                });
             }
         }
-        if self.k_end.iter().chain(&self.y_end).any(|x| !x.is_finite()) {
-            return Some("the accelerations are not finite".to_owned());
+        let end = &self.attempt.end;
+        if end.k.iter().chain(&end.y).any(|x| !x.is_finite()) {
+            return Some(StopFault::NotFinite);
         }
         None
     }
@@ -74,7 +73,7 @@ impl Simulation {
     /// Where a fixed step carried a free ball so far into the wall that it stores more energy there than any approach
     /// could bring: how many times more.
     fn energy_of_overshoot(&self, j: usize, h: f64) -> Option<f64> {
-        let (start, end) = (self.state.gaps[j], self.gaps_end[j]);
+        let (start, end) = (self.state.now.gaps[j], self.attempt.end.gaps[j]);
         if start.penetration > 0.0 || end.penetration <= 0.0 {
             return None;
         }

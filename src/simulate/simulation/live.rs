@@ -1,7 +1,9 @@
 //! Parameters changed while the simulation runs.
 
+use std::sync::Arc;
+
 use super::automatic::{Choice, controller_of, prepare_implicit};
-use super::{CLEARANCE_SPEED, Simulation, switching_of};
+use super::{CLEARANCE_SPEED, Simulation};
 use crate::contact::Memory;
 use crate::mechanism::Ramp;
 use crate::scene::{Scene, SceneError};
@@ -14,7 +16,7 @@ impl Simulation {
     /// # Errors
     /// Unknown key, bad unit, out of range: the running simulation is unchanged.
     pub fn set(&mut self, key: &str, value: &str) -> Result<Effect, SceneError> {
-        let mut next = self.scene.clone();
+        let mut next = Scene::clone(&self.scene);
         let waits = next.set(key, value)?.at_reset;
         self.adopt(next, |running| running.set(key, value).map(|_| ()), waits)
     }
@@ -28,7 +30,7 @@ impl Simulation {
         key: &str,
         value: &crate::scene::Value,
     ) -> Result<Effect, SceneError> {
-        let mut next = self.scene.clone();
+        let mut next = Scene::clone(&self.scene);
         let waits = next.set_value(key, value)?.at_reset;
         self.adopt(
             next,
@@ -43,7 +45,7 @@ impl Simulation {
         change: impl FnOnce(&mut Scene) -> Result<(), SceneError>,
         waits: bool,
     ) -> Result<Effect, SceneError> {
-        let mut running = self.running.clone();
+        let mut running = Scene::clone(&self.running);
         // What the running scene cannot take may suit the one that waits, say a joint of a longer chain.
         let waits = waits || change(&mut running).is_err();
         // A joint that turns ideal, or stops being so, changes the equations.
@@ -54,7 +56,7 @@ impl Simulation {
                 .any(|(a, b)| (a == 0.0) != (b == 0.0))
         };
         if waits || turns(&running) {
-            self.scene = next;
+            self.scene = Arc::new(next);
             return Ok(Effect::AtReset);
         }
         if running.solver.method != self.running.solver.method {
@@ -66,12 +68,12 @@ impl Simulation {
                 }
             })?;
         }
-        self.scene = next;
-        let before = std::mem::replace(&mut self.running, running);
+        self.scene = Arc::new(next);
+        let before = std::mem::replace(&mut self.running, Arc::new(running));
         self.mechanism.gravity = self.running.gravity;
         if self.running.gravity != before.gravity {
             let gravity = self.running.gravity;
-            self.reference.set_gravity(self.state.t, gravity);
+            self.reference.set_gravity(self.state.now.t, gravity);
         }
         for j in 0..self.running.ball_joints.len() {
             let contact = self.running.ball_joints[j].contact;
@@ -82,13 +84,12 @@ impl Simulation {
         if self.running.solver != before.solver {
             let solver = &self.running.solver;
             if solver.method != before.solver.method {
-                self.stepper = AnyStepper::new(solver.method, self.state.y.len());
-                self.state.implicit = false;
-                self.state.controller = controller_of(solver.method, false);
-                self.state.choice = Choice::default();
-                self.mechanism.contacts.switching = switching_of(&self.running);
+                self.stepper = AnyStepper::new(solver.method, self.state.now.y.len());
+                self.state.control.implicit = false;
+                self.state.control.controller = controller_of(solver.method, false);
+                self.state.control.choice = Choice::default();
             }
-            self.state.h_next = self.state.h_next.min(solver.step);
+            self.state.control.h_next = self.state.control.h_next.min(solver.step);
         }
         self.refresh();
         self.book_change();
@@ -97,22 +98,22 @@ impl Simulation {
 
     /// Gravity from now on, of a simulation that no change of a scene goes through.
     pub(in crate::simulate) fn set_gravity(&mut self, gravity: crate::scene::Vec3) {
-        self.running.gravity = gravity;
-        self.scene.gravity = gravity;
+        Arc::make_mut(&mut self.running).gravity = gravity;
+        Arc::make_mut(&mut self.scene).gravity = gravity;
         self.mechanism.gravity = gravity;
         self.refresh();
     }
 
     /// Back to `time` within the latest step, on its interpolant; of a simulation without contacts.
     pub(in crate::simulate) fn go_back_to(&mut self, time: f64) {
-        let h = self.state.t - self.state.t0;
-        if !(time < self.state.t && time >= self.state.t0) {
+        let h = self.state.now.t - self.state.before.t;
+        if !(time < self.state.now.t && time >= self.state.before.t) {
             return;
         }
-        self.interpolate((time - self.state.t0) / h, h);
-        self.state.t = time;
-        self.state.y.copy_from_slice(&self.scratch_y);
-        self.mechanism.project(time, &mut self.state.y);
+        self.interpolate((time - self.state.before.t) / h, h);
+        self.state.now.t = time;
+        self.state.now.y.copy_from_slice(&self.scratch_y);
+        self.mechanism.project(time, &mut self.state.now.y);
         self.refresh();
     }
 
@@ -124,13 +125,13 @@ impl Simulation {
         let Self {
             mechanism, state, ..
         } = self;
-        mechanism.measure(state.t, &state.y);
+        mechanism.measure(state.now.t, &state.now.y);
         let now = mechanism.contacts.clearance(j);
         let gap = mechanism.contacts.gaps()[j];
         let distance = gap.penetration + now;
         let clearance = if contact.clearance < now && distance > contact.clearance {
             let ramp = Ramp {
-                start: state.t,
+                start: state.now.t,
                 from: now,
                 rate: -CLEARANCE_SPEED,
                 to: contact.clearance,
@@ -144,10 +145,10 @@ impl Simulation {
         mechanism.contacts.set_ramp(j, state.ramps[j]);
         mechanism.contacts.set_parameters(j, contact, clearance);
         state.clearances[j] = clearance;
-        if state.memory[j].active && distance <= clearance {
-            state.memory[j] = Memory::default();
+        if state.now.memory[j].active && distance <= clearance {
+            state.now.memory[j] = Memory::default();
         }
-        state.impacts.change(j, state.memory[j].active);
+        state.record.impacts.change(j, state.now.memory[j].active);
     }
 
     /// When the first clearance under way arrives, s.
@@ -162,7 +163,7 @@ impl Simulation {
     }
 
     pub(super) fn finish_ramps(&mut self) {
-        let t = self.state.t;
+        let t = self.state.now.t;
         let mut finished = false;
         for j in 0..self.state.ramps.len() {
             let Some(ramp) = self.state.ramps[j] else {

@@ -1,9 +1,9 @@
 //! Everything at an instant within the latest step.
 
 use super::Simulation;
+use super::ideal::Reference;
 use crate::integrate::hermite;
-use crate::mechanism::Switching;
-use crate::simulate::ideal::Reference;
+use crate::mechanism::Touching;
 use crate::simulate::{Frame, report};
 
 impl Simulation {
@@ -22,9 +22,10 @@ impl Simulation {
     /// Everything at `time`, interpolated within the latest step; forces come from the interpolated state.
     /// Allocates only while `out` is too small.
     pub fn sample(&mut self, time: f64, out: &mut Frame) {
-        let time = time.clamp(self.state.t0, self.state.t);
+        let time = time.clamp(self.state.before.t, self.state.now.t);
         self.look(time);
-        report::fill(&mut self.mechanism, &self.running, time, out);
+        let memory = &self.scratch_memory;
+        report::fill(&mut self.mechanism, &self.running, memory, time, out);
         for (sampled, report) in self.sampled.iter_mut().zip(&out.joints) {
             let force = report.normal_force.norm();
             if force > sampled.0 {
@@ -39,14 +40,15 @@ impl Simulation {
 
     /// Evaluates everything at `time` within the latest step, for the mechanism to be read; counts as no evaluation.
     pub(super) fn look(&mut self, time: f64) {
-        let h = self.state.t - self.state.t0;
-        let inside = h > 0.0 && time < self.state.t;
+        let h = self.state.now.t - self.state.before.t;
+        let inside = h > 0.0 && time < self.state.now.t;
         if inside {
-            let theta = (time - self.state.t0) / h;
+            let theta = (time - self.state.before.t) / h;
             self.interpolate(theta, h);
         } else {
-            self.scratch_y.copy_from_slice(&self.state.y);
+            self.scratch_y.copy_from_slice(&self.state.now.y);
         }
+        let located = self.locates();
         let Self {
             mechanism,
             state,
@@ -55,26 +57,17 @@ impl Simulation {
             scratch_memory,
             ..
         } = self;
-        let counts = (mechanism.evaluations, mechanism.contacts.evaluations);
         if inside {
             mechanism.project(time, scratch_y);
         }
-        // A contact that began within a fixed step has its approach speed from there on.
-        let immediate = mechanism.contacts.switching == Switching::Immediate;
+        let (before, now) = (&state.before.memory, &state.now.memory);
         for (j, memory) in scratch_memory.iter_mut().enumerate() {
-            let known = !inside || (immediate && !state.memory0[j].active);
-            *memory = if known {
-                state.memory[j]
-            } else {
-                state.memory0[j]
-            };
+            // A contact that began within a fixed step has its approach speed from there on.
+            let known = !inside || (!located && !before[j].active);
+            *memory = if known { now[j] } else { before[j] };
         }
-        mechanism
-            .contacts
-            .memory_mut()
-            .copy_from_slice(scratch_memory);
-        mechanism.evaluate_fully(time, scratch_y, scratch_k);
-        (mechanism.evaluations, mechanism.contacts.evaluations) = counts;
+        let mut evaluator = mechanism.evaluator(Touching::by(located, scratch_memory));
+        evaluator.evaluate_fully(time, scratch_y, scratch_k);
     }
 
     /// State at the part `theta` of the latest step, of size `h`, into the scratch state, as the method interpolates it.
@@ -86,7 +79,8 @@ impl Simulation {
             scratch_y,
             ..
         } = self;
-        let (y0, k0, y, k) = (&state.y0, &state.k0, &state.y, &state.k);
+        let (before, now) = (&state.before, &state.now);
+        let (y0, k0, y, k) = (&before.y, &before.k, &now.y, &now.k);
         if mechanism.is_kinematic() {
             hermite(theta, h, y0, k0, y, k, scratch_y);
         } else {

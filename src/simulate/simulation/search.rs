@@ -1,7 +1,6 @@
 //! Peaks that the ends of a step do not tell: its inside is looked into, as a row would.
 
 use super::Simulation;
-use crate::mechanism::Switching;
 use crate::simulate::peaks::Course;
 
 /// A step whose forces stay below this part of their peaks so far is not looked into.
@@ -13,14 +12,14 @@ impl Simulation {
     /// Takes the reactions at the end of the step just accepted, of which everything was just evaluated. Without a
     /// contact they are smooth, and have their peaks on the parabola through three ends.
     pub(super) fn track_reactions(&mut self) {
-        let joints = self.state.gaps.len();
+        let joints = self.state.now.gaps.len();
         let smooth = !(0..joints).any(|j| self.mechanism.contacts.has_clearance(j));
         for j in 0..joints {
             let Some(reaction) = self.mechanism.reaction(j) else {
                 continue;
             };
-            let (size, time) = (reaction.norm(), self.state.t);
-            let vertex = self.state.reactions[j].rise(time, size);
+            let (size, time) = (reaction.norm(), self.state.now.t);
+            let vertex = self.state.record.reactions[j].rise(time, size);
             self.take_reaction(j, if smooth { vertex } else { size }, time);
         }
     }
@@ -29,26 +28,26 @@ impl Simulation {
     /// the penetration. Where that has a peak inside a located step it is looked up: the cubic's rate, by which damping
     /// goes, is not that of the motion.
     pub(super) fn find_strongest(&mut self, h: f64) {
-        let located = self.mechanism.contacts.switching == Switching::Located;
-        for j in 0..self.state.gaps.len() {
-            let memory = self.state.memory0[j];
+        let located = self.locates();
+        for j in 0..self.state.now.gaps.len() {
+            let memory = self.state.before.memory[j];
             if !memory.active || !self.mechanism.contacts.has_clearance(j) {
                 continue;
             }
-            let course = Course::new(self.state.gaps0[j], self.state.gaps[j], h);
+            let course = Course::new(self.state.before.gaps[j], self.state.now.gaps[j], h);
             let c = *self.mechanism.contacts.coefficients(j);
             let (force, theta) = course.strongest(&c, memory.approach_speed);
-            self.strongest[j] = (force, theta);
-            let least = self.state.statistics.peak_normal[j]
+            self.attempt.strongest[j] = (force, theta);
+            let least = self.state.record.statistics.peak_normal[j]
                 .min(self.peaks[j].normal)
-                .min(self.state.impacts.peak_under_way(j));
+                .min(self.state.record.impacts.peak_under_way(j));
             if !located || theta <= 0.0 || theta >= 1.0 || force <= least {
                 continue;
             }
-            self.look(self.state.t0 + theta * h);
+            self.look(self.state.before.t + theta * h);
             let inside = self.mechanism.contacts.gaps()[j].normal_force;
             let ends = course.stronger_end(&c, memory.approach_speed);
-            self.strongest[j] = if inside > ends.0 {
+            self.attempt.strongest[j] = if inside > ends.0 {
                 (inside, theta)
             } else {
                 ends
@@ -64,15 +63,15 @@ impl Simulation {
 
     /// Where a fixed step is long against an impact, a row reads other rates inside it than the cubic through the penetration.
     fn search_contacts(&mut self) {
-        let near = std::mem::take(&mut self.near_peak);
-        if !near || self.mechanism.contacts.switching == Switching::Located {
+        let near = std::mem::take(&mut self.attempt.near_peak);
+        if !near || self.locates() {
             return;
         }
-        let (t0, t) = (self.state.t0, self.state.t);
+        let (t0, t) = (self.state.before.t, self.state.now.t);
         for part in PARTS {
             let time = t0 + part * (t - t0);
             self.look(time);
-            for j in 0..self.state.gaps.len() {
+            for j in 0..self.state.now.gaps.len() {
                 if let Some(reaction) = self.mechanism.reaction(j) {
                     self.take_reaction(j, reaction.norm(), time);
                     continue;
@@ -90,18 +89,18 @@ impl Simulation {
     /// Looks for peaks of reactions inside the step just accepted, where impacts at other joints make them. Steps around an
     /// impact are too uneven for a parabola through their ends: it would have peaks that never were.
     fn search_reactions(&mut self) {
-        let joints = self.state.gaps.len();
+        let joints = self.state.now.gaps.len();
         if !self.mechanism.has_reactions()
             || !(0..joints).any(|j| self.mechanism.contacts.has_clearance(j))
         {
             return;
         }
-        let (t0, t) = (self.state.t0, self.state.t);
+        let (t0, t) = (self.state.before.t, self.state.now.t);
         for j in 0..joints {
-            let Some((start, end)) = self.state.reactions[j].ends(t0, t) else {
+            let Some((start, end)) = self.state.record.reactions[j].ends(t0, t) else {
                 continue;
             };
-            if start.max(end) <= NEAR_PEAK * self.state.statistics.peak_normal[j] {
+            if start.max(end) <= NEAR_PEAK * self.state.record.statistics.peak_normal[j] {
                 continue;
             }
             let middle = self.reaction_at(j, 0.5 * (t0 + t));
@@ -132,7 +131,7 @@ impl Simulation {
 
     /// Puts down a force if it is the largest so far; whether it is the largest since the peaks were last taken.
     fn is_peak(&mut self, j: usize, size: f64, time: f64) -> bool {
-        let statistics = &mut self.state.statistics;
+        let statistics = &mut self.state.record.statistics;
         if size > statistics.peak_normal[j] {
             statistics.peak_normal[j] = size;
             statistics.peak_time[j] = time;

@@ -2,8 +2,9 @@
 
 use super::Simulation;
 use super::automatic::prepare_implicit;
-use crate::integrate::System;
-use crate::mechanism::Mechanism;
+use crate::integrate::System as _;
+use crate::mechanism::{Mechanism, Touching};
+use crate::simulate::stepper::AnyStepper;
 use crate::simulate::{Snapshot, StartError};
 
 impl Simulation {
@@ -12,6 +13,7 @@ impl Simulation {
         Snapshot {
             scene: self.scene.clone(),
             running: self.running.clone(),
+            structure: self.mechanism.structure(),
             state: self.state.clone(),
             polynomial: self.stepper.polynomial().cloned(),
             ideal: self.reference.kept(),
@@ -21,54 +23,58 @@ impl Simulation {
     }
 
     /// Goes back to a state that this simulation, or another of the same scene, was in, with the peaks and counters that it had.
-    /// Nothing is assembled: a live change may have led where no start would be accepted. Resuming gives the same bits.
+    /// Nothing is assembled: a live change may have led where no start would be accepted. Where the equations are still those
+    /// of the snapshot they are kept, and this costs about as much as a step. Resuming gives the same bits.
     ///
     /// # Errors
     /// A snapshot of a scene whose equations cannot be set up.
     pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), StartError> {
-        let mut mechanism = Mechanism::new(&snapshot.running)?;
-        prepare_implicit(&mut mechanism, snapshot.running.solver.method)?;
-        let mut fresh = Self::assembled(&snapshot.running, mechanism, snapshot.state.clone());
-        fresh.scene = snapshot.scene.clone();
-        fresh.peaks.clone_from(&snapshot.peaks);
-        fresh.right_handed = snapshot.right_handed;
-        for j in 0..fresh.state.ramps.len() {
-            fresh.mechanism.contacts.set_ramp(j, fresh.state.ramps[j]);
-            let contact = fresh.running.ball_joints[j].contact;
-            if contact.clearance > 0.0 {
-                fresh
-                    .mechanism
-                    .contacts
-                    .set_parameters(j, &contact, fresh.state.clearances[j]);
+        let (running, method) = (&snapshot.running, snapshot.running.solver.method);
+        if !self.mechanism.has_structure(&snapshot.structure) {
+            let mut mechanism = Mechanism::resumed(running, &snapshot.structure)?;
+            prepare_implicit(&mut mechanism, method)?;
+            *self = Self::assembled(running, mechanism, snapshot.state.clone());
+        } else {
+            if method != self.running.solver.method {
+                prepare_implicit(&mut self.mechanism, method)?;
+                self.stepper = AnyStepper::new(method, self.state.now.y.len());
             }
+            self.stepper.invalidate();
+            self.state.clone_from(&snapshot.state);
+            self.running = running.clone();
+            self.sampled.fill((0.0, 0.0));
         }
-        // The interpolant of the step before is not part of a state.
-        let state = &mut fresh.state;
-        state.t0 = state.t;
-        state.y0.copy_from_slice(&state.y);
-        state.k0.copy_from_slice(&state.k);
-        state.gaps0.copy_from_slice(&state.gaps);
-        state.memory0.copy_from_slice(&state.memory);
+        self.scene = snapshot.scene.clone();
+        self.peaks.clone_from(&snapshot.peaks);
+        self.right_handed = snapshot.right_handed;
         if let Some(polynomial) = &snapshot.polynomial {
-            fresh.stepper.set_polynomial(polynomial);
+            self.stepper.set_polynomial(polynomial);
         }
         if let Some(ideal) = &snapshot.ideal {
-            fresh.reference.restore(ideal)?;
+            self.reference.restore(ideal)?;
         }
-        // What is read off the mechanism between steps: motion, reactions, clearances on their way.
+        let located = self.locates();
         let Self {
             mechanism,
             state,
             scratch_k,
             ..
-        } = &mut fresh;
-        mechanism
-            .contacts
-            .memory_mut()
-            .copy_from_slice(&state.memory);
-        mechanism.derivative(state.t, &state.y, scratch_k);
+        } = self;
+        mechanism.gravity = self.running.gravity;
+        for (j, joint) in self.running.ball_joints.iter().enumerate() {
+            if joint.contact.clearance > 0.0 {
+                let contacts = &mut mechanism.contacts;
+                contacts.set_ramp(j, state.ramps[j]);
+                contacts.set_parameters(j, &joint.contact, state.clearances[j]);
+            }
+        }
+        // The interpolant of the step before is not part of a state.
+        state.before.copy_from(&state.now);
+        // What is read off the mechanism between steps: motion, reactions, clearances on their way.
+        let now = &state.now;
+        let mut evaluator = mechanism.evaluator(Touching::by(located, &now.memory));
+        evaluator.derivative(now.t, &now.y, scratch_k);
         mechanism.forget_evaluation();
-        *self = fresh;
         Ok(())
     }
 
@@ -83,14 +89,14 @@ impl Simulation {
             }
         };
         let state = &self.state;
-        add(state.t.to_bits());
-        for y in &state.y {
+        add(state.now.t.to_bits());
+        for y in &state.now.y {
             add(y.to_bits());
         }
-        for (j, m) in state.memory.iter().enumerate() {
+        for (j, m) in state.now.memory.iter().enumerate() {
             add(u64::from(m.active));
             add(m.approach_speed.to_bits());
-            let clearance = state.ramps[j].map_or(state.clearances[j], |r| r.at(state.t).0);
+            let clearance = state.ramps[j].map_or(state.clearances[j], |r| r.at(state.now.t).0);
             add(clearance.to_bits());
         }
         hash

@@ -113,7 +113,7 @@ pub fn run(row: &Row, form: &str, column: &str) -> Outcome {
                 let hash = simulation.state_hash();
                 frame = frame_now(&mut simulation);
                 if let Some(what) = fault(&frame, &scene, form) {
-                    return Outcome::Wrong(format!("stopped ({}) too late: {what}", stopped.what));
+                    return Outcome::Wrong(format!("stopped ({}) too late: {what}", stopped.fault));
                 }
                 if stopped.time != simulation.time() || simulation.state_hash() != hash {
                     return Outcome::Wrong("stopped, but not at the last good state".to_owned());

@@ -6,7 +6,7 @@ use crate::scene::SceneError;
 use crate::simulate::{StartError, Stopped};
 
 /// Clock and progress of whoever asked for an analysis: the command line, a background thread, a worker in a browser.
-pub struct Outside<'a> {
+pub struct RunContext<'a> {
     clock: &'a mut dyn FnMut() -> f64,
     progress: &'a mut dyn FnMut(f64) -> ControlFlow<()>,
     /// Part of the whole that is being done, as fractions of it.
@@ -14,7 +14,7 @@ pub struct Outside<'a> {
     to: f64,
 }
 
-impl<'a> Outside<'a> {
+impl<'a> RunContext<'a> {
     /// `clock` gives seconds from any start; `progress` takes the fraction done, 0 to 1, some thousand times, and may break
     /// off.
     pub fn new(
@@ -47,10 +47,10 @@ impl<'a> Outside<'a> {
     }
 
     /// The same for one of `parts` equal parts of the current one.
-    pub fn part(&mut self, index: usize, parts: usize) -> Outside<'_> {
+    pub fn part(&mut self, index: usize, parts: usize) -> RunContext<'_> {
         let share = (self.to - self.from) / parts.max(1) as f64;
         let from = self.from + share * index as f64;
-        Outside {
+        RunContext {
             clock: &mut *self.clock,
             progress: &mut *self.progress,
             from,

@@ -1,9 +1,10 @@
 //! The ideal motion that a probe is compared with: where the scene has no closed form of it, a simulation of the same scene
 //! with every ball joint closed, alongside.
 
-use super::{Frame, Simulation, Snapshot, StartError};
+use super::Simulation;
 use crate::integrate::Method;
 use crate::scene::{Formulation, Scene, StartRule, Vec3};
+use crate::simulate::{Frame, Snapshot, StartError, Stopped};
 
 /// Tolerance of the ideal motion: it has no impacts, so that accuracy is cheap.
 const TOLERANCE: f64 = 1e-10;
@@ -11,6 +12,17 @@ const TOLERANCE: f64 = 1e-10;
 const FIRST_STEP: f64 = 1e-4;
 /// Latest step ends that are kept. Both motions step 10 ms at most, so that samples within a step lie among them.
 const MARKS: usize = 64;
+
+/// Why there is nothing, or nothing any more, that a probe could be compared with.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ProbeFault {
+    /// The ideal mechanism does not start.
+    #[error("cannot start: {0}")]
+    NoStart(StartError),
+    /// It came to where it cannot go on.
+    #[error("{0}")]
+    Stopped(Stopped),
+}
 
 /// Where the ideal tip is known from.
 pub(super) enum Reference {
@@ -46,12 +58,12 @@ struct Marks {
     ring: [Mark; MARKS],
     count: usize,
     /// Why it stopped.
-    stopped: Option<String>,
+    stopped: Option<Stopped>,
 }
 
 /// What a snapshot keeps of it.
 #[derive(Clone, Debug)]
-pub(super) struct Kept {
+pub(in crate::simulate) struct Kept {
     snapshot: Snapshot,
     marks: Marks,
 }
@@ -85,11 +97,11 @@ impl Reference {
     }
 
     /// Why there is no ideal motion, or none any more.
-    pub(super) fn fault(&self) -> Option<String> {
+    pub(super) fn fault(&self) -> Option<ProbeFault> {
         match self {
             Self::Elsewhere | Self::Itself => None,
-            Self::None(error) => Some(format!("cannot start: {error}")),
-            Self::Alongside(motion) => motion.marks.stopped.clone(),
+            Self::None(error) => Some(ProbeFault::NoStart(error.clone())),
+            Self::Alongside(motion) => motion.marks.stopped.clone().map(ProbeFault::Stopped),
         }
     }
 
@@ -172,7 +184,7 @@ impl IdealMotion {
         while self.simulation.time() < time && self.marks.stopped.is_none() {
             match self.simulation.step() {
                 Ok(()) => self.mark(),
-                Err(stopped) => self.marks.stopped = Some(stopped.to_string()),
+                Err(stopped) => self.marks.stopped = Some(stopped),
             }
         }
         self.marks.tip(time)

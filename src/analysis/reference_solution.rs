@@ -7,7 +7,7 @@
 use serde::Serialize;
 
 use super::stretch::stretch;
-use super::{AnalysisError, Effort, End, Outside, Setting};
+use super::{AnalysisError, Effort, End, RunContext, Setting};
 use crate::scene::{Scene, Vec3};
 use crate::simulate::{Frame, Peak, Simulation, Snapshot};
 
@@ -88,7 +88,7 @@ pub(super) struct Work {
 
 /// The reference of a scene.
 #[derive(Clone, Debug)]
-pub struct Standard {
+pub struct ReferenceSolution {
     scene: Scene,
     /// The first impacts in the order in which they begin; one entry for each joint where there is no impact.
     pub slots: Vec<Slot>,
@@ -126,16 +126,16 @@ impl Contact {
     }
 }
 
-impl Standard {
+impl ReferenceSolution {
     /// Runs the reference of `scene`.
     ///
     /// # Errors
-    /// A scene that does not start, or whose reference does not reach the end of the first impacts; [`Outside`]'s no.
-    pub fn new(scene: &Scene, outside: &mut Outside) -> Result<Self, AnalysisError> {
-        let setting = Setting::reference(scene, REFERENCE)?;
-        let (contacts, impacts) = first_contacts(&setting, scene, &mut outside.part(0, 5))?;
+    /// A scene that does not start, or whose reference does not reach the end of the first impacts; [`RunContext`]'s no.
+    pub fn new(scene: &Scene, context: &mut RunContext) -> Result<Self, AnalysisError> {
+        let setting = Setting::reference(REFERENCE);
+        let (contacts, impacts) = first_contacts(&setting, scene, &mut context.part(0, 5))?;
         let joints = scene.ball_joints.len();
-        let mut standard = Self {
+        let mut reference = Self {
             scene: scene.clone(),
             slots: Vec::new(),
             impacts,
@@ -147,22 +147,22 @@ impl Standard {
             setting,
             floor: Errors::default(),
         };
-        standard.lay_slots(&contacts, joints);
+        reference.lay_slots(&contacts, joints);
         let tighter = Setting {
             tolerance: 0.5 * REFERENCE,
             ..setting
         };
         // First the peaks, then what half the tolerance changes.
-        let (peaks, position) = standard.reference_impacts(&setting, &mut outside.part(1, 5))?;
-        for (slot, peak) in standard.slots.iter_mut().zip(&peaks) {
+        let (peaks, position) = reference.reference_impacts(&setting, &mut context.part(1, 5))?;
+        for (slot, peak) in reference.slots.iter_mut().zip(&peaks) {
             slot.peak_n = *peak;
         }
-        standard.position = position;
-        let (peaks, position) = standard.reference_impacts(&tighter, &mut outside.part(2, 5))?;
-        standard.floor.peak = standard.peak_error(&peaks);
-        standard.floor.position_m = Some((position - standard.position).norm());
-        standard.settle(&setting, &tighter, &mut outside.part(3, 5))?;
-        Ok(standard)
+        reference.position = position;
+        let (peaks, position) = reference.reference_impacts(&tighter, &mut context.part(2, 5))?;
+        reference.floor.peak = reference.peak_error(&peaks);
+        reference.floor.position_m = Some((position - reference.position).norm());
+        reference.settle(&setting, &tighter, &mut context.part(3, 5))?;
+        Ok(reference)
     }
 
     /// Slots of the first impacts: half-way to the same joint's contacts before and after.
@@ -203,10 +203,10 @@ impl Standard {
     fn reference_impacts(
         &self,
         setting: &Setting,
-        outside: &mut Outside,
+        context: &mut RunContext,
     ) -> Result<(Vec<f64>, Vec3), AnalysisError> {
         let mut simulation = setting.start(&self.scene)?;
-        let (end, peaks, position) = self.look(&mut simulation, &Effort::REFERENCE, outside)?;
+        let (end, peaks, position) = self.look(&mut simulation, &Effort::REFERENCE, context)?;
         done(end, &mut simulation)?;
         Ok((peaks, position.unwrap_or_default()))
     }
@@ -216,13 +216,13 @@ impl Standard {
         &self,
         simulation: &mut Simulation,
         effort: &Effort,
-        outside: &mut Outside,
+        context: &mut RunContext,
     ) -> Result<(End, Vec<f64>, Option<Vec3>), AnalysisError> {
         let mut found = vec![0.0_f64; self.slots.len()];
         let mut position = None;
         let mut peaks: Vec<Peak> = Vec::new();
         let mut frame = Frame::default();
-        let end = stretch(simulation, self.span, effort, outside, |simulation| {
+        let end = stretch(simulation, self.span, effort, context, |simulation| {
             simulation.take_peaks(&mut peaks);
             for (slot, found) in self.slots.iter().zip(&mut found) {
                 let peak = &peaks[slot.joint];
@@ -253,10 +253,10 @@ impl Standard {
         &self,
         setting: &Setting,
         effort: &Effort,
-        outside: &mut Outside,
+        context: &mut RunContext,
     ) -> Result<(End, Errors, Work), AnalysisError> {
         let mut simulation = setting.start(&self.scene)?;
-        let (end, peaks, position) = self.look(&mut simulation, effort, outside)?;
+        let (end, peaks, position) = self.look(&mut simulation, effort, context)?;
         let mut errors = Errors::default();
         if end == End::Reached {
             errors.peak = self.peak_error(&peaks);
@@ -276,9 +276,9 @@ impl Standard {
         &mut self,
         setting: &Setting,
         tighter: &Setting,
-        outside: &mut Outside,
+        context: &mut RunContext,
     ) -> Result<(), AnalysisError> {
-        let Some((start, started)) = settled_state(&self.scene, &mut outside.part(0, 3))? else {
+        let Some((start, started)) = settled_state(&self.scene, &mut context.part(0, 3))? else {
             return Ok(());
         };
         let from = started + WARM_UP;
@@ -291,7 +291,7 @@ impl Standard {
         let effort = Effort::REFERENCE;
         let mut means = [Vec::new(), Vec::new()];
         for (n, (setting, means)) in [setting, tighter].into_iter().zip(&mut means).enumerate() {
-            let (end, found, _) = self.averages(setting, &effort, &mut outside.part(n + 1, 3))?;
+            let (end, found, _) = self.averages(setting, &effort, &mut context.part(n + 1, 3))?;
             if end != End::Reached {
                 // Settled motion that the reference cannot follow is no measure.
                 self.settled = None;
@@ -313,10 +313,10 @@ impl Standard {
         span: &SettledSpan,
         setting: &Setting,
         effort: &Effort,
-        outside: &mut Outside,
+        context: &mut RunContext,
     ) -> Result<(End, Simulation), AnalysisError> {
         let mut simulation = setting.resume(&self.scene, &span.start)?;
-        let end = stretch(&mut simulation, span.from, effort, outside, |_| false)?;
+        let end = stretch(&mut simulation, span.from, effort, context, |_| false)?;
         Ok((end, simulation))
     }
 
@@ -324,13 +324,13 @@ impl Standard {
         &self,
         setting: &Setting,
         effort: &Effort,
-        outside: &mut Outside,
+        context: &mut RunContext,
     ) -> Result<(End, Vec<f64>, Work), AnalysisError> {
         let span = self
             .settled
             .as_ref()
             .expect("asked only of a scene that settles");
-        let (end, mut simulation) = self.resume(span, setting, effort, outside)?;
+        let (end, mut simulation) = self.resume(span, setting, effort, context)?;
         let before = work(&simulation, &Work::default());
         let mut means = vec![0.0; self.scene.ball_joints.len()];
         if end != End::Reached {
@@ -342,7 +342,7 @@ impl Standard {
             let theta = (f64::from(n) + 0.5) / f64::from(SAMPLES);
             span.from + (span.to - span.from) * theta
         };
-        let end = stretch(&mut simulation, span.to, effort, outside, |simulation| {
+        let end = stretch(&mut simulation, span.to, effort, context, |simulation| {
             while next < SAMPLES && instant(next) <= simulation.time() {
                 simulation.sample(instant(next), &mut frame);
                 for (mean, joint) in means.iter_mut().zip(&frame.joints) {
@@ -371,12 +371,12 @@ impl Standard {
         &self,
         setting: &Setting,
         effort: &Effort,
-        outside: &mut Outside,
+        context: &mut RunContext,
     ) -> Result<Option<(End, Option<f64>, Work)>, AnalysisError> {
         if self.settled.is_none() {
             return Ok(None);
         }
-        let (end, means, work) = self.averages(setting, effort, outside)?;
+        let (end, means, work) = self.averages(setting, effort, context)?;
         let error = (end == End::Reached).then(|| self.mean_error(&means));
         Ok(Some((end, error.flatten(), work)))
     }
@@ -418,7 +418,7 @@ fn done(end: End, simulation: &mut Simulation) -> Result<(), AnalysisError> {
 fn first_contacts(
     setting: &Setting,
     scene: &Scene,
-    outside: &mut Outside,
+    context: &mut RunContext,
 ) -> Result<(Vec<Contact>, usize), AnalysisError> {
     let mut simulation = setting.start(scene)?;
     let joints = scene.ball_joints.len();
@@ -441,7 +441,7 @@ fn first_contacts(
         &mut simulation,
         IMPACTS_WITHIN,
         &effort,
-        outside,
+        context,
         |simulation| {
             let now = simulation.time();
             simulation.take_peaks(&mut peaks);
@@ -486,9 +486,9 @@ fn first_contacts(
 /// The state in which every joint with clearance has been in contact, without a new one, for a while.
 fn settled_state(
     scene: &Scene,
-    outside: &mut Outside,
+    context: &mut RunContext,
 ) -> Result<Option<(Snapshot, f64)>, AnalysisError> {
-    let setting = Setting::automatic(scene, SETTLING)?;
+    let setting = Setting::automatic(SETTLING);
     let mut simulation = setting.start(scene)?;
     let mut peaks: Vec<Peak> = Vec::new();
     let mut since = 0.0;
@@ -504,7 +504,7 @@ fn settled_state(
         &mut simulation,
         SETTLED_WITHIN,
         &effort,
-        outside,
+        context,
         |simulation| {
             simulation.take_peaks(&mut peaks);
             let open = |&j: &usize| !simulation.contact_memory(j).active || peaks[j].impacts > 0;
@@ -524,7 +524,7 @@ mod tests {
 
     use super::*;
 
-    fn standard(name: &str, changes: &[(&str, &str)]) -> Standard {
+    fn reference(name: &str, changes: &[(&str, &str)]) -> ReferenceSolution {
         let changes: Vec<_> = changes
             .iter()
             .map(|(k, v)| ((*k).to_owned(), (*v).to_owned()))
@@ -532,12 +532,13 @@ mod tests {
         let scene = Scene::load(name, &changes).expect("built in");
         let mut clock = || 0.0;
         let mut go_on = |_: f64| ControlFlow::Continue(());
-        Standard::new(&scene, &mut Outside::new(&mut clock, &mut go_on)).expect("measures")
+        ReferenceSolution::new(&scene, &mut RunContext::new(&mut clock, &mut go_on))
+            .expect("measures")
     }
 
     #[test]
     fn the_reference_of_the_default_scene_has_the_published_impacts() {
-        let standard = standard("spcmm", &[]);
+        let reference = reference("spcmm", &[]);
         // (joint, begin in ms, peak in N) of an independent solution, whose last digit is rounded; two contacts at nearly one
         // instant may come in either order.
         let published = [
@@ -548,34 +549,34 @@ mod tests {
             (0, 10.50063, 771.13),
             (2, 12.38051, 321.29),
         ];
-        assert_eq!(standard.slots.len(), published.len());
-        for (slot, (joint, begin, peak)) in standard.slots.iter().zip(published) {
+        assert_eq!(reference.slots.len(), published.len());
+        for (slot, (joint, begin, peak)) in reference.slots.iter().zip(published) {
             assert_eq!(slot.joint, joint);
             assert!((slot.begin_s * 1e3 - begin).abs() < 1e-5, "{slot:?}");
             assert!((slot.peak_n / peak - 1.0).abs() < 1e-4, "{slot:?}");
         }
-        assert_eq!(standard.instant, standard.slots[2].begin_s);
-        let floor = standard.floor;
+        assert_eq!(reference.instant, reference.slots[2].begin_s);
+        let floor = reference.floor;
         assert!(floor.peak.is_some_and(|e| e < 1e-5), "{floor:?}");
         assert!(floor.position_m.is_some_and(|e| e < 1e-10), "{floor:?}");
         assert!(floor.settled.is_some_and(|e| e < 1e-3), "{floor:?}");
-        let settled = standard.settled.expect("its contacts settle");
+        let settled = reference.settled.expect("its contacts settle");
         assert!(settled.from < 0.6, "{}", settled.from);
     }
 
     #[test]
     fn a_scene_without_play_is_compared_by_its_reactions() {
-        let standard = standard("pendulum", &[("contact.clearance", "0")]);
-        assert_eq!((standard.impacts, standard.slots.len()), (0, 1));
+        let reference = reference("pendulum", &[("contact.clearance", "0")]);
+        assert_eq!((reference.impacts, reference.slots.len()), (0, 1));
         // The reaction of a pendulum that is let go grows: m g cos(theta) and what turns the path.
-        assert!(standard.slots[0].peak_n > 0.384 * 9.81 * 0.75);
-        assert!(standard.settled.is_some());
-        assert!(standard.floor.peak.is_some_and(|e| e < 1e-9));
+        assert!(reference.slots[0].peak_n > 0.384 * 9.81 * 0.75);
+        assert!(reference.settled.is_some());
+        assert!(reference.floor.peak.is_some_and(|e| e < 1e-9));
     }
 
     #[test]
     fn a_scene_that_keeps_rattling_does_not_settle() {
         let frictionless = [("contact.friction", "0"), ("contact.restitution", "1")];
-        assert!(standard("pendulum", &frictionless).settled.is_none());
+        assert!(reference("pendulum", &frictionless).settled.is_none());
     }
 }

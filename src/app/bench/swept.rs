@@ -1,0 +1,62 @@
+//! A sweep of the bench and what came of it.
+
+use crate::analysis::grid::Start;
+use crate::analysis::swept::{Range, SweepTask, SweptPoint};
+use crate::app::player::Player;
+use crate::app::value;
+use crate::scene::{Kind, Scene, Value, table};
+
+/// A sweep that was started, and what came of it.
+pub struct Swept {
+    /// What was asked for.
+    pub task: SweepTask,
+    /// The varied parameter.
+    pub range: Range,
+    /// Points by their number; `None` where one is still to come.
+    pub points: Vec<Option<SweptPoint>>,
+    /// The scene that it was made of, without what varies.
+    pub(super) scene: Option<Scene>,
+}
+
+impl Swept {
+    /// What it was made of: scene, changed parameters, range, periods.
+    pub(super) fn caption(&self) -> String {
+        let Self { task, range, .. } = self;
+        let varied = [range.key.clone()];
+        let scene = self.scene.as_ref();
+        let scene = scene.map_or_else(String::new, |scene| value::scene_line(scene, &varied));
+        let parameter = table().iter().find(|parameter| parameter.key == range.key);
+        let label = parameter.map_or_else(|| range.key.clone(), |p| p.label.to_lowercase());
+        let end = |si| match parameter.map(|p| (p, &p.kind)) {
+            Some((_, Kind::Count { .. })) | None => value::number(si, 6),
+            Some((parameter, _)) => parameter.show(&Value::Number(si)),
+        };
+        format!(
+            "{scene}; {label} {} to {}, {} values; {} periods of which {} discarded, phase {}°, {} start",
+            end(range.from),
+            end(range.to),
+            range.count,
+            task.periods,
+            task.discard,
+            value::number(360.0 * task.phase, 4),
+            start_word(task.start),
+        )
+    }
+
+    /// What stands against its being of the scene on show, a phrase each.
+    pub(super) fn differences(&self, player: &Player) -> Vec<String> {
+        let varied = [self.range.key.clone()];
+        let scene = self.scene.as_ref();
+        scene.map_or_else(Vec::new, |scene| {
+            value::differences(scene, player.wanted(), &varied)
+        })
+    }
+}
+
+pub(super) fn start_word(start: Start) -> &'static str {
+    match start {
+        Start::Cold => "cold",
+        Start::FollowUp => "follow upwards",
+        Start::FollowDown => "follow downwards",
+    }
+}

@@ -1,0 +1,86 @@
+//! Services of the desktop: files by their names, threads.
+
+use std::collections::VecDeque;
+use std::io::Write as _;
+use std::path::Path;
+use std::sync::Arc;
+
+use eframe::egui;
+
+use super::background::Thread;
+use super::host::{Host, OpenedFile, Running, SaveFile};
+use crate::analysis::task::Job;
+use crate::files::{FileError, Target, appear};
+use crate::scene::{LARGEST_FILE, too_large};
+
+/// Files of the desktop.
+#[derive(Debug, Default)]
+pub struct DesktopHost {
+    opened: VecDeque<OpenedFile>,
+    page: String,
+}
+
+impl DesktopHost {
+    /// Links are hung on the address `page`; on "" they have none.
+    pub fn new(page: String) -> Self {
+        Self {
+            page,
+            ..Self::default()
+        }
+    }
+}
+
+impl Host for DesktopHost {
+    fn address(&self) -> String {
+        self.page.clone()
+    }
+
+    fn asks_for_path(&self) -> bool {
+        true
+    }
+
+    fn save(&mut self, files: &[SaveFile]) -> Result<String, String> {
+        let cannot = |error: FileError| match error {
+            FileError::Exists(path) | FileError::NotEmpty(path) => format!(
+                "cannot write {}: it is already there; choose another name",
+                path.display()
+            ),
+            error @ FileError::Cannot { .. } => error.to_string(),
+        };
+        let mut filled = Vec::new();
+        for file in files {
+            let target = Target::claim(Path::new(&file.name), false).map_err(cannot)?;
+            filled.push(
+                target
+                    .fill(|out| out.write_all(&file.bytes))
+                    .map_err(cannot)?,
+            );
+        }
+        appear(filled).map_err(cannot)?;
+        let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
+        Ok(format!("Saved {}", names.join(" and ")))
+    }
+
+    fn read_dropped(&mut self, file: Arc<dyn egui::DroppedFile + Send + Sync>) {
+        let large = file
+            .path()
+            .metadata()
+            .is_ok_and(|file| file.len() > LARGEST_FILE);
+        self.opened.push_back(OpenedFile {
+            name: file.path().display().to_string(),
+            content: if large {
+                Err(too_large())
+            } else {
+                file.bytes()
+            },
+        });
+    }
+
+    fn opened(&mut self) -> Option<OpenedFile> {
+        self.opened.pop_front()
+    }
+
+    fn start(&mut self, job: Job) -> Option<Box<dyn Running>> {
+        Some(Box::new(Thread::start(job)?))
+    }
+}

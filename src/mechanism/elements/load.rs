@@ -1,0 +1,82 @@
+//! Force and torque from outside on a body, constant or harmonic, in world or body axes.
+
+use super::{Coupling, ElementPowers, ElementReport, ForceElement, point_of, push};
+use crate::mechanism::kinematics::{Kinematics, Wrench};
+use crate::mechanism::model::Anchor;
+use crate::scene::{Element, Vec3};
+
+struct Load {
+    on: Anchor,
+    force: Vec3,
+    torque: Vec3,
+    turns: bool,
+    /// rad/s; 0 where constant.
+    omega: f64,
+    phase: f64,
+}
+
+pub(super) fn make(element: &Element, anchors: &[Anchor]) -> Box<dyn ForceElement> {
+    Box::new(Load {
+        on: anchors[0],
+        force: element.vector("force"),
+        torque: element.vector("torque"),
+        turns: element.choice("axes") == "body",
+        omega: std::f64::consts::TAU * element.number("frequency"),
+        phase: element.number("phase"),
+    })
+}
+
+impl Load {
+    /// Force and torque at `t`, world axes.
+    fn at(&self, t: f64, motion: &[Kinematics]) -> (Vec3, Vec3) {
+        let size = if self.omega > 0.0 {
+            libm::sin(self.omega * t + self.phase)
+        } else {
+            1.0
+        };
+        let (force, torque) = (self.force * size, self.torque * size);
+        if self.turns {
+            let rotation = &motion[self.on.body].rotation;
+            (rotation * force, rotation * torque)
+        } else {
+            (force, torque)
+        }
+    }
+}
+
+impl ForceElement for Load {
+    fn load(&self, t: f64, motion: &[Kinematics], wrench: &mut [Wrench]) {
+        let (force, torque) = self.at(t, motion);
+        let (_, _, arm) = point_of(&self.on, motion);
+        let wrench = &mut wrench[self.on.body];
+        push(wrench, &arm, &force);
+        wrench.torque += torque;
+    }
+
+    fn coupling(&self, _: &[Kinematics]) -> Option<([Anchor; 2], Coupling)> {
+        None
+    }
+
+    fn stored(&self, _: &[Kinematics]) -> f64 {
+        0.0
+    }
+
+    fn powers(&self, t: f64, motion: &[Kinematics]) -> ElementPowers {
+        let (force, torque) = self.at(t, motion);
+        let (_, velocity, _) = point_of(&self.on, motion);
+        ElementPowers {
+            dissipated: 0.0,
+            supplied: force.dot(&velocity) + torque.dot(&motion[self.on.body].angular_velocity),
+        }
+    }
+
+    fn report(&self, t: f64, motion: &[Kinematics]) -> ElementReport {
+        let (force, torque) = self.at(t, motion);
+        let (point, ..) = point_of(&self.on, motion);
+        ElementReport {
+            points: [point; 2],
+            force,
+            torque,
+        }
+    }
+}

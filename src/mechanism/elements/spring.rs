@@ -1,0 +1,113 @@
+//! Spring with a damper along the line between two points: tension T = preload + stiffness (l - length) + damping dl/dt.
+
+use super::{Coupling, ElementPowers, ElementReport, ForceElement, point_of, push};
+use crate::mechanism::kinematics::{Kinematics, Wrench};
+use crate::mechanism::model::Anchor;
+use crate::scene::{Element, Mat3, Vec3};
+
+struct Spring {
+    from: Anchor,
+    to: Anchor,
+    length: f64,
+    stiffness: f64,
+    damping: f64,
+    preload: f64,
+}
+
+/// One instant.
+struct State {
+    arms: [Vec3; 2],
+    points: [Vec3; 2],
+    /// Velocity of `to` against `from`, m/s.
+    velocity: Vec3,
+    /// Distance of the points, m, and unit vector from `from` to `to`; zero where they coincide.
+    length: f64,
+    along: Vec3,
+    rate: f64,
+    /// N.
+    tension: f64,
+}
+
+pub(super) fn make(element: &Element, anchors: &[Anchor]) -> Box<dyn ForceElement> {
+    Box::new(Spring {
+        from: anchors[0],
+        to: anchors[1],
+        length: element.number("length"),
+        stiffness: element.number("stiffness"),
+        damping: element.number("damping"),
+        preload: element.number("preload"),
+    })
+}
+
+impl Spring {
+    fn state(&self, motion: &[Kinematics]) -> State {
+        let (start, start_velocity, start_arm) = point_of(&self.from, motion);
+        let (end, end_velocity, end_arm) = point_of(&self.to, motion);
+        let distance = end - start;
+        let length = distance.norm();
+        let along = if length > 0.0 {
+            distance / length
+        } else {
+            Vec3::zeros()
+        };
+        let velocity = end_velocity - start_velocity;
+        let rate = along.dot(&velocity);
+        let stretch = length - self.length;
+        State {
+            arms: [start_arm, end_arm],
+            points: [start, end],
+            velocity,
+            length,
+            along,
+            rate,
+            tension: self.preload + self.stiffness * stretch + self.damping * rate,
+        }
+    }
+}
+
+impl ForceElement for Spring {
+    fn load(&self, _: f64, motion: &[Kinematics], wrench: &mut [Wrench]) {
+        let s = self.state(motion);
+        let pull = s.along * s.tension;
+        push(&mut wrench[self.from.body], &s.arms[0], &pull);
+        push(&mut wrench[self.to.body], &s.arms[1], &-pull);
+    }
+
+    fn coupling(&self, motion: &[Kinematics]) -> Option<([Anchor; 2], Coupling)> {
+        let s = self.state(motion);
+        if s.length == 0.0 {
+            return None;
+        }
+        // F = -T u with u = e / |e|: dT = (k u + c P e_dot / l) . de + c u . de_dot, du = P de / l, P = 1 - u u'.
+        let u = s.along;
+        let turning = (Mat3::identity() - u * u.transpose()) / s.length;
+        let rise = u * self.stiffness + turning * s.velocity * self.damping;
+        let coupling = Coupling {
+            by_displacement: -u * rise.transpose() - turning * s.tension,
+            by_rate: -u * (u * self.damping).transpose(),
+        };
+        Some(([self.from, self.to], coupling))
+    }
+
+    fn stored(&self, motion: &[Kinematics]) -> f64 {
+        let stretch = self.state(motion).length - self.length;
+        stretch * (self.preload + 0.5 * self.stiffness * stretch)
+    }
+
+    fn powers(&self, _: f64, motion: &[Kinematics]) -> ElementPowers {
+        let rate = self.state(motion).rate;
+        ElementPowers {
+            dissipated: self.damping * rate * rate,
+            supplied: 0.0,
+        }
+    }
+
+    fn report(&self, _: f64, motion: &[Kinematics]) -> ElementReport {
+        let s = self.state(motion);
+        ElementReport {
+            points: s.points,
+            force: s.along * -s.tension,
+            torque: Vec3::zeros(),
+        }
+    }
+}

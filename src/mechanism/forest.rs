@@ -1,0 +1,286 @@
+//! The `tree` formulation whole: the spanning forest, and the ideal ball joints that close loops in it.
+
+use super::constraints::Constraints;
+use super::equations::Equations;
+use super::kinematics::{Driven, Kinematics, Wrench, spin_of};
+use super::model::{Anchor, Model, Motion};
+use super::power::inverse_dynamics;
+use super::tree::{self, Tree};
+use crate::scene::Vec3;
+
+/// Spanning forest with constraint rows for its ideal ball joints.
+pub(super) struct Forest {
+    tree: Tree,
+    constraints: Option<Constraints>,
+}
+
+impl Forest {
+    /// For `model`.
+    pub(super) fn new(model: &Model) -> Self {
+        let closed = &model.ideal_joints;
+        Self {
+            tree: Tree::new(model),
+            constraints: (!closed.is_empty()).then(|| Constraints::new(model, closed)),
+        }
+    }
+
+    /// Forces of the drives for the accelerations in the tree's motion, from the bodies for which `moved` says so.
+    fn find_drive_forces(
+        &mut self,
+        model: &Model,
+        gravity: &Vec3,
+        moved: impl Fn(usize) -> bool,
+        found: impl FnMut(usize, f64),
+    ) {
+        let Tree { motion, wrench, .. } = &mut self.tree;
+        inverse_dynamics(model, motion, wrench, gravity, moved, found);
+    }
+
+    /// Adds the reactions of the ideal joints to the loads.
+    fn load_reactions(&mut self, model: &Model) {
+        if let Some(constraints) = &self.constraints {
+            load_reactions(model, &mut self.tree, |k| constraints.reaction(k));
+        }
+    }
+}
+
+impl Equations for Forest {
+    fn positions(&self, model: &Model) -> usize {
+        model.nq
+    }
+
+    fn velocities(&self, model: &Model) -> usize {
+        model.nv
+    }
+
+    fn scale<'a>(&'a self, model: &'a Model) -> &'a [f64] {
+        &model.scale
+    }
+
+    fn reveal(&mut self, rank: usize) {
+        if let Some(constraints) = &mut self.constraints {
+            constraints.reveal(rank);
+        }
+    }
+
+    fn state_of(&self, _: &Model, y: Vec<f64>, _: &[Kinematics]) -> Vec<f64> {
+        y
+    }
+
+    fn motion(&self) -> &[Kinematics] {
+        &self.tree.motion
+    }
+
+    fn driven(&self) -> &Driven {
+        &self.tree.driven
+    }
+
+    fn forward(&mut self, model: &Model, t: f64, y: &[f64]) {
+        self.tree.forward(model, t, y);
+    }
+
+    fn loads(&mut self) -> (&[Kinematics], &mut [Wrench]) {
+        (&self.tree.motion, &mut self.tree.wrench)
+    }
+
+    fn accelerate(&mut self, model: &Model, gravity: &Vec3, t: f64, y: &[f64], dv: &mut [f64]) {
+        self.tree.assemble(model, gravity, dv);
+        self.tree.solve(model, dv);
+        if let Some(constraints) = &mut self.constraints {
+            constraints.correct(model, &self.tree, t, &y[..model.nq], dv);
+        }
+    }
+
+    fn complete_motion(&mut self, model: &Model, y: &[f64], dv: &[f64]) {
+        self.tree.accelerate(model, y, dv);
+    }
+
+    fn position_rate(&self, model: &Model, y: &[f64], dq: &mut [f64]) {
+        Tree::position_rate(model, y, dq);
+    }
+
+    fn velocities_of(&self, model: &Model, y: &[f64], rate: &[f64], out: &mut [f64]) {
+        for body in &model.bodies {
+            match body.motion {
+                Motion::Free { q, v } => {
+                    out[v..v + 3].copy_from_slice(&rate[q..q + 3]);
+                    out[v + 3..v + 6]
+                        .copy_from_slice(&spin_of(&y[q + 3..q + 7], &rate[q + 3..q + 7]));
+                }
+                Motion::Revolute { q, v } | Motion::Prismatic { q, v } => out[v] = rate[q],
+                Motion::Fixed | Motion::Driven { .. } => {}
+            }
+        }
+    }
+
+    fn project(&mut self, model: &Model, t: f64, y: &mut [f64]) -> f64 {
+        Tree::normalise(model, y);
+        match &mut self.constraints {
+            Some(constraints) => constraints.project(model, &mut self.tree, t, y),
+            None => 0.0,
+        }
+    }
+
+    fn projects(&self) -> bool {
+        self.constraints.is_some()
+    }
+
+    fn visit_columns(
+        &self,
+        model: &Model,
+        body: usize,
+        point: &Vec3,
+        visit: &mut dyn FnMut(usize, Vec3, Vec3),
+    ) {
+        if body < model.bodies.len() && !model.bodies[body].driven_only {
+            let first = model.blocks[model.block_of[body]].v;
+            tree::visit_columns(model, &self.tree.motion, body, point, |c, v, w| {
+                visit(first + c, v, w);
+            });
+        }
+    }
+
+    fn apply_inverse_mass(&mut self, model: &Model, x: &mut [f64]) {
+        self.tree.solve(model, x);
+        if let Some(constraints) = &mut self.constraints {
+            constraints.restrain(model, x);
+        }
+    }
+
+    fn apply_inverse_mass_within(
+        &mut self,
+        model: &Model,
+        (first, end): (usize, usize),
+        x: &mut [f64],
+    ) {
+        self.tree.solve_within(model, first, end, x);
+    }
+
+    fn is_block_diagonal(&self) -> bool {
+        self.constraints.is_none()
+    }
+
+    fn motion_by_time_alone(&mut self, model: &Model, t: f64, y: &[f64]) -> Option<&[Kinematics]> {
+        self.tree.forward(model, t, y);
+        Some(&self.tree.motion)
+    }
+
+    fn rows(&self) -> usize {
+        self.constraints.as_ref().map_or(0, Constraints::rows)
+    }
+
+    fn rank(&self) -> usize {
+        self.constraints.as_ref().map_or(0, Constraints::rank)
+    }
+
+    fn least_pivot(&self) -> f64 {
+        let constraints = self.constraints.as_ref();
+        constraints.map_or(f64::INFINITY, |c| c.least_pivot)
+    }
+
+    fn drift(&self) -> f64 {
+        0.0
+    }
+
+    fn is_kinematic(&self, model: &Model) -> bool {
+        let rows = self.constraints.as_ref().filter(|c| !c.is_dependent());
+        model.nv == rows.map_or(0, Constraints::rows)
+    }
+
+    fn is_right_handed(&mut self, model: &Model) -> bool {
+        match &mut self.constraints {
+            Some(constraints) => constraints.is_right_handed(model),
+            None => true,
+        }
+    }
+
+    fn reaction(&self, k: usize) -> Vec3 {
+        let constraints = self.constraints.as_ref();
+        constraints.map_or_else(Vec3::zeros, |c| c.reaction(k))
+    }
+
+    fn is_reaction_unique(&self, k: usize) -> bool {
+        self.constraints.as_ref().is_none_or(|c| c.is_unique(k))
+    }
+
+    fn actuators(&mut self, model: &Model, gravity: &Vec3, out: &mut [f64]) {
+        self.load_reactions(model);
+        self.find_drive_forces(model, gravity, |_| true, |drive, force| out[drive] = force);
+    }
+
+    fn is_actuator_unique(&mut self, model: &Model, gravity: &Vec3, i: usize) -> bool {
+        let Self { tree, constraints } = self;
+        let Some(constraints) = constraints else {
+            return true;
+        };
+        let mut force_under = |multipliers: Option<&[f64]>| {
+            tree.wrench.fill(Wrench::zero());
+            if let Some(multipliers) = multipliers {
+                load_reactions(model, tree, |k| {
+                    Vec3::from_column_slice(&multipliers[3 * k..3 * k + 3])
+                });
+            }
+            let mut force = 0.0;
+            let Tree { motion, wrench, .. } = &mut *tree;
+            let found = |drive, value| {
+                if drive == i {
+                    force = value;
+                }
+            };
+            inverse_dynamics(model, motion, wrench, gravity, |_| true, found);
+            force
+        };
+        let without = force_under(None);
+        constraints.system().idle_multipliers().all(|null| {
+            let largest = null.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+            // Of a lever arm of a metre a millionth of it is rounding.
+            (force_under(Some(null)) - without).abs() <= 1e-6 * largest
+        })
+    }
+
+    fn prescribes_drives(&self) -> bool {
+        self.constraints.is_none()
+    }
+
+    fn drive_power(
+        &mut self,
+        model: &Model,
+        gravity: &Vec3,
+        y: &[f64],
+        dv: &[f64],
+        all: bool,
+    ) -> f64 {
+        if all {
+            self.tree.accelerate(model, y, dv);
+            self.load_reactions(model);
+        }
+        let Tree {
+            motion,
+            wrench,
+            driven,
+            ..
+        } = &mut self.tree;
+        // Where forces suffice, all that hangs on a drive depends on time alone.
+        let moved = |b: usize| all || model.bodies[b].driven_only;
+        let mut power = 0.0;
+        inverse_dynamics(model, motion, wrench, gravity, moved, |drive, force| {
+            power += force * driven.coordinates[drive].rate;
+        });
+        power
+    }
+}
+
+/// Adds reactions of the ideal joints, by their order, to the loads on the bodies.
+fn load_reactions(model: &Model, tree: &mut Tree, reaction: impl Fn(usize) -> Vec3) {
+    let mut load = |anchor: &Anchor, force: Vec3| {
+        let arm = tree.motion[anchor.body].rotation * anchor.offset;
+        let w = &mut tree.wrench[anchor.body];
+        w.force += force;
+        w.torque += arm.cross(&force);
+    };
+    for (k, &j) in model.ideal_joints.iter().enumerate() {
+        let force = reaction(k);
+        load(&model.joints[j].ball, force);
+        load(&model.joints[j].socket, -force);
+    }
+}

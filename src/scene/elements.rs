@@ -1,0 +1,318 @@
+//! Force elements of a scene file: one row for each kind, from which its section is read. What it does is in `mechanism/elements`.
+
+use std::collections::BTreeMap;
+
+use super::document::{Node, Section};
+use super::error::nearest;
+use super::read_joints::read_attachment;
+use super::*;
+
+/// A number that an element has.
+#[derive(Debug)]
+pub struct ElementNumber {
+    /// Key.
+    pub key: &'static str,
+    /// What it is measured in.
+    pub dimension: Dimension,
+    /// Closed range, SI.
+    pub range: (f64, f64),
+    /// Value where the file gives none; `None` where it must give one.
+    pub default: Option<f64>,
+    /// How one is written.
+    pub like: &'static str,
+    /// What it is.
+    pub help: &'static str,
+}
+
+/// A kind of force element. Adding one takes a row here and a file in `mechanism/elements`.
+#[derive(Debug)]
+pub struct ElementKind {
+    /// Section of the file, `[[spring]]`.
+    pub section: &'static str,
+    /// What it is.
+    pub help: &'static str,
+    /// Points on bodies or the world, each `{ body, at }`.
+    pub points: &'static [&'static str],
+    /// Its numbers.
+    pub numbers: &'static [ElementNumber],
+    /// Its vectors, 0 where the file gives none: key, what they are measured in, what they are.
+    pub vectors: &'static [(&'static str, Dimension, &'static str)],
+    /// Its choices: key, words with the default first, what they decide.
+    pub choices: &'static [(&'static str, &'static [&'static str], &'static str)],
+}
+
+/// A force element of a scene, as its row says.
+#[derive(Clone, Debug)]
+pub struct Element {
+    /// Unique name.
+    pub name: String,
+    /// Row.
+    pub kind: &'static ElementKind,
+    /// In the order of the row.
+    pub points: Vec<Attachment>,
+    numbers: Vec<f64>,
+    vectors: Vec<Vec3>,
+    choices: Vec<&'static str>,
+}
+
+const LARGEST_FORCE: f64 = 1e12;
+
+/// Every kind of force element.
+pub static ELEMENT_KINDS: [ElementKind; 2] = [
+    ElementKind {
+        section: "spring",
+        help: "spring with a damper along the line between two points",
+        points: &["from", "to"],
+        numbers: &[
+            ElementNumber {
+                key: "length",
+                dimension: Dimension::Length,
+                range: (0.0, 1e6),
+                default: None,
+                like: "\"100 mm\"",
+                help: "distance of the points at which the spring carries `preload`",
+            },
+            ElementNumber {
+                key: "stiffness",
+                dimension: Dimension::Stiffness,
+                range: (0.0, LARGEST_FORCE),
+                default: Some(0.0),
+                like: "\"10 N/mm\"",
+                help: "change of its tension with the distance",
+            },
+            ElementNumber {
+                key: "damping",
+                dimension: Dimension::Damping,
+                range: (0.0, LARGEST_FORCE),
+                default: Some(0.0),
+                like: "\"20 N s/m\"",
+                help: "change of its tension with the rate of the distance",
+            },
+            ElementNumber {
+                key: "preload",
+                dimension: Dimension::Force,
+                range: (-LARGEST_FORCE, LARGEST_FORCE),
+                default: Some(0.0),
+                like: "\"5 N\"",
+                help: "tension at `length`; negative where it pushes",
+            },
+        ],
+        vectors: &[],
+        choices: &[],
+    },
+    ElementKind {
+        section: "load",
+        help: "force and torque from outside on a body, constant or times sin(2π frequency t + phase)",
+        points: &["on"],
+        numbers: &[
+            ElementNumber {
+                key: "frequency",
+                dimension: Dimension::Frequency,
+                range: (0.0, 1e6),
+                default: Some(0.0),
+                like: "\"2 Hz\"",
+                help: "0 for a constant load",
+            },
+            ElementNumber {
+                key: "phase",
+                dimension: Dimension::Angle,
+                range: (-1e6, 1e6),
+                default: Some(0.0),
+                like: "\"90 deg\"",
+                help: "phase at t = 0; not used where the load is constant",
+            },
+        ],
+        vectors: &[
+            ("force", Dimension::Force, "force at the point"),
+            ("torque", Dimension::Torque, "torque"),
+        ],
+        choices: &[(
+            "axes",
+            &["world", "body"],
+            "whether force and torque keep to the world's axes or turn with the body",
+        )],
+    },
+];
+
+impl ElementKind {
+    fn keys(&self) -> Vec<&'static str> {
+        let numbers = self.numbers.iter().map(|number| number.key);
+        let vectors = self.vectors.iter().map(|(key, ..)| *key);
+        let choices = self.choices.iter().map(|(key, ..)| *key);
+        let points = self.points.iter().copied();
+        ["name"]
+            .into_iter()
+            .chain(points)
+            .chain(numbers)
+            .chain(vectors)
+            .chain(choices)
+            .collect()
+    }
+}
+
+impl Element {
+    /// A number of its row, SI.
+    ///
+    /// # Panics
+    /// If the row has no such key.
+    pub fn number(&self, key: &str) -> f64 {
+        let at = self.kind.numbers.iter().position(|of| of.key == key);
+        self.numbers[at.expect("a number of the row")]
+    }
+
+    /// A vector of its row, SI.
+    ///
+    /// # Panics
+    /// If the row has no such key.
+    pub fn vector(&self, key: &str) -> Vec3 {
+        let at = self.kind.vectors.iter().position(|of| of.0 == key);
+        self.vectors[at.expect("a vector of the row")]
+    }
+
+    /// Word of a choice of its row.
+    ///
+    /// # Panics
+    /// If the row has no such key.
+    pub fn choice(&self, key: &str) -> &'static str {
+        let at = self.kind.choices.iter().position(|of| of.0 == key);
+        self.choices[at.expect("a choice of the row")]
+    }
+}
+
+/// One element of `kind`; `bodies` maps names to places in the sorted scene.
+pub(super) fn read_element<'d>(
+    node: &Node<'d>,
+    kind: &'static ElementKind,
+    scene: &Scene,
+    bodies: &BTreeMap<String, usize>,
+) -> Result<(Element, Section<'d>), SceneError> {
+    let section = node.section_as(node.title(kind.section), &kind.keys())?;
+    let name = section.require("name", "\"s1\"")?.name()?.to_owned();
+    let point = |key: &&str| read_attachment(&section, key, scene, bodies);
+    let points = kind
+        .points
+        .iter()
+        .map(point)
+        .collect::<Result<Vec<_>, _>>()?;
+    if let [first, second] = points[..]
+        && first.body == second.body
+    {
+        let [from, to] = [kind.points[0], kind.points[1]];
+        return Err(section.error(
+            to,
+            format!(
+                "{from} and {to} are on the same body: a {} needs two",
+                kind.section
+            ),
+        ));
+    }
+    if let [only] = points[..]
+        && only.body.is_none()
+    {
+        return Err(section.error(
+            kind.points[0],
+            format!("a {} acts on a body, not on the world", kind.section),
+        ));
+    }
+    let number = |row: &ElementNumber| match section.get(row.key) {
+        None => match row.default {
+            Some(default) => Ok(default),
+            None => section.require(row.key, row.like).map(|_| 0.0),
+        },
+        Some(node) => {
+            let value = node.quantity(row.dimension)?;
+            let (least, most) = row.range;
+            if (least..=most).contains(&value) {
+                return Ok(value);
+            }
+            let unit = si_unit(row.dimension);
+            Err(node.error(format!(
+                "out of range; allowed {} to {}; units {}",
+                format_quantity(least, unit),
+                format_quantity(most, unit),
+                unit_names(row.dimension).join(", ")
+            )))
+        }
+    };
+    let numbers = kind.numbers.iter().map(number).collect::<Result<_, _>>()?;
+    let vector = |&(key, dimension, _): &(&str, Dimension, &str)| {
+        let Some(node) = section.get(key) else {
+            return Ok(Vec3::zeros());
+        };
+        let value = node.vector(dimension)?;
+        if value.amax() <= LARGEST_FORCE {
+            return Ok(value);
+        }
+        let most = format_quantity(LARGEST_FORCE, si_unit(dimension));
+        Err(node.error(format!("out of range; allowed -{most} to {most}")))
+    };
+    let vectors = kind.vectors.iter().map(vector).collect::<Result<_, _>>()?;
+    let choice = |&(key, words, _): &(&str, &'static [&'static str], &str)| {
+        let Some(node) = section.get(key) else {
+            return Ok(words[0]);
+        };
+        let text = node.text()?;
+        words
+            .iter()
+            .copied()
+            .find(|word| *word == text)
+            .ok_or_else(|| {
+                let near = nearest(text, words.iter().copied());
+                node.error(format!(
+                    "is not one of the choices{near}; allowed {}",
+                    words.join(", ")
+                ))
+            })
+    };
+    let choices = kind.choices.iter().map(choice).collect::<Result<_, _>>()?;
+    let element = Element {
+        name,
+        kind,
+        points,
+        numbers,
+        vectors,
+        choices,
+    };
+    Ok((element, section))
+}
+
+/// The sections of all kinds as rows of the page on the file format.
+pub fn element_table() -> String {
+    let mut out = String::new();
+    for kind in &ELEMENT_KINDS {
+        let points = kind.points.iter();
+        let mut keys: Vec<String> = points
+            .map(|key| format!("`{key}` (`{{ body, at }}`)"))
+            .collect();
+        for number in kind.numbers {
+            let default = match number.default {
+                None => "must be given".to_owned(),
+                Some(value) => format!(
+                    "{} if left out",
+                    format_quantity(value, si_unit(number.dimension))
+                ),
+            };
+            keys.push(format!("`{}`: {} ({default})", number.key, number.help));
+        }
+        for (key, dimension, help) in kind.vectors {
+            keys.push(format!(
+                "`{key}`: {help}, a vector in {} (0 if left out)",
+                si_unit(*dimension)
+            ));
+        }
+        for (key, words, help) in kind.choices {
+            keys.push(format!(
+                "`{key}`: {help}, {} ({} if left out)",
+                words.join(" or "),
+                words[0]
+            ));
+        }
+        out.push_str(&format!(
+            "| `[[{}]]` | {}: `name`, {} |\n",
+            kind.section,
+            kind.help,
+            keys.join("; ")
+        ));
+    }
+    out
+}

@@ -1,0 +1,106 @@
+//! How a row of the parameter table is read from a scene and written to it.
+
+use super::{Scene, Value};
+use crate::contact;
+use crate::words::Words;
+
+/// Reads and writes one field of a `T`. What is written has passed the row's range.
+#[derive(Debug)]
+pub struct Field<T> {
+    pub(super) get: fn(&T) -> Value,
+    pub(super) set: fn(&mut T, &Value),
+}
+
+// Derived, these would ask for a `T` that can be copied.
+impl<T> Clone for Field<T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T> Copy for Field<T> {}
+
+/// Where the value of a row is kept.
+#[derive(Clone, Copy, Debug)]
+pub enum Access {
+    /// In the contact parameters: of the scene, and of each ball joint.
+    Contact(Field<contact::Parameters>),
+    /// In the scene itself.
+    Scene(Field<Scene>),
+}
+
+/// A type that a field can have.
+pub(super) trait Held: Sized {
+    fn to_value(self) -> Value;
+    fn of_value(value: &Value) -> Self;
+}
+
+impl Held for f64 {
+    fn to_value(self) -> Value {
+        Value::Number(self)
+    }
+
+    fn of_value(value: &Value) -> Self {
+        match value {
+            Value::Number(number) => *number,
+            _ => unreachable!("the table has checked the kind"),
+        }
+    }
+}
+
+/// Words of a switch.
+pub(super) const SWITCH: [&str; 2] = ["on", "off"];
+
+impl Held for bool {
+    fn to_value(self) -> Value {
+        Value::Choice(if self { SWITCH[0] } else { SWITCH[1] })
+    }
+
+    fn of_value(value: &Value) -> Self {
+        *value == Value::Choice(SWITCH[0])
+    }
+}
+
+impl<T: Words> Held for T {
+    fn to_value(self) -> Value {
+        Value::Choice(self.word())
+    }
+
+    fn of_value(value: &Value) -> Self {
+        match value {
+            Value::Choice(word) => T::of_word(word).expect("the table has checked the word"),
+            _ => unreachable!("the table has checked the kind"),
+        }
+    }
+}
+
+/// A field by its path: `field!(solver.step)` of a scene.
+macro_rules! field {
+    ($($path:ident).+) => {
+        Field {
+            get: |it| Held::to_value(it.$($path).+),
+            set: |it, value| it.$($path).+ = Held::of_value(value),
+        }
+    };
+}
+
+/// A field of what not every scene has: `optional_field!(spcmm.frequency)`.
+macro_rules! optional_field {
+    ($part:ident.$name:ident) => {
+        Field {
+            get: |scene: &Scene| {
+                scene
+                    .$part
+                    .as_ref()
+                    .map_or(Value::Unset, |it| it.$name.to_value())
+            },
+            set: |scene, value| {
+                if let Some(it) = &mut scene.$part {
+                    it.$name = Held::of_value(value);
+                }
+            },
+        }
+    };
+}
+
+pub(super) use {field, optional_field};

@@ -1,0 +1,107 @@
+//! Why a simulation stopped, in numbers; words for people are made where it is displayed.
+
+/// Why a simulation stopped: the divergence guard. The state is the last good one.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("stopped at t = {time:.6e} s: {fault}; {advice}")]
+pub struct Stopped {
+    /// Time of the last good state, s.
+    pub time: f64,
+    /// What went wrong.
+    pub fault: StopFault,
+    /// What to try.
+    pub advice: StopAdvice,
+}
+
+/// What no accepted step may show.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum StopFault {
+    /// An ideal motion at a pose behind which its loops could close on another branch.
+    #[error("the loops through the ideal ball joints pass a singular pose")]
+    SingularLoops,
+    /// Loops that projection leaves open.
+    #[error("the loops through the ideal ball joints came apart by {open:.1e} m")]
+    OpenLoops {
+        /// m.
+        open: f64,
+    },
+    /// Stabilised constraints that hold nothing together any more.
+    #[error("the constraints of the lagrange form are off by {drift:.1e} m")]
+    Drift {
+        /// m, or rad.
+        drift: f64,
+    },
+    /// Constraint rows of the `lagrange` form that lose their independence.
+    #[error("the constraints pass a singular pose")]
+    SingularConstraints,
+    /// A ball that has left its socket through the wall.
+    #[error(
+        "ball joint {joint}: the ball is {penetration:.3e} m inside its socket wall, more than a tenth of its radius"
+    )]
+    LeftSocket {
+        /// Name.
+        joint: String,
+        /// m.
+        penetration: f64,
+    },
+    /// A fixed step that stored more energy in a contact than can have arrived there.
+    #[error(
+        "ball joint {joint}: one step put the ball {penetration:.3e} m inside its socket wall, with {times:.1} times the energy \
+         that it can have arrived with"
+    )]
+    Overshoot {
+        /// Name.
+        joint: String,
+        /// m.
+        penetration: f64,
+        /// Energy stored over energy of the approach.
+        times: f64,
+    },
+    /// An absurd speed, or none at all.
+    #[error("body {body}: speed {speed:.3e} m/s, angular speed {angular_speed:.3e} rad/s")]
+    AbsurdSpeed {
+        /// Name.
+        body: String,
+        /// m/s.
+        speed: f64,
+        /// rad/s.
+        angular_speed: f64,
+    },
+    /// Accelerations beyond the range of numbers.
+    #[error("the accelerations are not finite")]
+    NotFinite,
+    /// A step size that reaches rounding.
+    #[error("the step size that the tolerance asks for fell below 1e-14 s")]
+    ShortStep,
+}
+
+/// What to try where a simulation stopped.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum StopAdvice {
+    /// Closed loops cannot stay closed here.
+    #[error(
+        "the ideal joints are (nearly) dependent here: keep clear of this pose, or give a joint a clearance"
+    )]
+    Dependent,
+    /// Adaptive steps are as short as they need to be: the motion itself is beyond the model.
+    #[error(
+        "try slower drives, a stiffer contact, or a tighter solver.tolerance (now {tolerance:e})"
+    )]
+    GentlerMotion {
+        /// In force.
+        tolerance: f64,
+    },
+    /// A fixed step is too long.
+    #[error(
+        "try a smaller solver.step (now {step:e} s) or solver.method = automatic, or else a stiffer contact"
+    )]
+    ShorterStep {
+        /// In force, s.
+        step: f64,
+    },
+    /// A tolerance that the scene cannot be held to.
+    #[error("try a looser solver.tolerance (now {tolerance:e}) or a softer or heavier scene")]
+    LooserTolerance {
+        /// In force.
+        tolerance: f64,
+    },
+}

@@ -1,0 +1,302 @@
+//! Force elements against closed solutions, in every method and both formulations.
+
+use crate::common::METHODS;
+use jointplay::scene::{Scene, Vec3};
+use jointplay::simulate::{Frame, Simulation};
+
+const MASS: f64 = 0.5;
+
+/// One body of `MASS` that starts at (0.13, 0, 0) m at rest, no gravity, with `more` in its file.
+fn floating(more: &str, changes: &[(&str, &str)]) -> Simulation {
+    let text = format!(
+        "[gravity]\nx = 0\ny = 0\nz = 0\n\
+         [[body]]\nname = \"mass\"\nmass = \"{MASS} kg\"\ninertia = \"2e-4 3e-4 4e-4 kg m^2\"\n\
+         [[joint]]\nname = \"free\"\nkind = \"free\"\nchild = \"mass\"\nstart = {{ position = \"130 0 0 mm\" }}\n{more}"
+    );
+    let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
+    let changes: Vec<(String, String)> = changes.iter().map(own).collect();
+    Simulation::new(&Scene::parse(&text, None, &changes).unwrap()).unwrap()
+}
+
+fn at(simulation: &mut Simulation, time: f64) -> Frame {
+    while simulation.time() < time {
+        simulation.step_until(time).unwrap();
+    }
+    let mut frame = Frame::default();
+    simulation.sample(time, &mut frame);
+    frame
+}
+
+/// Spring of 200 N/m with 100 mm of free length, from the origin to the body's centroid.
+const SPRING: &str = "[[spring]]\nname = \"s\"\nfrom = { body = \"world\" }\nto = { body = \"mass\" }\n\
+                      length = \"100 mm\"\nstiffness = \"200 N/m\"\n";
+
+/// A step that suits the method's order, and how close it then comes, m.
+fn settings(method: &str) -> (&'static str, f64) {
+    match method {
+        "semi-implicit-euler" | "imex-euler" => ("1 us", 2e-6),
+        "rk4" => ("100 us", 1e-9),
+        _ => ("10 us", 1e-8),
+    }
+}
+
+#[test]
+fn a_mass_on_a_spring_swings_as_it_should_in_every_method_and_formulation() {
+    let omega = (200.0 / MASS).sqrt();
+    for method in METHODS {
+        for formulation in ["tree", "lagrange"] {
+            let (step, bound) = settings(method);
+            let mut simulation = floating(
+                SPRING,
+                &[
+                    ("solver.method", method),
+                    ("solver.step", step),
+                    ("solver.tolerance", "1e-10"),
+                    ("formulation", formulation),
+                ],
+            );
+            let time = 0.2;
+            let frame = at(&mut simulation, time);
+            let expected = 0.1 + 0.03 * (omega * time).cos();
+            let off = (frame.bodies[0].position - Vec3::new(expected, 0.0, 0.0)).norm();
+            assert!(off < bound, "{method} {formulation}: {off:e}");
+            let tension = 200.0 * (expected - 0.1);
+            assert!((frame.elements[0].force.x + tension).abs() < 2e3 * bound);
+            assert!(
+                (frame.elastic - 0.5 * 200.0 * (expected - 0.1f64).powi(2)).abs() < 20.0 * bound
+            );
+            let ledger = simulation.ledger().unwrap();
+            assert!(ledger.exchanged > 0.1, "{ledger:?}");
+            assert!(
+                ledger.relative_residual().abs() < 1e-4,
+                "{method} {formulation}"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_error_falls_with_the_order_of_the_method() {
+    let omega = (200.0 / MASS).sqrt();
+    let error = |method: &str, step: f64| {
+        let step = format!("{step} s");
+        let changes = [("solver.method", method), ("solver.step", &*step)];
+        let frame = at(&mut floating(SPRING, &changes), 0.2);
+        (frame.bodies[0].position.x - 0.1 - 0.03 * (omega * 0.2).cos()).abs()
+    };
+    for (method, steps, order) in [
+        ("semi-implicit-euler", [1e-4, 5e-5], 1.0),
+        ("imex-euler", [1e-4, 5e-5], 1.0),
+        ("rk4", [4e-3, 2e-3], 4.0),
+    ] {
+        let [coarse, fine] = steps.map(|step| error(method, step));
+        let found = (coarse / fine).log2();
+        println!("{method}: {coarse:e}, {fine:e}, order {found}");
+        assert!((found - order).abs() < 0.15, "{method}: {found}");
+    }
+}
+
+#[test]
+fn a_damper_takes_what_the_closed_solution_says() {
+    // Underdamped: x = 0.1 + e^(-d t) (A cos w t + B sin w t) with d = c / 2m, w^2 = k/m - d^2, started at rest.
+    let (k, c): (f64, f64) = (200.0, 4.0);
+    let d = c / (2.0 * MASS);
+    let w = (k / MASS - d * d).sqrt();
+    for method in ["dopri5", "radau5", "rosenbrock", "automatic", "rk4"] {
+        for formulation in ["tree", "lagrange"] {
+            let mut simulation = floating(
+                &format!("{SPRING}damping = \"4 N s/m\"\n"),
+                &[
+                    ("solver.method", method),
+                    ("solver.tolerance", "1e-10"),
+                    ("formulation", formulation),
+                ],
+            );
+            let time = 0.25;
+            let frame = at(&mut simulation, time);
+            let (sin, cos) = (w * time).sin_cos();
+            let fall = (-d * time).exp();
+            let expected = 0.1 + 0.03 * fall * (cos + d / w * sin);
+            let off = (frame.bodies[0].position.x - expected).abs();
+            assert!(off < 1e-8, "{method} {formulation}: {off:e}");
+            let speed = -0.03 * fall * (w + d * d / w) * sin;
+            let left = 0.5 * MASS * speed * speed + 0.5 * k * (expected - 0.1).powi(2);
+            let lost = simulation.ledger().unwrap().damping_loss;
+            let expected = 0.5 * k * 0.03 * 0.03 - left;
+            assert!(
+                (lost / expected - 1.0).abs() < 1e-5,
+                "{method} {formulation}: {lost} {expected}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_stiff_damped_spring_does_not_hold_an_implicit_method_back() {
+    // 2 kHz and nearly critically damped: after 0.2 s nothing moves, and an explicit method still steps by microseconds.
+    let stiff = "[[spring]]\nname = \"s\"\nfrom = { body = \"world\" }\nto = { body = \"mass\" }\n\
+                 length = \"100 mm\"\nstiffness = \"80 kN/mm\"\ndamping = \"10 kN s/m\"\n";
+    let evaluations = |method: &str| {
+        let mut simulation = floating(
+            stiff,
+            &[("solver.method", method), ("solver.tolerance", "1e-6")],
+        );
+        let frame = at(&mut simulation, 0.2);
+        let length = frame.bodies[0].position.norm();
+        assert!((length - 0.1).abs() < 1e-6, "{method}: {length}");
+        simulation.statistics().evaluations
+    };
+    let (implicit, explicit) = (evaluations("radau5"), evaluations("dopri5"));
+    println!("radau5 {implicit}, dopri5 {explicit} evaluations");
+    assert!(4 * implicit < explicit, "{implicit} {explicit}");
+}
+
+#[test]
+fn a_preload_pulls_at_the_rest_length_and_enters_the_energy() {
+    let preload = "[[spring]]\nname = \"s\"\nfrom = { body = \"world\" }\nto = { body = \"mass\" }\n\
+                   length = \"130 mm\"\npreload = \"6 N\"\n";
+    let mut simulation = floating(preload, &[("solver.tolerance", "1e-10")]);
+    // A constant pull: x = x0 - F t^2 / 2 m.
+    let frame = at(&mut simulation, 0.05);
+    let expected = 0.13 - 0.5 * 6.0 / MASS * 0.05 * 0.05;
+    assert!((frame.bodies[0].position.x - expected).abs() < 1e-10);
+    assert!((frame.elastic - 6.0 * (expected - 0.13)).abs() < 1e-9);
+    let residual = simulation.ledger().unwrap().relative_residual();
+    assert!(residual.abs() < 1e-9, "{residual:e}");
+}
+
+#[test]
+fn loads_move_a_body_as_newton_and_euler_say() {
+    let push = |axes: &str| {
+        format!(
+            "[[load]]\nname = \"f\"\non = {{ body = \"mass\" }}\nforce = \"0 3 0 N\"\ntorque = \"0 0 0.02 N m\"\naxes = \"{axes}\"\n"
+        )
+    };
+    let (spin_up, time) = (0.02 / 4e-4, 0.1);
+    for formulation in ["tree", "lagrange"] {
+        for method in ["dopri5", "radau5", "rosenbrock", "rk4"] {
+            let changes = [
+                ("solver.method", method),
+                ("solver.tolerance", "1e-10"),
+                ("solver.step", "50 us"),
+                ("formulation", formulation),
+            ];
+            let mut simulation = floating(&push("world"), &changes);
+            let body = at(&mut simulation, time).bodies[0];
+            let moved = body.position - Vec3::new(0.13, 0.5 * 3.0 / MASS * time * time, 0.0);
+            assert!(moved.norm() < 1e-9, "{method} {formulation}: {moved}");
+            assert!((body.angular_velocity.z - spin_up * time).abs() < 1e-8);
+            let kinetic =
+                0.5 * MASS * body.velocity.norm_squared() + 0.5 * 4e-4 * (spin_up * time).powi(2);
+            let work = simulation.ledger().unwrap().external_work;
+            assert!((work / kinetic - 1.0).abs() < 1e-6, "{work} {kinetic}");
+            // In body axes the force turns by spin_up t^2 / 2: its impulse is Fresnel's integral.
+            let mut turning = floating(&push("body"), &changes);
+            let velocity = at(&mut turning, time).bodies[0].velocity;
+            let (mut x, mut y) = (0.0, 0.0);
+            let n = 20_000;
+            for i in 0..n {
+                let t = (f64::from(i) + 0.5) * time / f64::from(n);
+                let (sin, cos) = (0.5 * spin_up * t * t).sin_cos();
+                x -= 3.0 * sin / MASS * time / f64::from(n);
+                y += 3.0 * cos / MASS * time / f64::from(n);
+            }
+            let off = (velocity - Vec3::new(x, y, 0.0)).norm();
+            assert!(off < 1e-6, "{method} {formulation}: {off:e}");
+        }
+    }
+}
+
+#[test]
+fn a_harmonic_load_drives_as_it_should() {
+    let load = "[[load]]\nname = \"f\"\non = { body = \"mass\" }\nforce = \"2 0 0 N\"\nfrequency = \"5 Hz\"\nphase = \"90 deg\"\n";
+    let mut simulation = floating(load, &[("solver.tolerance", "1e-10")]);
+    let omega = std::f64::consts::TAU * 5.0;
+    let time = 0.37;
+    let frame = at(&mut simulation, time);
+    // m x'' = F cos w t from rest.
+    let expected = 0.13 + 2.0 / (MASS * omega * omega) * (1.0 - (omega * time).cos());
+    assert!((frame.bodies[0].position.x - expected).abs() < 1e-9);
+    assert!((frame.elements[0].force.x - 2.0 * (omega * time).cos()).abs() < 1e-9);
+}
+
+#[test]
+fn a_spring_on_a_driven_slide_gives_its_work_to_the_drive() {
+    // A slide moves one end of a spring whose other end is the world: all that the drive gives is stored.
+    let text = "[gravity]\nx = 0\ny = 0\nz = 0\n\
+        [[body]]\nname = \"slide\"\nmass = \"1 kg\"\ninertia = \"1e-3 1e-3 1e-3 kg m^2\"\n\
+        [[body]]\nname = \"mass\"\nmass = \"0.5 kg\"\ninertia = \"1e-3 1e-3 1e-3 kg m^2\"\n\
+        [[joint]]\nname = \"x\"\nkind = \"prismatic\"\nchild = \"slide\"\naxis = [1, 0, 0]\n\
+        drive = { law = \"constant\", position = \"100 mm\", velocity = \"50 mm/s\" }\n\
+        [[joint]]\nname = \"free\"\nkind = \"free\"\nchild = \"mass\"\nstart = { position = \"0 500 0 mm\" }\n\
+        [[spring]]\nname = \"s\"\nfrom = { body = \"world\" }\nto = { body = \"slide\" }\nlength = \"100 mm\"\nstiffness = \"300 N/m\"\n";
+    for formulation in ["tree", "lagrange"] {
+        let changes = [("formulation".to_owned(), formulation.to_owned())];
+        let mut simulation = Simulation::new(&Scene::parse(text, None, &changes).unwrap()).unwrap();
+        let frame = at(&mut simulation, 0.2);
+        let stored = 0.5 * 300.0 * 0.01 * 0.01;
+        assert!(
+            (frame.elastic - stored).abs() < 1e-6 * stored,
+            "{formulation}"
+        );
+        let ledger = simulation.ledger().unwrap();
+        assert!(
+            (ledger.drive_work / stored - 1.0).abs() < 1e-5,
+            "{formulation}: {ledger:?}"
+        );
+        assert!(
+            (frame.actuators[0] - 300.0 * 0.01).abs() < 1e-5,
+            "{formulation}"
+        );
+    }
+}
+
+#[test]
+fn a_scene_without_elements_pays_nothing_for_them() {
+    let mut simulation = crate::common::simulation("spcmm", &[]);
+    let frame = at(&mut simulation, 1e-3);
+    assert!(frame.elements.is_empty());
+    let ledger = simulation.ledger().unwrap();
+    assert_eq!((ledger.damping_loss, ledger.external_work), (0.0, 0.0));
+}
+
+#[test]
+fn bad_elements_are_refused_where_they_stand() {
+    let error = |more: &str| {
+        let text = format!(
+            "[[body]]\nname = \"mass\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n[[joint]]\nname = \"free\"\nkind = \"free\"\nchild = \"mass\"\nstart = {{ position = [0, 0, 0] }}\n{more}"
+        );
+        Scene::parse(&text, Some("mine.toml"), &[])
+            .unwrap_err()
+            .to_string()
+    };
+    for (more, said) in [
+        ("[[spring]]\nname = \"s\"\n", ["spring.s.from", "missing"]),
+        (
+            "[[spring]]\nname = \"s\"\nfrom = { body = \"world\" }\nto = { body = \"world\" }\nlength = \"1 m\"\n",
+            ["spring.s.to", "same body"],
+        ),
+        (
+            "[[spring]]\nname = \"s\"\nfrom = { body = \"world\" }\nto = { body = \"mass\" }\nlength = \"1 m\"\nstiffness = \"-1 N/m\"\n",
+            ["-1 N/m", "allowed 0 N/m to"],
+        ),
+        (
+            "[[spring]]\nname = \"s\"\nfrom = { body = \"world\" }\nto = { body = \"mass\" }\nlength = \"1 m\"\nstifness = \"1 N/m\"\n",
+            ["stifness", "stiffness"],
+        ),
+        (
+            "[[load]]\nname = \"f\"\non = { body = \"world\" }\nforce = \"1 0 0 N\"\n",
+            ["load.f.on", "not on the world"],
+        ),
+        (
+            "[[load]]\nname = \"f\"\non = { body = \"mass\" }\naxes = \"bodies\"\n",
+            ["axes", "world, body"],
+        ),
+    ] {
+        let message = error(more);
+        for said in said {
+            assert!(message.contains(said), "{message}\nlacks {said}");
+        }
+        assert!(message.starts_with("mine.toml:"), "{message}");
+    }
+}
