@@ -70,7 +70,7 @@ pub struct Simulation {
 
 /// The end of a step, and what goes with it.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Instant {
+pub(super) struct StepEnd {
     t: f64,
     /// Coordinates, then velocities.
     y: Vec<f64>,
@@ -81,7 +81,7 @@ pub(super) struct Instant {
     memory: Vec<Memory>,
 }
 
-impl Instant {
+impl StepEnd {
     fn new(y: Vec<f64>, joints: usize) -> Self {
         Self {
             t: 0.0,
@@ -104,7 +104,7 @@ impl Instant {
 
 /// The step being taken.
 struct Attempt {
-    end: Instant,
+    end: StepEnd,
     /// Joint whose contact starts or ends at its end.
     located: Option<usize>,
     /// Joint that goes onto another piece of a law there.
@@ -125,8 +125,8 @@ struct Attempt {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct State {
     /// The physical state, and the start of the latest step, inside which samples lie.
-    now: Instant,
-    before: Instant,
+    now: StepEnd,
+    before: StepEnd,
     /// Clearances on their way, and in force.
     ramps: Vec<Option<Ramp>>,
     clearances: Vec<f64>,
@@ -189,7 +189,7 @@ impl State {
     /// At t = 0 with the coordinates and velocities `y`.
     fn new(scene: &Scene, mechanism: &Mechanism, y: Vec<f64>) -> Self {
         let joints = mechanism.contacts.len();
-        let now = Instant::new(y, joints);
+        let now = StepEnd::new(y, joints);
         Self {
             before: now.clone(),
             now,
@@ -251,7 +251,7 @@ impl Simulation {
             right_handed: true,
             sampled: vec![(0.0, 0.0); joints],
             attempt: Attempt {
-                end: Instant::new(vec![0.0; n], joints),
+                end: StepEnd::new(vec![0.0; n], joints),
                 located: None,
                 corner: None,
                 turned: false,
@@ -414,7 +414,7 @@ impl Simulation {
             running,
             ..
         } = self;
-        let Instant {
+        let StepEnd {
             t, y, k, memory, ..
         } = &state.now;
         let mut evaluator = mechanism.evaluator(Touching::by(located, memory));
@@ -489,7 +489,7 @@ impl Simulation {
         if mean_rates {
             // Forces at its end are those of a contact that may be long over by the next: the step's own mean tells more.
             let (mechanism, now) = (&mut self.mechanism, &self.state.now);
-            let Instant { y, k, .. } = &mut self.attempt.end;
+            let StepEnd { y, k, .. } = &mut self.attempt.end;
             mechanism.measure(t_end, y);
             mechanism.position_rate(y, k);
             for i in mechanism.positions()..y.len() {
@@ -558,7 +558,7 @@ impl Simulation {
                 scratch_k,
                 ..
             } = self;
-            let Instant {
+            let StepEnd {
                 t, y, k, memory, ..
             } = &mut state.now;
             let rate = if mean_rates { scratch_k } else { k };
