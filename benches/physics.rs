@@ -97,6 +97,24 @@ fn real_time(c: &mut Criterion) {
     group.finish();
 }
 
+/// Going back to a state: asked are 5 us in the default scene.
+fn snapshots(c: &mut Criterion) {
+    let mut group = c.benchmark_group("snapshot");
+    for name in ["spcmm", "chain"] {
+        let scene = load(name, &[]);
+        let mut simulation = Simulation::new(&scene).expect("a built-in scene starts");
+        simulation.advance_to(0.02).expect("a built-in scene runs");
+        let snapshot = simulation.snapshot();
+        group.bench_function(format!("{name}: take"), |b| {
+            b.iter(|| black_box(simulation.snapshot()));
+        });
+        group.bench_function(format!("{name}: restore"), |b| {
+            b.iter(|| simulation.restore(black_box(&snapshot)).expect("its own"));
+        });
+    }
+    group.finish();
+}
+
 /// Simulated spans with the methods that are meant for them, beside Runge-Kutta 4 at 10 us over the same span.
 fn spans(c: &mut Criterion) {
     let span =
@@ -199,5 +217,13 @@ fn set_up(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, evaluations, real_time, spans, chain, set_up);
+criterion_group!(
+    benches,
+    evaluations,
+    real_time,
+    snapshots,
+    spans,
+    chain,
+    set_up
+);
 criterion_main!(benches);

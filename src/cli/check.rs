@@ -330,6 +330,7 @@ impl std::fmt::Display for NearSingular {
 pub(super) fn near_singular(scene: &Scene) -> Option<NearSingular> {
     let mut rigid = scene.clone();
     rigid.formulation = Formulation::Tree;
+    rigid.elements.clear();
     let drive = rigid.spcmm.as_mut()?;
     // Sliders that rest have one pose.
     let instants = if drive.frequency > 0.0 { INSTANTS } else { 0 };

@@ -26,8 +26,8 @@ pub fn contact_sides(joint: &BallJoint, c: &Coefficients) -> [(Anchor, f64); 2] 
     ]
 }
 
-/// How each coordinate moves the first of two points against the second, and points of their bodies beyond them along `n`, into
-/// `columns`.
+/// Fills `columns`: how each coordinate moves the first of two points against the second, and points of their bodies that lie
+/// beyond them along `n`.
 pub fn collect_columns(
     columns: &mut Vec<Column>,
     model: &Model,

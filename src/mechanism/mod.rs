@@ -286,9 +286,10 @@ impl Mechanism {
         self.equations.is_kinematic(&self.model)
     }
 
-    /// Longest step of a scene that is a function of time alone, s: a fiftieth of its shortest period.
+    /// Longest step of a scene that is a function of time alone, s: a fiftieth of the shortest period of drives and loads.
     pub fn kinematic_step(&self) -> f64 {
-        self.model.shortest_period() / 50.0
+        let loads = self.elements.iter().map(|element| element.period());
+        loads.fold(self.model.shortest_period(), f64::min) / 50.0
     }
 
     /// For a scene that is a function of time alone, on which side of a singular pose its loops are.
@@ -433,6 +434,12 @@ impl Mechanism {
     pub fn element_reports(&self, t: f64) -> impl Iterator<Item = ElementReport> {
         let motion = self.equations.motion();
         self.elements.iter().map(move |e| e.report(t, motion))
+    }
+
+    /// Whether an element answers to motion, so that it can be stiff.
+    pub fn has_couplings(&self) -> bool {
+        let motion = self.equations.motion();
+        self.elements.iter().any(|e| e.coupling(motion).is_some())
     }
 
     /// Origin of body `b`'s scene frame from its centroid, body axes, m.

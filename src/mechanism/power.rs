@@ -38,7 +38,7 @@ impl Powers {
 
 /// What of a scene can have a power.
 pub(super) struct Sources {
-    /// Neither drives nor contacts: every power is zero.
+    /// Neither drives, nor contacts, nor force elements: every power is zero.
     pub none: bool,
     /// No drive feels an acceleration that the equations of motion have to be solved for: forces alone will do.
     pub forces_suffice: bool,
@@ -66,7 +66,7 @@ impl Sources {
 }
 
 impl Mechanism {
-    /// Whether drives or contacts can give or take energy at all.
+    /// Whether anything can give or take energy but gravity.
     pub fn has_powers(&self) -> bool {
         !self.sources.none
     }

@@ -1,4 +1,5 @@
-//! The stiff part of the equations of motion, linearised analytically: contact forces against displacement and velocity.
+//! The stiff part of the equations of motion, linearised analytically: forces of contacts and of
+//! force elements against displacement and velocity.
 //!
 //! A W-method keeps its order with any approximation of the Jacobian, so what is not stiff (gravity, gyroscopic terms,
 //! the turning of arms) is left out. With a = M^-1 (Q + ...), K = dQ/dq and D = dQ/dv in velocity space,
@@ -16,7 +17,7 @@ use crate::contact::Stiffness;
 use crate::scene::Vec3;
 use nalgebra::Complex;
 
-/// Partial time derivatives of a contact's motion at fixed coordinates.
+/// Partial time derivatives of the motion of one point against another at fixed coordinates.
 #[derive(Clone, Copy, Default)]
 struct Drift {
     eccentricity: Vec3,
@@ -36,7 +37,7 @@ pub struct Stiff {
     pub time_derivative: Vec<f64>,
     /// Scratch for the derivative at the point of linearisation.
     pub derivative: Vec<f64>,
-    /// How each contact moves with time alone: rates of the eccentricity, of its rate, and of the sliding velocity.
+    /// How the points of each contact and element move with time alone.
     drift: Vec<Drift>,
     /// Positions at which the linearisation was taken.
     y: Vec<f64>,
@@ -47,7 +48,7 @@ pub struct Stiff {
     rate: Vec<f64>,
     rate_im: Vec<f64>,
     pair: Vec<Complex<f64>>,
-    /// No contact carries a force: J is taken as zero but for q' = T v.
+    /// Neither a contact nor an element carries a force: J is taken as zero but for q' = T v.
     empty: bool,
 }
 

@@ -71,6 +71,10 @@ pub(super) fn expand<'d>(
             .ball_joints
             .iter()
             .any(|joint| joint_used(&joint.name))
+        || scene
+            .elements
+            .iter()
+            .any(|element| joint_used(&element.name))
     {
         let message = "the file already uses a name that the chain needs: bodies link1, link2, …, joints free1, free2, … \
                        and J1, J2, …";

@@ -139,7 +139,10 @@ impl Scene {
             step: self.solver.step,
             duration,
             sliding: friction > 1.0,
-            stable: self.solver.method == Method::ImexEuler && friction <= 1.0,
+            // It takes force elements as explicit steps do.
+            stable: self.solver.method == Method::ImexEuler
+                && friction <= 1.0
+                && self.elements.is_empty(),
             recommended,
         })
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::document::{Node, Section};
 use super::error::nearest;
-use super::read_joints::read_attachment;
+use super::read_joints::{FASTEST_DRIVE, read_attachment};
 use super::*;
 
 /// A number that an element has.
@@ -24,7 +24,7 @@ pub struct ElementNumber {
     pub help: &'static str,
 }
 
-/// A kind of force element. Adding one takes a row here and a file in `mechanism/elements`.
+/// A kind of force element. Adding one takes a row here, and a file in `mechanism/elements` with its row there.
 #[derive(Debug)]
 pub struct ElementKind {
     /// Section of the file, `[[spring]]`.
@@ -37,6 +37,8 @@ pub struct ElementKind {
     pub numbers: &'static [ElementNumber],
     /// Its vectors, 0 where the file gives none: key, what they are measured in, what they are.
     pub vectors: &'static [(&'static str, Dimension, &'static str)],
+    /// Of its numbers and vectors, those without any of which it does nothing.
+    pub acts_by: &'static [&'static str],
     /// Its choices: key, words with the default first, what they decide.
     pub choices: &'static [(&'static str, &'static [&'static str], &'static str)],
 }
@@ -98,6 +100,7 @@ pub static ELEMENT_KINDS: [ElementKind; 2] = [
             },
         ],
         vectors: &[],
+        acts_by: &["stiffness", "damping", "preload"],
         choices: &[],
     },
     ElementKind {
@@ -108,7 +111,7 @@ pub static ELEMENT_KINDS: [ElementKind; 2] = [
             ElementNumber {
                 key: "frequency",
                 dimension: Dimension::Frequency,
-                range: (0.0, 1e6),
+                range: (0.0, FASTEST_DRIVE),
                 default: Some(0.0),
                 like: "\"2 Hz\"",
                 help: "0 for a constant load",
@@ -126,6 +129,7 @@ pub static ELEMENT_KINDS: [ElementKind; 2] = [
             ("force", Dimension::Force, "force at the point"),
             ("torque", Dimension::Torque, "torque"),
         ],
+        acts_by: &["force", "torque"],
         choices: &[(
             "axes",
             &["world", "body"],
@@ -273,6 +277,17 @@ pub(super) fn read_element<'d>(
         vectors,
         choices,
     };
+    let acts = |key: &&str| match kind.numbers.iter().any(|number| number.key == *key) {
+        true => element.number(key) != 0.0,
+        false => element.vector(key) != Vec3::zeros(),
+    };
+    if !kind.acts_by.iter().any(acts) {
+        let (kind, keys) = (kind.section, kind.acts_by.join(", "));
+        return Err(section.error(
+            "",
+            format!("this {kind} does nothing: {keys} are 0; one must not be"),
+        ));
+    }
     Ok((element, section))
 }
 

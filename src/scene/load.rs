@@ -27,7 +27,7 @@ pub const MOST_BODIES: usize = 10_000;
 pub const MOST_BALL_JOINTS: usize = 10_000;
 /// Most shapes of a scene, those of its bodies and the fixed ones.
 pub const MOST_SHAPES: usize = 50_000;
-/// Most force elements of a scene.
+/// Most force elements of each kind.
 pub const MOST_ELEMENTS: usize = 10_000;
 /// Most corners of a plate.
 pub const MOST_CORNERS: usize = 100;

@@ -10,8 +10,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use toml::de::DeTable;
 
-/// Keys at the top of a file.
-const TOP: [&str; 18] = [
+/// Keys at the top of a file, beside the sections of [`ELEMENT_KINDS`].
+const TOP: [&str; 16] = [
     "name",
     "title",
     "description",
@@ -28,8 +28,6 @@ const TOP: [&str; 18] = [
     "joint",
     "ball_joint",
     "fixed_shape",
-    "spring",
-    "load",
 ];
 
 /// Keys of `[spcmm]` that are no parameters: the file's bodies are built to these dimensions.
@@ -75,7 +73,9 @@ impl Scene {
                 format!("not valid TOML: {}", error.message()),
             )
         })?;
-        let top = Section::new(document, String::new(), parsed.get_ref(), 0..0, &TOP)?;
+        let elements = ELEMENT_KINDS.iter().map(|kind| kind.section);
+        let keys: Vec<&str> = TOP.into_iter().chain(elements).collect();
+        let top = Section::new(document, String::new(), parsed.get_ref(), 0..0, &keys)?;
         let mut scene = read_settings(&top)?;
         let mut places = read_parameters(&top, &mut scene)?;
         scene.source.places = places
@@ -340,11 +340,11 @@ fn read_mechanism<'d>(
         scene.ball_joints.push(joint);
         places.extend(own);
     }
-    let mut element_names = Names::default();
     for kind in &ELEMENT_KINDS {
         for node in list(kind.section, MOST_ELEMENTS, "force elements")? {
             let (element, section) = read_element(&node, kind, scene, &by_name)?;
-            element_names.add(&section, kind.section, &element.name)?;
+            // Joints and elements name columns of one table.
+            joint_names.add(&section, "joint or force element", &element.name)?;
             scene.elements.push(element);
         }
     }

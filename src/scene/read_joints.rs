@@ -23,7 +23,7 @@ words!(Law {
 });
 
 /// Highest frequency of a harmonic drive, Hz.
-const FASTEST_DRIVE: f64 = 1e4;
+pub(super) const FASTEST_DRIVE: f64 = 1e4;
 
 /// A tree joint whose bodies are still places in the file.
 pub(super) struct JointText<'d> {

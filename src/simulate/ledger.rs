@@ -214,7 +214,7 @@ impl Account {
             gravitational,
             elastic,
         } = self.now.1;
-        kinetic + gravitational.abs() + elastic
+        kinetic + gravitational.abs() + elastic.abs()
     }
 
     /// At the end of the latest step.

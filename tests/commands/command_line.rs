@@ -821,6 +821,18 @@ fn scenes_are_listed_and_each_says_what_it_contains() {
         line_of(&singular, "Warning").contains("singular"),
         "{singular}"
     );
+    // Reactions to a load tell nothing of the pose.
+    let text = std::fs::read_to_string("assets/scenes/spcmm.toml").unwrap();
+    let load = "[[load]]\nname = \"press\"\non = { body = \"platform\" }\nforce = \"0 0 -900 N\"\n";
+    std::fs::write(
+        folder.path().join("pressed.toml"),
+        format!("{text}\n{load}"),
+    )
+    .unwrap();
+    let pressed = jointplay(folder.path(), "check pressed.toml")
+        .expect(0)
+        .stdout;
+    assert!(!pressed.contains("singular"), "{pressed}");
     assert!(!free.contains("Warning"), "{free}");
     let tight = jointplay(folder.path(), "check spcmm --set contact.clearance=5um")
         .expect(0)

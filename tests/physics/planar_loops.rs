@@ -324,6 +324,16 @@ fn every_method_takes_a_planar_loop_ideal_driven_and_with_play() {
                 let mut simulation = Simulation::new(&scene).unwrap();
                 run_until(&mut simulation, 0.02);
                 let frame = frame_now(&mut simulation);
+                // Another simulation of the scene goes on from here: it knows the rank without a start.
+                let snapshot = simulation.snapshot();
+                let mut other = Simulation::new(&scene).unwrap();
+                other.restore(&snapshot).unwrap();
+                let mut plain = Simulation::new(&scene).unwrap();
+                run_until(&mut plain, 0.02);
+                for run in [&mut plain, &mut other] {
+                    run_until(run, 0.025);
+                }
+                assert_eq!(plain.state_hash(), other.state_hash(), "{form}, {method}");
                 let impacts = simulation.statistics().impacts[0];
                 assert_eq!(impacts > 0, clearance != "0");
                 for (a, b) in frame.bodies.iter().zip(&reference.bodies) {

@@ -118,8 +118,15 @@ impl Table {
         if ledger {
             names.extend(fixed(&LEDGER));
         }
-        for element in &scene.elements {
-            names.extend(["x", "y", "z"].map(|axis| format!("{}_force_{axis}_N", element.name)));
+        for (element, report) in scene.elements.iter().zip(&first.elements) {
+            let mut column = |quantity: &str, unit: &str| {
+                let name = |axis| format!("{}_{quantity}_{axis}_{unit}", element.name);
+                names.extend(["x", "y", "z"].map(name));
+            };
+            column("force", "N");
+            if report.torque.is_some() {
+                column("torque", "Nm");
+            }
         }
         if ledger && !scene.elements.is_empty() {
             names.extend(fixed(&LEDGER_OF_ELEMENTS));
@@ -254,6 +261,7 @@ impl Table {
         }
         for element in &frame.elements {
             values.extend(element.force.iter());
+            values.extend(element.torque.iter().flat_map(|torque| torque.iter()));
         }
         if let Some(ledger) = frame
             .ledger

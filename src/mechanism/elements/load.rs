@@ -70,13 +70,17 @@ impl ForceElement for Load {
         }
     }
 
+    fn period(&self) -> f64 {
+        std::f64::consts::TAU / self.omega
+    }
+
     fn report(&self, t: f64, motion: &[Kinematics]) -> ElementReport {
         let (force, torque) = self.at(t, motion);
         let (point, ..) = point_of(&self.on, motion);
         ElementReport {
             points: [point; 2],
             force,
-            torque,
+            torque: Some(torque),
         }
     }
 }

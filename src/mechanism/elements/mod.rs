@@ -30,10 +30,10 @@ pub(super) struct ElementPowers {
 pub struct ElementReport {
     /// Where it acts: both points of an element between two, the same point twice of another, m.
     pub points: [Vec3; 2],
-    /// Force on the second, N, and torque, N m.
+    /// Force on the second, N.
     pub force: Vec3,
-    /// Torque on the body, N m.
-    pub torque: Vec3,
+    /// Torque on the body, N m, of a kind that has one.
+    pub torque: Option<Vec3>,
 }
 
 /// Something that loads bodies by their motion and by time.
@@ -49,6 +49,11 @@ pub(super) trait ForceElement: Send {
 
     /// Powers at `t`.
     fn powers(&self, t: f64, motion: &[Kinematics]) -> ElementPowers;
+
+    /// Period of what it does by time alone, s; infinite where that does not change.
+    fn period(&self) -> f64 {
+        f64::INFINITY
+    }
 
     /// What it does at `t`.
     fn report(&self, t: f64, motion: &[Kinematics]) -> ElementReport;

@@ -76,7 +76,13 @@ impl ForceElement for Spring {
     fn coupling(&self, motion: &[Kinematics]) -> Option<([Anchor; 2], Coupling)> {
         let s = self.state(motion);
         if s.length == 0.0 {
-            return None;
+            // A bush pulls back however its points part; else the direction, and with it the force, jumps here.
+            let bush = self.length == 0.0 && self.preload == 0.0;
+            let coupling = Coupling {
+                by_displacement: Mat3::identity() * -self.stiffness,
+                by_rate: Mat3::zeros(),
+            };
+            return bush.then_some(([self.from, self.to], coupling));
         }
         // F = -T u with u = e / |e|: dT = (k u + c P e_dot / l) . de + c u . de_dot, du = P de / l, P = 1 - u u'.
         let u = s.along;
@@ -107,7 +113,7 @@ impl ForceElement for Spring {
         ElementReport {
             points: s.points,
             force: s.along * -s.tension,
-            torque: Vec3::zeros(),
+            torque: None,
         }
     }
 }

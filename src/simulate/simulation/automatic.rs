@@ -91,8 +91,10 @@ impl Simulation {
             choice.wait -= 1;
             return;
         }
-        let settled = choice.held >= HELD_STEPS || choice.since_contact >= SETTLED_STEPS;
-        if settled && velocities <= LARGEST_IMPLICIT && state.now.memory.iter().any(|m| m.active) {
+        let touches = state.now.memory.iter().any(|m| m.active);
+        let held = choice.held >= HELD_STEPS && (touches || self.mechanism.has_couplings());
+        let settled = held || (touches && choice.since_contact >= SETTLED_STEPS);
+        if settled && velocities <= LARGEST_IMPLICIT {
             state.control.implicit = true;
             state.control.controller = controller_of(Method::Automatic, true);
             *choice = Choice {
