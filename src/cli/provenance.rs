@@ -2,6 +2,7 @@
 
 use serde_json::{Map, Value as Json, json};
 
+#[cfg(feature = "gui")]
 use super::Failure;
 use crate::files::PROGRAM;
 use crate::scene::Scene;

@@ -41,7 +41,7 @@ pub struct Findings {
     pub ideal: Traced,
     /// Settled curves, in the order of [`paper::CASES`].
     pub curves: Vec<Loop>,
-    /// Sweeps: [`Findings::data`] finds one by name.
+    /// Sweeps: [`Findings::sweep_data`] finds one by name.
     pub sweeps: Vec<SweepData>,
     /// What two sections must differ by in x (m) and beta (rad) to be different.
     pub resolution: [f64; 2],
