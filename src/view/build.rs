@@ -460,6 +460,9 @@ fn extents(parts: &[Part], frame: &Frame, joints: &[DrawnJoint]) -> Vec<(Vec3, f
             .iter()
             .map(|joint| (joint.socket_centre, joint.outer)),
     );
+    let springs = frame.elements.iter().map(|element| element.points);
+    let springs = springs.filter(|[from, to]| from != to);
+    extents.extend(springs.flatten().map(|end| (to_f32(&end), 0.0)));
     extents.retain(|(centre, radius)| centre.is_finite() && radius.is_finite());
     extents
 }

@@ -432,3 +432,26 @@ fn a_frame_with_broken_numbers_draws_without_a_panic() {
             .is_empty()
     );
 }
+
+#[test]
+fn a_spring_is_in_the_picture_from_end_to_end() {
+    let text = "[[body]]\nname = \"mass\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n\
+                shapes = [{ form = \"box\", centre = [0, 0, 0], size = \"20 20 20 mm\", role = \"slider\" }]\n\
+                [[joint]]\nname = \"free\"\nkind = \"free\"\nchild = \"mass\"\nstart = { position = \"0 0 -200 mm\" }\n\
+                [[spring]]\nname = \"s\"\nfrom = { body = \"world\" }\nto = { body = \"mass\" }\nlength = \"1 m\"\nstiffness = \"1 N/m\"\n";
+    let scene = Scene::parse(text, None, &[]).unwrap();
+    let mut simulation = crate::simulate::Simulation::new(&scene).unwrap();
+    let mut frame = Frame::default();
+    simulation.sample(0.0, &mut frame);
+    let view = SceneView::new(&scene, &frame);
+    let mut camera = view.camera();
+    view.fit(&mut camera, &scene, &frame, &ViewOptions::default(), SIZE);
+    let ends = frame.elements[0].points;
+    for end in ends {
+        let at = camera.project(to_f32(&end), SIZE).unwrap();
+        assert!(
+            at.cmpge(Vec2::ZERO).all() && at.cmple(Vec2::new(1280.0, 720.0)).all(),
+            "{at}"
+        );
+    }
+}
