@@ -263,8 +263,8 @@ fn verdict(out: &mut String, report: &Report, models: &[Model], turned: &[(State
             "(13) as printed gives the paper's scatter and its response; it may well be what the paper computed."
         }
         (true, false) => {
-            "(13) as printed makes settled sections scatter, as the paper's do, and leaves the response to impacts as far from the \
-             paper's as before: it explains at most the scatter, and what made the paper's impacts last longer and turn the \
+            "(13) as printed makes settled sections scatter, as the paper's do, and moves the response to impacts little towards the \
+             paper's: it explains at most the scatter, and what made the paper's impacts last longer and turn the \
              platform faster is something else."
         }
         (false, _) => "(13) as printed does not give the paper's scatter.",
@@ -314,7 +314,7 @@ pub(super) fn section(out: &mut String, report: &Report) {
     out.push_str(
         "<p>Friction 0.2. The last rows of each quantity have a second slip or gap of the paper beside (13): the dimension a<sub>1</sub> that it leaves \
          out, and (19) as printed, whose elastic force is divided by four times the approach speed in m/s. (57) and (58) give the contact forces without \
-         the signs of their two bodies; with both alike a ball is driven through its wall, and there is no motion to compare.</p>\n",
+         the signs of their two bodies; with both alike a ball is driven through its wall, and there is no motion to compare. A last separation of 2 s is the end of the period: the balls never rest.</p>\n",
     );
     sweeps(out, report);
     let turned = turned(&report.corrected.statements(), &report.printed.statements());
