@@ -375,7 +375,7 @@ pub struct ReproduceArguments {
     /// Folder to write: `index.html`, `data/` and `plots/`; what is done until then is kept in `FOLDER.partial`.
     #[arg(long, value_name = "FOLDER")]
     pub out: PathBuf,
-    /// Few points and few periods, within about a minute instead of under half an hour on two cores.
+    /// Few points and few periods, in about a minute instead of half an hour on two cores.
     #[arg(long)]
     pub quick: bool,
     /// Threads; default: one a core. The files are the same for any number.
