@@ -5,6 +5,8 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
+use crate::program::jointplay;
+
 const SWEEP: &str = "spcmm --vary contact.clearance=0.2mm..0.4mm:3 --periods 2 --discard 1";
 
 fn example(folder: &Path, line: &str) -> Output {
@@ -30,12 +32,7 @@ fn gnu_parallel_spreads_a_sweep_and_goes_on_after_a_failure() {
     );
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
-    let whole = Command::new(env!("CARGO_BIN_EXE_jointplay"))
-        .args(format!("sweep {SWEEP} --out whole.npz").split_whitespace())
-        .current_dir(folder.path())
-        .output()
-        .unwrap();
-    assert!(whole.status.success());
+    jointplay(folder.path(), &format!("sweep {SWEEP} --out whole.npz")).expect(0);
 
     // A shard that cannot be written fails, and nothing is merged.
     fs::create_dir_all(at("spread.npz.shards/2.npz.partial")).unwrap();

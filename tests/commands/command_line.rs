@@ -5,73 +5,12 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use serde_json::Value as Json;
-use tempfile::TempDir;
+
+use crate::program::{command, folder, jointplay, names};
 
 /// First columns, in the order that readers of the published reference files expect.
 const FIRST_COLUMNS: &str = "t_s,x_m,y_m,z_m,alpha_rad,beta_rad,gamma_rad,vx_m_s,vy_m_s,vz_m_s,\
                              S1_eccentricity_m,S2_eccentricity_m,S3_eccentricity_m,S1_normal_N,S2_normal_N,S3_normal_N";
-
-struct Outcome {
-    code: Option<i32>,
-    stdout: String,
-    stderr: String,
-}
-
-impl Outcome {
-    #[track_caller]
-    fn expect(self, code: i32) -> Self {
-        assert_eq!(
-            self.code,
-            Some(code),
-            "stdout: {}\nstderr: {}",
-            self.stdout,
-            self.stderr
-        );
-        self
-    }
-
-    fn json(&self) -> Json {
-        serde_json::from_str(&self.stdout)
-            .unwrap_or_else(|error| panic!("{error} in: {}", self.stdout))
-    }
-}
-
-/// Runs the program in `folder` with the words of `line`.
-fn jointplay(folder: &Path, line: &str) -> Outcome {
-    let output = command(folder, line).output().unwrap();
-    Outcome {
-        code: output.status.code(),
-        stdout: String::from_utf8(output.stdout).unwrap(),
-        stderr: String::from_utf8(output.stderr).unwrap(),
-    }
-}
-
-fn command(folder: &Path, line: &str) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_jointplay"));
-    command
-        .args(line.split_whitespace())
-        .current_dir(folder)
-        .env_remove("RUST_LOG")
-        .env_remove("RUST_BACKTRACE")
-        // No test opens a window.
-        .env_remove("DISPLAY")
-        .env_remove("WAYLAND_DISPLAY")
-        .env_remove("WAYLAND_SOCKET");
-    command
-}
-
-fn folder() -> TempDir {
-    tempfile::tempdir().unwrap()
-}
-
-fn names(folder: &Path) -> Vec<String> {
-    let mut names: Vec<String> = fs::read_dir(folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-        .collect();
-    names.sort();
-    names
-}
 
 struct Csv {
     header: Vec<String>,

@@ -2,26 +2,14 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
 
 use serde_json::Value as Json;
 
-fn jointplay(folder: &Path, line: &str) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_jointplay"))
-        .args(line.split_whitespace())
-        .current_dir(folder)
-        .env_remove("DISPLAY")
-        .env_remove("WAYLAND_DISPLAY")
-        .output()
-        .unwrap()
-}
+use crate::program::jointplay;
 
 /// Standard output of a run that is done.
 fn done(folder: &Path, line: &str) -> String {
-    let output = jointplay(folder, line);
-    let error = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{line}: {error}");
-    String::from_utf8(output.stdout).unwrap()
+    jointplay(folder, line).expect(0).stdout
 }
 
 fn json(path: &Path) -> Json {
@@ -203,11 +191,8 @@ fn every_impact_has_its_row() {
             folder.path(),
             &format!("run pendulum --duration 1000000s {line}"),
         );
-        assert_eq!(output.status.code(), Some(code), "{line}");
-        assert!(
-            String::from_utf8_lossy(&output.stderr).contains(word),
-            "{line}"
-        );
+        assert_eq!(output.code, Some(code), "{line}");
+        assert!(output.stderr.contains(word), "{line}");
     }
     done(folder.path(), &format!("{run} --impacts hits.csv --force"));
     // A run without impacts writes none.

@@ -7,6 +7,7 @@ mod chart;
 mod cluster;
 mod command_line;
 mod ledger_files;
+mod program;
 mod reproduce;
 mod sweep;
 mod tradeoff;

@@ -11,24 +11,7 @@ use jointplay::analysis::reproduction::Extent;
 use jointplay::cli::output::significant;
 use jointplay::cli::reproduce::into_folder;
 
-struct Outcome {
-    code: Option<i32>,
-    stdout: String,
-    stderr: String,
-}
-
-fn jointplay(folder: &Path, line: &str) -> Outcome {
-    let output = Command::new(env!("CARGO_BIN_EXE_jointplay"))
-        .args(line.split_whitespace())
-        .current_dir(folder)
-        .output()
-        .unwrap();
-    Outcome {
-        code: output.status.code(),
-        stdout: String::from_utf8(output.stdout).unwrap(),
-        stderr: String::from_utf8(output.stderr).unwrap(),
-    }
-}
+use crate::program::{Outcome, command, jointplay};
 
 /// Every file under `folder` with its content.
 fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
@@ -273,9 +256,8 @@ fn bad_input_is_refused_before_anything_runs() {
 fn ctrl_c_leaves_nothing_half_written_and_the_same_command_goes_on() {
     let folder = tempfile::tempdir().unwrap();
     let entries = || files(folder.path());
-    let mut child = Command::new(env!("CARGO_BIN_EXE_jointplay"))
-        .args("reproduce --out report/ --quick --threads 1".split(' '))
-        .current_dir(folder.path())
+    let line = "reproduce --out report/ --quick --threads 1";
+    let mut child = command(folder.path(), line)
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()

@@ -12,56 +12,11 @@ use jointplay::scene::Scene;
 use ndarray::{ArrayD, IxDyn, OwnedRepr};
 use ndarray_npy::NpzReader;
 use serde_json::Value as Json;
-use tempfile::TempDir;
+
+use crate::program::{command, folder, jointplay, names};
 
 /// A sweep of four points that takes a fraction of a second.
 const SMALL: &str = "sweep spcmm --vary contact.clearance=0.2mm..0.5mm:4 --periods 3 --discard 1";
-
-struct Outcome {
-    code: Option<i32>,
-    stdout: String,
-    stderr: String,
-}
-
-impl Outcome {
-    #[track_caller]
-    fn expect(self, code: i32) -> Self {
-        assert_eq!(self.code, Some(code), "{}\n{}", self.stdout, self.stderr);
-        self
-    }
-}
-
-fn command(folder: &Path, line: &str) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_jointplay"));
-    command
-        .args(line.split_whitespace())
-        .current_dir(folder)
-        .env_remove("RUST_LOG")
-        .env_remove("RUST_BACKTRACE");
-    command
-}
-
-fn jointplay(folder: &Path, line: &str) -> Outcome {
-    let output = command(folder, line).output().unwrap();
-    Outcome {
-        code: output.status.code(),
-        stdout: String::from_utf8(output.stdout).unwrap(),
-        stderr: String::from_utf8(output.stderr).unwrap(),
-    }
-}
-
-fn folder() -> TempDir {
-    tempfile::tempdir().unwrap()
-}
-
-fn names(folder: &Path) -> Vec<String> {
-    let entries = fs::read_dir(folder).unwrap();
-    let mut names: Vec<String> = entries
-        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-        .collect();
-    names.sort();
-    names
-}
 
 /// The arrays of an archive, whole numbers as floating-point ones, and its `meta`.
 fn archive(path: &Path) -> (BTreeMap<String, ArrayD<f64>>, Json) {

@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 
 use jointplay::analysis::{
     AnalysisError, Effort, End, RunContext, Setting, WorkPrecision, presets, work_precision,
@@ -13,6 +13,14 @@ use jointplay::integrate::Method;
 use jointplay::scene::{Preset, Scene};
 use serde_json::Value as Json;
 
+use crate::program::{command, jointplay, names};
+
+#[track_caller]
+fn run(folder: &Path, line: &str, code: i32) -> String {
+    let said = jointplay(folder, line).expect(code);
+    said.stdout + &said.stderr
+}
+
 const FILES: [&str; 5] = [
     "manifest.json",
     "tradeoff.csv",
@@ -20,40 +28,6 @@ const FILES: [&str; 5] = [
     "tradeoff.png",
     "tradeoff.svg",
 ];
-
-fn command(folder: &Path, line: &str) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_jointplay"));
-    command
-        .args(line.split_whitespace())
-        .current_dir(folder)
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped());
-    command
-}
-
-#[track_caller]
-fn run(folder: &Path, line: &str, code: i32) -> String {
-    let Output {
-        status,
-        stdout,
-        stderr,
-    } = command(folder, line).output().unwrap();
-    let (out, err) = (
-        String::from_utf8(stdout).unwrap(),
-        String::from_utf8(stderr).unwrap(),
-    );
-    assert_eq!(status.code(), Some(code), "{line}\n{out}\n{err}");
-    out + &err
-}
-
-fn names(folder: &Path) -> Vec<String> {
-    let entries = fs::read_dir(folder).unwrap();
-    let mut names: Vec<String> = entries
-        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-        .collect();
-    names.sort();
-    names
-}
 
 /// A scene with little to do: a rod without play.
 const SMALL: &str = "pendulum --set contact.clearance=0 --quick --quiet";
@@ -138,6 +112,8 @@ fn bad_input_is_answered_with_what_would_be_right() {
 fn an_interrupted_measurement_writes_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let child = command(folder.path(), "tradeoff chain --quiet --out found")
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
         .spawn()
         .unwrap();
     let pid = child.id();

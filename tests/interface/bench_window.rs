@@ -6,7 +6,8 @@ use std::ops::ControlFlow;
 use std::rc::Rc;
 use std::sync::Arc;
 
-use eframe::egui::{self, Key, Modifiers, accesskit::Role};
+use crate::hands::type_over;
+use eframe::egui::{self, Key, accesskit::Role};
 use egui_kittest::{
     Harness, SnapshotResults,
     kittest::{NodeT as _, Queryable as _},
@@ -104,19 +105,6 @@ fn click(harness: &mut Harness<'_, App>, role: Role, label: &str) {
     harness.step();
 }
 
-fn type_into(harness: &mut Harness<'_, App>, label: &str, text: &str) {
-    harness
-        .get_by_role_and_label(Role::TextInput, label)
-        .focus();
-    harness.step();
-    harness.key_press_modifiers(Modifiers::COMMAND, Key::A);
-    harness.step();
-    harness
-        .get_by_role_and_label(Role::TextInput, label)
-        .type_text(text);
-    harness.step();
-}
-
 fn set_number(harness: &mut Harness<'_, App>, label: &str, number: f64) {
     harness
         .get_by_role_and_label(Role::SpinButton, label)
@@ -127,8 +115,8 @@ fn set_number(harness: &mut Harness<'_, App>, label: &str, number: f64) {
 
 /// Asks for a sweep of so many values from `from` to `to`.
 fn sweep(harness: &mut Harness<'_, App>, from: &str, to: &str, values: f64) {
-    type_into(harness, "From", from);
-    type_into(harness, "To", to);
+    type_over(harness, "From", from);
+    type_over(harness, "To", to);
     set_number(harness, "Values", values);
     set_number(harness, "Periods", 4.0);
     set_number(harness, "Discard", 1.0);

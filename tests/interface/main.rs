@@ -6,6 +6,7 @@ mod common;
 
 mod bench_window;
 mod frames;
+mod hands;
 mod headless_window;
 mod page;
 mod window;

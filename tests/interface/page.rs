@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::sync::Arc;
 
+use crate::hands::type_over;
 use eframe::egui::{
     self, Event, Key, Modifiers, PointerButton, Pos2, TouchDeviceId, TouchId, TouchPhase,
     accesskit::{Live, Role},
@@ -837,16 +838,7 @@ fn on_the_desktop_a_path_is_asked_for_and_nothing_is_overwritten() {
     for again in [false, true] {
         click(&mut harness, "Save");
         click(&mut harness, "Record…");
-        harness
-            .get_by_role_and_label(Role::TextInput, "Path")
-            .focus();
-        harness.step();
-        harness.key_press_modifiers(Modifiers::COMMAND, Key::A);
-        harness.step();
-        harness
-            .get_by_role_and_label(Role::TextInput, "Path")
-            .type_text(&path);
-        harness.step();
+        type_over(&mut harness, "Path", &path);
         harness.key_press(Key::Enter);
         harness.run_steps(3);
         let refused = label(&harness, "it is already there");
@@ -1016,16 +1008,7 @@ fn a_menu_that_the_keyboard_opens_begins_at_its_first_entry_and_closes_behind_it
 
 /// Types `text` into the dialog that is open and enters it.
 fn answer(harness: &mut Harness<'_, App>, text: &str) {
-    harness
-        .get_by_role_and_label(Role::TextInput, "Path")
-        .focus();
-    harness.step();
-    harness.key_press_modifiers(Modifiers::COMMAND, Key::A);
-    harness.step();
-    harness
-        .get_by_role_and_label(Role::TextInput, "Path")
-        .type_text(text);
-    harness.step();
+    type_over(harness, "Path", text);
     harness.key_press(Key::Enter);
     harness.run_steps(4);
 }

@@ -1,6 +1,7 @@
 //! The window, driven by role and label as a person with a screen reader would.
 
-use eframe::egui::{self, Key, Modifiers, accesskit::Role};
+use crate::hands::type_over;
+use eframe::egui::{self, Key, accesskit::Role};
 use egui_kittest::{
     Harness, SnapshotResults,
     kittest::{NodeT as _, Queryable as _},
@@ -66,16 +67,7 @@ fn click(harness: &mut Harness<'_, App>, label: &str) {
 
 /// Replaces what stands in a text field and presses Enter.
 fn type_into(harness: &mut Harness<'_, App>, label: &str, text: &str) {
-    harness
-        .get_by_role_and_label(Role::TextInput, label)
-        .focus();
-    harness.step();
-    harness.key_press_modifiers(Modifiers::COMMAND, Key::A);
-    harness.step();
-    harness
-        .get_by_role_and_label(Role::TextInput, label)
-        .type_text(text);
-    harness.step();
+    type_over(harness, label, text);
     harness.key_press(Key::Enter);
     harness.step();
     harness.step();
