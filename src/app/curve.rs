@@ -26,6 +26,15 @@ pub struct Trace {
     pub colour: Color32,
 }
 
+impl Trace {
+    /// Least and greatest value recorded about `time`, s.
+    pub fn at(&self, time: f64) -> Option<(f64, f64)> {
+        let after = self.bins.partition_point(|bin| bin.from <= time);
+        let bin = self.bins[..after].last()?;
+        (time <= bin.to).then_some((bin.least, bin.greatest))
+    }
+}
+
 /// Curves over one time axis. Where one would hide another they share the place: in a column of pixels the taller stands
 /// behind the shorter, and those that coincide take turns.
 pub struct Curves<'a> {

@@ -31,7 +31,7 @@ impl App {
         let followed = self.viewport.followed();
         Link {
             scene: SceneText::of(player.wanted()),
-            log: player.log().clone(),
+            log: player.log(),
             steps: Some(player.steps()),
             time: Some(player.pacer.shown()),
             hash: Some(player.simulation().state_hash()),
@@ -288,7 +288,7 @@ fn meta(player: &Player) -> String {
         .collect();
     let link = Link {
         scene: SceneText::of(player.wanted()),
-        log: player.log().clone(),
+        log: player.log(),
         steps: Some(player.steps()),
         time: Some(player.pacer.shown()),
         hash: Some(player.simulation().state_hash()),

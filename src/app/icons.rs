@@ -16,6 +16,12 @@ pub enum Icon {
     Step,
     /// Bar and triangle backwards: to the start.
     Restart,
+    /// Triangle to the left.
+    Backwards,
+    /// Two triangles to the left, and to the right: to the impact before or after.
+    Before,
+    #[allow(missing_docs)]
+    After,
     /// Arrow around: back to the default.
     Undo,
 }
@@ -90,6 +96,20 @@ fn paint(ui: &Ui, icon: Icon, rect: Rect, colour: Color32) {
         Icon::Restart => {
             painter.rect_filled(bar(0.0, 0.2), 1.0, colour);
             painter.add(triangle([at(1.0, 0.0), at(1.0, 1.0), at(0.3, 0.5)]));
+        }
+        Icon::Backwards => {
+            painter.add(triangle([at(0.86, 0.0), at(0.0, 0.5), at(0.86, 1.0)]));
+        }
+        Icon::Before | Icon::After => {
+            let turned = |x: f32| if icon == Icon::After { x } else { 1.0 - x };
+            for left in [0.0, 0.5] {
+                let point = |x: f32, y: f32| at(turned(left + x), y);
+                painter.add(triangle([
+                    point(0.0, 0.1),
+                    point(0.5, 0.5),
+                    point(0.0, 0.9),
+                ]));
+            }
         }
         Icon::Undo => {
             let centre = rect.center();

@@ -9,6 +9,13 @@ pub enum Action {
     PlayPause,
     Step,
     StepBack,
+    Backwards,
+    /// To the impact after, or before.
+    Impact {
+        forward: bool,
+    },
+    Home,
+    End,
     Reset,
     Slower,
     Faster,
@@ -49,7 +56,7 @@ const fn bind(key: Key, action: Action, written: &'static str, help: &'static st
 }
 
 /// All keys.
-pub const BINDINGS: [Binding; 29] = [
+pub const BINDINGS: [Binding; 34] = [
     bind(Key::Space, Action::PlayPause, "Space", "Play or pause"),
     bind(
         Key::ArrowRight,
@@ -61,8 +68,23 @@ pub const BINDINGS: [Binding; 29] = [
         Key::ArrowLeft,
         Action::StepBack,
         "Left arrow",
-        "Take such a step back (the last 64)",
+        "Take the latest step back",
     ),
+    bind(
+        Key::Comma,
+        Action::Impact { forward: false },
+        ", and .",
+        "Impact before and after: of the ball joint that is followed, else of any",
+    ),
+    bind(Key::Period, Action::Impact { forward: true }, "", ""),
+    bind(Key::J, Action::Backwards, "J", "Play backwards"),
+    bind(
+        Key::Home,
+        Action::Home,
+        "Home, End",
+        "Start, and end of what was on show",
+    ),
+    bind(Key::End, Action::End, "", ""),
     bind(Key::R, Action::Reset, "R", "Reset to t = 0"),
     bind(Key::ArrowUp, Action::Faster, "Up arrow, +", "Faster"),
     bind(Key::Plus, Action::Faster, "", ""),
@@ -102,8 +124,12 @@ pub const BINDINGS: [Binding; 29] = [
 ];
 
 /// Mouse and touch, for the overlay.
-pub const POINTER: [(&str, &str); 8] = [
-    ("Drag, one finger", "Turn the view"),
+pub const POINTER: [(&str, &str); 9] = [
+    ("Drag beside the machine, one finger", "Turn the view"),
+    (
+        "Drag on a body; a finger stays first",
+        "Pull on it by a spring; with shift along the line of sight",
+    ),
     (
         "Right or middle drag, shift-drag, two fingers",
         "Shift the view",
@@ -164,7 +190,9 @@ pub fn pressed(ctx: &egui::Context) -> Vec<Action> {
     }
     let held_back = |key: Key| match key {
         Key::Space => focused.is_some() && !slider,
-        Key::ArrowUp | Key::ArrowDown | Key::ArrowLeft | Key::ArrowRight => focused.is_some(),
+        Key::ArrowUp | Key::ArrowDown | Key::ArrowLeft | Key::ArrowRight | Key::Home | Key::End => {
+            focused.is_some()
+        }
         _ => false,
     };
     ctx.input(|input| {
@@ -207,7 +235,8 @@ mod tests {
             }
             let listed = BINDINGS.iter().any(|b| {
                 !b.written.is_empty()
-                    && std::mem::discriminant(&b.action) == std::mem::discriminant(&a.action)
+                    && (std::mem::discriminant(&b.action) == std::mem::discriminant(&a.action)
+                        || (a.action == Action::End && b.action == Action::Home))
             });
             assert!(listed, "{:?} is missing from the overlay", a.action);
         }

@@ -188,6 +188,8 @@ impl App {
             accuracy,
             plots,
             bench,
+            timeline,
+            viewport,
             show_controls,
             show_plots,
             show_bench,
@@ -229,13 +231,21 @@ impl App {
                 // Else the panel would shrink to what the plots leave of it.
                 ui.take_available_space();
                 plots.header(ui, player);
-                plots.ui(ui, player);
+                if let Some(time) = plots.ui(ui, player).filter(|_| free) {
+                    player.go_to(time);
+                    viewport.arrive(player);
+                }
             });
         let asked = Panel::bottom("transport")
             .frame(bar)
             .show(ui, |ui| {
-                ui.add_enabled_ui(free, |ui| transport::ui(ui, player))
-                    .inner
+                let contents = ui.add_enabled_ui(free, |ui| {
+                    if timeline.ui(ui, player, viewport.focus()) {
+                        viewport.arrive(player);
+                    }
+                    transport::ui(ui, player)
+                });
+                contents.inner
             })
             .inner;
         let stop = CentralPanel::no_frame()
@@ -261,6 +271,7 @@ impl App {
         let asked = Panel::bottom("transport")
             .frame(bar)
             .show(ui, |ui| {
+                ui.add_enabled_ui(free, |ui| self.timeline_ui(ui));
                 let asked = ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.player));
                 ui.horizontal(|ui| self.sheet_tabs(ui, false));
                 asked.inner
@@ -279,6 +290,7 @@ impl App {
         let asked = Panel::bottom("transport")
             .frame(bar)
             .show(ui, |ui| {
+                ui.add_enabled_ui(free, |ui| self.timeline_ui(ui));
                 ui.horizontal(|ui| {
                     let room = ui.available_width() - 270.0;
                     let asked = ui
@@ -307,6 +319,13 @@ impl App {
             .inner;
         if asked.or(stop).is_some() {
             self.reset();
+        }
+    }
+
+    fn timeline_ui(&mut self, ui: &mut Ui) {
+        let focus = self.viewport.focus();
+        if self.timeline.ui(ui, &mut self.player, focus) {
+            self.viewport.arrive(&self.player);
         }
     }
 
@@ -344,6 +363,7 @@ impl App {
             plots,
             bench,
             sheet,
+            viewport,
             ..
         } = self;
         let mut load = None;
@@ -359,7 +379,11 @@ impl App {
                     Some(Sheet::Plots) => {
                         plots.header(ui, player);
                         let size = egui::vec2(ui.available_width(), 340.0);
-                        ui.allocate_ui(size, |ui| plots.ui(ui, player));
+                        let asked = ui.allocate_ui(size, |ui| plots.ui(ui, player)).inner;
+                        if let Some(time) = asked.filter(|_| free) {
+                            player.go_to(time);
+                            viewport.arrive(player);
+                        }
                     }
                     Some(Sheet::Bench) => {
                         load = ui.add_enabled_ui(free, |ui| bench.ui(ui, player)).inner;
@@ -379,6 +403,11 @@ impl App {
         let plain = self.picture.is_plain();
         self.player.place_ghost();
         self.viewport.ui(ui, &self.player, plain);
+        if let Some(pull) = self.viewport.take_pull()
+            && !self.is_under_way()
+        {
+            self.player.pull(pull);
+        }
         if plain {
             // A saved picture has no buttons in it.
             return None;

@@ -3,6 +3,13 @@
 //! A change happens between two steps, so the number of steps taken says exactly when. Sampling and drawing never change a
 //! step and are not in it.
 
+use crate::analysis::section::Schedule;
+use crate::scene::Vec3;
+use crate::simulate::Pull;
+
+/// Largest stiffness in N/m, and damping in N s/m, of a hand in a log.
+const STIFFEST: f64 = 1e9;
+
 /// What happened between two steps.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Event {
@@ -27,8 +34,82 @@ pub enum Event {
         /// How many.
         sections: u64,
     },
+    /// Somebody pulled, or let go.
+    Pull(Option<Pulled>),
     /// A step was tried and the divergence guard refused it.
     Stop,
+}
+
+impl Event {
+    /// A change of `key` to `value`.
+    pub fn set(key: &str, value: &str) -> Self {
+        Self::Set {
+            key: key.to_owned(),
+            // One line for one event: line breaks separate no more than spaces do.
+            value: value.split_whitespace().collect::<Vec<_>>().join(" "),
+        }
+    }
+
+    /// The instants at which steps end from here on.
+    pub fn schedule(&self) -> Option<Schedule> {
+        let Self::Sections {
+            first,
+            interval,
+            sections,
+        } = self
+        else {
+            return None;
+        };
+        Some(Schedule {
+            first: first.0,
+            interval: interval.0,
+            sections: usize::try_from(*sections).unwrap_or(usize::MAX),
+            discard: 0,
+        })
+    }
+
+    /// What happened, for a reader.
+    pub fn words(&self) -> String {
+        match self {
+            Self::Set { key, value } => format!("{key} = {value}"),
+            Self::Original { key } => format!("{key} as in the scene file"),
+            Self::Sections { sections, .. } => format!("{sections} sections of a sweep"),
+            Self::Pull(Some(_)) => "pulled".to_owned(),
+            Self::Pull(None) => "let go".to_owned(),
+            Self::Stop => "stopped".to_owned(),
+        }
+    }
+}
+
+/// A pull: body, and what [`Pull`] holds as numbers: point, hand, stiffness, damping.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pulled {
+    body: usize,
+    numbers: [Number; 8],
+}
+
+impl From<Pull> for Pulled {
+    fn from(pull: Pull) -> Self {
+        let (p, h) = (pull.point, pull.hand);
+        let numbers = [p.x, p.y, p.z, h.x, h.y, h.z, pull.stiffness, pull.damping];
+        Self {
+            body: pull.body,
+            numbers: numbers.map(Number),
+        }
+    }
+}
+
+impl From<Pulled> for Pull {
+    fn from(pulled: Pulled) -> Self {
+        let [px, py, pz, hx, hy, hz, stiffness, damping] = pulled.numbers.map(|n| n.0);
+        Self {
+            body: pulled.body,
+            point: Vec3::new(px, py, pz),
+            hand: Vec3::new(hx, hy, hz),
+            stiffness,
+            damping,
+        }
+    }
 }
 
 /// A finite number that is compared by its bits.
@@ -72,10 +153,7 @@ impl Log {
 
     /// Adds a change of `key` to `value`.
     pub fn set(&mut self, steps: u64, key: &str, value: &str) {
-        // One line for one event: line breaks separate no more than spaces do.
-        let value = value.split_whitespace().collect::<Vec<_>>().join(" ");
-        let key = key.to_owned();
-        self.push(steps, Event::Set { key, value });
+        self.push(steps, Event::set(key, value));
     }
 
     /// Adds an event.
@@ -98,6 +176,11 @@ impl Log {
                     interval,
                     sections,
                 } => format!("{steps} |{} {} {sections}\n", first.0, interval.0),
+                Event::Pull(None) => format!("{steps} @\n"),
+                Event::Pull(Some(pulled)) => {
+                    let numbers = pulled.numbers.map(|number| number.0.to_string());
+                    format!("{steps} @{} {}\n", pulled.body, numbers.join(" "))
+                }
                 Event::Stop => format!("{steps} !\n"),
             });
         }
@@ -127,6 +210,10 @@ impl Log {
             }
             if let Some(text) = what.strip_prefix('|') {
                 log.push(before, read_sections(text).ok_or_else(wrong)?);
+                continue;
+            }
+            if let Some(text) = what.strip_prefix('@') {
+                log.push(before, read_pull(text).ok_or_else(wrong)?);
                 continue;
             }
             log.push(
@@ -163,6 +250,23 @@ fn read_sections(text: &str) -> Option<Event> {
     })
 }
 
+/// Reads `BODY` and eight numbers, or nothing.
+fn read_pull(text: &str) -> Option<Event> {
+    if text.is_empty() {
+        return Some(Event::Pull(None));
+    }
+    let (body, rest) = text.split_once(' ')?;
+    let numbers: Option<Vec<Number>> = rest
+        .split(' ')
+        .map(|part| part.parse::<f64>().ok())
+        .map(|value| value.filter(|value| value.is_finite()).map(Number))
+        .collect();
+    let numbers: [Number; 8] = numbers?.try_into().ok()?;
+    let soft = numbers[6..].iter().all(|n| (0.0..=STIFFEST).contains(&n.0));
+    let body = body.parse().ok()?;
+    soft.then_some(Event::Pull(Some(Pulled { body, numbers })))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -180,6 +284,15 @@ mod tests {
             sections: 30,
         };
         log.push(130, sections);
+        let pull = Pull {
+            body: 3,
+            point: Vec3::new(0.1, -1e-300, 0.0),
+            hand: Vec3::new(1.0 / 3.0, 2.0, 1e22),
+            stiffness: 700.5,
+            damping: 0.0,
+        };
+        log.push(131, Event::Pull(Some(pull.into())));
+        log.push(140, Event::Pull(None));
         log.push(7_000_000_000, Event::Stop);
         let text = log.text();
         assert_eq!(text.lines().next(), Some("0 contact.clearance=0.5 mm"));
@@ -194,6 +307,10 @@ mod tests {
             "1 |0 2 3",
             "1 |1 NaN 3",
             "1 |1 2 3 4",
+            "1 @0 1 2 3",
+            "1 @0 1 2 3 4 5 6 -7 8",
+            "1 @0 1 2 3 4 5 inf 7 8",
+            "1 @0 1 2 3 4 5 6 7 1e10",
         ] {
             assert!(Log::read(Vec::new(), bad).is_err(), "{bad}");
         }

@@ -27,11 +27,13 @@ mod overlay;
 mod picture;
 mod player;
 mod plots;
+mod pull;
 mod replay;
 mod settled;
 mod share;
 mod stack;
 mod theme;
+mod timeline;
 mod transport;
 mod twin;
 mod value;
@@ -68,6 +70,7 @@ pub use player::{Clock, Player};
 pub use plots::{Plots, Window};
 pub use replay::{Replay, Verdict};
 pub use share::{CameraPose, LONGEST_LINK, Link, LinkError, SceneText};
+use timeline::Timeline;
 use viewport::Viewport;
 #[cfg(not(target_arch = "wasm32"))]
 pub use window::{WindowError, run_native};
@@ -201,6 +204,7 @@ pub struct App {
     accuracy: Accuracy,
     viewport: Viewport,
     plots: Plots,
+    timeline: Timeline,
     bench: Bench,
     dialog: Option<Dialog>,
     /// What the last attempt to open or reset said.
@@ -267,6 +271,7 @@ impl App {
             controls: Controls::default(),
             accuracy: Accuracy::default(),
             plots,
+            timeline: Timeline::default(),
             bench: Bench::default(),
             dialog: None,
             problem: options.problem,
@@ -429,6 +434,8 @@ impl App {
         match self.player.reset() {
             Ok(()) => {
                 self.problem = None;
+                self.timeline.reset();
+                self.plots.reset();
                 self.viewport.restart(&self.player);
             }
             Err(error) => self.problem = Some(error.located(self.player.wanted()).to_string()),
@@ -525,6 +532,8 @@ impl App {
         player.set_playing(self.player.is_playing() || self.player.stopped().is_some());
         self.player = player;
         self.viewport.show_scene(&self.player);
+        self.timeline.reset();
+        self.plots.reset();
         self.controls.clear();
         self.problem = None;
         self.replay = None;
@@ -540,7 +549,14 @@ impl App {
         }
         let moves = matches!(
             action,
-            Action::PlayPause | Action::Step | Action::StepBack | Action::Reset
+            Action::PlayPause
+                | Action::Step
+                | Action::StepBack
+                | Action::Backwards
+                | Action::Impact { .. }
+                | Action::Home
+                | Action::End
+                | Action::Reset
         );
         if self.is_under_way() && moves {
             return;
@@ -549,7 +565,21 @@ impl App {
         match action {
             Action::PlayPause => player.set_playing(!player.is_playing()),
             Action::Step => player.single_step(),
-            Action::StepBack => player.step_back(),
+            Action::StepBack => {
+                player.step_back();
+                self.viewport.arrive(&self.player);
+            }
+            Action::Backwards if player.is_playing_backwards() => player.set_playing(false),
+            Action::Backwards => player.play_backwards(),
+            Action::Impact { forward } => {
+                player.go_to_touch(self.viewport.focus(), forward);
+                self.viewport.arrive(&self.player);
+            }
+            Action::Home | Action::End => {
+                let end = player.reached();
+                player.go_to(if action == Action::End { end } else { 0.0 });
+                self.viewport.arrive(&self.player);
+            }
             Action::Reset => self.reset(),
             Action::Slower | Action::Faster => {
                 let scale = transport::next_scale(player.pacer.scale(), action == Action::Faster);

@@ -56,7 +56,9 @@ pub fn labels(painter: &Painter, rect: Rect, scale: f32, list: &DrawList) {
         let at = rect.min + vec2(label.pixel.x, label.pixel.y) / scale;
         let plate = match label.kind {
             LabelKind::Joint(_) => Some((13.0, Align2::LEFT_BOTTOM, vec2(10.0, -8.0))),
-            LabelKind::Peak(_) => Some((12.0, Align2::LEFT_CENTER, vec2(9.0, 0.0))),
+            LabelKind::Peak(_) | LabelKind::Outside => {
+                Some((12.0, Align2::LEFT_CENTER, vec2(9.0, 0.0)))
+            }
             LabelKind::Axis | LabelKind::Gravity => None,
         };
         if let Some((size, anchor, beside)) = plate {

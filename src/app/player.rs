@@ -1,20 +1,28 @@
 //! A running scene with its transport: playing, pacing, recording, peaks and what went wrong. No egui here.
 
-use std::collections::VecDeque;
+pub mod course;
+mod keyframes;
+#[cfg(test)]
+mod tests;
+mod travel;
+
 use std::sync::OnceLock;
 
 use web_time::Instant;
 
-use super::log::{Event, Log, Number};
+use super::log::{Entry, Event, Log, Number};
 use super::settled::Settling;
 use super::twin::Twin;
 use super::watch::Watch;
 use crate::analysis::section::Schedule;
 use crate::scene::{Scene, SceneError, Value};
 use crate::simulate::{
-    Channels, Effect, Frame, History, Mark, Pacer, Peak, RECORDED_JOINTS, Simulation, Snapshot,
-    StartError, Stopped,
+    Channels, Effect, Frame, History, Pacer, Peak, Pull, RECORDED_JOINTS, Simulation, StartError,
+    Stopped,
 };
+use course::Course;
+use keyframes::Keyframes;
+pub use travel::{Flag, Left};
 
 /// Narrowest bin of the record, s: shorter than any step that resolves an impact.
 const FINEST_BIN: f64 = 2e-6;
@@ -30,8 +38,10 @@ pub fn wall() -> f64 {
 
 /// A simulation and everything needed to play and plot it.
 ///
-/// There is one instant on show, the pacer's: frame, record, peaks, sections and link are those of it. The simulation itself
-/// is further on by a part of its latest step, of which nothing is told before its time.
+/// There is one instant on show, the pacer's: frame, peaks, sections and link are those of it. The simulation itself is
+/// further on by a part of its latest step, of which nothing is told before its time. The record goes as far as the run was
+/// ever shown ([`Self::reached`]): an instant of the past is put on show by going back to a state that was kept and taking the
+/// same steps again.
 pub struct Player {
     /// How fast simulated time passes.
     pub pacer: Pacer,
@@ -45,6 +55,8 @@ pub struct Player {
     /// What is allowed but may not mean what the user expects.
     warnings: Vec<String>,
     playing: bool,
+    /// Time runs backwards while it plays.
+    backwards: bool,
     stopped: Option<Stopped>,
     frame: Frame,
     peaks: Vec<Peak>,
@@ -55,13 +67,25 @@ pub struct Player {
     channels: Channels,
     /// Of the channels, and behind them the clearance of each recorded ball joint.
     history: History,
+    /// The stretch of the past that was last gone through again, in all detail.
+    near: Option<Box<History>>,
+    course: Course,
     recorded: Frame,
+    /// Up to where the latest steps were recorded, s.
+    recorded_to: f64,
     values: Vec<f64>,
     settling: Settling,
-    /// What was before the latest single steps, oldest first.
-    past: VecDeque<Before>,
+    keyframes: Keyframes,
+    /// Latest instant that was on show, s, and most steps taken.
+    reached: f64,
+    most_steps: u64,
+    /// The future that was left when the run went on from its past.
+    left: Option<Box<Left>>,
     /// What was done since the start.
     log: Log,
+    /// Of the log, what was done before the instant on show; and the time of each that ever was, s.
+    applied: usize,
+    event_times: Vec<f64>,
     /// Instants at which steps end.
     sections: Option<Schedule>,
     watch: Watch,
@@ -71,19 +95,8 @@ pub struct Player {
     stepping: f64,
 }
 
-/// What a single step is taken back to.
-struct Before {
-    state: Snapshot,
-    /// Length of the log.
-    entries: usize,
-    record: Mark,
-}
-
 /// Keys of the solver that win over its preset.
 const SOLVER_KEYS: [&str; 3] = ["solver.method", "solver.step", "solver.tolerance"];
-
-/// Single steps that can be taken back.
-const PAST: usize = 64;
 
 /// Seconds of viewing that the automatic window of the plots shows.
 const VIEWING: f64 = 5.0;
@@ -118,6 +131,7 @@ impl Player {
             original,
             warnings: sentences(scene),
             playing: false,
+            backwards: false,
             stopped: None,
             frame: Frame::default(),
             peaks: Vec::new(),
@@ -125,11 +139,19 @@ impl Player {
             passed: Vec::new(),
             unchanged: None,
             history: record_of(scene, &channels),
+            near: None,
+            course: Course::default(),
             channels,
             recorded: Frame::default(),
+            recorded_to: 0.0,
             values: Vec::new(),
             settling: Settling::new(scene),
-            past: VecDeque::new(),
+            keyframes: Keyframes::default(),
+            reached: 0.0,
+            most_steps: 0,
+            left: None,
+            applied: 0,
+            event_times: Vec::new(),
             stepped: 0.0,
             stepping: 0.0,
             log: Log::new(&scene.changes),
@@ -177,14 +199,16 @@ impl Player {
         self.channels.len()..self.history.channels()
     }
 
-    /// The recorded past.
+    /// The record of the run, as far as it was ever on show.
     pub fn history(&self) -> &History {
         &self.history
     }
 
-    /// What was done to the run since its start.
-    pub fn log(&self) -> &Log {
-        &self.log
+    /// What was done to the run from its start to the instant on show.
+    pub fn log(&self) -> Log {
+        let mut log = self.log.clone();
+        log.entries.truncate(self.applied);
+        log
     }
 
     /// What the chaos bench keeps of the run.
@@ -236,9 +260,16 @@ impl Player {
             interval: Number(schedule.interval),
             sections: schedule.sections as u64,
         };
-        self.log.push(self.steps(), event);
-        self.past.clear();
+        self.branch();
         self.sections = Some(schedule);
+        self.note(event);
+    }
+
+    /// Adds to the log what was just done.
+    fn note(&mut self, event: Event) {
+        self.log.push(self.steps(), event);
+        self.event_times.push(self.simulation.time());
+        self.applied = self.log.entries.len();
     }
 
     /// Instants of the schedule that are still to come.
@@ -263,14 +294,27 @@ impl Player {
         self.playing
     }
 
-    /// Lets time pass, or stand still. A stopped run does not start again before a reset.
+    /// Lets time pass, or stand still. A stopped run does not start again before a reset, or a way back.
     pub fn set_playing(&mut self, playing: bool) {
+        self.backwards = false;
         self.playing = playing && self.stopped.is_none();
         if self.playing {
-            self.past.clear();
+            self.go_on();
             // The average of the reached speed starts anew.
             self.pacer.jump(self.pacer.shown());
         }
+    }
+
+    /// Lets time pass backwards, to the start.
+    pub fn play_backwards(&mut self) {
+        self.playing = self.pacer.shown() > 0.0;
+        self.backwards = self.playing;
+        self.pacer.jump(self.pacer.shown());
+    }
+
+    /// Whether time passes backwards.
+    pub fn is_playing_backwards(&self) -> bool {
+        self.playing && self.backwards
     }
 
     /// Why the divergence guard stopped the run.
@@ -285,7 +329,12 @@ impl Player {
 
     /// Moves on by one frame that comes `dt` seconds after the last, and refreshes what is on show.
     pub fn advance(&mut self, dt: f64) {
-        if self.playing {
+        if self.is_playing_backwards() {
+            let shown = self.pacer.shown();
+            let ahead = self.pacer.begin(dt);
+            self.travel(2.0 * shown - ahead);
+            self.playing = self.pacer.shown() > 0.0;
+        } else if self.playing {
             let target = self.pacer.begin(dt);
             let start = (self.clock)();
             let before = self.simulation.time();
@@ -314,48 +363,21 @@ impl Player {
 
     /// One accepted step, shown at once.
     pub fn single_step(&mut self) {
-        self.playing = false;
+        self.set_playing(false);
         if self.stopped.is_some() {
             return;
         }
+        self.go_on();
         // Where the step begins, not the instant on show within the one before.
         self.record_until(self.simulation.time());
-        if self.past.len() == PAST {
-            self.past.pop_front();
-        }
-        self.past.push_back(Before {
-            state: self.simulation.snapshot(),
-            entries: self.log.entries.len(),
-            record: self.history.mark(),
-        });
         self.step();
         self.show_latest();
     }
 
-    /// Takes the latest single step back; nothing where there is none.
-    pub fn step_back(&mut self) {
-        let Some(before) = self.past.pop_back() else {
-            return;
-        };
-        self.playing = false;
-        // A scene that has run once starts again.
-        if self.simulation.restore(&before.state).is_ok() {
-            self.stopped = None;
-            self.unchanged = None;
-            self.log.entries.truncate(before.entries);
-            self.history.rewind(&before.record);
-            self.forget_peaks();
-            self.watch.back_to(self.simulation.time());
-            self.settling = Settling::new(self.simulation.running_scene());
-            self.restart_twin();
-            self.show_latest();
-        }
-    }
-
     /// Pauses and runs on until `time`, s, whatever it takes: the start of a headless frame.
     pub fn run_to(&mut self, time: f64) {
-        self.playing = false;
-        self.past.clear();
+        self.set_playing(false);
+        self.go_on();
         while self.simulation.time() < time && self.stopped.is_none() {
             self.step();
         }
@@ -369,8 +391,7 @@ impl Player {
 
     /// Puts `time`, s, on show, as far as it lies in what is left of the latest step: no way leads back.
     pub(super) fn show(&mut self, time: f64) {
-        let recorded = self.history.span().map_or(0.0, |(_, end)| end);
-        let shown = time.max(recorded).min(self.simulation.time());
+        let shown = time.max(self.recorded_to).min(self.simulation.time());
         self.pacer.jump(shown);
         self.present();
     }
@@ -400,8 +421,18 @@ impl Player {
     /// # Errors
     /// As [`Simulation::set`]; nothing has changed then.
     pub fn set(&mut self, key: &str, value: &str) -> Result<Effect, SceneError> {
+        if self.has_future() {
+            // What is refused leaves no future.
+            self.wanted().clone().set(key, value)?;
+            self.branch();
+        }
+        let effect = self.apply_set(key, value)?;
+        self.note(Event::set(key, value));
+        Ok(effect)
+    }
+
+    fn apply_set(&mut self, key: &str, value: &str) -> Result<Effect, SceneError> {
         let effect = self.change(|run| run.set(key, value))?;
-        self.log.set(self.steps(), key, value);
         if key == "solver.preset" {
             // Chosen here, a preset is to have effect: it replaces what was set by name before.
             for by_name in SOLVER_KEYS {
@@ -424,14 +455,47 @@ impl Player {
     /// # Errors
     /// As [`Simulation::set_value`]; nothing has changed then.
     pub fn set_original(&mut self, key: &str) -> Result<Effect, SceneError> {
+        self.original.get(key)?;
+        self.branch();
+        let effect = self.apply_original(key)?;
+        let key = key.to_owned();
+        self.note(Event::Original { key });
+        Ok(effect)
+    }
+
+    fn apply_original(&mut self, key: &str) -> Result<Effect, SceneError> {
         let value = self.original.get(key)?;
         let effect = self.change(|run| run.set_value(key, &value))?;
-        let event = Event::Original {
-            key: key.to_owned(),
-        };
-        self.log.push(self.steps(), event);
         self.after_change();
         Ok(effect)
+    }
+
+    /// Somebody pulls on a body from now on, elsewhere or otherwise than before, or lets go.
+    pub fn pull(&mut self, pull: Option<Pull>) {
+        if self.simulation.pulled() == pull {
+            return;
+        }
+        self.branch();
+        // Of several moves between two steps the last one counts.
+        let steps = self.steps();
+        let moved =
+            |entry: &Entry| entry.steps == steps && matches!(entry.event, Event::Pull(Some(_)));
+        if pull.is_some() && self.log.entries.last().is_some_and(moved) {
+            self.log.entries.pop();
+            self.event_times.pop();
+        }
+        if self.apply_pull(pull).is_ok() {
+            self.note(Event::Pull(pull.map(Into::into)));
+        }
+    }
+
+    fn apply_pull(&mut self, pull: Option<Pull>) -> Result<Effect, SceneError> {
+        self.change(|run| {
+            run.pull(pull);
+            Ok(())
+        })?;
+        self.after_change();
+        Ok(Effect::Now)
     }
 
     /// Changes the run at its latest state. What is left to show of the step before is shown as it was.
@@ -458,7 +522,6 @@ impl Player {
 
     fn after_change(&mut self) {
         self.warnings = sentences(self.wanted());
-        self.past.clear();
         self.watch
             .begin(self.simulation.running_scene(), self.simulation.time());
         self.settling = Settling::new(self.simulation.running_scene());
@@ -503,6 +566,7 @@ impl Player {
     /// One step, the rest of the one before recorded first; false when the guard stopped it.
     fn step(&mut self) -> bool {
         self.record_until(self.simulation.time());
+        self.keep();
         match self.simulation.step_until(self.next_section()) {
             Ok(()) => {
                 self.unchanged = None;
@@ -515,7 +579,11 @@ impl Player {
             Err(stopped) => {
                 self.playing = false;
                 self.stopped = Some(stopped);
-                self.log.push(self.steps(), Event::Stop);
+                match self.log.entries.get(self.applied) {
+                    // As it was the first time.
+                    Some(entry) if entry.event == Event::Stop => self.applied += 1,
+                    _ => self.note(Event::Stop),
+                }
                 false
             }
         }
@@ -541,9 +609,7 @@ impl Player {
 
     /// Takes what the latest step did until `until`, s, into the record.
     fn record_until(&mut self, until: f64) {
-        let Some((_, start)) = self.history.span() else {
-            return;
-        };
+        let start = self.recorded_to;
         if until > start {
             // A long step is recorded at instants within it, so that a curve stays one on a plot.
             let parts = ((until - start) / self.automatic_window() * 400.0)
@@ -593,7 +659,12 @@ impl Player {
                 self.values[channel] = peak.normal;
             }
         }
+        self.recorded_to = time;
         self.history.push(time, &self.values);
+        if let Some(near) = &mut self.near {
+            near.push(time, &self.values);
+        }
+        self.course.record(&frame);
         self.watch.record(&frame);
         self.settling.record(&frame);
         self.recorded = frame;
@@ -613,7 +684,9 @@ impl Player {
             if peak.normal > 0.0
                 && let Some(channel) = self.channels.normal_force(joint)
             {
-                self.history.widen(peak.time, channel, peak.normal);
+                for record in std::iter::once(&mut self.history).chain(self.near.as_deref_mut()) {
+                    record.widen(peak.time, channel, peak.normal);
+                }
             }
             let passed = &mut self.passed[joint];
             let (impacts, speed) = (passed.impacts, passed.approach_speed);
@@ -644,6 +717,8 @@ impl Player {
     fn present(&mut self) {
         let shown = self.pacer.shown();
         self.record_until(shown);
+        self.reached = self.reached.max(shown);
+        self.watch.show(shown);
         let mut frame = std::mem::take(&mut self.frame);
         self.run_at(shown).sample(shown, &mut frame);
         self.frame = frame;
@@ -656,13 +731,14 @@ impl Player {
 
     fn start_record(&mut self) {
         self.history.clear();
-        self.past.clear();
+        self.forget_travels();
         self.unchanged = None;
         self.settling = Settling::new(self.simulation.running_scene());
         // Forces at the start are those of the first frame: nothing has struck yet.
         self.simulation.take_peaks(&mut self.coming);
         self.forget_peaks();
         self.record(self.simulation.time());
+        self.keep();
         self.show_latest();
     }
 }
@@ -682,272 +758,4 @@ fn passed(schedule: &Schedule, now: f64) -> usize {
         k += 1;
     }
     k
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::simulate::Quantity;
-
-    fn player(scene: &str) -> Player {
-        let scene = Scene::load(scene, &[]).expect("built in");
-        Player::new(&scene).expect("starts")
-    }
-
-    fn recorded(player: &Player, quantity: Quantity, to: f64) -> Vec<[f64; 2]> {
-        let list = player.channels().list();
-        let channel = list
-            .iter()
-            .position(|c| c.quantity == quantity)
-            .expect("recorded");
-        let mut bins = Vec::new();
-        player.history().bins(channel, 0.0, to, 400, &mut bins);
-        let points = bins.iter().map(|b| [0.5 * (b.from + b.to), b.greatest]);
-        points.collect()
-    }
-
-    #[test]
-    fn the_record_holds_the_peak_of_an_impact_between_steps() {
-        let mut player = player("spcmm");
-        player.run_to(9e-3);
-        player.advance(0.0);
-        let points = recorded(&player, Quantity::NormalForce, 9e-3);
-        let peak = points.iter().map(|p| p[1]).fold(0.0, f64::max);
-        // Peak of the first impact of S1 (`tests/physics/reference.rs`); the live tolerance is coarser than the reference's.
-        assert!((peak - 621.35).abs() < 0.005 * 621.35, "{peak}");
-    }
-
-    #[test]
-    fn a_long_step_is_recorded_as_a_curve() {
-        // Free fall: half an acceleration times time squared, in steps of milliseconds.
-        let mut player = player("spcmm");
-        player.run_to(7e-3);
-        let points = recorded(&player, Quantity::Eccentricity, 7e-3);
-        assert!(points.len() > 15, "{}", points.len());
-        let last = points[points.len() - 1];
-        for point in points {
-            let fall = last[1] * (point[0] / last[0]).powi(2);
-            assert!(
-                (point[1] - fall).abs() < 0.03 * last[1],
-                "{point:?}: {fall}"
-            );
-        }
-    }
-
-    /// The instant on show is that of frame, record, peaks and sections, whatever the run itself has computed beyond it.
-    fn one_clock(player: &Player) {
-        let shown = player.pacer.shown();
-        assert_eq!(player.frame().time, shown);
-        let (_, end) = player.history().span().expect("recorded");
-        assert_eq!(end, shown);
-        assert!(player.peaks().iter().all(|peak| peak.time <= shown));
-        assert!(player.watch().orbit().all(|(time, _)| *time <= shown));
-        assert!(player.watch().sections().all(|(time, _)| *time <= shown));
-        assert!(player.simulation().time() >= shown);
-    }
-
-    #[test]
-    fn nothing_tells_of_what_is_still_to_come() {
-        let mut player = player("spcmm");
-        one_clock(&player);
-        player.pacer.set_scale(0.01);
-        player.set_playing(true);
-        let mut within = 0;
-        for frame in 0..150 {
-            player.advance(1.0 / 60.0);
-            one_clock(&player);
-            let far = player.simulation().time() - player.pacer.shown();
-            within += usize::from(far > 1e-4);
-            if frame == 60 {
-                player.set_playing(false);
-                player.advance(1.0 / 60.0);
-                one_clock(&player);
-                player.set_playing(true);
-            }
-        }
-        assert!(within > 20, "in the midst of long steps: {within}");
-        // Strictly after the peak of the second impact: the record has its top, and the last value is that on show.
-        let forces = recorded(&player, Quantity::NormalForce, 1.0);
-        let peak = player.simulation().statistics().peak_normal[0];
-        let top = forces.iter().map(|p| p[1]).fold(0.0, f64::max);
-        assert!((top / peak - 1.0).abs() < 1e-6, "{top} {peak}");
-        for back in 0..6 {
-            player.single_step();
-            one_clock(&player);
-            if back > 2 {
-                player.step_back();
-                one_clock(&player);
-            }
-        }
-        player.run_to(0.2);
-        one_clock(&player);
-        player.reset().expect("starts");
-        one_clock(&player);
-        assert!(player.peaks().iter().all(|peak| *peak == Peak::default()));
-        assert_eq!(player.history().rows(9).len(), 1);
-    }
-
-    #[test]
-    fn after_steps_back_the_record_is_as_before_and_another_future_follows_it() {
-        let mut player = player("spcmm");
-        player.run_to(8.6e-3);
-        player.single_step();
-        let rows = player.history().rows(200);
-        for _ in 0..40 {
-            player.single_step();
-        }
-        assert!(player.history().rows(200) != rows);
-        for _ in 0..40 {
-            player.step_back();
-        }
-        assert!(player.history().rows(200) == rows);
-        // A change takes nothing of the past away.
-        player.set("contact.friction", "0.3").expect("in range");
-        assert!(player.history().rows(200) == rows);
-        player.run_to(12e-3);
-        one_clock(&player);
-        let forces = recorded(&player, Quantity::NormalForce, 8.6e-3);
-        assert!(forces.iter().any(|point| point[1] > 300.0));
-    }
-
-    #[test]
-    fn a_change_in_the_middle_of_a_step_leaves_the_rest_of_it_as_it_was() {
-        let (mut player, mut other) = (player("spcmm"), player("spcmm"));
-        for player in [&mut player, &mut other] {
-            player.pacer.set_scale(0.005);
-            player.set_playing(true);
-            while player.simulation().time() < 2e-3 + player.pacer.shown() {
-                player.advance(1.0 / 60.0);
-            }
-        }
-        let change = player.simulation().time();
-        player.set("contact.clearance", "0.6 mm").expect("in range");
-        one_clock(&player);
-        // The run goes on as if it had been changed there by itself.
-        let mut straight = Simulation::new(other.scene()).expect("starts");
-        straight
-            .restore(&other.simulation().snapshot())
-            .expect("the same scene");
-        straight
-            .set("contact.clearance", "0.6 mm")
-            .expect("in range");
-        assert_eq!(player.simulation().state_hash(), straight.state_hash());
-        let mut frames = 0;
-        loop {
-            player.advance(1.0 / 60.0);
-            other.advance(1.0 / 60.0);
-            one_clock(&player);
-            if player.pacer.shown() >= change {
-                break;
-            }
-            frames += 1;
-            assert_eq!(player.frame().pose, other.frame().pose);
-            assert_eq!(player.frame().joints, other.frame().joints);
-        }
-        assert!(frames > 5, "{frames}");
-        assert_eq!(player.frame().joints[0].clearance, 0.6e-3);
-        let mut clearances = Vec::new();
-        let channel = player.clearances().start;
-        player
-            .history()
-            .bins(channel, 0.0, 1.0, 400, &mut clearances);
-        let (first, last) = (clearances[0], clearances[clearances.len() - 1]);
-        assert!((first.greatest - 0.3e-3).abs() < 1e-9 && (last.greatest - 0.6e-3).abs() < 1e-9);
-    }
-
-    #[test]
-    fn a_window_that_was_hidden_for_minutes_goes_on_and_does_not_catch_up() {
-        let mut player = player("spcmm");
-        player.pacer.set_scale(0.02);
-        player.set_playing(true);
-        for _ in 0..30 {
-            player.advance(1.0 / 60.0);
-        }
-        let (before, steps) = (player.pacer.shown(), player.steps());
-        // Ten minutes at 1:50 would be 12 s of simulated time.
-        player.advance(600.0);
-        let leap = player.pacer.shown() - before;
-        assert!(
-            leap <= 0.02 * crate::simulate::LONGEST_FRAME + 1e-12,
-            "{leap}"
-        );
-        assert!(player.steps() - steps < 20_000);
-        let before = player.pacer.shown();
-        for _ in 0..30 {
-            player.advance(1.0 / 60.0);
-        }
-        let passed = player.pacer.shown() - before;
-        assert!(passed <= 0.01 + 1e-9, "nothing is owed: {passed}");
-        assert!(player.is_playing());
-    }
-
-    #[test]
-    fn another_number_of_links_is_recorded_after_the_reset() {
-        let mut player = player("chain");
-        let before = player.channels().len();
-        assert_eq!(
-            player.set("chain.links", "3").expect("in range"),
-            Effect::AtReset
-        );
-        assert!(player.is_waiting("chain.links") && player.has_waiting());
-        assert_eq!(player.channels().len(), before);
-        player.reset().expect("starts");
-        assert!(!player.has_waiting());
-        assert!(player.channels().len() < before);
-        player.run_to(0.01);
-        assert!(!recorded(&player, Quantity::NormalForce, 0.01).is_empty());
-    }
-
-    #[test]
-    fn single_steps_are_taken_back_bit_by_bit() {
-        let mut player = player("spcmm");
-        player.run_to(8e-3);
-        player.step_back();
-        let mut hashes = Vec::new();
-        for _ in 0..80 {
-            hashes.push(player.simulation().state_hash());
-            player.single_step();
-        }
-        let end = player.simulation().state_hash();
-        for hash in hashes.iter().rev().take(PAST) {
-            player.step_back();
-            assert_eq!(player.simulation().state_hash(), *hash);
-        }
-        player.step_back();
-        assert_eq!(player.simulation().state_hash(), hashes[80 - PAST]);
-        for _ in 0..PAST {
-            player.single_step();
-        }
-        assert_eq!(player.simulation().state_hash(), end);
-        player.set("contact.friction", "0.3").expect("in range");
-        player.step_back();
-        assert_eq!(player.simulation().state_hash(), end);
-    }
-
-    #[test]
-    fn a_preset_chosen_here_replaces_what_was_set_by_name() {
-        let mut player = player("spcmm");
-        player.set("solver.tolerance", "1e-9").expect("in range");
-        player.set("solver.preset", "accurate").expect("a preset");
-        let (_, _, tolerance) = crate::scene::Preset::Accurate.point();
-        assert_eq!(player.wanted().solver.tolerance, tolerance);
-        assert_eq!(player.scene().solver.tolerance, tolerance);
-        player.set("solver.tolerance", "1e-9").expect("in range");
-        assert_eq!(player.scene().solver.tolerance, 1e-9);
-        assert!(player.beats_preset().is_empty());
-    }
-
-    #[test]
-    fn a_refused_value_changes_nothing() {
-        let mut player = player("spcmm");
-        let before = player.wanted().contact;
-        assert!(player.set("contact.clearance", "-1 mm").is_err());
-        assert!(player.set("contact.clearence", "1 mm").is_err());
-        assert_eq!(player.wanted().contact, before);
-        player.set("contact.clearance", "0.7 mm").expect("in range");
-        player
-            .set_original("contact.clearance")
-            .expect("the scene's own");
-        assert_eq!(player.wanted().contact, before);
-    }
 }

@@ -14,6 +14,8 @@ use crate::simulate::{Bin, Quantity, RECORDED_JOINTS};
 
 /// Windows to choose from, s.
 const WINDOWS: [f64; 6] = [1e-3, 1e-2, 0.05, 0.1, 1.0, 10.0];
+/// The shortest time that a plot comes near to, s.
+const SHORTEST_WINDOW: f64 = 1e-6;
 /// Height below which a plot says nothing.
 const LEAST_HEIGHT: f32 = 110.0;
 /// Least distance of two marks on an axis, points: the height of their numbers.
@@ -50,6 +52,8 @@ pub struct Plots {
     readings: Vec<Vec<PlotPoint>>,
     /// Where each plot was last.
     places: Vec<(Quantity, Place)>,
+    /// The stretch of time that somebody has come nearer to, s, in place of the window.
+    zoomed: Option<(f64, f64)>,
 }
 
 /// Where a plot is on the screen, and its units in SI.
@@ -68,6 +72,7 @@ impl Default for Plots {
             levels: Vec::new(),
             readings: Vec::new(),
             places: Vec::new(),
+            zoomed: None,
         }
     }
 }
@@ -92,18 +97,24 @@ impl Plots {
             ui.label("Window");
             ComboBox::from_id_salt("window")
                 .width(110.0)
-                .selected_text(self.window.label())
+                .selected_text(self.window_label())
                 .show_ui(ui, |ui| {
                     let all = [Window::Automatic]
                         .into_iter()
                         .chain(WINDOWS.map(Window::Last))
                         .chain([Window::Everything]);
                     for window in all {
-                        ui.selectable_value(&mut self.window, window, window.label());
+                        let chosen = self.window == window && self.zoomed.is_none();
+                        if ui.selectable_label(chosen, window.label()).clicked() {
+                            (self.window, self.zoomed) = (window, None);
+                        }
                     }
                 })
                 .response
-                .on_hover_text("Simulated time that the plots show")
+                .on_hover_text(
+                    "Simulated time that the plots show. Over a plot: wheel or pinch for nearer, drag to shift, click to put \
+                     an instant on show, double-click for the window chosen here",
+                )
                 .accessible_name("Window");
         });
     }
@@ -144,8 +155,44 @@ impl Plots {
         }
     }
 
-    /// The chosen plots, beside each other where there is room, else below each other.
-    pub fn ui(&mut self, ui: &mut Ui, player: &Player) {
+    /// The window chosen again.
+    pub fn reset(&mut self) {
+        self.zoomed = None;
+    }
+
+    fn window_label(&self) -> String {
+        match self.zoomed {
+            Some((from, to)) => format!("{} zoomed", value::time(to - from)),
+            None => self.window.label(),
+        }
+    }
+
+    /// The time that the plots show, s. The instant on show is its end; where there is a future, three quarters of the way.
+    fn range(&self, player: &Player) -> (f64, f64) {
+        if let Some(range) = self.zoomed {
+            return range;
+        }
+        let shown = player.pacer.shown();
+        let known = player
+            .left()
+            .map_or(0.0, |left| left.to)
+            .max(player.reached());
+        let (length, end) = match self.window {
+            Window::Automatic => (player.automatic_window(), shown),
+            Window::Last(length) => (length, shown),
+            Window::Everything => (known.max(1e-4), known),
+        };
+        let end = end.max(known.min(shown + 0.25 * length));
+        // A window that starts before t = 0 fills from the left.
+        if end < length {
+            (0.0, length)
+        } else {
+            (end - length, end)
+        }
+    }
+
+    /// The chosen plots, beside each other where there is room, else below each other. Returns the instant that was clicked on, s.
+    pub fn ui(&mut self, ui: &mut Ui, player: &Player) -> Option<f64> {
         self.places.clear();
         let chosen: Vec<Quantity> = self
             .chosen
@@ -155,8 +202,9 @@ impl Plots {
             .collect();
         if chosen.is_empty() {
             ui.label(RichText::new("No plot chosen").weak());
-            return;
+            return None;
         }
+        let mut asked = None;
         let space = ui.available_size();
         let columns = ((space.x / 300.0).floor() as usize).clamp(1, chosen.len());
         let rows = chosen.len().div_ceil(columns);
@@ -170,29 +218,27 @@ impl Plots {
                 for row in chosen.chunks(columns) {
                     ui.horizontal_top(|ui| {
                         for quantity in row {
-                            ui.allocate_ui(vec2(width, height), |ui| {
+                            let shown = ui.allocate_ui(vec2(width, height), |ui| {
                                 self.plot(ui, player, *quantity, vec2(width, height))
                             });
+                            asked = asked.or(shown.inner);
                         }
                     });
                 }
             });
+        asked
     }
 
-    fn plot(&mut self, ui: &mut Ui, player: &Player, quantity: Quantity, space: egui::Vec2) {
+    fn plot(
+        &mut self,
+        ui: &mut Ui,
+        player: &Player,
+        quantity: Quantity,
+        space: egui::Vec2,
+    ) -> Option<f64> {
         let (unit, size) = quantity.unit();
-        let end = player.pacer.shown();
-        let length = match self.window {
-            Window::Automatic => player.automatic_window(),
-            Window::Last(length) => length,
-            Window::Everything => end.max(1e-4),
-        };
-        // A window that starts before t = 0 fills from the left.
-        let (from, to) = if end < length {
-            (0.0, length)
-        } else {
-            (end - length, end)
-        };
+        let (from, to) = self.range(player);
+        let (length, now) = (to - from, player.pacer.shown());
         let (time_unit, time_size) = time_axis(length);
         let units = [time_size, size];
 
@@ -210,7 +256,7 @@ impl Plots {
         let bins = (2.0 * space.x * ui.ctx().pixels_per_point()) as usize;
         let query = |channel: usize, out: &mut Vec<Bin>| {
             out.clear();
-            player.history().bins(channel, from, to, bins, out);
+            player.bins(channel, from, to, bins, out);
         };
         self.traces.resize_with(members.len(), Trace::default);
         for (index, (channel, _)) in members.iter().enumerate() {
@@ -327,19 +373,7 @@ impl Plots {
                 .y_grid_spacer(|input| marks(&input, MARKS))
                 .grid_spacing(Rangef::new(MARKS_APART, 300.0))
                 .grid_color(faint.gamma_multiply(0.35))
-                .grid_fade(0.0)
-                .label_formatter(move |position| match position {
-                    HoverPosition::NearDataPoint {
-                        plot_name,
-                        position,
-                        ..
-                    } => Some(format!(
-                        "{plot_name}\n{} {unit}\nat {} {time_unit}",
-                        value::number(position.y, finest),
-                        value::number(position.x, earliest)
-                    )),
-                    HoverPosition::Elsewhere { .. } => None,
-                });
+                .grid_fade(0.0);
             let Self {
                 traces,
                 levels,
@@ -347,6 +381,28 @@ impl Plots {
                 hidden,
                 ..
             } = &*self;
+            // All curves at the time under the pointer.
+            let reading = |position: &HoverPosition<'_>| {
+                let (HoverPosition::NearDataPoint { position, .. }
+                | HoverPosition::Elsewhere { position }) = position;
+                let time = position.x * time_size;
+                let mut words = format!("{} {time_unit}", value::number(position.x, earliest));
+                for ((channel, member), trace) in members.iter().zip(traces) {
+                    let values = trace.at(time).filter(|_| !hidden.contains(channel));
+                    let Some((least, greatest)) = values else {
+                        continue;
+                    };
+                    let [least, greatest] =
+                        [least, greatest].map(|v| value::number(v / size, finest));
+                    words += &if least == greatest {
+                        format!("\n{member} {least} {unit}")
+                    } else {
+                        format!("\n{member} {least} to {greatest} {unit}")
+                    };
+                }
+                Some(words)
+            };
+            let plot = plot.label_formatter(reading);
             let shown = plot.show(ui, |plot| {
                 plot.set_plot_bounds_x(from / time_size..=to / time_size);
                 plot.set_plot_bounds_y(least..=greatest);
@@ -372,8 +428,79 @@ impl Plots {
                 }
             });
             let transform = shown.transform;
+            let asked = self.pointer(ui, &shown.response, &transform, time_size, player);
             self.places.push((quantity, Place { transform, units }));
-        });
+            let x = |time: f64| {
+                let point = PlotPoint::new(time / time_size, 0.0);
+                transform.position_from_point(&point).x
+            };
+            let frame = *transform.frame();
+            if (from..to).contains(&now)
+                && (player.has_future() || self.zoomed.is_some() || player.left().is_some())
+            {
+                // What is to come is pale.
+                let painter = ui.painter_at(frame);
+                let veil = ui.visuals().panel_fill.gamma_multiply(0.65);
+                painter.rect_filled(frame.with_min_x(x(now)), 0.0, veil);
+                let line = egui::Stroke::new(1.0, ui.visuals().strong_text_color());
+                painter.vline(x(now), frame.y_range(), line);
+            }
+            for flag in player
+                .flags()
+                .filter(|flag| (from..=to).contains(&flag.time))
+            {
+                let line = egui::Stroke::new(1.0, ui.visuals().warn_fg_color.gamma_multiply(0.7));
+                ui.painter_at(frame)
+                    .vline(x(flag.time), frame.y_range(), line);
+            }
+            asked
+        })
+        .inner
+    }
+
+    /// What the pointer asks of a plot: another stretch of time, or the instant that is returned, s.
+    fn pointer(
+        &mut self,
+        ui: &Ui,
+        response: &egui::Response,
+        transform: &PlotTransform,
+        time_size: f64,
+        player: &Player,
+    ) -> Option<f64> {
+        let (from, to) = self.range(player);
+        let time = |pos: Pos2| transform.value_from_position(pos).x * time_size;
+        let end = player
+            .left()
+            .map_or(0.0, |left| left.to)
+            .max(player.reached());
+        if response.double_clicked() {
+            self.zoomed = None;
+            return None;
+        }
+        if let Some(pos) = response.hover_pos() {
+            let (wheel, pinch) = ui.input(|i| (i.smooth_scroll_delta().y, i.zoom_delta()));
+            let factor = f64::from((wheel * 0.004).exp() * pinch);
+            if factor != 1.0 && end > 0.0 {
+                let length = ((to - from) / factor).max(SHORTEST_WINDOW);
+                let share = (time(pos) - from) / (to - from);
+                let from = (time(pos) - share * length).max(0.0);
+                self.zoomed = (length < end).then_some((from, from + length));
+            }
+        }
+        if response.dragged_by(egui::PointerButton::Primary) {
+            let width = f64::from(transform.frame().width());
+            let length = to - from;
+            let by = f64::from(response.drag_delta().x) / width * length;
+            let from = (from - by).clamp(0.0, (end - length).max(0.0));
+            if by != 0.0 {
+                self.zoomed = Some((from, from + length));
+            }
+        }
+        let clicked = response.clicked().then(|| response.interact_pointer_pos());
+        clicked
+            .flatten()
+            .map(time)
+            .filter(|time| *time <= player.reached())
     }
 
     /// The terms of the energy balance, stacked: what gives energy above zero, what takes or holds it below.

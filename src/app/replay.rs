@@ -3,7 +3,6 @@
 use super::log::{Entry, Event};
 use super::player::Player;
 use super::share::Link;
-use crate::analysis::section::Schedule;
 
 /// What became of a link.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -140,17 +139,14 @@ fn apply(player: &mut Player, entry: &Entry) -> Result<(), String> {
         Event::Original { key } => player
             .set_original(key)
             .map_err(|error| error.to_string())?,
-        Event::Sections {
-            first,
-            interval,
-            sections,
-        } => {
-            player.end_steps_at(Schedule {
-                first: first.0,
-                interval: interval.0,
-                sections: usize::try_from(*sections).unwrap_or(usize::MAX),
-                discard: 0,
-            });
+        Event::Sections { .. } => {
+            if let Some(schedule) = entry.event.schedule() {
+                player.end_steps_at(schedule);
+            }
+            return Ok(());
+        }
+        Event::Pull(pulled) => {
+            player.pull(pulled.map(Into::into));
             return Ok(());
         }
         // Taken by the step before.
@@ -174,7 +170,7 @@ mod tests {
     fn link_to(player: &Player) -> Link {
         let link = Link {
             scene: SceneText::of(player.scene()),
-            log: player.log().clone(),
+            log: player.log(),
             steps: Some(player.steps()),
             time: Some(player.pacer.shown()),
             hash: Some(player.simulation().state_hash()),
@@ -308,7 +304,8 @@ mod tests {
         }
         original.step_back();
         assert!(original.stopped().is_none());
-        let events = original.log().entries.iter().map(|entry| &entry.event);
+        let log = original.log();
+        let events = log.entries.iter().map(|entry| &entry.event);
         assert!(!events.clone().any(|event| *event == Event::Stop));
         assert_eq!(
             follow(link_to(&original), 5).1,
@@ -342,6 +339,6 @@ mod tests {
         let (player, verdict, _) = follow(link, 5);
         assert_eq!(verdict, Verdict::Reached);
         assert_eq!(player.pacer.shown(), 9.5e-3);
-        assert_eq!(player.log(), &Log::new(&player.scene().changes));
+        assert_eq!(player.log(), Log::new(&player.scene().changes));
     }
 }

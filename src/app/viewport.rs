@@ -9,10 +9,11 @@ use eframe::egui::{
 use glam::{Vec2, Vec3};
 
 use super::player::Player;
+use super::pull::Grip;
 use super::share::CameraPose;
 use super::{keys, overlay, value};
 use crate::render;
-use crate::simulate::ContactState;
+use crate::simulate::{ContactState, Pull};
 use crate::view::{
     Camera, DrawList, PeakMarks, Picked, Preset, SEEN, Scaling, SceneView, Shot, Theme,
     ViewOptions, to_f32,
@@ -60,6 +61,9 @@ pub struct Viewport {
     time: f64,
     /// The user has turned, moved or chosen the view: it is no longer the one that a scene opens with.
     moved: bool,
+    /// What the pointer holds, and whether that changed.
+    grip: Option<Grip>,
+    grip_changed: bool,
     /// More than one finger was down since the last time that none was.
     pinched: bool,
 }
@@ -82,6 +86,8 @@ impl Viewport {
             followed: None,
             time: player.pacer.shown(),
             moved: false,
+            grip: None,
+            grip_changed: false,
             pinched: false,
         }
     }
@@ -195,6 +201,20 @@ impl Viewport {
     pub fn follow(&mut self, picked: Option<Picked>) {
         self.followed = picked;
         self.camera.follow(None);
+    }
+
+    /// What the pointer pulls at by now, if that changed; `None` where it let go.
+    pub fn take_pull(&mut self) -> Option<Option<Pull>> {
+        let changed = std::mem::take(&mut self.grip_changed);
+        changed.then(|| self.grip.as_ref().map(Grip::pull))
+    }
+
+    /// The ball joint in focus: the one that is followed.
+    pub fn focus(&self) -> Option<usize> {
+        match self.followed {
+            Some(Picked::Joint(joint)) => Some(joint),
+            _ => None,
+        }
     }
 
     /// What [`Self::follow`] was given.
@@ -367,6 +387,9 @@ impl Viewport {
         }
         let delta = response.drag_delta() * scale;
         let delta = Vec2::new(delta.x, delta.y);
+        if self.pull(ui, response, player, rect, size, scale) {
+            return;
+        }
         let pans = response.dragged_by(PointerButton::Secondary)
             || response.dragged_by(PointerButton::Middle)
             || (shift && response.dragged_by(PointerButton::Primary));
@@ -384,6 +407,54 @@ impl Viewport {
             let factor = (scroll * 0.004).exp() * pinch;
             self.zoom(player, factor, pos, rect, size, scale);
         }
+    }
+
+    /// Takes hold of a body by a press on it and a drag, by a finger that stays on it; whether the pointer holds one.
+    fn pull(
+        &mut self,
+        ui: &Ui,
+        response: &egui::Response,
+        player: &Player,
+        rect: Rect,
+        size: [u32; 2],
+        scale: f32,
+    ) -> bool {
+        let (finger, shift, origin) =
+            ui.input(|i| (i.any_touches(), i.modifiers.shift, i.pointer.press_origin()));
+        let taken = if finger {
+            response.long_touched()
+        } else {
+            response.drag_started_by(PointerButton::Primary)
+        };
+        let pixel = |pos: Pos2| {
+            let pixel = (pos - rect.min) * scale;
+            Vec2::new(pixel.x, pixel.y)
+        };
+        if let Some(origin) = origin.filter(|_| taken) {
+            let shot = shot!(self, player, &self.camera, size, scale);
+            let hit = self.view.pick(&shot, pixel(origin));
+            self.grip = hit.and_then(|hit| Grip::new(player, hit));
+            self.grip_changed |= self.grip.is_some();
+        }
+        let Some(grip) = &mut self.grip else {
+            return false;
+        };
+        let held = response.is_pointer_button_down_on();
+        match response.interact_pointer_pos().filter(|_| held) {
+            None => {
+                self.grip = None;
+                self.grip_changed = true;
+            }
+            Some(pos) => {
+                let moved = ui.input(|i| i.pointer.delta()) * scale;
+                if moved != egui::Vec2::ZERO || taken {
+                    let moved = Vec2::new(moved.x, moved.y);
+                    grip.drag(&self.camera, pixel(pos), moved, size, shift);
+                    self.grip_changed = true;
+                }
+            }
+        }
+        true
     }
 
     /// Comes nearer by `factor` to what is at `pos`, points.

@@ -25,6 +25,8 @@ pub struct Watch {
     phase: f64,
     /// Number of the section that comes next: it is at (next + phase) T.
     next: u64,
+    /// The instant on show, s: what is known of later ones waits for its time.
+    shown: f64,
     orbit: VecDeque<(f64, Observed)>,
     sections: VecDeque<(f64, Observed)>,
     frame: Frame,
@@ -37,6 +39,7 @@ impl Watch {
             period: drive_period(scene).map_err(|why| why.to_string()),
             phase: 0.0,
             next: 0,
+            shown: 0.0,
             orbit: VecDeque::new(),
             sections: VecDeque::new(),
             frame: Frame::default(),
@@ -66,12 +69,17 @@ impl Watch {
 
     /// The orbit of the last periods, oldest first: time in s, state.
     pub fn orbit(&self) -> impl DoubleEndedIterator<Item = &(f64, Observed)> {
-        self.orbit.iter()
+        self.orbit.range(..known(&self.orbit, self.shown))
     }
 
     /// The sections, oldest first: time in s, state.
     pub fn sections(&self) -> impl ExactSizeIterator<Item = &(f64, Observed)> {
-        self.sections.iter()
+        self.sections.range(..known(&self.sections, self.shown))
+    }
+
+    /// Another instant is on show, s.
+    pub fn show(&mut self, shown: f64) {
+        self.shown = shown;
     }
 
     /// After a change at `now`, s: what was is another motion's.
@@ -82,12 +90,19 @@ impl Watch {
         self.seek(now);
     }
 
-    /// Steps were taken back to `now`, s.
-    pub fn back_to(&mut self, now: f64) {
+    /// Another future begins at `now`, s.
+    pub fn cut(&mut self, now: f64) {
         for list in [&mut self.orbit, &mut self.sections] {
-            while list.back().is_some_and(|(time, _)| *time > now) {
-                list.pop_back();
-            }
+            list.truncate(known(list, now));
+        }
+        self.seek(now);
+    }
+
+    /// The run goes on from `now`, s, where it was before. What is known already stays; an orbit that would have a gap does not.
+    pub fn go_to(&mut self, now: f64) {
+        let ends = self.orbit.front().zip(self.orbit.back());
+        if ends.is_some_and(|((first, _), (last, _))| !(*first..=*last).contains(&now)) {
+            self.orbit.clear();
         }
         self.seek(now);
     }
@@ -109,6 +124,7 @@ impl Watch {
     pub fn record(&mut self, frame: &Frame) {
         let period = self.period.as_ref().copied().unwrap_or(NO_PERIOD);
         let before = self.orbit.back().map(|(time, _)| *time);
+        // Also one that was recorded before the run was taken back.
         if before.is_some_and(|before| frame.time - before < period / PER_PERIOD) {
             return;
         }
@@ -122,14 +138,22 @@ impl Watch {
     /// The latest step is on show until `until`, s: sections within it are interpolated. Sampling never changes a run.
     pub fn step(&mut self, simulation: &mut Simulation, until: f64) {
         while let Some(time) = self.next_time().filter(|time| *time <= until) {
+            self.next += 1;
+            if self.sections.back().is_some_and(|(last, _)| time <= *last) {
+                continue;
+            }
             simulation.sample(time, &mut self.frame);
             if self.sections.len() == SECTIONS {
                 self.sections.pop_front();
             }
             self.sections.push_back((time, observed(&self.frame.pose)));
-            self.next += 1;
         }
     }
+}
+
+/// How many of `list` lie no later than `now`, s.
+fn known(list: &VecDeque<(f64, Observed)>, now: f64) -> usize {
+    list.partition_point(|(time, _)| *time <= now)
 }
 
 #[cfg(test)]
@@ -143,6 +167,7 @@ mod tests {
             watch.step(simulation, simulation.time());
             simulation.sample(simulation.time(), &mut frame);
             watch.record(&frame);
+            watch.show(frame.time);
         }
     }
 
@@ -165,7 +190,12 @@ mod tests {
             a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12)
         };
         assert!(near(&times(&watch), &[0.05, 0.25, 0.45, 0.65]));
-        watch.back_to(0.5);
+        watch.show(0.5);
+        assert!(near(&times(&watch), &[0.05, 0.25, 0.45]));
+        // Gone through again they are what they were; with another future they are cut.
+        watch.show(0.7);
+        assert_eq!(watch.sections().len(), 4);
+        watch.cut(0.5);
         assert!(near(&times(&watch), &[0.05, 0.25, 0.45]));
         run(&mut watch, &mut simulation, 0.9);
         watch.set_phase(0.75, simulation.time());

@@ -28,7 +28,7 @@ mod tree;
 
 pub use bounds::CostOf;
 pub use contacts::{Contacts, Counts, Gap, Ramp, Touching};
-pub use elements::ElementReport;
+pub use elements::{ElementReport, Pull};
 pub use jet::Jet;
 pub use kinematics::{Kinematics, Wrench};
 pub use power::Powers;
@@ -204,7 +204,10 @@ pub struct Mechanism {
     equations: Box<dyn Equations>,
     /// Ball joints with clearance.
     pub contacts: Contacts,
+    /// Those of the scene in its order, then the hand that pulls, if one does.
     elements: Vec<Box<dyn ForceElement>>,
+    of_scene: usize,
+    pull: Option<Pull>,
     /// World gravity, m/s^2.
     pub gravity: Vec3,
     joint_names: Vec<String>,
@@ -237,6 +240,8 @@ impl Mechanism {
         Ok(Self {
             sources: power::Sources::new(&model, &*equations, scene.elements.len()),
             elements: elements_of(scene, &model),
+            of_scene: scene.elements.len(),
+            pull: None,
             evaluated: None,
             model,
             rank: None,
@@ -433,7 +438,31 @@ impl Mechanism {
     /// What the force elements do at `t`, that of the latest evaluation, in the order of the scene.
     pub fn element_reports(&self, t: f64) -> impl Iterator<Item = ElementReport> {
         let motion = self.equations.motion();
-        self.elements.iter().map(move |e| e.report(t, motion))
+        let of_scene = self.elements[..self.of_scene].iter();
+        of_scene.map(move |e| e.report(t, motion))
+    }
+
+    /// What the hand does that pulls, at `t`, that of the latest evaluation.
+    pub fn pull_report(&self, t: f64) -> Option<ElementReport> {
+        let hand = self.elements.get(self.of_scene)?;
+        Some(hand.report(t, self.equations.motion()))
+    }
+
+    /// Where a hand pulls.
+    pub fn pull(&self) -> Option<Pull> {
+        self.pull
+    }
+
+    /// From now on a hand pulls on a body of `scene`, whose equations these are, or none does.
+    pub fn set_pull(&mut self, scene: &Scene, pull: Option<Pull>) {
+        self.elements.truncate(self.of_scene);
+        self.pull = pull;
+        if let Some(pull) = pull.filter(|pull| pull.body < scene.bodies.len()) {
+            let hand = elements::hand(scene, &self.model, pull);
+            self.elements.push(hand);
+        }
+        let elements = self.elements.len();
+        self.sources = power::Sources::new(&self.model, &*self.equations, elements);
     }
 
     /// Whether an element answers to motion, so that it can be stiff.

@@ -15,6 +15,8 @@ pub struct Frame {
     pub joints: Vec<JointReport>,
     /// Force elements in scene order.
     pub elements: Vec<ElementReport>,
+    /// The hand that pulls, if one does: from it to the point.
+    pub pull: Option<ElementReport>,
     /// Driven joints in scene order: actuator force, N (or torque, N m), positive along the joint axis's positive sense.
     pub actuators: Vec<f64>,
     /// The output body.

@@ -46,6 +46,13 @@ pub struct Mark {
     span: Option<(f64, f64)>,
 }
 
+impl Mark {
+    /// Bytes that it takes, about.
+    pub fn bytes(&self) -> usize {
+        size_of::<Self>() + std::mem::size_of_val(self.ranges.as_slice())
+    }
+}
+
 impl History {
     /// A record of `channels` quantities whose narrowest bins are `finest` seconds wide.
     pub fn new(channels: usize, finest: f64) -> Self {

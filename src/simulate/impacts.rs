@@ -61,6 +61,11 @@ pub(super) struct Impacts {
 }
 
 impl Impacts {
+    /// What is kept of the finished ones.
+    pub(super) fn kept(&self) -> &[Impact] {
+        &self.finished
+    }
+
     /// For `joints` ball joints. A step finishes at most one impact of each, so that all can be had between two steps.
     pub(super) fn new(joints: usize) -> Self {
         Self {

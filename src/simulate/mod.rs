@@ -28,6 +28,7 @@ pub use stopped::{StopAdvice, StopFault, Stopped};
 
 use std::sync::Arc;
 
+pub use crate::mechanism::Pull;
 use crate::mechanism::{CostOf, Counts, MechanismError, Structure};
 use crate::scene::{Scene, SceneError};
 
@@ -198,6 +199,21 @@ impl Snapshot {
     /// The scene it belongs to, as it ran.
     pub fn running_scene(&self) -> &Scene {
         &self.running
+    }
+
+    /// Time of the state, s.
+    pub fn time(&self) -> f64 {
+        self.state.time()
+    }
+
+    /// Accepted steps before it.
+    pub fn steps(&self) -> u64 {
+        self.state.steps()
+    }
+
+    /// Bytes that it takes, about; the scene, which others share, left out.
+    pub fn bytes(&self) -> usize {
+        self.state.bytes() + std::mem::size_of_val(self.peaks.as_slice())
     }
 }
 

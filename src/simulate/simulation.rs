@@ -23,7 +23,7 @@ use super::stepper::AnyStepper;
 use super::{Frame, NotUnique, Peak, StartError, Statistics, StopAdvice, StopFault, Stopped};
 use crate::contact::Memory;
 use crate::integrate::{Controller, System as _};
-use crate::mechanism::{Counts, Mechanism, MechanismError, Ramp, Touching};
+use crate::mechanism::{Counts, Mechanism, MechanismError, Pull, Ramp, Touching};
 use crate::scene::Scene;
 use automatic::{Choice, controller_of, prepare_implicit};
 pub use automatic::{LARGEST_DENSE, LARGEST_IMPLICIT};
@@ -130,6 +130,8 @@ pub(super) struct State {
     /// Clearances on their way, and in force.
     ramps: Vec<Option<Ramp>>,
     clearances: Vec<f64>,
+    /// Where somebody pulls.
+    pull: Option<Pull>,
     control: Control,
     record: Record,
 }
@@ -197,6 +199,7 @@ impl State {
             clearances: (0..joints)
                 .map(|j| mechanism.contacts.clearance(j))
                 .collect(),
+            pull: None,
             control: Control::new(scene),
             record: Record {
                 account: Account::default(),

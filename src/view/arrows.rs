@@ -166,7 +166,13 @@ pub(super) fn push_forces(
     out: &mut DrawList,
 ) {
     let options = &shot.options.arrows;
-    if !(options.normal || options.friction) || joints.is_empty() {
+    let at_joints = (options.normal || options.friction) && !joints.is_empty();
+    let loads = shot.frame.elements.iter().filter(|_| options.normal);
+    let mut outside = loads
+        .filter(|report| report.torque.is_some())
+        .chain(&shot.frame.pull)
+        .peekable();
+    if !at_joints && outside.peek().is_none() {
         return;
     }
     let ruler = Ruler::new(shot.camera, shot.size);
@@ -184,7 +190,8 @@ pub(super) fn push_forces(
             ..Arrow::new(tail, along * length, THICKEST * height * pixel)
         })
     };
-    for (joint, report) in joints.iter().zip(&shot.frame.joints) {
+    let reports = joints.iter().zip(&shot.frame.joints);
+    for (joint, report) in reports.filter(|_| at_joints) {
         let normal = to_f32(&report.normal_force);
         // The wall pushes the ball away from the point of contact, so that lies against the normal force.
         let contact = joint.ball_centre - normal.normalize_or_zero() * joint.ball_radius;
@@ -197,6 +204,30 @@ pub(super) fn push_forces(
                 arrow.push(&mut out.arrows, colour);
             }
         }
+    }
+    for report in outside {
+        let point = to_f32(&report.points[1]);
+        if let Some(arrow) = arrow(to_f32(&report.force), point) {
+            arrow.push(&mut out.arrows, palette.outside);
+            let words = format_quantity_digits(report.force.norm(), "N", 3);
+            let tip = arrow.tail + arrow.along;
+            push_label(out, &words.into(), LabelKind::Outside, tip, palette.outside);
+        }
+    }
+    if let Some(pull) = &shot.frame.pull {
+        let [from, to] = pull.points.map(|point| to_f32(&point).to_array());
+        let faint = palette.outside.with_opacity(0.6);
+        out.lines.push(Line {
+            from,
+            width: OUTLINE * shot.pixels_per_point,
+            to,
+            pad: 0.0,
+            from_colour: faint.0,
+            to_colour: faint.0,
+        });
+    }
+    if !at_joints {
+        return;
     }
     let marked = options.normal && options.peaks;
     for mark in shot.marks.marks(shot.frame).filter(|_| marked) {

@@ -174,6 +174,8 @@ pub enum LabelKind {
     Joint(usize),
     /// The mark of a peak of a ball joint, by index.
     Peak(usize),
+    /// The arrow of a force from outside.
+    Outside,
 }
 
 /// Text that the interface paints over the picture.

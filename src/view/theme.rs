@@ -84,6 +84,8 @@ pub struct Palette {
     pub normal: Colour,
     /// Friction arrows.
     pub friction: Colour,
+    /// Arrows of forces from outside.
+    pub outside: Colour,
     /// Light of a joint that was hit.
     pub flash: Colour,
     /// Gravity arrow.
@@ -114,6 +116,7 @@ impl Palette {
                 text: Colour::hex(0x1E2A36),
                 normal: Colour::hex(0xD9480F),
                 friction: Colour::hex(0x1769C9),
+                outside: Colour::hex(0x00796B),
                 flash: Colour::hex(0xFFC61A),
                 gravity: Colour::hex(0x6B3FA0),
                 axes: [
@@ -143,6 +146,7 @@ impl Palette {
                 text: Colour::hex(0xE6EBF0),
                 normal: Colour::hex(0xFF7A33),
                 friction: Colour::hex(0x4DABF7),
+                outside: Colour::hex(0x2FD6BE),
                 flash: Colour::hex(0xFFE27A),
                 gravity: Colour::hex(0xB197FC),
                 axes: [

@@ -1,11 +1,13 @@
 //! Force elements other than contacts: what pushes bodies without a constraint. Each kind is one file, and a row below.
 
 mod load;
+mod pull;
 mod spring;
 
 use super::kinematics::{Kinematics, Wrench};
 use super::model::{Anchor, Model};
-use crate::scene::{Element, Mat3, Scene, Vec3};
+use crate::scene::{Attachment, Element, Mat3, Scene, Vec3};
+pub use pull::Pull;
 
 /// How the force of an element between two points answers to their relative motion.
 #[derive(Clone, Copy, Debug)]
@@ -80,6 +82,16 @@ pub(super) fn elements_of(scene: &Scene, model: &Model) -> Vec<Box<dyn ForceElem
         make(element, &anchors)
     };
     scene.elements.iter().map(make).collect()
+}
+
+/// The element of a hand that pulls.
+pub(super) fn hand(scene: &Scene, model: &Model, pull: Pull) -> Box<dyn ForceElement> {
+    let point = Attachment {
+        body: Some(pull.body),
+        point: pull.point,
+    };
+    let on = model.anchor(scene, &point);
+    Box::new(pull::Hand { on, pull })
 }
 
 /// Position and velocity of a point, m and m/s, and its arm from the centroid.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::automatic::{Choice, controller_of, prepare_implicit};
 use super::{CLEARANCE_SPEED, Simulation};
 use crate::contact::Memory;
-use crate::mechanism::Ramp;
+use crate::mechanism::{Pull, Ramp};
 use crate::scene::{Scene, SceneError};
 use crate::simulate::Effect;
 use crate::simulate::stepper::AnyStepper;
@@ -37,6 +37,19 @@ impl Simulation {
             |running| running.set_value(key, value).map(|_| ()),
             waits,
         )
+    }
+
+    /// Somebody pulls on a body from now on, elsewhere or otherwise than before, or lets go.
+    pub fn pull(&mut self, pull: Option<Pull>) {
+        self.state.pull = pull;
+        self.mechanism.set_pull(&self.running, pull);
+        self.refresh();
+        self.book_change();
+    }
+
+    /// Where somebody pulls.
+    pub fn pulled(&self) -> Option<Pull> {
+        self.state.pull
     }
 
     fn adopt(

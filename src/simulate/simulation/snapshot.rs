@@ -1,11 +1,32 @@
 //! The whole state: copied, put back, hashed.
 
-use super::Simulation;
 use super::automatic::prepare_implicit;
+use super::{Simulation, State};
 use crate::integrate::System as _;
 use crate::mechanism::{Mechanism, Touching};
 use crate::simulate::stepper::AnyStepper;
 use crate::simulate::{Snapshot, StartError};
+
+impl State {
+    pub(in crate::simulate) fn time(&self) -> f64 {
+        self.now.t
+    }
+
+    pub(in crate::simulate) fn steps(&self) -> u64 {
+        self.record.statistics.steps
+    }
+
+    /// About; upwards.
+    pub(in crate::simulate) fn bytes(&self) -> usize {
+        // Both ends of the step, the ledger's and the stepper's copies.
+        const COPIES: usize = 12;
+        const OF_JOINT: usize = 1024;
+        const FIXED: usize = 4096;
+        let (coordinates, joints) = (self.now.y.len(), self.now.gaps.len());
+        let impacts = std::mem::size_of_val(self.record.impacts.kept());
+        FIXED + coordinates * COPIES * size_of::<f64>() + joints * OF_JOINT + impacts
+    }
+}
 
 impl Simulation {
     /// The whole state.
@@ -43,6 +64,9 @@ impl Simulation {
             self.state.clone_from(&snapshot.state);
             self.running = running.clone();
             self.sampled.fill((0.0, 0.0));
+        }
+        if self.mechanism.pull() != self.state.pull {
+            self.mechanism.set_pull(&self.running, self.state.pull);
         }
         self.scene = snapshot.scene.clone();
         self.peaks.clone_from(&snapshot.peaks);

@@ -1,0 +1,220 @@
+//! When each ball joint was free, slid or stuck.
+
+use crate::simulate::{ContactState, Frame};
+
+/// Changes of state that are kept of all joints together; the oldest half goes then.
+const KEPT: usize = 200_000;
+
+/// The contact states of a run over time. What was recorded twice, since the run was taken back, is kept once.
+#[derive(Clone, Debug, Default)]
+pub struct Course {
+    /// By ball joint: from when on, s, which state.
+    joints: Vec<Vec<(f64, ContactState)>>,
+    changes: usize,
+    from: f64,
+    to: f64,
+}
+
+impl Course {
+    /// Of a run that begins at `time`, s.
+    pub(super) fn begin(&mut self, time: f64) {
+        self.joints.clear();
+        self.changes = 0;
+        (self.from, self.to) = (time, f64::NEG_INFINITY);
+    }
+
+    /// Takes the next instant of the run.
+    pub(super) fn record(&mut self, frame: &Frame) {
+        if frame.time <= self.to {
+            return;
+        }
+        self.to = frame.time;
+        self.joints.resize_with(frame.joints.len(), Vec::new);
+        for (states, now) in self.joints.iter_mut().zip(&frame.joints) {
+            if states.last().is_none_or(|(_, state)| *state != now.state) {
+                states.push((frame.time, now.state));
+                self.changes += 1;
+            }
+        }
+        if self.changes > KEPT {
+            self.forget_half();
+        }
+    }
+
+    fn forget_half(&mut self) {
+        let middle = 0.5 * (self.from + self.to);
+        self.from = middle;
+        for states in &mut self.joints {
+            let gone = states.partition_point(|(time, _)| *time <= middle);
+            states.drain(..gone.saturating_sub(1));
+            if let Some(first) = states.first_mut() {
+                first.0 = first.0.max(middle);
+            }
+        }
+        self.changes = self.joints.iter().map(Vec::len).sum();
+    }
+
+    /// Forgets what came after `time`, s.
+    pub(super) fn cut(&mut self, time: f64) {
+        for states in &mut self.joints {
+            states.truncate(states.partition_point(|(from, _)| *from <= time));
+        }
+        self.changes = self.joints.iter().map(Vec::len).sum();
+        self.to = self.to.min(time);
+    }
+
+    /// Ball joints.
+    pub fn joints(&self) -> usize {
+        self.joints.len()
+    }
+
+    /// From when on the states are known, s.
+    pub fn known_from(&self) -> f64 {
+        self.from
+    }
+
+    /// The states of ball joint `joint` that were between two times, s: from when, to when, which.
+    pub fn states(
+        &self,
+        joint: usize,
+        from: f64,
+        to: f64,
+    ) -> impl Iterator<Item = (f64, f64, ContactState)> {
+        let states = self.joints.get(joint).map_or(&[][..], Vec::as_slice);
+        let first = states.partition_point(|(time, _)| *time <= from);
+        let all = states[first.saturating_sub(1)..].iter().enumerate();
+        let at = first.saturating_sub(1);
+        all.take_while(move |(_, (time, _))| *time < to)
+            .map(move |(index, (time, state))| {
+                let next = states.get(at + index + 1);
+                (*time, next.map_or(self.to, |next| next.0), *state)
+            })
+    }
+
+    /// When ball joint `joint` came to touch between two times, s.
+    pub fn touches(&self, joint: usize, from: f64, to: f64) -> impl Iterator<Item = f64> {
+        let states = self.joints.get(joint).map_or(&[][..], Vec::as_slice);
+        let first = states.partition_point(|(time, _)| *time < from);
+        let pairs = states[first.saturating_sub(1)..].windows(2);
+        let touches = |pair: &&[(f64, ContactState)]| {
+            pair[0].1 == ContactState::Free
+                && matches!(pair[1].1, ContactState::Slip | ContactState::Stick)
+        };
+        pairs
+            .filter(touches)
+            .map(|pair| pair[1].0)
+            .filter(move |time| *time >= from)
+            .take_while(move |time| *time <= to)
+    }
+
+    /// The instant nearest to `time`, s, at which a ball came to touch after it, or before it; of one joint or of any.
+    pub fn next_touch(&self, joint: Option<usize>, time: f64, forward: bool) -> Option<f64> {
+        let chosen = |index: &usize| joint.is_none_or(|joint| joint == *index);
+        let joints = (0..self.joints.len()).filter(chosen);
+        let found = joints.filter_map(|index| {
+            if forward {
+                self.touches(index, time, f64::INFINITY)
+                    .find(|at| *at > time)
+            } else {
+                let states = &self.joints[index];
+                let end = states.partition_point(|(at, _)| *at < time);
+                let pairs = states[..end].windows(2).rev();
+                let touch = pairs.into_iter().find(|pair| {
+                    pair[0].1 == ContactState::Free && pair[1].1 != ContactState::Free
+                });
+                touch.map(|pair| pair[1].0)
+            }
+        });
+        if forward {
+            found.min_by(f64::total_cmp)
+        } else {
+            found.max_by(f64::total_cmp)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::JointReport;
+
+    fn frame(time: f64, state: ContactState) -> Frame {
+        Frame {
+            time,
+            joints: vec![JointReport {
+                state,
+                ..JointReport::default()
+            }],
+            ..Frame::default()
+        }
+    }
+
+    fn course() -> Course {
+        use ContactState::{Free, Slip, Stick};
+        let mut course = Course::default();
+        course.begin(0.0);
+        let states = [Free, Free, Slip, Stick, Free, Slip, Slip];
+        for (index, state) in states.into_iter().enumerate() {
+            course.record(&frame(index as f64, state));
+        }
+        course
+    }
+
+    #[test]
+    fn states_follow_one_another_without_gaps() {
+        use ContactState::{Free, Slip, Stick};
+        let course = course();
+        let all: Vec<_> = course.states(0, 0.0, 9.0).collect();
+        let expected = [
+            (0.0, 2.0, Free),
+            (2.0, 3.0, Slip),
+            (3.0, 4.0, Stick),
+            (4.0, 5.0, Free),
+            (5.0, 6.0, Slip),
+        ];
+        assert_eq!(all, expected);
+        let part: Vec<_> = course.states(0, 2.5, 3.5).collect();
+        assert_eq!(part, expected[1..3]);
+        assert_eq!(course.states(1, 0.0, 9.0).count(), 0);
+    }
+
+    #[test]
+    fn touches_are_found_both_ways_and_a_second_time_changes_nothing() {
+        let mut course = course();
+        for _ in 0..2 {
+            let touches: Vec<f64> = course.touches(0, 0.0, 9.0).collect();
+            assert_eq!(touches, [2.0, 5.0]);
+            assert_eq!(course.next_touch(Some(0), 2.0, true), Some(5.0));
+            assert_eq!(course.next_touch(None, 0.5, true), Some(2.0));
+            assert_eq!(course.next_touch(None, 5.0, true), None);
+            assert_eq!(course.next_touch(None, 5.0, false), Some(2.0));
+            assert_eq!(course.next_touch(None, 5.1, false), Some(5.0));
+            assert_eq!(course.next_touch(None, 2.0, false), None);
+            course.record(&frame(1.0, ContactState::Stick));
+        }
+        course.cut(2.5);
+        assert_eq!(course.next_touch(None, 2.0, true), None);
+        course.record(&frame(3.0, ContactState::Free));
+        course.record(&frame(4.0, ContactState::Stick));
+        assert_eq!(course.next_touch(None, 2.0, true), Some(4.0));
+    }
+
+    #[test]
+    fn a_long_run_forgets_its_oldest_states_and_says_from_when_it_knows() {
+        let mut course = Course::default();
+        course.begin(0.0);
+        for index in 0..=KEPT + 10 {
+            let state = if index % 2 == 0 {
+                ContactState::Free
+            } else {
+                ContactState::Slip
+            };
+            course.record(&frame(index as f64, state));
+        }
+        let from = course.known_from();
+        assert!(from > 0.4 * KEPT as f64);
+        let (start, ..) = course.states(0, 0.0, 1e9).next().expect("kept");
+        assert_eq!(start, from);
+        assert!(course.changes <= KEPT / 2 + 12);
+    }
+}

@@ -1,0 +1,351 @@
+//! Going back in time and on from there: any instant of the run is put on show by restoring the nearest state before it and
+//! taking the same steps again, with what the log says was done on the way. The bits are those of the first time.
+
+use super::course::Course;
+use super::keyframes::Keyframe;
+use super::{FINEST_BIN, Player, sentences};
+use crate::app::log::{Entry, Event};
+use crate::app::settled::Settling;
+use crate::scene::SceneError;
+use crate::simulate::{Bin, Effect, History, Pull};
+
+/// Most steps taken again before an instant of the past, so that the plots have what led to it in detail.
+const LEAD: u64 = 512;
+
+/// Something that was done to the run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Flag {
+    /// When, s.
+    pub time: f64,
+    /// What, in words.
+    pub words: String,
+}
+
+/// A future that was left: the run went on otherwise from an instant before it.
+#[derive(Clone, Debug)]
+pub struct Left {
+    /// What was recorded, the time before it included.
+    pub history: History,
+    /// The contact states.
+    pub course: Course,
+    /// What was done in it.
+    pub flags: Vec<Flag>,
+    /// When it was left, and how far it had been on show, s.
+    pub from: f64,
+    #[allow(missing_docs)]
+    pub to: f64,
+}
+
+/// Of the bins from `first` on those that have something of the time before `start`, s, go.
+fn drop_before(bins: &mut Vec<Bin>, first: usize, start: f64) {
+    let early = bins[first..].iter().take_while(|bin| bin.from < start);
+    let count = early.count();
+    bins.drain(first..first + count);
+}
+
+impl Player {
+    /// Latest instant of the run that was on show, s.
+    pub fn reached(&self) -> f64 {
+        self.reached
+    }
+
+    /// Whether the instant on show has a future that was already on show, or something to be done that already was.
+    pub fn has_future(&self) -> bool {
+        self.pacer.shown() < self.reached || self.applied < self.log.entries.len()
+    }
+
+    /// The future that was left, as far as it is still ahead.
+    pub fn left(&self) -> Option<&Left> {
+        self.left.as_deref().filter(|left| left.to > self.reached)
+    }
+
+    /// When the ball joints were free, slid or stuck.
+    pub fn course(&self) -> &Course {
+        &self.course
+    }
+
+    /// What was done to the run, that of its future included.
+    pub fn flags(&self) -> impl Iterator<Item = Flag> {
+        let entries = self.log.entries.iter().zip(&self.event_times);
+        entries.map(|(entry, time)| Flag {
+            time: *time,
+            words: entry.event.words(),
+        })
+    }
+
+    /// What was recorded of `channel` from `from` to `to`, s, appended to `out` as by [`History::bins`]: from the stretch that was
+    /// last gone through again where there is one, since it is still known in detail. What comes after all that was on show is of
+    /// the future that was left.
+    pub fn bins(&self, channel: usize, from: f64, to: f64, most_bins: usize, out: &mut Vec<Bin>) {
+        self.own_bins(channel, from, to, most_bins, out);
+        let reached = self.reached;
+        if let Some(left) = self.left().filter(|_| to > reached) {
+            let first = out.len();
+            let from = from.max(reached);
+            left.history.bins(channel, from, to, most_bins, out);
+            drop_before(out, first, reached);
+        }
+    }
+
+    fn own_bins(&self, channel: usize, from: f64, to: f64, most_bins: usize, out: &mut Vec<Bin>) {
+        let near = self.near.as_ref().and_then(|near| near.span());
+        let Some((start, end)) = near.filter(|(start, end)| *start < to && *end > from) else {
+            return self.history.bins(channel, from, to, most_bins, out);
+        };
+        if from < start {
+            let first = out.len();
+            self.history.bins(channel, from, start, most_bins, out);
+            // A wider one has something of what follows.
+            let whole = out[first..].iter().filter(|bin| bin.to <= start).count();
+            out.truncate(first + whole);
+        }
+        if let Some(near) = &self.near {
+            near.bins(channel, from.max(start), to.min(end), most_bins, out);
+        }
+        if to > end {
+            let first = out.len();
+            self.history.bins(channel, end, to, most_bins, out);
+            drop_before(out, first, end);
+        }
+    }
+
+    /// Pauses and puts `time`, s, on show: any instant that already was.
+    pub fn go_to(&mut self, time: f64) {
+        self.set_paused();
+        self.travel(time);
+    }
+
+    /// The instant after the one on show, or before it, at which the ball of joint `joint` (of any joint) came to touch; goes
+    /// there, or to the end of what was on show, or to the start.
+    pub fn go_to_touch(&mut self, joint: Option<usize>, forward: bool) {
+        let shown = self.pacer.shown();
+        let found = self.course.next_touch(joint, shown, forward);
+        let end = if forward { self.reached } else { 0.0 };
+        self.go_to(found.filter(|time| *time <= self.reached).unwrap_or(end));
+    }
+
+    /// Takes the latest step back: to where it began, or the one before where that is on show.
+    pub fn step_back(&mut self) {
+        self.set_paused();
+        let Some(steps) = self.steps().checked_sub(1) else {
+            return;
+        };
+        let before = |keyframe: &Keyframe| keyframe.state.steps() <= steps;
+        let time = self.keyframes.latest(before).map(|k| k.state.time());
+        if let Some(time) = time {
+            self.restore_at(time);
+            self.retrace(|player| player.steps() >= steps, f64::INFINITY);
+            self.arrive(self.simulation.time());
+        }
+    }
+
+    fn set_paused(&mut self) {
+        (self.playing, self.backwards) = (false, false);
+    }
+
+    /// Puts `time`, s, on show.
+    pub(super) fn travel(&mut self, time: f64) {
+        if !time.is_finite() {
+            return;
+        }
+        let time = time.clamp(0.0, self.reached);
+        let here = self.simulation.time();
+        let run = self.unchanged.as_deref().unwrap_or(&self.simulation);
+        // The latest step holds every instant of it, but for one from which more was done.
+        if !(run.step_start() < time && time <= here) {
+            let best = self.keyframes.latest(|k| k.state.time() <= time);
+            let best = best.map_or(0.0, |k| k.state.time());
+            if here > time || here < best {
+                self.restore_at(time);
+            }
+            self.retrace(|player| player.simulation.time() >= time, time);
+        }
+        self.arrive(time);
+    }
+
+    /// Puts `time`, s, of the latest step on show, with what was done then.
+    fn arrive(&mut self, time: f64) {
+        self.pacer.jump(time.min(self.simulation.time()));
+        if time >= self.simulation.time().min(self.reached) {
+            self.apply_due();
+        }
+        self.restart_twin();
+        self.present();
+    }
+
+    /// Goes back to a state before `time`, s. Where what led to that instant is not known in detail, to one that lies earlier, and
+    /// keeps the detail from there on.
+    fn restore_at(&mut self, time: f64) {
+        let best = self.keyframes.latest(|k| k.state.time() <= time);
+        let Some((start, steps)) = best.map(|k| (k.state.time(), k.state.steps())) else {
+            return;
+        };
+        let span = self.near.as_ref().and_then(|near| near.span());
+        if span.is_some_and(|(from, to)| from <= start && start <= to) {
+            return self.restore(start, false);
+        }
+        let lead = time - self.automatic_window();
+        let early = |k: &Keyframe| k.state.time() <= lead || k.state.steps() + LEAD <= steps;
+        let first = self.keyframes.latest_kept(early);
+        let start = first.map_or(0.0, |k| k.state.time());
+        self.restore(start, true);
+    }
+
+    /// Goes back to the state kept of `time`, s; with `anew` another stretch is recorded in detail from there on.
+    fn restore(&mut self, time: f64, anew: bool) {
+        let Some(keyframe) = self.keyframes.latest(|k| k.state.time() <= time) else {
+            return;
+        };
+        // A scene that runs once is restored again.
+        if self.simulation.restore(&keyframe.state).is_err() {
+            return;
+        }
+        self.applied = keyframe.events;
+        let now = self.simulation.time();
+        self.stopped = None;
+        self.unchanged = None;
+        self.recorded_to = now;
+        let entries = self.log.entries[..self.applied].iter().rev();
+        let mut schedules = entries.filter_map(|entry| entry.event.schedule());
+        self.sections = schedules.next();
+        self.watch.go_to(now);
+        self.settling = Settling::new(self.simulation.running_scene());
+        self.forget_peaks();
+        self.warnings = sentences(self.wanted());
+        if anew {
+            self.keyframes.forget_fine();
+            let channels = self.history.channels();
+            match &mut self.near {
+                Some(near) => near.clear(),
+                None => self.near = Some(Box::new(History::new(channels, FINEST_BIN))),
+            }
+            self.record(now);
+        }
+    }
+
+    /// Takes steps again until `is_there`, the way led by the log; no further than what was on show before `time`, s.
+    fn retrace(&mut self, is_there: impl Fn(&Self) -> bool, time: f64) {
+        while !is_there(self) {
+            self.pacer.jump(self.simulation.time().min(time));
+            self.apply_due();
+            if self.stopped.is_some() || !self.step() {
+                break;
+            }
+        }
+    }
+
+    /// Does again what was done after so many steps.
+    fn apply_due(&mut self) {
+        while let Some(entry) = self.log.entries.get(self.applied) {
+            if entry.steps > self.steps() {
+                break;
+            }
+            if entry.event == Event::Stop {
+                // The step that is refused again says so.
+                self.step();
+                break;
+            }
+            let entry = entry.clone();
+            self.applied += 1;
+            // It was accepted once, of the same scene in the same state.
+            let _ = self.apply(&entry);
+        }
+    }
+
+    fn apply(&mut self, entry: &Entry) -> Result<(), SceneError> {
+        let done: Result<Effect, SceneError> = match &entry.event {
+            Event::Set { key, value } => self.apply_set(key, value),
+            Event::Original { key } => self.apply_original(key),
+            Event::Sections { .. } => {
+                self.sections = entry.event.schedule();
+                return Ok(());
+            }
+            Event::Pull(pulled) => self.apply_pull(pulled.map(Pull::from)),
+            Event::Stop => return Ok(()),
+        };
+        done.map(|_| ())
+    }
+
+    /// The run goes on from the instant on show. Steps that were taken before are taken again; where something was done on the way,
+    /// that future is left.
+    pub(super) fn go_on(&mut self) {
+        if self.applied < self.log.entries.len() {
+            self.branch();
+        }
+    }
+
+    /// The instant on show becomes the end of the run; what was after it is left.
+    pub(super) fn branch(&mut self) {
+        if !self.has_future() {
+            return;
+        }
+        let (steps, shown, applied) = (self.steps(), self.pacer.shown(), self.applied);
+        if shown < self.reached {
+            let after = |flag: &Flag| flag.time > shown;
+            self.left = Some(Box::new(Left {
+                history: self.history.clone(),
+                course: self.course.clone(),
+                flags: self.flags().filter(after).collect(),
+                from: shown,
+                to: self.reached,
+            }));
+        }
+        self.log.entries.truncate(applied);
+        self.event_times.truncate(applied);
+        let before = |k: &Keyframe| k.state.steps() <= steps && k.events <= applied;
+        let Some(keyframe) = self.keyframes.latest_kept(before) else {
+            return;
+        };
+        let (start, start_steps) = (keyframe.state.time(), keyframe.state.steps());
+        if let Some(mark) = &keyframe.record {
+            self.history.rewind(mark);
+        }
+        self.course.cut(start);
+        self.watch.cut(start);
+        self.keyframes.cut(start_steps);
+        self.near = None;
+        (self.reached, self.most_steps) = (start, start_steps);
+        self.restore(start, false);
+        self.retrace(|player| player.steps() >= steps, shown);
+        self.arrive(shown);
+    }
+
+    /// Keeps the latest state, which is recorded, where one is due: of the run as it goes on, or on the way through its past.
+    pub(super) fn keep(&mut self) {
+        let steps = self.steps();
+        let new = steps >= self.most_steps;
+        self.most_steps = self.most_steps.max(steps);
+        if new && self.keyframes.is_due(steps) {
+            let record = Some(self.history.mark());
+            self.keyframes.keep(self.keyframe(record));
+        } else if !new && self.keyframes.is_fine(steps) {
+            let keyframe = self.keyframe(None);
+            self.keyframes.keep_fine(keyframe);
+        }
+    }
+
+    fn keyframe(&self, record: Option<crate::simulate::Mark>) -> Keyframe {
+        Keyframe {
+            state: self.simulation.snapshot(),
+            events: self.applied,
+            record,
+        }
+    }
+
+    /// A run begins: nothing of the one before is known any more.
+    pub(super) fn forget_travels(&mut self) {
+        self.keyframes.clear();
+        self.near = None;
+        self.left = None;
+        self.course.begin(0.0);
+        self.event_times.clear();
+        (self.applied, self.most_steps) = (0, 0);
+        (self.reached, self.recorded_to) = (0.0, 0.0);
+    }
+
+    /// Bytes that the ways back take, about.
+    #[cfg(test)]
+    pub(super) fn bytes_of_travels(&self) -> usize {
+        self.keyframes.bytes()
+    }
+}

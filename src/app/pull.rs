@@ -1,0 +1,142 @@
+//! Pulling on a body: a press on it and a drag hold it by a spring from the point that was pressed to the pointer.
+
+use glam::{Vec2, Vec3};
+
+use super::player::Player;
+use crate::scene::Vec3 as Exact;
+use crate::simulate::Pull;
+use crate::view::{Camera, Hit, Picked};
+
+/// Frequency at which all that moves would swing on the spring, Hz: soft enough for every method, and in the length of a hand's
+/// move a few times the weight.
+const FREQUENCY: f64 = 3.0;
+/// Damping of that swinging, in parts of the critical one.
+const DAMPING: f64 = 0.3;
+
+/// What a pointer holds.
+#[derive(Clone, Copy, Debug)]
+pub struct Grip {
+    body: usize,
+    /// In the body's frame, m.
+    point: Exact,
+    stiffness: f64,
+    damping: f64,
+    /// Where the pointer holds it now, m.
+    hand: Vec3,
+}
+
+impl Grip {
+    /// Takes hold of what was met; `None` of what does not move.
+    pub fn new(player: &Player, hit: Hit) -> Option<Self> {
+        let scene = player.scene();
+        let body = match hit.what {
+            Picked::Body(body) => body,
+            Picked::Joint(joint) => scene.ball_joints.get(joint)?.ball.body?,
+            Picked::Fixed(_) => return None,
+        };
+        let motion = player.frame().bodies.get(body)?;
+        let point = Exact::from(hit.point.to_array().map(f64::from));
+        let mass: f64 = scene.bodies.iter().map(|body| body.mass).sum();
+        let rate = std::f64::consts::TAU * FREQUENCY;
+        Some(Self {
+            body,
+            point: motion.rotation.tr_mul(&(point - motion.position)),
+            stiffness: mass * rate * rate,
+            damping: 2.0 * DAMPING * mass * rate,
+            hand: hit.point,
+        })
+    }
+
+    /// The pointer came to `pixel`: the hand moves parallel to the picture, or with `depth` along the line of sight, upwards away.
+    pub fn drag(&mut self, camera: &Camera, pixel: Vec2, moved: Vec2, size: [u32; 2], depth: bool) {
+        let (eye, ray) = camera.ray(pixel, size);
+        let (_, _, back) = camera.axes();
+        let distance = -(self.hand - eye).dot(back);
+        if depth {
+            self.hand += back * (moved.y / size[1] as f32 * 2.0 * distance);
+        } else {
+            let along = -ray.dot(back);
+            if along > 0.0 {
+                self.hand = eye + ray * (distance / along);
+            }
+        }
+    }
+
+    /// As the run takes it.
+    pub fn pull(&self) -> Pull {
+        Pull {
+            body: self.body,
+            point: self.point,
+            hand: Exact::from(self.hand.to_array().map(f64::from)),
+            stiffness: self.stiffness,
+            damping: self.damping,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Scene;
+    use crate::view::{SceneView, to_f32};
+
+    #[test]
+    fn what_is_held_follows_the_hand_and_only_bodies_are_held() {
+        let scene = Scene::load("pendulum", &[]).expect("built in");
+        let mut player = Player::new(&scene).expect("starts");
+        let place = player.frame().bodies[0].position;
+        let hit = |what| Hit {
+            what,
+            point: to_f32(&place),
+            distance: 1.0,
+        };
+        assert!(Grip::new(&player, hit(Picked::Fixed(0))).is_none());
+        let mut grip = Grip::new(&player, hit(Picked::Body(0))).expect("moves");
+        // Length of the spring, m.
+        let stretch = |grip: &Grip, player: &Player| {
+            let motion = &player.frame().bodies[grip.body];
+            let point = motion.position + motion.rotation * grip.point;
+            grip.hand.distance(to_f32(&point))
+        };
+        assert!(stretch(&grip, &player) < 1e-6);
+        let view = SceneView::new(player.scene(), player.frame());
+        let camera = view.camera();
+        let size = [800, 600];
+        let pixel = camera.project(grip.hand, size).expect("seen");
+        let aside = pixel + Vec2::new(120.0, 0.0);
+        grip.drag(&camera, aside, Vec2::ZERO, size, false);
+        let seen = camera.project(grip.hand, size).expect("seen");
+        assert!(seen.distance(aside) < 0.1, "the hand is under the pointer");
+        let (_, _, back) = camera.axes();
+        assert!(
+            (grip.hand - to_f32(&place)).dot(back).abs() < 1e-5,
+            "no depth"
+        );
+        let before = grip.hand;
+        grip.drag(&camera, aside, Vec2::new(0.0, -30.0), size, true);
+        let moved = grip.hand - before;
+        assert!(moved.dot(back) < 0.0 && moved.cross(back).length() < 1e-6);
+
+        // The force is the spring's, and what it does is in the energy balance.
+        player.pull(Some(grip.pull()));
+        let pulled = player.frame().pull.expect("pulls");
+        let expected = f64::from(stretch(&grip, &player)) * grip.stiffness;
+        let speed = player.frame().bodies[0].velocity.norm();
+        assert!((pulled.force.norm() - expected).abs() <= 1e-5 * expected + grip.damping * speed);
+        player.run_to(0.4);
+        let ledger = player.frame().ledger.expect("kept");
+        assert!(ledger.external_work.abs() > 1e-3, "{ledger:?}");
+        assert!(
+            ledger.residual().abs() < 1e-3 * ledger.external_work.abs(),
+            "{ledger:?}"
+        );
+        player.pull(None);
+        let work = |player: &Player| player.frame().ledger.expect("kept").external_work;
+        // The rest of the step on show was pulled, too.
+        player.run_to(0.41);
+        let pulled = work(&player);
+        player.run_to(0.5);
+        assert!(player.frame().pull.is_none());
+        assert!((work(&player) - pulled).abs() < 1e-9 * pulled.abs());
+    }
+}

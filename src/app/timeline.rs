@@ -1,0 +1,371 @@
+//! The timeline: the run so far from end to end. A lane for each ball joint shows when it was free, slid or stuck, and where its
+//! ball came to touch; flags show what was done. A click or a drag puts any instant on show.
+
+use eframe::egui::{
+    self, Color32, EventFilter, Key, Mesh, Pos2, Rect, Response, Sense, Shape, Stroke, Ui,
+    WidgetInfo, pos2, vec2,
+};
+
+use super::icons::{Icon, icon_button};
+use super::player::course::Course;
+use super::player::{Flag, Player};
+use super::{theme, value};
+use crate::simulate::{ContactState, RECORDED_JOINTS};
+
+/// Height of the row that the flags stand in, and of all lanes together, points.
+const FLAGS: f32 = 9.0;
+const LANES: f32 = 24.0;
+/// The shortest time that is shown, s.
+const SHORTEST: f64 = 1e-6;
+/// How much stands out what is, of what was left or is to come.
+const PALE: f32 = 0.35;
+/// Part of the shown time that an arrow key moves by.
+const NUDGE: f64 = 0.01;
+/// Nearer than this to the pointer a flag is meant, points.
+const NEAR: f32 = 6.0;
+
+/// The strip under the picture.
+#[derive(Default)]
+pub struct Timeline {
+    /// The part of the run that is shown, s; all of it unless somebody has come nearer.
+    zoomed: Option<(f64, f64)>,
+}
+
+impl Timeline {
+    /// All of the run again.
+    pub fn reset(&mut self) {
+        self.zoomed = None;
+    }
+
+    /// The row: to the impact before and after, backwards, and the strip. `focus`: the ball joint whose impacts are meant.
+    /// Returns whether another instant was put on show.
+    pub fn ui(&mut self, ui: &mut Ui, player: &mut Player, focus: Option<usize>) -> bool {
+        let side = theme::side(ui, 26.0);
+        let mut moved = false;
+        ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = 4.0;
+            let of = focus.and_then(|joint| player.scene().ball_joints.get(joint));
+            let of = of.map_or("any ball joint".to_owned(), |joint| joint.name.clone());
+            let enabled = player.reached() > 0.0;
+            ui.add_enabled_ui(enabled, |ui| {
+                let help = format!("To the impact of {of} before (key ,)");
+                if icon_button(ui, Icon::Before, "Previous impact", &help, side, false).clicked() {
+                    player.go_to_touch(focus, false);
+                    moved = true;
+                }
+                let help = "Let time pass backwards, to the start (key J)";
+                let backwards = player.is_playing_backwards();
+                let (icon, name) = if backwards {
+                    (Icon::Pause, "Pause backwards")
+                } else {
+                    (Icon::Backwards, "Play backwards")
+                };
+                if icon_button(ui, icon, name, help, side, false).clicked() {
+                    if backwards {
+                        player.set_playing(false);
+                    } else {
+                        player.play_backwards();
+                    }
+                    moved = true;
+                }
+                let help = format!("To the next impact of {of} (key .)");
+                if icon_button(ui, Icon::After, "Next impact", &help, side, false).clicked() {
+                    player.go_to_touch(focus, true);
+                    moved = true;
+                }
+            });
+            moved |= self.strip(ui, player, side.max(FLAGS + LANES));
+        });
+        moved
+    }
+
+    /// What is shown, s.
+    fn range(&self, player: &Player) -> (f64, f64) {
+        let left = player.left().map_or(0.0, |left| left.to);
+        let end = player.reached().max(left).max(SHORTEST);
+        let Some((from, to)) = self.zoomed else {
+            return (0.0, end);
+        };
+        // Time that passes takes the shown part along.
+        let (shown, length) = (player.pacer.shown(), to - from);
+        if player.is_playing() && !(from..=to).contains(&shown) {
+            let from = (shown - 0.8 * length).clamp(0.0, (end - length).max(0.0));
+            return (from, from + length);
+        }
+        (from, to)
+    }
+
+    fn strip(&mut self, ui: &mut Ui, player: &mut Player, height: f32) -> bool {
+        let size = vec2(ui.available_width().max(40.0), height);
+        let (rect, response) = ui.allocate_exact_size(size, Sense::click_and_drag());
+        let shown = player.pacer.shown();
+        let enabled = ui.is_enabled();
+        response.widget_info(|| WidgetInfo::slider(enabled, shown, "Timeline, s"));
+        let range = self.range(player);
+        if self.zoomed.is_some() {
+            self.zoomed = Some(range);
+        }
+        let scale = Scale { rect, range };
+        let asked = self.input(ui, &response, player, &scale);
+        if let Some(time) = asked {
+            player.go_to(time);
+        }
+        if ui.is_rect_visible(rect) {
+            let scale = Scale {
+                rect,
+                range: self.range(player),
+            };
+            paint(ui, player, &scale, &response);
+        }
+        if let Some(pos) = response.hover_pos() {
+            response
+                .clone()
+                .on_hover_ui_at_pointer(|ui| describe(ui, player, &scale, pos));
+        }
+        asked.is_some()
+    }
+
+    /// What pointer and keys ask for: an instant, or another part of the run.
+    fn input(
+        &mut self,
+        ui: &Ui,
+        response: &Response,
+        player: &Player,
+        scale: &Scale,
+    ) -> Option<f64> {
+        let (from, to) = scale.range;
+        let length = to - from;
+        if response.has_focus() {
+            let arrows = EventFilter {
+                horizontal_arrows: true,
+                ..EventFilter::default()
+            };
+            ui.memory_mut(|memory| memory.set_focus_lock_filter(response.id, arrows));
+            let pressed = |key| ui.input(|input| input.num_presses(key)) as f64;
+            let by = pressed(Key::ArrowRight) - pressed(Key::ArrowLeft);
+            if by != 0.0 {
+                return Some(player.pacer.shown() + by * NUDGE * length);
+            }
+        }
+        if let Some(pos) = response.hover_pos() {
+            let (wheel, pinch) = ui.input(|i| (i.smooth_scroll_delta().y, i.zoom_delta()));
+            let factor = f64::from((wheel * 0.004).exp() * pinch);
+            if factor != 1.0 {
+                self.zoomed = zoomed(scale, scale.time(pos.x), factor, player);
+            }
+        }
+        if response.double_clicked() {
+            self.zoomed = None;
+            return None;
+        }
+        let held = response.clicked() || response.dragged_by(egui::PointerButton::Primary);
+        let pos = response.interact_pointer_pos().filter(|_| held)?;
+        Some(scale.time(pos.x).clamp(0.0, player.reached()))
+    }
+}
+
+/// The part of the run that is shown after coming nearer to `time` by `factor`; `None` for all of it.
+fn zoomed(scale: &Scale, time: f64, factor: f64, player: &Player) -> Option<(f64, f64)> {
+    let (from, to) = scale.range;
+    let end = player
+        .reached()
+        .max(player.left().map_or(0.0, |left| left.to));
+    let length = ((to - from) / factor).max(SHORTEST);
+    if length >= end {
+        return None;
+    }
+    let share = (time - from) / (to - from);
+    let from = (time - share * length).clamp(0.0, end - length);
+    Some((from, from + length))
+}
+
+/// Time across the strip.
+struct Scale {
+    rect: Rect,
+    range: (f64, f64),
+}
+
+impl Scale {
+    fn time(&self, x: f32) -> f64 {
+        let share = f64::from((x - self.rect.left()) / self.rect.width());
+        self.range.0 + share.clamp(0.0, 1.0) * (self.range.1 - self.range.0)
+    }
+
+    fn x(&self, time: f64) -> f32 {
+        let share = (time - self.range.0) / (self.range.1 - self.range.0);
+        self.rect.left() + (share.clamp(-1.0, 2.0) as f32) * self.rect.width()
+    }
+
+    fn lanes(&self) -> Rect {
+        self.rect.with_min_y(self.rect.top() + FLAGS)
+    }
+
+    /// The lane of ball joint `joint` of so many.
+    fn lane(&self, joint: usize, joints: usize) -> Rect {
+        let lanes = self.lanes();
+        let height = lanes.height() / joints.max(1) as f32;
+        let top = lanes.top() + joint as f32 * height;
+        let gap = if height > 5.0 { 1.0 } else { 0.0 };
+        Rect::from_x_y_ranges(lanes.x_range(), top..=top + height - gap)
+    }
+}
+
+fn paint(ui: &Ui, player: &Player, scale: &Scale, response: &Response) {
+    let visuals = ui.visuals();
+    let painter = ui.painter_at(scale.rect.expand(2.0));
+    let lanes = scale.lanes();
+    painter.rect_filled(lanes, 3.0, visuals.extreme_bg_color);
+    let shown = player.pacer.shown();
+    let (_, end) = scale.range;
+    if let Some(left) = player.left() {
+        course(ui, &left.course, scale, (player.reached(), end), PALE);
+    }
+    course(ui, player.course(), scale, (0.0, shown), 1.0);
+    course(ui, player.course(), scale, (shown, player.reached()), PALE);
+    let flags = |flags: &mut dyn Iterator<Item = Flag>, pale: bool| {
+        for flag in flags {
+            let later = pale || flag.time > shown;
+            let part = if later { PALE } else { 1.0 };
+            flag_at(ui, scale, flag.time, part);
+        }
+    };
+    flags(&mut player.flags(), false);
+    if let Some(left) = player.left() {
+        flags(&mut left.flags.iter().cloned(), true);
+    }
+    let x = scale.x(shown);
+    let colour = visuals.strong_text_color();
+    painter.vline(x, scale.rect.y_range(), Stroke::new(1.5, colour));
+    let handle = pos2(x, scale.rect.top() + 4.0);
+    painter.circle_filled(handle, 4.0, colour);
+    let edge = if response.has_focus() {
+        visuals.widgets.hovered.fg_stroke
+    } else {
+        visuals.widgets.noninteractive.bg_stroke
+    };
+    painter.rect_stroke(lanes, 3.0, edge, egui::StrokeKind::Outside);
+}
+
+/// The lanes between two times, s: sliding in half of the joint's colour, sticking in all of it, and a mark where its ball came to
+/// touch. A column of pixels has as much colour as it has of each state.
+fn course(ui: &Ui, course: &Course, scale: &Scale, between: (f64, f64), part: f32) {
+    let dark = ui.visuals().dark_mode;
+    let pixel = 1.0 / ui.ctx().pixels_per_point();
+    let from = between.0.max(scale.range.0);
+    let to = between.1.min(scale.range.1);
+    if to <= from {
+        return;
+    }
+    let joints = course.joints().min(RECORDED_JOINTS);
+    let columns = (scale.rect.width() / pixel).ceil() as usize;
+    let per_second = columns as f64 / (scale.range.1 - scale.range.0);
+    let mut shares = vec![0.0_f32; columns + 1];
+    let mut mesh = Mesh::default();
+    for joint in 0..joints {
+        let lane = scale.lane(joint, joints);
+        let colour = theme::series(joint, dark).gamma_multiply(part);
+        shares.fill(0.0);
+        for (begins, ends, state) in course.states(joint, from, to) {
+            let weight = match state {
+                ContactState::Free => continue,
+                ContactState::Slip => 0.5,
+                ContactState::Stick | ContactState::Ideal => 1.0,
+            };
+            let a = (begins.max(from) - scale.range.0) * per_second;
+            let b = (ends.min(to) - scale.range.0) * per_second;
+            let last = (b.floor() as usize).min(columns);
+            let first = (a.floor() as usize).min(last);
+            for (index, share) in shares[first..=last].iter_mut().enumerate() {
+                let left = (first + index) as f64;
+                let covered = b.min(left + 1.0) - a.max(left);
+                *share += weight * covered.max(0.0) as f32;
+            }
+        }
+        // Columns of one colour make one rectangle.
+        let mut start = 0;
+        while start < columns {
+            let share = shares[start];
+            let same = shares[start..columns].iter();
+            let count = same
+                .take_while(|other| (*other - share).abs() < 0.01)
+                .count();
+            if share > 0.0 {
+                let left = scale.rect.left() + start as f32 * pixel;
+                let place =
+                    Rect::from_x_y_ranges(left..=left + count as f32 * pixel, lane.y_range());
+                // Something is to be seen of the shortest contact.
+                mesh.add_colored_rect(place, colour.gamma_multiply(share.clamp(0.12, 1.0)));
+            }
+            start += count.max(1);
+        }
+        let mut drawn = f32::NEG_INFINITY;
+        for time in course.touches(joint, from, to) {
+            let x = scale.x(time);
+            if x - drawn >= pixel {
+                let mark = Rect::from_min_size(pos2(x, lane.top()), vec2(1.0, lane.height()));
+                mesh.add_colored_rect(mark, colour);
+                drawn = x;
+            }
+        }
+    }
+    ui.painter().add(Shape::mesh(mesh));
+}
+
+fn flag_at(ui: &Ui, scale: &Scale, time: f64, part: f32) {
+    let x = scale.x(time);
+    if !scale.rect.x_range().contains(x) {
+        return;
+    }
+    let colour = ui.visuals().warn_fg_color.gamma_multiply(part);
+    let (top, low) = (scale.rect.top(), scale.rect.bottom());
+    let painter = ui.painter();
+    painter.vline(x, top..=low, Stroke::new(1.0, colour));
+    let points: Vec<Pos2> = vec![pos2(x, top), pos2(x + 8.0, top + 3.5), pos2(x, top + 7.0)];
+    painter.add(Shape::convex_polygon(points, colour, Stroke::NONE));
+}
+
+/// What is under the pointer.
+fn describe(ui: &mut Ui, player: &Player, scale: &Scale, pos: Pos2) {
+    let time = scale.time(pos.x);
+    ui.strong(value::time(time));
+    let joints = player.course().joints().min(RECORDED_JOINTS);
+    let under = (0..joints).find(|&joint| scale.lane(joint, joints).y_range().contains(pos.y));
+    let course = if time > player.reached() {
+        player.left().map(|left| &left.course)
+    } else {
+        Some(player.course())
+    };
+    if let (Some(joint), Some(course)) = (under, course) {
+        let name = &player.scene().ball_joints[joint].name;
+        let state = course.states(joint, time, time + SHORTEST).next();
+        let words = match state {
+            None => "not recorded",
+            Some((.., ContactState::Free)) => "free",
+            Some((.., ContactState::Slip)) => "sliding",
+            Some((.., ContactState::Stick)) => "sticking",
+            Some((.., ContactState::Ideal)) => "ideal",
+        };
+        ui.label(format!("{name}: {words}"));
+    }
+    let left = player
+        .left()
+        .into_iter()
+        .flat_map(|left| left.flags.iter().cloned());
+    for flag in player.flags().chain(left) {
+        if (scale.x(flag.time) - pos.x).abs() <= NEAR {
+            ui.label(format!("{}: {}", value::time(flag.time), flag.words));
+        }
+    }
+    let known = player.course().known_from();
+    if time < known {
+        let words = format!("Contacts before {} are no longer kept", value::time(known));
+        ui.label(words);
+    }
+    let help = "Click or drag: any instant again, by the same steps; wheel or pinch: nearer; double click: all of it. Half \
+                colour slides, full colour sticks, a mark is a ball that comes to touch; pale is what is to come, or was left.";
+    ui.label(egui::RichText::new(help).small().color(faint(ui)));
+}
+
+fn faint(ui: &Ui) -> Color32 {
+    ui.visuals().weak_text_color()
+}
