@@ -329,6 +329,11 @@ impl App {
         &mut self.player
     }
 
+    /// Where the camera stands or is going; `None` before the first picture.
+    pub fn camera_pose(&self) -> Option<CameraPose> {
+        self.viewport.pose()
+    }
+
     /// Which plots are shown.
     pub fn plots_mut(&mut self) -> &mut Plots {
         &mut self.plots

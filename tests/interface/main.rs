@@ -8,5 +8,6 @@ mod bench_window;
 mod frames;
 mod hands;
 mod headless_window;
+mod instrument;
 mod page;
 mod window;

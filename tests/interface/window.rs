@@ -15,11 +15,11 @@ mod pixels;
 use pixels::{Picture, top};
 
 /// The wide window on `scene` at t = 0, paused.
-fn window(scene: &str) -> Harness<'static, App> {
+pub(crate) fn window(scene: &str) -> Harness<'static, App> {
     sized(scene, [1280.0, 800.0], egui::Theme::Light)
 }
 
-fn sized(scene: &str, size: [f32; 2], theme: egui::Theme) -> Harness<'static, App> {
+pub(crate) fn sized(scene: &str, size: [f32; 2], theme: egui::Theme) -> Harness<'static, App> {
     let mut options = AppOptions::new(Scene::load(scene, &[]).expect("a built-in scene"));
     options.playing = false;
     options.theme = theme.into();
@@ -39,7 +39,7 @@ fn time(harness: &Harness<'_, App>) -> f64 {
     harness.state().player().simulation().time()
 }
 
-fn shown(harness: &Harness<'_, App>) -> f64 {
+pub(crate) fn shown(harness: &Harness<'_, App>) -> f64 {
     harness.state().player().pacer.shown()
 }
 
@@ -59,7 +59,7 @@ fn hardest(harness: &Harness<'_, App>) -> f64 {
     statistics.peak_normal.iter().copied().fold(0.0, f64::max)
 }
 
-fn click(harness: &mut Harness<'_, App>, label: &str) {
+pub(crate) fn click(harness: &mut Harness<'_, App>, label: &str) {
     harness.get_by_role_and_label(Role::Button, label).click();
     harness.step();
     harness.step();
@@ -878,14 +878,15 @@ fn a_preset_is_measured_beside_the_running_scene() {
 }
 
 /// Colours of the first three curves in the light theme.
-const CURVES: [[u8; 3]; 3] = [[0x00, 0x72, 0xB2], [0xD5, 0x5E, 0x00], [0x00, 0x8F, 0x68]];
+pub(crate) const CURVES: [[u8; 3]; 3] =
+    [[0x00, 0x72, 0xB2], [0xD5, 0x5E, 0x00], [0x00, 0x8F, 0x68]];
 
-fn picture(harness: &mut Harness<'_, App>) -> Picture {
+pub(crate) fn picture(harness: &mut Harness<'_, App>) -> Picture {
     let image = harness.render().expect("drawn");
     Picture::new(image.width(), image.into_raw())
 }
 
-const WHITE: [u8; 3] = [255; 3];
+pub(crate) const WHITE: [u8; 3] = [255; 3];
 
 /// Pixels around the place of a value in the plot of the normal force, from `top` N down to a little above zero, and the
 /// row of the value.

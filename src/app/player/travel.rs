@@ -64,13 +64,18 @@ impl Player {
         &self.course
     }
 
-    /// What was done to the run, that of its future included.
+    /// What was done to the run, that of its future included; of a pull its beginning and its end.
     pub fn flags(&self) -> impl Iterator<Item = Flag> {
-        let entries = self.log.entries.iter().zip(&self.event_times);
-        entries.map(|(entry, time)| Flag {
-            time: *time,
-            words: entry.event.words(),
-        })
+        let entries = &self.log.entries;
+        let pulls = |at: usize| matches!(entries[at].event, Event::Pull(Some(_)));
+        let goes_on = move |at: usize| at > 0 && pulls(at) && pulls(at - 1);
+        let times = self.event_times.iter().enumerate();
+        times
+            .filter(move |(at, _)| !goes_on(*at))
+            .map(|(at, time)| Flag {
+                time: *time,
+                words: entries[at].event.words(),
+            })
     }
 
     /// What was recorded of `channel` from `from` to `to`, s, appended to `out` as by [`History::bins`]: from the stretch that was

@@ -1,0 +1,341 @@
+//! The lecture instrument: what a teacher does in front of a class, each in at most three gestures.
+
+use eframe::egui::{self, Key, PointerButton, Pos2, accesskit::Role, vec2};
+use egui_kittest::{Harness, SnapshotResults, kittest::Queryable as _};
+use jointplay::app::{App, Event, Link, Log, Replay, SceneText, Verdict};
+use jointplay::simulate::{ContactState, Quantity};
+
+use crate::window::{CURVES, WHITE, click, picture, shown, sized, window};
+
+/// Where the timeline's strip stands.
+fn strip(harness: &Harness<'_, App>) -> egui::Rect {
+    let strip = harness.get_by_role_and_label(Role::Slider, "Timeline, s");
+    let mut rect = strip.rect();
+    // The lanes, without the flags above them.
+    rect.min.y += 9.0;
+    rect
+}
+
+/// Where an instant stands in it, when all of the run is shown.
+fn place(harness: &Harness<'_, App>, time: f64) -> Pos2 {
+    let rect = strip(harness);
+    let share = time / harness.state().player().reached();
+    let x = rect.left() + share as f32 * rect.width();
+    egui::pos2(x, rect.center().y)
+}
+
+fn key(harness: &mut Harness<'_, App>, key: Key) {
+    harness.key_press(key);
+    harness.run();
+}
+
+/// One gesture: presses at the first place and lets go at the last.
+fn drag(harness: &mut Harness<'_, App>, places: &[Pos2]) {
+    harness.drag_at(places[0]);
+    harness.step();
+    for place in &places[1..] {
+        harness.hover_at(*place);
+        harness.step();
+    }
+    harness.drop_at(places[places.len() - 1]);
+    harness.step();
+}
+
+fn run_to(harness: &mut Harness<'_, App>, time: f64) {
+    harness.state_mut().player_mut().run_to(time);
+    harness.run();
+}
+
+#[test]
+fn a_click_on_the_timeline_shows_that_instant_and_a_drag_passes_over_all_between() {
+    for size in [[1280.0, 800.0], [420.0, 800.0], [844.0, 390.0]] {
+        let mut harness = sized("spcmm", size, egui::Theme::Light);
+        run_to(&mut harness, 40e-3);
+        for time in [12e-3, 31e-3, 2e-3] {
+            let at = place(&harness, time);
+            drag(&mut harness, &[at]);
+            harness.run();
+            let pixel = 40e-3 / f64::from(strip(&harness).width());
+            assert!(
+                (shown(&harness) - time).abs() <= pixel,
+                "{size:?} {}",
+                shown(&harness)
+            );
+            assert_eq!(harness.state().player().frame().time, shown(&harness));
+            assert_eq!(harness.state().player().reached(), 40e-3);
+        }
+        let [from, to] = [2e-3, 20e-3].map(|time| place(&harness, time));
+        drag(&mut harness, &[from, from.lerp(to, 0.5), to]);
+        let pixel = 40e-3 / f64::from(strip(&harness).width());
+        assert!((shown(&harness) - 20e-3).abs() <= pixel);
+    }
+}
+
+#[test]
+fn the_lanes_have_the_colours_of_the_states_that_were() {
+    let mut harness = window("spcmm");
+    run_to(&mut harness, 20e-3);
+    let player = harness.state().player();
+    let touch = player
+        .course()
+        .touches(0, 0.0, 1.0)
+        .next()
+        .expect("strikes");
+    let until = player
+        .course()
+        .states(0, touch, 1.0)
+        .find(|state| state.2 == ContactState::Free);
+    let until = until.expect("leaves again").0;
+    let rect = strip(&harness);
+    let lane = rect.height() / 3.0;
+    let x = |time: f64| place(&harness, time).x as usize;
+    let (row, before, strikes, after) = (
+        (rect.top() + 0.5 * lane) as usize,
+        x(0.5 * touch),
+        x(touch),
+        x(until + 0.3e-3),
+    );
+    let drawn = picture(&mut harness);
+    let blue = |column: usize| {
+        let area = [column - 1, row - 1, column + 2, row + 1];
+        drawn.covered(area, CURVES[0], WHITE).len()
+    };
+    assert_eq!(blue(before), 0, "free before the first impact");
+    assert!(blue(strikes) > 0, "a mark where the ball comes to touch");
+    assert_eq!(blue(after), 0, "free after it");
+}
+
+#[test]
+fn keys_go_from_impact_to_impact_to_both_ends_and_backwards() {
+    let mut harness = window("spcmm");
+    run_to(&mut harness, 30e-3);
+    key(&mut harness, Key::Home);
+    assert_eq!(shown(&harness), 0.0);
+    key(&mut harness, Key::Period);
+    let first = shown(&harness);
+    // The first impact of the paper's mechanism, at 7.8 ms.
+    assert!((first - 7.8e-3).abs() < 0.1e-3, "{first}");
+    key(&mut harness, Key::Period);
+    assert!(shown(&harness) > first);
+    key(&mut harness, Key::Comma);
+    assert_eq!(shown(&harness), first);
+    key(&mut harness, Key::End);
+    assert_eq!(shown(&harness), 30e-3);
+    harness.key_press(Key::J);
+    harness.step();
+    let before = shown(&harness);
+    harness.run_steps(5);
+    assert!(shown(&harness) < before);
+    click(&mut harness, "Pause backwards");
+    let still = shown(&harness);
+    harness.run_steps(5);
+    assert_eq!(shown(&harness), still);
+    // The buttons do the same.
+    click(&mut harness, "Previous impact");
+    assert!(shown(&harness) < still);
+    click(&mut harness, "Play backwards");
+    harness.run_steps(3);
+    assert!(harness.state().player().is_playing_backwards());
+}
+
+#[test]
+fn going_on_from_the_past_with_another_clearance_leaves_a_pale_future_that_a_link_does_not_carry() {
+    let mut harness = window("spcmm");
+    run_to(&mut harness, 10e-3);
+    harness
+        .state_mut()
+        .player_mut()
+        .set("contact.friction", "0")
+        .expect("in range");
+    run_to(&mut harness, 30e-3);
+    let at = place(&harness, 5e-3);
+    drag(&mut harness, &[at]);
+    let player = harness.state_mut().player_mut();
+    assert_eq!(player.wanted().contact.friction, 0.15, "as it was then");
+    player.set("contact.clearance", "0.6 mm").expect("in range");
+    let left = player.left().expect("left");
+    assert!((left.from - 5e-3).abs() < 1e-4 && left.to == 30e-3);
+    assert_eq!(left.flags.len(), 1);
+    player.run_to(12e-3);
+    harness.run();
+    // A link takes the branch again, to the same bits.
+    let player = harness.state().player();
+    let link = Link {
+        scene: SceneText::of(player.scene()),
+        log: player.log(),
+        steps: Some(player.steps()),
+        time: Some(shown(&harness)),
+        hash: Some(player.simulation().state_hash()),
+        ..Link::default()
+    };
+    assert_eq!(
+        follow(&link),
+        Verdict::Agrees(player.simulation().state_hash())
+    );
+    run_to(&mut harness, 31e-3);
+    assert!(harness.state().player().left().is_none(), "replaced");
+}
+
+fn follow(link: &Link) -> Verdict {
+    let link = Link::parse(&link.format()).expect("a link");
+    let mut copy = jointplay::app::Player::new(&link.load().expect("loads")).expect("starts");
+    let mut replay = Replay::new(link).expect("an instant");
+    replay.advance(&mut copy, || true).expect("there")
+}
+
+#[test]
+fn a_body_that_is_pressed_and_dragged_is_pulled_until_it_is_let_go() {
+    let mut harness = window("pendulum");
+    let image = harness.get_by_role_and_label(Role::Image, "3D view").rect();
+    // The rod hangs through the middle of the picture.
+    let rod = image.center();
+    let camera = camera(&harness);
+    harness.drag_at(rod);
+    harness.step();
+    for step in 1..=4 {
+        harness.hover_at(rod + vec2(15.0 * step as f32, 0.0));
+        harness.step();
+    }
+    let player = harness.state().player();
+    let pull = player.frame().pull.expect("pulls");
+    assert!(pull.force.norm() > 0.1, "{pull:?}");
+    assert_eq!(self::camera(&harness), camera, "the view stays");
+    harness.state_mut().player_mut().set_playing(true);
+    harness.run_steps(30);
+    harness.state_mut().player_mut().set_playing(false);
+    let player = harness.state().player();
+    let ledger = player.frame().ledger.expect("kept");
+    assert!(ledger.external_work.abs() > 1e-6, "{ledger:?}");
+    harness.drop_at(rod + vec2(60.0, 0.0));
+    harness.run();
+    let player = harness.state().player();
+    assert!(player.frame().pull.is_none());
+    let pulls = |log: &Log| {
+        let pulls = log
+            .entries
+            .iter()
+            .filter(|entry| matches!(entry.event, Event::Pull(_)));
+        pulls.count()
+    };
+    assert!(pulls(&player.log()) >= 2);
+    let link = Link {
+        scene: SceneText::of(player.scene()),
+        log: player.log(),
+        steps: Some(player.steps()),
+        time: Some(shown(&harness)),
+        hash: Some(player.simulation().state_hash()),
+        ..Link::default()
+    };
+    assert_eq!(
+        follow(&link),
+        Verdict::Agrees(player.simulation().state_hash())
+    );
+    // Beside the machine a drag turns the view.
+    let beside = image.left_center() + vec2(30.0, 0.0);
+    drag(&mut harness, &[beside, beside + vec2(40.0, 0.0)]);
+    assert_ne!(self::camera(&harness), camera);
+    assert_eq!(pulls(&harness.state().player().log()), pulls(&link.log));
+}
+
+fn camera(harness: &Harness<'_, App>) -> String {
+    format!("{:?}", harness.state().camera_pose())
+}
+
+#[test]
+fn plots_come_nearer_shift_and_go_where_they_are_clicked() {
+    let mut harness = window("spcmm");
+    run_to(&mut harness, 30e-3);
+    let place = |harness: &mut Harness<'_, App>, time: f64| {
+        let plots = harness.state_mut().plots_mut();
+        plots
+            .place(Quantity::NormalForce, time, 100.0)
+            .expect("shown")
+    };
+    let width = |harness: &mut Harness<'_, App>| {
+        let [a, b] = [7.8e-3, 8.0e-3].map(|time| place(harness, time).x);
+        b - a
+    };
+    let (before, impact) = (width(&mut harness), place(&mut harness, 7.85e-3));
+    harness.hover_at(impact);
+    harness.step();
+    for _ in 0..3 {
+        harness.event(egui::Event::MouseWheel {
+            unit: egui::MouseWheelUnit::Point,
+            delta: vec2(0.0, 200.0),
+            phase: egui::TouchPhase::Move,
+            modifiers: egui::Modifiers::NONE,
+        });
+        harness.run_steps(8);
+    }
+    harness.run();
+    assert!(width(&mut harness) > 4.0 * before, "an impact enlarged");
+    assert!(
+        (place(&mut harness, 7.85e-3).x - impact.x).abs() < 2.0,
+        "about the pointer"
+    );
+    // A click goes there, and the cursor stands there.
+    harness.drag_at(impact);
+    harness.step();
+    harness.drop_at(impact);
+    harness.run_steps(40);
+    assert!(
+        (shown(&harness) - 7.85e-3).abs() < 2e-5,
+        "{}",
+        shown(&harness)
+    );
+    let line = place(&mut harness, shown(&harness));
+    assert!((line.x - impact.x).abs() < 2.0);
+    // A drag shifts the stretch that is shown.
+    drag(
+        &mut harness,
+        &[impact, impact + vec2(20.0, 0.0), impact + vec2(40.0, 0.0)],
+    );
+    harness.run();
+    let shifted = place(&mut harness, 7.85e-3).x - impact.x;
+    assert!((shifted - 40.0).abs() < 10.0, "{shifted}");
+    // A double click: the chosen window again.
+    for _ in 0..2 {
+        harness.event(egui::Event::PointerButton {
+            pos: impact,
+            button: PointerButton::Primary,
+            pressed: true,
+            modifiers: egui::Modifiers::NONE,
+        });
+        harness.event(egui::Event::PointerButton {
+            pos: impact,
+            button: PointerButton::Primary,
+            pressed: false,
+            modifiers: egui::Modifiers::NONE,
+        });
+        harness.step();
+    }
+    harness.run();
+    assert!((width(&mut harness) - before).abs() < 0.1 * before);
+}
+
+#[test]
+fn pictures_of_the_past() {
+    let mut results = SnapshotResults::new();
+    for (name, size, theme) in [
+        ("past_light", [1280.0, 800.0], egui::Theme::Light),
+        ("past_dark", [1280.0, 800.0], egui::Theme::Dark),
+        ("past_phone", [390.0, 844.0], egui::Theme::Light),
+    ] {
+        let mut harness = sized("spcmm", size, theme);
+        run_to(&mut harness, 25e-3);
+        harness
+            .state_mut()
+            .player_mut()
+            .set("contact.clearance", "0.6 mm")
+            .expect("in range");
+        run_to(&mut harness, 60e-3);
+        let player = harness.state_mut().player_mut();
+        player.go_to(15e-3);
+        player.set("contact.friction", "0").expect("in range");
+        player.run_to(40e-3);
+        player.go_to(30e-3);
+        harness.run();
+        harness.snapshot(name);
+        results.extend_harness(&mut harness);
+    }
+}
