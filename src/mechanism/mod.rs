@@ -27,8 +27,8 @@ mod systems;
 mod tree;
 
 pub use bounds::CostOf;
-pub use contacts::{Contacts, Counts, Gap, Ramp, Touching};
-pub use elements::ElementReport;
+pub use contacts::{Contacts, Counts, Ramp, Touching};
+pub use elements::{ElementReport, Gap};
 pub use jet::Jet;
 pub use kinematics::{Kinematics, Wrench};
 pub use power::Powers;
@@ -40,7 +40,7 @@ pub use systems::Evaluator;
 use std::sync::Arc;
 
 use crate::scene::{Formulation, Scene, Vec3, format_quantity_digits};
-use elements::{ForceElement, elements_of};
+use elements::{ForceElement, SceneElement, elements_of};
 use equations::Equations;
 use forest::Forest;
 use lagrange::Lagrange;
@@ -204,7 +204,7 @@ pub struct Mechanism {
     equations: Box<dyn Equations>,
     /// Ball joints with clearance.
     pub contacts: Contacts,
-    elements: Vec<Box<dyn ForceElement>>,
+    elements: Vec<Box<dyn SceneElement>>,
     /// World gravity, m/s^2.
     pub gravity: Vec3,
     joint_names: Vec<String>,
@@ -424,6 +424,16 @@ impl Mechanism {
         (kinetic, potential)
     }
 
+    /// Energy stored in contacts and springs where gaps were measured last, J.
+    pub fn elastic_energy(&self) -> f64 {
+        let motion = self.equations.motion();
+        let mut energy = 0.0;
+        for contact in self.contacts.loose() {
+            energy += contact.stored(motion);
+        }
+        energy + self.energy_in_elements()
+    }
+
     /// Energy stored in springs at the latest evaluation, J.
     pub fn energy_in_elements(&self) -> f64 {
         let motion = self.equations.motion();
@@ -438,8 +448,7 @@ impl Mechanism {
 
     /// Whether an element answers to motion, so that it can be stiff.
     pub fn has_couplings(&self) -> bool {
-        let motion = self.equations.motion();
-        self.elements.iter().any(|e| e.coupling(motion).is_some())
+        self.elements.iter().any(|e| e.ends().is_some())
     }
 
     /// Origin of body `b`'s scene frame from its centroid, body axes, m.
