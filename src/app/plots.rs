@@ -508,11 +508,7 @@ impl Plots {
         let mut bands: Vec<Band<'a>> = Vec::new();
         let mut terms = Vec::new();
         for ((_, member), trace) in members.iter().zip(&self.traces) {
-            let sign = if Quantity::TAKES.contains(member) {
-                -0.5
-            } else {
-                0.5
-            };
+            let sign = if Quantity::takes(member) { -0.5 } else { 0.5 };
             let value = |bin: &Bin| sign * (bin.least + bin.greatest) / units[1];
             let terms_of: Vec<f64> = trace.bins.iter().map(value).collect();
             if terms_of.is_empty() {

@@ -163,7 +163,7 @@ impl ImplicitContacts {
         self.right.clear();
         let mut near = false;
         for (j, joint) in model.joints.iter().enumerate() {
-            let gap = &contacts.gaps()[j];
+            let gap = contacts.gap(j);
             // Others may push a ball that is still free into its wall.
             let distance = gap.eccentricity.norm();
             if joint.ideal.is_some() || distance < NEAR * contacts.clearance(j) {

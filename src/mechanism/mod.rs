@@ -27,8 +27,8 @@ mod systems;
 mod tree;
 
 pub use bounds::CostOf;
-pub use contacts::{Contacts, Counts, Gap, Ramp, Touching};
-pub use elements::{ElementReport, Pull};
+pub use contacts::{Contacts, Counts, Ramp, Touching};
+pub use elements::{ElementReport, Gap, Pull};
 pub use jet::Jet;
 pub use kinematics::{Kinematics, Wrench};
 pub use power::Powers;
@@ -40,7 +40,7 @@ pub use systems::Evaluator;
 use std::sync::Arc;
 
 use crate::scene::{Formulation, Scene, Vec3, format_quantity_digits};
-use elements::{ForceElement, elements_of};
+use elements::{ForceElement, SceneElement, elements_of};
 use equations::Equations;
 use forest::Forest;
 use lagrange::Lagrange;
@@ -205,7 +205,7 @@ pub struct Mechanism {
     /// Ball joints with clearance.
     pub contacts: Contacts,
     /// Those of the scene in its order, then the hand that pulls, if one does.
-    elements: Vec<Box<dyn ForceElement>>,
+    elements: Vec<Box<dyn SceneElement>>,
     of_scene: usize,
     pull: Option<Pull>,
     /// World gravity, m/s^2.
@@ -429,6 +429,16 @@ impl Mechanism {
         (kinetic, potential)
     }
 
+    /// Energy stored in contacts and springs where gaps were measured last, J.
+    pub fn elastic_energy(&self) -> f64 {
+        let motion = self.equations.motion();
+        let mut energy = 0.0;
+        for contact in self.contacts.loose() {
+            energy += contact.stored(motion);
+        }
+        energy + self.energy_in_elements()
+    }
+
     /// Energy stored in springs at the latest evaluation, J.
     pub fn energy_in_elements(&self) -> f64 {
         let motion = self.equations.motion();
@@ -467,8 +477,7 @@ impl Mechanism {
 
     /// Whether an element answers to motion, so that it can be stiff.
     pub fn has_couplings(&self) -> bool {
-        let motion = self.equations.motion();
-        self.elements.iter().any(|e| e.coupling(motion).is_some())
+        self.elements.iter().any(|e| e.ends().is_some())
     }
 
     /// Origin of body `b`'s scene frame from its centroid, body axes, m.

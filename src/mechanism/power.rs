@@ -2,6 +2,7 @@
 //! Allocates nothing.
 
 use super::Mechanism;
+use super::elements::ForceElement;
 use super::equations::Equations;
 use super::kinematics::{Kinematics, Wrench};
 use super::model::{Model, Motion};
@@ -83,11 +84,13 @@ impl Mechanism {
 
     /// Powers at the latest evaluation, whose derivative is `dy` where accelerations enter.
     pub(super) fn powers_of_latest(&mut self, t: f64, y: &[f64], dy: &[f64]) -> Powers {
-        let mut powers = self.contact_powers();
+        let mut powers = Powers::default();
+        let motion = self.equations.motion();
+        for contact in self.contacts.loose() {
+            contact.add_powers(t, motion, &mut powers);
+        }
         for element in &self.elements {
-            let own = element.powers(t, self.equations.motion());
-            powers.damping += own.dissipated;
-            powers.external += own.supplied;
+            element.add_powers(t, motion, &mut powers);
         }
         if !self.model.drives.is_empty() {
             let dv = &dy[self.positions()..];
@@ -96,31 +99,6 @@ impl Mechanism {
             powers.drive = self.equations.drive_power(model, gravity, y, dv, all);
             // The loads were changed, and the accelerations may have been.
             self.evaluated = None;
-        }
-        powers
-    }
-
-    fn contact_powers(&self) -> Powers {
-        let mut powers = Powers::default();
-        let motion = self.motion();
-        for (j, joint) in self.model.joints.iter().enumerate() {
-            if joint.ideal.is_some() {
-                continue;
-            }
-            let (gap, c) = (&self.contacts.gaps()[j], self.contacts.coefficients(j));
-            if gap.eccentricity.norm_squared() <= c.clearance * c.clearance {
-                continue;
-            }
-            let at = self.contacts.separation(j);
-            powers.restitution += c.restitution_power(&at, gap.normal_force);
-            powers.clearance += c.clearance_power(&at, gap.normal_force);
-            if gap.friction != Vec3::zeros() {
-                let spin = |body: usize| &motion[body].angular_velocity;
-                let (ball, socket) = (spin(joint.ball.body), spin(joint.socket.body));
-                let velocity = &gap.eccentricity_rate;
-                let surfaces = c.surface_velocity(&at.normal, velocity, ball, socket);
-                powers.friction -= gap.friction.dot(&surfaces);
-            }
         }
         powers
     }

@@ -6,14 +6,13 @@
 //! (s I - J) (x_q, x_v) = (b_q, b_v) becomes (s I - M^-1 D - M^-1 K / s) x_v = b_v + M^-1 K T^+ b_q / s,
 //! x_q = (b_q + T x_v) / s, where T maps velocities to position rates.
 
-use super::columns::{Column, collect_columns, contact_sides};
+use super::columns::{Column, collect_columns};
 use super::contacts::{Contacts, Touching};
-use super::elements::ForceElement;
+use super::elements::{At, Coupling, ForceElement, SceneElement};
 use super::equations::Equations;
 use super::kinematics::Kinematics;
 use super::lu::Lu;
 use super::model::{BallJoint, Model};
-use crate::contact::Stiffness;
 use crate::scene::Vec3;
 use nalgebra::Complex;
 
@@ -78,15 +77,16 @@ impl Stiff {
         }
     }
 
-    /// Generalised stiffness and damping of all contacts and elements, from gaps and forces of the evaluation just made at `y`.
+    /// Generalised stiffness and damping of all contacts and elements, from gaps and forces of the evaluation just made at
+    /// (t, y).
     pub fn gather(
         &mut self,
         model: &Model,
         contacts: &Contacts,
-        elements: &[Box<dyn ForceElement>],
+        elements: &[Box<dyn SceneElement>],
         touching: Touching<'_>,
         equations: &dyn Equations,
-        y: &[f64],
+        (t, y): (f64, &[f64]),
     ) {
         let motion = equations.motion();
         self.y.copy_from_slice(y);
@@ -94,64 +94,56 @@ impl Stiff {
         self.by_velocity.fill(0.0);
         self.time_derivative.fill(0.0);
         self.empty = true;
-        for (j, joint) in model.joints.iter().enumerate() {
-            let Some(stiffness) = contacts.linearise(j, motion, touching) else {
+        let at = At {
+            t,
+            motion,
+            touching,
+        };
+        let of_contacts = contacts.loose().map(|contact| contact.coupling(&at));
+        let of_elements = elements.iter().map(|element| element.coupling(&at));
+        for (i, coupling) in of_contacts.chain(of_elements).enumerate() {
+            let Some(coupling) = coupling else {
                 continue;
             };
             self.empty = false;
-            let c = contacts.coefficients(j);
-            let n = contacts.separation(j).normal;
-            let sides = contact_sides(joint, c);
-            collect_columns(&mut self.columns, model, equations, &sides, &n);
-            let on_ball = contacts.gaps()[j].force_on_ball(&n);
-            self.add(&stiffness, &on_ball, c.reads_surfaces());
-            self.add_drift(&stiffness, &on_ball, j);
-        }
-        for (i, element) in elements.iter().enumerate() {
-            let Some((ends, coupling)) = element.coupling(motion) else {
-                continue;
-            };
-            self.empty = false;
-            let sides = [(ends[1], 0.0), (ends[0], 0.0)];
-            let nowhere = Vec3::zeros();
-            collect_columns(&mut self.columns, model, equations, &sides, &nowhere);
-            let stiffness = Stiffness::between_points(coupling.by_displacement, coupling.by_rate);
-            self.add(&stiffness, &nowhere, false);
-            self.add_drift(&stiffness, &nowhere, model.joints.len() + i);
+            let (sides, n) = (&coupling.sides, &coupling.normal);
+            collect_columns(&mut self.columns, model, equations, sides, n);
+            self.add(&coupling);
+            self.add_drift(&coupling, i);
         }
     }
 
-    /// Takes how the contacts move with time alone from a motion with all coordinates at rest.
+    /// Takes how the points of contacts and elements move with time alone from a motion with all coordinates at rest.
     pub fn observe_drift(
         &mut self,
-        model: &Model,
-        elements: &[Box<dyn ForceElement>],
+        contacts: &Contacts,
+        elements: &[Box<dyn SceneElement>],
         motion: &[Kinematics],
     ) {
-        let of_joints = model.joints.iter().copied().map(Some);
-        let ends = elements.iter().map(|element| element.coupling(motion));
-        let of_elements = ends.map(|found| {
-            found.map(|([from, to], _)| BallJoint {
-                socket: from,
-                ball: to,
-                ideal: None,
-            })
-        });
-        for (drift, joint) in self.drift.iter_mut().zip(of_joints.chain(of_elements)) {
-            *drift = joint.map_or_else(Drift::default, |joint| Drift {
-                eccentricity: joint.opening_rate(motion),
-                rate: joint.opening_acceleration(motion),
+        let of_contacts = contacts.loose().map(|contact| contact.ends());
+        let of_elements = elements.iter().map(|element| element.ends());
+        for (drift, ends) in self.drift.iter_mut().zip(of_contacts.chain(of_elements)) {
+            *drift = ends.map_or_else(Drift::default, |[socket, ball]| {
+                let joint = BallJoint {
+                    socket,
+                    ball,
+                    ideal: None,
+                };
+                Drift {
+                    eccentricity: joint.opening_rate(motion),
+                    rate: joint.opening_acceleration(motion),
+                }
             });
         }
     }
 
-    /// dQ_k/dt of one contact. The sliding of driven bodies' surfaces by their turning is not stiff and left out.
-    fn add_drift(&mut self, s: &Stiffness, on_ball: &Vec3, j: usize) {
-        let drift = self.drift[j];
+    /// dQ_k/dt of one coupling. The sliding of driven bodies' surfaces by their turning is not stiff and left out.
+    fn add_drift(&mut self, coupling: &Coupling, i: usize) {
+        let (s, drift) = (&coupling.stiffness, self.drift[i]);
         let force = s.by_displacement * drift.eccentricity
             + (s.by_rate + s.by_slip) * drift.rate
             + s.by_clearance;
-        let lever = (s.normal * drift.eccentricity).cross(on_ball);
+        let lever = (s.normal * drift.eccentricity).cross(&coupling.force);
         let positions = self.time_derivative.len() - self.n;
         for k in &self.columns {
             self.time_derivative[positions + k.coordinate] +=
@@ -159,15 +151,19 @@ impl Stiff {
         }
     }
 
-    /// Adds one contact: dQ_k = surface_k . dF + (F x turn_k) . dn.
-    fn add(&mut self, s: &Stiffness, on_ball: &Vec3, reads_surfaces: bool) {
-        let n = self.n;
+    /// Adds one coupling: dQ_k = surface_k . dF + (F x turn_k) . dn.
+    fn add(&mut self, coupling: &Coupling) {
+        let (n, s) = (self.n, &coupling.stiffness);
         for l in &self.columns {
             let force_q = s.by_displacement * l.centre;
             let normal_q = s.normal * l.centre;
-            let slip = if reads_surfaces { l.surface } else { l.centre };
+            let slip = if coupling.reads_surfaces {
+                l.surface
+            } else {
+                l.centre
+            };
             let force_v = s.by_rate * l.centre + s.by_slip * slip;
-            let lever = normal_q.cross(on_ball);
+            let lever = normal_q.cross(&coupling.force);
             for k in &self.columns {
                 let at = l.coordinate * n + k.coordinate;
                 self.by_position[at] += k.surface.dot(&force_q) + k.turn.dot(&lever);
@@ -341,7 +337,7 @@ mod tests {
             let (mut m, y, memory) = resting(&changes, remembered);
             let (t, nq) = (0.0, m.positions());
             m.measure(t, &y);
-            let rises = m.contacts.gaps().iter().all(|gap| gap.rate > remembered);
+            let rises = m.contacts.gaps().all(|gap| gap.rate > remembered);
             assert_eq!(rises, remembered < 1e-6);
             let touching = Touching::Located(&memory);
             m.evaluator(touching).linearise(t, &y);

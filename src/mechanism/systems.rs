@@ -1,6 +1,7 @@
 //! The equations of motion as what the steppers ask for.
 
 use super::contacts::{Counts, Touching};
+use super::elements::{At, Loads};
 use super::implicit::TURNS;
 use super::kinematics::Wrench;
 use super::{Mechanism, Powers};
@@ -60,11 +61,21 @@ impl Evaluator<'_> {
         equations.forward(model, t, y);
         let (motion, wrench) = equations.loads();
         wrench.fill(Wrench::zero());
-        let (touching, counts) = (self.touching, &mut self.counts);
-        self.left_piece |= contacts.evaluate(t, motion, wrench, touching, counts);
+        let at = At {
+            t,
+            motion,
+            touching: self.touching,
+        };
+        let mut loads = Loads {
+            wrench,
+            counts: &mut self.counts,
+            left_piece: false,
+        };
+        contacts.load(&at, &mut loads);
         for element in elements {
-            element.load(t, motion, wrench);
+            element.load(&at, &mut loads);
         }
+        self.left_piece |= loads.left_piece;
     }
 
     /// Powers at (t, y). `dy` holds the derivative there if the latest evaluation was at this instant, and is scratch
@@ -134,11 +145,12 @@ impl StiffSystem for Evaluator<'_> {
         let Mechanism {
             model,
             equations,
+            contacts,
             elements,
             ..
         } = &mut *self.mechanism;
         if let Some(motion) = equations.motion_by_time_alone(model, t, &scratch) {
-            stiff.observe_drift(model, elements, motion);
+            stiff.observe_drift(contacts, elements, motion);
         }
         self.derivative(t, y, &mut scratch);
         stiff.derivative = scratch;
@@ -149,7 +161,8 @@ impl StiffSystem for Evaluator<'_> {
             elements,
             ..
         } = &mut *self.mechanism;
-        stiff.gather(model, contacts, elements, self.touching, &**equations, y);
+        let touching = self.touching;
+        stiff.gather(model, contacts, elements, touching, &**equations, (t, y));
         stiff.apply_inverse_mass(model, &mut **equations);
         self.mechanism.stiff = Some(stiff);
     }

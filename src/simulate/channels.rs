@@ -1,189 +1,54 @@
-//! Which quantities of a simulation are recorded for the plots, in which order, and how they are read from a frame.
+//! Which values of a frame a scene has recorded: channels of the plots and columns of `run`, laid out from the one table.
 
-use super::{Frame, Ledger};
-use crate::scene::{JointKind, Scene, Vec3};
+mod table;
+
+pub use table::Quantity;
+
+use super::Frame;
+use crate::scene::{JointKind, Scene};
+use table::{Each, Signal, TABLE, Take};
 
 /// Ball joints, and drives, that are recorded; in a longer chain the rest would cost more memory than they tell.
 pub const RECORDED_JOINTS: usize = 12;
 
-/// A physical quantity that a plot shows; its channels share one axis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[allow(missing_docs)]
-pub enum Quantity {
-    NormalForce,
-    FrictionForce,
-    Eccentricity,
-    Penetration,
-    Position,
-    Angles,
-    Velocity,
-    AngleRates,
-    Acceleration,
-    AngleAccelerations,
-    ActuatorForce,
-    ActuatorTorque,
-    Energy,
-    EnergyBalance,
-    ProbeError,
+/// Where in a frame one value stands.
+#[derive(Clone, Copy, Debug)]
+pub struct Reading {
+    take: Take,
+    part: usize,
+    component: usize,
 }
 
-/// How a term of the balance is read, J.
-type Take = fn(&Ledger) -> f64;
-
-impl Quantity {
-    /// All of them, in the order in which a list shows them.
-    pub const ALL: [Self; 15] = [
-        Self::NormalForce,
-        Self::FrictionForce,
-        Self::Eccentricity,
-        Self::Penetration,
-        Self::Position,
-        Self::Angles,
-        Self::Velocity,
-        Self::AngleRates,
-        Self::Acceleration,
-        Self::AngleAccelerations,
-        Self::ActuatorForce,
-        Self::ActuatorTorque,
-        Self::Energy,
-        Self::EnergyBalance,
-        Self::ProbeError,
-    ];
-
-    /// Members of [`Self::EnergyBalance`]: kinetic and elastic change equal the works given by drives, gravity, clearance,
-    /// changes and loads from outside, less the losses by restitution, friction and dampers, plus the residual.
-    const BALANCE: [(&str, Take); 11] = [
-        ("drives", |ledger| ledger.drive_work),
-        ("gravity", |ledger| ledger.gravity_work),
-        ("clearance", |ledger| ledger.clearance_work),
-        ("changes", |ledger| ledger.change_work),
-        ("external", |ledger| ledger.external_work),
-        ("restitution", |ledger| ledger.restitution_loss),
-        ("friction", |ledger| ledger.friction_loss),
-        ("damping", |ledger| ledger.damping_loss),
-        ("kinetic", |ledger| ledger.kinetic_change),
-        ("elastic", |ledger| ledger.elastic_change),
-        ("residual", Ledger::residual),
-    ];
-
-    /// Those that a scene without force elements has not.
-    const OF_ELEMENTS: [&str; 2] = ["external", "damping"];
-
-    /// Those of the balance that take energy, or hold it; the others give. All together cancel.
-    pub const TAKES: [&str; 5] = ["restitution", "friction", "damping", "kinetic", "elastic"];
-
-    /// Sentence-case name.
-    pub fn label(self) -> &'static str {
-        match self {
-            Self::NormalForce => "Normal force",
-            Self::FrictionForce => "Friction force",
-            Self::Eccentricity => "Eccentricity",
-            Self::Penetration => "Penetration",
-            Self::Position => "Position",
-            Self::Angles => "Angles",
-            Self::Velocity => "Velocity",
-            Self::AngleRates => "Angle rates",
-            Self::Acceleration => "Acceleration",
-            Self::AngleAccelerations => "Angle accelerations",
-            Self::ActuatorForce => "Actuator force",
-            Self::ActuatorTorque => "Actuator torque",
-            Self::Energy => "Energy",
-            Self::EnergyBalance => "Energy balance",
-            Self::ProbeError => "Probe error",
-        }
-    }
-
-    /// Unit on the axis, and SI units in one of it.
-    pub fn unit(self) -> (&'static str, f64) {
-        match self {
-            Self::NormalForce | Self::FrictionForce | Self::ActuatorForce => ("N", 1.0),
-            Self::ActuatorTorque => ("N m", 1.0),
-            Self::Eccentricity | Self::Position | Self::ProbeError => ("mm", 1e-3),
-            Self::Penetration => ("µm", 1e-6),
-            Self::Angles => ("mrad", 1e-3),
-            Self::Velocity => ("m/s", 1.0),
-            Self::AngleRates => ("rad/s", 1.0),
-            Self::Acceleration => ("m/s²", 1.0),
-            Self::AngleAccelerations => ("rad/s²", 1.0),
-            Self::Energy | Self::EnergyBalance => ("mJ", 1e-3),
-        }
-    }
-
-    /// What it is, in a sentence.
-    pub fn help(self) -> &'static str {
-        match self {
-            Self::NormalForce => {
-                "Size of the normal force on each ball; of the whole reaction where a joint is ideal."
-            }
-            Self::FrictionForce => "Size of the friction force on each ball.",
-            Self::Eccentricity => {
-                "Distance of each ball's centre from its socket's centre. Contact begins at the clearance."
-            }
-            Self::Penetration => {
-                "How deep each ball presses into its socket; below zero there is a gap."
-            }
-            Self::Position => "Origin of the output body in world axes.",
-            Self::Angles => "Angles α, β, γ of the output body.",
-            Self::Velocity => "Velocity of the output body's origin.",
-            Self::AngleRates => "Rates of the angles α, β, γ.",
-            Self::Acceleration => "Acceleration of the output body's origin.",
-            Self::AngleAccelerations => "Second derivatives of the angles α, β, γ.",
-            Self::ActuatorForce => "Force that each driven slide needs, positive along its axis.",
-            Self::ActuatorTorque => "Torque that each driven hinge needs, positive about its axis.",
-            Self::Energy => "Kinetic, potential and elastic energy of the whole mechanism.",
-            Self::EnergyBalance => {
-                "Since the start: work of drives, gravity, moving clearances, changed parameters and loads from outside, loss \
-                 by restitution, friction and dampers, change of kinetic and elastic energy, and the residual, which is the \
-                 error of the integration."
-            }
-            Self::ProbeError => "Probe tip minus the tip of the ideal mechanism at the same time.",
-        }
+impl Reading {
+    /// The value, SI units; `None` where `frame` does not know it.
+    #[inline]
+    pub fn read(&self, frame: &Frame) -> Option<f64> {
+        self.take.value(frame, self.part, self.component)
     }
 }
 
 /// One recorded series.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Channel {
     /// What it measures.
     pub quantity: Quantity,
     /// Which one of them: a joint's name, an axis, a kind of energy.
     pub member: String,
+    column: String,
+    reading: Reading,
+}
+
+impl PartialEq for Channel {
+    /// Quantity and member tell a channel; where it is read follows from them.
+    fn eq(&self, other: &Self) -> bool {
+        (self.quantity, &self.member) == (other.quantity, &other.member)
+    }
 }
 
 impl Channel {
     /// Name of its column in a file, with the SI unit: that of `run` for the same quantity.
-    pub fn column(&self) -> String {
-        let member = self.member.as_str();
-        let angle = match member {
-            "α" => "alpha",
-            "β" => "beta",
-            "γ" => "gamma",
-            other => other,
-        };
-        match self.quantity {
-            Quantity::NormalForce => format!("{member}_normal_N"),
-            Quantity::FrictionForce => format!("{member}_friction_N"),
-            Quantity::Eccentricity => format!("{member}_eccentricity_m"),
-            Quantity::Penetration => format!("{member}_penetration_m"),
-            Quantity::Position => format!("{member}_m"),
-            Quantity::Angles => format!("{angle}_rad"),
-            Quantity::Velocity => format!("v{member}_m_s"),
-            Quantity::AngleRates => format!("{angle}_rate_rad_s"),
-            Quantity::Acceleration => format!("a{member}_m_s2"),
-            Quantity::AngleAccelerations => format!("{angle}_accel_rad_s2"),
-            Quantity::ActuatorForce => format!("{member}_actuator_N"),
-            Quantity::ActuatorTorque => format!("{member}_actuator_Nm"),
-            Quantity::Energy => format!("{member}_J"),
-            Quantity::EnergyBalance => match member {
-                "drives" => "drive_work_J".to_owned(),
-                "changes" => "change_work_J".to_owned(),
-                "restitution" | "friction" | "damping" => format!("{member}_loss_J"),
-                "kinetic" | "elastic" => format!("{member}_change_J"),
-                "residual" => "energy_residual_J".to_owned(),
-                other => format!("{other}_work_J"),
-            },
-            Quantity::ProbeError => format!("probe_error_{member}_m"),
-        }
+    pub fn column(&self) -> &str {
+        &self.column
     }
 }
 
@@ -191,77 +56,22 @@ impl Channel {
 #[derive(Clone, Debug, Default)]
 pub struct Channels {
     list: Vec<Channel>,
-    joints: usize,
-    drives: usize,
-    probe: bool,
-    balance: bool,
-    elements: bool,
-}
-
-/// Members of the energy balance of a scene, with force `elements` or without.
-fn balance_of(elements: bool) -> impl Iterator<Item = (&'static str, Take)> {
-    let all = Quantity::BALANCE.into_iter();
-    all.filter(move |(member, _)| elements || !Quantity::OF_ELEMENTS.contains(member))
 }
 
 impl Channels {
     /// The channels that `scene` has.
     pub fn of(scene: &Scene) -> Self {
-        let joints = scene.ball_joints.len().min(RECORDED_JOINTS);
-        let all_driven = scene.joints.iter().filter(|joint| joint.drive.is_some());
-        let driven = || all_driven.clone().take(RECORDED_JOINTS);
         let mut list = Vec::new();
-        let mut add = |quantity, member: &str| {
-            list.push(Channel {
+        let in_plots = |signal: &Signal| signal.plot.map(|_| 0);
+        lay_out(scene, None, RECORDED_JOINTS, in_plots, |found| {
+            list.extend(found.signal.plot.map(|quantity| Channel {
                 quantity,
-                member: member.to_owned(),
-            });
-        };
-        for joint in scene.ball_joints.iter().take(joints) {
-            for quantity in &Quantity::ALL[..4] {
-                add(*quantity, &joint.name);
-            }
-        }
-        for (quantity, members) in [
-            (Quantity::Position, ["x", "y", "z"]),
-            (Quantity::Angles, ["α", "β", "γ"]),
-            (Quantity::Velocity, ["x", "y", "z"]),
-            (Quantity::AngleRates, ["α", "β", "γ"]),
-            (Quantity::Acceleration, ["x", "y", "z"]),
-            (Quantity::AngleAccelerations, ["α", "β", "γ"]),
-            (Quantity::Energy, ["kinetic", "potential", "elastic"]),
-        ] {
-            for member in members {
-                add(quantity, member);
-            }
-        }
-        for joint in driven() {
-            let quantity = match joint.kind {
-                JointKind::Revolute => Quantity::ActuatorTorque,
-                _ => Quantity::ActuatorForce,
-            };
-            add(quantity, &joint.name);
-        }
-        let (balance, elements) = (scene.solver.energy_ledger, !scene.elements.is_empty());
-        if balance {
-            for (member, _) in balance_of(elements) {
-                add(Quantity::EnergyBalance, member);
-            }
-        }
-        let probe = scene.output.probe.is_some();
-        if probe {
-            for member in ["x", "y", "z"] {
-                add(Quantity::ProbeError, member);
-            }
-        }
-        Self {
-            list,
-            joints,
-            drives: driven().count(),
-            probe,
-            balance,
-            elements,
-        }
+                member: found.member.to_owned(),
+                column: found.column,
+                reading: found.reading,
+            }));
+        });
+        Self { list }
     }
 
     /// The channels in order.
@@ -281,40 +91,146 @@ impl Channels {
 
     /// Index of the normal force of ball joint `joint`, if it is recorded.
     pub fn normal_force(&self, joint: usize) -> Option<usize> {
-        (joint < self.joints).then_some(4 * joint)
+        let own = |c: &Channel| c.quantity == Quantity::NormalForce && c.reading.part == joint;
+        self.list.iter().position(own)
     }
 
-    /// Reads every channel from `frame` into `out`, SI units.
+    /// Reads every channel from `frame` into `out`, SI units; NaN where the frame does not know it.
     pub fn read(&self, frame: &Frame, out: &mut Vec<f64>) {
         out.clear();
-        for report in frame.joints.iter().take(self.joints) {
-            out.extend([
-                report.normal_force.norm(),
-                report.friction_force.norm(),
-                report.eccentricity.norm(),
-                report.penetration,
-            ]);
+        let value = |channel: &Channel| channel.reading.read(frame).unwrap_or(f64::NAN);
+        out.extend(self.list.iter().map(value));
+    }
+}
+
+/// Columns of the rows of `run` in order, each with its name and where it is read; `first` tells whether the scene has a probe
+/// error and a ledger, and what its elements report.
+pub fn run_columns(scene: &Scene, first: &Frame) -> (Vec<String>, Vec<Reading>) {
+    let (mut names, mut readings) = (Vec::new(), Vec::new());
+    let in_run = |signal: &Signal| signal.run;
+    lay_out(scene, Some(first), usize::MAX, in_run, |found| {
+        names.push(found.column);
+        readings.push(found.reading);
+    });
+    (names, readings)
+}
+
+/// One value of a signal.
+struct Found<'a> {
+    signal: &'a Signal,
+    member: &'a str,
+    column: String,
+    reading: Reading,
+}
+
+/// Calls `add` with the values of all signals that have a place, by place; of those that share one and are repeated for the same
+/// parts, part by part, the first `most`.
+fn lay_out(
+    scene: &Scene,
+    first: Option<&Frame>,
+    most: usize,
+    place: impl Fn(&Signal) -> Option<u8>,
+    mut add: impl FnMut(Found<'_>),
+) {
+    let mut signals: Vec<&Signal> = TABLE.iter().filter(|s| place(s).is_some()).collect();
+    signals.sort_by_key(|signal| place(signal));
+    let key = |signal: &Signal| (place(signal), signal.take.each());
+    for group in signals.chunk_by(|a, b| key(a) == key(b)) {
+        let parts = parts_of(scene, group[0].take.each());
+        for (part, (name, kind)) in parts.into_iter().take(most).enumerate() {
+            let here = |signal: &&&Signal| has(scene, first, signal, part, kind);
+            for signal in group.iter().filter(here) {
+                let take = signal.take;
+                for (component, &(symbol, word)) in take.components().iter().enumerate() {
+                    let members = [take.member(), symbol, name];
+                    add(Found {
+                        signal,
+                        member: members
+                            .into_iter()
+                            .find(|m| !m.is_empty())
+                            .unwrap_or_default(),
+                        column: signal.column.replace('#', word).replace('@', name),
+                        reading: Reading {
+                            take,
+                            part,
+                            component,
+                        },
+                    });
+                }
+            }
         }
-        let pose = &frame.pose;
-        for vector in [
-            pose.position,
-            pose.angles,
-            pose.velocity,
-            pose.angle_rates,
-            pose.acceleration,
-            pose.angle_accelerations,
-            Vec3::new(frame.kinetic, frame.potential, frame.elastic),
-        ] {
-            out.extend(vector.iter());
+    }
+}
+
+/// Names of what a signal is repeated for; of a driven joint with its kind.
+fn parts_of(scene: &Scene, each: Each) -> Vec<(&str, Option<JointKind>)> {
+    let joints = scene.ball_joints.iter().map(|joint| joint.name.as_str());
+    let elements = scene.elements.iter().map(|element| element.name.as_str());
+    let driven = scene.joints.iter().filter(|joint| joint.drive.is_some());
+    match each {
+        Each::Once => vec![("", None)],
+        Each::Joint => joints.map(|name| (name, None)).collect(),
+        Each::Drive => driven.map(|j| (j.name.as_str(), Some(j.kind))).collect(),
+        Each::Element => elements.map(|name| (name, None)).collect(),
+    }
+}
+
+/// Whether `scene` has `signal` for its `part`; without a `first` frame, whether it may have it.
+fn has(
+    scene: &Scene,
+    first: Option<&Frame>,
+    signal: &Signal,
+    part: usize,
+    kind: Option<JointKind>,
+) -> bool {
+    let take = signal.take;
+    let known = |may_have: bool| first.map_or(may_have, |f| take.value(f, part, 0).is_some());
+    match take {
+        Take::Slide => kind != Some(JointKind::Revolute),
+        Take::Hinge => kind == Some(JointKind::Revolute),
+        Take::Given(..) | Take::Taken(..) => {
+            known(scene.solver.energy_ledger) && (!signal.of_elements || !scene.elements.is_empty())
         }
-        out.extend(frame.actuators.iter().take(self.drives));
-        if self.balance {
-            let ledger = frame.ledger.unwrap_or_default();
-            out.extend(balance_of(self.elements).map(|(_, take)| take(&ledger)));
+        Take::ProbeError => known(scene.output.probe.is_some()),
+        Take::Element(_) => known(true),
+        _ => true,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_plot_has_a_signal_and_no_two_signals_have_one_column() {
+        for quantity in Quantity::ALL {
+            let mut plots = TABLE.iter().filter_map(|signal| signal.plot);
+            assert!(plots.any(|plot| plot == quantity), "{quantity:?}");
         }
-        if self.probe {
-            out.extend(frame.probe_error.unwrap_or(Vec3::repeat(f64::NAN)).iter());
-        }
-        debug_assert_eq!(out.len(), self.list.len());
+        let mut columns: Vec<(&str, usize)> = TABLE
+            .iter()
+            .map(|signal| (signal.column, signal.take.each() as usize))
+            .collect();
+        columns.sort_unstable();
+        columns.dedup();
+        assert_eq!(columns.len(), TABLE.len());
+    }
+
+    #[test]
+    fn readers_that_know_columns_by_their_place_find_them() {
+        let text = crate::scene::built_in_text("slider-crank-driven").expect("built in");
+        let load = "[[load]]\nname = \"wind\"\non = { body = \"rod\" }\nforce = \"1 0 0 N\"\n";
+        let scene = Scene::parse(&format!("{text}\n{load}"), None, &[]).expect("reads");
+        let mut first = Frame::default();
+        let mut simulation = crate::simulate::Simulation::new(&scene).expect("starts");
+        simulation.sample(0.0, &mut first);
+        let (names, readings) = run_columns(&scene, &first);
+        let last = "drive_work_J,gravity_work_J,restitution_loss_J,friction_loss_J,clearance_work_J,energy_residual_J,\
+                    wind_force_x_N,wind_force_y_N,wind_force_z_N,wind_torque_x_Nm,wind_torque_y_Nm,wind_torque_z_Nm,\
+                    damping_loss_J,external_work_J";
+        assert!(names.join(",").ends_with(last), "{names:?}");
+        assert_eq!(names.len(), readings.len());
+        let known = |reading: &Reading| reading.read(&first).is_some_and(f64::is_finite);
+        assert!(readings.iter().all(known));
     }
 }

@@ -29,18 +29,11 @@ pub(super) fn fill(
     }
     out.pose = pose_of(&out.bodies[scene.output.body]);
     out.joints.clear();
-    out.elastic = 0.0;
     for (j, joint) in scene.ball_joints.iter().enumerate() {
-        let report = joint_report(mechanism, joint, &memory[j], j);
-        if mechanism.contacts.has_clearance(j) {
-            out.elastic += mechanism
-                .contacts
-                .coefficients(j)
-                .elastic_energy(report.penetration);
-        }
-        out.joints.push(report);
+        out.joints
+            .push(joint_report(mechanism, joint, &memory[j], j));
     }
-    out.elastic += mechanism.energy_in_elements();
+    out.elastic = mechanism.elastic_energy();
     out.elements.clear();
     out.elements.extend(mechanism.element_reports(time));
     out.pull = mechanism.pull_report(time);
@@ -66,7 +59,7 @@ fn joint_report(
             m.position + m.rotation * (a.point + mechanism.frame_origin(b))
         }
     };
-    let gap = &mechanism.contacts.gaps()[j];
+    let gap = mechanism.contacts.gap(j);
     let contacts = &mechanism.contacts;
     let coefficients = contacts.coefficients(j);
     let ball_centre = centre(&joint.ball);

@@ -194,14 +194,14 @@ impl Equations for Borrowed {
     fn gaps(&self, t: f64, y: &[f64]) -> Vec<(f64, f64)> {
         let mut mechanism = self.mechanism.borrow_mut();
         mechanism.measure(t, y);
-        let gaps = mechanism.contacts.gaps().iter();
+        let gaps = mechanism.contacts.gaps();
         gaps.map(|gap| (gap.penetration, gap.rate)).collect()
     }
 
     fn forces(&self, t: f64, y: &[f64]) -> Vec<f64> {
         self.derivative(t, y, &mut vec![0.0; y.len()]);
         let mechanism = self.mechanism.borrow();
-        let gaps = mechanism.contacts.gaps().iter();
+        let gaps = mechanism.contacts.gaps();
         gaps.map(|gap| gap.normal_force).collect()
     }
 

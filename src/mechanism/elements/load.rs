@@ -1,7 +1,8 @@
 //! Force and torque from outside on a body, constant or harmonic, in world or body axes.
 
-use super::{Coupling, ElementPowers, ElementReport, ForceElement, point_of, push};
-use crate::mechanism::kinematics::{Kinematics, Wrench};
+use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, point_of, push};
+use crate::mechanism::Powers;
+use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::model::Anchor;
 use crate::scene::{Element, Vec3};
 
@@ -15,7 +16,7 @@ struct Load {
     phase: f64,
 }
 
-pub(super) fn make(element: &Element, anchors: &[Anchor]) -> Box<dyn ForceElement> {
+pub(super) fn make(element: &Element, anchors: &[Anchor]) -> Box<dyn SceneElement> {
     Box::new(Load {
         on: anchors[0],
         force: element.vector("force"),
@@ -45,15 +46,19 @@ impl Load {
 }
 
 impl ForceElement for Load {
-    fn load(&self, t: f64, motion: &[Kinematics], wrench: &mut [Wrench]) {
-        let (force, torque) = self.at(t, motion);
-        let (_, _, arm) = point_of(&self.on, motion);
-        let wrench = &mut wrench[self.on.body];
+    fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
+        let (force, torque) = self.at(at.t, at.motion);
+        let (_, _, arm) = point_of(&self.on, at.motion);
+        let wrench = &mut loads.wrench[self.on.body];
         push(wrench, &arm, &force);
         wrench.torque += torque;
     }
 
-    fn coupling(&self, _: &[Kinematics]) -> Option<([Anchor; 2], Coupling)> {
+    fn ends(&self) -> Option<[Anchor; 2]> {
+        None
+    }
+
+    fn coupling(&self, _: &At<'_>) -> Option<Coupling> {
         None
     }
 
@@ -61,15 +66,15 @@ impl ForceElement for Load {
         0.0
     }
 
-    fn powers(&self, t: f64, motion: &[Kinematics]) -> ElementPowers {
+    fn add_powers(&self, t: f64, motion: &[Kinematics], powers: &mut Powers) {
         let (force, torque) = self.at(t, motion);
         let (_, velocity, _) = point_of(&self.on, motion);
-        ElementPowers {
-            dissipated: 0.0,
-            supplied: force.dot(&velocity) + torque.dot(&motion[self.on.body].angular_velocity),
-        }
+        let spin = &motion[self.on.body].angular_velocity;
+        powers.external += force.dot(&velocity) + torque.dot(spin);
     }
+}
 
+impl SceneElement for Load {
     fn period(&self) -> f64 {
         std::f64::consts::TAU / self.omega
     }

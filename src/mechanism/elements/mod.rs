@@ -1,30 +1,65 @@
-//! Force elements other than contacts: what pushes bodies without a constraint. Each kind is one file, and a row below.
+//! Force elements: what pushes bodies without a constraint. Each kind is one file. Loose ball joints are among them; the others
+//! are those of a scene's own list, each kind with a row below.
 
+mod contact;
 mod load;
 mod pull;
 mod spring;
 
+pub(super) use contact::Contact;
+pub use contact::Gap;
+
+use super::Powers;
+use super::contacts::{Counts, Touching};
 use super::kinematics::{Kinematics, Wrench};
 use super::model::{Anchor, Model};
+use crate::contact::Stiffness;
 use crate::scene::{Attachment, Element, Mat3, Scene, Vec3};
 pub use pull::Pull;
 
-/// How the force of an element between two points answers to their relative motion.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Coupling {
-    /// dF/d(e) of the force F on `to`, by the distance e from `from` to `to`, N/m.
-    pub by_displacement: Mat3,
-    /// dF/d(e_dot), N s/m.
-    pub by_rate: Mat3,
+/// Motion of the bodies at `t`, s, and what decides which contacts carry a force.
+#[derive(Clone, Copy)]
+pub(super) struct At<'a> {
+    pub t: f64,
+    pub motion: &'a [Kinematics],
+    pub touching: Touching<'a>,
 }
 
-/// Powers of an element, W.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct ElementPowers {
-    /// Turned into heat.
-    pub dissipated: f64,
-    /// Given by what is outside of the scene.
-    pub supplied: f64,
+/// What elements add to at an evaluation.
+pub(super) struct Loads<'a> {
+    /// On the bodies, about their centroids; the last is the world's.
+    pub wrench: &'a mut [Wrench],
+    pub counts: &'a mut Counts,
+    /// A sliding speed or a penetration rate was beyond the piece of its law that the memory holds.
+    pub left_piece: bool,
+}
+
+/// How the force between two points answers to their relative motion.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Coupling {
+    /// The points, first the one that `force` acts on, each with how far beyond it along `normal` its body is pushed, m.
+    pub sides: [(Anchor, f64); 2],
+    /// Zero where the bodies are pushed at the points.
+    pub normal: Vec3,
+    /// N; its lever changes with the normal.
+    pub force: Vec3,
+    /// Derivatives of the force.
+    pub stiffness: Stiffness,
+    /// Whether the part of it by slip follows the surfaces and not the points.
+    pub reads_surfaces: bool,
+}
+
+impl Coupling {
+    /// Of a force on the second of two points that acts there: by their distance, N/m, and by its rate, N s/m.
+    fn between_points([from, to]: [Anchor; 2], by_displacement: Mat3, by_rate: Mat3) -> Self {
+        Self {
+            sides: [(to, 0.0), (from, 0.0)],
+            normal: Vec3::zeros(),
+            force: Vec3::zeros(),
+            stiffness: Stiffness::between_points(by_displacement, by_rate),
+            reads_surfaces: false,
+        }
+    }
 }
 
 /// What an element reports of an instant. SI units.
@@ -38,20 +73,26 @@ pub struct ElementReport {
     pub torque: Option<Vec3>,
 }
 
-/// Something that loads bodies by their motion and by time.
+/// Something that loads bodies by their motion and by time. Allocates nothing.
 pub(super) trait ForceElement: Send {
-    /// Adds its loads at `t` to those on the bodies, about their centroids. Allocates nothing.
-    fn load(&self, t: f64, motion: &[Kinematics], wrench: &mut [Wrench]);
+    /// Adds its loads.
+    fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>);
 
-    /// The two points that it couples, and how; `None` where nothing of it is stiff.
-    fn coupling(&self, motion: &[Kinematics]) -> Option<([Anchor; 2], Coupling)>;
+    /// The two points to whose relative motion it answers; `None` where nothing of it is stiff.
+    fn ends(&self) -> Option<[Anchor; 2]>;
 
-    /// Energy stored, J.
+    /// How it answers there, after an evaluation; `None` where it does not.
+    fn coupling(&self, at: &At<'_>) -> Option<Coupling>;
+
+    /// Energy stored, J; of a contact that at the gap last measured.
     fn stored(&self, motion: &[Kinematics]) -> f64;
 
-    /// Powers at `t`.
-    fn powers(&self, t: f64, motion: &[Kinematics]) -> ElementPowers;
+    /// Adds its powers at `t`, after an evaluation.
+    fn add_powers(&self, t: f64, motion: &[Kinematics], powers: &mut Powers);
+}
 
+/// One of a scene's own list. A ball joint is reported as one, loose or not.
+pub(super) trait SceneElement: ForceElement {
     /// Period of what it does by time alone, s; infinite where that does not change.
     fn period(&self) -> f64 {
         f64::INFINITY
@@ -62,13 +103,13 @@ pub(super) trait ForceElement: Send {
 }
 
 /// Makes the element of one kind; its points as anchors.
-type Make = fn(&Element, &[Anchor]) -> Box<dyn ForceElement>;
+type Make = fn(&Element, &[Anchor]) -> Box<dyn SceneElement>;
 
 /// Every kind by its section.
 const KINDS: [(&str, Make); 2] = [("spring", spring::make), ("load", load::make)];
 
 /// The force elements of `scene`, in its order.
-pub(super) fn elements_of(scene: &Scene, model: &Model) -> Vec<Box<dyn ForceElement>> {
+pub(super) fn elements_of(scene: &Scene, model: &Model) -> Vec<Box<dyn SceneElement>> {
     let make = |element: &Element| {
         let anchors: Vec<Anchor> = element
             .points
@@ -85,7 +126,7 @@ pub(super) fn elements_of(scene: &Scene, model: &Model) -> Vec<Box<dyn ForceElem
 }
 
 /// The element of a hand that pulls.
-pub(super) fn hand(scene: &Scene, model: &Model, pull: Pull) -> Box<dyn ForceElement> {
+pub(super) fn hand(scene: &Scene, model: &Model, pull: Pull) -> Box<dyn SceneElement> {
     let point = Attachment {
         body: Some(pull.body),
         point: pull.point,

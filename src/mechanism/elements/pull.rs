@@ -1,8 +1,10 @@
 //! A hand that pulls on a body: a spring and a damper from a point of it to a place that the hand holds. To the scene it is
 //! something outside, so all that it does is work from outside.
 
-use super::{Coupling, ElementPowers, ElementReport, ForceElement, point_of, push};
-use crate::mechanism::kinematics::{Kinematics, Wrench};
+use super::{
+    At, Coupling, ElementReport, ForceElement, Loads, Powers, SceneElement, point_of, push,
+};
+use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::model::Anchor;
 use crate::scene::Vec3;
 
@@ -36,13 +38,17 @@ impl Hand {
 }
 
 impl ForceElement for Hand {
-    fn load(&self, _: f64, motion: &[Kinematics], wrench: &mut [Wrench]) {
-        let (force, _, _, arm) = self.force(motion);
-        push(&mut wrench[self.on.body], &arm, &force);
+    fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
+        let (force, _, _, arm) = self.force(at.motion);
+        push(&mut loads.wrench[self.on.body], &arm, &force);
     }
 
     // Soft by choice: nothing that an implicit method would have to know.
-    fn coupling(&self, _: &[Kinematics]) -> Option<([Anchor; 2], Coupling)> {
+    fn ends(&self) -> Option<[Anchor; 2]> {
+        None
+    }
+
+    fn coupling(&self, _: &At<'_>) -> Option<Coupling> {
         None
     }
 
@@ -50,14 +56,13 @@ impl ForceElement for Hand {
         0.0
     }
 
-    fn powers(&self, _: f64, motion: &[Kinematics]) -> ElementPowers {
+    fn add_powers(&self, _: f64, motion: &[Kinematics], powers: &mut Powers) {
         let (force, _, velocity, _) = self.force(motion);
-        ElementPowers {
-            dissipated: 0.0,
-            supplied: force.dot(&velocity),
-        }
+        powers.external += force.dot(&velocity);
     }
+}
 
+impl SceneElement for Hand {
     fn report(&self, _: f64, motion: &[Kinematics]) -> ElementReport {
         let (force, point, ..) = self.force(motion);
         ElementReport {

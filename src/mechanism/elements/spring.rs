@@ -1,7 +1,8 @@
 //! Spring with a damper along the line between two points: tension T = preload + stiffness (l - length) + damping dl/dt.
 
-use super::{Coupling, ElementPowers, ElementReport, ForceElement, point_of, push};
-use crate::mechanism::kinematics::{Kinematics, Wrench};
+use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, point_of, push};
+use crate::mechanism::Powers;
+use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::model::Anchor;
 use crate::scene::{Element, Mat3, Vec3};
 
@@ -28,7 +29,7 @@ struct State {
     tension: f64,
 }
 
-pub(super) fn make(element: &Element, anchors: &[Anchor]) -> Box<dyn ForceElement> {
+pub(super) fn make(element: &Element, anchors: &[Anchor]) -> Box<dyn SceneElement> {
     Box::new(Spring {
         from: anchors[0],
         to: anchors[1],
@@ -66,33 +67,32 @@ impl Spring {
 }
 
 impl ForceElement for Spring {
-    fn load(&self, _: f64, motion: &[Kinematics], wrench: &mut [Wrench]) {
-        let s = self.state(motion);
+    fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
+        let s = self.state(at.motion);
         let pull = s.along * s.tension;
-        push(&mut wrench[self.from.body], &s.arms[0], &pull);
-        push(&mut wrench[self.to.body], &s.arms[1], &-pull);
+        push(&mut loads.wrench[self.from.body], &s.arms[0], &pull);
+        push(&mut loads.wrench[self.to.body], &s.arms[1], &-pull);
     }
 
-    fn coupling(&self, motion: &[Kinematics]) -> Option<([Anchor; 2], Coupling)> {
-        let s = self.state(motion);
+    fn ends(&self) -> Option<[Anchor; 2]> {
+        Some([self.from, self.to])
+    }
+
+    fn coupling(&self, at: &At<'_>) -> Option<Coupling> {
+        let (s, ends) = (self.state(at.motion), [self.from, self.to]);
         if s.length == 0.0 {
             // A bush pulls back however its points part; else the direction, and with it the force, jumps here.
             let bush = self.length == 0.0 && self.preload == 0.0;
-            let coupling = Coupling {
-                by_displacement: Mat3::identity() * -self.stiffness,
-                by_rate: Mat3::zeros(),
-            };
-            return bush.then_some(([self.from, self.to], coupling));
+            let by_displacement = Mat3::identity() * -self.stiffness;
+            return bush.then(|| Coupling::between_points(ends, by_displacement, Mat3::zeros()));
         }
         // F = -T u with u = e / |e|: dT = (k u + c P e_dot / l) . de + c u . de_dot, du = P de / l, P = 1 - u u'.
         let u = s.along;
         let turning = (Mat3::identity() - u * u.transpose()) / s.length;
         let rise = u * self.stiffness + turning * s.velocity * self.damping;
-        let coupling = Coupling {
-            by_displacement: -u * rise.transpose() - turning * s.tension,
-            by_rate: -u * (u * self.damping).transpose(),
-        };
-        Some(([self.from, self.to], coupling))
+        let by_displacement = -u * rise.transpose() - turning * s.tension;
+        let by_rate = -u * (u * self.damping).transpose();
+        Some(Coupling::between_points(ends, by_displacement, by_rate))
     }
 
     fn stored(&self, motion: &[Kinematics]) -> f64 {
@@ -100,14 +100,13 @@ impl ForceElement for Spring {
         stretch * (self.preload + 0.5 * self.stiffness * stretch)
     }
 
-    fn powers(&self, _: f64, motion: &[Kinematics]) -> ElementPowers {
+    fn add_powers(&self, _: f64, motion: &[Kinematics], powers: &mut Powers) {
         let rate = self.state(motion).rate;
-        ElementPowers {
-            dissipated: self.damping * rate * rate,
-            supplied: 0.0,
-        }
+        powers.damping += self.damping * rate * rate;
     }
+}
 
+impl SceneElement for Spring {
     fn report(&self, _: f64, motion: &[Kinematics]) -> ElementReport {
         let s = self.state(motion);
         ElementReport {

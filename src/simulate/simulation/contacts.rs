@@ -184,7 +184,7 @@ impl Simulation {
                 state.record.statistics.peak_time[j] = time;
             }
             if force > peaks[j].normal {
-                let gap = &mechanism.contacts.gaps()[j];
+                let gap = mechanism.contacts.gap(j);
                 let n = if gap.eccentricity.norm() > 0.0 {
                     gap.eccentricity.normalize()
                 } else {

@@ -109,7 +109,7 @@ impl Simulation {
                 let speed = mechanism.slip_speed(j);
                 memory.friction_piece = c.slip_at(speed);
                 if anew {
-                    let rate = mechanism.contacts.gaps()[j].rate;
+                    let rate = mechanism.contacts.gap(j).rate;
                     memory.approach_piece = c.pace_at(memory.approach_speed, rate);
                 }
             }
@@ -203,7 +203,7 @@ impl Simulation {
     /// Penetration rate of joint `j` on the interpolant of the attempted step, m/s.
     fn rate_at(&mut self, j: usize, theta: f64, h: f64) -> f64 {
         self.measure_at(theta, h);
-        self.mechanism.contacts.gaps()[j].rate
+        self.mechanism.contacts.gap(j).rate
     }
 
     /// Measures the interpolant of the attempted step.

@@ -27,7 +27,7 @@ impl Simulation {
                 state.now.memory[j].friction_piece,
                 state.now.memory[j].approach_piece,
             ) = (FrictionPiece::Unsplit, ApproachPiece::Unsplit);
-            let gap = mechanism.contacts.gaps()[j];
+            let gap = *mechanism.contacts.gap(j);
             let touching = gap.penetration > 0.0;
             if touching == state.now.memory[j].active {
                 continue;

@@ -140,7 +140,7 @@ impl Simulation {
         } = self;
         mechanism.measure(state.now.t, &state.now.y);
         let now = mechanism.contacts.clearance(j);
-        let gap = mechanism.contacts.gaps()[j];
+        let gap = *mechanism.contacts.gap(j);
         let distance = gap.penetration + now;
         let clearance = if contact.clearance < now && distance > contact.clearance {
             let ramp = Ramp {

@@ -45,7 +45,7 @@ impl Simulation {
                 continue;
             }
             self.look(self.state.before.t + theta * h);
-            let inside = self.mechanism.contacts.gaps()[j].normal_force;
+            let inside = self.mechanism.contacts.gap(j).normal_force;
             let ends = course.stronger_end(&c, memory.approach_speed);
             self.attempt.strongest[j] = if inside > ends.0 {
                 (inside, theta)
@@ -76,7 +76,7 @@ impl Simulation {
                     self.take_reaction(j, reaction.norm(), time);
                     continue;
                 }
-                let gap = &self.mechanism.contacts.gaps()[j];
+                let gap = self.mechanism.contacts.gap(j);
                 let (normal, size, friction) = (gap.normal, gap.normal_force, gap.friction);
                 if self.is_peak(j, size, time) {
                     self.peaks[j].normal_force = normal * -size;
