@@ -344,7 +344,9 @@ pub(super) const TABLE: &[Signal] = &[
     both("gravity_work_J", Q::EnergyBalance, 10, Given("gravity", |ledger| ledger.gravity_work)),
     both("clearance_work_J", Q::EnergyBalance, 11, Given("clearance", |ledger| ledger.clearance_work)),
     plotted("change_work_J", Q::EnergyBalance, Given("changes", |ledger| ledger.change_work)),
-    of_elements(both("external_work_J", Q::EnergyBalance, 14, Given("external", |ledger| ledger.external_work))),
+    // A hand can pull on any scene.
+    plotted("external_work_J", Q::EnergyBalance, Given("external", |ledger| ledger.external_work)),
+    of_elements(listed("external_work_J", 14, Given("external", |ledger| ledger.external_work))),
     both("restitution_loss_J", Q::EnergyBalance, 10, Taken("restitution", |ledger| ledger.restitution_loss)),
     both("friction_loss_J", Q::EnergyBalance, 10, Taken("friction", |ledger| ledger.friction_loss)),
     of_elements(both("damping_loss_J", Q::EnergyBalance, 13, Taken("damping", |ledger| ledger.damping_loss))),
