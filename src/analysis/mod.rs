@@ -33,4 +33,4 @@ pub use reference_solution::{Errors, ReferenceSolution, SettledSpan, Slot};
 pub use run_context::{AnalysisError, RunContext};
 pub use setting::Setting;
 pub use stretch::{Effort, End};
-pub use work_precision::{Phase, Point, WorkPrecision, work_precision};
+pub use work_precision::{Phase, Point, View, WorkPrecision, work_precision};

@@ -1,26 +1,38 @@
-//! What Sheng & Chen print in sections 4.2 and 4.3, number by number and statement by statement, and what this
-//! program gets for the same. Nothing is tuned to match; the paper leaves one dimension out and contradicts itself in places.
+//! What Sheng & Chen show, print and say in sections 4.2, 4.3 and 5, as a table (`assets/paper.toml`), and the runs that it
+//! names. Nothing is tuned to match; the paper leaves one dimension out and contradicts itself in places.
 
-pub mod chaos;
-pub mod curves;
-mod words;
+mod quantity;
 
-pub use words::{Agreement, Comparison, compare};
+use std::f64::consts::PI;
+use std::sync::LazyLock;
 
-use super::response::{Extremes, Response};
+use serde::{Deserialize, Deserializer, de::Error as _};
+
+pub use quantity::{Agreement, Comparison, Quantity};
+
+use crate::words::{Words, words};
 
 /// Simulated time of the paper's runs: one period of trajectory (59), s.
 pub const DURATION: f64 = 2.0;
 /// The paper's output step, s.
 pub const SAMPLING: f64 = 1e-3;
+/// Amplitudes of x (m) and of beta (rad) in trajectory (59).
+const AMPLITUDES: [f64; 2] = [0.025, 0.025];
 
 /// Clearance (mm) and friction coefficient of a run.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(from = "(f64, f64)")]
 pub struct Case {
     /// Clearance of all three joints, mm.
     pub clearance: f64,
     /// Friction coefficient.
     pub friction: f64,
+}
+
+impl From<(f64, f64)> for Case {
+    fn from((clearance, friction): (f64, f64)) -> Self {
+        Self::new(clearance, friction)
+    }
 }
 
 impl Case {
@@ -52,462 +64,374 @@ pub const CASES: [Case; 5] = [
     Case::new(0.3, 0.25),
 ];
 
-/// What a figure shows. SI units.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quantity {
-    /// Largest deviation of beta from the ideal motion, rad.
-    DeviationBeta,
-    /// Largest |dx/dt|, m/s.
-    RateX,
-    /// Largest |d beta/dt|, rad/s.
-    RateBeta,
-    /// Largest |d2x/dt2|, m/s^2.
-    AccelerationX,
-    /// Largest |d2 beta/dt2|, rad/s^2.
-    AccelerationBeta,
-    /// Largest normal force of the joint with this index, N.
-    Normal(usize),
-    /// Time of the last separation of any joint, s.
-    LastSeparation,
+/// Runs that differ in one parameter alone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Series {
+    /// Figures 5 to 10 and 18 to 20.
+    Clearance,
+    /// Figures 11 to 16 and 21 to 23.
+    Friction,
 }
 
-impl Quantity {
-    /// Name and unit.
-    pub fn label(self) -> (String, &'static str) {
+words!(Series {
+    Clearance => "clearance",
+    Friction => "friction",
+});
+
+impl Series {
+    /// Its runs, by the parameter ascending.
+    pub const fn cases(self) -> [Case; 3] {
         match self {
-            Self::DeviationBeta => ("largest deviation of beta".to_owned(), "rad"),
-            Self::RateX => ("largest velocity in x".to_owned(), "m/s"),
-            Self::RateBeta => ("largest angular rate of beta".to_owned(), "rad/s"),
-            Self::AccelerationX => ("largest acceleration in x".to_owned(), "m/s²"),
-            Self::AccelerationBeta => ("largest acceleration of beta".to_owned(), "rad/s²"),
-            Self::Normal(joint) => (format!("largest contact force in S{}", joint + 1), "N"),
-            Self::LastSeparation => ("last separation".to_owned(), "s"),
+            Self::Clearance => [CASES[0], CASES[1], CASES[2]],
+            Self::Friction => [CASES[3], CASES[0], CASES[4]],
         }
     }
 
-    fn of_extremes(self, extremes: &Extremes) -> Option<f64> {
-        const X: usize = 0;
-        const BETA: usize = 4;
+    /// What its parameter is called with a value, in the unit of [`Case`].
+    pub fn name(self, value: impl std::fmt::Display) -> String {
         match self {
-            Self::DeviationBeta => Some(extremes.deviation[BETA]),
-            Self::RateX => Some(extremes.rate[X]),
-            Self::RateBeta => Some(extremes.rate[BETA]),
-            Self::AccelerationX => Some(extremes.acceleration[X]),
-            Self::AccelerationBeta => Some(extremes.acceleration[BETA]),
-            Self::Normal(joint) => extremes.normal.get(joint).copied(),
-            Self::LastSeparation => None,
+            Self::Clearance => format!("{value} mm"),
+            Self::Friction => format!("friction {value}"),
         }
     }
 
-    /// In continuous time, and sampled as the paper samples; the second is `None` where sampling does not enter.
-    pub fn of(self, response: &Response) -> (f64, Option<f64>) {
+    /// Value of its parameter in a run.
+    pub fn of(self, case: Case) -> f64 {
         match self {
-            Self::LastSeparation => {
-                let last = response.last_separation.iter().copied();
-                (last.fold(f64::NAN, f64::max), None)
-            }
-            _ => (
-                self.of_extremes(&response.full).unwrap_or(f64::NAN),
-                self.of_extremes(&response.sampled),
-            ),
+            Self::Clearance => case.clearance,
+            Self::Friction => case.friction,
         }
     }
+
+    /// More than one value of its parameter.
+    pub fn values(self) -> &'static str {
+        match self {
+            Self::Clearance => "clearances",
+            Self::Friction => "frictions",
+        }
+    }
+}
+
+/// One of the two coordinates that the paper shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Coordinate {
+    /// Position, m.
+    X,
+    /// Angle, rad.
+    Beta,
+}
+
+words!(Coordinate {
+    X => "x",
+    Beta => "beta",
+});
+
+impl Coordinate {
+    /// Its index among the coordinates of the output body.
+    pub const fn index(self) -> usize {
+        [0, 4][self as usize]
+    }
+
+    /// Amplitude in the ideal motion of the coordinate (m or rad) or its `nth` derivative: the drive turns at pi rad/s.
+    pub fn amplitude(self, nth: usize) -> f64 {
+        AMPLITUDES[self as usize] * [1.0, PI, PI * PI][nth]
+    }
+}
+
+/// Curves that are compared with each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Curves {
+    /// The runs by clearance.
+    Clearance,
+    /// The runs by friction.
+    Friction,
+    /// The same run by two formulations that share no equations of motion.
+    Formulations,
+}
+
+/// Sections that are compared with each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Sections {
+    /// Those of the paper's three runs.
+    Runs,
+    /// Those of all values of a sweep from cold starts.
+    Sweep,
 }
 
 /// One number that the paper prints.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Published {
     /// Figure that it belongs to.
-    pub figure: &'static str,
+    pub figure: String,
     /// The run.
+    #[serde(rename = "run")]
     pub case: Case,
     /// What it measures.
+    #[serde(deserialize_with = "word")]
     pub quantity: Quantity,
     /// The value printed in the text of section 4.2, SI units.
     pub value: f64,
 }
 
-const fn published(
-    figure: &'static str,
-    (clearance, friction): (f64, f64),
-    quantity: Quantity,
-    value: f64,
-) -> Published {
-    Published {
-        figure,
-        case: Case::new(clearance, friction),
-        quantity,
-        value,
+/// A peak of Figure 17, whose run the paper does not name, SI units.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Verification {
+    /// Part of the figure.
+    pub figure: String,
+    /// What is measured.
+    #[serde(deserialize_with = "word")]
+    pub quantity: Quantity,
+    /// By the paper's own program.
+    pub own: f64,
+    /// By the commercial one that it is compared with.
+    pub commercial: f64,
+}
+
+/// What a figure shows. Columns are named as in [`super::reproduction::COLUMNS`].
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Shows {
+    /// Columns of three runs over the whole period, and as the balls bounce.
+    Response {
+        /// The runs.
+        to: Series,
+        /// Columns above.
+        whole: Vec<String>,
+        /// Columns below.
+        early: Vec<String>,
+    },
+    /// The contact forces of a run.
+    Forces(Case),
+    /// Columns of two formulations and the ideal motion.
+    Verification(Vec<String>),
+    /// How far the formulations part, and by how much constraints are violated.
+    Drift,
+    /// Phase portraits, settled and with impacts.
+    Portraits(Series),
+    /// Sections of three runs.
+    Sections(Series),
+    /// Sections of a sweep, their spread and hysteresis.
+    Bifurcation(Series),
+    /// Largest Lyapunov exponents of a sweep.
+    Exponents(Series),
+    /// Clearance and friction together.
+    Map,
+    /// Error of the probe against clearance.
+    Probe,
+}
+
+/// A figure of the paper, or one beyond it.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub struct Figure {
+    /// Name in files: `figure-` and two digits for those of the paper.
+    pub name: String,
+    /// Heading.
+    pub heading: String,
+    /// Caption.
+    pub caption: String,
+    /// What is drawn.
+    pub shows: Shows,
+    /// Figures whose largest forces are compared below it.
+    #[serde(default)]
+    pub strongest_of: Vec<String>,
+}
+
+impl Figure {
+    /// Whether it is the figure of the paper that `figure`, such as `6a`, is a part of.
+    pub fn contains(&self, figure: &str) -> bool {
+        let number = figure.trim_end_matches(char::is_alphabetic);
+        self.name == format!("figure-{number:0>2}")
     }
 }
 
-/// Every number of section 4.2 whose run is named. (The case of Figure 17 is not.)
-pub const PUBLISHED: &[Published] = {
-    use Quantity::{
-        AccelerationBeta, AccelerationX, DeviationBeta, LastSeparation, Normal, RateBeta, RateX,
-    };
-    &[
-        published("5b", (0.3, 0.2), DeviationBeta, 0.006),
-        published("5b", (0.5, 0.2), DeviationBeta, 0.008),
-        published("5b", (0.7, 0.2), DeviationBeta, 0.012),
-        published("6a", (0.3, 0.2), RateX, 0.147),
-        published("6a", (0.5, 0.2), RateX, 0.167),
-        published("6a", (0.7, 0.2), RateX, 0.186),
-        published("6b", (0.3, 0.2), RateBeta, 0.906),
-        published("6b", (0.5, 0.2), RateBeta, 1.104),
-        published("6b", (0.7, 0.2), RateBeta, 1.511),
-        published("7a", (0.3, 0.2), AccelerationX, 430.7),
-        published("7a", (0.5, 0.2), AccelerationX, 446.2),
-        published("7a", (0.7, 0.2), AccelerationX, 667.5),
-        published("8", (0.3, 0.2), Normal(0), 809.7),
-        published("8", (0.3, 0.2), Normal(1), 463.3),
-        published("8", (0.3, 0.2), Normal(2), 755.8),
-        published("8", (0.3, 0.2), LastSeparation, 0.21),
-        published("9", (0.5, 0.2), Normal(0), 840.0),
-        published("9", (0.5, 0.2), Normal(1), 1061.0),
-        published("9", (0.5, 0.2), Normal(2), 982.7),
-        published("9", (0.5, 0.2), LastSeparation, 0.33),
-        published("10", (0.7, 0.2), Normal(0), 1094.0),
-        published("10", (0.7, 0.2), Normal(1), 917.4),
-        published("10", (0.7, 0.2), Normal(2), 1176.0),
-        published("10", (0.7, 0.2), LastSeparation, 0.39),
-        published("11b", (0.3, 0.15), DeviationBeta, 6.61e-3),
-        published("11b", (0.3, 0.2), DeviationBeta, 6.77e-3),
-        published("11b", (0.3, 0.25), DeviationBeta, 6.90e-3),
-        published("12a", (0.3, 0.15), RateX, 0.149),
-        published("12a", (0.3, 0.2), RateX, 0.156),
-        published("12a", (0.3, 0.25), RateX, 0.161),
-        published("12b", (0.3, 0.15), RateBeta, 1.265),
-        published("12b", (0.3, 0.2), RateBeta, 1.277),
-        published("12b", (0.3, 0.25), RateBeta, 1.279),
-        published("13a", (0.3, 0.15), AccelerationX, 533.2),
-        published("13a", (0.3, 0.2), AccelerationX, 430.7),
-        published("13a", (0.3, 0.25), AccelerationX, 426.0),
-        published("13b", (0.3, 0.15), AccelerationBeta, 993.1),
-        published("13b", (0.3, 0.2), AccelerationBeta, 2193.0),
-        published("13b", (0.3, 0.25), AccelerationBeta, 1582.0),
-        published("14", (0.3, 0.15), Normal(0), 966.4),
-        published("14", (0.3, 0.15), Normal(1), 1057.0),
-        published("14", (0.3, 0.15), Normal(2), 866.8),
-        published("15", (0.3, 0.2), Normal(0), 552.6),
-        published("15", (0.3, 0.2), Normal(1), 922.3),
-        published("15", (0.3, 0.2), Normal(2), 444.7),
-        published("14", (0.3, 0.15), LastSeparation, 0.22),
-        published("15", (0.3, 0.2), LastSeparation, 0.23),
-        published("16", (0.3, 0.25), Normal(0), 719.4),
-        published("16", (0.3, 0.25), Normal(1), 560.8),
-        published("16", (0.3, 0.25), Normal(2), 500.2),
-        published("16", (0.3, 0.25), LastSeparation, 0.22),
-    ]
-};
-
-/// Peaks that the text gives for Figure 17, whose run it does not name: what is measured, the paper's own program (Matlab) and the
-/// commercial one that it is compared with (Adams), SI units.
-pub const VERIFICATION: [(&str, Quantity, f64, f64); 2] = [
-    ("17e", Quantity::AccelerationX, 319.2, 291.0),
-    ("17f", Quantity::AccelerationBeta, 1754.0, 1571.0),
-];
-
-/// Whether a statement of the paper holds here.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
-    /// It does.
-    Confirmed,
-    /// It does not.
-    NotConfirmed,
+/// A section of the page.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Section {
+    /// Name in links.
+    pub id: String,
+    /// Heading.
+    pub title: String,
+    /// Its figures.
+    #[serde(rename = "figure")]
+    pub figures: Vec<Figure>,
 }
 
-/// A qualitative statement of the paper and what this program finds.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Statement {
+/// What must hold here for a statement to count as confirmed; [`super::reproduction::Findings::statements`] has the criteria in
+/// words.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+#[allow(missing_docs, reason = "fields read as the sentences of the table")]
+pub enum Test {
+    /// A coordinate of a run leaves the ideal motion by little of its amplitude.
+    StaysNearIdeal { coordinate: Coordinate, run: Case },
+    /// A quantity grows from run to run.
+    Grows {
+        #[serde(deserialize_with = "word")]
+        of: Quantity,
+        with: Series,
+    },
+    /// All quantities do that are said to grow.
+    AllGrow(Series),
+    /// One quantity is the larger number in every run.
+    Exceeds {
+        #[serde(deserialize_with = "word")]
+        of: Quantity,
+        #[serde(deserialize_with = "word")]
+        that: Quantity,
+        over: Series,
+    },
+    /// The middle run has an extreme of a quantity.
+    NoRule {
+        #[serde(deserialize_with = "word")]
+        of: Quantity,
+        with: Series,
+    },
+    /// One quantity differs by a larger share of its mean than another.
+    DiffersMore {
+        #[serde(deserialize_with = "word")]
+        of: Quantity,
+        #[serde(deserialize_with = "word")]
+        than: Quantity,
+        with: Series,
+    },
+    /// A quantity changes more over one series than over the other.
+    ChangesMoreWith {
+        #[serde(deserialize_with = "word")]
+        of: Quantity,
+        with: Series,
+        than: Series,
+    },
+    /// No ball leaves its socket after an instant, s.
+    Steady { after: f64, over: Series },
+    /// A joint, counted from 1, has the largest peak force of a run.
+    Hardest { joint: usize, run: Case },
+    /// Curves are close to each other, and to the ideal motion, from an instant (s) on.
+    Coincide {
+        curves: Curves,
+        #[serde(default)]
+        ideal: bool,
+        columns: Vec<String>,
+        from: f64,
+    },
+    /// Two formulations stay close, measured by the largest deviation from the ideal motion.
+    FormulationsAgree(Vec<Coordinate>),
+    /// Settled curves are close to each other.
+    PortraitsCoincide {
+        #[serde(rename = "in")]
+        coordinate: Coordinate,
+        over: Series,
+    },
+    /// Settled curves do not close, and if `growing`, the less the larger the parameter.
+    PortraitsWide {
+        #[serde(rename = "in")]
+        coordinate: Coordinate,
+        over: Series,
+        #[serde(default)]
+        growing: bool,
+    },
+    /// The last sections of three runs ascend.
+    SectionsAscend {
+        #[serde(rename = "in")]
+        coordinate: Coordinate,
+        over: Series,
+    },
+    /// The sections of three runs spread, and more from run to run.
+    SectionsSpread {
+        #[serde(rename = "in")]
+        coordinate: Coordinate,
+        over: Series,
+    },
+    /// Sections lie denser the nearer to their centre.
+    SectionsCrowd(Series),
+    /// Sections move little over a series.
+    SectionsStay { of: Sections, over: Series },
+    /// Sections of every value of a sweep agree.
+    SectionsRepeat {
+        #[serde(rename = "in")]
+        coordinate: Coordinate,
+        over: Series,
+    },
+    /// Three runs are quasi-periodic.
+    QuasiPeriodic(Series),
+    /// Every value of a sweep repeats after one period.
+    AllPeriodic(Series),
+    /// The first value of a sweep is periodic, the last chaotic.
+    PeriodicToChaotic(Series),
+    /// More chaos in the upper half of a sweep.
+    ChaosGrows(Series),
+    /// Every value of a sweep is chaotic, or none.
+    ChaosAllOrNone(Series),
+}
+
+/// A statement of the paper in words.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Claim {
     /// Where the paper makes it.
-    pub place: std::borrow::Cow<'static, str>,
+    pub place: String,
     /// What it says, in other words.
     pub says: String,
-    /// What must hold here for it to count as confirmed.
-    pub criterion: String,
-    /// Whether that holds here.
-    pub verdict: Verdict,
-    /// The numbers behind the verdict.
-    pub evidence: String,
+    /// What it is held against.
+    pub test: Test,
 }
 
-/// A run of each case, in any order.
-pub type Runs = [(Case, Response)];
-
-/// The full-resolution value of `quantity` over a series of cases.
-fn series(runs: &Runs, cases: [Case; 3], quantity: Quantity) -> Option<[f64; 3]> {
-    let value = |case| {
-        let (_, response) = runs.iter().find(|(of, _)| *of == case)?;
-        Some(quantity.of(response).0)
-    };
-    Some([value(cases[0])?, value(cases[1])?, value(cases[2])?])
+/// Everything that is held against the paper, in its order.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Paper {
+    /// Numbers whose run is named.
+    #[serde(rename = "number")]
+    pub numbers: Vec<Published>,
+    /// Numbers whose run is not.
+    pub verification: Vec<Verification>,
+    /// Figures.
+    #[serde(rename = "section")]
+    pub sections: Vec<Section>,
+    /// Statements.
+    #[serde(rename = "statement")]
+    pub statements: Vec<Claim>,
 }
 
-/// The runs of Figures 5 to 10 and 18 to 20, clearance ascending.
-pub const BY_CLEARANCE: [Case; 3] = [CASES[0], CASES[1], CASES[2]];
-/// The runs of Figures 11 to 16 and 21 to 23, friction ascending.
-pub const BY_FRICTION: [Case; 3] = [CASES[3], CASES[0], CASES[4]];
+/// The table.
+pub static PAPER: LazyLock<Paper> = LazyLock::new(|| {
+    let text = include_str!("../../assets/paper.toml");
+    toml::from_str(text).expect("a test reads it")
+});
 
-fn verdict(holds: bool) -> Verdict {
-    if holds {
-        Verdict::Confirmed
-    } else {
-        Verdict::NotConfirmed
-    }
-}
-
-/// "It grows with the clearance", and the like.
-fn grows(
-    place: &'static str,
-    cases: [Case; 3],
-    what: &str,
-    unit: &str,
-    value: impl Fn(Case) -> Option<f64>,
-) -> Option<Statement> {
-    let values = [value(cases[0])?, value(cases[1])?, value(cases[2])?];
-    let (cause, names) = if cases == BY_CLEARANCE {
-        (
-            "clearance",
-            cases.map(|case| format!("{} mm", case.clearance)),
-        )
-    } else {
-        (
-            "friction",
-            cases.map(|case| format!("cf {}", case.friction)),
-        )
-    };
-    let listed: Vec<String> = names
-        .iter()
-        .zip(values)
-        .map(|(name, value)| format!("{name}: {} {unit}", words::digits(value, 6)))
-        .collect();
-    Some(Statement {
-        place: place.into(),
-        says: format!("{what} grows with the {cause}"),
-        criterion: "larger at each of the three values than at the one before, in continuous time"
-            .to_owned(),
-        verdict: verdict(values[0] < values[1] && values[1] < values[2]),
-        evidence: listed.join(", "),
-    })
-}
-
-/// The qualitative statements of section 4.2 and of the second conclusion, one by one; those whose runs are missing are left out.
-pub fn response_statements(runs: &Runs) -> Vec<Statement> {
-    let one = |cases: [Case; 3], quantity: Quantity| {
-        move |case: Case| {
-            let at = cases.iter().position(|of| *of == case)?;
-            Some(series(runs, cases, quantity)?[at])
-        }
-    };
-    let strongest = |case: Case| {
-        let (_, response) = runs.iter().find(|(of, _)| *of == case)?;
-        Some(response.full.normal.iter().copied().fold(0.0, f64::max))
-    };
-    let (c, f) = (BY_CLEARANCE, BY_FRICTION);
-    let mut out = Vec::new();
-    if let Some((_, widest)) = runs.iter().find(|(case, _)| *case == CASES[2]) {
-        // Amplitude of x in (59).
-        let share = widest.full.deviation[0] / 0.025;
-        out.push(Statement {
-            place: "4.2.1, Figure 5a".into(),
-            says: "the displacement in x shows no obvious deviation whatever the clearance"
-                .to_owned(),
-            criterion: "at 0.7 mm, x leaves the ideal motion by less than 5 % of its amplitude"
-                .to_owned(),
-            verdict: verdict(share < 0.05),
-            evidence: format!(
-                "0.7 mm: at most {:.3} mm, {:.1} % of the amplitude",
-                widest.full.deviation[0] * 1e3,
-                share * 100.0
-            ),
-        });
-    }
-    use Quantity::{AccelerationX, DeviationBeta, LastSeparation, RateBeta, RateX};
-    let more = [
-        grows(
-            "4.2.1, Figure 5b",
-            c,
-            "the largest deviation of beta",
-            "rad",
-            one(c, DeviationBeta),
-        ),
-        grows(
-            "4.2.1, Figure 6a",
-            c,
-            "the largest velocity in x",
-            "m/s",
-            one(c, RateX),
-        ),
-        grows(
-            "4.2.1, Figure 6b",
-            c,
-            "the largest angular rate of beta",
-            "rad/s",
-            one(c, RateBeta),
-        ),
-        grows(
-            "4.2.1, Figure 7a",
-            c,
-            "the largest acceleration in x",
-            "m/s²",
-            one(c, AccelerationX),
-        ),
-        grows(
-            "4.2.1, Figures 8 to 10",
-            c,
-            "the largest contact force of any joint",
-            "N",
-            strongest,
-        ),
-        grows(
-            "4.2.1, Figures 8 to 10",
-            c,
-            "the time of the last separation",
-            "s",
-            one(c, LastSeparation),
-        ),
-        grows(
-            "4.2.2, Figure 11b",
-            f,
-            "the largest deviation of beta",
-            "rad",
-            one(f, DeviationBeta),
-        ),
-        grows(
-            "4.2.2, Figure 12a",
-            f,
-            "the largest velocity in x",
-            "m/s",
-            one(f, RateX),
-        ),
-        grows(
-            "4.2.2, Figure 12b",
-            f,
-            "the largest angular rate of beta",
-            "rad/s",
-            one(f, RateBeta),
-        ),
-        // The paper's own numbers fall: 533.2, 430.7, 426 m/s².
-        grows(
-            "4.2.2, Figure 13a",
-            f,
-            "the largest acceleration in x",
-            "m/s²",
-            one(f, AccelerationX),
-        ),
-    ];
-    out.extend(more.into_iter().flatten());
-    out.extend(words::further_statements(runs));
-    out
-}
-
-/// Puts statements in the paper's order: by section, then by the figure that they begin with; a section's last words stand
-/// after its figures.
-pub fn in_order(statements: &mut [Statement]) {
-    statements.sort_by_cached_key(|statement| {
-        let (section, rest) = statement
-            .place
-            .split_once(',')
-            .unwrap_or((&statement.place, "Figure 0"));
-        let figure = rest.split_once("Figure").map(|(_, number)| {
-            let digits = number.chars().skip_while(|c| !c.is_ascii_digit());
-            digits
-                .map_while(|c| c.to_digit(10))
-                .fold(0, |n, digit| n * 10 + digit)
-        });
-        (section.to_owned(), figure.unwrap_or(u32::MAX))
-    });
+/// Reads a word.
+fn word<'de, D: Deserializer<'de>, T: Words>(deserializer: D) -> Result<T, D::Error> {
+    let word = String::deserialize(deserializer)?;
+    T::of_word(&word)
+        .ok_or_else(|| D::Error::custom(format!("{word}: one of {}", T::WORDS.join(", "))))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::response::respond;
-    use crate::scene::Scene;
 
     #[test]
-    fn every_number_belongs_to_a_run() {
-        for published in PUBLISHED {
+    fn every_number_belongs_to_a_run_and_to_a_figure() {
+        let figures = || PAPER.sections.iter().flat_map(|s| &s.figures);
+        for published in &PAPER.numbers {
             assert!(CASES.contains(&published.case), "{published:?}");
             assert!(published.value > 0.0);
+            let of = figures().filter(|f| f.contains(&published.figure));
+            assert_eq!(of.count(), 1, "{published:?}");
         }
-        assert!(PUBLISHED.len() > 40);
+        assert_eq!((PAPER.numbers.len(), PAPER.statements.len()), (51, 52));
     }
 
     #[test]
-    fn statements_stand_in_the_order_of_the_paper() {
-        let places = [
-            "5, second conclusion",
-            "4.2.2, Figure 16",
-            "4.2.1, Figures 8 to 10",
-            "4.2.1, Figure 10",
-            "4.3, Figure 18a",
-            "5, third conclusion",
-            "4.2.1, Figure 8",
-            "4.2.3, first conclusion",
-            "4.2.3, Figure 17a and b",
-            "4.2.2",
-        ];
-        let mut statements = places.map(|place| Statement {
-            place: place.into(),
-            says: String::new(),
-            criterion: String::new(),
-            verdict: Verdict::Confirmed,
-            evidence: String::new(),
-        });
-        in_order(&mut statements);
-        assert_eq!(
-            statements.map(|s| s.place.into_owned()),
-            [
-                "4.2.1, Figures 8 to 10",
-                "4.2.1, Figure 8",
-                "4.2.1, Figure 10",
-                "4.2.2",
-                "4.2.2, Figure 16",
-                "4.2.3, Figure 17a and b",
-                "4.2.3, first conclusion",
-                "4.3, Figure 18a",
-                "5, second conclusion",
-                "5, third conclusion",
-            ]
-        );
-    }
-
-    #[test]
-    fn statements_follow_the_numbers() {
-        let scene = Scene::load("pendulum", &[]).expect("built in");
-        let response = respond(&scene, 1e-3, 1e-3, |_| true).expect("runs");
-        // The same run for every case but for what is put into it by hand.
-        let with = |deviation: f64, force: f64| {
-            let mut response = response.clone();
-            response.full.deviation[4] = deviation;
-            response.full.normal = vec![force];
-            response.last_separation = vec![0.1];
-            response
-        };
-        let runs = [
-            (CASES[0], with(1e-3, 100.0)),
-            (CASES[1], with(2e-3, 90.0)),
-            (CASES[2], with(3e-3, 120.0)),
-        ];
-        let statements = response_statements(&runs);
-        let find = |figure: &str, what: &str| {
-            let found = statements
-                .iter()
-                .find(|s| s.place.contains(figure) && s.says.contains(what));
-            found.map(|s| s.verdict)
-        };
-        assert_eq!(find("5b", "deviation of beta"), Some(Verdict::Confirmed));
-        assert_eq!(
-            find("8 to 10", "contact force"),
-            Some(Verdict::NotConfirmed)
-        );
-        assert_eq!(
-            find("8 to 10", "last separation"),
-            Some(Verdict::NotConfirmed)
-        );
-        // Runs that are missing answer nothing.
-        assert_eq!(find("11b", "deviation of beta"), None);
+    fn rates_are_held_against_the_amplitude_of_the_rate() {
+        let beta = [0, 1, 2].map(|nth| Coordinate::Beta.amplitude(nth));
+        assert_eq!(beta, [0.025, 0.025 * PI, 0.025 * (PI * PI)]);
     }
 }

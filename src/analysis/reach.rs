@@ -1,9 +1,10 @@
 //! How far the program gets: three spans of the default scene, each with what is asked of it.
 
+use super::reference_solution::{MeanForces, done};
 use super::stretch::{stretch, time_to};
-use super::{AnalysisError, Effort, End, ReferenceSolution, RunContext, Setting};
+use super::{AnalysisError, Effort, ReferenceSolution, RunContext, Setting};
 use crate::scene::Scene;
-use crate::simulate::{Frame, Simulation, Snapshot};
+use crate::simulate::Simulation;
 
 /// Tolerance of the automatic pair that is asked to reach them.
 const TOLERANCE: f64 = 1e-5;
@@ -115,7 +116,7 @@ fn one(scene: &Scene, goal: Goal, context: &mut RunContext) -> Result<Reach, Ana
     };
     let (from, to) = goal.span();
     let speed = |setting: &Setting, context: &mut RunContext| {
-        let start = snapshot_at(setting, scene, from, context)?;
+        let start = run_to(setting, scene, from, context, |_| {})?.snapshot();
         let seconds = time_to(to, &effort, context, |_| {
             let mut simulation = setting.start(scene)?;
             simulation.restore(&start)?;
@@ -140,8 +141,8 @@ fn one(scene: &Scene, goal: Goal, context: &mut RunContext) -> Result<Reach, Ana
         }
         Goal::Settled => {
             let converged = Setting::reference(CONVERGED);
-            let expected = mean_forces(&converged, scene, from, to, &mut last)?;
-            let means = mean_forces(&setting, scene, from, to, &mut last)?;
+            let expected = mean_forces(&converged, scene, (from, to), &mut last)?;
+            let means = mean_forces(&setting, scene, (from, to), &mut last)?;
             let pairs = means.iter().zip(&expected);
             pairs
                 .map(|(mean, expected)| (mean / expected - 1.0).abs())
@@ -158,16 +159,7 @@ fn one(scene: &Scene, goal: Goal, context: &mut RunContext) -> Result<Reach, Ana
     })
 }
 
-/// The state at `time`, which the method reached itself.
-fn snapshot_at(
-    setting: &Setting,
-    scene: &Scene,
-    time: f64,
-    context: &mut RunContext,
-) -> Result<Snapshot, AnalysisError> {
-    Ok(run_to(setting, scene, time, context, |_| {})?.snapshot())
-}
-
+/// The run from the start to `end`, every step of which `seen` looks at.
 fn run_to(
     setting: &Setting,
     scene: &Scene,
@@ -176,50 +168,24 @@ fn run_to(
     mut seen: impl FnMut(&mut Simulation),
 ) -> Result<Simulation, AnalysisError> {
     let mut simulation = setting.start(scene)?;
-    let ended = stretch(
-        &mut simulation,
-        end,
-        &Effort::REFERENCE,
-        context,
-        |simulation| {
-            seen(simulation);
-            false
-        },
-    )?;
-    match ended {
-        End::Reached => Ok(simulation),
-        End::Capped => Err(AnalysisError::TooLong {
-            evaluations: Effort::REFERENCE.evaluations,
-        }),
-        // The guard gives the same answer when asked again.
-        End::Stopped(_) => {
-            simulation.step()?;
-            Ok(simulation)
-        }
-    }
+    let look = |simulation: &mut Simulation| {
+        seen(simulation);
+        false
+    };
+    let ended = stretch(&mut simulation, end, &Effort::REFERENCE, context, look)?;
+    done(ended, &mut simulation)?;
+    Ok(simulation)
 }
 
-/// Mean size of each joint's contact force from `from` to `to`, by a run from the start.
 fn mean_forces(
     setting: &Setting,
     scene: &Scene,
-    from: f64,
-    to: f64,
+    span: (f64, f64),
     context: &mut RunContext,
 ) -> Result<Vec<f64>, AnalysisError> {
-    let mut means = vec![0.0; scene.ball_joints.len()];
-    let mut frame = Frame::default();
-    let mut next = 0;
-    let instant = |n: u32| from + (to - from) * (f64::from(n) + 0.5) / f64::from(SAMPLES);
-    run_to(setting, scene, to, context, |simulation| {
-        while next < SAMPLES && instant(next) <= simulation.time() {
-            simulation.sample(instant(next), &mut frame);
-            for (mean, joint) in means.iter_mut().zip(&frame.joints) {
-                let force = (joint.normal_force + joint.friction_force).norm();
-                *mean += force / f64::from(SAMPLES);
-            }
-            next += 1;
-        }
+    let mut forces = MeanForces::new(scene, span, SAMPLES);
+    run_to(setting, scene, span.1, context, |simulation| {
+        forces.see(simulation)
     })?;
-    Ok(means)
+    Ok(forces.means)
 }

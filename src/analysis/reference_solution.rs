@@ -266,11 +266,6 @@ impl ReferenceSolution {
         Ok((end, errors, work(&simulation, &Work::default())))
     }
 
-    /// Simulation over the first impacts with `setting`, at its start.
-    pub(super) fn start(&self, setting: &Setting) -> Result<Simulation, AnalysisError> {
-        setting.start(&self.scene)
-    }
-
     /// Finds settled motion and averages its forces.
     fn settle(
         &mut self,
@@ -332,28 +327,15 @@ impl ReferenceSolution {
             .expect("asked only of a scene that settles");
         let (end, mut simulation) = self.resume(span, setting, effort, context)?;
         let before = work(&simulation, &Work::default());
-        let mut means = vec![0.0; self.scene.ball_joints.len()];
+        let mut forces = MeanForces::new(&self.scene, (span.from, span.to), SAMPLES);
         if end != End::Reached {
-            return Ok((end, means, work(&simulation, &before)));
+            return Ok((end, forces.means, work(&simulation, &before)));
         }
-        let mut frame = Frame::default();
-        let mut next = 0;
-        let instant = |n: u32| {
-            let theta = (f64::from(n) + 0.5) / f64::from(SAMPLES);
-            span.from + (span.to - span.from) * theta
-        };
         let end = stretch(&mut simulation, span.to, effort, context, |simulation| {
-            while next < SAMPLES && instant(next) <= simulation.time() {
-                simulation.sample(instant(next), &mut frame);
-                for (mean, joint) in means.iter_mut().zip(&frame.joints) {
-                    let force = (joint.normal_force + joint.friction_force).norm();
-                    *mean += force / f64::from(SAMPLES);
-                }
-                next += 1;
-            }
+            forces.see(simulation);
             false
         })?;
-        Ok((end, means, work(&simulation, &before)))
+        Ok((end, forces.means, work(&simulation, &before)))
     }
 
     fn mean_error(&self, means: &[f64]) -> Option<f64> {
@@ -402,8 +384,48 @@ fn energy_residual(simulation: &Simulation) -> Option<f64> {
     Some(ledger.relative_residual().abs())
 }
 
+/// Mean size of each joint's contact force over a span, of instants at equal distances.
+pub(super) struct MeanForces {
+    span: (f64, f64),
+    samples: u32,
+    next: u32,
+    frame: Frame,
+    /// N; whole once a run has been seen to the end of the span.
+    pub means: Vec<f64>,
+}
+
+impl MeanForces {
+    pub(super) fn new(scene: &Scene, span: (f64, f64), samples: u32) -> Self {
+        Self {
+            span,
+            samples,
+            next: 0,
+            frame: Frame::default(),
+            means: vec![0.0; scene.ball_joints.len()],
+        }
+    }
+
+    /// Takes the instants of the latest step.
+    pub(super) fn see(&mut self, simulation: &mut Simulation) {
+        let (from, to) = self.span;
+        while self.next < self.samples {
+            let theta = (f64::from(self.next) + 0.5) / f64::from(self.samples);
+            let instant = from + (to - from) * theta;
+            if instant > simulation.time() {
+                return;
+            }
+            simulation.sample(instant, &mut self.frame);
+            for (mean, joint) in self.means.iter_mut().zip(&self.frame.joints) {
+                let force = (joint.normal_force + joint.friction_force).norm();
+                *mean += force / f64::from(self.samples);
+            }
+            self.next += 1;
+        }
+    }
+}
+
 /// The reference must reach its end: the error says why it did not.
-fn done(end: End, simulation: &mut Simulation) -> Result<(), AnalysisError> {
+pub(super) fn done(end: End, simulation: &mut Simulation) -> Result<(), AnalysisError> {
     match end {
         End::Reached => Ok(()),
         End::Capped => Err(AnalysisError::TooLong {

@@ -2,16 +2,20 @@
 
 mod findings;
 mod record;
+mod statements;
 
 pub use findings::{Combination, Findings, Report};
 use record::row;
-pub use record::{COLUMNS, Row, SweepData, Traced, regime_word};
+pub use record::{
+    COLUMNS, Column, Loop, Row, SweepData, Swept, Traced, column_of, derivative, exponents,
+    regime_word,
+};
+pub use statements::Statement;
 
 use super::grid::{Axis, Grid, RangeError, Start};
-use super::paper::chaos::Loop;
-use super::paper::{BY_CLEARANCE, CASES, Case, DURATION, SAMPLING};
+use super::paper::{CASES, Case, Coordinate, DURATION, SAMPLING, Series};
 use super::point::{Plan, resolution};
-use super::response::{COORDINATES, Look, Response, ResponseError, respond_seen};
+use super::response::{Look, Response, ResponseError, derivatives, respond_seen};
 use super::sweep::{Sweep, SweepError};
 use crate::scene::{Scene, SceneError};
 use crate::simulate::{Frame, Simulation};
@@ -20,8 +24,6 @@ use crate::simulate::{Frame, Simulation};
 pub const PERIOD: f64 = 2.0;
 /// Points of a settled curve in a period.
 const CURVE_POINTS: usize = 800;
-/// Indices of x and beta among the coordinates.
-const PICKED: [usize; 2] = [0, 4];
 
 /// Changes to the default scene under which the paper's runs are made.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -115,9 +117,15 @@ impl Extent {
 /// Why there is no report.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum ReproductionError {
-    /// An extent that no sweep can have.
-    #[error("{0}")]
-    Extent(String),
+    /// A scene that does not load.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// An axis that no sweep can have.
+    #[error(transparent)]
+    Range(#[from] RangeError),
+    /// A sweep that is none.
+    #[error(transparent)]
+    Sweep(#[from] SweepError),
     /// A run that did not come to its end.
     #[error("{name}: {error}")]
     Run {
@@ -126,24 +134,6 @@ pub enum ReproductionError {
         /// Why.
         error: Box<ResponseError>,
     },
-}
-
-impl From<SceneError> for ReproductionError {
-    fn from(error: SceneError) -> Self {
-        Self::Extent(error.to_string())
-    }
-}
-
-impl From<RangeError> for ReproductionError {
-    fn from(error: RangeError) -> Self {
-        Self::Extent(error.to_string())
-    }
-}
-
-impl From<SweepError> for ReproductionError {
-    fn from(error: SweepError) -> Self {
-        Self::Extent(error.to_string())
-    }
 }
 
 /// What there is to do.
@@ -213,6 +203,7 @@ fn sweep_data(
         name,
         sweep: Sweep::new(scene, grid, plan)?,
         records: Vec::new(),
+        points: Vec::new(),
     })
 }
 
@@ -243,7 +234,7 @@ impl Work {
             run(variant, "lagrange".to_owned(), nominal, &multipliers)?;
         }
         for variant in COMBINATIONS {
-            for case in BY_CLEARANCE {
+            for case in Series::Clearance.cases() {
                 run(variant, file_name(case), case, &[])?;
             }
         }
@@ -419,7 +410,8 @@ impl Work {
         let (_, ideal) = runs.pop().expect("the last run is the ideal one");
         let nominal = &self.runs[0].scene;
         let all = resolution(nominal, nominal.solver.tolerance);
-        let resolution = PICKED.map(|i| all[i]);
+        let resolution = Coordinate::ALL.map(|c| all[c.index()]);
+        self.sweeps.iter_mut().for_each(SweepData::read_points);
         let mut runs_of = |variant: Variant| -> Vec<Traced> {
             let own = runs.extract_if(.., |(of, _)| *of == variant);
             own.map(|(_, run)| run).collect()
@@ -479,7 +471,6 @@ fn curve(
         rates: [Vec::new(), Vec::new()],
         width: [0.0; 2],
     };
-    let mut before: Vec<[f64; COORDINATES]> = Vec::new();
     for n in 0..=2 * CURVE_POINTS {
         let time = PERIOD * (settle as f64 + n as f64 / CURVE_POINTS as f64);
         while simulation.time() < time {
@@ -489,28 +480,18 @@ fn curve(
             simulation.step()?;
         }
         simulation.sample(time, &mut frame);
-        let pose = &frame.pose;
-        let coordinates = [
-            pose.position.x,
-            pose.position.y,
-            pose.position.z,
-            pose.angles.x,
-            pose.angles.y,
-            pose.angles.z,
-        ];
-        if n < CURVE_POINTS {
-            before.push(coordinates);
-            continue;
+        let [coordinates, rates, _] = derivatives(&frame.pose);
+        for c in Coordinate::ALL {
+            found.coordinates[c as usize].push(coordinates[c.index()]);
+            found.rates[c as usize].push(rates[c.index()]);
         }
-        let rates = [pose.velocity.x, pose.angle_rates.y];
-        for (which, i) in PICKED.into_iter().enumerate() {
-            found.coordinates[which].push(coordinates[i]);
-            found.rates[which].push(rates[which]);
-            if let Some(earlier) = before.get(n - CURVE_POINTS) {
-                let width = (coordinates[i] - earlier[i]).abs();
-                found.width[which] = found.width[which].max(width);
-            }
-        }
+    }
+    for c in 0..2 {
+        let (before, settled) = found.coordinates[c].split_at(CURVE_POINTS);
+        let pairs = before.iter().zip(settled);
+        found.width[c] = pairs.map(|(a, b)| (b - a).abs()).fold(0.0, f64::max);
+        found.coordinates[c].drain(..CURVE_POINTS);
+        found.rates[c].drain(..CURVE_POINTS);
     }
     Ok(found)
 }

@@ -51,7 +51,7 @@ impl Extremes {
 }
 
 /// Coordinates, rates and second derivatives of a pose.
-fn derivatives(pose: &Pose) -> [[f64; COORDINATES]; 3] {
+pub(super) fn derivatives(pose: &Pose) -> [[f64; COORDINATES]; 3] {
     let join = |a: &crate::scene::Vec3, b: &crate::scene::Vec3| [a.x, a.y, a.z, b.x, b.y, b.z];
     [
         join(&pose.position, &pose.angles),

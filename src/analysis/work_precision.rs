@@ -58,6 +58,21 @@ pub struct Point {
     pub errors: Errors,
 }
 
+/// A phase of a point and the relative error in it.
+pub type View = fn(&Point) -> Option<(&Phase, f64)>;
+
+impl Point {
+    /// The first impacts and the error of the peak forces.
+    pub fn in_impacts(&self) -> Option<(&Phase, f64)> {
+        Some((&self.impacts, self.errors.peak?))
+    }
+
+    /// Settled motion and the error of the mean forces.
+    pub fn in_settled(&self) -> Option<(&Phase, f64)> {
+        Some((self.settled.as_ref()?, self.errors.settled?))
+    }
+}
+
 /// All points of a scene.
 #[derive(Clone, Debug)]
 pub struct WorkPrecision {
@@ -75,23 +90,22 @@ impl WorkPrecision {
 
     /// The fastest point over the first impacts whose peak forces err by at most `error`.
     pub fn fastest_within(&self, error: f64) -> Option<&Point> {
-        let good = |p: &&Point| p.errors.peak.is_some_and(|e| e <= error);
-        let cost = |p: &Point| p.impacts.wall_s.unwrap_or(f64::INFINITY);
-        let points = self.points.iter().filter(good);
-        points.min_by(|a, b| cost(a).total_cmp(&cost(b)))
+        self.fastest(Point::in_impacts, error)
     }
 
     /// The fastest point in settled motion whose mean forces err by at most `error`.
     pub fn fastest_settled_within(&self, error: f64) -> Option<&Point> {
-        let good = |p: &&Point| p.errors.settled.is_some_and(|e| e <= error);
-        let cost = |p: &Point| {
-            p.settled
-                .as_ref()
-                .and_then(|phase| phase.wall_s)
-                .unwrap_or(f64::INFINITY)
+        self.fastest(Point::in_settled, error)
+    }
+
+    fn fastest(&self, view: View, limit: f64) -> Option<&Point> {
+        let cost = |point: &Point| {
+            let (phase, error) = view(point)?;
+            (error <= limit).then(|| phase.wall_s.unwrap_or(f64::INFINITY))
         };
-        let points = self.points.iter().filter(good);
-        points.min_by(|a, b| cost(a).total_cmp(&cost(b)))
+        let good = self.points.iter().filter_map(|p| Some((p, cost(p)?)));
+        let fastest = good.min_by(|a, b| a.1.total_cmp(&b.1));
+        fastest.map(|(point, _)| point)
     }
 }
 
@@ -179,7 +193,7 @@ pub(super) fn measure(
     };
     let wall = match end {
         End::Reached => Some(time_to(reference.span, effort, context, |_| {
-            reference.start(&setting)
+            setting.start(reference.scene())
         })?),
         _ => None,
     };
@@ -267,34 +281,22 @@ impl Yardstick {
 }
 
 fn mark_fronts(points: &mut [Point], floor: &Errors) {
-    let pair = |phase: &Phase, error: Option<f64>| {
-        let cost = phase.wall_s.unwrap_or(f64::INFINITY);
-        (cost, error.unwrap_or(f64::NAN))
+    let on_front = |view: View, floor: Option<f64>| {
+        let pair = |point| {
+            let seen = view(point);
+            seen.map_or((f64::INFINITY, f64::NAN), |(phase, error)| {
+                (phase.wall_s.unwrap_or(f64::INFINITY), error)
+            })
+        };
+        let pairs: Vec<_> = points.iter().map(pair).collect();
+        front(&pairs, floor.unwrap_or(0.0))
     };
-    let impacts: Vec<_> = points
-        .iter()
-        .map(|p| pair(&p.impacts, p.errors.peak))
-        .collect();
-    for (point, on) in points
-        .iter_mut()
-        .zip(front(&impacts, floor.peak.unwrap_or(0.0)))
-    {
-        point.impacts.front = on;
-    }
-    let settled: Vec<_> = points
-        .iter()
-        .map(|p| {
-            p.settled
-                .as_ref()
-                .map_or((f64::INFINITY, f64::NAN), |phase| {
-                    pair(phase, p.errors.settled)
-                })
-        })
-        .collect();
-    let on = front(&settled, floor.settled.unwrap_or(0.0));
-    for (point, on) in points.iter_mut().zip(on) {
-        if let Some(settled) = &mut point.settled {
-            settled.front = on;
+    let impacts = on_front(Point::in_impacts, floor.peak);
+    let settled = on_front(Point::in_settled, floor.settled);
+    for ((point, impacts), settled) in points.iter_mut().zip(impacts).zip(settled) {
+        point.impacts.front = impacts;
+        if let Some(phase) = &mut point.settled {
+            phase.front = settled;
         }
     }
 }

@@ -25,6 +25,7 @@ mod summary;
 #[cfg(test)]
 mod survival;
 mod sweep;
+mod tables;
 pub mod tradeoff;
 
 use std::fmt::Write as _;

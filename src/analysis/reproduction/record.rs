@@ -1,44 +1,74 @@
-//! What a run and a sweep of the report leave behind.
+//! What a run, a settled curve and a sweep of the report leave behind.
 
-use super::{PICKED, Variant};
-use crate::analysis::paper::Case;
-use crate::analysis::paper::chaos::Swept;
+use super::Variant;
+use crate::analysis::paper::{Case, Coordinate};
 use crate::analysis::regime::Regime;
 use crate::analysis::response::{Look, Response};
 use crate::analysis::sweep::Sweep;
 
-/// Columns of a [`Row`].
-pub const COLUMNS: [&str; 15] = [
-    "t_s",
-    "x_m",
-    "vx_m_s",
-    "ax_m_s2",
-    "beta_rad",
-    "beta_rate_rad_s",
-    "beta_accel_rad_s2",
-    "S1_normal_N",
-    "S2_normal_N",
-    "S3_normal_N",
-    "x_deviation_m",
-    "beta_deviation_rad",
-    "probe_error_m",
-    "constraint_drift",
-    "sample",
+/// A column of a [`Row`].
+pub struct Column {
+    /// Name in files.
+    pub name: &'static str,
+    /// What it is, in words.
+    pub label: &'static str,
+    /// Unit in pictures.
+    pub unit: &'static str,
+    /// SI units in one of it.
+    pub one: f64,
+}
+
+const fn column(name: &'static str, label: &'static str, unit: &'static str, one: f64) -> Column {
+    Column {
+        name,
+        label,
+        unit,
+        one,
+    }
+}
+
+/// Columns of a [`Row`], each coordinate before its derivatives.
+pub const COLUMNS: [Column; 15] = [
+    column("t_s", "time", "s", 1.0),
+    column("x_m", "x", "mm", 1e-3),
+    column("vx_m_s", "velocity in x", "m/s", 1.0),
+    column("ax_m_s2", "acceleration in x", "m/s²", 1.0),
+    column("beta_rad", "beta", "mrad", 1e-3),
+    column("beta_rate_rad_s", "rate of beta", "rad/s", 1.0),
+    column("beta_accel_rad_s2", "acceleration of beta", "rad/s²", 1.0),
+    column("S1_normal_N", "contact force", "N", 1.0),
+    column("S2_normal_N", "contact force", "N", 1.0),
+    column("S3_normal_N", "contact force", "N", 1.0),
+    column("x_deviation_m", "x less ideal", "mm", 1e-3),
+    column("beta_deviation_rad", "beta less ideal", "mrad", 1e-3),
+    column("probe_error_m", "probe error", "µm", 1e-6),
+    column("constraint_drift", "largest violation so far", "", 1.0),
+    column("sample", "at the paper's output step", "", 1.0),
 ];
 
-/// One instant of a run, in the order of [`COLUMNS`]; `sample` is 1 at whole multiples of the paper's output step.
+/// Index of the column called `name`.
+///
+/// # Panics
+/// If there is none.
+pub fn column_of(name: &str) -> usize {
+    let found = COLUMNS.iter().position(|c| c.name == name);
+    found.unwrap_or_else(|| panic!("no column {name}"))
+}
+
+/// Index of the column of a coordinate or of its `nth` derivative.
+pub fn derivative(coordinate: Coordinate, nth: usize) -> usize {
+    1 + 3 * coordinate as usize + nth
+}
+
+/// One instant of a run, in the order of [`COLUMNS`]; the last is 1 at whole multiples of the paper's output step.
 pub type Row = [f64; COLUMNS.len()];
 
 pub(super) fn row(look: &Look) -> Row {
     let [c, r, a] = look.derivatives();
     let deviation = look.deviation();
-    let force = |j: usize| {
-        look.frame
-            .joints
-            .get(j)
-            .map_or(f64::NAN, |j| j.normal_force.norm())
-    };
-    let (x, beta) = (PICKED[0], PICKED[1]);
+    let joints = &look.frame.joints;
+    let force = |j: usize| joints.get(j).map_or(f64::NAN, |j| j.normal_force.norm());
+    let [x, beta] = Coordinate::ALL.map(Coordinate::index);
     [
         look.time,
         c[x],
@@ -71,6 +101,89 @@ pub struct Traced {
     pub rows: Vec<Row>,
 }
 
+impl Traced {
+    /// The instants at the paper's output step.
+    pub fn samples(&self) -> Vec<&Row> {
+        let last = COLUMNS.len() - 1;
+        self.rows.iter().filter(|row| row[last] == 1.0).collect()
+    }
+
+    /// A column in its unit of pictures against time.
+    pub fn curve(&self, column: usize) -> impl Iterator<Item = (f64, f64)> {
+        let one = COLUMNS[column].one;
+        self.rows.iter().map(move |row| (row[0], row[column] / one))
+    }
+}
+
+/// Settled motion of one of the paper's runs over one period.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Loop {
+    /// The run.
+    pub case: Case,
+    /// x (m) and beta (rad) at equal drive phases, the same for every run.
+    pub coordinates: [Vec<f64>; 2],
+    /// Their rates, m/s and rad/s.
+    pub rates: [Vec<f64>; 2],
+    /// Largest difference of x and of beta at equal phases of this period and the one before: how wide the closed curve is.
+    pub width: [f64; 2],
+}
+
+/// One value of a swept parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Swept {
+    /// Value: clearance in mm, or friction.
+    pub value: f64,
+    /// Regime, in a word.
+    pub regime: &'static str,
+    /// Drive periods after which it repeats; 0 where it does not.
+    pub period: usize,
+    /// Largest Lyapunov exponent and its standard error, 1/s; NaN where none was measured.
+    pub exponent: (f64, f64),
+    /// Sections in x (m) and beta (rad), kept ones, in order of time.
+    pub sections: [Vec<f64>; 2],
+}
+
+impl Swept {
+    /// Latest section in a coordinate.
+    pub fn latest(&self, coordinate: Coordinate) -> f64 {
+        let last = self.sections[coordinate as usize].last();
+        last.copied().unwrap_or(f64::NAN)
+    }
+
+    /// Distance between the extremes of the latest half of the sections in a coordinate.
+    pub fn spread(&self, coordinate: Coordinate) -> f64 {
+        let all = &self.sections[coordinate as usize];
+        extent(all[all.len() / 2..].iter().copied())
+    }
+
+    /// Regime with its period.
+    pub fn word(&self) -> String {
+        match self.period {
+            0 => self.regime.to_owned(),
+            period => format!("{} {period}", self.regime),
+        }
+    }
+}
+
+/// Least and largest.
+pub fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
+        (a.min(v), b.max(v))
+    })
+}
+
+/// Largest less least.
+pub(super) fn extent(values: impl Iterator<Item = f64>) -> f64 {
+    let (least, most) = range(values);
+    most - least
+}
+
+/// Least and largest exponent of those that were measured, 1/s.
+pub fn exponents(points: &[Swept]) -> (f64, f64) {
+    let measured = points.iter().map(|p| p.exponent.0);
+    range(measured.filter(|e| e.is_finite()))
+}
+
 /// A sweep with the records of all its points.
 #[derive(Clone, Debug)]
 pub struct SweepData {
@@ -82,6 +195,8 @@ pub struct SweepData {
     pub sweep: Sweep,
     /// A record a point, one after the other; empty until its blocks are put in.
     pub records: Vec<f64>,
+    /// The points along its axis; empty for a map, and as long as there are no records.
+    pub points: Vec<Swept>,
 }
 
 impl SweepData {
@@ -103,10 +218,16 @@ impl SweepData {
             .collect()
     }
 
-    /// The points along its last axis, whose values are multiplied by `factor`.
-    pub fn swept(&self, factor: f64) -> Vec<Swept> {
-        let Some(axis) = self.sweep.grid().axes().last() else {
-            return Vec::new();
+    /// Reads [`Self::points`] from the records.
+    pub(super) fn read_points(&mut self) {
+        let [axis] = self.sweep.grid().axes() else {
+            return;
+        };
+        // Clearances in mm.
+        let factor = if axis.key() == "contact.clearance" {
+            1e3
+        } else {
+            1.0
         };
         let kept = self.sweep.layout().kept();
         let column = |name: &str| self.values(name);
@@ -115,16 +236,14 @@ impl SweepData {
         let errors = column("exponent_standard_error_per_s");
         let (x, beta) = (column("section_x_m"), column("section_beta_rad"));
         let part = |all: &[f64], k: usize| all[k * kept..(k + 1) * kept].to_vec();
-        axis.values()
-            .enumerate()
-            .map(|(k, value)| Swept {
-                value: value * factor,
-                regime: regime_word(regimes[k] as i64),
-                period: periods[k] as usize,
-                exponent: (exponents[k], errors[k]),
-                sections: [part(&x, k), part(&beta, k)],
-            })
-            .collect()
+        let points = axis.values().enumerate().map(|(k, value)| Swept {
+            value: value * factor,
+            regime: regime_word(regimes[k] as i64),
+            period: periods[k] as usize,
+            exponent: (exponents[k], errors[k]),
+            sections: [part(&x, k), part(&beta, k)],
+        });
+        self.points = points.collect();
     }
 }
 

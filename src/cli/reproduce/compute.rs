@@ -84,6 +84,6 @@ pub(super) fn compute(
 fn is_cancelled(error: &ReproductionError) -> bool {
     match error {
         ReproductionError::Run { error, .. } => matches!(**error, ResponseError::Cancelled),
-        ReproductionError::Extent(_) => false,
+        _ => false,
     }
 }

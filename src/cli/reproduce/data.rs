@@ -1,17 +1,15 @@
 //! The numbers behind the page: runs and settled curves as NumPy archives and CSV, sweeps as NumPy archives, comparisons as CSV.
 
-use std::fmt::Write as _;
-
 use ndarray::Array1;
 use ndarray_npy::NpzWriter;
 use serde_json::{Map, Value as Json, json};
 
-use super::text::{self, Compared};
-use crate::analysis::paper::Case;
-use crate::analysis::reproduction::{COLUMNS, Findings, Report, SweepData, Traced};
+use super::text;
+use crate::analysis::paper::Published;
+use crate::analysis::reproduction::{COLUMNS, Column, Findings, Report, SweepData, Traced};
 use crate::cli::Failure;
-use crate::cli::output::significant;
 use crate::cli::sweep::{Archive, Source, meta};
+use crate::cli::tables::{csv, number};
 use crate::files::Folder;
 
 /// Writes all data files into `folder`.
@@ -54,85 +52,57 @@ pub(super) fn write(folder: &Folder, report: &Report) -> Result<(), Failure> {
     Ok(())
 }
 
-/// A field of a CSV file.
-fn quoted(text: &str) -> String {
-    if text.contains([',', '"', '\n']) {
-        format!("\"{}\"", text.replace('"', "\"\""))
-    } else {
-        text.to_owned()
-    }
-}
-
 fn numbers(found: &Findings) -> String {
-    let mut out = String::from(
-        "figure,clearance_mm,friction,quantity,unit,paper,full,sampled,ratio,sampled_ratio,agreement\n",
-    );
-    for Compared {
-        figure,
-        case,
-        what,
-        unit,
-        paper,
-        full,
-        sampled,
-        agreement,
-    } in text::compared(found)
-    {
-        let optional = |v: Option<f64>| v.map_or_else(String::new, |v| significant(v, 12));
-        let Case {
-            clearance,
-            friction,
-        } = case;
-        // Writing to a String cannot fail.
-        let _ = writeln!(
-            out,
-            "{figure},{clearance},{friction},{},{unit},{},{},{},{},{},{agreement}",
-            quoted(&what),
-            significant(paper, 12),
-            significant(full, 12),
-            optional(sampled),
-            significant(full / paper, 12),
-            optional(sampled.map(|s| s / paper)),
-        );
-    }
-    out
+    csv(
+        "figure,clearance_mm,friction,quantity,unit,paper,full,sampled,ratio,sampled_ratio,agreement",
+        found.comparisons().iter().map(|c| {
+            let Published {
+                figure,
+                case,
+                quantity,
+                value,
+            } = c.published;
+            vec![
+                figure.clone(),
+                case.clearance.to_string(),
+                case.friction.to_string(),
+                quantity.to_string(),
+                quantity.unit().to_owned(),
+                number(*value),
+                number(c.full),
+                number(c.sampled),
+                number(c.ratio()),
+                number(c.sampled_ratio()),
+                c.agreement().to_string(),
+            ]
+        }),
+    )
 }
 
 fn statements(found: &Findings) -> String {
-    let mut out = String::from("place,statement,criterion,verdict,evidence\n");
-    for s in found.statements() {
-        let fields = [
-            &s.place[..],
-            &s.says,
-            &s.criterion,
-            text::verdict(s.verdict),
-            &s.evidence,
-        ];
-        let _ = writeln!(out, "{}", fields.map(quoted).join(","));
-    }
-    out
+    csv(
+        "place,statement,criterion,verdict,evidence",
+        found.statements().into_iter().map(|s| {
+            vec![
+                s.claim.place.clone(),
+                s.claim.says.clone(),
+                s.criterion,
+                text::verdict(s.confirmed).to_owned(),
+                s.evidence,
+            ]
+        }),
+    )
 }
 
-/// A run at the paper's output step.
+/// A run at the paper's output step, which the last column tells.
 fn samples(run: &Traced) -> String {
-    let last = COLUMNS.len() - 1;
-    let mut out = COLUMNS[..last].join(",");
-    out.push('\n');
-    for row in run.rows.iter().filter(|row| row[last] == 1.0) {
-        let cells: Vec<String> = row[..last].iter().map(|v| cell(*v)).collect();
-        out.push_str(&cells.join(","));
-        out.push('\n');
-    }
-    out
-}
-
-/// Empty where there is no value.
-fn cell(value: f64) -> String {
-    if value.is_nan() {
-        String::new()
-    } else {
-        significant(value, 12)
-    }
+    let columns = COLUMNS.len() - 1;
+    let names = COLUMNS.map(|c| c.name);
+    let rows = run.samples().into_iter();
+    csv(
+        &names[..columns].join(","),
+        rows.map(|row| row[..columns].iter().map(|v| number(*v)).collect()),
+    )
 }
 
 /// A run at every instant that was looked at.
@@ -145,7 +115,7 @@ fn rows(run: &Traced, report: &Report) -> Result<Vec<u8>, Failure> {
         |e: ndarray_npy::WriteNpzError| Failure::io(format!("cannot write {}: {e}", run.name));
     let mut bytes = std::io::Cursor::new(Vec::new());
     let mut archive = NpzWriter::new(&mut bytes);
-    for (k, name) in COLUMNS.into_iter().enumerate() {
+    for (k, Column { name, .. }) in COLUMNS.into_iter().enumerate() {
         let column: Array1<f64> = run.rows.iter().map(|row| row[k]).collect();
         archive.add_array(name, &column).map_err(failed)?;
     }
@@ -156,53 +126,40 @@ fn rows(run: &Traced, report: &Report) -> Result<Vec<u8>, Failure> {
 }
 
 fn curves(found: &Findings) -> String {
-    let mut out = String::from("clearance_mm,friction,phase,x_m,vx_m_s,beta_rad,beta_rate_rad_s\n");
-    for curve in &found.curves {
-        let Case {
-            clearance,
-            friction,
-        } = curve.case;
-        let count = curve.coordinates[0].len();
-        for k in 0..count {
-            let phase = k as f64 / (count - 1).max(1) as f64;
-            let values = [
-                phase,
-                curve.coordinates[0][k],
-                curve.rates[0][k],
-                curve.coordinates[1][k],
-                curve.rates[1][k],
+    let rows = found.curves.iter().flat_map(|curve| {
+        let last = curve.coordinates[0].len() - 1;
+        (0..=last).map(move |k| {
+            let mut row = vec![
+                curve.case.clearance.to_string(),
+                curve.case.friction.to_string(),
+                number(k as f64 / last.max(1) as f64),
             ];
-            let values = values.map(|v| significant(v, 12)).join(",");
-            let _ = writeln!(out, "{clearance},{friction},{values}");
-        }
-    }
-    out
+            for (values, rates) in curve.coordinates.iter().zip(&curve.rates) {
+                row.extend([number(values[k]), number(rates[k])]);
+            }
+            row
+        })
+    });
+    csv(
+        "clearance_mm,friction,phase,x_m,vx_m_s,beta_rad,beta_rate_rad_s",
+        rows,
+    )
 }
 
 /// One row a point of a sweep, without its sections.
 fn points(data: &SweepData) -> String {
-    let layout = data.sweep.layout();
-    let grid = data.sweep.grid();
-    let single: Vec<_> = layout.columns().iter().filter(|c| !c.per_section).collect();
-    let axes = grid.axes().iter().map(|a| a.key().to_owned());
-    let mut names: Vec<String> = axes.collect();
-    names.extend(single.iter().map(|c| c.name.clone()));
-    let columns: Vec<Vec<f64>> = single.iter().map(|c| data.values(&c.name)).collect();
-    let mut out = names.join(",");
-    out.push('\n');
-    for point in 0..grid.points() {
-        let indices = grid.indices(point).into_iter();
-        let at = grid
-            .axes()
-            .iter()
-            .zip(indices)
-            .map(|(a, i)| significant(a.value(i), 12));
-        let mut cells: Vec<String> = at.collect();
-        cells.extend(columns.iter().map(|column| cell(column[point])));
-        out.push_str(&cells.join(","));
-        out.push('\n');
-    }
-    out
+    let (layout, grid) = (data.sweep.layout(), data.sweep.grid());
+    let single = layout.columns().iter().filter(|c| !c.per_section);
+    let axes = grid.axes().iter().map(|a| a.key());
+    let names: Vec<&str> = axes.chain(single.clone().map(|c| &c.name[..])).collect();
+    let columns: Vec<Vec<f64>> = single.map(|c| data.values(&c.name)).collect();
+    let row = |point: usize| {
+        let at = grid.axes().iter().zip(grid.indices(point));
+        let at = at.map(|(axis, index)| axis.value(index));
+        let values = columns.iter().map(|column| column[point]);
+        at.chain(values).map(number).collect()
+    };
+    csv(&names.join(","), (0..grid.points()).map(row))
 }
 
 /// Records in memory.

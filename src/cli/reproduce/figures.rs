@@ -1,97 +1,45 @@
 //! The figures of the paper, and those beyond it, as sheets.
 
-use crate::analysis::paper::chaos::{Loop, Swept};
-use crate::analysis::paper::{BY_CLEARANCE, BY_FRICTION, CASES, Case};
-use crate::analysis::reproduction::{Findings, Row, SweepData, Traced, Variant, regime_word};
-use crate::chart::{Axis, Chart, Colour, Level, Map, Marker, PALETTE, Scale, Series, Sheet};
+use super::text::{capital, typeset};
+use crate::analysis::paper::{Case, Coordinate, PAPER, Series, Shows};
+use crate::analysis::reproduction::{
+    COLUMNS, Column, Findings, Swept, Traced, Variant, column_of, derivative, regime_word,
+};
+use crate::chart::{Axis, Chart, Colour, Level, Map, Marker, PALETTE, Scale, Sheet};
+use crate::cli::output::significant;
 
 /// Width of a sheet, height of a row of charts, pixels.
 const WIDTH: u32 = 1120;
 const ROW: u32 = 290;
-/// The first part of a run, in which the balls bounce, s.
+/// The first part of a run, in which the balls bounce, s; and of the comparison of formulations.
 const EARLY: f64 = 0.15;
+const EARLIEST: f64 = 0.1;
 
-/// Name and unit of a column of a [`Row`], and SI units in one of it.
-#[derive(Clone, Copy)]
-struct Shown(usize, &'static str, &'static str, f64);
-
-const X: Shown = Shown(1, "x", "mm", 1e-3);
-const RATE_X: Shown = Shown(2, "Velocity in x", "m/s", 1.0);
-const ACCELERATION_X: Shown = Shown(3, "Acceleration in x", "m/s²", 1.0);
-const BETA: Shown = Shown(4, "β", "mrad", 1e-3);
-const RATE_BETA: Shown = Shown(5, "Rate of β", "rad/s", 1.0);
-const ACCELERATION_BETA: Shown = Shown(6, "Acceleration of β", "rad/s²", 1.0);
-const DEVIATION_X: Shown = Shown(10, "x less ideal", "mm", 1e-3);
-const DEVIATION_BETA: Shown = Shown(11, "β less ideal", "mrad", 1e-3);
-const PROBE: Shown = Shown(12, "Probe error", "µm", 1e-6);
-const FORCE: Shown = Shown(7, "Contact force", "N", 1.0);
+type Points = Vec<(f64, f64)>;
 
 /// Every figure by name, in the order of the page.
 pub(super) fn all(found: &Findings) -> Vec<(String, Sheet)> {
-    let mut out: Vec<(&str, Sheet)> = Vec::new();
-    let kinds = [
-        ["figure-05", "figure-06", "figure-07"],
-        ["figure-11", "figure-12", "figure-13"],
-    ];
-    let forces = [
-        [
-            ("figure-08", BY_CLEARANCE[0]),
-            ("figure-09", BY_CLEARANCE[1]),
-            ("figure-10", BY_CLEARANCE[2]),
-        ],
-        [
-            ("figure-14", BY_FRICTION[0]),
-            ("figure-15", BY_FRICTION[1]),
-            ("figure-16", BY_FRICTION[2]),
-        ],
-    ];
-    for (which, cases) in [BY_CLEARANCE, BY_FRICTION].into_iter().enumerate() {
-        let runs: Vec<(String, &Traced)> = cases
-            .iter()
-            .filter_map(|&case| Some((case_name(case, which), found.run(case)?)))
-            .collect();
-        let [displacement, velocity, acceleration] = kinds[which];
-        out.push((
-            displacement,
-            early_and_whole(&runs, [X, BETA], [DEVIATION_X, DEVIATION_BETA]),
-        ));
-        out.push((
-            velocity,
-            early_and_whole(&runs, [RATE_X, RATE_BETA], [RATE_X, RATE_BETA]),
-        ));
-        let accelerations = [ACCELERATION_X, ACCELERATION_BETA];
-        out.push((
-            acceleration,
-            early_and_whole(&runs, accelerations, accelerations),
-        ));
-        for (name, case) in forces[which] {
-            out.extend(found.run(case).map(|run| (name, contact_forces(run))));
-        }
-    }
-    out.push(("figure-17", verification(found)));
-    out.push(("figure-17-drift", drift(found)));
-    for (which, cases, names) in [
-        (
-            0,
-            BY_CLEARANCE,
-            ["figure-18", "figure-19", "figure-20", "exponent-clearance"],
-        ),
-        (
-            1,
-            BY_FRICTION,
-            ["figure-21", "figure-22", "figure-23", "exponent-friction"],
-        ),
-    ] {
-        let [portrait, section, bifurcated, exponents] = names;
-        out.push((portrait, portraits(found, cases, which)));
-        out.push((section, sections(found, which)));
-        out.push((bifurcated, bifurcation(found, which)));
-        out.push((exponents, exponent(found, which)));
-    }
-    out.push(("map", map(found)));
-    out.push(("probe", probe(found)));
-    out.into_iter()
-        .map(|(name, sheet)| (picture_name(found.variant, name), sheet))
+    let figures = PAPER.sections.iter().flat_map(|section| &section.figures);
+    figures
+        .map(|figure| {
+            let charts = match figure.shows {
+                Shows::Response {
+                    to,
+                    ref whole,
+                    ref early,
+                } => response(found, to, whole, early),
+                Shows::Forces(case) => forces(found.run(case)),
+                Shows::Verification(ref columns) => verification(found, columns),
+                Shows::Drift => drift(found),
+                Shows::Portraits(series) => portraits(found, series),
+                Shows::Sections(series) => sections(found, series),
+                Shows::Bifurcation(series) => bifurcation(found, series),
+                Shows::Exponents(series) => exponents(found, series),
+                Shows::Map => map(found),
+                Shows::Probe => probe(found),
+            };
+            (picture_name(found.variant, &figure.name), sheet(charts))
+        })
         .collect()
 }
 
@@ -100,13 +48,21 @@ pub(super) fn picture_name(variant: Variant, name: &str) -> String {
     format!("{}{name}", variant.prefix.replace('_', "-"))
 }
 
-/// What tells a run of a series from the others.
-fn case_name(case: Case, which: usize) -> String {
-    if which == 0 {
-        format!("{} mm", case.clearance)
-    } else {
-        format!("friction {}", case.friction)
+/// Two charts in a row.
+fn sheet(charts: Vec<Chart>) -> Sheet {
+    let rows = charts.len().div_ceil(2) as u32;
+    Sheet {
+        title: String::new(),
+        charts,
+        columns: 2,
+        size: (WIDTH, ROW * rows + 34),
+        note: String::new(),
     }
+}
+
+/// What tells a run of a series from the others.
+fn case_name(series: Series, case: Case) -> String {
+    series.name(series.of(case))
 }
 
 fn axis(label: &str, unit: &str) -> Axis {
@@ -117,15 +73,27 @@ fn axis(label: &str, unit: &str) -> Axis {
     }
 }
 
-fn time(to: f64) -> Axis {
+fn logarithmic(label: &str, unit: &str) -> Axis {
     Axis {
-        range: Some((0.0, to)),
-        ..axis("Time", "s")
+        scale: Scale::Logarithmic,
+        ..axis(label, unit)
     }
 }
 
-fn line(label: &str, points: Vec<(f64, f64)>, colour: Colour) -> Series {
-    Series {
+fn of_column(column: usize) -> Axis {
+    let Column { label, unit, .. } = COLUMNS[column];
+    axis(&typeset(&capital(label)), unit)
+}
+
+fn parameter(series: Series) -> Axis {
+    match series {
+        Series::Clearance => axis("Clearance", "mm"),
+        Series::Friction => axis("Friction coefficient", ""),
+    }
+}
+
+fn line(label: &str, points: Points, colour: Colour) -> crate::chart::Series {
+    crate::chart::Series {
         label: label.to_owned(),
         points,
         colour,
@@ -134,239 +102,181 @@ fn line(label: &str, points: Vec<(f64, f64)>, colour: Colour) -> Series {
     }
 }
 
-fn dots(label: &str, points: Vec<(f64, f64)>, colour: Colour, marker: Marker) -> Series {
-    Series {
+fn dots(label: &str, points: Points, colour: Colour, marker: Marker) -> crate::chart::Series {
+    crate::chart::Series {
         line: false,
         marker: Some(marker),
         ..line(label, points, colour)
     }
 }
 
-fn sheet(charts: Vec<Chart>, columns: usize) -> Sheet {
-    let rows = charts.len().div_ceil(columns) as u32;
-    Sheet {
-        title: String::new(),
-        charts,
-        columns,
-        size: (WIDTH, ROW * rows + 34),
-        note: String::new(),
-    }
-}
-
-fn picked(rows: &[Row], shown: Shown, to: f64) -> Vec<(f64, f64)> {
-    let early = rows.iter().take_while(|row| row[0] <= to);
-    early.map(|row| (row[0], row[shown.0] / shown.3)).collect()
-}
-
-fn over_time(runs: &[(String, &Traced)], shown: Shown, to: f64, title: &str) -> Chart {
-    let series = runs
-        .iter()
-        .enumerate()
-        .map(|(n, (name, run))| line(name, picked(&run.rows, shown, to), PALETTE[n + 1]));
+fn chart(title: &str, x: Axis, y: Axis, series: Vec<crate::chart::Series>) -> Chart {
     Chart {
         title: title.to_owned(),
-        x: time(to),
-        y: axis(shown.1, shown.2),
-        series: series.collect(),
+        x,
+        y,
+        series,
         ..Chart::default()
     }
+}
+
+/// Curves over the first `to` seconds.
+fn over_time(title: &str, to: f64, y: Axis, series: Vec<crate::chart::Series>) -> Chart {
+    let time = Axis {
+        range: Some((0.0, to)),
+        ..axis("Time", "s")
+    };
+    chart(title, time, y, series)
+}
+
+/// Columns of runs over the first `to` seconds, each run in its colour.
+fn columns(runs: &[(String, &Traced, usize)], to: f64, title: &str, colour: usize) -> Chart {
+    let series = runs.iter().enumerate().map(|(n, (name, run, column))| {
+        let early = run.curve(*column).take_while(|(time, _)| *time <= to);
+        line(name, early.collect(), PALETTE[colour + n])
+    });
+    over_time(title, to, of_column(runs[0].2), series.collect())
+}
+
+fn of_series(found: &Findings, series: Series, column: usize) -> [(String, &Traced, usize); 3] {
+    series
+        .cases()
+        .map(|case| (case_name(series, case), found.run(case), column))
 }
 
 /// The whole run above, its beginning below.
-fn early_and_whole(runs: &[(String, &Traced)], whole: [Shown; 2], early: [Shown; 2]) -> Sheet {
-    let mut charts: Vec<Chart> = whole
-        .iter()
-        .map(|&s| over_time(runs, s, 2.0, "One period"))
-        .collect();
-    charts.extend(
-        early
-            .iter()
-            .map(|&s| over_time(runs, s, EARLY, "While the balls bounce")),
-    );
-    sheet(charts, 2)
-}
-
-fn contact_forces(run: &Traced) -> Sheet {
-    let chart = |to: f64, title: &str| Chart {
-        title: title.to_owned(),
-        x: time(to),
-        y: axis(FORCE.1, FORCE.2),
-        series: (0..3)
-            .map(|j| {
-                let shown = Shown(FORCE.0 + j, FORCE.1, FORCE.2, FORCE.3);
-                line(
-                    &format!("S{}", j + 1),
-                    picked(&run.rows, shown, to),
-                    PALETTE[j + 1],
-                )
-            })
-            .collect(),
-        ..Chart::default()
+fn response(found: &Findings, to: Series, whole: &[String], early: &[String]) -> Vec<Chart> {
+    let row = |names: &[String], end: f64, title: &str| -> Vec<Chart> {
+        let chart = |name: &String| columns(&of_series(found, to, column_of(name)), end, title, 1);
+        names.iter().map(chart).collect()
     };
-    sheet(
-        vec![
-            chart(2.0, "One period"),
-            chart(EARLY, "While the balls bounce"),
-        ],
-        2,
-    )
+    [
+        row(whole, 2.0, "One period"),
+        row(early, EARLY, "While the balls bounce"),
+    ]
+    .concat()
 }
 
-fn verification(found: &Findings) -> Sheet {
-    let runs = [
-        ("ideal joints".to_owned(), &found.ideal),
-        ("tree formulation".to_owned(), &found.runs[0]),
-        ("lagrange formulation".to_owned(), &found.lagrange),
-    ];
-    let all = [
-        X,
-        BETA,
-        RATE_X,
-        RATE_BETA,
-        ACCELERATION_X,
-        ACCELERATION_BETA,
-    ];
-    let charts = all.iter().map(|&shown| {
-        let mut chart = over_time(&runs, shown, 0.1, "");
-        // The ideal motion is what all others are compared with.
-        for (n, series) in chart.series.iter_mut().enumerate() {
-            series.colour = PALETTE[n];
-        }
-        chart
-    });
-    sheet(charts.collect(), 2)
+fn forces(run: &Traced) -> Vec<Chart> {
+    let joints = ["S1", "S2", "S3"];
+    let joints = joints.map(|j| (j.to_owned(), run, column_of(&format!("{j}_normal_N"))));
+    vec![
+        columns(&joints, 2.0, "One period", 1),
+        columns(&joints, EARLY, "While the balls bounce", 1),
+    ]
 }
 
-fn drift(found: &Findings) -> Sheet {
-    let samples = |run: &'_ Traced| -> Vec<Row> {
-        run.rows
-            .iter()
-            .filter(|row| row[14] == 1.0)
-            .copied()
-            .collect()
+fn verification(found: &Findings, names: &[String]) -> Vec<Chart> {
+    let chart = |name: &String| {
+        let runs = [
+            ("ideal joints", &found.ideal),
+            ("tree formulation", &found.runs[0]),
+            ("lagrange formulation", &found.lagrange),
+        ];
+        let runs = runs.map(|(label, run)| (label.to_owned(), run, column_of(name)));
+        // The ideal motion is what all others are compared with: in the first colour.
+        columns(&runs, EARLIEST, "", 0)
     };
-    let (tree, lagrange) = (samples(&found.runs[0]), samples(&found.lagrange));
-    let apart = |column: usize| -> Vec<(f64, f64)> {
+    names.iter().map(chart).collect()
+}
+
+fn drift(found: &Findings) -> Vec<Chart> {
+    let (tree, lagrange) = (found.runs[0].samples(), found.lagrange.samples());
+    let apart = |coordinate: Coordinate| {
+        let column = derivative(coordinate, 0);
         let pairs = tree.iter().zip(&lagrange);
-        pairs
-            .map(|(a, b)| (a[0], (a[column] - b[column]).abs() * 1e6))
+        let apart = pairs.map(|(a, b)| (a[0], (a[column] - b[column]).abs() * 1e6));
+        let (label, colour) = [("x", PALETTE[1]), ("β", PALETTE[2])][coordinate as usize];
+        line(label, apart.collect(), colour)
+    };
+    let violation = found.lagrange.curve(column_of("constraint_drift"));
+    let violation = violation.map(|(time, size)| (time, size * 1e6)).collect();
+    let unit = "µm, µrad";
+    vec![
+        over_time(
+            "Difference of the formulations",
+            2.0,
+            logarithmic("|tree − lagrange|", unit),
+            Coordinate::ALL.map(apart).to_vec(),
+        ),
+        over_time(
+            "Drift of the lagrange formulation",
+            2.0,
+            logarithmic("Largest violation so far", unit),
+            vec![line("constraints", violation, PALETTE[3])],
+        ),
+    ]
+}
+
+/// Rate against value of a coordinate, a series a run.
+fn phases(coordinate: Coordinate, title: &str, series: Vec<crate::chart::Series>) -> Chart {
+    let [x, y] = [0, 1].map(|nth| of_column(derivative(coordinate, nth)));
+    chart(title, x, y, series)
+}
+
+/// Points of values in thousandths of SI units.
+fn pairs<'a>(
+    values: impl IntoIterator<Item = &'a f64>,
+    rates: impl IntoIterator<Item = &'a f64>,
+) -> Points {
+    let pairs = values.into_iter().zip(rates);
+    pairs.map(|(value, rate)| (value * 1e3, *rate)).collect()
+}
+
+fn portraits(found: &Findings, series: Series) -> Vec<Chart> {
+    let each = |points: &dyn Fn(usize, Case) -> Points| {
+        let cases = series.cases().into_iter().enumerate();
+        cases
+            .map(|(n, case)| line(&case_name(series, case), points(n, case), PALETTE[n + 1]))
             .collect()
     };
-    let logarithmic = |label: &str, unit: &str| Axis {
-        scale: Scale::Logarithmic,
-        ..axis(label, unit)
-    };
-    let difference = Chart {
-        title: "Difference of the formulations".to_owned(),
-        x: time(2.0),
-        y: logarithmic("|tree − lagrange|", "µm, µrad"),
-        series: vec![
-            line("x", apart(1), PALETTE[1]),
-            line("β", apart(4), PALETTE[2]),
-        ],
-        ..Chart::default()
-    };
-    let violation = Chart {
-        title: "Drift of the lagrange formulation".to_owned(),
-        x: time(2.0),
-        y: logarithmic("Largest violation so far", "µm, µrad"),
-        series: vec![line(
-            "constraints",
-            found
-                .lagrange
-                .rows
-                .iter()
-                .map(|row| (row[0], row[13] * 1e6))
-                .collect(),
-            PALETTE[3],
-        )],
-        ..Chart::default()
-    };
-    sheet(vec![difference, violation], 2)
-}
-
-/// Value and rate of x or beta, as phase portraits show them.
-const PHASES: [(&str, &str, &str, &str); 2] = [
-    ("x", "mm", "Velocity in x", "m/s"),
-    ("β", "mrad", "Rate of β", "rad/s"),
-];
-
-fn portraits(found: &Findings, cases: [Case; 3], which: usize) -> Sheet {
-    let loops: Vec<Loop> = found.loops(cases);
-    let chart = |c: usize, title: &str, points: &dyn Fn(usize) -> Vec<(f64, f64)>| {
-        let (value, unit, rate, rate_unit) = PHASES[c];
-        Chart {
-            title: title.to_owned(),
-            x: axis(value, unit),
-            y: axis(rate, rate_unit),
-            series: cases
-                .iter()
-                .enumerate()
-                .map(|(n, &case)| line(&case_name(case, which), points(n), PALETTE[n + 1]))
-                .collect(),
-            ..Chart::default()
-        }
-    };
-    let settled = |c: usize| {
-        chart(c, "Settled", &|n| {
-            let Some(l) = loops.get(n) else {
-                return Vec::new();
-            };
-            let pairs = l.coordinates[c].iter().zip(&l.rates[c]);
-            pairs.map(|(v, r)| (v * 1e3, *r)).collect()
-        })
-    };
-    let first = |c: usize| {
-        chart(c, "First period, with its impacts", &|n| {
-            let rows = found
-                .run(cases[n])
-                .map(|run| &run.rows[..])
-                .unwrap_or_default();
-            let (value, rate) = ([1, 4][c], [2, 5][c]);
-            rows.iter()
-                .map(|row| (row[value] * 1e3, row[rate]))
-                .collect()
-        })
-    };
-    sheet(vec![settled(0), settled(1), first(0), first(1)], 2)
-}
-
-fn sections(found: &Findings, which: usize) -> Sheet {
-    let data = found.sweep_data(["runs_by_clearance", "runs_by_friction"][which]);
-    let kept = data.sweep.layout().kept();
-    let names = [
-        ["section_x_m", "section_vx_m_s"],
-        ["section_beta_rad", "section_beta_rate_rad_s"],
-    ];
-    let cases = [BY_CLEARANCE, BY_FRICTION][which];
-    let charts = (0..2).map(|c| {
-        let (value, unit, rate, rate_unit) = PHASES[c];
-        let [values, rates] = names[c].map(|name| data.values(name));
-        let series = cases.iter().enumerate().map(|(n, &case)| {
-            let part = n * kept..(n + 1) * kept;
-            let pairs = values[part.clone()].iter().zip(&rates[part]);
-            let points = pairs.map(|(v, r)| (v * 1e3, *r)).collect::<Vec<_>>();
-            let marker = [Marker::Disc, Marker::Square, Marker::Triangle][n];
-            dots(
-                &case_name(case, which),
-                seen(points),
-                PALETTE[n + 1],
-                marker,
+    let settled = Coordinate::ALL.map(|c| {
+        let loops = found.loops(series);
+        let points = |n: usize, _| {
+            pairs(
+                &loops[n].coordinates[c as usize],
+                &loops[n].rates[c as usize],
             )
-        });
-        Chart {
-            title: format!("{kept} sections each"),
-            x: axis(value, unit),
-            y: axis(rate, rate_unit),
-            series: series.collect(),
-            ..Chart::default()
-        }
+        };
+        phases(c, "Settled", each(&points))
     });
-    sheet(charts.collect(), 2)
+    let first = Coordinate::ALL.map(|c| {
+        let [value, rate] = [0, 1].map(|nth| derivative(c, nth));
+        let points = |_, case| {
+            let rows = &found.run(case).rows;
+            pairs(
+                rows.iter().map(|row| &row[value]),
+                rows.iter().map(|row| &row[rate]),
+            )
+        };
+        phases(c, "First period, with its impacts", each(&points))
+    });
+    settled.into_iter().chain(first).collect()
+}
+
+fn sections(found: &Findings, series: Series) -> Vec<Chart> {
+    let data = found.sweep(&format!("runs_by_{series}"));
+    let kept = data.sweep.layout().kept();
+    let charts = Coordinate::ALL.map(|c| {
+        let [values, rates] = [0, 1].map(|nth| {
+            let column = &COLUMNS[derivative(c, nth)];
+            data.values(&format!("section_{}", column.name))
+        });
+        let looks = [Marker::Disc, Marker::Square, Marker::Triangle]
+            .into_iter()
+            .enumerate();
+        let dots = looks.zip(series.cases()).map(|((n, marker), case)| {
+            let part = n * kept..(n + 1) * kept;
+            let points = seen(pairs(&values[part.clone()], &rates[part]));
+            dots(&case_name(series, case), points, PALETTE[n + 1], marker)
+        });
+        phases(c, &format!("{kept} sections each"), dots.collect())
+    });
+    charts.to_vec()
 }
 
 /// Points that a picture can tell apart, once each.
-fn seen(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+fn seen(points: Points) -> Points {
     let mut cells = std::collections::HashSet::new();
     let cell = |v: f64| format!("{v:.6}");
     points
@@ -375,87 +285,68 @@ fn seen(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
         .collect()
 }
 
-fn parameter(which: usize) -> Axis {
-    [axis("Clearance", "mm"), axis("Friction coefficient", "")][which].clone()
-}
-
-fn swept(found: &Findings, which: usize) -> [Vec<Swept>; 3] {
-    let names = [
-        ["clearance_cold", "clearance_up", "clearance_down"],
-        ["friction_cold", "friction_up", "friction_down"],
+fn bifurcation(found: &Findings, series: Series) -> Vec<Chart> {
+    let all = found.branches(series);
+    // Each start on top of the one before, and smaller: all of them show.
+    let looks = [
+        ("cold start", PALETTE[0], Marker::Disc),
+        ("followed upward", PALETTE[5], Marker::Point),
+        ("followed downward", PALETTE[6], Marker::Dot),
     ];
-    names[which].map(|name| found.sweep_data(name).swept([1e3, 1.0][which]))
-}
-
-fn bifurcation(found: &Findings, which: usize) -> Sheet {
-    let all = swept(found, which);
-    let starts = ["cold start", "followed upward", "followed downward"];
-    let diagram = |c: usize| {
-        // Each start on top of the one before, and smaller: all of them show.
-        let looks = [(0, Marker::Disc), (5, Marker::Point), (6, Marker::Dot)];
-        let series = all.iter().enumerate().map(|(n, points)| {
-            let points = points
-                .iter()
-                .flat_map(|p| p.sections[c].iter().map(|s| (p.value, s * 1e3)));
-            let (colour, marker) = looks[n];
-            dots(starts[n], points.collect(), PALETTE[colour], marker)
-        });
-        Chart {
-            title: format!("Sections in {}", PHASES[c].0),
-            x: parameter(which),
-            y: axis(PHASES[c].0, PHASES[c].1),
-            series: series.collect(),
-            ..Chart::default()
-        }
-    };
-    let differences = |c: usize| {
-        let apart = |other: &[Swept]| -> Vec<(f64, f64)> {
-            let pairs = all[0].iter().zip(other);
-            pairs
-                .map(|(a, b)| (a.value, (a.latest(c) - b.latest(c)).abs() * 1e6))
-                .collect()
-        };
-        let spread = all[0]
+    let diagram = |c: Coordinate| {
+        let dots = all
             .iter()
-            .map(|p| (p.value, p.spread(c) * 1e6))
-            .collect();
-        let unit = ["µm", "µrad"][c];
+            .zip(looks)
+            .map(|(points, (start, colour, marker))| {
+                let points = points
+                    .iter()
+                    .flat_map(|p| p.sections[c as usize].iter().map(|s| (p.value, s * 1e3)));
+                dots(start, points.collect(), colour, marker)
+            });
+        let value = of_column(derivative(c, 0));
+        let title = format!("Sections in {}", value.label);
+        chart(&title, parameter(series), value, dots.collect())
+    };
+    let differences = |c: Coordinate| {
+        let along = |label: &str, colour: usize, size: &dyn Fn(usize, &Swept) -> f64| {
+            let points = all[0].iter().enumerate();
+            let points = points.map(|(k, p)| (p.value, size(k, p) * 1e6));
+            line(label, points.collect(), PALETTE[colour])
+        };
+        let apart = |branch: usize| {
+            let label = format!("{} against cold", looks[branch].0);
+            along(&label, branch + 4, &|k, cold| {
+                (cold.latest(c) - all[branch][k].latest(c)).abs()
+            })
+        };
+        let spread = along("spread of the sections of a point", 0, &|_, p| p.spread(c));
+        let (name, unit) = [("x", "µm"), ("β", "µrad")][c as usize];
         Chart {
-            title: format!("Spread and hysteresis in {}", PHASES[c].0),
-            x: parameter(which),
-            y: Axis {
-                scale: Scale::Logarithmic,
-                ..axis("Distance", unit)
-            },
-            series: vec![
-                line("spread of the sections of a point", spread, PALETTE[0]),
-                line("followed upward against cold", apart(&all[1]), PALETTE[5]),
-                line("followed downward against cold", apart(&all[2]), PALETTE[6]),
-            ],
             levels: vec![Level {
-                y: found.resolution[c] * 1e6,
+                y: found.resolution[c as usize] * 1e6,
                 text: "resolution: less counts as equal".to_owned(),
             }],
-            ..Chart::default()
+            ..chart(
+                &format!("Spread and hysteresis in {name}"),
+                parameter(series),
+                logarithmic("Distance", unit),
+                vec![spread, apart(1), apart(2)],
+            )
         }
     };
-    sheet(
-        vec![diagram(0), diagram(1), differences(0), differences(1)],
-        2,
-    )
+    let diagrams = Coordinate::ALL.map(diagram).into_iter();
+    diagrams.chain(Coordinate::ALL.map(differences)).collect()
 }
 
 /// Lower exponents are left out of the picture: the smallest clearances would press all others against 0, 1/s.
 const LEAST_EXPONENT: f64 = -10.0;
 
-fn exponent(found: &Findings, which: usize) -> Sheet {
-    let data = found.sweep_data(["clearance_cold", "friction_cold"][which]);
-    let points = data.swept([1e3, 1.0][which]);
+fn exponents(found: &Findings, series: Series) -> Vec<Chart> {
+    let data = found.cold(series);
+    let points = &data.points;
     let along = points.iter().map(|p| (p.value, p.exponent.0)).collect();
-    let (kept, running) = (
-        data.sweep.layout().kept(),
-        data.values("exponent_running_per_s"),
-    );
+    let kept = data.sweep.layout().kept();
+    let running = data.values("exponent_running_per_s");
     let discard = data.sweep.plan().discard;
     let legible: Vec<usize> = (0..points.len())
         .filter(|&k| points[k].exponent.0 > LEAST_EXPONENT)
@@ -463,143 +354,109 @@ fn exponent(found: &Findings, which: usize) -> Sheet {
     let chosen = 5.min(legible.len());
     let convergence = (0..chosen).map(|n| {
         let k = legible[n * (legible.len() - 1) / (chosen - 1).max(1)];
-        let values = running[k * kept..(k + 1) * kept].iter();
-        let values = values
-            .enumerate()
-            .map(|(i, v)| ((discard + i + 1) as f64, *v));
-        let name = if which == 0 {
-            format!("{} mm", crate::cli::output::significant(points[k].value, 3))
-        } else {
-            format!(
-                "friction {}",
-                crate::cli::output::significant(points[k].value, 3)
-            )
-        };
+        let values = running[k * kept..(k + 1) * kept].iter().enumerate();
+        let values = values.map(|(i, v)| ((discard + i + 1) as f64, *v));
+        let name = series.name(significant(points[k].value, 3));
         line(&name, values.collect(), PALETTE[n + 1])
     });
-    let zero = vec![Level {
-        y: 0.0,
-        text: "chaos lies above".to_owned(),
-    }];
     let most = points.iter().map(|p| p.exponent.0).fold(0.0, f64::max);
-    let y = Axis {
-        range: Some((LEAST_EXPONENT, 1.1 * most + 1.0)),
-        ..axis("Largest Lyapunov exponent", "1/s")
+    let exponents = |title: &str, x: Axis, lines: Vec<crate::chart::Series>| {
+        let y = Axis {
+            range: Some((LEAST_EXPONENT, 1.1 * most + 1.0)),
+            ..axis("Largest Lyapunov exponent", "1/s")
+        };
+        Chart {
+            levels: vec![Level {
+                y: 0.0,
+                text: "chaos lies above".to_owned(),
+            }],
+            ..chart(title, x, y, lines)
+        }
     };
-    let along = Chart {
-        title: "Along the sweep".to_owned(),
-        x: parameter(which),
-        y: y.clone(),
-        series: vec![Series {
-            marker: Some(Marker::Dot),
-            ..line("exponent", along, PALETTE[0])
-        }],
-        levels: zero.clone(),
-        ..Chart::default()
+    let along = crate::chart::Series {
+        marker: Some(Marker::Dot),
+        ..line("exponent", along, PALETTE[0])
     };
-    let convergence = Chart {
-        title: "How it converges".to_owned(),
-        x: axis("Periods run", ""),
-        y,
-        series: convergence.collect(),
-        levels: zero,
-        ..Chart::default()
-    };
-    sheet(vec![along, convergence], 2)
+    vec![
+        exponents("Along the sweep", parameter(series), vec![along]),
+        exponents(
+            "How it converges",
+            axis("Periods run", ""),
+            convergence.collect(),
+        ),
+    ]
 }
 
-fn map(found: &Findings) -> Sheet {
-    let data: &SweepData = found.sweep_data("map");
+fn map(found: &Findings) -> Vec<Chart> {
+    let data = found.sweep("map");
     let axes = data.sweep.grid().axes();
-    let (ys, xs): (Vec<f64>, Vec<f64>) = (
-        axes[0].values().collect(),
-        axes[1].values().map(|v| v * 1e3).collect(),
-    );
-    let chart = |title: &str, values: Vec<f64>, scale: Axis, names: Vec<(f64, String)>| Chart {
-        title: title.to_owned(),
-        x: axis("Clearance", "mm"),
-        y: axis("Friction coefficient", ""),
+    let heat = |title: &str, values: Vec<f64>, scale: Axis, names: Vec<(f64, String)>| Chart {
         map: Some(Map {
-            xs: xs.clone(),
-            ys: ys.clone(),
+            xs: axes[1].values().map(|v| v * 1e3).collect(),
+            ys: axes[0].values().collect(),
             values,
             scale,
             names,
         }),
-        ..Chart::default()
+        ..chart(
+            title,
+            parameter(Series::Clearance),
+            parameter(Series::Friction),
+            Vec::new(),
+        )
     };
     let regimes = data.values("regime");
     let mut codes: Vec<i64> = regimes.iter().map(|r| *r as i64).collect();
     codes.sort_unstable();
     codes.dedup();
-    let names = codes
-        .iter()
-        .map(|&c| (c as f64, regime_word(c).to_owned()))
-        .collect();
+    let names = codes.iter().map(|&c| (c as f64, regime_word(c).to_owned()));
     let joints = &found.runs[0].response.joints;
-    let peaks: Vec<Vec<f64>> = joints
-        .iter()
-        .map(|j| data.values(&format!("{j}_peak_N")))
-        .collect();
+    let peaks = joints.iter().map(|j| data.values(&format!("{j}_peak_N")));
+    let peaks: Vec<Vec<f64>> = peaks.collect();
     let hardest = (0..regimes.len()).map(|k| peaks.iter().map(|p| p[k]).fold(f64::NAN, f64::max));
     let exponents = data.values("exponent_per_s").into_iter();
     // Grey where a disturbance grows.
-    let memory = exponents
-        .map(|e| if e < 0.0 { -1.0 / e } else { f64::NAN })
-        .collect();
-    let logarithmic = Axis {
-        scale: Scale::Logarithmic,
-        ..axis("", "s")
-    };
-    let charts = vec![
-        chart("Regime", regimes.clone(), Axis::default(), names),
-        chart(
+    let memory = exponents.map(|e| if e < 0.0 { -1.0 / e } else { f64::NAN });
+    let size = |title: &str, values: Vec<f64>, scale: Axis| heat(title, values, scale, Vec::new());
+    vec![
+        heat("Regime", regimes.clone(), Axis::default(), names.collect()),
+        size(
             "Peak contact force of any joint",
             hardest.collect(),
             axis("", "N"),
-            Vec::new(),
         ),
-        chart(
+        size(
             "Largest probe error, settled",
             data.values("probe_error_max_um"),
             axis("", "µm"),
-            Vec::new(),
         ),
-        chart(
+        size(
             "Time in which a disturbance falls to 1/e",
-            memory,
-            logarithmic,
-            Vec::new(),
+            memory.collect(),
+            logarithmic("", "s"),
         ),
-    ];
-    sheet(charts, 2)
+    ]
 }
 
-fn probe(found: &Findings) -> Sheet {
-    let data = found.sweep_data("clearance_cold");
-    let values: Vec<f64> = data.swept(1e3).iter().map(|p| p.value).collect();
-    let along = |name: &str| {
-        values
-            .iter()
-            .copied()
-            .zip(data.values(name))
-            .collect::<Vec<_>>()
+fn probe(found: &Findings) -> Vec<Chart> {
+    let data = found.cold(Series::Clearance);
+    let along = |label: &str, name: &str, colour: usize| {
+        let values = data.points.iter().map(|p| p.value).zip(data.values(name));
+        line(label, values.collect(), PALETTE[colour])
     };
-    let against = Chart {
-        title: "Settled, against clearance".to_owned(),
-        x: parameter(0),
-        y: axis(PROBE.1, PROBE.2),
-        series: vec![
-            line("largest", along("probe_error_max_um"), PALETTE[4]),
-            line("root mean square", along("probe_error_rms_um"), PALETTE[0]),
-        ],
-        ..Chart::default()
-    };
-    let runs: Vec<(String, &Traced)> = BY_CLEARANCE
-        .iter()
-        .filter_map(|&case| Some((case_name(case, 0), found.run(case)?)))
-        .collect();
-    debug_assert_eq!(BY_CLEARANCE[0], CASES[0]);
-    let over = over_time(&runs, PROBE, 2.0, "The first period");
-    sheet(vec![against, over], 2)
+    let error = column_of("probe_error_m");
+    let settled = vec![
+        along("largest", "probe_error_max_um", 4),
+        along("root mean square", "probe_error_rms_um", 0),
+    ];
+    let first = of_series(found, Series::Clearance, error);
+    vec![
+        chart(
+            "Settled, against clearance",
+            parameter(Series::Clearance),
+            of_column(error),
+            settled,
+        ),
+        columns(&first, 2.0, "The first period", 1),
+    ]
 }

@@ -3,11 +3,9 @@
 mod compute;
 mod data;
 mod figures;
-mod html;
 mod kept;
 mod page;
 mod scatter;
-mod sections;
 mod text;
 
 use std::path::Path;
@@ -19,8 +17,8 @@ use serde_json::{Value as Json, json};
 use self::kept::Kept;
 use super::args::ReproduceArguments;
 use super::{Failure, interrupt, print, progress, warn};
-use crate::analysis::paper::{Agreement, Verdict};
-use crate::analysis::reproduction::{Extent, Findings, Report, Work};
+use crate::analysis::paper::{Agreement, Series};
+use crate::analysis::reproduction::{Extent, Findings, Report, Statement, Work};
 use crate::files::Folder;
 
 /// Does what `reproduce` asks.
@@ -87,8 +85,8 @@ fn fill(
     let drawn = [&report.corrected, &report.printed]
         .map(figures::all)
         .concat();
-    let mut pictures = Vec::new();
-    for (name, sheet) in &drawn {
+    let mut pictures = page::Pictures::new();
+    for (name, sheet) in drawn {
         if interrupt::asked() {
             return Err(interrupted(kept));
         }
@@ -97,7 +95,7 @@ fn fill(
         folder.write(&format!("plots/{name}.svg"), svg.as_bytes())?;
         let png = sheet.png(1.5).map_err(drawing)?;
         folder.write(&format!("plots/{name}.png"), &png)?;
-        pictures.push((name.clone(), svg));
+        pictures.insert(name, svg);
     }
     let page = page::page(report, &pictures);
     folder.write("index.html", page.as_bytes())?;
@@ -106,7 +104,7 @@ fn fill(
 
 /// What made the report.
 fn meta(report: &Report) -> serde_json::Map<String, Json> {
-    let scene = report.corrected.sweep_data("clearance_cold").sweep.scene();
+    let scene = report.corrected.cold(Series::Clearance).sweep.scene();
     let mut meta = super::provenance::meta(scene);
     meta.insert("command".into(), json!(command(report)));
     meta.insert("simulated_s".into(), json!(text::simulated(report)));
@@ -137,14 +135,12 @@ struct Score {
     numbers: usize,
     agree: usize,
     near: usize,
-    statements: usize,
     confirmed: usize,
 }
 
 impl Score {
-    fn of(found: &Findings) -> Self {
-        let statements = found.statements();
-        let compared = crate::analysis::paper::compare(&found.responses());
+    fn of(found: &Findings, statements: &[Statement]) -> Self {
+        let compared = found.comparisons();
         let with = |agreement| {
             let of = compared.iter().filter(|c| c.agreement() == agreement);
             of.count()
@@ -153,18 +149,20 @@ impl Score {
             numbers: compared.len(),
             agree: with(Agreement::Agrees),
             near: with(Agreement::Near),
-            confirmed: statements
-                .iter()
-                .filter(|s| s.verdict == Verdict::Confirmed)
-                .count(),
-            statements: statements.len(),
+            confirmed: statements.iter().filter(|s| s.confirmed).count(),
         }
+    }
+
+    fn differ(&self) -> usize {
+        self.numbers - self.agree - self.near
     }
 }
 
 /// What was found, in a few lines.
 fn summary(report: &Report, out: &Path, wall: f64) -> String {
-    let (corrected, printed) = (Score::of(&report.corrected), Score::of(&report.printed));
+    let statements = report.corrected.statements();
+    let corrected = Score::of(&report.corrected, &statements);
+    let printed = Score::of(&report.printed, &report.printed.statements());
     format!(
         "Numbers           {} of {} agree within 10 %, {} more within a factor of 2, {} differ\n\
          Statements        {} of {} confirmed\n\
@@ -176,9 +174,9 @@ fn summary(report: &Report, out: &Path, wall: f64) -> String {
         corrected.agree,
         corrected.numbers,
         corrected.near,
-        corrected.numbers - corrected.agree - corrected.near,
+        corrected.differ(),
         corrected.confirmed,
-        corrected.statements,
+        statements.len(),
         printed.agree,
         printed.near,
         printed.confirmed,

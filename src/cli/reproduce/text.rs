@@ -1,36 +1,22 @@
-//! What page and data files say alike.
+//! Words of page, pictures and data files.
 
-use crate::analysis::paper::{Case, Verdict, compare};
+use crate::analysis::paper::DURATION;
 use crate::analysis::reproduction::{Findings, PERIOD, Report, SweepData};
+use crate::cli::output::significant;
 
-/// A number of the paper beside the same of this program, SI units.
-pub(super) struct Compared {
-    pub figure: &'static str,
-    pub case: Case,
-    pub what: String,
-    pub unit: &'static str,
-    pub paper: f64,
-    pub full: f64,
-    pub sampled: Option<f64>,
-    pub agreement: &'static str,
+pub(super) fn escape(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
 }
 
-/// All of them, in the paper's order.
-pub(super) fn compared(found: &Findings) -> Vec<Compared> {
-    let all = compare(&found.responses()).into_iter().map(|c| {
-        let (what, unit) = c.published.quantity.label();
-        Compared {
-            figure: c.published.figure,
-            case: c.published.case,
-            what,
-            unit,
-            paper: c.published.value,
-            full: c.full,
-            sampled: c.sampled,
-            agreement: c.agreement().word(),
-        }
-    });
-    all.collect()
+/// Stands where there is no number.
+pub(super) const NONE: &str = "\u{2013}";
+
+/// Four digits: what a reader takes in.
+pub(super) fn shown(value: impl Into<Option<f64>>) -> String {
+    let text = |value| typeset(&significant(value, 4));
+    value.into().map_or_else(|| NONE.to_owned(), text)
 }
 
 /// As the page shows it: beta by its letter, powers of ten raised, minus signs.
@@ -83,17 +69,28 @@ pub(super) fn typeset(text: &str) -> String {
     out
 }
 
-/// In a word or two.
-pub(super) fn verdict(verdict: Verdict) -> &'static str {
-    match verdict {
-        Verdict::Confirmed => "confirmed",
-        Verdict::NotConfirmed => "not confirmed",
+/// With a capital letter, but for names of coordinates.
+pub(super) fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    match (letters.next(), text.split(' ').next()) {
+        (Some(first), Some(word)) if !["x", "beta"].contains(&word) => {
+            first.to_uppercase().chain(letters).collect()
+        }
+        _ => text.to_owned(),
+    }
+}
+
+pub(super) fn verdict(confirmed: bool) -> &'static str {
+    if confirmed {
+        "confirmed"
+    } else {
+        "not confirmed"
     }
 }
 
 /// Simulated time of all runs together, without twins, s.
 pub(super) fn simulated(report: &Report) -> f64 {
-    let of_runs = |count: usize| count as f64 * crate::analysis::paper::DURATION;
+    let of_runs = |count: usize| count as f64 * DURATION;
     let of_sweep =
         |data: &SweepData| PERIOD * (data.sweep.plan().periods * data.sweep.grid().points()) as f64;
     let of_findings = |found: &Findings| {
@@ -110,7 +107,7 @@ pub(super) fn simulated(report: &Report) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::typeset;
+    use super::{capital, typeset};
 
     #[test]
     fn numbers_and_names_are_set_as_in_print() {
@@ -129,6 +126,17 @@ mod tests {
             ("", ""),
         ] {
             assert_eq!(typeset(text), set);
+        }
+    }
+
+    #[test]
+    fn sentences_begin_with_a_capital_but_for_coordinates() {
+        for (text, set) in [
+            ("rate of beta", "Rate of beta"),
+            ("x", "x"),
+            ("beta less ideal", "beta less ideal"),
+        ] {
+            assert_eq!(capital(text), set);
         }
     }
 }

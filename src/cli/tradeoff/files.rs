@@ -1,12 +1,10 @@
 //! Results of one scene as a folder: points as CSV and JSON, diagrams as SVG and PNG, and what made them.
 
-use std::fmt::Write as _;
-
 use serde_json::{Map, Value as Json, json};
 
 use super::picture::picture;
-use crate::analysis::{End, Phase, WorkPrecision};
-use crate::cli::output::significant;
+use crate::analysis::{End, Phase, Point, WorkPrecision};
+use crate::cli::tables::{self, number};
 use crate::cli::{Failure, machine, provenance};
 use crate::files::Folder;
 use crate::scene::Scene;
@@ -14,32 +12,16 @@ use crate::scene::Scene;
 /// Pixels of the PNG for one of the diagram.
 const PNG_SCALE: f32 = 2.0;
 
-/// Columns of the CSV file.
-const COLUMNS: [&str; 24] = [
-    "method",
-    "step_s",
-    "tolerance",
-    "preset",
-    "impacts_end",
-    "impacts_simulated_s",
-    "impacts_wall_s",
-    "impacts_ratio",
-    "impacts_steps",
-    "impacts_evaluations",
-    "impacts_rejected",
-    "impacts_front",
-    "peak_error",
-    "position_error_m",
-    "energy_error",
-    "settled_end",
-    "settled_simulated_s",
-    "settled_wall_s",
-    "settled_ratio",
-    "settled_steps",
-    "settled_evaluations",
-    "settled_rejected",
-    "settled_front",
-    "settled_error",
+/// Columns of the CSV file of one phase, each after its name.
+const OF_PHASE: [&str; 8] = [
+    "end",
+    "simulated_s",
+    "wall_s",
+    "ratio",
+    "steps",
+    "evaluations",
+    "rejected",
+    "front",
 ];
 
 /// Writes all files into `folder`; what made them.
@@ -111,54 +93,43 @@ fn reference(found: &WorkPrecision) -> Result<Json, Failure> {
     }))
 }
 
-fn end(phase: &Phase) -> &'static str {
-    match phase.end {
+fn cells(phase: &Phase) -> [String; OF_PHASE.len()] {
+    let end = match phase.end {
         End::Reached => "reached",
         End::Capped => "capped",
         End::Stopped(_) => "stopped",
-    }
+    };
+    [
+        end.to_owned(),
+        number(phase.simulated_s),
+        number(phase.wall_s),
+        number(phase.ratio),
+        phase.steps.to_string(),
+        phase.evaluations.to_string(),
+        phase.rejected.to_string(),
+        u8::from(phase.front).to_string(),
+    ]
 }
 
 fn csv(found: &WorkPrecision) -> String {
-    let mut out = COLUMNS.join(",");
-    out.push('\n');
-    // An empty cell where there is no value.
-    let number = |value: Option<f64>| value.map_or_else(String::new, |v| significant(v, 12));
-    for point in &found.points {
-        let (setting, impacts, errors) = (&point.setting, &point.impacts, &point.errors);
-        let settled = point.settled.as_ref();
-        let cells: [String; COLUMNS.len()] = [
+    let [impacts, settled] = ["impacts", "settled"]
+        .map(|phase| OF_PHASE.map(|name| format!("{phase}_{name}")).join(","));
+    let head = format!(
+        "method,step_s,tolerance,preset,{impacts},peak_error,position_error_m,energy_error,{settled},settled_error"
+    );
+    let row = |point: &Point| {
+        let (setting, errors) = (&point.setting, &point.errors);
+        let mut row = vec![
             setting.method.word().to_owned(),
-            significant(setting.step_s, 12),
-            if setting.adaptive {
-                significant(setting.tolerance, 12)
-            } else {
-                String::new()
-            },
+            number(setting.step_s),
+            number(setting.adaptive.then_some(setting.tolerance)),
             point.preset.map_or("", |preset| preset.word()).to_owned(),
-            end(impacts).to_owned(),
-            significant(impacts.simulated_s, 12),
-            number(impacts.wall_s),
-            number(impacts.ratio),
-            impacts.steps.to_string(),
-            impacts.evaluations.to_string(),
-            impacts.rejected.to_string(),
-            u8::from(impacts.front).to_string(),
-            number(errors.peak),
-            number(errors.position_m),
-            number(errors.energy),
-            settled.map_or("", end).to_owned(),
-            number(settled.map(|phase| phase.simulated_s)),
-            number(settled.and_then(|phase| phase.wall_s)),
-            number(settled.and_then(|phase| phase.ratio)),
-            settled.map_or_else(String::new, |phase| phase.steps.to_string()),
-            settled.map_or_else(String::new, |phase| phase.evaluations.to_string()),
-            settled.map_or_else(String::new, |phase| phase.rejected.to_string()),
-            settled.map_or_else(String::new, |phase| u8::from(phase.front).to_string()),
-            number(errors.settled),
         ];
-        // Writing to a String cannot fail.
-        let _ = writeln!(out, "{}", cells.join(","));
-    }
-    out
+        row.extend(cells(&point.impacts));
+        row.extend([errors.peak, errors.position_m, errors.energy].map(number));
+        row.extend(point.settled.as_ref().map(cells).unwrap_or_default());
+        row.push(number(errors.settled));
+        row
+    };
+    tables::csv(&head, found.points.iter().map(row))
 }

@@ -5,7 +5,7 @@ mod page;
 mod picture;
 mod words;
 
-pub use page::{RATIO_NOTE, headings};
+pub use page::skeleton;
 pub use words::{grid, percent, times, value};
 
 use std::ffi::OsStr;

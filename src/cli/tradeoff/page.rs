@@ -5,9 +5,10 @@ use std::io::Write as _;
 use std::path::Path;
 
 use super::picture::{is_yardstick, picture};
-use super::words::{cost_ratios, end, error, reference, times, value};
+use super::words::{cost_rows, end, error, reference, times, value};
 use crate::analysis::presets::{Measured, Record, choose, limit};
-use crate::analysis::{PartCost, Point, Setting, WorkPrecision};
+use crate::analysis::{PartCost, Phase, Point, Setting, WorkPrecision};
+use crate::cli::tables::{fill, markdown};
 use crate::cli::{Failure, machine};
 use crate::files::{Target, appear};
 use crate::scene::{BUILT_IN, Preset};
@@ -15,35 +16,6 @@ use crate::scene::{BUILT_IN, Preset};
 /// Where its parts lie under the source folder.
 const PAGE: &str = "docs/tradeoff.md";
 const RECORD: &str = "assets/presets.json";
-
-const TITLE: &str = "# Speed for accuracy";
-const METHOD: &str = "## How it is measured";
-const PRESETS: &str = "## Presets";
-const MODEL: &str = "## What each part of the model costs";
-const CHOICE_TABLE: &str = "| Preset | Setting | Limit of peak errors | Chosen by this run |";
-const PRESET_TABLE: &str = "| Scene | Preset | Ratio, impacts | Peak error | Position error (m) | Energy error | Ratio, settled | Force error | Held |";
-const POINT_TABLE: &str = "| Method | Setting | Ratio, impacts | Peak error | Position error (m) | Energy error | Ratio, settled | Force error | Front |";
-const MODEL_TABLE: &str = "| Scene | With | An evaluation | A simulated second |";
-
-/// How ratios are meant.
-pub const RATIO_NOTE: &str = "Ratios are speeds over that of Runge-Kutta 4 at 10 us on the same span, measured in the same run";
-
-fn scene_heading(name: &str) -> String {
-    format!("## Scene `{name}`")
-}
-
-/// Headings and heads of tables of the page, in order: what a test finds in it.
-pub fn headings() -> Vec<String> {
-    let mut all: Vec<String> = [TITLE, METHOD, PRESETS, CHOICE_TABLE, PRESET_TABLE]
-        .map(str::to_owned)
-        .to_vec();
-    for name in BUILT_IN {
-        all.push(scene_heading(name));
-        all.push(POINT_TABLE.to_owned());
-    }
-    all.extend([MODEL, MODEL_TABLE].map(str::to_owned));
-    all
-}
 
 /// All files, claimed before the measuring begins.
 pub(super) struct Targets {
@@ -70,7 +42,8 @@ impl Targets {
     /// Writes everything; all texts are made before the first file changes.
     pub(super) fn write(self, found: &[WorkPrecision], costs: &[PartCost]) -> Result<(), Failure> {
         let machine = machine::name();
-        let page = page(found, costs, &machine);
+        let scenes: String = found.iter().map(measured_scene).collect();
+        let page = page(&machine, found, &scenes, costs);
         let record = serde_json::to_string_pretty(&record(found, &machine))
             .map_err(|error| Failure::io(error.to_string()))?;
         let mut drawn = Vec::with_capacity(found.len());
@@ -118,174 +91,122 @@ fn record(found: &[WorkPrecision], machine: &str) -> Record {
     record
 }
 
-/// The page itself.
-fn page(found: &[WorkPrecision], costs: &[PartCost], machine: &str) -> String {
-    let mut out = String::new();
-    let mut line = |text: &str| {
-        out.push_str(text);
-        out.push('\n');
-    };
-    line(TITLE);
-    line("");
-    line(
-        "What every method costs on the built-in scenes and how wrong it is. `jointplay tradeoff --all --write .` measures all of it",
-    );
-    line(
-        "and writes this page with its diagrams, and what the program says about its presets. Other scenes: `jointplay tradeoff SCENE`.",
-    );
-    line("");
-    line(&format!(
-        "Measured on: {machine}. {RATIO_NOTE}: other machines come to other speeds, but to much the same ratios."
-    ));
-    line("");
-    line(METHOD);
-    line("");
-    for text in METHOD_TEXT {
-        line(text);
-    }
-    line("");
-    line(PRESETS);
-    line("");
-    line(
-        "A preset is for every scene, so it must hold its limit in each of these: the peak forces of the first impacts err by no more.",
-    );
-    line(
-        "*Chosen by this run*: of the settings that do, the one with the largest product of its ratios, over the impacts and in settled",
-    );
-    line(
-        "motion of every scene. *Held* says whether the preset, as it stands in the program, holds its limit in a scene.",
-    );
-    line("");
-    line(CHOICE_TABLE);
-    line(&rule(CHOICE_TABLE));
-    for preset in Preset::ALL {
-        line(&choice_row(found, preset));
-    }
-    line("");
-    line(PRESET_TABLE);
-    line(&rule(PRESET_TABLE));
-    for found in found {
-        for preset in Preset::ALL {
-            if let Some(point) = found.preset(preset) {
-                line(&preset_row(found, point, preset));
-            }
-        }
-    }
-    for found in found {
-        let name = &found.reference.scene().name;
-        line("");
-        line(&scene_heading(name));
-        line("");
-        for (label, value) in reference(&found.reference) {
-            line(&format!("- {label}: {value}"));
-        }
-        line("");
-        line(&format!(
-            "![Error against time of every method, {name}]({})",
-            diagram(name)
-        ));
-        line("");
-        for text in reading(found) {
-            line(&format!("- {text}"));
-        }
-        line("");
-        line(POINT_TABLE);
-        line(&rule(POINT_TABLE));
-        for point in found.points.iter().filter(|point| is_told(point)) {
-            line(&point_row(found, point));
-        }
-    }
-    line("");
-    line(MODEL);
-    line("");
-    line(
-        "Time of one evaluation of the equations with the contacts under load, and of a simulated second with the preset `accurate`",
-    );
-    line("(`spcmm`: the first 0.4 s; `chain`: the first 10 ms), the first row being 1.");
-    line("");
-    line(MODEL_TABLE);
-    line(&rule(MODEL_TABLE));
-    for (cost, (evaluation, second)) in costs.iter().zip(cost_ratios(costs)) {
-        let part = &cost.part;
-        line(&format!(
-            "| {} | {} | {} | {} |",
-            part.scene,
-            part.label,
-            times(Some(evaluation)),
-            times(Some(second))
-        ));
-    }
-    out
+/// The page with its headings, its diagrams and the heads of its tables, and nothing measured.
+pub fn skeleton() -> String {
+    let scenes: String = BUILT_IN
+        .iter()
+        .map(|name| scene(name, &[], &[], Vec::new()))
+        .collect();
+    page("", &[], &scenes, &[])
 }
 
-const METHOD_TEXT: [&str; 13] = [
-    "Every method runs over its steps or tolerances, twice: over the first impacts, from the start; and over 0.2 s of settled",
-    "motion, all from the same state. For after some tens of impacts two good runs have parted, and only statistics can be compared.",
-    "",
-    "- **Peak error**: the largest relative error among the peak forces of the first six impacts, each within its own span of time",
-    "  (half-way to the same joint's contacts before and after). Peaks are those of continuous time.",
-    "- **Position error**: of the output body at the instant of the third impact.",
-    "- **Energy error**: residual of the energy balance over the first impacts, of the energy exchanged (`docs/numerics.md`).",
-    "- **Force error**: the largest relative error among the joints' mean contact forces in settled motion.",
-    "- **Front**: nothing else is both faster and more accurate, over the impacts (i) or in settled motion (s).",
-    "- Errors are against the same scene at a tolerance at which halving it changes no more than is said with each scene; what is",
-    "  smaller than that change reads `<`. A run that reaches the cap on work, or that the divergence guard stops, says so.",
-    "- Time is processor time of stepping alone, on one core, of the shortest of repeated runs: nothing else that the machine does",
-    "  counts. It repeats to some per cent; a difference smaller than that is none.",
-];
-
-fn rule(head: &str) -> String {
-    "|---".repeat(head.matches('|').count() - 1) + "|"
-}
-
-/// What a preset is, what it is to hold, and what this run would choose.
-fn choice_row(found: &[WorkPrecision], preset: Preset) -> String {
-    let words = |setting: &Setting| format!("{} {}", setting.method, value(setting));
-    let own = found.first().and_then(|found| found.preset(preset));
-    let own = own.map_or_else(|| "-".to_owned(), |point| words(&point.setting));
-    let chosen = choose(found, limit(preset));
-    let chosen = chosen.map_or_else(|| "nothing".to_owned(), |setting| words(&setting));
-    format!(
-        "| {} | {own} | {:e} | {chosen} |",
-        preset.word(),
-        limit(preset)
+fn page(machine: &str, found: &[WorkPrecision], scenes: &str, costs: &[PartCost]) -> String {
+    let rows = found.iter().flat_map(|found| {
+        let presets = Preset::ALL.into_iter();
+        presets.filter_map(|preset| Some(preset_row(found, found.preset(preset)?, preset)))
+    });
+    fill(
+        include_str!("page.md"),
+        &[
+            ("machine", machine.to_owned()),
+            (
+                "choices",
+                markdown(
+                    "Preset | Setting | Limit of peak errors | Chosen by this run",
+                    Preset::ALL.map(|preset| choice_row(found, preset)),
+                ),
+            ),
+            (
+                "presets",
+                markdown(
+                    "Scene | Preset | Ratio, impacts | Peak error | Position error (m) | Energy error | Ratio, settled | Force error | Held",
+                    rows,
+                ),
+            ),
+            ("scenes", scenes.to_owned()),
+            (
+                "costs",
+                markdown(
+                    "Scene | With | An evaluation | A simulated second",
+                    cost_rows(costs),
+                ),
+            ),
+        ],
     )
 }
 
-fn preset_row(found: &WorkPrecision, point: &Point, preset: Preset) -> String {
+/// The part of a scene: what it is measured against, its diagram, what that says, and the points that the page names.
+fn scene(name: &str, against: &[String], reading: &[String], rows: Vec<Vec<String>>) -> String {
+    let list = |lines: &[String]| -> String { lines.iter().map(|l| format!("- {l}\n")).collect() };
+    format!(
+        "## Scene `{name}`\n\n{}\n![Error against time of every method, {name}]({})\n\n{}\n{}\n",
+        list(against),
+        diagram(name),
+        list(reading),
+        markdown(
+            "Method | Setting | Ratio, impacts | Peak error | Position error (m) | Energy error | Ratio, settled | Force error | Front",
+            rows
+        )
+    )
+}
+
+fn measured_scene(found: &WorkPrecision) -> String {
+    let against = reference(&found.reference).into_iter();
+    let against: Vec<String> = against
+        .map(|(label, value)| format!("{label}: {value}"))
+        .collect();
+    let told = found.points.iter().filter(|point| is_told(point));
+    let rows = told.map(|point| point_row(found, point)).collect();
+    scene(
+        &found.reference.scene().name,
+        &against,
+        &reading(found),
+        rows,
+    )
+}
+
+/// What a preset is, what it is to hold, and what this run would choose.
+fn choice_row(found: &[WorkPrecision], preset: Preset) -> Vec<String> {
+    let words = |setting: &Setting| format!("{} {}", setting.method, value(setting));
+    let own = found.first().and_then(|found| found.preset(preset));
+    let chosen = choose(found, limit(preset));
+    vec![
+        preset.word().to_owned(),
+        own.map_or_else(|| "-".to_owned(), |point| words(&point.setting)),
+        format!("{:e}", limit(preset)),
+        chosen.map_or_else(|| "nothing".to_owned(), |setting| words(&setting)),
+    ]
+}
+
+fn preset_row(found: &WorkPrecision, point: &Point, preset: Preset) -> Vec<String> {
     let held = match point.errors.peak {
         Some(error) if error <= limit(preset) => "yes",
         Some(_) => "no",
         None => "-",
     };
-    format!(
-        "| {} | {} | {} | {held} |",
-        found.reference.scene().name,
-        preset.word(),
-        figures(found, point)
-    )
+    let name = found.reference.scene().name.clone();
+    row([name, preset.word().to_owned()], found, point, held)
 }
 
-/// Ratios and errors of a point as cells.
-fn figures(found: &WorkPrecision, point: &Point) -> String {
+/// Ratios and errors of a point between its names and a last word.
+fn row(names: [String; 2], found: &WorkPrecision, point: &Point, last: &str) -> Vec<String> {
     let floor = &found.reference.floor;
-    let ratio = |ended: &str, ratio| {
-        if ended.is_empty() {
-            times(ratio)
-        } else {
-            ended.to_owned()
-        }
+    let ratio = |phase: &Phase| match end(phase) {
+        "" => times(phase.ratio),
+        ended => ended.to_owned(),
     };
     let settled = point.settled.as_ref();
-    format!(
-        "{} | {} | {} | {} | {} | {}",
-        ratio(end(&point.impacts), point.impacts.ratio),
+    let mut row = names.to_vec();
+    row.extend([
+        ratio(&point.impacts),
         error(point.errors.peak, floor.peak),
         error(point.errors.position_m, floor.position_m),
         error(point.errors.energy, None),
-        settled.map_or_else(|| "-".to_owned(), |phase| ratio(end(phase), phase.ratio)),
+        settled.map_or_else(|| "-".to_owned(), ratio),
         error(point.errors.settled, floor.settled),
-    )
+        last.to_owned(),
+    ]);
+    row
 }
 
 /// Points that the page names: on a front, a preset, or what the others are divided by.
@@ -294,7 +215,7 @@ fn is_told(point: &Point) -> bool {
     front || point.preset.is_some() || is_yardstick(point)
 }
 
-fn point_row(found: &WorkPrecision, point: &Point) -> String {
+fn point_row(found: &WorkPrecision, point: &Point) -> Vec<String> {
     let settled = point.settled.as_ref().is_some_and(|phase| phase.front);
     let front = match (point.impacts.front, settled) {
         (true, true) => "i s",
@@ -302,15 +223,12 @@ fn point_row(found: &WorkPrecision, point: &Point) -> String {
         (false, true) => "s",
         (false, false) => "",
     };
-    let name = point
-        .preset
-        .map_or_else(String::new, |preset| format!(" ({})", preset.word()));
-    format!(
-        "| {} | {}{name} | {} | {front} |",
-        point.setting.method,
-        value(&point.setting),
-        figures(found, point)
-    )
+    let setting = match point.preset {
+        Some(preset) => format!("{} ({})", value(&point.setting), preset.word()),
+        None => value(&point.setting),
+    };
+    let method = point.setting.method.to_string();
+    row([method, setting], found, point, front)
 }
 
 /// What the numbers say, in words.
@@ -345,37 +263,4 @@ fn reading(found: &WorkPrecision) -> Vec<String> {
         ));
     }
     told
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_page_has_the_headings_that_it_promises() {
-        let text = page(&[], &[], "a machine");
-        let mut written = structure(&text);
-        let mut promised = headings();
-        let scenes: Vec<String> = BUILT_IN.iter().map(|name| scene_heading(name)).collect();
-        promised.retain(|head| !scenes.contains(head) && head != POINT_TABLE);
-        written.sort();
-        promised.sort();
-        assert_eq!(written, promised);
-        assert_eq!(rule(MODEL_TABLE), "|---|---|---|---|");
-    }
-
-    /// Headings and heads of tables of a page.
-    fn structure(text: &str) -> Vec<String> {
-        let lines: Vec<&str> = text.lines().collect();
-        let head = |n: &usize| {
-            lines[*n].starts_with('#')
-                || lines
-                    .get(n + 1)
-                    .is_some_and(|next| next.starts_with("|---"))
-        };
-        (0..lines.len())
-            .filter(head)
-            .map(|n| lines[n].to_owned())
-            .collect()
-    }
 }

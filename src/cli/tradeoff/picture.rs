@@ -1,7 +1,7 @@
 //! The work-precision diagram of a scene.
 
 use super::words::value;
-use crate::analysis::{Phase, Point, WorkPrecision};
+use crate::analysis::{Point, View, WorkPrecision};
 use crate::chart::{Axis, Chart, Label, Level, Marker, PALETTE, Scale, Series, Sheet};
 use crate::integrate::Method;
 
@@ -23,15 +23,10 @@ const MARKERS: [Marker; 8] = [
 const WORST: f64 = 1.0;
 const FRONT: &str = "On the front: nothing is both faster and more accurate";
 
-/// What one diagram shows of a point: its phase and its error there.
-type View = fn(&Point) -> Option<(&Phase, f64)>;
-
 /// Error against time, both phases side by side. `relative`: times over that of Runge-Kutta 4 at 10 microseconds, which mean
 /// something on other machines, too.
 pub(super) fn picture(found: &WorkPrecision, relative: bool, machine: &str) -> Sheet {
     let floor = &found.reference.floor;
-    let impacts: View = |point| Some((&point.impacts, point.errors.peak?));
-    let settled: View = |point| Some((point.settled.as_ref()?, point.errors.settled?));
     let mut charts = vec![diagram(
         found,
         relative,
@@ -41,7 +36,7 @@ pub(super) fn picture(found: &WorkPrecision, relative: bool, machine: &str) -> S
             "First impacts"
         },
         "Largest relative error of a peak force",
-        impacts,
+        Point::in_impacts,
         floor.peak,
     )];
     if found.reference.settled.is_some() {
@@ -50,7 +45,7 @@ pub(super) fn picture(found: &WorkPrecision, relative: bool, machine: &str) -> S
             relative,
             "Settled motion",
             "Largest relative error of a mean force",
-            settled,
+            Point::in_settled,
             floor.settled,
         ));
     }

@@ -138,11 +138,28 @@ pub(super) fn text(found: &WorkPrecision) -> String {
     line("Ratio", "speed over that of rk4 at 10 us on the same span");
     line("*", "nothing else is both faster and more accurate");
     out.push('\n');
+    let floor = &found.reference.floor;
     out.push_str("First impacts\n");
-    out.push_str(&grid(&impacts(found)));
+    out += &phase_table(
+        found,
+        |point| Some(&point.impacts),
+        &["peak error", "position error (m)", "energy error"],
+        |Point { errors, .. }| {
+            vec![
+                error(errors.peak, floor.peak),
+                error(errors.position_m, floor.position_m),
+                error(errors.energy, None),
+            ]
+        },
+    );
     if found.reference.settled.is_some() {
         out.push_str("\nSettled motion\n");
-        out.push_str(&grid(&settled(found)));
+        out += &phase_table(
+            found,
+            |point| point.settled.as_ref(),
+            &["force error"],
+            |point| vec![error(point.errors.settled, floor.settled)],
+        );
     }
     for point in &found.points {
         if let End::Stopped(why) = &point.impacts.end {
@@ -158,147 +175,89 @@ pub(super) fn text(found: &WorkPrecision) -> String {
     out
 }
 
-fn named(point: &Point) -> [String; 3] {
-    [
-        point.setting.method.word().to_owned(),
-        value(&point.setting),
-        point.preset.map_or("", |preset| preset.word()).to_owned(),
-    ]
-}
-
-fn speeds(phase: &Phase) -> [String; 5] {
-    [
-        times(phase.speed()),
-        times(phase.ratio),
-        phase.steps.to_string(),
-        phase.evaluations.to_string(),
-        phase.rejected.to_string(),
-    ]
-}
-
-fn mark(phase: &Phase) -> String {
-    if phase.front { "*" } else { end(phase) }.to_owned()
-}
-
-fn impacts(found: &WorkPrecision) -> Vec<Vec<String>> {
-    let floor = &found.reference.floor;
-    let head = [
-        "method",
-        "value",
-        "preset",
-        "speed",
-        "ratio",
-        "steps",
-        "evaluations",
-        "rejected",
-        "peak error",
-        "position error (m)",
-        "energy error",
-        "",
-    ];
-    let mut rows = vec![head.map(str::to_owned).to_vec()];
+/// A table of the points in one phase: their settings, speeds and work, the errors under `errors`, and how the phase ended.
+fn phase_table(
+    found: &WorkPrecision,
+    phase: impl Fn(&Point) -> Option<&Phase>,
+    errors: &[&str],
+    error: impl Fn(&Point) -> Vec<String>,
+) -> String {
+    let mut head = "method,value,preset,speed,ratio,steps,evaluations,rejected"
+        .split(',')
+        .map(str::to_owned)
+        .collect::<Vec<_>>();
+    head.extend(errors.iter().map(|&name| name.to_owned()));
+    head.push(String::new());
+    let mut rows = vec![head];
     for point in &found.points {
-        let mut row = named(point).to_vec();
-        row.extend(speeds(&point.impacts));
-        row.push(error(point.errors.peak, floor.peak));
-        row.push(error(point.errors.position_m, floor.position_m));
-        row.push(error(point.errors.energy, None));
-        row.push(mark(&point.impacts));
-        rows.push(row);
-    }
-    rows
-}
-
-fn settled(found: &WorkPrecision) -> Vec<Vec<String>> {
-    let head = [
-        "method",
-        "value",
-        "preset",
-        "speed",
-        "ratio",
-        "steps",
-        "evaluations",
-        "rejected",
-        "force error",
-        "",
-    ];
-    let mut rows = vec![head.map(str::to_owned).to_vec()];
-    for point in &found.points {
-        let Some(phase) = &point.settled else {
+        let Some(phase) = phase(point) else {
             continue;
         };
-        let mut row = named(point).to_vec();
-        row.extend(speeds(phase));
-        row.push(error(point.errors.settled, found.reference.floor.settled));
-        row.push(mark(phase));
+        let mut row = vec![
+            point.setting.method.word().to_owned(),
+            value(&point.setting),
+            point.preset.map_or("", |preset| preset.word()).to_owned(),
+            times(phase.speed()),
+            times(phase.ratio),
+            phase.steps.to_string(),
+            phase.evaluations.to_string(),
+            phase.rejected.to_string(),
+        ];
+        row.extend(error(point));
+        row.push(if phase.front { "*" } else { end(phase) }.to_owned());
         rows.push(row);
     }
-    rows
+    grid(&rows)
 }
 
 /// Costs of the parts of the model as text.
 pub(super) fn costs(costs: &[PartCost]) -> String {
     let head = ["scene", "with", "an evaluation", "a simulated second"];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
-    for (cost, (evaluation, second)) in costs.iter().zip(cost_ratios(costs)) {
-        rows.push(vec![
-            cost.part.scene.to_owned(),
-            cost.part.label.to_owned(),
-            times(Some(evaluation)),
-            times(Some(second)),
-        ]);
-    }
+    rows.extend(cost_rows(costs));
     format!(
         "Cost of the parts of the model, the first row being 1\n{}",
         grid(&rows)
     )
 }
 
-/// Cost of an evaluation and of a simulated second over those of the first.
-pub(super) fn cost_ratios(costs: &[PartCost]) -> Vec<(f64, f64)> {
-    let Some(first) = costs.first() else {
-        return Vec::new();
+/// Scene and name of each part, cost of an evaluation and of a simulated second over those of the first.
+pub(super) fn cost_rows(costs: &[PartCost]) -> Vec<Vec<String>> {
+    let row = |cost: &PartCost| {
+        let first = &costs[0];
+        vec![
+            cost.part.scene.to_owned(),
+            cost.part.label.to_owned(),
+            times(Some(cost.evaluation_s / first.evaluation_s)),
+            times(Some(cost.cost / first.cost)),
+        ]
     };
-    let ratio = |cost: &PartCost| {
-        (
-            cost.evaluation_s / first.evaluation_s,
-            cost.cost / first.cost,
-        )
-    };
-    costs.iter().map(ratio).collect()
+    costs.iter().map(row).collect()
 }
 
 /// Rows of cells in columns, the first row being the head: numbers to the right, words to the left.
 pub fn grid(rows: &[Vec<String>]) -> String {
-    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
-    let cell = |row: &[String], c: usize| row.get(c).cloned().unwrap_or_default();
     let is_number = |text: &str| {
         let first = text.chars().next();
-        text == "-" || first.is_some_and(|c| c.is_ascii_digit() || c == '<')
+        text == "-" || first.is_none_or(|c| c.is_ascii_digit() || c == '<')
     };
-    let mut out = String::new();
-    let mut widths = Vec::with_capacity(columns);
-    let mut right = Vec::with_capacity(columns);
-    for c in 0..columns {
-        widths.push(
-            rows.iter()
-                .map(|row| cell(row, c).chars().count())
-                .max()
-                .unwrap_or(0),
-        );
-        let mut body = rows
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let looks = (0..columns).map(|c| {
+        let width = rows
             .iter()
-            .skip(1)
-            .map(|row| cell(row, c))
-            .filter(|text| !text.is_empty());
-        right.push(rows.len() > 1 && body.all(|text| is_number(&text)));
-    }
+            .filter_map(|row| row.get(c))
+            .map(|text| text.chars().count());
+        let mut body = rows.iter().skip(1).filter_map(|row| row.get(c));
+        let right = rows.len() > 1 && body.all(|text| is_number(text));
+        (width.max().unwrap_or(0), right)
+    });
+    let looks: Vec<(usize, bool)> = looks.collect();
+    let mut out = String::new();
     for row in rows {
         let mut line = String::new();
-        for c in 0..columns {
-            let (text, width) = (cell(row, c), widths[c]);
+        for (text, (width, right)) in row.iter().zip(&looks) {
             // Writing to a String cannot fail.
-            let _ = if right[c] {
+            let _ = if *right {
                 write!(line, "{text:>width$}  ")
             } else {
                 write!(line, "{text:<width$}  ")
