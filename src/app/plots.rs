@@ -167,6 +167,18 @@ impl Plots {
         }
     }
 
+    /// Length of the chosen window, s.
+    fn window_length(&self, player: &Player) -> f64 {
+        match self.window {
+            Window::Automatic => player.automatic_window(),
+            Window::Last(length) => length,
+            Window::Everything => {
+                let left = player.left().map_or(0.0, |left| left.to);
+                left.max(player.reached()).max(1e-4)
+            }
+        }
+    }
+
     /// The time that the plots show, s. The instant on show is its end; where there is a future, three quarters of the way.
     fn range(&self, player: &Player) -> (f64, f64) {
         if let Some(range) = self.zoomed {
@@ -177,10 +189,11 @@ impl Plots {
             .left()
             .map_or(0.0, |left| left.to)
             .max(player.reached());
-        let (length, end) = match self.window {
-            Window::Automatic => (player.automatic_window(), shown),
-            Window::Last(length) => (length, shown),
-            Window::Everything => (known.max(1e-4), known),
+        let length = self.window_length(player);
+        let end = if self.window == Window::Everything {
+            known
+        } else {
+            shown
         };
         let end = end.max(known.min(shown + 0.25 * length));
         // A window that starts before t = 0 fills from the left.
@@ -480,11 +493,12 @@ impl Plots {
         if let Some(pos) = response.hover_pos() {
             let (wheel, pinch) = ui.input(|i| (i.smooth_scroll_delta().y, i.zoom_delta()));
             let factor = f64::from((wheel * 0.004).exp() * pinch);
-            if factor != 1.0 && end > 0.0 {
+            if factor != 1.0 {
                 let length = ((to - from) / factor).max(SHORTEST_WINDOW);
+                let all = end.max(self.window_length(player));
                 let share = (time(pos) - from) / (to - from);
                 let from = (time(pos) - share * length).max(0.0);
-                self.zoomed = (length < end).then_some((from, from + length));
+                self.zoomed = (length < all).then_some((from, from + length));
             }
         }
         if response.dragged_by(egui::PointerButton::Primary) {

@@ -15,6 +15,8 @@ use crate::simulate::{ContactState, RECORDED_JOINTS};
 /// Height of the row that the flags stand in, and of all lanes together, points.
 const FLAGS: f32 = 9.0;
 const LANES: f32 = 24.0;
+/// Height of a window below which the strip stands alone and low, points.
+const LOW: f32 = 360.0;
 /// The shortest time that is shown, s.
 const SHORTEST: f64 = 1e-6;
 /// How much stands out what is, of what was left or is to come.
@@ -40,6 +42,9 @@ impl Timeline {
     /// The row: to the impact before and after, backwards, and the strip. `focus`: the ball joint whose impacts are meant.
     /// Returns whether another instant was put on show.
     pub fn ui(&mut self, ui: &mut Ui, player: &mut Player, focus: Option<usize>) -> bool {
+        if ui.ctx().content_rect().height() < LOW {
+            return self.strip(ui, player, FLAGS + 0.6 * LANES);
+        }
         let side = theme::side(ui, 26.0);
         let mut moved = false;
         ui.horizontal(|ui| {
@@ -231,7 +236,11 @@ fn paint(ui: &Ui, player: &Player, scale: &Scale, response: &Response) {
     };
     flags(&mut player.flags(), false);
     if let Some(left) = player.left() {
-        flags(&mut left.flags.iter().cloned(), true);
+        let ahead = left
+            .flags
+            .iter()
+            .filter(|flag| flag.time > player.reached());
+        flags(&mut ahead.cloned(), true);
     }
     let x = scale.x(shown);
     let colour = visuals.strong_text_color();

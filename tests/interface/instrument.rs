@@ -185,15 +185,15 @@ fn follow(link: &Link) -> Verdict {
 
 #[test]
 fn a_body_that_is_pressed_and_dragged_is_pulled_until_it_is_let_go() {
-    let mut harness = window("pendulum");
+    let mut harness = window("spcmm");
     let image = harness.get_by_role_and_label(Role::Image, "3D view").rect();
-    // The rod hangs through the middle of the picture.
-    let rod = image.center();
+    // The middle of the platform, in the isometric view that the window starts with.
+    let platform = image.lerp_inside(vec2(0.571, 0.722));
     let camera = camera(&harness);
-    harness.drag_at(rod);
+    harness.drag_at(platform);
     harness.step();
     for step in 1..=4 {
-        harness.hover_at(rod + vec2(15.0 * step as f32, 0.0));
+        harness.hover_at(platform + vec2(15.0 * step as f32, 0.0));
         harness.step();
     }
     let player = harness.state().player();
@@ -206,7 +206,7 @@ fn a_body_that_is_pressed_and_dragged_is_pulled_until_it_is_let_go() {
     let player = harness.state().player();
     let ledger = player.frame().ledger.expect("kept");
     assert!(ledger.external_work.abs() > 1e-6, "{ledger:?}");
-    harness.drop_at(rod + vec2(60.0, 0.0));
+    harness.drop_at(platform + vec2(60.0, 0.0));
     harness.run();
     let player = harness.state().player();
     assert!(player.frame().pull.is_none());
@@ -263,6 +263,7 @@ fn plots_come_nearer_shift_and_go_where_they_are_clicked() {
             unit: egui::MouseWheelUnit::Point,
             delta: vec2(0.0, 200.0),
             phase: egui::TouchPhase::Move,
+            source: egui::MouseWheelSource::Unknown,
             modifiers: egui::Modifiers::NONE,
         });
         harness.run_steps(8);
@@ -283,7 +284,8 @@ fn plots_come_nearer_shift_and_go_where_they_are_clicked() {
         "{}",
         shown(&harness)
     );
-    let line = place(&mut harness, shown(&harness));
+    let now = shown(&harness);
+    let line = place(&mut harness, now);
     assert!((line.x - impact.x).abs() < 2.0);
     // A drag shifts the stretch that is shown.
     drag(
