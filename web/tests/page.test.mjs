@@ -73,6 +73,30 @@ for (const backend of ['webgl', 'webgpu']) {
     });
 }
 
+test('the timeline goes back to the same bits by key, click and finger', async () => {
+    const lab = await open('play=0&theme=light');
+    await lab.runTo(0.02);
+    const end = await lab.state();
+    await lab.key('Home');
+    await lab.until(async () => (await lab.state()).shown_s === 0, 'not at the start');
+    await lab.key('.');
+    await lab.until(async () => (await lab.state()).shown_s > 0.007, 'no impact');
+    const impact = await lab.state();
+    assert.ok(Math.abs(impact.shown_s - 0.0078) < 1e-4, `the first impact at ${impact.shown_s} s`);
+    const strip = await lab.find('Slider', 'Timeline, s');
+    const [x0, y0, x1, y1] = strip.rect;
+    const at = (part) => [x0 + part * (x1 - x0), (y0 + y1) / 2];
+    await lab.clickAt(...at(0.75));
+    const pixel = 0.02 / (x1 - x0);
+    const near = (time) => async () => Math.abs((await lab.state()).shown_s - time) <= 2 * pixel;
+    await lab.until(near(0.015), 'not where the click was');
+    await lab.fingers([at(0.25), at(0.5)]);
+    await lab.until(near(0.01), 'not where the finger was');
+    await lab.key('End');
+    await lab.until(async () => (await lab.state()).state_hash === end.state_hash, 'other bits at the end');
+    await lab.close();
+});
+
 test('what it draws changes while it plays', async () => {
     const lab = await open('theme=light&scale=1:1', { backend: 'webgl' });
     const view = { x: 320, y: 60, width: 460, height: 200 };
