@@ -18,6 +18,7 @@ pub enum Action {
     /// Close-up of a ball joint, by index.
     CloseUp(usize),
     Magnify,
+    Microscope,
     Arrows,
     Panel,
     Plots,
@@ -49,7 +50,7 @@ const fn bind(key: Key, action: Action, written: &'static str, help: &'static st
 }
 
 /// All keys.
-pub const BINDINGS: [Binding; 29] = [
+pub const BINDINGS: [Binding; 30] = [
     bind(Key::Space, Action::PlayPause, "Space", "Play or pause"),
     bind(
         Key::ArrowRight,
@@ -78,7 +79,7 @@ pub const BINDINGS: [Binding; 29] = [
         Key::Num5,
         Action::CloseUp(0),
         "5, 6, 7, 8, 9",
-        "Close-up of the first, second, … ball joint",
+        "Close-up of the first, second, … ball joint; the view follows it",
     ),
     bind(Key::Num6, Action::CloseUp(1), "", ""),
     bind(Key::Num7, Action::CloseUp(2), "", ""),
@@ -89,6 +90,12 @@ pub const BINDINGS: [Binding; 29] = [
         Action::Magnify,
         "M",
         "Next magnification of the play",
+    ),
+    bind(
+        Key::L,
+        Action::Microscope,
+        "L",
+        "Microscope on the ball joint in focus, shown or hidden",
     ),
     bind(Key::A, Action::Arrows, "A", "Force arrows on or off"),
     bind(Key::C, Action::Panel, "C", "Controls shown or hidden"),
@@ -102,7 +109,7 @@ pub const BINDINGS: [Binding; 29] = [
 ];
 
 /// Mouse and touch, for the overlay.
-pub const POINTER: [(&str, &str); 8] = [
+pub const POINTER: [(&str, &str); 9] = [
     ("Drag, one finger", "Turn the view"),
     (
         "Right or middle drag, shift-drag, two fingers",
@@ -110,6 +117,10 @@ pub const POINTER: [(&str, &str); 8] = [
     ),
     ("Wheel, pinch", "Come nearer to what is under the cursor"),
     ("Hover", "What is known about a part"),
+    (
+        "Click, tap on a ball joint",
+        "Put it into the middle and under the microscope",
+    ),
     (
         "Double-click, double tap",
         "Follow a body or joint; the ground lets go",

@@ -23,7 +23,9 @@ mod keys;
 mod layout;
 mod load;
 mod log;
+mod microscope;
 mod overlay;
+mod paths;
 mod picture;
 mod player;
 mod plots;
@@ -62,6 +64,7 @@ use keys::Action;
 use layout::Sheet;
 use load::Load;
 pub use log::{Entry, Event, Log};
+pub use microscope::{Circle, Microscope};
 pub use overlay::{force_notes, plate};
 use picture::Picture;
 pub use player::{Clock, Player};
@@ -222,6 +225,7 @@ pub struct App {
     verdict: Option<Verdict>,
     notice: Option<Notice>,
     announcer: Announcer,
+    microscope: Microscope,
     picture: Picture,
     /// Where the 3D view is, points.
     picture_rect: egui::Rect,
@@ -283,6 +287,7 @@ impl App {
             verdict: None,
             notice: None,
             announcer: Announcer::default(),
+            microscope: Microscope::default(),
             picture: Picture::default(),
             picture_rect: egui::Rect::ZERO,
             renderer: String::new(),
@@ -561,7 +566,16 @@ impl App {
                     self.viewport.preset(*preset);
                 }
             }
-            Action::CloseUp(joint) => self.viewport.close_up(&self.player, joint),
+            Action::CloseUp(joint) => {
+                if joint < self.player.scene().ball_joints.len() {
+                    self.microscope.focus(joint);
+                    self.viewport.close_up(&self.player, joint);
+                }
+            }
+            Action::Microscope => {
+                let open = !self.microscope.is_open();
+                self.microscope.set_open(open);
+            }
             Action::Magnify => self.viewport.next_magnification(),
             Action::Arrows => {
                 let arrows = &mut self.viewport.options.arrows;
@@ -586,9 +600,15 @@ impl App {
                 };
             }
             Action::Close => {
+                let told = self.problem.is_some()
+                    || self.is_under_way()
+                    || egui::Popup::is_any_open(ctx);
                 if self.dialog.take().is_none() {
                     self.cancel_replay();
                     self.problem = None;
+                    if !told {
+                        self.microscope.set_open(false);
+                    }
                 }
             }
         }

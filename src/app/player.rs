@@ -6,6 +6,7 @@ use std::sync::OnceLock;
 use web_time::Instant;
 
 use super::log::{Event, Log, Number};
+use super::paths::Paths;
 use super::settled::Settling;
 use super::twin::Twin;
 use super::watch::Watch;
@@ -58,6 +59,7 @@ pub struct Player {
     recorded: Frame,
     values: Vec<f64>,
     settling: Settling,
+    paths: Paths,
     /// What was before the latest single steps, oldest first.
     past: VecDeque<Before>,
     /// What was done since the start.
@@ -129,6 +131,7 @@ impl Player {
             recorded: Frame::default(),
             values: Vec::new(),
             settling: Settling::new(scene),
+            paths: Paths::new(scene),
             past: VecDeque::new(),
             stepped: 0.0,
             stepping: 0.0,
@@ -180,6 +183,11 @@ impl Player {
     /// The recorded past.
     pub fn history(&self) -> &History {
         &self.history
+    }
+
+    /// Where the balls went lately.
+    pub fn paths(&self) -> &Paths {
+        &self.paths
     }
 
     /// What was done to the run since its start.
@@ -596,6 +604,7 @@ impl Player {
         self.history.push(time, &self.values);
         self.watch.record(&frame);
         self.settling.record(&frame);
+        self.paths.record(&frame);
         self.recorded = frame;
     }
 
@@ -659,6 +668,7 @@ impl Player {
         self.past.clear();
         self.unchanged = None;
         self.settling = Settling::new(self.simulation.running_scene());
+        self.paths = Paths::new(self.simulation.running_scene());
         // Forces at the start are those of the first frame: nothing has struck yet.
         self.simulation.take_peaks(&mut self.coming);
         self.forget_peaks();
