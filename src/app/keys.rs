@@ -19,6 +19,7 @@ pub enum Action {
     CloseUp(usize),
     Magnify,
     Microscope,
+    IdealGhost,
     Arrows,
     Panel,
     Plots,
@@ -50,7 +51,7 @@ const fn bind(key: Key, action: Action, written: &'static str, help: &'static st
 }
 
 /// All keys.
-pub const BINDINGS: [Binding; 30] = [
+pub const BINDINGS: [Binding; 31] = [
     bind(Key::Space, Action::PlayPause, "Space", "Play or pause"),
     bind(
         Key::ArrowRight,
@@ -96,6 +97,12 @@ pub const BINDINGS: [Binding; 30] = [
         Action::Microscope,
         "L",
         "Microscope on the ball joint in focus, shown or hidden",
+    ),
+    bind(
+        Key::G,
+        Action::IdealGhost,
+        "G",
+        "Ideal ghost: the machine without play, shown or hidden",
     ),
     bind(Key::A, Action::Arrows, "A", "Force arrows on or off"),
     bind(Key::C, Action::Panel, "C", "Controls shown or hidden"),

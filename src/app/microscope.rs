@@ -412,5 +412,6 @@ impl App {
             .on_hover_text(
                 "An inset with the play of the joint in focus: path of the ball, contact, impacts (key L)",
             );
+        self.ideal_switch(ui);
     }
 }

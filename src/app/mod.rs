@@ -14,11 +14,13 @@ mod curve;
 mod desktop;
 mod dialogs;
 mod files;
+mod ghosts;
 mod header;
 #[cfg(not(target_arch = "wasm32"))]
 mod headless;
 mod host;
 mod icons;
+mod ideal;
 mod keys;
 mod layout;
 mod load;
@@ -520,7 +522,7 @@ impl App {
         self.player.advance(dt);
         self.announcer.observe(&self.player);
         let moves = self.viewport.advance(&self.player, dt as f32);
-        moves || self.player.is_playing()
+        moves || self.player.is_playing() || self.player.is_ideal_behind()
     }
 
     fn show_scene(&mut self, scene: &Scene) -> Result<(), String> {
@@ -528,6 +530,7 @@ impl App {
         player.clock = self.player.clock;
         player.pacer.set_scale(self.player.pacer.scale());
         player.set_playing(self.player.is_playing() || self.player.stopped().is_some());
+        player.set_ideal(self.player.ideal().is_some());
         self.player = player;
         self.viewport.show_scene(&self.player);
         self.controls.clear();
@@ -572,6 +575,7 @@ impl App {
                     self.viewport.close_up(&self.player, joint);
                 }
             }
+            Action::IdealGhost => self.show_ideal(self.player.ideal().is_none()),
             Action::Microscope => {
                 let open = !self.microscope.is_open();
                 self.microscope.set_open(open);
@@ -600,9 +604,8 @@ impl App {
                 };
             }
             Action::Close => {
-                let told = self.problem.is_some()
-                    || self.is_under_way()
-                    || egui::Popup::is_any_open(ctx);
+                let told =
+                    self.problem.is_some() || self.is_under_way() || egui::Popup::is_any_open(ctx);
                 if self.dialog.take().is_none() {
                     self.cancel_replay();
                     self.problem = None;

@@ -58,6 +58,7 @@ pub fn labels(painter: &Painter, rect: Rect, scale: f32, list: &DrawList) {
         let plate = match label.kind {
             LabelKind::Joint(_) => Some((13.0, Align2::LEFT_BOTTOM, vec2(10.0, -8.0))),
             LabelKind::Peak(_) => Some((12.0, Align2::LEFT_CENTER, vec2(9.0, 0.0))),
+            LabelKind::Error => Some((12.0, Align2::CENTER_TOP, vec2(0.0, 10.0))),
             LabelKind::Axis | LabelKind::Gravity => None,
         };
         if let Some((size, anchor, beside)) = plate {

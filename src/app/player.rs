@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 
 use web_time::Instant;
 
+use super::ideal::{Gravity, Ideal};
 use super::log::{Event, Log, Number};
 use super::paths::Paths;
 use super::settled::Settling;
@@ -68,6 +69,9 @@ pub struct Player {
     sections: Option<Schedule>,
     watch: Watch,
     twin: Option<Box<Twin>>,
+    /// Gravity since the start, for the ideal motion.
+    gravity: Gravity,
+    ideal: Option<Box<Ideal>>,
     /// Simulated time and seconds of stepping that it took, both fading.
     stepped: f64,
     stepping: f64,
@@ -139,6 +143,8 @@ impl Player {
             sections: None,
             watch: Watch::new(scene),
             twin: None,
+            gravity: Gravity::new(scene.gravity),
+            ideal: None,
             simulation,
         };
         player.start_record();
@@ -215,6 +221,25 @@ impl Player {
         if let Some(twin) = &mut self.twin {
             twin.place(self.pacer.shown());
         }
+        if let Some(ideal) = &mut self.ideal {
+            ideal.catch_up(self.pacer.shown(), &self.gravity, self.clock);
+        }
+    }
+
+    /// The ideal motion, where it is on.
+    pub fn ideal(&self) -> Option<&Ideal> {
+        self.ideal.as_deref()
+    }
+
+    /// Whether the ideal motion is on its way to the instant on show.
+    pub fn is_ideal_behind(&self) -> bool {
+        let shown = self.pacer.shown();
+        self.ideal().is_some_and(|ideal| ideal.is_behind(shown))
+    }
+
+    /// Has the ideal motion computed beside the run, or no longer. The run itself never changes by it.
+    pub fn set_ideal(&mut self, on: bool) {
+        self.ideal = on.then(|| Box::new(Ideal::new(self.simulation.running_scene())));
     }
 
     /// Starts a twin run from the present state, or ends it. The run itself never changes by it.
@@ -518,6 +543,15 @@ impl Player {
                 if let Some(twin) = &mut self.twin {
                     twin.follow(&self.simulation);
                 }
+                let (start, gravity) = (
+                    self.simulation.step_start(),
+                    self.simulation.running_scene().gravity,
+                );
+                if self.gravity.observe(start, gravity)
+                    && let Some(ideal) = &mut self.ideal
+                {
+                    ideal.forget_after(start);
+                }
                 true
             }
             Err(stopped) => {
@@ -601,6 +635,11 @@ impl Player {
                 self.values[channel] = peak.normal;
             }
         }
+        if let Some(ideal) = &mut self.ideal {
+            ideal.follow(time, &self.gravity);
+            let error = ideal.output_error(&frame).map_or(f64::NAN, |e| e.norm());
+            self.values[self.channels.tip_error()] = error;
+        }
         self.history.push(time, &self.values);
         self.watch.record(&frame);
         self.settling.record(&frame);
@@ -669,6 +708,8 @@ impl Player {
         self.unchanged = None;
         self.settling = Settling::new(self.simulation.running_scene());
         self.paths = Paths::new(self.simulation.running_scene());
+        self.gravity = Gravity::new(self.simulation.running_scene().gravity);
+        self.set_ideal(self.ideal.is_some());
         // Forces at the start are those of the first frame: nothing has struck yet.
         self.simulation.take_peaks(&mut self.coming);
         self.forget_peaks();

@@ -10,7 +10,7 @@ use glam::{Vec2, Vec3};
 
 use super::player::Player;
 use super::share::CameraPose;
-use super::{keys, overlay, value};
+use super::{ghosts, keys, overlay, value};
 use crate::render;
 use crate::simulate::ContactState;
 use crate::view::{
@@ -316,11 +316,7 @@ impl Viewport {
         // egui has dropped the clone of the frame before: nothing is copied.
         self.view.build(&shot, Arc::make_mut(&mut self.list));
         let list = Arc::make_mut(&mut self.list);
-        // One that starts at the end of the step on show has not started yet.
-        let ghost = player
-            .twin()
-            .filter(|twin| twin.frame().time <= player.frame().time)
-            .map(|twin| self.view.add_ghost(&shot, twin.frame(), list));
+        let said = ghosts::add(&self.view, &shot, player, list);
         if response.clicked() {
             // A finger that has left hovers over nothing.
             let tapped = response
@@ -346,14 +342,7 @@ impl Viewport {
         if let Some(name) = self.followed.and_then(|picked| name_of(player, picked)) {
             notes.push(format!("following {name}"));
         }
-        if let Some(apart) = ghost {
-            let words = if apart {
-                "ghost: the twin run"
-            } else {
-                "ghost: the twin run, less than a pixel away"
-            };
-            notes.push(words.to_owned());
-        }
+        notes.extend(said);
         overlay::time(
             &painter,
             rect,

@@ -25,6 +25,7 @@ pub enum Quantity {
     Energy,
     EnergyBalance,
     ProbeError,
+    TipError,
 }
 
 /// How a term of the balance is read, J.
@@ -32,7 +33,7 @@ type Take = fn(&Ledger) -> f64;
 
 impl Quantity {
     /// All of them, in the order in which a list shows them.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 16] = [
         Self::NormalForce,
         Self::FrictionForce,
         Self::Eccentricity,
@@ -48,6 +49,7 @@ impl Quantity {
         Self::Energy,
         Self::EnergyBalance,
         Self::ProbeError,
+        Self::TipError,
     ];
 
     /// Members of [`Self::EnergyBalance`]: kinetic and elastic change equal the works given by drives, gravity, clearance,
@@ -90,6 +92,7 @@ impl Quantity {
             Self::Energy => "Energy",
             Self::EnergyBalance => "Energy balance",
             Self::ProbeError => "Probe error",
+            Self::TipError => "Tip error",
         }
     }
 
@@ -99,7 +102,7 @@ impl Quantity {
             Self::NormalForce | Self::FrictionForce | Self::ActuatorForce => ("N", 1.0),
             Self::ActuatorTorque => ("N m", 1.0),
             Self::Eccentricity | Self::Position | Self::ProbeError => ("mm", 1e-3),
-            Self::Penetration => ("µm", 1e-6),
+            Self::Penetration | Self::TipError => ("µm", 1e-6),
             Self::Angles => ("mrad", 1e-3),
             Self::Velocity => ("m/s", 1.0),
             Self::AngleRates => ("rad/s", 1.0),
@@ -137,6 +140,10 @@ impl Quantity {
                  error of the integration."
             }
             Self::ProbeError => "Probe tip minus the tip of the ideal mechanism at the same time.",
+            Self::TipError => {
+                "Distance of the output point (the probe tip, or the output body's origin) from where ideal joints have it at the \
+                 same time. Recorded while the ideal ghost is on (key G)."
+            }
         }
     }
 }
@@ -183,6 +190,7 @@ impl Channel {
                 other => format!("{other}_work_J"),
             },
             Quantity::ProbeError => format!("probe_error_{member}_m"),
+            Quantity::TipError => "tip_error_m".to_owned(),
         }
     }
 }
@@ -254,6 +262,7 @@ impl Channels {
                 add(Quantity::ProbeError, member);
             }
         }
+        add(Quantity::TipError, "distance");
         Self {
             list,
             joints,
@@ -284,7 +293,13 @@ impl Channels {
         (joint < self.joints).then_some(4 * joint)
     }
 
-    /// Reads every channel from `frame` into `out`, SI units.
+    /// Index of the error of the output point.
+    pub fn tip_error(&self) -> usize {
+        self.list.len() - 1
+    }
+
+    /// Reads every channel from `frame` into `out`, SI units; the error of the output point, which is no part of a frame, is
+    /// NaN.
     pub fn read(&self, frame: &Frame, out: &mut Vec<f64>) {
         out.clear();
         for report in frame.joints.iter().take(self.joints) {
@@ -315,6 +330,7 @@ impl Channels {
         if self.probe {
             out.extend(frame.probe_error.unwrap_or(Vec3::repeat(f64::NAN)).iter());
         }
+        out.push(f64::NAN);
         debug_assert_eq!(out.len(), self.list.len());
     }
 }

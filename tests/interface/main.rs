@@ -8,5 +8,6 @@ mod bench_window;
 mod frames;
 mod hands;
 mod headless_window;
+mod instruments;
 mod page;
 mod window;

@@ -954,10 +954,12 @@ fn recorded_channels_have_the_columns_of_a_run() {
             .sample(0.0, &mut frame);
         let table = Table::new(&scene, &frame);
         for channel in Channels::of(&scene).list() {
-            // A run has friction as a vector, energies instead of their changes, and no live change that does work.
+            // A run has friction as a vector, energies instead of their changes, no live change that does work, and no ghost.
             let in_other_words = ["change_work_J", "kinetic_change_J", "elastic_change_J"];
-            let own = channel.quantity == Quantity::FrictionForce
-                || in_other_words.contains(&channel.column().as_str());
+            let own = matches!(
+                channel.quantity,
+                Quantity::FrictionForce | Quantity::TipError
+            ) || in_other_words.contains(&channel.column().as_str());
             let there = table.names().contains(&channel.column());
             assert_eq!(there, !own, "{name}: {}", channel.column());
         }
