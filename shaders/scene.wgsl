@@ -138,6 +138,28 @@ fn place(in: Vertex) -> Surface {
     return out;
 }
 
+// Before everything but the triad, each ghost in a slice of depth of its own (its `metal`): it takes turns neither with the
+// machine nor with another, and yet it is in order in itself.
+fn before_all(clip: vec4<f32>, slice: f32) -> vec4<f32> {
+    return vec4<f32>(clip.xy, 0.001 * (clip.z + (1.0 + slice) * clip.w), clip.w);
+}
+
+@vertex fn vs_ghost(in: Vertex) -> Surface {
+    var out = place(in);
+    out.clip = before_all(out.clip, in.surface.y);
+    return out;
+}
+
+// Its far side grown by the width of an outline (its `roughness`, pixels): what shows of it around the near side is one.
+@vertex fn vs_ghost_edge(in: Vertex) -> Surface {
+    var out = place(in);
+    let n = globals.clip_from_world * vec4<f32>(out.normal, 0.0);
+    let along = (n.xy * out.clip.w - out.clip.xy * n.w) * globals.picture.xy;
+    let grown = along / max(length(along), 1e-9) * (2.0 * in.surface.x / globals.picture.xy) * out.clip.w;
+    out.clip = before_all(out.clip, in.surface.y) + vec4<f32>(grown, 0.0, 0.0);
+    return out;
+}
+
 @vertex fn vs_shadow(in: Vertex) -> @builtin(position) vec4<f32> {
     return globals.light_from_world * vec4<f32>(place(in).world, 1.0);
 }
@@ -165,11 +187,15 @@ fn mark(in: Surface) -> vec3<f32> {
     return finish(mark(in), in.clip.xy, 0.6);
 }
 
-// A second state of the machine, seen through: clearest along its edge.
+// Another state of the machine, seen through: clearest along its edge.
 @fragment fn fs_ghost(in: Surface) -> @location(0) vec4<f32> {
     let facing = max(dot(normalize(in.normal), normalize(globals.eye.xyz - in.world)), 0.0);
     let edge = pow(1.0 - facing, 1.5);
     return finish(to_linear(in.colour.rgb), in.clip.xy, in.colour.a * mix(0.3, 1.0, edge));
+}
+
+@fragment fn fs_ghost_edge(in: Surface) -> @location(0) vec4<f32> {
+    return finish(to_linear(in.colour.rgb), in.clip.xy, in.colour.a);
 }
 
 // Light about a joint that was hit: a ring outside of its socket, which hides nothing of the contact.

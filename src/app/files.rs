@@ -271,6 +271,11 @@ fn record_csv(player: &Player) -> String {
     for (time, values) in player.history().rows(ROWS) {
         let _ = write!(text, "{time:.9e}");
         for (least, greatest) in values.iter().take(player.channels().len()) {
+            if least > greatest {
+                // Nothing was recorded of it here.
+                text.push_str(",NaN,NaN");
+                continue;
+            }
             let _ = write!(text, ",{least:.7e},{greatest:.7e}");
         }
         text.push('\n');

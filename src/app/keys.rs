@@ -25,6 +25,8 @@ pub enum Action {
     /// Close-up of a ball joint, by index.
     CloseUp(usize),
     Magnify,
+    Microscope,
+    IdealGhost,
     Arrows,
     Panel,
     Plots,
@@ -56,7 +58,7 @@ const fn bind(key: Key, action: Action, written: &'static str, help: &'static st
 }
 
 /// All keys.
-pub const BINDINGS: [Binding; 34] = [
+pub const BINDINGS: [Binding; 36] = [
     bind(Key::Space, Action::PlayPause, "Space", "Play or pause"),
     bind(
         Key::ArrowRight,
@@ -100,7 +102,7 @@ pub const BINDINGS: [Binding; 34] = [
         Key::Num5,
         Action::CloseUp(0),
         "5, 6, 7, 8, 9",
-        "Close-up of the first, second, … ball joint",
+        "Close-up of the first, second, … ball joint; the view follows it",
     ),
     bind(Key::Num6, Action::CloseUp(1), "", ""),
     bind(Key::Num7, Action::CloseUp(2), "", ""),
@@ -111,6 +113,18 @@ pub const BINDINGS: [Binding; 34] = [
         Action::Magnify,
         "M",
         "Next magnification of the play",
+    ),
+    bind(
+        Key::L,
+        Action::Microscope,
+        "L",
+        "Microscope on the ball joint in focus, shown or hidden",
+    ),
+    bind(
+        Key::G,
+        Action::IdealGhost,
+        "G",
+        "Ideal ghost: the machine without play, shown or hidden",
     ),
     bind(Key::A, Action::Arrows, "A", "Force arrows on or off"),
     bind(Key::C, Action::Panel, "C", "Controls shown or hidden"),
@@ -124,7 +138,7 @@ pub const BINDINGS: [Binding; 34] = [
 ];
 
 /// Mouse and touch, for the overlay.
-pub const POINTER: [(&str, &str); 9] = [
+pub const POINTER: [(&str, &str); 10] = [
     ("Drag beside the machine, one finger", "Turn the view"),
     (
         "Drag on a body; a finger stays first",
@@ -136,6 +150,10 @@ pub const POINTER: [(&str, &str); 9] = [
     ),
     ("Wheel, pinch", "Come nearer to what is under the cursor"),
     ("Hover", "What is known about a part"),
+    (
+        "Click, tap on a ball joint",
+        "Put it into the middle and under the microscope",
+    ),
     (
         "Double-click, double tap",
         "Follow a body or joint; the ground lets go",

@@ -427,12 +427,14 @@ impl App {
                     ui.separator();
                 }
                 self.viewport.options_ui(ui);
+                self.instruments(ui);
             });
             if !narrow {
                 ui.with_layout(backwards, |ui| self.viewport.camera_buttons(ui, true));
             }
         });
         drop_hint(ui, area);
+        self.inset(ui, inner);
         let messages = self.messages(ui, inner);
         self.notice_plate(ui, messages);
         let middle = egui::UiBuilder::new().max_rect(inner.shrink2(egui::vec2(0.0, 44.0)));

@@ -14,16 +14,20 @@ mod curve;
 mod desktop;
 mod dialogs;
 mod files;
+mod ghosts;
 mod header;
 #[cfg(not(target_arch = "wasm32"))]
 mod headless;
 mod host;
 mod icons;
+mod ideal;
 mod keys;
 mod layout;
 mod load;
 mod log;
+mod microscope;
 mod overlay;
+mod paths;
 mod picture;
 mod player;
 mod plots;
@@ -64,6 +68,7 @@ use keys::Action;
 use layout::Sheet;
 use load::Load;
 pub use log::{Entry, Event, Log};
+pub use microscope::{Circle, Microscope};
 pub use overlay::{force_notes, plate};
 use picture::Picture;
 pub use player::{Clock, Player};
@@ -226,6 +231,7 @@ pub struct App {
     verdict: Option<Verdict>,
     notice: Option<Notice>,
     announcer: Announcer,
+    microscope: Microscope,
     picture: Picture,
     /// Where the 3D view is, points.
     picture_rect: egui::Rect,
@@ -288,6 +294,7 @@ impl App {
             verdict: None,
             notice: None,
             announcer: Announcer::default(),
+            microscope: Microscope::default(),
             picture: Picture::default(),
             picture_rect: egui::Rect::ZERO,
             renderer: String::new(),
@@ -527,7 +534,7 @@ impl App {
         self.player.advance(dt);
         self.announcer.observe(&self.player);
         let moves = self.viewport.advance(&self.player, dt as f32);
-        moves || self.player.is_playing()
+        moves || self.player.is_playing() || self.player.is_ideal_behind()
     }
 
     fn show_scene(&mut self, scene: &Scene) -> Result<(), String> {
@@ -535,6 +542,7 @@ impl App {
         player.clock = self.player.clock;
         player.pacer.set_scale(self.player.pacer.scale());
         player.set_playing(self.player.is_playing() || self.player.stopped().is_some());
+        player.set_ideal(self.player.ideal().is_some());
         self.player = player;
         self.viewport.show_scene(&self.player);
         self.timeline.reset();
@@ -596,7 +604,17 @@ impl App {
                     self.viewport.preset(*preset);
                 }
             }
-            Action::CloseUp(joint) => self.viewport.close_up(&self.player, joint),
+            Action::CloseUp(joint) => {
+                if joint < self.player.scene().ball_joints.len() {
+                    self.microscope.focus(joint);
+                    self.viewport.close_up(&self.player, joint);
+                }
+            }
+            Action::IdealGhost => self.show_ideal(self.player.ideal().is_none()),
+            Action::Microscope => {
+                let open = !self.microscope.is_open();
+                self.microscope.set_open(open);
+            }
             Action::Magnify => self.viewport.next_magnification(),
             Action::Arrows => {
                 let arrows = &mut self.viewport.options.arrows;
@@ -621,9 +639,14 @@ impl App {
                 };
             }
             Action::Close => {
+                let told =
+                    self.problem.is_some() || self.is_under_way() || egui::Popup::is_any_open(ctx);
                 if self.dialog.take().is_none() {
                     self.cancel_replay();
                     self.problem = None;
+                    if !told {
+                        self.microscope.set_open(false);
+                    }
                 }
             }
         }

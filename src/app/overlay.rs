@@ -11,13 +11,14 @@ use crate::view::{Colour, DrawList, Label, LabelKind, Legend, Palette, Scaling, 
 /// Distance of overlays from the edge, points.
 const MARGIN: f32 = 14.0;
 
-fn colour(colour: Colour) -> Color32 {
+/// A colour of the view's as the painter's.
+pub(super) fn colour(colour: Colour) -> Color32 {
     let [r, g, b, a] = colour.to_rgba8();
     Color32::from_rgba_unmultiplied(r, g, b, a)
 }
 
 /// Text with a halo in the colour of the ground, readable over anything.
-fn text(
+pub(super) fn text(
     painter: &Painter,
     at: Pos2,
     anchor: Align2,
@@ -59,6 +60,7 @@ pub fn labels(painter: &Painter, rect: Rect, scale: f32, list: &DrawList) {
             LabelKind::Peak(_) | LabelKind::Outside => {
                 Some((12.0, Align2::LEFT_CENTER, vec2(9.0, 0.0)))
             }
+            LabelKind::Error => Some((12.0, Align2::CENTER_TOP, vec2(0.0, 10.0))),
             LabelKind::Axis | LabelKind::Gravity => None,
         };
         if let Some((size, anchor, beside)) = plate {

@@ -10,7 +10,9 @@ use std::sync::OnceLock;
 
 use web_time::Instant;
 
+use super::ideal::{Gravity, Ideal};
 use super::log::{Entry, Event, Log, Number};
+use super::paths::Paths;
 use super::settled::Settling;
 use super::twin::Twin;
 use super::watch::Watch;
@@ -75,6 +77,7 @@ pub struct Player {
     recorded_to: f64,
     values: Vec<f64>,
     settling: Settling,
+    paths: Paths,
     keyframes: Keyframes,
     /// Latest instant that was on show, s, and most steps taken.
     reached: f64,
@@ -90,6 +93,9 @@ pub struct Player {
     sections: Option<Schedule>,
     watch: Watch,
     twin: Option<Box<Twin>>,
+    /// Gravity since the start, for the ideal motion.
+    gravity: Gravity,
+    ideal: Option<Box<Ideal>>,
     /// Simulated time and seconds of stepping that it took, both fading.
     stepped: f64,
     stepping: f64,
@@ -146,6 +152,7 @@ impl Player {
             recorded_to: 0.0,
             values: Vec::new(),
             settling: Settling::new(scene),
+            paths: Paths::new(scene),
             keyframes: Keyframes::default(),
             reached: 0.0,
             most_steps: 0,
@@ -158,6 +165,8 @@ impl Player {
             sections: None,
             watch: Watch::new(scene),
             twin: None,
+            gravity: Gravity::new(scene.gravity),
+            ideal: None,
             simulation,
         };
         player.start_record();
@@ -204,6 +213,11 @@ impl Player {
         &self.history
     }
 
+    /// Where the balls went lately.
+    pub fn paths(&self) -> &Paths {
+        &self.paths
+    }
+
     /// What was done to the run from its start to the instant on show.
     pub fn log(&self) -> Log {
         let mut log = self.log.clone();
@@ -231,6 +245,25 @@ impl Player {
         if let Some(twin) = &mut self.twin {
             twin.place(self.pacer.shown());
         }
+        if let Some(ideal) = &mut self.ideal {
+            ideal.catch_up(self.pacer.shown(), &self.gravity, self.clock);
+        }
+    }
+
+    /// The ideal motion, where it is on.
+    pub fn ideal(&self) -> Option<&Ideal> {
+        self.ideal.as_deref()
+    }
+
+    /// Whether the ideal motion is on its way to the instant on show.
+    pub fn is_ideal_behind(&self) -> bool {
+        let shown = self.pacer.shown();
+        self.ideal().is_some_and(|ideal| ideal.is_behind(shown))
+    }
+
+    /// Has the ideal motion computed beside the run, or no longer. The run itself never changes by it.
+    pub fn set_ideal(&mut self, on: bool) {
+        self.ideal = on.then(|| Box::new(Ideal::new(self.simulation.running_scene())));
     }
 
     /// Starts a twin run from the present state, or ends it. The run itself never changes by it.
@@ -574,6 +607,15 @@ impl Player {
                 if let Some(twin) = &mut self.twin {
                     twin.follow(&self.simulation);
                 }
+                let (start, gravity) = (
+                    self.simulation.step_start(),
+                    self.simulation.running_scene().gravity,
+                );
+                if self.gravity.observe(start, gravity)
+                    && let Some(ideal) = &mut self.ideal
+                {
+                    ideal.forget_after(start);
+                }
                 true
             }
             Err(stopped) => {
@@ -660,6 +702,11 @@ impl Player {
             }
         }
         self.recorded_to = time;
+        if let Some(ideal) = &mut self.ideal {
+            ideal.follow(time, &self.gravity);
+            let error = ideal.output_error(&frame).map_or(f64::NAN, |e| e.norm());
+            self.values[self.channels.tip_error()] = error;
+        }
         self.history.push(time, &self.values);
         if let Some(near) = &mut self.near {
             near.push(time, &self.values);
@@ -667,6 +714,7 @@ impl Player {
         self.course.record(&frame);
         self.watch.record(&frame);
         self.settling.record(&frame);
+        self.paths.record(&frame);
         self.recorded = frame;
     }
 
@@ -734,6 +782,9 @@ impl Player {
         self.forget_travels();
         self.unchanged = None;
         self.settling = Settling::new(self.simulation.running_scene());
+        self.paths = Paths::new(self.simulation.running_scene());
+        self.gravity = Gravity::new(self.simulation.running_scene().gravity);
+        self.set_ideal(self.ideal.is_some());
         // Forces at the start are those of the first frame: nothing has struck yet.
         self.simulation.take_peaks(&mut self.coming);
         self.forget_peaks();

@@ -302,7 +302,10 @@ impl Plots {
         };
         let from_zero = matches!(
             quantity,
-            Quantity::NormalForce | Quantity::FrictionForce | Quantity::Eccentricity
+            Quantity::NormalForce
+                | Quantity::FrictionForce
+                | Quantity::Eccentricity
+                | Quantity::TipError
         );
         let values = if bands.is_empty() {
             extremes(self.traces.iter().chain(&self.levels), size)

@@ -11,7 +11,7 @@ use glam::{Vec2, Vec3};
 use super::player::Player;
 use super::pull::Grip;
 use super::share::CameraPose;
-use super::{keys, overlay, value};
+use super::{ghosts, keys, overlay, value};
 use crate::render;
 use crate::simulate::{ContactState, Pull};
 use crate::view::{
@@ -66,6 +66,8 @@ pub struct Viewport {
     grip_changed: bool,
     /// More than one finger was down since the last time that none was.
     pinched: bool,
+    /// Ball joint that was clicked, until somebody asks.
+    clicked: Option<usize>,
 }
 
 impl Viewport {
@@ -89,6 +91,7 @@ impl Viewport {
             grip: None,
             grip_changed: false,
             pinched: false,
+            clicked: None,
         }
     }
 
@@ -149,7 +152,11 @@ impl Viewport {
             self.extend_trail(player);
         }
         if let Some(picked) = self.followed {
-            self.camera.follow(self.view.anchor(player.frame(), picked));
+            let anchor = self.view.anchor(player.frame(), picked);
+            self.camera.follow(anchor);
+            if let Some(goal) = &mut self.goal {
+                goal.follow(anchor);
+            }
         }
         let Some(goal) = self.goal else {
             return false;
@@ -190,17 +197,50 @@ impl Viewport {
             let scene = player.scene();
             self.view
                 .close_up(&mut goal, joint, scene, player.frame(), &self.options);
-            self.goal = Some(goal);
-            self.fit_pending = false;
-            self.moved = true;
-            self.follow(None);
+            self.glide(player, goal, joint);
         }
+    }
+
+    /// Puts the centre of ball joint `joint` into the middle and keeps it there.
+    pub fn centre(&mut self, player: &Player, joint: usize) {
+        if let Some(centre) = self.view.anchor(player.frame(), Picked::Joint(joint)) {
+            let mut goal = self.goal.unwrap_or(self.camera);
+            goal.target = centre;
+            self.glide(player, goal, joint);
+        }
+    }
+
+    /// Goes to `goal`, and along with ball joint `joint` from now on.
+    fn glide(&mut self, player: &Player, goal: Camera, joint: usize) {
+        self.goal = Some(goal);
+        (self.fit_pending, self.moved) = (false, true);
+        let picked = Picked::Joint(joint);
+        self.follow(Some(picked));
+        let anchor = self.view.anchor(player.frame(), picked);
+        self.camera.follow(anchor);
+        if let Some(goal) = &mut self.goal {
+            goal.follow(anchor);
+        }
+    }
+
+    /// World vectors to the right and up in the picture.
+    pub fn across(&self) -> [Vec3; 2] {
+        let (right, up, _) = self.camera.axes();
+        [right, up]
+    }
+
+    /// The ball joint that was clicked since the last call.
+    pub fn take_clicked(&mut self) -> Option<usize> {
+        self.clicked.take()
     }
 
     /// Keeps a body or joint where it is on the screen; `None` lets go.
     pub fn follow(&mut self, picked: Option<Picked>) {
         self.followed = picked;
         self.camera.follow(None);
+        if let Some(goal) = &mut self.goal {
+            goal.follow(None);
+        }
     }
 
     /// What the pointer pulls at by now, if that changed; `None` where it let go.
@@ -296,18 +336,19 @@ impl Viewport {
         // egui has dropped the clone of the frame before: nothing is copied.
         self.view.build(&shot, Arc::make_mut(&mut self.list));
         let list = Arc::make_mut(&mut self.list);
-        // One that starts at the end of the step on show has not started yet.
-        let ghost = player
-            .twin()
-            .filter(|twin| twin.frame().time <= player.frame().time)
-            .map(|twin| self.view.add_ghost(&shot, twin.frame(), list));
-        if response.double_clicked() {
+        let said = ghosts::add(&self.view, &shot, player, list);
+        if response.clicked() {
             // A finger that has left hovers over nothing.
             let tapped = response
                 .interact_pointer_pos()
                 .map(|pos| (pos - rect.min) * scale)
-                .and_then(|pixel| self.view.pick(&shot, Vec2::new(pixel.x, pixel.y)));
-            self.follow(tapped.map(|hit| hit.what));
+                .and_then(|pixel| self.view.pick(&shot, Vec2::new(pixel.x, pixel.y)))
+                .map(|hit| hit.what);
+            if let Some(Picked::Joint(joint)) = tapped {
+                self.clicked = Some(joint);
+            } else if response.double_clicked() {
+                self.follow(tapped);
+            }
         }
         let painter = ui.painter_at(rect);
         painter.add(render::Viewport::shape(rect, self.list.clone()));
@@ -321,14 +362,7 @@ impl Viewport {
         if let Some(name) = self.followed.and_then(|picked| name_of(player, picked)) {
             notes.push(format!("following {name}"));
         }
-        if let Some(apart) = ghost {
-            let words = if apart {
-                "ghost: the twin run"
-            } else {
-                "ghost: the twin run, less than a pixel away"
-            };
-            notes.push(words.to_owned());
-        }
+        notes.extend(said);
         overlay::time(
             &painter,
             rect,

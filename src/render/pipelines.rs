@@ -22,7 +22,9 @@ pub(super) struct Pipelines {
     pub line: wgpu::RenderPipeline,
     pub outline: wgpu::RenderPipeline,
     pub faded: wgpu::RenderPipeline,
+    pub ghost_depth: wgpu::RenderPipeline,
     pub ghost: wgpu::RenderPipeline,
+    pub ghost_edge: wgpu::RenderPipeline,
     pub halo: wgpu::RenderPipeline,
     pub socket_far: wgpu::RenderPipeline,
     pub socket_near: wgpu::RenderPipeline,
@@ -43,6 +45,8 @@ struct Recipe<'a> {
     compare: wgpu::CompareFunction,
     write_depth: bool,
     blend: bool,
+    /// Off: depth only.
+    colour: bool,
     /// Drawn a little farther away than it is.
     behind: bool,
 }
@@ -115,7 +119,7 @@ impl Pipelines {
             attributes: &line_ends,
         })];
 
-        use wgpu::CompareFunction::{Always, Greater, Less};
+        use wgpu::CompareFunction::{Always, Greater, Less, LessEqual};
         use wgpu::Face::{Back, Front};
         use wgpu::PrimitiveTopology::{TriangleList, TriangleStrip};
         let mesh = |label, vertex, fragment| Recipe {
@@ -128,6 +132,7 @@ impl Pipelines {
             compare: Less,
             write_depth: true,
             blend: false,
+            colour: true,
             // Keeps a surface from shadowing itself.
             behind: fragment.is_none(),
         };
@@ -164,10 +169,21 @@ impl Pipelines {
                 ..flat("outline", "vs_line", "fs_line", TriangleStrip)
             }),
             faded: make(glass("faded", "fs_solid", Back)),
-            // Whatever stands there: where it all but coincides with a solid part, depths would take turns.
+            // Its nearest surface alone is seen: what of itself lies behind would show through it in patches.
+            ghost_depth: make(Recipe {
+                colour: false,
+                ..mesh("ghost, depth", "vs_ghost", Some("fs_ghost"))
+            }),
             ghost: make(Recipe {
-                compare: Always,
+                vertex: "vs_ghost",
+                // The same corners as just before.
+                compare: LessEqual,
                 ..glass("ghost", "fs_ghost", Back)
+            }),
+            ghost_edge: make(Recipe {
+                cull: Some(Front),
+                blend: true,
+                ..mesh("ghost, outline", "vs_ghost_edge", Some("fs_ghost_edge"))
             }),
             halo: make(glass("halo", "fs_halo", Back)),
             socket_far: make(glass("socket, far side", "fs_socket", Front)),
@@ -209,7 +225,11 @@ fn pipeline(
     let colour = [Some(wgpu::ColorTargetState {
         format: COLOUR,
         blend: recipe.blend.then_some(wgpu::BlendState::ALPHA_BLENDING),
-        write_mask: wgpu::ColorWrites::ALL,
+        write_mask: if recipe.colour {
+            wgpu::ColorWrites::ALL
+        } else {
+            wgpu::ColorWrites::empty()
+        },
     })];
     device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label: Some(recipe.label),

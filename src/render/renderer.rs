@@ -162,6 +162,7 @@ impl Renderer {
         let solid = self.pack(&list.solid);
         let faded = self.pack(&list.faded);
         let ghost = self.pack(&list.ghost);
+        let ghost_edges = self.pack(&list.ghost_edges);
         let arrows = self.pack(&list.arrows);
         let overlay = self.pack(&list.overlay);
         let halos = [self.pack_one(Mesh::Sphere.index(), &list.halos)];
@@ -222,7 +223,9 @@ impl Renderer {
         self.draw_meshes(&mut pass, &pipelines.halo, &halos);
         self.draw_meshes(&mut pass, &pipelines.socket_far, &sockets);
         self.draw_meshes(&mut pass, &pipelines.socket_near, &sockets);
+        self.draw_meshes(&mut pass, &pipelines.ghost_depth, &ghost);
         self.draw_meshes(&mut pass, &pipelines.ghost, &ghost);
+        self.draw_meshes(&mut pass, &pipelines.ghost_edge, &ghost_edges);
         // After the sockets, so that glass does not dim a force.
         draw_lines(&mut pass, &pipelines.outline, &self.marks, &list.marks);
         self.draw_meshes(&mut pass, &pipelines.mark_behind, &arrows);

@@ -7,7 +7,8 @@ use super::{Image, Offscreen, RenderError};
 use crate::scene::Scene;
 use crate::simulate::Frame;
 use crate::view::{
-    Camera, DrawList, PeakMarks, Preset, SceneView, Shot, Theme, ViewOptions, fixture, to_f32,
+    Camera, DrawList, Ghost, Palette, PeakMarks, Preset, SceneView, Shot, Theme, ViewOptions,
+    fixture, to_f32,
 };
 
 const SIZE: [u32; 2] = [480, 360];
@@ -420,7 +421,7 @@ fn a_ghost_in_the_same_place_is_not_seen_in_patches() {
             size: SIZE,
             pixels_per_point: 1.0,
         };
-        assert!(view.add_ghost(&shot, &ghost, &mut list));
+        assert!(view.add_ghost(&shot, &ghost, Ghost::Twin, &mut list));
         let with = device.render(&list).expect("a picture");
         let (right, up, _) = camera.axes();
         for k in 0..400 {
@@ -430,6 +431,78 @@ fn a_ghost_in_the_same_place_is_not_seen_in_patches() {
             assert!(change > 8, "{move_by}: {change} at {point}");
         }
     }
+}
+
+#[test]
+fn ghosts_are_outlined_and_two_in_one_place_take_no_turns() {
+    let options = ViewOptions {
+        sockets: false,
+        floor: false,
+        ..bare()
+    };
+    let (scene, frame, camera) = close_up(&options);
+    let view = SceneView::new(&scene, &frame);
+    let mut device = offscreen();
+    let plain = picture(&scene, &frame, &options, &camera, false);
+    let (right, up, _) = camera.axes();
+    let pixel = camera.metres_per_pixel(SIZE);
+    let aside = (40.0 * pixel * right).as_dvec3();
+    let aside = crate::scene::Vec3::new(aside.x, aside.y, aside.z);
+    let mut ghost = frame.clone();
+    ghost.bodies[0].position += aside;
+    ghost.joints[0].socket_centre += aside;
+    let (marks, trail) = (PeakMarks::new(), []);
+    let shot = Shot {
+        scene: &scene,
+        frame: &frame,
+        marks: &marks,
+        options: &options,
+        camera: &camera,
+        trail: &trail,
+        size: SIZE,
+        pixels_per_point: 1.0,
+    };
+    let mut drawn = |ghosts: &[Ghost]| {
+        let mut list = plain.clone();
+        for which in ghosts {
+            assert!(view.add_ghost(&shot, &ghost, *which, &mut list));
+        }
+        device.render(&list).expect("a picture")
+    };
+    let twin = drawn(&[Ghost::Twin]);
+    let ideal = drawn(&[Ghost::Ideal]);
+    let both = drawn(&[Ghost::Ideal, Ghost::Twin]);
+    let report = &ghost.joints[0];
+    let centre = to_f32(&(report.socket_centre + 20.0 * report.eccentricity));
+    let radius = scene.ball_joints[0].contact.ball_radius as f32;
+    let palette = Palette::of(options.theme);
+    let near = |image: &Image, point: Vec3, colour: [u8; 4]| {
+        let [r, g, b, _] = colour;
+        difference(at(image, &camera, point), [r, g, b]) < 40
+    };
+    let mut edged = [0; 2];
+    for k in 0..120 {
+        let turn = k as f32 * (std::f32::consts::TAU / 120.0);
+        let out = right * turn.cos() + up * turn.sin();
+        for part in [0.1, 0.4, 0.7] {
+            let point = centre + 0.95 * radius * part * out;
+            let change = difference(at(&both, &camera, point), at(&twin, &camera, point));
+            assert!(change <= 1, "the nearer alone is seen: {change} at {point}");
+        }
+        for (found, (image, which)) in edged
+            .iter_mut()
+            .zip([(&twin, Ghost::Twin), (&both, Ghost::Ideal)])
+        {
+            let edge = palette.ghost(which).edge.to_rgba8();
+            // About the outline of the ball, which perspective makes a little larger.
+            let ring = |step: i32| centre + (radius + 0.25 * step as f32 * pixel) * out;
+            *found += usize::from((-4..16).any(|step| near(image, ring(step), edge)));
+        }
+    }
+    // The rod leaves the ball on one side, with an outline of its own.
+    assert!(edged[0] > 100 && edged[1] > 75, "{edged:?}");
+    let apart = differing(&twin, &ideal, 30).len();
+    assert!(apart > 3000, "told from each other: {apart}");
 }
 
 #[test]

@@ -95,6 +95,12 @@ impl Channels {
         self.list.iter().position(own)
     }
 
+    /// Index of the error of the output point, which no frame knows.
+    pub fn tip_error(&self) -> usize {
+        let own = |c: &Channel| c.quantity == Quantity::TipError;
+        self.list.iter().position(own).unwrap_or_default()
+    }
+
     /// Reads every channel from `frame` into `out`, SI units; NaN where the frame does not know it.
     pub fn read(&self, frame: &Frame, out: &mut Vec<f64>) {
         out.clear();

@@ -7,6 +7,8 @@ const BINS: usize = 2048;
 const LEVELS: usize = 23;
 /// No bin.
 const EMPTY: i64 = i64::MIN;
+/// Nothing was recorded of a channel.
+const NOTHING: (f32, f32) = (f32::INFINITY, f32::NEG_INFINITY);
 
 /// Fixed-size record of `channels` quantities over time. Nothing is allocated after [`History::new`].
 #[derive(Clone, Debug)]
@@ -130,7 +132,8 @@ impl History {
         }
     }
 
-    /// Records one instant, s; one value per channel. An instant before the latest, or not finite, is ignored.
+    /// Records one instant, s; one value per channel, NaN where there is none. An instant before the latest, or not finite, is
+    /// ignored.
     pub fn push(&mut self, time: f64, values: &[f64]) {
         if !time.is_finite() || (self.start.is_some() && time < self.end) {
             return;
@@ -152,7 +155,11 @@ impl History {
         let at = self.at(0, index);
         let slot = self.ranges[at].iter_mut().zip(values).zip(&self.base);
         for ((range, &value), &base) in slot {
-            let kept = ((value - base) as f32, (value - base) as f32);
+            let kept = if value.is_nan() {
+                NOTHING
+            } else {
+                ((value - base) as f32, (value - base) as f32)
+            };
             *range = if fresh { kept } else { join(*range, kept) };
         }
     }
@@ -193,7 +200,7 @@ impl History {
         }
         for index in first..=self.index(level, to) {
             if let Some((least, greatest)) = self.range(level, index, complete, channel)
-                && !least.is_nan()
+                && least <= greatest
             {
                 out.push(Bin {
                     from: (index as f64 * width).max(start),
@@ -206,7 +213,7 @@ impl History {
     }
 
     /// Everything that is kept in at most so many rows: time of each bin's middle in s, then the least and the greatest
-    /// value of each channel in it, channel after channel.
+    /// value of each channel in it, channel after channel; least above greatest where there was none.
     pub fn rows(&self, most_bins: usize) -> Vec<(f64, Vec<(f64, f64)>)> {
         let Some((start, end)) = self.span() else {
             return Vec::new();
@@ -474,6 +481,28 @@ mod tests {
         assert_eq!(found[found.len() - 1].greatest, 199_999.0);
         history.clear();
         assert!(bins(&history, 0, 0.0, 20.0, 400).is_empty() && history.span().is_none());
+    }
+
+    #[test]
+    fn what_had_no_value_is_told_from_what_had() {
+        let mut history = History::new(2, 1e-5);
+        for n in 0..3000_u64 {
+            let late = if n < 1000 { f64::NAN } else { wave(n) };
+            history.push(n as f64 * 1e-4, &[wave(n), late]);
+        }
+        assert!(history.rows(40) == history.clone().rows(40));
+        for most in [40, 900] {
+            let found = bins(&history, 1, 0.0, 0.3, most);
+            assert!(found[0].to > 0.1 && found[0].from <= 0.1 + 1e-9);
+            assert!(
+                found
+                    .iter()
+                    .all(|b| b.least.is_finite() && b.greatest <= 1.0)
+            );
+            assert_eq!(bins(&history, 0, 0.0, 0.3, most)[0].from, 0.0);
+        }
+        let rows = history.rows(40);
+        assert!(rows[0].1[1].0 > rows[0].1[1].1);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Force arrows, the ruler that they are read by, and the hollow marks of peaks that are over.
+//! Force arrows, the ruler that they are read by, the hollow marks of peaks that are over, and the arrow of an error.
 
 use glam::Vec3;
 
@@ -269,6 +269,25 @@ pub(super) fn push_forces(
         peaks: marked,
         friction: options.friction.then_some(palette.friction),
     });
+}
+
+/// An arrow that is no force but a length in the scene, with its label at its head.
+pub(super) fn push_error(
+    shot: &Shot<'_>,
+    tail: Vec3,
+    along: Vec3,
+    colour: Colour,
+    words: &std::sync::Arc<str>,
+    out: &mut DrawList,
+) {
+    let ruler = Ruler::new(shot.camera, shot.size);
+    let height = shot.size[1] as f32;
+    let unit = along.normalize_or(shot.camera.axes().0);
+    if let Some((_, pixel)) = ruler.measure(tail, unit, 1.0) {
+        let arrow = Arrow::new(tail, along, THICKEST * height * pixel);
+        arrow.push(&mut out.arrows, colour);
+    }
+    push_label(out, words, LabelKind::Error, tail + along, colour);
 }
 
 /// How hard, and how long ago in simulated time.

@@ -289,52 +289,13 @@ impl SceneView {
         }
     }
 
-    /// Adds the moving parts as they stand in `ghost`, another state of the scene of `shot`, to the list that was built of
-    /// it, each the clearer the farther it stands from its place there; whether any differs by a pixel or more.
-    pub fn add_ghost(&self, shot: &Shot<'_>, ghost: &Frame, out: &mut DrawList) -> bool {
-        let palette = Palette::of(shot.options.theme);
-        let at = |frame| drawn::joints(shot.scene, frame, out.magnification);
-        let (here, there) = (at(shot.frame), at(ghost));
-        let (eye, back) = (shot.camera.eye(), shot.camera.axes().2);
-        let target = shot.camera.metres_per_pixel(shot.size) / shot.camera.distance;
-        // From one pixel to three.
-        let material = |from: Vec3, to: Vec3| {
-            let pixel = target * (eye - to).dot(back);
-            let seen = (from.distance(to) / pixel / shot.pixels_per_point - 0.5) / 2.5;
-            let opacity = palette.ghost.colour.0[3] * seen.clamp(0.0, 1.0);
-            (pixel > 0.0 && opacity > 0.0).then(|| palette.ghost.with_opacity(opacity))
-        };
-        for part in self.parts.iter().filter(|part| part.body.is_some()) {
-            let (from, to) = (part.place(shot.frame, &here), part.place(ghost, &there));
-            let (mut starts, mut farthest) = (Vec::new(), (0.0, Vec3::ZERO, Vec3::ZERO));
-            from.extent(|point, _| starts.push(point));
-            let mut starts = starts.into_iter();
-            to.extent(|point, _| {
-                let start = starts.next().unwrap_or(point);
-                if start.distance(point) > farthest.0 {
-                    farthest = (start.distance(point), start, point);
-                }
-            });
-            if let Some(material) = material(farthest.1, farthest.2) {
-                push_solid(&mut out.ghost, &to, material);
-            }
-        }
-        for (from, to) in here.iter().zip(&there) {
-            if let Some(material) = material(from.ball_centre, to.ball_centre) {
-                let size = Mat3::from_diagonal(Vec3::splat(to.ball_radius));
-                let ball = placed(size, to.ball_centre, material);
-                out.ghost.push(Mesh::Sphere, ball);
-            }
-        }
-        !out.ghost.is_empty()
-    }
-
     fn start(&self, shot: &Shot<'_>, palette: &Palette, out: &mut DrawList) {
         let meshes = Mesh::SHARED + self.plates.len();
         for layer in [
             &mut out.solid,
             &mut out.faded,
             &mut out.ghost,
+            &mut out.ghost_edges,
             &mut out.arrows,
             &mut out.overlay,
         ] {
@@ -502,7 +463,7 @@ fn magnification_text(drawn: f32, asked: f32) -> String {
     }
 }
 
-fn push_solid(layer: &mut Layer, solid: &Solid<'_>, material: Material) {
+pub(super) fn push_solid(layer: &mut Layer, solid: &Solid<'_>, material: Material) {
     let ball =
         |centre, radius: f32| placed(Mat3::from_diagonal(Vec3::splat(radius)), centre, material);
     match *solid {

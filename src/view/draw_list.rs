@@ -59,9 +59,9 @@ pub struct Instance {
     pub world_from_mesh: [[f32; 4]; 3],
     /// Red, green, blue (sRGB-encoded), opacity.
     pub colour: [f32; 4],
-    /// 0 mirror, 1 chalk.
+    /// 0 mirror, 1 chalk; of a ghost's outline its width, pixels.
     pub roughness: f32,
-    /// 0 plastic, 1 metal.
+    /// 0 plastic, 1 metal; of a ghost its slice of depth ([`super::GhostLook::slice`]).
     pub metal: f32,
     /// Inner radius of a socket, in units of its outer radius; unused elsewhere.
     pub inner_radius: f32,
@@ -176,6 +176,8 @@ pub enum LabelKind {
     Peak(usize),
     /// The arrow of a force from outside.
     Outside,
+    /// The error of the output point.
+    Error,
 }
 
 /// Text that the interface paints over the picture.
@@ -248,8 +250,10 @@ pub struct DrawList {
     pub faded: Layer,
     /// Solid things seen through all others where these stand before them: force arrows.
     pub arrows: Layer,
-    /// A second state of the machine, translucent before all others but arrows.
+    /// Other states of the machine, translucent before all others but arrows.
     pub ghost: Layer,
+    /// The same in the colour of their outlines.
+    pub ghost_edges: Layer,
     /// Rings of light about joints that were hit.
     pub halos: Vec<Instance>,
     /// Sockets, farthest first: for each the half that stands and, fainter, the half that is cut away.
@@ -296,6 +300,7 @@ impl Default for DrawList {
             solid: Layer::default(),
             faded: Layer::default(),
             ghost: Layer::default(),
+            ghost_edges: Layer::default(),
             arrows: Layer::default(),
             halos: Vec::new(),
             sockets: Vec::new(),

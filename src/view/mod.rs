@@ -18,6 +18,7 @@ mod draw_list;
 mod drawn;
 #[cfg(test)]
 pub(crate) mod fixture;
+mod ghost;
 mod instances;
 mod options;
 mod peaks;
@@ -33,6 +34,7 @@ pub use draw_list::{
     Background, DrawList, Eye, Floor, Instance, Label, LabelKind, Layer, Legend, Light, Line, Mesh,
     MeshData, Tick,
 };
+pub use ghost::{Ghost, GhostLook, output_point};
 pub use options::{ArrowOptions, Scaling, ViewOptions};
 pub use peaks::{Mark, PeakMarks, SEEN};
 pub use pick::{Hit, Picked};

@@ -216,15 +216,15 @@ fn a_ghost_is_drawn_where_it_differs_and_only_there() {
     let mut list = DrawList::default();
     view.build(&shot, &mut list);
     let mut ghost = frame.clone();
-    assert!(!view.add_ghost(&shot, &ghost, &mut list) && list.ghost.is_empty());
+    assert!(!view.add_ghost(&shot, &ghost, Ghost::Twin, &mut list) && list.ghost.is_empty());
     let pixel = f64::from(camera.metres_per_pixel(SIZE));
     ghost.bodies[3].position.y += 0.2 * pixel;
     assert!(
-        !view.add_ghost(&shot, &ghost, &mut list),
+        !view.add_ghost(&shot, &ghost, Ghost::Twin, &mut list),
         "a fifth of a pixel"
     );
     ghost.bodies[3].position.y += 10.0 * pixel;
-    assert!(view.add_ghost(&shot, &ghost, &mut list));
+    assert!(view.add_ghost(&shot, &ghost, Ghost::Twin, &mut list));
     let moved = list.ghost.by_mesh[Mesh::Cylinder.index()].len();
     assert_eq!(
         (list.ghost.len(), moved),

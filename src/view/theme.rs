@@ -1,5 +1,6 @@
 //! Colours of the picture, light and dark. Colours are sRGB-encoded here; the shader linearises them.
 
+use super::{Ghost, GhostLook};
 use crate::scene::Role;
 
 /// Light or dark.
@@ -67,6 +68,23 @@ const fn material(rgb: u32, roughness: f32, metal: f32) -> Material {
     }
 }
 
+const fn twin(fill: u32, opacity: f32, edge: u32) -> GhostLook {
+    GhostLook {
+        fill: Colour::hex(fill).with_opacity(opacity),
+        edge: Colour::hex(edge),
+        width: 1.4,
+        slice: 0.0,
+    }
+}
+
+const fn ideal(fill: u32, opacity: f32, edge: u32) -> GhostLook {
+    GhostLook {
+        width: 2.4,
+        slice: 1.0,
+        ..twin(fill, opacity, edge)
+    }
+}
+
 /// All colours of one theme.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Palette {
@@ -98,8 +116,8 @@ pub struct Palette {
     pub ball: Material,
     /// Sockets (opacity applies).
     pub socket: Material,
-    /// Parts of a second state (opacity applies along their edges).
-    pub ghost: Material,
+    /// The neighbouring motion, and that with ideal joints.
+    ghosts: [GhostLook; 2],
     /// Factor on all light.
     pub exposure: f32,
 }
@@ -131,11 +149,10 @@ impl Palette {
                     roughness: 0.15,
                     metal: 0.0,
                 },
-                ghost: Material {
-                    colour: Colour::hex(0x7B2FBE).with_opacity(0.85),
-                    roughness: 0.5,
-                    metal: 0.0,
-                },
+                ghosts: [
+                    twin(0x7B2FBE, 0.85, 0x5A189A),
+                    ideal(0xFFFFFF, 0.9, 0x2F4858),
+                ],
                 exposure: 1.0,
             },
             Theme::Dark => Self {
@@ -161,14 +178,18 @@ impl Palette {
                     roughness: 0.15,
                     metal: 0.0,
                 },
-                ghost: Material {
-                    colour: Colour::hex(0xC9A0FF).with_opacity(0.85),
-                    roughness: 0.5,
-                    metal: 0.0,
-                },
+                ghosts: [
+                    twin(0xC9A0FF, 0.85, 0xE0C3FF),
+                    ideal(0xFFFFFF, 0.5, 0xFFFFFF),
+                ],
                 exposure: 0.92,
             },
         }
+    }
+
+    /// How a ghost is drawn: violet the twin, pale the ideal.
+    pub const fn ghost(&self, which: Ghost) -> GhostLook {
+        self.ghosts[which as usize]
     }
 
     /// Surface of a shape by what it stands for; the same in both themes, so that a part keeps its colour.

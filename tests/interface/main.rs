@@ -9,5 +9,6 @@ mod frames;
 mod hands;
 mod headless_window;
 mod instrument;
+mod instruments;
 mod page;
 mod window;

@@ -954,11 +954,13 @@ fn recorded_channels_have_the_columns_of_a_run() {
             .sample(0.0, &mut frame);
         let table = Table::new(&scene, &frame);
         for channel in Channels::of(&scene).list() {
-            // A run has friction as a vector, energies instead of their changes, no live change that does work, and no hand that
-            // pulls.
+            // A run has friction as a vector, energies instead of their changes, no live change that does work, no hand that pulls,
+            // and no ghost.
             let in_other_words = ["change_work_J", "kinetic_change_J", "elastic_change_J"];
-            let own = channel.quantity == Quantity::FrictionForce
-                || in_other_words.contains(&channel.column())
+            let own = matches!(
+                channel.quantity,
+                Quantity::FrictionForce | Quantity::TipError
+            ) || in_other_words.contains(&channel.column())
                 || (channel.column() == "external_work_J" && scene.elements.is_empty());
             let there = table.names().iter().any(|name| name == channel.column());
             assert_eq!(there, !own, "{name}: {}", channel.column());

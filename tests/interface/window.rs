@@ -11,7 +11,7 @@ use jointplay::scene::Scene;
 use jointplay::simulate::Quantity;
 
 #[path = "../common/pixels.rs"]
-mod pixels;
+pub(crate) mod pixels;
 use pixels::{Picture, top};
 
 /// The wide window on `scene` at t = 0, paused.

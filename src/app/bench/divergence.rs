@@ -21,7 +21,7 @@ pub fn ui(ui: &mut Ui, player: &mut Player, problem: &mut Option<String>) {
             .add_enabled(moves, Checkbox::new(&mut on, "Twin run"))
             .on_hover_text(
                 "A second run from the present state, displaced by a billionth of the scales of its coordinates and \
-                 velocities, drawn as a ghost in the 3D view. The run itself does not change by a bit. Halves the speed.",
+                 velocities, drawn as a violet ghost in the 3D view. The run itself does not change by a bit. Halves the speed.",
             )
             .on_disabled_hover_text(
                 "The motion of this scene is a function of time alone: it has no neighbouring motions",

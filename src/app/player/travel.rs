@@ -5,6 +5,7 @@ use super::course::Course;
 use super::keyframes::Keyframe;
 use super::{FINEST_BIN, Player, sentences};
 use crate::app::log::{Entry, Event};
+use crate::app::paths::Paths;
 use crate::app::settled::Settling;
 use crate::scene::SceneError;
 use crate::simulate::{Bin, Effect, History, Pull};
@@ -209,6 +210,10 @@ impl Player {
         let now = self.simulation.time();
         self.stopped = None;
         self.unchanged = None;
+        if now > self.recorded_to {
+            // Nobody saw the way there.
+            self.paths = Paths::new(self.simulation.running_scene());
+        }
         self.recorded_to = now;
         let entries = self.log.entries[..self.applied].iter().rev();
         let mut schedules = entries.filter_map(|entry| entry.event.schedule());

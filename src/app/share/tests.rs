@@ -77,7 +77,7 @@ impl Chance {
             magnification: self.maybe(|c| 1.0 + 99.0 * c.unit() as f32),
             follow: self.maybe(|c| format!("joint.x{}x", c.text(6)).replace('\n', " ")),
             plots: self.maybe(|c| {
-                let one = Quantity::ALL[c.below(15) as usize];
+                let one = Quantity::ALL[c.below(16) as usize];
                 Quantity::ALL
                     .into_iter()
                     .filter(|q| c.below(3) == 0 || *q == one && c.below(2) == 0)

@@ -28,6 +28,7 @@ pub enum Quantity {
     Energy,
     EnergyBalance,
     ProbeError,
+    TipError,
 }
 
 /// What a plot says of its quantity.
@@ -132,6 +133,13 @@ const PLOTS: &[Plot] = &[
         label: "Probe error",
         unit: ("mm", 1e-3),
         help: "Probe tip minus the tip of the ideal mechanism at the same time.",
+    },
+    Plot {
+        quantity: Q::TipError,
+        label: "Tip error",
+        unit: ("µm", 1e-6),
+        help: "Distance of the output point (the probe tip, or the output body's origin) from where ideal joints have it at the \
+               same time. Recorded while the ideal ghost is on (key G).",
     },
 ];
 
@@ -354,6 +362,8 @@ pub(super) const TABLE: &[Signal] = &[
     plotted("elastic_change_J", Q::EnergyBalance, Taken("elastic", |ledger| ledger.elastic_change)),
     both("energy_residual_J", Q::EnergyBalance, 11, Given("residual", Ledger::residual)),
 
+    // Given by who computes the ideal motion beside the run.
+    plotted("tip_error_m", Q::TipError, Whole("distance", |_| f64::NAN)),
     both("probe_error_#_m", Q::ProbeError, 9, ProbeError),
 
     listed("@_force_#_N", 12, Element(|element| Some(element.force))),

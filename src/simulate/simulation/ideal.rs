@@ -133,23 +133,29 @@ impl Reference {
     }
 }
 
+/// `scene` with every ball joint closed, at the same drives and gravity, solved so closely that it can be a reference. It has no
+/// probe of its own.
+pub fn closed(scene: &Scene) -> Scene {
+    let mut ideal = scene.clone();
+    for joint in &mut ideal.ball_joints {
+        joint.contact.clearance = 0.0;
+    }
+    // Balls may start off-centre in their play.
+    ideal.start = StartRule::Ideal;
+    ideal.formulation = Formulation::Tree;
+    ideal.output.probe = None;
+    ideal.solver.preset = None;
+    ideal.solver.method = Method::DormandPrince5;
+    ideal.solver.tolerance = TOLERANCE;
+    ideal.solver.step = FIRST_STEP;
+    ideal.solver.energy_ledger = false;
+    ideal
+}
+
 impl IdealMotion {
     fn new(scene: &Scene, probe: Vec3) -> Result<Self, StartError> {
-        let mut ideal = scene.clone();
-        for joint in &mut ideal.ball_joints {
-            joint.contact.clearance = 0.0;
-        }
-        // Balls may start off-centre in their play.
-        ideal.start = StartRule::Ideal;
-        ideal.formulation = Formulation::Tree;
-        ideal.output.probe = None;
-        ideal.solver.preset = None;
-        ideal.solver.method = Method::DormandPrince5;
-        ideal.solver.tolerance = TOLERANCE;
-        ideal.solver.step = FIRST_STEP;
-        ideal.solver.energy_ledger = false;
         let mut motion = Self {
-            simulation: Simulation::new(&ideal)?,
+            simulation: Simulation::new(&closed(scene))?,
             body: scene.output.body,
             probe,
             frame: Frame::default(),

@@ -109,8 +109,8 @@ impl Simulation {
         Ok(Effect::Now)
     }
 
-    /// Gravity from now on, of a simulation that no change of a scene goes through.
-    pub(in crate::simulate) fn set_gravity(&mut self, gravity: crate::scene::Vec3) {
+    /// Gravity from now on, m/s^2, of a simulation that no change of a scene goes through.
+    pub fn set_gravity(&mut self, gravity: crate::scene::Vec3) {
         Arc::make_mut(&mut self.running).gravity = gravity;
         Arc::make_mut(&mut self.scene).gravity = gravity;
         self.mechanism.gravity = gravity;

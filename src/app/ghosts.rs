@@ -1,0 +1,73 @@
+//! The ghosts of the 3D view: the twin run and the ideal motion, and what is said of them.
+
+use eframe::egui::{RichText, Ui};
+
+use super::App;
+use super::player::Player;
+use super::value;
+use crate::view::{DrawList, Ghost, SceneView, Shot};
+
+/// Draws the ghosts of the instant on show over the list that was built of `shot`; a note on each.
+pub fn add(view: &SceneView, shot: &Shot<'_>, player: &Player, list: &mut DrawList) -> Vec<String> {
+    let mut notes = Vec::new();
+    let mut note = |ghost: &str, apart: bool| {
+        let near = if apart {
+            ""
+        } else {
+            ", less than a pixel away"
+        };
+        notes.push(format!("{ghost}{near}"));
+    };
+    let now = player.frame().time;
+    // One that starts at the end of the step on show has not started yet.
+    if let Some(twin) = player.twin().filter(|twin| twin.frame().time <= now) {
+        let apart = view.add_ghost(shot, twin.frame(), Ghost::Twin, list);
+        note("violet ghost: the twin run", apart);
+    }
+    let Some(ideal) = player.ideal() else {
+        return notes;
+    };
+    if let Some(frame) = ideal.frame(now) {
+        let apart = view.add_ghost(shot, frame, Ghost::Ideal, list);
+        view.add_output_error(shot, frame, list);
+        note("pale ghost: ideal joints", apart);
+        if let Some(error) = ideal.output_error(player.frame()) {
+            let length = value::quantity(error.norm(), "um", 4);
+            notes.push(format!("tip error {length}"));
+        }
+    } else if ideal.fault().is_some() {
+        notes.push("no ideal ghost: see View options".to_owned());
+    } else {
+        notes.push("ideal ghost on its way".to_owned());
+    }
+    notes
+}
+
+impl App {
+    /// Shows the ideal ghost, or no longer; says why where there is none.
+    pub fn show_ideal(&mut self, on: bool) {
+        self.player.set_ideal(on);
+        if let Some(fault) = self.player.ideal().and_then(|ideal| ideal.fault()) {
+            self.problem = Some(format!("No ideal ghost: {fault}"));
+        }
+    }
+
+    /// Its switch in the menu of the view.
+    pub(super) fn ideal_switch(&mut self, ui: &mut Ui) {
+        let mut on = self.player.ideal().is_some();
+        let help = "The same machine with every ball joint closed, at the same drives and gravity, drawn pale over the \
+                    run, and an arrow from its tip to the run's: the error of the play (key G). The plot Tip error records it. The \
+                    run itself does not change by a bit.";
+        if ui
+            .checkbox(&mut on, "Ideal ghost")
+            .on_hover_text(help)
+            .changed()
+        {
+            self.show_ideal(on);
+        }
+        if let Some(fault) = self.player.ideal().and_then(|ideal| ideal.fault()) {
+            let words = RichText::new(format!("No ideal ghost: {fault}")).small();
+            ui.label(words.color(ui.visuals().warn_fg_color));
+        }
+    }
+}

@@ -1,0 +1,417 @@
+//! The microscope: an inset over the 3D view that shows one ball joint so large that its play can be seen.
+
+mod draw;
+mod sight;
+
+use eframe::egui::{
+    self, ComboBox, Grid, Id, Rect, RichText, Role, ScrollArea, Sense, Ui, WidgetInfo, vec2,
+};
+use glam::Vec3;
+
+use super::player::Player;
+use super::{App, layout, value};
+use crate::simulate::ContactState;
+pub use draw::Circle;
+use draw::{Plane, Sheet};
+use sight::Sight;
+
+/// Least size of the inset, points.
+const LEAST: egui::Vec2 = vec2(190.0, 170.0);
+/// Width below which it opens only where there is no more room, points.
+const USUAL: f32 = 250.0;
+/// Height of the section of the contact, points.
+const SECTION: f32 = 112.0;
+/// From this width on, pictures and numbers stand side by side, points.
+const WIDE: f32 = 430.0;
+/// Width of the numbers beside the pictures, points.
+const NUMBERS: f32 = 215.0;
+/// Least reference of the arrow of velocity, m/s.
+const SLOWEST: f64 = 1e-4;
+
+/// The inset and its choices.
+#[derive(Default)]
+pub struct Microscope {
+    open: bool,
+    joint: usize,
+    plane: Plane,
+    circle: Option<Circle>,
+}
+
+impl Microscope {
+    /// Whether it is on show.
+    pub fn is_open(&self) -> bool {
+        self.open
+    }
+
+    /// Shows or closes it.
+    pub fn set_open(&mut self, open: bool) {
+        self.open = open;
+    }
+
+    /// The ball joint in focus, by index.
+    pub fn joint(&self) -> usize {
+        self.joint
+    }
+
+    /// Puts another ball joint into focus.
+    pub fn focus(&mut self, joint: usize) {
+        self.joint = joint;
+    }
+
+    /// Where the clearance was drawn last; `None` where nothing with clearance was.
+    pub fn circle(&self) -> Option<Circle> {
+        self.circle
+    }
+
+    /// The inset within `area`; `view`: world vectors to the right and up in the 3D view. Returns a joint that was chosen in
+    /// it.
+    fn ui(
+        &mut self,
+        ctx: &egui::Context,
+        area: Rect,
+        player: &Player,
+        view: [Vec3; 2],
+        enabled: bool,
+    ) -> Option<usize> {
+        self.circle = None;
+        if !self.open {
+            return None;
+        }
+        let size = vec2(
+            (0.42 * area.width()).clamp(USUAL.min(area.width()), 330.0),
+            (area.height() - 60.0).clamp(LEAST.y, 520.0),
+        );
+        let corner = area.right_top() + vec2(-size.x, 44.0);
+        let frame = egui::Frame::window(&ctx.global_style()).inner_margin(8.0);
+        let shown = egui::Window::new("Microscope")
+            .id(Id::unique("microscope"))
+            .enabled(enabled)
+            .title_bar(false)
+            .default_rect(Rect::from_min_size(corner, size))
+            .min_size(LEAST.min(area.size()))
+            .constrain_to(area)
+            .frame(frame)
+            .show(ctx, |ui| self.contents(ui, player, view));
+        shown.and_then(|shown| shown.inner).flatten()
+    }
+
+    fn contents(&mut self, ui: &mut Ui, player: &Player, view: [Vec3; 2]) -> Option<usize> {
+        let joints = &player.scene().ball_joints;
+        self.joint = self.joint.min(joints.len().saturating_sub(1));
+        let mut chosen = None;
+        ui.horizontal_wrapped(|ui| {
+            if ui.available_width() > 300.0 {
+                ui.label(RichText::new("Microscope").strong());
+            }
+            let name = joints.get(self.joint).map_or("", |joint| &joint.name);
+            ComboBox::from_id_salt("joint under the microscope")
+                .width(54.0)
+                .selected_text(name)
+                .show_ui(ui, |ui| {
+                    for (index, joint) in joints.iter().enumerate() {
+                        let on = index == self.joint;
+                        if ui.selectable_label(on, &joint.name).clicked() {
+                            chosen = Some(index);
+                        }
+                    }
+                })
+                .response
+                .on_hover_text("Ball joint in focus (a click on it, or keys 5 to 9)")
+                .accessible_name("Ball joint in focus");
+            ComboBox::from_id_salt("plane of the microscope")
+                .width(54.0)
+                .selected_text(self.plane.label())
+                .show_ui(ui, |ui| {
+                    for plane in Plane::ALL {
+                        ui.selectable_value(&mut self.plane, plane, plane.label());
+                    }
+                })
+                .response
+                .on_hover_text(
+                    "Plane of the picture, seen along its normal: as the 3D view, or that of two world axes",
+                )
+                .accessible_name("Plane of the microscope");
+            let close = ui.button("Close").on_hover_text("Esc, or key L");
+            if close.clicked() {
+                self.open = false;
+            }
+        });
+        self.joint = chosen.unwrap_or(self.joint);
+        let Some(sight) = Sight::of(player, self.joint) else {
+            ui.label("This scene has no ball joint");
+            return chosen;
+        };
+        let space = ui.available_size();
+        let axes = self.plane.axes(player.scene().view.down, view);
+        if space.x >= WIDE && space.x > space.y {
+            ui.horizontal_top(|ui| {
+                let side = (space.x - NUMBERS - 8.0).min(space.y).max(96.0);
+                self.sphere(ui, player, &sight, axes, vec2(side, side));
+                ui.vertical(|ui| {
+                    scrolled(ui, |ui| {
+                        section(ui, &sight);
+                        numbers(ui, player, &sight, axes);
+                    });
+                });
+            });
+        } else {
+            scrolled(ui, |ui| {
+                let width = ui.available_width();
+                let side = draw::side(vec2(width, space.y), 150.0);
+                self.sphere(ui, player, &sight, axes, vec2(width, side));
+                section(ui, &sight);
+                numbers(ui, player, &sight, axes);
+            });
+        }
+        chosen
+    }
+
+    /// The picture of the clearance sphere.
+    fn sphere(
+        &mut self,
+        ui: &mut Ui,
+        player: &Player,
+        sight: &Sight,
+        axes: [Vec3; 2],
+        size: egui::Vec2,
+    ) {
+        let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
+        let report = &sight.report;
+        let name = player.scene().ball_joints.get(self.joint);
+        let words = format!(
+            "Ball joint {} under the microscope. {}. Ball's centre {} from the socket's, clearance {}.",
+            name.map_or("", |joint| &joint.name),
+            sight.state(),
+            draw::length(report.eccentricity.norm(), 3),
+            draw::length(report.clearance, 3)
+        );
+        response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &words));
+        if report.state == ContactState::Ideal || report.clearance <= 0.0 {
+            draw::empty(
+                ui,
+                rect,
+                "An ideal joint has no clearance: there is no play to see",
+            );
+            return;
+        }
+        let now = player.pacer.shown();
+        let path = player.paths().between(self.joint, sight.since, now);
+        let approach = sight.impact.map_or(0.0, |impact| impact.approach_speed);
+        let fastest = sight.sliding.unwrap_or(sight.velocity).norm();
+        let speed = draw::round_up(approach.max(fastest).max(SLOWEST));
+        let sheet = Sheet::new(ui, rect, sight);
+        self.circle = Some(draw::sphere(&sheet, axes, path, now, speed));
+        response.on_hover_text(
+            "The circle is the clearance: the ball's centre cannot leave it but by what it presses into the wall. The \
+             path reaches back over the latest six impacts, the older the fainter, seen from the socket (of the first 12 \
+             ball joints). The dot is orange while the ball touches, with the wall and its normal where it does; the \
+             arrow is the velocity of the ball's centre, in contact that of sliding as friction reads it.",
+        );
+    }
+}
+
+fn scrolled(ui: &mut Ui, add: impl FnOnce(&mut Ui)) {
+    ScrollArea::vertical()
+        .id_salt("under the microscope")
+        .auto_shrink(false)
+        .show(ui, |ui| {
+            // Room for the scroll bar.
+            ui.set_max_width(ui.available_width() - 10.0);
+            add(ui);
+        });
+}
+
+/// The picture of the contact.
+fn section(ui: &mut Ui, sight: &Sight) {
+    let size = vec2(ui.available_width(), SECTION);
+    let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
+    let Some(patch) = &sight.patch else {
+        draw::empty(ui, rect, "No contact patch");
+        return;
+    };
+    let words = if patch.penetration > 0.0 {
+        let pressed = draw::length(patch.penetration, 3);
+        let radius = draw::length(patch.radius(), 3);
+        format!("Section of the contact: {pressed} deep, patch of radius {radius}")
+    } else {
+        let gap = draw::length(-patch.penetration, 3);
+        format!("Section of the contact: a gap of {gap}")
+    };
+    response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &words));
+    draw::section(&Sheet::new(ui, rect, sight), patch);
+    response.on_hover_text(
+        "Ball and wall as they would lie without pressing each other, about the point of contact: the gap grows as x²/2R, \
+         R = (r + c) r / c. What lies below the wall is taken up elastically over the patch, the thick line, of radius \
+         a = √(R δ) by Hertz. The scale follows the latest impact's depth.",
+    );
+}
+
+/// What the pictures show, in numbers and words.
+fn numbers(ui: &mut Ui, player: &Player, sight: &Sight, axes: [Vec3; 2]) {
+    const NONE: &str = "—";
+    let report = &sight.report;
+    ui.label(RichText::new(sight.state()).strong());
+    let speed = |si: f64| value::quantity(si, "m/s", 3);
+    let towards = crate::view::to_f32(&report.eccentricity).dot(axes[0].cross(axes[1]));
+    let (beside, pressed) = match &sight.patch {
+        Some(patch) if patch.penetration > 0.0 => {
+            (NONE.to_owned(), value::quantity(patch.penetration, "um", 3))
+        }
+        Some(patch) => (draw::length(-patch.penetration, 3), NONE.to_owned()),
+        None => (NONE.to_owned(), NONE.to_owned()),
+    };
+    let patch = sight.patch.filter(|patch| patch.penetration > 0.0);
+    let rows = [
+        (
+            "Eccentricity",
+            draw::length(report.eccentricity.norm(), 4),
+            "Distance of the ball's centre from the socket's",
+        ),
+        (
+            "Towards the eye",
+            draw::length(f64::from(towards), 3),
+            "The part of it that the picture does not show, along the line of sight",
+        ),
+        (
+            "Gap",
+            beside,
+            "Between ball and wall, where they are nearest",
+        ),
+        (
+            "Penetration",
+            pressed,
+            "How deep the ball presses into the wall",
+        ),
+        (
+            "Elastic patch",
+            patch.map_or(NONE.to_owned(), |patch| {
+                format!("radius {}", draw::length(patch.radius(), 3))
+            }),
+            "Radius of the contact patch by Hertz, a = √(R δ), R = (r + c) r / c",
+        ),
+        (
+            "Speed of approach",
+            if sight.normal.is_some() {
+                speed(report.penetration_rate)
+            } else {
+                NONE.to_owned()
+            },
+            "Rate at which the ball nears the wall now; negative while it leaves it",
+        ),
+        (
+            "Sliding",
+            sight.sliding.map_or(NONE.to_owned(), |v| speed(v.norm())),
+            "Sliding speed that the friction law reads",
+        ),
+        (
+            "Normal force",
+            value::quantity(report.normal_force.norm(), "N", 4),
+            "On the ball; of an ideal joint the whole reaction",
+        ),
+    ];
+    let given = |number: f64| value::number(number, 4);
+    let impact = sight.impact;
+    let of = |read: fn(&crate::simulate::Impact) -> String| {
+        impact.as_ref().map_or(NONE.to_owned(), read)
+    };
+    let now = player.pacer.shown();
+    let ago = impact.map_or(NONE.to_owned(), |impact| {
+        format!("{} ago", value::time(now - impact.end))
+    });
+    let latest = [
+        ("Latest impact", ago, "When its contact ended"),
+        (
+            "Struck with",
+            of(|impact| value::quantity(impact.approach_speed, "m/s", 4)),
+            "Speed of approach when the latest impact began",
+        ),
+        (
+            "Left with",
+            of(|impact| value::quantity(impact.separation_speed, "m/s", 4)),
+            "Speed of separation when it ended",
+        ),
+        (
+            "Deepest",
+            of(|impact| value::quantity(impact.deepest, "um", 3)),
+            "Its deepest penetration",
+        ),
+        (
+            "Restitution asked",
+            impact.map_or(NONE.to_owned(), |impact| given(impact.asked)),
+            "Coefficient of restitution that the joint asks for",
+        ),
+        (
+            "By its law",
+            impact.map_or(NONE.to_owned(), |impact| given(impact.law)),
+            "Restitution that the normal-force law gives an undisturbed impact",
+        ),
+        (
+            "Given",
+            impact.map_or(NONE.to_owned(), |impact| given(impact.given())),
+            "Speed of separation over speed of approach of the latest impact",
+        ),
+    ];
+    Grid::new("numbers under the microscope")
+        .num_columns(2)
+        .spacing([10.0, 2.0])
+        .min_row_height(16.0)
+        .show(ui, |ui| {
+            for (name, number, help) in rows.into_iter().chain(latest) {
+                let label = ui.label(RichText::new(name).small().weak());
+                label.on_hover_text(help);
+                ui.label(RichText::new(number).small());
+                ui.end_row();
+            }
+        });
+    let remark = match impact {
+        Some(impact) if impact.floored => {
+            "It began slower than impact_speed_floor: it rebounds higher than asked"
+        }
+        Some(impact) if impact.disturbed => {
+            "Another joint touched meanwhile, or a change came: its restitution is not the law's alone"
+        }
+        _ => "",
+    };
+    layout::reserved(ui, "remark under the microscope", 3, |ui| {
+        ui.label(RichText::new(remark).small());
+    });
+}
+
+impl App {
+    /// The microscope.
+    pub fn microscope(&self) -> &Microscope {
+        &self.microscope
+    }
+
+    /// Puts ball joint `joint` into focus where the scene has it: the view follows its centre.
+    pub(super) fn focus(&mut self, joint: usize) {
+        self.microscope.focus(joint);
+        self.viewport.centre(&self.player, joint);
+    }
+
+    /// The inset, over the part `area` of the window.
+    pub(super) fn inset(&mut self, ui: &Ui, area: Rect) {
+        if let Some(joint) = self.viewport.take_clicked() {
+            self.focus(joint);
+            self.microscope.set_open(true);
+        }
+        let view = self.viewport.across();
+        let enabled = self.dialog.is_none();
+        let (player, ctx) = (&self.player, ui.ctx());
+        let chosen = self.microscope.ui(ctx, area, player, view, enabled);
+        if let Some(joint) = chosen {
+            self.focus(joint);
+        }
+    }
+
+    /// What the menu of the view switches on beside it.
+    pub(super) fn instruments(&mut self, ui: &mut Ui) {
+        ui.add_space(4.0);
+        ui.label("Instruments");
+        ui.checkbox(&mut self.microscope.open, "Microscope")
+            .on_hover_text(
+                "An inset with the play of the joint in focus: path of the ball, contact, impacts (key L)",
+            );
+        self.ideal_switch(ui);
+    }
+}

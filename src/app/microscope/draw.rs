@@ -1,0 +1,379 @@
+//! The pictures of the microscope: the clearance sphere in a plane, and the contact in section.
+
+use eframe::egui::{
+    Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, Ui, Vec2, pos2, vec2,
+};
+use glam::Vec3;
+
+use super::sight::{Patch, Sight};
+use crate::app::overlay::{colour, text};
+use crate::app::paths::Point;
+use crate::app::value;
+use crate::scene::SignedAxis;
+use crate::view::{Palette, Theme, to_f32};
+
+/// Radius of the clearance circle, in sides of the picture.
+const CIRCLE: f32 = 0.39;
+/// Radius of the mark of the ball's centre, points.
+const CENTRE: f32 = 4.5;
+/// Length of the arrow of the reference speed, points.
+const ARROW: f32 = 40.0;
+/// Points of the path that lie closer on the screen are one, points.
+const APART: f32 = 0.8;
+/// Least scale of the section, m: penetrations of some micrometres are usual.
+const SHALLOWEST: f64 = 0.5e-6;
+
+/// The plane that the picture shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Plane {
+    /// That of the screen.
+    #[default]
+    View,
+    /// Of two world axes.
+    Xy,
+    /// See [`Self::Xy`].
+    Yz,
+    /// See [`Self::Xy`].
+    Zx,
+}
+
+impl Plane {
+    pub const ALL: [Self; 4] = [Self::View, Self::Xy, Self::Yz, Self::Zx];
+
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::View => "View",
+            Self::Xy => "XY",
+            Self::Yz => "YZ",
+            Self::Zx => "ZX",
+        }
+    }
+
+    /// World vectors that run to the right and up in the picture; `view`: those of the 3D view. What is down in the scene is
+    /// down in the picture where that is possible.
+    pub fn axes(self, down: SignedAxis, view: [Vec3; 2]) -> [Vec3; 2] {
+        let [first, second] = match self {
+            Self::View => return view,
+            Self::Xy => [Vec3::X, Vec3::Y],
+            Self::Yz => [Vec3::Y, Vec3::Z],
+            Self::Zx => [Vec3::Z, Vec3::X],
+        };
+        let down = to_f32(&down.unit());
+        if first.dot(down) != 0.0 {
+            [second, -down]
+        } else if second.dot(down) != 0.0 {
+            [first, -down]
+        } else {
+            [first, second]
+        }
+    }
+}
+
+/// 1, 2 or 5 times a power of ten, at most `value` > 0.
+fn round_down(value: f64) -> f64 {
+    let power = 10_f64.powf(value.log10().floor());
+    let steps = [5.0, 2.0, 1.0].map(|step| step * power);
+    let fits = steps.into_iter().find(|step| *step <= value * 1.000_001);
+    fits.unwrap_or(power)
+}
+
+/// The same, at least `value`.
+pub fn round_up(value: f64) -> f64 {
+    let below = round_down(value);
+    let leading = (below / 10_f64.powf(below.log10().floor())).round();
+    match leading {
+        _ if below >= value => below,
+        2.0 => 2.5 * below,
+        _ => 2.0 * below,
+    }
+}
+
+/// A length for a person.
+pub fn length(si: f64, digits: usize) -> String {
+    let unit = if si.abs() < 9.9995e-6 { "um" } else { "mm" };
+    value::quantity(si, unit, digits)
+}
+
+/// Where a picture is, and its colours.
+pub struct Sheet<'a> {
+    painter: Painter,
+    rect: Rect,
+    palette: Palette,
+    ink: Color32,
+    faint: Color32,
+    ground: Color32,
+    sight: &'a Sight,
+}
+
+impl<'a> Sheet<'a> {
+    pub fn new(ui: &Ui, rect: Rect, sight: &'a Sight) -> Self {
+        let dark = ui.visuals().dark_mode;
+        let theme = if dark { Theme::Dark } else { Theme::Light };
+        let sheet = Self {
+            painter: ui.painter_at(rect),
+            rect,
+            palette: Palette::of(theme),
+            ink: ui.visuals().text_color(),
+            faint: ui.visuals().weak_text_color(),
+            ground: ui.visuals().extreme_bg_color,
+            sight,
+        };
+        sheet.painter.rect_filled(rect, 4.0, sheet.ground);
+        sheet
+    }
+
+    fn words(&self, at: Pos2, anchor: Align2, words: &str, ink: Color32) -> Rect {
+        text(&self.painter, at, anchor, words, 11.0, ink, self.ground)
+    }
+
+    /// A scale bar with its length, its right end at `end`.
+    fn bar(&self, end: Pos2, points: f32, words: &str) {
+        let stroke = Stroke::new(1.5, self.ink);
+        let start = end - vec2(points, 0.0);
+        self.painter.line_segment([start, end], stroke);
+        for at in [start, end] {
+            let tick = vec2(0.0, 3.5);
+            self.painter.line_segment([at - tick, at + tick], stroke);
+        }
+        let middle = start.lerp(end, 0.5) - vec2(0.0, 3.0);
+        self.words(middle, Align2::CENTER_BOTTOM, words, self.ink);
+    }
+}
+
+/// Centre and radius of the circle, points of the screen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Circle {
+    /// Where the socket's centre is.
+    pub centre: Pos2,
+    /// Of the clearance.
+    pub radius: f32,
+}
+
+/// The clearance sphere along the line of sight of a plane: path and centre of the ball, contact, velocity, scale. `axes` run
+/// to the right and up; `speed` is what the arrow of the ruler stands for, m/s.
+pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, speed: f64) -> Circle {
+    let Sheet {
+        painter,
+        rect,
+        palette,
+        sight,
+        ..
+    } = sheet;
+    let report = &sight.report;
+    let circle = Circle {
+        centre: rect.center(),
+        radius: CIRCLE * rect.size().min_elem(),
+    };
+    let clearance = report.clearance as f32;
+    let scale = circle.radius / clearance;
+    let flat = |v: Vec3| vec2(v.dot(axes[0]), -v.dot(axes[1]));
+
+    let hair = Stroke::new(1.0, sheet.faint.gamma_multiply(0.5));
+    for reach in [vec2(1.0, 0.0), vec2(0.0, 1.0)] {
+        let end = reach * circle.radius;
+        painter.line_segment([circle.centre - end, circle.centre + end], hair);
+    }
+    painter.circle_stroke(
+        circle.centre,
+        circle.radius,
+        Stroke::new(1.5, colour(palette.socket.colour.with_opacity(0.9))),
+    );
+
+    let place = |v: Vec3| circle.centre + flat(v) * scale;
+    let young = colour(palette.trail);
+    let old = sheet.faint.gamma_multiply(0.45);
+    let start = path.first().map_or(now, |point| point.time);
+    let age = (now - start).max(f64::MIN_POSITIVE);
+    let column = |i: usize| to_f32(&sight.carrier.column(i).into_owned());
+    let carrier = glam::Mat3::from_cols(column(0), column(1), column(2));
+    let here = place(to_f32(&report.eccentricity));
+    let mut before: Option<Pos2> = None;
+    for point in path {
+        let at = place(carrier * Vec3::from_array(point.place));
+        if let Some(from) = before {
+            if from.distance(at) < APART {
+                continue;
+            }
+            let share = ((point.time - start) / age) as f32;
+            let stroke = Stroke::new(1.2 + 0.6 * share, old.lerp_to_gamma(young, share));
+            painter.line_segment([from, at], stroke);
+        }
+        before = Some(at);
+    }
+    if let Some(from) = before {
+        painter.line_segment([from, here], Stroke::new(1.8, young));
+    }
+
+    let touches = sight.sliding.is_some();
+    let contact = colour(palette.normal);
+    if let (true, Some(normal)) = (touches, sight.normal) {
+        // The wall of the ball's centre is the clearance sphere: it touches there, and the normal leaves it there.
+        let normal = to_f32(&normal);
+        let foot = place(normal * clearance);
+        let out = flat(normal);
+        painter.line_segment([foot, foot + out * 22.0], Stroke::new(2.0, contact));
+        let across = vec2(-out.y, out.x) * 9.0;
+        painter.line_segment([foot - across, foot + across], Stroke::new(2.0, contact));
+    }
+    let moving = colour(palette.friction);
+    let velocity = to_f32(&sight.sliding.unwrap_or(sight.velocity));
+    let arrow = flat(velocity) * (ARROW / speed as f32);
+    if arrow.length() > 2.0 {
+        painter.arrow(here, arrow, Stroke::new(2.0, moving));
+    }
+    let fill = if touches { contact } else { sheet.ink };
+    painter.circle(here, CENTRE, fill, Stroke::new(1.5, sheet.ground));
+
+    triad(sheet, axes);
+    let bar = round_down(f64::from(clearance) * 0.9);
+    let end = pos2(rect.right() - 10.0, rect.bottom() - 9.0);
+    sheet.bar(end, bar as f32 * scale, &length(bar, 3));
+    let ruler = pos2(rect.left() + 10.0, rect.top() + 12.0);
+    painter.arrow(ruler, vec2(ARROW, 0.0), Stroke::new(2.0, moving));
+    let words = value::quantity(speed, "m/s", 3);
+    let beside = ruler + vec2(ARROW + 6.0, 0.0);
+    sheet.words(beside, Align2::LEFT_CENTER, &words, moving);
+    if path.len() > 1 {
+        let words = format!("path of {}", value::quantity(now - start, "ms", 3));
+        let below = ruler + vec2(0.0, 9.0);
+        sheet.words(below, Align2::LEFT_TOP, &words, young);
+    }
+    circle
+}
+
+/// The world axes as they lie in the picture, in its lower left corner.
+fn triad(sheet: &Sheet<'_>, axes: [Vec3; 2]) {
+    const LENGTH: f32 = 22.0;
+    let origin = pos2(sheet.rect.left() + 34.0, sheet.rect.bottom() - 34.0);
+    for (i, axis) in Vec3::AXES.into_iter().enumerate() {
+        let along = vec2(axis.dot(axes[0]), -axis.dot(axes[1])) * LENGTH;
+        if along.length() < 0.15 * LENGTH {
+            continue;
+        }
+        let ink = colour(sheet.palette.axes[i]);
+        sheet.painter.arrow(origin, along, Stroke::new(1.5, ink));
+        let beyond = origin + along + along.normalized() * 8.0;
+        sheet.words(beyond, Align2::CENTER_CENTER, ["X", "Y", "Z"][i], ink);
+    }
+}
+
+/// Ball and wall about the point of contact in section, as they would be without each other: what lies below the wall's line is
+/// pressed in, elastically, over the patch. Depths are drawn larger than widths, and it says how much.
+pub fn section(sheet: &Sheet<'_>, patch: &Patch) {
+    let Sheet {
+        painter,
+        rect,
+        palette,
+        ..
+    } = sheet;
+    let depth = round_up(1.1 * patch.penetration.max(patch.deepest).max(SHALLOWEST));
+    let radius = patch.effective_radius;
+    let half = 1.3 * (2.0 * radius * depth).sqrt();
+    let wide = f64::from(rect.width()) / (2.0 * half);
+    let wall = rect.top() + 0.55 * rect.height();
+    let deep = 0.36 * f64::from(rect.height()) / depth;
+    let middle = f64::from(rect.center().x);
+    let ball = |x: f64| {
+        let below = (patch.penetration - x * x / (2.0 * radius)) * deep;
+        pos2((middle + x * wide) as f32, wall + below as f32)
+    };
+    let steps = 48;
+    let points: Vec<Pos2> = (0..=steps)
+        .map(|i| ball(half * (2.0 * f64::from(i) / f64::from(steps) - 1.0)))
+        .collect();
+    let contact = colour(palette.normal);
+    for pair in points.windows(2) {
+        if pair[0].y.max(pair[1].y) > wall {
+            let [a, b] = [pair[0], pair[1]].map(|p| pos2(p.x, p.y.max(wall)));
+            let corners = vec![pos2(a.x, wall), pos2(b.x, wall), b, a];
+            let fill = contact.gamma_multiply(0.25);
+            painter.add(Shape::convex_polygon(corners, fill, Stroke::NONE));
+        }
+    }
+    let blue = colour(palette.socket.colour.with_opacity(0.9));
+    painter.hline(rect.x_range(), wall, Stroke::new(1.5, blue));
+    painter.line(points, Stroke::new(1.5, sheet.ink));
+    let patched = (patch.radius() * wide) as f32;
+    if patched > 0.0 {
+        let centre = pos2(rect.center().x, wall);
+        let reach = vec2(patched, 0.0);
+        let stroke = Stroke::new(3.5, contact);
+        painter.line_segment([centre - reach, centre + reach], stroke);
+    }
+    let above = pos2(rect.center().x, rect.top() + 5.0);
+    sheet.words(above, Align2::CENTER_TOP, "ball", sheet.ink);
+    let below = pos2(rect.left() + 8.0, wall + 3.0);
+    sheet.words(below, Align2::LEFT_TOP, "wall", blue);
+    let times = value::number(deep / wide, 2);
+    let words = format!("depths ×{times}");
+    let right = rect.right_top() + vec2(-8.0, 5.0);
+    sheet.words(right, Align2::RIGHT_TOP, &words, sheet.faint);
+    let bar = round_down(0.5 * half);
+    let end = pos2(rect.right() - 10.0, rect.bottom() - 8.0);
+    sheet.bar(end, (bar * wide) as f32, &length(bar, 3));
+    // Upright, at the left edge, from the wall's line down.
+    let down = round_down(depth);
+    let stroke = Stroke::new(1.5, sheet.ink);
+    let top = pos2(rect.left() + 48.0, wall);
+    let foot = top + vec2(0.0, (down * deep) as f32);
+    painter.line_segment([top, foot], stroke);
+    for at in [top, foot] {
+        painter.line_segment([at - vec2(3.5, 0.0), at + vec2(3.5, 0.0)], stroke);
+    }
+    let beside = Pos2::lerp(&top, foot, 0.5) + vec2(6.0, 0.0);
+    let words = length(down, 3);
+    sheet.words(beside, Align2::LEFT_CENTER, &words, sheet.ink);
+}
+
+/// Words in the middle of an empty picture.
+pub fn empty(ui: &Ui, rect: Rect, words: &str) {
+    ui.painter()
+        .rect_filled(rect, 4.0, ui.visuals().extreme_bg_color);
+    let font = FontId::proportional(12.0);
+    let ink = ui.visuals().weak_text_color();
+    let width = (rect.width() - 16.0).max(40.0);
+    let galley = ui.painter().layout(words.to_owned(), font, ink, width);
+    let at = Align2::CENTER_CENTER.align_size_within_rect(galley.size(), rect);
+    ui.painter().galley(at.min, galley, ink);
+}
+
+/// Sides of the picture in a place so large: as large as it can be with `below` points left for what stands under it.
+pub fn side(space: Vec2, below: f32) -> f32 {
+    space.x.min((space.y - below).max(0.55 * space.y)).max(96.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scales_are_round() {
+        for (value, down, up) in [
+            (0.27e-3, 0.2e-3, 0.5e-3),
+            (0.5e-3, 0.5e-3, 0.5e-3),
+            (3.1e-6, 2e-6, 5e-6),
+            (6.0, 5.0, 10.0),
+            (1.2, 1.0, 2.0),
+        ] {
+            assert!((round_down(value) / down - 1.0).abs() < 1e-9, "{value}");
+            assert!((round_up(value) / up - 1.0).abs() < 1e-9, "{value}");
+        }
+        assert_eq!(length(0.2e-3, 3), "0.2 mm");
+        assert_eq!(length(2e-6, 3), "2 µm");
+    }
+
+    #[test]
+    fn what_is_down_in_the_scene_is_down_in_the_plane() {
+        for down in [SignedAxis::PlusX, SignedAxis::MinusZ, SignedAxis::PlusY] {
+            for plane in [Plane::Xy, Plane::Yz, Plane::Zx] {
+                let [right, up] = plane.axes(down, [Vec3::X, Vec3::Y]);
+                assert_eq!(right.dot(up), 0.0);
+                let down = to_f32(&down.unit());
+                let within = right.cross(up).dot(down) == 0.0;
+                assert_eq!(up.dot(down), if within { -1.0 } else { 0.0 });
+            }
+        }
+        let view = [Vec3::Z, Vec3::Y];
+        assert_eq!(Plane::View.axes(SignedAxis::PlusX, view), view);
+    }
+}

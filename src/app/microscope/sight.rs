@@ -1,0 +1,205 @@
+//! What the microscope shows of one ball joint: read from the instant on show and from what the run recorded, none of it a
+//! force of its own.
+
+use crate::app::paths::axes_of;
+use crate::app::player::Player;
+use crate::contact::Coefficients;
+use crate::scene::{Attachment, Mat3, Vec3};
+use crate::simulate::{ContactState, Frame, Impact, JointReport};
+
+/// Impacts over which the path reaches back.
+pub const IMPACTS: usize = 6;
+
+/// One ball joint at the instant on show. SI units, world axes.
+pub struct Sight {
+    /// What the step reported.
+    pub report: JointReport,
+    /// Axes of the socket's body as columns.
+    pub carrier: Mat3,
+    /// n = e/|e| (8); `None` where the centres coincide.
+    pub normal: Option<Vec3>,
+    /// Velocity of the ball's centre from the socket's, de/dt, m/s.
+    pub velocity: Vec3,
+    /// Sliding velocity of the ball that friction reads, m/s; `None` out of contact.
+    pub sliding: Option<Vec3>,
+    /// What presses; `None` in an ideal joint.
+    pub patch: Option<Patch>,
+    /// The latest impact that is over.
+    pub impact: Option<Impact>,
+    /// From when on the path is shown, s.
+    pub since: f64,
+}
+
+/// Ball and wall near the point of contact: a gap that grows as x²/(2 R) from there, R the effective radius.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Patch {
+    /// R = (r + c) r / c, m: 1/R is the difference of both curvatures.
+    pub effective_radius: f64,
+    /// delta, m; below zero a gap.
+    pub penetration: f64,
+    /// Deepest penetration of the latest impact, m; 0 without one.
+    pub deepest: f64,
+}
+
+impl Patch {
+    /// Radius of the elastic contact patch by Hertz, a = sqrt(R delta), m; 0 out of contact.
+    pub fn radius(&self) -> f64 {
+        (self.effective_radius * self.penetration.max(0.0)).sqrt()
+    }
+}
+
+/// Velocity of an attachment's point, m/s; the world's rest.
+fn velocity_of(frame: &Frame, at: &Attachment) -> (Vec3, Vec3) {
+    let motion = at.body.and_then(|body| frame.bodies.get(body));
+    motion.map_or((Vec3::zeros(), Vec3::zeros()), |motion| {
+        let spin = motion.angular_velocity;
+        let arm = motion.rotation * at.point;
+        (motion.velocity + spin.cross(&arm), spin)
+    })
+}
+
+impl Sight {
+    /// Of ball joint `joint`; `None` where the scene has no such joint.
+    pub fn of(player: &Player, joint: usize) -> Option<Self> {
+        let (frame, shown) = (player.frame(), player.pacer.shown());
+        let spec = player.scene().ball_joints.get(joint)?;
+        let report = *frame.joints.get(joint)?;
+        let distance = report.eccentricity.norm();
+        let ideal = report.state == ContactState::Ideal;
+        let normal = (distance > 0.0 && !ideal).then(|| report.eccentricity / distance);
+        let (ball, ball_spin) = velocity_of(frame, &spec.ball);
+        let (socket, socket_spin) = velocity_of(frame, &spec.socket);
+        let velocity = ball - socket;
+        let touches = matches!(report.state, ContactState::Stick | ContactState::Slip);
+        let sliding = normal.filter(|_| touches).map(|normal| {
+            let law = Coefficients::new(&spec.contact, report.clearance);
+            let gap = law.separation(&report.eccentricity, &velocity);
+            let read = law.friction_reads(&normal, &velocity, &ball_spin, &socket_spin);
+            law.sliding(&gap, &read)
+        });
+        // What the run has computed beyond the instant on show is not told.
+        let mut over = player
+            .simulation()
+            .impacts()
+            .rev()
+            .filter(|impact| impact.joint == joint && impact.end <= shown);
+        let impact = over.next().copied();
+        let first = over.nth(IMPACTS - 2);
+        let since = first.map_or(f64::NEG_INFINITY, |impact| impact.start);
+        let (radius, clearance) = (spec.contact.ball_radius, report.clearance);
+        let patch = (!ideal && clearance > 0.0).then(|| Patch {
+            effective_radius: (radius + clearance) * radius / clearance,
+            penetration: report.penetration,
+            deepest: impact.map_or(0.0, |impact| impact.deepest),
+        });
+        Some(Self {
+            carrier: axes_of(frame, spec.socket.body),
+            report,
+            normal,
+            velocity,
+            sliding,
+            patch,
+            impact,
+            since,
+        })
+    }
+
+    /// What the contact does, in words.
+    pub fn state(&self) -> &'static str {
+        match self.report.state {
+            ContactState::Free => "The ball touches nothing",
+            ContactState::Stick => "In contact, sticking",
+            ContactState::Slip => "In contact, sliding",
+            ContactState::Ideal => "Ideal joint: no clearance",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Scene;
+
+    fn player(scene: &str, changes: &[(&str, &str)]) -> Player {
+        let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
+        let changes: Vec<(String, String)> = changes.iter().map(own).collect();
+        let scene = Scene::load(scene, &changes).expect("built in");
+        Player::new(&scene).expect("starts")
+    }
+
+    #[test]
+    fn the_sliding_velocity_is_the_one_that_friction_read() {
+        for velocity in ["centres", "surface", "printed"] {
+            let mut player = player("pendulum", &[("contact.friction_velocity", velocity)]);
+            let mut compared = 0;
+            for _ in 0..4000 {
+                player.single_step();
+                let sight = Sight::of(&player, 0).expect("has a joint");
+                let rate = sight
+                    .normal
+                    .map_or(0.0, |normal| normal.dot(&sight.velocity));
+                let reported = sight.report.penetration_rate;
+                assert!((rate - reported).abs() < 1e-12 + 1e-9 * sight.velocity.norm());
+                // The law reads none where its normal force is cut at zero.
+                let presses = sight.report.normal_force.norm() > 0.0;
+                let Some(sliding) = sight.sliding.filter(|_| presses) else {
+                    continue;
+                };
+                let read = sight.report.slip_speed;
+                assert!(
+                    (sliding.norm() - read).abs() < 1e-12 + 1e-9 * read,
+                    "{velocity}: {sliding} {read}"
+                );
+                // Friction pushes the ball against it; near the speed below which there is none, its law is continued.
+                let friction = sight.report.friction_force;
+                assert!(read < 1e-5 || friction.dot(&sliding) < 0.0);
+                compared += 1;
+            }
+            assert!(compared > 200, "{velocity}: {compared}");
+        }
+    }
+
+    #[test]
+    fn an_impact_is_told_once_it_is_over_and_forgotten_with_its_future() {
+        let mut player = player("spcmm", &[]);
+        let (mut before, mut ends) = (None, Vec::new());
+        while ends.len() < 3 {
+            player.single_step();
+            let sight = Sight::of(&player, 0).expect("has a joint");
+            if let Some(impact) = sight.impact.filter(|_| sight.impact != before) {
+                assert!(impact.end <= player.pacer.shown() && impact.joint == 0);
+                ends.push(impact);
+                before = sight.impact;
+            }
+        }
+        // The first impact of S1 in `physics.md`.
+        assert!((ends[0].start - 7.801_422_908e-3).abs() < 1e-6);
+        assert!((ends[0].approach_speed - 0.076_909).abs() < 1e-4);
+        let given = ends[0].separation_speed / ends[0].approach_speed;
+        assert!((ends[0].given() - given).abs() < 1e-15 && ends[0].asked == 0.9);
+        player.step_back();
+        let sight = Sight::of(&player, 0).expect("has a joint");
+        assert_eq!(sight.impact, Some(ends[1]));
+        assert_eq!(sight.since, f64::NEG_INFINITY, "fewer than are shown");
+    }
+
+    #[test]
+    fn the_patch_carries_the_force_of_its_penetration() {
+        // Hertz: F = 4/3 E* a³ / R, E* = E / (2 (1 - nu²)); the scene's law without damping is the same number.
+        let player = player("spcmm", &[]);
+        let contact = player.scene().ball_joints[0].contact;
+        let sight = Sight::of(&player, 0).expect("has a joint");
+        let patch = Patch {
+            penetration: 3e-6,
+            ..sight.patch.expect("has clearance")
+        };
+        let modulus = contact.youngs_modulus / (2.0 * (1.0 - contact.poisson_ratio.powi(2)));
+        let force = 4.0 / 3.0 * modulus * patch.radius().powi(3) / patch.effective_radius;
+        let law = Coefficients::new(&contact, contact.clearance);
+        assert!((force / law.normal_force(3e-6, 0.0, 1.0) - 1.0).abs() < 1e-12);
+        assert_eq!(patch.radius(), (patch.effective_radius * 3e-6).sqrt());
+        let ideal = super::tests::player("spcmm", &[("contact.clearance", "0")]);
+        let sight = Sight::of(&ideal, 0).expect("has a joint");
+        assert!(sight.patch.is_none() && sight.normal.is_none() && sight.impact.is_none());
+    }
+}

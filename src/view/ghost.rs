@@ -1,0 +1,133 @@
+//! Ghosts: other states of the machine, drawn translucent and outlined before it.
+
+use glam::{Mat3, Vec3};
+
+use super::arrows::push_error;
+use super::build::push_solid;
+use super::instances::placed;
+use super::theme::Material;
+use super::{Colour, DrawList, Mesh, Palette, SceneView, Shot, drawn, to_f32};
+use crate::scene::{Output, format_quantity_digits};
+use crate::simulate::Frame;
+
+/// Which other state a ghost is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ghost {
+    /// The neighbouring motion.
+    Twin,
+    /// Every ball joint closed.
+    Ideal,
+}
+
+/// How a ghost is drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GhostLook {
+    /// Of its surfaces; opacity applies along their edges.
+    pub fill: Colour,
+    /// Of its outline.
+    pub edge: Colour,
+    /// Of the outline, points. That of the farther slice is wider: it is seen around the nearer.
+    pub width: f32,
+    /// Slice of depth that it is drawn in: 0 lies before 1, and both before the machine, so that no two take turns.
+    pub slice: f32,
+}
+
+impl GhostLook {
+    /// Surface and outline, seen so far, 0 to 1; a pixel has so many points.
+    fn materials(&self, seen: f32, pixels_per_point: f32) -> [Material; 2] {
+        let material = |colour: Colour| Material {
+            colour: colour.with_opacity(seen * colour.0[3]),
+            // See `Instance`.
+            roughness: self.width * pixels_per_point,
+            metal: self.slice,
+        };
+        [material(self.fill), material(self.edge)]
+    }
+}
+
+/// The output point of a scene in `frame`, m: its probe tip, or its output body's origin.
+pub fn output_point(output: &Output, frame: &Frame) -> Option<crate::scene::Vec3> {
+    let body = frame.bodies.get(output.body)?;
+    let arm = output
+        .probe
+        .map_or_else(crate::scene::Vec3::zeros, |probe| body.rotation * probe);
+    Some(body.position + arm)
+}
+
+impl SceneView {
+    /// Adds the moving parts as they stand in `ghost`, another state of the scene of `shot`, to the list that was built of
+    /// it, each the clearer the farther it stands from its place there; whether any differs by a pixel or more.
+    pub fn add_ghost(
+        &self,
+        shot: &Shot<'_>,
+        ghost: &Frame,
+        which: Ghost,
+        out: &mut DrawList,
+    ) -> bool {
+        let look = Palette::of(shot.options.theme).ghost(which);
+        let at = |frame| drawn::joints(shot.scene, frame, out.magnification);
+        let (here, there) = (at(shot.frame), at(ghost));
+        let (eye, back) = (shot.camera.eye(), shot.camera.axes().2);
+        let target = shot.camera.metres_per_pixel(shot.size) / shot.camera.distance;
+        // From one pixel to three.
+        let materials = |from: Vec3, to: Vec3| {
+            let pixel = target * (eye - to).dot(back);
+            let seen = (from.distance(to) / pixel / shot.pixels_per_point - 0.5) / 2.5;
+            let seen = seen.clamp(0.0, 1.0);
+            (pixel > 0.0 && seen > 0.0).then(|| look.materials(seen, shot.pixels_per_point))
+        };
+        let mut differs = false;
+        for part in self.parts.iter().filter(|part| part.body.is_some()) {
+            let (from, to) = (part.place(shot.frame, &here), part.place(ghost, &there));
+            let (mut starts, mut farthest) = (Vec::new(), (0.0, Vec3::ZERO, Vec3::ZERO));
+            from.extent(|point, _| starts.push(point));
+            let mut starts = starts.into_iter();
+            to.extent(|point, _| {
+                let start = starts.next().unwrap_or(point);
+                if start.distance(point) > farthest.0 {
+                    farthest = (start.distance(point), start, point);
+                }
+            });
+            if let Some([fill, edge]) = materials(farthest.1, farthest.2) {
+                push_solid(&mut out.ghost, &to, fill);
+                push_solid(&mut out.ghost_edges, &to, edge);
+                differs = true;
+            }
+        }
+        for (from, to) in here.iter().zip(&there) {
+            if let Some([fill, edge]) = materials(from.ball_centre, to.ball_centre) {
+                let size = Mat3::from_diagonal(Vec3::splat(to.ball_radius));
+                let ball = |material| placed(size, to.ball_centre, material);
+                out.ghost.push(Mesh::Sphere, ball(fill));
+                out.ghost_edges.push(Mesh::Sphere, ball(edge));
+                differs = true;
+            }
+        }
+        differs
+    }
+
+    /// Adds the arrow of the error of the output point, from where `ideal` has it: as much larger than it is as the play is
+    /// drawn, unless that does not fit. Its label gives its length and, where it is drawn larger, by how much.
+    pub fn add_output_error(&self, shot: &Shot<'_>, ideal: &Frame, out: &mut DrawList) {
+        let output = &shot.scene.output;
+        let (Some(from), Some(to)) = (
+            output_point(output, ideal),
+            output_point(output, shot.frame),
+        ) else {
+            return;
+        };
+        let error = to - from;
+        let fits = 0.5 * self.bounds().radius / (error.norm() as f32).max(f32::MIN_POSITIVE);
+        let times = out.magnification.min(fits).max(1.0);
+        let length = format_quantity_digits(error.norm() * 1e6, "", 4);
+        let words = if times > 1.0 {
+            let times = format_quantity_digits(f64::from(times), "", 3);
+            format!("tip error {length} µm, drawn ×{times}")
+        } else {
+            format!("tip error {length} µm")
+        };
+        let colour = Palette::of(shot.options.theme).ghost(Ghost::Ideal).edge;
+        let along = to_f32(&error) * times;
+        push_error(shot, to_f32(&from), along, colour, &words.into(), out);
+    }
+}
