@@ -6,11 +6,11 @@ mod quantity;
 use std::f64::consts::PI;
 use std::sync::LazyLock;
 
-use serde::{Deserialize, Deserializer, de::Error as _};
+use serde::Deserialize;
 
 pub use quantity::{Agreement, Comparison, Quantity};
 
-use crate::words::{Words, words};
+use crate::words::words;
 
 /// Simulated time of the paper's runs: one period of trajectory (59), s.
 pub const DURATION: f64 = 2.0;
@@ -172,7 +172,6 @@ pub struct Published {
     #[serde(rename = "run")]
     pub case: Case,
     /// What it measures.
-    #[serde(deserialize_with = "word")]
     pub quantity: Quantity,
     /// The value printed in the text of section 4.2, SI units.
     pub value: f64,
@@ -185,7 +184,6 @@ pub struct Verification {
     /// Part of the figure.
     pub figure: String,
     /// What is measured.
-    #[serde(deserialize_with = "word")]
     pub quantity: Quantity,
     /// By the paper's own program.
     pub own: f64,
@@ -273,38 +271,25 @@ pub enum Test {
     /// A coordinate of a run leaves the ideal motion by little of its amplitude.
     StaysNearIdeal { coordinate: Coordinate, run: Case },
     /// A quantity grows from run to run.
-    Grows {
-        #[serde(deserialize_with = "word")]
-        of: Quantity,
-        with: Series,
-    },
+    Grows { of: Quantity, with: Series },
     /// All quantities do that are said to grow.
     AllGrow(Series),
     /// One quantity is the larger number in every run.
     Exceeds {
-        #[serde(deserialize_with = "word")]
         of: Quantity,
-        #[serde(deserialize_with = "word")]
         that: Quantity,
         over: Series,
     },
     /// The middle run has an extreme of a quantity.
-    NoRule {
-        #[serde(deserialize_with = "word")]
-        of: Quantity,
-        with: Series,
-    },
+    NoRule { of: Quantity, with: Series },
     /// One quantity differs by a larger share of its mean than another.
     DiffersMore {
-        #[serde(deserialize_with = "word")]
         of: Quantity,
-        #[serde(deserialize_with = "word")]
         than: Quantity,
         with: Series,
     },
     /// A quantity changes more over one series than over the other.
     ChangesMoreWith {
-        #[serde(deserialize_with = "word")]
         of: Quantity,
         with: Series,
         than: Series,
@@ -324,41 +309,24 @@ pub enum Test {
     /// Two formulations stay close, measured by the largest deviation from the ideal motion.
     FormulationsAgree(Vec<Coordinate>),
     /// Settled curves are close to each other.
-    PortraitsCoincide {
-        #[serde(rename = "in")]
-        coordinate: Coordinate,
-        over: Series,
-    },
+    PortraitsCoincide { of: Coordinate, over: Series },
     /// Settled curves do not close, and if `growing`, the less the larger the parameter.
     PortraitsWide {
-        #[serde(rename = "in")]
-        coordinate: Coordinate,
+        of: Coordinate,
         over: Series,
         #[serde(default)]
         growing: bool,
     },
     /// The last sections of three runs ascend.
-    SectionsAscend {
-        #[serde(rename = "in")]
-        coordinate: Coordinate,
-        over: Series,
-    },
+    SectionsAscend { of: Coordinate, over: Series },
     /// The sections of three runs spread, and more from run to run.
-    SectionsSpread {
-        #[serde(rename = "in")]
-        coordinate: Coordinate,
-        over: Series,
-    },
+    SectionsSpread { of: Coordinate, over: Series },
     /// Sections lie denser the nearer to their centre.
     SectionsCrowd(Series),
     /// Sections move little over a series.
     SectionsStay { of: Sections, over: Series },
     /// Sections of every value of a sweep agree.
-    SectionsRepeat {
-        #[serde(rename = "in")]
-        coordinate: Coordinate,
-        over: Series,
-    },
+    SectionsRepeat { of: Coordinate, over: Series },
     /// Three runs are quasi-periodic.
     QuasiPeriodic(Series),
     /// Every value of a sweep repeats after one period.
@@ -405,13 +373,6 @@ pub static PAPER: LazyLock<Paper> = LazyLock::new(|| {
     let text = include_str!("../../assets/paper.toml");
     toml::from_str(text).expect("a test reads it")
 });
-
-/// Reads a word.
-fn word<'de, D: Deserializer<'de>, T: Words>(deserializer: D) -> Result<T, D::Error> {
-    let word = String::deserialize(deserializer)?;
-    T::of_word(&word)
-        .ok_or_else(|| D::Error::custom(format!("{word}: one of {}", T::WORDS.join(", "))))
-}
 
 #[cfg(test)]
 mod tests {

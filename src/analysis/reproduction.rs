@@ -15,7 +15,7 @@ pub use statements::Statement;
 use super::grid::{Axis, Grid, RangeError, Start};
 use super::paper::{CASES, Case, Coordinate, DURATION, SAMPLING, Series};
 use super::point::{Plan, resolution};
-use super::response::{Look, Response, ResponseError, derivatives, respond_seen};
+use super::response::{Look, Response, ResponseError, derivatives, respond};
 use super::sweep::{Sweep, SweepError};
 use crate::scene::{Scene, SceneError};
 use crate::simulate::{Frame, Simulation};
@@ -139,20 +139,18 @@ pub enum ReproductionError {
 /// What there is to do.
 pub struct Work {
     extent: Extent,
-    runs: Vec<RunOf>,
+    /// Runs of section 4.2 by name: of each variant in the order of [`CASES`], then with all bodies and multipliers; of each
+    /// combination by clearance; with ideal joints.
+    runs: Vec<(String, Case, Scene)>,
     /// Scenes of settled curves, of each variant in the order of [`CASES`].
-    curves: Vec<(Variant, Case, Scene)>,
+    curves: Vec<(Case, Scene)>,
+    /// [`SWEEPS`] of each variant, one of each combination.
     sweeps: Vec<SweepData>,
     jobs: Vec<Job>,
 }
 
-/// A run of section 4.2.
-struct RunOf {
-    variant: Variant,
-    name: String,
-    case: Case,
-    scene: Scene,
-}
+/// Sweeps of a variant.
+const SWEEPS: usize = 9;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Job {
@@ -215,14 +213,8 @@ impl Work {
     pub fn new(extent: Extent) -> Result<Self, ReproductionError> {
         let mut runs = Vec::new();
         let mut run = |variant: Variant, name: String, case: Case, more: &[(&str, &str)]| {
-            let scene = scene(variant, case, more)?;
             let name = format!("{}{name}", variant.prefix);
-            runs.push(RunOf {
-                variant,
-                name,
-                case,
-                scene,
-            });
+            runs.push((name, case, scene(variant, case, more)?));
             Ok::<_, SceneError>(())
         };
         let nominal = CASES[0];
@@ -241,8 +233,8 @@ impl Work {
         let closed = [("contact.clearance", "0")];
         run(CORRECTED, "ideal".to_owned(), nominal, &closed)?;
         let both = [CORRECTED, PRINTED].into_iter();
-        let curves = both
-            .flat_map(|variant| CASES.map(|case| Ok((variant, case, scene(variant, case, &[])?))));
+        let curves =
+            both.flat_map(|variant| CASES.map(|case| Ok((case, scene(variant, case, &[])?))));
         let curves = curves.collect::<Result<Vec<_>, SceneError>>()?;
         let clearance = |n: usize| vec![format!("contact.clearance=0.01mm..1mm:{n}")];
         let friction = |n: usize| vec![format!("contact.friction=0.01..0.4:{n}")];
@@ -256,7 +248,7 @@ impl Work {
         let (up, down, cold) = (Start::FollowUp, Start::FollowDown, Start::Cold);
         let (c, f) = (clearance(c), friction(f));
         let (runs_of, sweep_of) = (extent.runs, extent.sweep);
-        let sweeps = [
+        let sweeps: [_; SWEEPS] = [
             ("runs_by_clearance", &cases[0], cold, runs_of, true),
             ("runs_by_friction", &cases[1], cold, runs_of, true),
             ("clearance_up", &c, up, sweep_of, false),
@@ -339,15 +331,15 @@ impl Work {
         };
         match self.jobs[job] {
             Job::Run(n) => {
-                let RunOf { name, scene, .. } = &self.runs[n];
+                let (name, _, scene) = &self.runs[n];
                 let mut rows = Vec::new();
                 let see = |look: &Look| rows.push(row(look));
-                let response = respond_seen(scene, DURATION, SAMPLING, see, go_on);
+                let response = respond(scene, DURATION, SAMPLING, see, go_on);
                 let response = response.map_err(|e| failed(name, e))?;
                 Ok(Outcome::Run(Box::new((response, rows))))
             }
             Job::Curve(n) => {
-                let (_, case, scene) = &self.curves[n];
+                let (case, scene) = &self.curves[n];
                 let curve = curve(*case, scene, self.extent.settle, go_on);
                 Ok(Outcome::Curve(
                     curve.map_err(|e| failed("settled curve", e))?,
@@ -384,22 +376,16 @@ impl Work {
         for (job, outcome) in self.jobs.iter().zip(outcomes) {
             match (job, outcome) {
                 (Job::Run(n), Outcome::Run(found)) => {
-                    let RunOf {
-                        variant,
-                        name,
-                        case,
-                        ..
-                    } = &self.runs[*n];
+                    let (name, case, _) = &self.runs[*n];
                     let (response, rows) = *found;
-                    let run = Traced {
+                    runs.push(Traced {
                         name: name.clone(),
                         case: *case,
                         response,
                         rows,
-                    };
-                    runs.push((*variant, run));
+                    });
                 }
-                (Job::Curve(n), Outcome::Curve(curve)) => curves.push((self.curves[*n].0, curve)),
+                (Job::Curve(_), Outcome::Curve(curve)) => curves.push(curve),
                 // Blocks of a sweep come in order of their points.
                 (Job::Block(s, _), Outcome::Block(records)) => {
                     self.sweeps[*s].records.extend(records);
@@ -407,46 +393,33 @@ impl Work {
                 _ => unreachable!("a job has an outcome of its kind"),
             }
         }
-        let (_, ideal) = runs.pop().expect("the last run is the ideal one");
-        let nominal = &self.runs[0].scene;
+        let (_, _, nominal) = &self.runs[0];
         let all = resolution(nominal, nominal.solver.tolerance);
         let resolution = Coordinate::ALL.map(|c| all[c.index()]);
         self.sweeps.iter_mut().for_each(SweepData::read_points);
-        let mut runs_of = |variant: Variant| -> Vec<Traced> {
-            let own = runs.extract_if(.., |(of, _)| *of == variant);
-            own.map(|(_, run)| run).collect()
-        };
-        let mut sweeps_of = |variant: Variant| -> Vec<SweepData> {
-            let own = self.sweeps.extract_if(.., |s| s.variant == variant);
-            own.collect()
-        };
-        let mut findings = |variant: Variant| {
-            let mut runs = runs_of(variant);
-            let own = curves.extract_if(.., |(of, _)| *of == variant);
-            Findings {
-                extent: self.extent,
-                variant,
-                lagrange: runs
-                    .pop()
-                    .expect("the last run of a variant has multipliers"),
-                runs,
-                ideal: ideal.clone(),
-                curves: own.map(|(_, curve)| curve).collect(),
-                sweeps: sweeps_of(variant),
-                resolution,
-            }
+        let ideal = runs.pop().expect("the last run is the ideal one");
+        let (mut runs, mut curves) = (runs.into_iter(), curves.into_iter());
+        let mut sweeps = self.sweeps.into_iter();
+        let mut findings = |variant: Variant| Findings {
+            extent: self.extent,
+            variant,
+            runs: runs.by_ref().take(CASES.len()).collect(),
+            lagrange: runs.next().expect("then one with multipliers"),
+            ideal: ideal.clone(),
+            curves: curves.by_ref().take(CASES.len()).collect(),
+            sweeps: sweeps.by_ref().take(SWEEPS).collect(),
+            resolution,
         };
         let (corrected, printed) = (findings(CORRECTED), findings(PRINTED));
+        let combination = |variant: Variant| Combination {
+            variant,
+            runs: runs.by_ref().take(3).collect(),
+            sections: sweeps.next().expect("one a combination"),
+        };
         Report {
             corrected,
             printed,
-            combinations: COMBINATIONS
-                .map(|variant| Combination {
-                    variant,
-                    runs: runs_of(variant),
-                    sections: sweeps_of(variant).remove(0),
-                })
-                .into(),
+            combinations: COMBINATIONS.map(combination).into(),
         }
     }
 }

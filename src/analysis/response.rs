@@ -1,14 +1,12 @@
 //! Response of a mechanism beside its ideal motion: what Sheng & Chen show in section 4.2, Figures 5 to 17.
 
 use crate::scene::{Scene, SceneError};
-use crate::simulate::{Channels, Frame, History, Pose, Simulation, StartError, Stopped};
+use crate::simulate::{Frame, Pose, Simulation, StartError, Stopped};
 
 /// Coordinates of the output body: x, y, z, alpha, beta, gamma.
 pub const COORDINATES: usize = 6;
 /// Instants at which a step is looked at: accelerations peak inside an impact's steps, not at their ends.
 const LOOKS_PER_STEP: u32 = 4;
-/// Narrowest bin of the record, s.
-const FINEST_BIN: f64 = 2e-6;
 
 /// Largest sizes over a run. SI units; coordinates in the order x, y, z, alpha, beta, gamma.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -79,20 +77,12 @@ fn deviation(pose: &Pose, ideal: &Pose) -> [f64; COORDINATES] {
 pub struct Response {
     /// Names of the ball joints.
     pub joints: Vec<String>,
-    /// Simulated time, s.
-    pub duration: f64,
     /// In continuous time: forces by the cubic through each step, the rest at four instants of each step.
     pub full: Extremes,
     /// At whole multiples of the sampling interval alone, as a solver with that output step would report.
     pub sampled: Extremes,
     /// Time of the last separation of each joint, s; NaN if there was none.
     pub last_separation: Vec<f64>,
-    /// Contacts begun, per joint.
-    pub impacts: Vec<u64>,
-    /// The recorded channels.
-    pub channels: Channels,
-    /// Their record.
-    pub history: History,
     /// Largest constraint violation of the `lagrange` form, m or rad.
     pub constraint_drift: f64,
 }
@@ -173,24 +163,12 @@ impl Look<'_> {
 }
 
 /// Runs `scene` for `duration` (s) and compares it with its ideal motion; `every` (s) is the interval of
-/// [`Response::sampled`]. `go_on` hears the simulated time after every step and may end the run by false.
+/// [`Response::sampled`]. `see` is shown every instant that is looked at, in order of time; `go_on` hears the simulated time
+/// after every step and may end the run by false.
 ///
 /// # Errors
 /// A scene that does not start, the divergence guard, `go_on`.
 pub fn respond(
-    scene: &Scene,
-    duration: f64,
-    every: f64,
-    go_on: impl FnMut(f64) -> bool,
-) -> Result<Response, ResponseError> {
-    respond_seen(scene, duration, every, |_| (), go_on)
-}
-
-/// [`respond`], with every instant that it looks at shown to `see`, in order of time.
-///
-/// # Errors
-/// As [`respond`].
-pub fn respond_seen(
     scene: &Scene,
     duration: f64,
     every: f64,
@@ -205,9 +183,7 @@ pub fn respond_seen(
     let joints = scene.ball_joints.len();
     let mut full = Extremes::new(joints, ideal.simulation.is_some());
     let mut sampled = full.clone();
-    let channels = Channels::of(scene);
-    let mut history = History::new(channels.len(), FINEST_BIN);
-    let (mut frame, mut values) = (Frame::default(), Vec::new());
+    let mut frame = Frame::default();
     let mut next_sample = 0_u64;
     loop {
         let (start, end) = (simulation.step_start(), simulation.time());
@@ -241,8 +217,6 @@ pub fn respond_seen(
                 next_sample += 1;
             } else {
                 full.take(&frame, pose);
-                channels.read(&frame, &mut values);
-                history.push(time, &values);
                 look += 1;
             }
         }
@@ -260,13 +234,9 @@ pub fn respond_seen(
     }
     Ok(Response {
         joints: scene.ball_joints.iter().map(|j| j.name.clone()).collect(),
-        duration,
         full,
         sampled,
         last_separation: statistics.last_separation.clone(),
-        impacts: statistics.impacts.clone(),
-        channels,
-        history,
         constraint_drift: statistics.constraint_drift,
     })
 }
@@ -284,14 +254,13 @@ mod tests {
     #[test]
     fn the_ideal_mechanism_does_not_deviate_and_moves_as_its_drive_says() {
         let scene = scene("spcmm", &[("contact.clearance", "0")]);
-        let response = respond(&scene, 2.0, 1e-3, |_| true).expect("runs");
+        let response = respond(&scene, 2.0, 1e-3, |_| (), |_| true).expect("runs");
         // x = 0.203 + sin(pi t)/40: |dx/dt| <= pi/40, |d2x/dt2| <= pi^2/40 (59).
         let pi = std::f64::consts::PI;
         assert!((response.full.rate[0] - pi / 40.0).abs() < 1e-9);
         assert!((response.full.acceleration[0] - pi * pi / 40.0).abs() < 1e-6);
         assert!((response.sampled.rate[4] - pi / 40.0).abs() < 1e-9);
         assert!(response.full.deviation.iter().all(|d| *d < 1e-9));
-        assert_eq!(response.impacts, [0, 0, 0]);
         assert!(response.last_separation.iter().all(|t| t.is_nan()));
     }
 
@@ -299,11 +268,7 @@ mod tests {
     fn play_shows_as_deviation_and_coarse_samples_miss_peaks() {
         let scene = scene("spcmm", &[]);
         let mut looks = 0;
-        let response = respond(&scene, 0.02, 1e-3, |_| {
-            looks += 1;
-            true
-        })
-        .expect("runs");
+        let response = respond(&scene, 0.02, 1e-3, |_| looks += 1, |_| true).expect("runs");
         assert!(looks > 100);
         // The peaks of `tests/physics/reference.rs`; friction moves no peak of the first 20 ms by more.
         for (peak, expected) in response.full.normal.iter().zip([771.15, 870.59, 533.36]) {
@@ -320,7 +285,7 @@ mod tests {
     #[test]
     fn a_run_ends_when_asked() {
         let scene = scene("pendulum", &[]);
-        let ended = respond(&scene, 1.0, 1e-3, |t| t < 0.01);
+        let ended = respond(&scene, 1.0, 1e-3, |_| (), |t| t < 0.01);
         assert!(matches!(ended, Err(ResponseError::Cancelled)));
     }
 }

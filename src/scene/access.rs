@@ -2,7 +2,7 @@
 
 use super::error::{brief, nearest, nearest_parameter};
 use super::field::Access;
-use super::read::{SPCMM_DIMENSIONS, VIEW_SETTINGS};
+use super::read::{REBUILDS, SPCMM_DIMENSIONS, VIEW_SETTINGS};
 use super::table::{contact_part, contact_rows, find};
 use super::*;
 
@@ -153,15 +153,15 @@ impl Scene {
         self.resolve(key).map(|resolved| resolved.parameter)
     }
 
-    /// Changes a parameter in place and records it in `changes`. `chain.links` and `spcmm.slider_plane` rebuild the
-    /// scene from its source with the changes so far.
+    /// Changes a parameter in place and records it in `changes`. Some rebuild the scene from its source with the
+    /// changes so far.
     ///
     /// # Errors
     /// Unknown key, wrong unit, out of range, or a scene that would no longer hold together; `self` is then unchanged.
     pub fn set(&mut self, key: &str, value: &str) -> Result<&'static Parameter, SceneError> {
         let mut next = self.clone();
         let parameter = next.change(key, value)?;
-        if matches!(key, "chain.links" | "spcmm.slider_plane") {
+        if REBUILDS.contains(&key) {
             next = next.rebuilt()?;
         }
         next.check_contacts()

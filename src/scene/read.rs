@@ -30,6 +30,8 @@ const TOP: [&str; 16] = [
     "fixed_shape",
 ];
 
+/// Parameters that decide what the bodies are: a change of one reads the file anew.
+pub(super) const REBUILDS: [&str; 2] = ["chain.links", "spcmm.slider_plane"];
 /// Keys of `[spcmm]` that are no parameters: the file's bodies are built to these dimensions.
 pub(super) const SPCMM_DIMENSIONS: [&str; 5] = [
     "mean_x",
@@ -86,12 +88,10 @@ impl Scene {
                     .map(|node| ("spcmm".to_owned(), node.place())),
             )
             .collect();
-        // These two decide what the bodies are, so they come before them.
-        for (key, value) in changes
-            .iter()
-            .filter(|(key, _)| matches!(key.as_str(), "chain.links" | "spcmm.slider_plane"))
-        {
-            scene.change(key, value)?;
+        for (key, value) in changes {
+            if REBUILDS.contains(&key.as_str()) {
+                scene.change(key, value)?;
+            }
         }
         read_mechanism(&top, &mut scene, &mut places)?;
         for (key, value) in changes {

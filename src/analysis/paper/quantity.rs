@@ -1,9 +1,10 @@
 //! What the paper measures of a run, and its numbers beside this program's.
 
-use super::Published;
-use super::{Coordinate, Coordinate::Beta, Coordinate::X};
+use serde::{Deserialize, Deserializer, de::Error as _};
+
+use super::{Coordinate, Coordinate::Beta, Coordinate::X, Published};
 use crate::analysis::response::{Extremes, Response};
-use crate::words::words;
+use crate::words::{Words as _, words};
 
 /// What a figure shows of a run, as one number in SI units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,6 +36,13 @@ words!(Quantity {
     Strongest => "largest contact force of any joint",
     LastSeparation => "last separation",
 });
+
+impl<'de> Deserialize<'de> for Quantity {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let word = String::deserialize(deserializer)?;
+        Self::of_word(&word).ok_or_else(|| D::Error::unknown_variant(&word, Self::WORDS))
+    }
+}
 
 impl Quantity {
     /// Contact forces joint by joint.

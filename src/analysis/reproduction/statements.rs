@@ -201,15 +201,15 @@ impl Findings {
                     listed.collect::<Vec<_>>().join("; "),
                 )
             }
-            Test::PortraitsCoincide { coordinate, over } => {
-                let c = coordinate as usize;
+            Test::PortraitsCoincide { of, over } => {
+                let c = of as usize;
                 let loops = self.loops(over);
                 let [values, rates] = [
                     loops.map(|l| &l.coordinates[c][..]),
                     loops.map(|l| &l.rates[c][..]),
                 ];
-                let share = (furthest(&values) / coordinate.amplitude(0))
-                    .max(furthest(&rates) / coordinate.amplitude(1));
+                let share =
+                    (furthest(&values) / of.amplitude(0)).max(furthest(&rates) / of.amplitude(1));
                 (
                     format!(
                         "in settled motion no two of the three differ by more than {little} % of the amplitude at equal phases"
@@ -218,14 +218,10 @@ impl Findings {
                     format!("at most {}", percent(share)),
                 )
             }
-            Test::PortraitsWide {
-                coordinate,
-                over,
-                growing,
-            } => {
-                let resolution = self.resolution[coordinate as usize];
-                let widths = self.loops(over).map(|l| l.width[coordinate as usize]);
-                let resolved = size(resolution, coordinate);
+            Test::PortraitsWide { of, over, growing } => {
+                let resolution = self.resolution[of as usize];
+                let widths = self.loops(over).map(|l| l.width[of as usize]);
+                let resolved = size(resolution, of);
                 let more = if growing {
                     format!("its resolution of {resolved}, and more the larger the {over}")
                 } else {
@@ -233,41 +229,33 @@ impl Findings {
                 };
                 (
                     format!(
-                        "{coordinate} differs between two successive settled periods by more than {more}"
+                        "{of} differs between two successive settled periods by more than {more}"
                     ),
                     widths.iter().all(|w| *w > resolution) && (!growing || ascending(&widths)),
-                    each(over, &widths, |w| size(*w, coordinate)),
+                    each(over, &widths, |w| size(*w, of)),
                 )
             }
-            Test::SectionsAscend { coordinate, over } => {
-                let resolution = self.resolution[coordinate as usize];
-                let latest: Vec<f64> = self
-                    .sections(over)
-                    .iter()
-                    .map(|r| r.latest(coordinate))
-                    .collect();
+            Test::SectionsAscend { of, over } => {
+                let resolution = self.resolution[of as usize];
+                let latest: Vec<f64> = self.sections(over).iter().map(|r| r.latest(of)).collect();
                 (
                     format!(
-                        "{coordinate} of the section grows with the {over} by more than the resolution"
+                        "{of} of the section grows with the {over} by more than the resolution"
                     ),
                     latest.windows(2).all(|pair| pair[1] - pair[0] > resolution),
                     each(over, &latest, |v| format!("{:.4} mm", v * 1e3)),
                 )
             }
-            Test::SectionsSpread { coordinate, over } => {
-                let resolution = self.resolution[coordinate as usize];
-                let spreads: Vec<f64> = self
-                    .sections(over)
-                    .iter()
-                    .map(|r| r.spread(coordinate))
-                    .collect();
+            Test::SectionsSpread { of, over } => {
+                let resolution = self.resolution[of as usize];
+                let spreads: Vec<f64> = self.sections(over).iter().map(|r| r.spread(of)).collect();
                 (
                     format!(
                         "their spread is above the resolution of {} and grows",
-                        size(resolution, coordinate)
+                        size(resolution, of)
                     ),
                     spreads.iter().all(|s| *s > resolution) && ascending(&spreads),
-                    format!("spreads {}", each(over, &spreads, |s| size(*s, coordinate))),
+                    format!("spreads {}", each(over, &spreads, |s| size(*s, of))),
                 )
             }
             Test::SectionsCrowd(over) => {
@@ -316,18 +304,18 @@ impl Findings {
                     ),
                 )
             }
-            Test::SectionsRepeat { coordinate, over } => {
-                let (points, resolution) = (self.swept(over), self.resolution[coordinate as usize]);
-                let widest = widest(points, coordinate);
+            Test::SectionsRepeat { of, over } => {
+                let (points, resolution) = (self.swept(over), self.resolution[of as usize]);
+                let widest = widest(points, of);
                 (
                     format!(
-                        "at every point the latest half of the sections in {coordinate} agree within {}",
-                        size(resolution, coordinate)
+                        "at every point the latest half of the sections in {of} agree within {}",
+                        size(resolution, of)
                     ),
                     widest <= resolution,
                     format!(
                         "largest spread {} over {} {}",
-                        size(widest, coordinate),
+                        size(widest, of),
                         points.len(),
                         over.values()
                     ),
@@ -556,11 +544,11 @@ mod tests {
         })
         .expect("an extent");
         let scene = Scene::load("spcmm", &[]).expect("built in");
-        let response = respond(&scene, 1e-3, 1e-3, |_| true).expect("runs");
+        let response = respond(&scene, 1e-3, 1e-3, |_| (), |_| true).expect("runs");
         let outcome = |job: &Job| match *job {
             Job::Run(_) => Outcome::Run(Box::new((response.clone(), Vec::new()))),
             Job::Curve(n) => Outcome::Curve(Loop {
-                case: work.curves[n].1,
+                case: work.curves[n].0,
                 coordinates: [vec![0.0; 4], vec![0.0; 4]],
                 rates: [vec![0.0; 4], vec![0.0; 4]],
                 width: [0.0; 2],

@@ -5,7 +5,9 @@ use crate::analysis::paper::{Case, Coordinate, PAPER, Series, Shows};
 use crate::analysis::reproduction::{
     COLUMNS, Column, Findings, Swept, Traced, Variant, column_of, derivative, regime_word,
 };
-use crate::chart::{Axis, Chart, Colour, Level, Map, Marker, PALETTE, Scale, Sheet};
+use crate::chart::{
+    Axis, Chart, Colour, Level, Map, Marker, PALETTE, Scale, Series as Curve, Sheet,
+};
 use crate::cli::output::significant;
 
 /// Width of a sheet, height of a row of charts, pixels.
@@ -92,8 +94,8 @@ fn parameter(series: Series) -> Axis {
     }
 }
 
-fn line(label: &str, points: Points, colour: Colour) -> crate::chart::Series {
-    crate::chart::Series {
+fn line(label: &str, points: Points, colour: Colour) -> Curve {
+    Curve {
         label: label.to_owned(),
         points,
         colour,
@@ -102,15 +104,15 @@ fn line(label: &str, points: Points, colour: Colour) -> crate::chart::Series {
     }
 }
 
-fn dots(label: &str, points: Points, colour: Colour, marker: Marker) -> crate::chart::Series {
-    crate::chart::Series {
+fn dots(label: &str, points: Points, colour: Colour, marker: Marker) -> Curve {
+    Curve {
         line: false,
         marker: Some(marker),
         ..line(label, points, colour)
     }
 }
 
-fn chart(title: &str, x: Axis, y: Axis, series: Vec<crate::chart::Series>) -> Chart {
+fn chart(title: &str, x: Axis, y: Axis, series: Vec<Curve>) -> Chart {
     Chart {
         title: title.to_owned(),
         x,
@@ -121,7 +123,7 @@ fn chart(title: &str, x: Axis, y: Axis, series: Vec<crate::chart::Series>) -> Ch
 }
 
 /// Curves over the first `to` seconds.
-fn over_time(title: &str, to: f64, y: Axis, series: Vec<crate::chart::Series>) -> Chart {
+fn over_time(title: &str, to: f64, y: Axis, series: Vec<Curve>) -> Chart {
     let time = Axis {
         range: Some((0.0, to)),
         ..axis("Time", "s")
@@ -209,7 +211,7 @@ fn drift(found: &Findings) -> Vec<Chart> {
 }
 
 /// Rate against value of a coordinate, a series a run.
-fn phases(coordinate: Coordinate, title: &str, series: Vec<crate::chart::Series>) -> Chart {
+fn phases(coordinate: Coordinate, title: &str, series: Vec<Curve>) -> Chart {
     let [x, y] = [0, 1].map(|nth| of_column(derivative(coordinate, nth)));
     chart(title, x, y, series)
 }
@@ -360,7 +362,7 @@ fn exponents(found: &Findings, series: Series) -> Vec<Chart> {
         line(&name, values.collect(), PALETTE[n + 1])
     });
     let most = points.iter().map(|p| p.exponent.0).fold(0.0, f64::max);
-    let exponents = |title: &str, x: Axis, lines: Vec<crate::chart::Series>| {
+    let exponents = |title: &str, x: Axis, lines: Vec<Curve>| {
         let y = Axis {
             range: Some((LEAST_EXPONENT, 1.1 * most + 1.0)),
             ..axis("Largest Lyapunov exponent", "1/s")
@@ -373,7 +375,7 @@ fn exponents(found: &Findings, series: Series) -> Vec<Chart> {
             ..chart(title, x, y, lines)
         }
     };
-    let along = crate::chart::Series {
+    let along = Curve {
         marker: Some(Marker::Dot),
         ..line("exponent", along, PALETTE[0])
     };

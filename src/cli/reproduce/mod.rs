@@ -28,7 +28,6 @@ use crate::files::Folder;
 pub fn reproduce(arguments: &ReproduceArguments) -> Result<(), Failure> {
     // From here on there is a scratch folder, which a run that is told to end takes away.
     interrupt::listen();
-    let folder = Folder::claim(&arguments.out, arguments.force)?;
     let extent = if arguments.quick {
         Extent::QUICK
     } else {
@@ -37,27 +36,10 @@ pub fn reproduce(arguments: &ReproduceArguments) -> Result<(), Failure> {
     let cores = || thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
     let threads = arguments.threads.map_or_else(cores, usize::from);
     let started = Instant::now();
-    let work = Work::new(extent).map_err(|error| Failure::usage(error.to_string()))?;
-    let mut kept = Kept::open(&arguments.out, &work)?;
-    if kept.is_begun() && !arguments.quiet {
-        warn(&format!(
-            "going on where {} stopped",
-            kept.folder().display()
-        ));
-    }
-    let length = (0..work.jobs()).map(|job| work.length(job)).sum::<f64>();
-    let bar = progress::bar(!arguments.quiet, length.ceil() as u64);
-    let found = compute::compute(work, &mut kept, threads, &bar);
-    bar.finish_and_clear();
-    let found = found?;
-    let manifest = fill(&folder, &found, &kept)?;
-    folder.finish(manifest)?;
-    kept.remove();
-    print(&summary(
-        &found,
-        &arguments.out,
-        started.elapsed().as_secs_f64(),
-    ))
+    let folder = Folder::claim(&arguments.out, arguments.force)?;
+    let report = make(folder, &arguments.out, extent, threads, arguments.quiet)?;
+    let wall = started.elapsed().as_secs_f64();
+    print(&summary(&report, &arguments.out, wall))
 }
 
 /// Computes a report of any extent and writes it to `out`, which must not exist or be empty.
@@ -65,14 +47,34 @@ pub fn reproduce(arguments: &ReproduceArguments) -> Result<(), Failure> {
 /// # Errors
 /// As [`reproduce`].
 pub fn into_folder(out: &Path, extent: Extent, threads: usize) -> Result<(), Failure> {
-    let folder = Folder::claim(out, false)?;
+    make(Folder::claim(out, false)?, out, extent, threads, true).map(|_| ())
+}
+
+/// Computes a report into the `folder` that will be `out`.
+fn make(
+    folder: Folder,
+    out: &Path,
+    extent: Extent,
+    threads: usize,
+    quiet: bool,
+) -> Result<Report, Failure> {
     let work = Work::new(extent).map_err(|error| Failure::usage(error.to_string()))?;
     let mut kept = Kept::open(out, &work)?;
-    let found = compute::compute(work, &mut kept, threads, &progress::bar(false, 1))?;
-    let manifest = fill(&folder, &found, &kept)?;
+    if kept.is_begun() && !quiet {
+        warn(&format!(
+            "going on where {} stopped",
+            kept.folder().display()
+        ));
+    }
+    let length = (0..work.jobs()).map(|job| work.length(job)).sum::<f64>();
+    let bar = progress::bar(!quiet, length.ceil() as u64);
+    let report = compute::compute(work, &mut kept, threads, &bar);
+    bar.finish_and_clear();
+    let report = report?;
+    let manifest = fill(&folder, &report, &kept)?;
     folder.finish(manifest)?;
     kept.remove();
-    Ok(())
+    Ok(report)
 }
 
 /// Writes all files into `folder`; what made them.
