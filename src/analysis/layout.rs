@@ -1,7 +1,8 @@
 //! The columns of a sweep's result and the order of its numbers: one record of a fixed length for every point.
 
 use super::drive::OBSERVABLES;
-use super::point::{Plan, PointResult};
+use super::exponent::Exponent;
+use super::point::{JointResult, Plan, PointResult};
 use crate::scene::Scene;
 
 /// What a point's numbers are worth.
@@ -46,14 +47,56 @@ pub struct Layout {
     kept: usize,
 }
 
-const JOINT: [(&str, bool); 6] = [
-    ("peak_N", false),
-    ("peak_kept_N", false),
-    ("mean_N", false),
-    ("impacts", true),
-    ("impacts_kept", true),
-    ("last_separation_s", false),
+/// An array of one value a point: its name, whether that is a whole number, and what it tells of a result.
+type OfPoint = (&'static str, bool, fn(&PointResult, Status) -> f64);
+
+const POINT: [OfPoint; 10] = [
+    ("status", true, |_, status| status.code() as f64),
+    ("stopped_at_s", false, |r, _| r.stopped.unwrap_or(f64::NAN)),
+    // A point that did not end has no regime: its code is that of none, -1.
+    ("regime", true, |r, status| match status {
+        Status::Done => r.regime.code() as f64,
+        Status::Diverged | Status::NoStart => -1.0,
+    }),
+    ("period", true, |r, _| r.regime.period() as f64),
+    ("return_distance", false, |r, status| {
+        known(status, r.evidence.return_distance)
+    }),
+    ("distinct_sections", true, |r, _| r.evidence.distinct as f64),
+    ("zero_one", false, |r, _| r.evidence.zero_one),
+    ("exponent_per_s", false, |r, _| exponent(r, |e| e.value)),
+    ("exponent_standard_error_per_s", false, |r, _| {
+        exponent(r, |e| e.standard_error)
+    }),
+    ("exponent_bound_per_s", false, |r, status| {
+        known(status, r.evidence.exponent_bound)
+    }),
 ];
+
+/// The same for each ball joint, whose name goes before it.
+type OfJoint = (&'static str, bool, fn(&JointResult) -> f64);
+
+const JOINT: [OfJoint; 6] = [
+    ("peak_N", false, |joint| joint.peak),
+    ("peak_kept_N", false, |joint| joint.peak_kept),
+    ("mean_N", false, |joint| joint.mean),
+    ("impacts", true, |joint| joint.impacts as f64),
+    ("impacts_kept", true, |joint| joint.impacts_kept as f64),
+    ("last_separation_s", false, |joint| joint.last_separation),
+];
+
+/// What only a point that ended knows.
+fn known(status: Status, value: f64) -> f64 {
+    if status == Status::Done {
+        value
+    } else {
+        f64::NAN
+    }
+}
+
+fn exponent(result: &PointResult, of: fn(&Exponent) -> f64) -> f64 {
+    result.evidence.exponent.as_ref().map_or(f64::NAN, of)
+}
 
 impl Layout {
     /// The arrays that a sweep of `scene` has.
@@ -66,18 +109,11 @@ impl Layout {
                 per_section,
             });
         };
-        add("status", true, false);
-        add("stopped_at_s", false, false);
-        add("regime", true, false);
-        add("period", true, false);
-        add("return_distance", false, false);
-        add("distinct_sections", true, false);
-        add("zero_one", false, false);
-        add("exponent_per_s", false, false);
-        add("exponent_standard_error_per_s", false, false);
-        add("exponent_bound_per_s", false, false);
+        for (name, whole, _) in POINT {
+            add(name, whole, false);
+        }
         for joint in &scene.ball_joints {
-            for (quantity, whole) in JOINT {
+            for (quantity, whole, _) in JOINT {
                 add(&format!("{}_{quantity}", joint.name), whole, false);
             }
         }
@@ -138,34 +174,15 @@ impl Layout {
             }
         };
         let start = record.len();
-        let evidence = &result.evidence;
-        let exponent = evidence.exponent.as_ref();
-        record.push(status.code() as f64);
-        record.push(result.stopped.unwrap_or(f64::NAN));
-        // A point that did not end has no regime: its code is that of none, -1.
-        let done = status == Status::Done;
-        record.push(if done {
-            result.regime.code() as f64
-        } else {
-            -1.0
-        });
-        record.push(result.regime.period() as f64);
-        let known = |value: f64| if done { value } else { f64::NAN };
-        record.push(known(evidence.return_distance));
-        record.push(evidence.distinct as f64);
-        record.push(evidence.zero_one);
-        record.push(exponent.map_or(f64::NAN, |e| e.value));
-        record.push(exponent.map_or(f64::NAN, |e| e.standard_error));
-        record.push(known(evidence.exponent_bound));
+        record.extend(POINT.iter().map(|(.., of)| of(result, status)));
         for joint in &result.joints {
-            record.extend([joint.peak, joint.peak_kept, joint.mean]);
-            record.extend([joint.impacts as f64, joint.impacts_kept as f64]);
-            record.push(joint.last_separation);
+            record.extend(JOINT.iter().map(|(.., of)| of(joint)));
         }
         if self.probe {
             let (largest, rms) = result.probe.unwrap_or((f64::NAN, f64::NAN));
             record.extend([largest * 1e6, rms * 1e6]);
         }
+        let exponent = result.evidence.exponent.as_ref();
         let running = exponent.map_or(&[][..], |e| &e.running);
         record.extend((0..self.kept).map(|k| running.get(k).copied().unwrap_or(f64::NAN)));
         let width = OBSERVABLES.len();
