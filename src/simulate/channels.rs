@@ -213,13 +213,24 @@ mod tests {
             let mut plots = TABLE.iter().filter_map(|signal| signal.plot);
             assert!(plots.any(|plot| plot == quantity), "{quantity:?}");
         }
-        let mut columns: Vec<(&str, usize)> = TABLE
-            .iter()
-            .map(|signal| (signal.column, signal.take.each() as usize))
-            .collect();
-        columns.sort_unstable();
-        columns.dedup();
-        assert_eq!(columns.len(), TABLE.len());
+        for in_run in [false, true] {
+            let here = |signal: &&Signal| {
+                if in_run {
+                    signal.run.is_some()
+                } else {
+                    signal.plot.is_some()
+                }
+            };
+            let mut columns: Vec<(&str, usize)> = TABLE
+                .iter()
+                .filter(here)
+                .map(|signal| (signal.column, signal.take.each() as usize))
+                .collect();
+            let all = columns.len();
+            columns.sort_unstable();
+            columns.dedup();
+            assert_eq!(columns.len(), all);
+        }
     }
 
     #[test]
