@@ -41,7 +41,7 @@ pub(super) struct Coupling {
     pub sides: [(Anchor, f64); 2],
     /// Zero where the bodies are pushed at the points.
     pub normal: Vec3,
-    /// N; its lever changes with the normal.
+    /// Force on the first, N, where it acts along a normal that turns with the points; zero elsewhere.
     pub force: Vec3,
     /// Derivatives of the force.
     pub stiffness: Stiffness,
