@@ -769,6 +769,13 @@ impl Player {
         self.watch.show(shown);
         let mut frame = std::mem::take(&mut self.frame);
         self.run_at(shown).sample(shown, &mut frame);
+        // The hand is where it is now, though the run feels it from its next step on.
+        frame.pull = self.simulation.pulled().and_then(|pull| {
+            let motion = frame.bodies.get(pull.body)?;
+            let arm = motion.rotation * pull.point;
+            let velocity = motion.velocity + motion.angular_velocity.cross(&arm);
+            Some(pull.report(motion.position + arm, velocity))
+        });
         self.frame = frame;
     }
 

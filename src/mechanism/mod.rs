@@ -452,12 +452,6 @@ impl Mechanism {
         of_scene.map(move |e| e.report(t, motion))
     }
 
-    /// What the hand does that pulls, at `t`, that of the latest evaluation.
-    pub fn pull_report(&self, t: f64) -> Option<ElementReport> {
-        let hand = self.elements.get(self.of_scene)?;
-        Some(hand.report(t, self.equations.motion()))
-    }
-
     /// Where a hand pulls.
     pub fn pull(&self) -> Option<Pull> {
         self.pull

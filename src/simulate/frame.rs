@@ -15,7 +15,7 @@ pub struct Frame {
     pub joints: Vec<JointReport>,
     /// Force elements in scene order.
     pub elements: Vec<ElementReport>,
-    /// The hand that pulls, if one does: from it to the point.
+    /// The hand that pulls, if one does: from it to the point. Of the frame on show alone.
     pub pull: Option<ElementReport>,
     /// Driven joints in scene order: actuator force, N (or torque, N m), positive along the joint axis's positive sense.
     pub actuators: Vec<f64>,

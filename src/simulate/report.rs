@@ -36,7 +36,6 @@ pub(super) fn fill(
     out.elastic = mechanism.elastic_energy();
     out.elements.clear();
     out.elements.extend(mechanism.element_reports(time));
-    out.pull = mechanism.pull_report(time);
     let (kinetic, gravitational) = mechanism.energies();
     out.kinetic = kinetic;
     out.potential = gravitational + out.elastic;

@@ -28,19 +28,29 @@ pub(super) struct Hand {
     pub pull: Pull,
 }
 
+impl Pull {
+    /// What it does with the point at a place, m, with a velocity, m/s: from the hand to the point.
+    pub fn report(&self, point: Vec3, velocity: Vec3) -> ElementReport {
+        ElementReport {
+            points: [self.hand, point],
+            force: self.stiffness * (self.hand - point) - self.damping * velocity,
+            torque: None,
+        }
+    }
+}
+
 impl Hand {
-    fn force(&self, motion: &[Kinematics]) -> (Vec3, Vec3, Vec3, Vec3) {
+    /// What it does, the velocity of the point and its arm from the centroid.
+    fn at(&self, motion: &[Kinematics]) -> (ElementReport, Vec3, Vec3) {
         let (point, velocity, arm) = point_of(&self.on, motion);
-        let pull = &self.pull;
-        let force = pull.stiffness * (pull.hand - point) - pull.damping * velocity;
-        (force, point, velocity, arm)
+        (self.pull.report(point, velocity), velocity, arm)
     }
 }
 
 impl ForceElement for Hand {
     fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
-        let (force, _, _, arm) = self.force(at.motion);
-        push(&mut loads.wrench[self.on.body], &arm, &force);
+        let (report, _, arm) = self.at(at.motion);
+        push(&mut loads.wrench[self.on.body], &arm, &report.force);
     }
 
     // Soft by choice: nothing that an implicit method would have to know.
@@ -57,18 +67,13 @@ impl ForceElement for Hand {
     }
 
     fn add_powers(&self, _: f64, motion: &[Kinematics], powers: &mut Powers) {
-        let (force, _, velocity, _) = self.force(motion);
-        powers.external += force.dot(&velocity);
+        let (report, velocity, _) = self.at(motion);
+        powers.external += report.force.dot(&velocity);
     }
 }
 
 impl SceneElement for Hand {
     fn report(&self, _: f64, motion: &[Kinematics]) -> ElementReport {
-        let (force, point, ..) = self.force(motion);
-        ElementReport {
-            points: [self.pull.hand, point],
-            force,
-            torque: None,
-        }
+        self.at(motion).0
     }
 }
