@@ -95,6 +95,10 @@ pub struct RunArguments {
     /// File for one row per finished impact, with the restitution that it really gave: .csv, .json or .npz.
     #[arg(long, value_name = "FILE")]
     pub impacts: Option<PathBuf>,
+    /// File for the wear map: one row per cell of the sockets' inner faces, with the contacts that began there, the impulse and
+    /// the work of friction that it took: .csv, .json or .npz.
+    #[arg(long, value_name = "FILE")]
+    pub wear: Option<PathBuf>,
     /// Form of the summary on standard output.
     #[arg(long, value_enum, value_name = "FORM", default_value = "text")]
     pub summary: SummaryForm,

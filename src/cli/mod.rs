@@ -26,6 +26,7 @@ mod summary;
 mod survival;
 mod sweep;
 pub mod tradeoff;
+mod wear;
 
 use std::fmt::Write as _;
 use std::io::{self, Write as _};

@@ -24,6 +24,17 @@ pub struct Powers {
     pub external: f64,
 }
 
+/// A ball that presses against the wall of its socket.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Touch {
+    /// Unit vector from the socket's centre to the point of contact, in the axes of the socket's body.
+    pub direction: Vec3,
+    /// F_N, N.
+    pub normal_force: f64,
+    /// Power that friction takes, W.
+    pub friction_power: f64,
+}
+
 impl Powers {
     /// Adds `weight` times `other`.
     pub fn add(&mut self, weight: f64, other: &Self) {
@@ -102,7 +113,6 @@ impl Mechanism {
 
     fn contact_powers(&self) -> Powers {
         let mut powers = Powers::default();
-        let motion = self.motion();
         for (j, joint) in self.model.joints.iter().enumerate() {
             if joint.ideal.is_some() {
                 continue;
@@ -114,15 +124,42 @@ impl Mechanism {
             let at = self.contacts.separation(j);
             powers.restitution += c.restitution_power(&at, gap.normal_force);
             powers.clearance += c.clearance_power(&at, gap.normal_force);
-            if gap.friction != Vec3::zeros() {
-                let spin = |body: usize| &motion[body].angular_velocity;
-                let (ball, socket) = (spin(joint.ball.body), spin(joint.socket.body));
-                let velocity = &gap.eccentricity_rate;
-                let surfaces = c.surface_velocity(&at.normal, velocity, ball, socket);
-                powers.friction -= gap.friction.dot(&surfaces);
-            }
+            powers.friction += self.friction_power(j, &at.normal);
         }
         powers
+    }
+
+    /// Power that friction takes in joint `j` where its contact has the normal `n`, W.
+    fn friction_power(&self, j: usize, n: &Vec3) -> f64 {
+        let (gap, c) = (&self.contacts.gaps()[j], self.contacts.coefficients(j));
+        if gap.friction == Vec3::zeros() {
+            return 0.0;
+        }
+        let (joint, motion) = (&self.model.joints[j], self.motion());
+        let spin = |body: usize| &motion[body].angular_velocity;
+        let (ball, socket) = (spin(joint.ball.body), spin(joint.socket.body));
+        let surfaces = c.surface_velocity(n, &gap.eccentricity_rate, ball, socket);
+        -gap.friction.dot(&surfaces)
+    }
+
+    /// What the ball of joint `j` does to the wall of its socket at the latest evaluation; `None` where it does not press.
+    pub fn touch(&self, j: usize) -> Option<Touch> {
+        let gap = &self.contacts.gaps()[j];
+        if !self.contacts.has_clearance(j) || gap.normal_force <= 0.0 {
+            return None;
+        }
+        Some(Touch {
+            direction: self.wall_direction(j),
+            normal_force: gap.normal_force,
+            friction_power: self.friction_power(j, &self.contacts.separation(j).normal),
+        })
+    }
+
+    /// Unit vector from the socket's centre of joint `j` to the ball's, off the centre, at the latest evaluation, in the axes of
+    /// the socket's body: towards the point of the wall that the ball is next to.
+    pub fn wall_direction(&self, j: usize) -> Vec3 {
+        let socket = &self.motion()[self.model.joints[j].socket.body];
+        socket.rotation.tr_mul(&self.contacts.separation(j).normal)
     }
 }
 
