@@ -330,6 +330,9 @@ pub struct RenderArguments {
         help_heading = "Picture"
     )]
     pub hide: Vec<Hideable>,
+    /// Colour the sockets' inner faces by what they took since the start, with a scale; balls are seen through.
+    #[arg(long, value_enum, value_name = "WHAT", help_heading = "Picture")]
+    pub wear: Option<WearChoice>,
     /// Write time, forces and labels over the picture.
     #[arg(long, help_heading = "Picture")]
     pub overlay: bool,
@@ -437,6 +440,15 @@ pub enum ArrowScale {
     Linear,
     /// Three decades below the reference force.
     Logarithmic,
+}
+
+/// What a wear map shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum WearChoice {
+    /// Time integral of the normal force.
+    Impulse,
+    /// Work that friction took, its size.
+    Friction,
 }
 
 /// Colours of the picture.
