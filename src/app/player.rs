@@ -13,7 +13,7 @@ use crate::analysis::section::Schedule;
 use crate::scene::{Scene, SceneError, Value};
 use crate::simulate::{
     Channels, Effect, Frame, History, Mark, Pacer, Peak, RECORDED_JOINTS, Simulation, Snapshot,
-    StartError, Stopped,
+    StartError, Stopped, Wear,
 };
 
 /// Narrowest bin of the record, s: shorter than any step that resolves an impact.
@@ -190,6 +190,11 @@ impl Player {
     /// What the chaos bench keeps of the run.
     pub fn watch(&self) -> &Watch {
         &self.watch
+    }
+
+    /// What the steps that are over at the instant on show did to the sockets since the start.
+    pub fn wear(&self) -> Option<&Wear> {
+        self.simulation.wear()
     }
 
     /// Another drive phase of the sections.
@@ -603,6 +608,9 @@ impl Player {
     fn pass_peaks(&mut self, time: f64) {
         self.passed.resize(self.coming.len(), Peak::default());
         let all = time >= self.simulation.time();
+        if all {
+            self.simulation.pass_wear();
+        }
         for joint in 0..self.coming.len() {
             let peak = self.coming[joint];
             // A contact that began without a force yet began with the end of the step.
@@ -659,6 +667,7 @@ impl Player {
         self.past.clear();
         self.unchanged = None;
         self.settling = Settling::new(self.simulation.running_scene());
+        self.simulation.keep_wear();
         // Forces at the start are those of the first frame: nothing has struck yet.
         self.simulation.take_peaks(&mut self.coming);
         self.forget_peaks();
@@ -922,6 +931,49 @@ mod tests {
         player.set("contact.friction", "0.3").expect("in range");
         player.step_back();
         assert_eq!(player.simulation().state_hash(), end);
+    }
+
+    #[test]
+    fn the_wear_map_is_that_of_the_steps_that_are_over() {
+        let mut player = player("spcmm");
+        let kept = |player: &Player| player.wear().expect("kept").clone();
+        let contacts = |player: &Player| -> u64 {
+            let wear = kept(player);
+            let cells = (0..3).flat_map(|j| wear.cells(j));
+            cells.map(|cell| cell.contacts).sum()
+        };
+        player.run_to(7e-3);
+        player.pacer.set_scale(0.001);
+        player.set_playing(true);
+        let mut ahead = 0;
+        while player.pacer.shown() < 7.9e-3 {
+            player.advance(1.0 / 60.0);
+            let shown = player.pacer.shown();
+            // The first contacts of S1, S2 and S3 (`tests/physics/reference.rs`), within the tolerance of the preset.
+            let begun = [7.80142e-3, 7.80768e-3, 7.80781e-3];
+            if begun.iter().all(|time: &f64| (time - shown).abs() > 1e-6) {
+                let expected = begun.iter().filter(|time| **time < shown).count();
+                assert_eq!(contacts(&player), expected as u64, "t = {shown}");
+            }
+            let computed: u64 = player.simulation().statistics().impacts.iter().sum();
+            ahead += usize::from(computed > contacts(&player));
+        }
+        assert!(ahead > 0, "the run itself was further on");
+        player.set_playing(false);
+        player.single_step();
+        let before = kept(&player);
+        for _ in 0..30 {
+            player.single_step();
+        }
+        assert!(kept(&player) != before);
+        for _ in 0..30 {
+            player.step_back();
+        }
+        assert!(kept(&player) == before);
+        player.reset().expect("starts");
+        assert_eq!(contacts(&player), 0);
+        let after = kept(&player);
+        assert!(after.cells(0).iter().all(|cell| cell.impulse == 0.0));
     }
 
     #[test]
