@@ -187,6 +187,16 @@ fn mark(in: Surface) -> vec3<f32> {
     return finish(mark(in), in.clip.xy, 0.6);
 }
 
+// A cell of a wear map: its colour is a value.
+@fragment fn fs_wear(in: Surface) -> @location(0) vec4<f32> {
+    return finish(to_linear(in.colour.rgb), in.clip.xy, 1.0);
+}
+
+// The same where something stands before it, or where it is seen from behind, through the wall.
+@fragment fn fs_wear_behind(in: Surface) -> @location(0) vec4<f32> {
+    return finish(to_linear(in.colour.rgb), in.clip.xy, 0.5);
+}
+
 // Another state of the machine, seen through: clearest along its edge.
 @fragment fn fs_ghost(in: Surface) -> @location(0) vec4<f32> {
     let facing = max(dot(normalize(in.normal), normalize(globals.eye.xyz - in.world)), 0.0);

@@ -144,6 +144,7 @@ impl Headless {
     ) -> Result<Image, RenderError> {
         theme::apply(&self.canvas.ctx);
         let mut notes = vec![list.magnification_text.clone()];
+        notes.extend(overlay::wear_note(list));
         notes.extend_from_slice(&overlay.notes);
         let output = self.canvas.pass(list.size, scale, |ui| {
             let rect = ui.max_rect();
@@ -157,6 +158,9 @@ impl Headless {
                 && let Some(legend) = &list.legend
             {
                 overlay::legend(&painter, rect, scale, legend, theme);
+            }
+            if let Some(scale) = &list.wear_scale {
+                overlay::wear_scale(&painter, rect, scale, theme);
             }
             if let Some(time) = overlay.time {
                 overlay::time(&painter, rect, time, &notes, theme);

@@ -6,7 +6,9 @@ use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, 
 use super::value;
 use crate::scene::{Scene, format_quantity_digits};
 use crate::simulate::{ContactState, Frame};
-use crate::view::{Colour, DrawList, Label, LabelKind, Legend, Palette, Scaling, Theme};
+use crate::view::{
+    Colour, DrawList, Label, LabelKind, Legend, Palette, Scaling, Theme, WearMap, WearScale,
+};
 
 /// Distance of overlays from the edge, points.
 const MARGIN: f32 = 14.0;
@@ -243,6 +245,87 @@ pub fn legend(painter: &Painter, rect: Rect, scale: f32, legend: &Legend, theme:
         }
         at.y = placed.min.y - 1.0;
     }
+}
+
+/// What a wear map shows, and its unit.
+fn wear_words(map: WearMap) -> Option<(&'static str, &'static str)> {
+    match map {
+        WearMap::Off => None,
+        WearMap::Impulse => Some(("impulse", "N s/mm²")),
+        WearMap::FrictionWork => Some(("size of friction work", "mJ/mm²")),
+    }
+}
+
+/// What the colours of `list` stand for, where it has a wear map.
+pub fn wear_note(list: &DrawList) -> Option<String> {
+    let scale = list.wear_scale?;
+    let (what, unit) = wear_words(scale.map)?;
+    Some(if scale.largest > 0.0 {
+        let largest = format_quantity_digits(f64::from(scale.largest), unit, 3);
+        format!("wear map: {what}, at most {largest}")
+    } else {
+        format!("wear map: {what}, none yet")
+    })
+}
+
+/// How to read the colours of a wear map, at the right edge above the legend of the arrows; left out where there is no room.
+pub fn wear_scale(painter: &Painter, rect: Rect, scale: &WearScale, theme: Theme) {
+    const BAR: [f32; 2] = [12.0, 110.0];
+    const PARTS: u32 = 48;
+    // Above: its own title, the time with its notes, the buttons of the window. Below: the legend of the arrows.
+    const FREE: [f32; 2] = [100.0, 122.0];
+    let Some((what, unit)) = wear_words(scale.map).filter(|_| scale.largest > 0.0) else {
+        return;
+    };
+    let room = rect.height() - FREE[0] - FREE[1];
+    if room < 0.5 * BAR[1] || !has_room(rect) {
+        return;
+    }
+    let palette = Palette::of(theme);
+    let (ink, halo) = (colour(palette.text), colour(palette.sky));
+    let corner = lower_right(rect, MARGIN) - vec2(0.0, FREE[1] - MARGIN);
+    let bar = Rect::from_min_max(corner - vec2(BAR[0], BAR[1].min(room)), corner);
+    let at = |place: f32| bar.max.y - place * bar.height();
+    for part in 0..PARTS {
+        let [from, to] = [part, part + 1].map(|part| part as f32 / PARTS as f32);
+        let rows = [pos2(bar.min.x, at(to)), pos2(bar.max.x, at(from))];
+        let hue = colour(WearScale::colour(0.5 * (from + to)));
+        painter.rect_filled(Rect::from_points(&rows), 0.0, hue);
+    }
+    let outline = [
+        bar.left_top(),
+        bar.right_top(),
+        bar.right_bottom(),
+        bar.left_bottom(),
+    ];
+    painter.add(Shape::closed_line(outline.to_vec(), Stroke::new(1.0, ink)));
+    for tick in scale.ticks() {
+        let y = at(scale.place(tick));
+        let left = bar.min.x - 4.0;
+        painter.line_segment([pos2(left, y), pos2(bar.min.x, y)], Stroke::new(1.0, ink));
+        let words = format_quantity_digits(f64::from(tick), "", 1);
+        let place = pos2(left - 3.0, y);
+        text(
+            painter,
+            place,
+            Align2::RIGHT_CENTER,
+            &words,
+            11.0,
+            ink,
+            halo,
+        );
+    }
+    let title = format!("Wear: {what}, {unit}");
+    let place = pos2(bar.max.x, bar.min.y - 6.0);
+    text(
+        painter,
+        place,
+        Align2::RIGHT_BOTTOM,
+        &title,
+        12.0,
+        ink,
+        halo,
+    );
 }
 
 /// Lower right corner, `margin` points away from both edges.

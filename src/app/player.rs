@@ -20,7 +20,7 @@ use crate::analysis::section::Schedule;
 use crate::scene::{Scene, SceneError, Value};
 use crate::simulate::{
     Channels, Effect, Frame, History, Pacer, Peak, Pull, RECORDED_JOINTS, Simulation, StartError,
-    Stopped,
+    Stopped, Wear,
 };
 use course::Course;
 use keyframes::Keyframes;
@@ -228,6 +228,11 @@ impl Player {
     /// What the chaos bench keeps of the run.
     pub fn watch(&self) -> &Watch {
         &self.watch
+    }
+
+    /// What the steps that are over at the instant on show did to the sockets since the start.
+    pub fn wear(&self) -> Option<&Wear> {
+        self.simulation.wear()
     }
 
     /// Another drive phase of the sections.
@@ -722,6 +727,9 @@ impl Player {
     fn pass_peaks(&mut self, time: f64) {
         self.passed.resize(self.coming.len(), Peak::default());
         let all = time >= self.simulation.time();
+        if all {
+            self.simulation.pass_wear();
+        }
         for joint in 0..self.coming.len() {
             let peak = self.coming[joint];
             // A contact that began without a force yet began with the end of the step.
@@ -792,6 +800,7 @@ impl Player {
         self.paths = Paths::new(self.simulation.running_scene());
         self.gravity = Gravity::new(self.simulation.running_scene().gravity);
         self.set_ideal(self.ideal.is_some());
+        self.simulation.keep_wear();
         // Forces at the start are those of the first frame: nothing has struck yet.
         self.simulation.take_peaks(&mut self.coming);
         self.forget_peaks();

@@ -16,7 +16,7 @@ use crate::render;
 use crate::simulate::{ContactState, Pull};
 use crate::view::{
     Camera, DrawList, PeakMarks, Picked, Preset, SEEN, Scaling, SceneView, Shot, Theme,
-    ViewOptions, to_f32,
+    ViewOptions, WearMap, to_f32,
 };
 
 /// Points of the probe's trail that are kept.
@@ -337,6 +337,9 @@ impl Viewport {
         self.view.build(&shot, Arc::make_mut(&mut self.list));
         let list = Arc::make_mut(&mut self.list);
         let said = ghosts::add(&self.view, &shot, player, list);
+        if let Some(wear) = player.wear() {
+            self.view.add_wear(&shot, wear, list);
+        }
         if response.clicked() {
             // A finger that has left hovers over nothing.
             let tapped = response
@@ -358,7 +361,11 @@ impl Viewport {
         {
             overlay::legend(&painter, rect, scale, legend, self.options.theme);
         }
+        if let Some(scale) = &self.list.wear_scale {
+            overlay::wear_scale(&painter, rect, scale, self.options.theme);
+        }
         let mut notes = vec![self.list.magnification_text.clone()];
+        notes.extend(overlay::wear_note(&self.list));
         if let Some(name) = self.followed.and_then(|picked| name_of(player, picked)) {
             notes.push(format!("following {name}"));
         }
@@ -626,6 +633,30 @@ impl Viewport {
             .on_hover_text("World axes X, Y, Z and the direction of gravity g");
         ui.checkbox(&mut options.trail, "Trail of the probe tip")
             .on_hover_text("Where the tip of the probe was");
+        ui.add_space(4.0);
+        ui.label("Wear map").on_hover_text(
+            "Colours the inner faces of the sockets by what they took since the reset, in cells of equal area; the balls are then \
+             seen through. The scale is logarithmic and follows the largest value.",
+        );
+        ui.horizontal(|ui| {
+            for (map, name, help) in [
+                (WearMap::Off, "Off", "Sockets as they are"),
+                (
+                    WearMap::Impulse,
+                    "Impulse",
+                    "How often and how hard: time integral of the normal force, N s/mm²",
+                ),
+                (
+                    WearMap::FrictionWork,
+                    "Friction work",
+                    "Size of the work that friction took, mJ/mm²",
+                ),
+            ] {
+                ui.radio_value(&mut options.wear, map, name)
+                    .on_hover_text(help)
+                    .accessible_name(format!("Wear map: {name}"));
+            }
+        });
         if self.followed.is_some()
             && ui
                 .button("Stop following")

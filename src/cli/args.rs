@@ -95,6 +95,10 @@ pub struct RunArguments {
     /// File for one row per finished impact, with the restitution that it really gave: .csv, .json or .npz.
     #[arg(long, value_name = "FILE")]
     pub impacts: Option<PathBuf>,
+    /// File for the wear map: one row per cell of the sockets' inner faces, with the contacts that began there, the impulse and
+    /// the work of friction that it took: .csv, .json or .npz.
+    #[arg(long, value_name = "FILE")]
+    pub wear: Option<PathBuf>,
     /// Form of the summary on standard output.
     #[arg(long, value_enum, value_name = "FORM", default_value = "text")]
     pub summary: SummaryForm,
@@ -326,6 +330,9 @@ pub struct RenderArguments {
         help_heading = "Picture"
     )]
     pub hide: Vec<Hideable>,
+    /// Colour the sockets' inner faces by what they took since the start, with a scale; balls are seen through.
+    #[arg(long, value_enum, value_name = "WHAT", help_heading = "Picture")]
+    pub wear: Option<WearChoice>,
     /// Write time, forces and labels over the picture.
     #[arg(long, help_heading = "Picture")]
     pub overlay: bool,
@@ -433,6 +440,15 @@ pub enum ArrowScale {
     Linear,
     /// Three decades below the reference force.
     Logarithmic,
+}
+
+/// What a wear map shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum WearChoice {
+    /// Time integral of the normal force.
+    Impulse,
+    /// Work that friction took, its size.
+    Friction,
 }
 
 /// Colours of the picture.

@@ -27,6 +27,7 @@ mod survival;
 mod sweep;
 mod tables;
 pub mod tradeoff;
+mod wear;
 
 use std::fmt::Write as _;
 use std::io::{self, Write as _};

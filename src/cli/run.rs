@@ -12,7 +12,7 @@ use super::assembly::Start;
 use super::impacts::ImpactsFile;
 use super::output::{NoRow, RowsFile, Table, check_distinct, check_size};
 use super::summary::{self, Status};
-use super::{Failure, interrupt, load, print, progress, quantity, start, warn};
+use super::{Failure, interrupt, load, print, progress, quantity, start, warn, wear};
 use crate::files::{FileError, appear};
 use crate::simulate::{Frame, Simulation};
 
@@ -82,7 +82,11 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         "the scene".to_owned(),
         PathBuf::from(&arguments.scene.scene),
     )];
-    for (option, path) in [("--out", &arguments.out), ("--impacts", &arguments.impacts)] {
+    for (option, path) in [
+        ("--out", &arguments.out),
+        ("--impacts", &arguments.impacts),
+        ("--wear", &arguments.wear),
+    ] {
         names.extend(path.iter().flat_map(|path| RowsFile::names(option, path)));
     }
     check_distinct(&names)?;
@@ -94,11 +98,18 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         Some(path) => Some(ImpactsFile::claim(path, arguments.force)?),
         None => None,
     };
+    let wear = match &arguments.wear {
+        Some(path) => Some(RowsFile::claim(path, arguments.force)?),
+        None => None,
+    };
     let scene = load(&arguments.scene)?;
     let mut simulation = start(&scene)?;
     let begun = Start::of(&mut simulation);
     let mut frame = Frame::default();
     simulation.sample(0.0, &mut frame);
+    if wear.is_some() {
+        simulation.keep_wear();
+    }
     let mut table = Table::new(&scene, &frame);
     if let (Some(times), Some(file)) = (&times, &file) {
         check_size(times.last.saturating_add(1), table.names().len())?;
@@ -176,10 +187,17 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         summary::written(&mut text, table.len(), "row", &path);
     }
     if let (Some(impacts), Some(path)) = (impacts, &arguments.impacts) {
-        let (rows, filled) = impacts.fill(&scene, meta)?;
+        let (rows, filled) = impacts.fill(&scene, meta.clone())?;
         files.extend(filled);
         facts.insert("impacts_out".into(), json!(path.display().to_string()));
         summary::written(&mut text, rows, "impact", path);
+    }
+    simulation.pass_wear();
+    if let (Some(file), Some(map), Some(path)) = (wear, simulation.wear(), &arguments.wear) {
+        let (rows, filled) = wear::fill(file, map, &scene, meta)?;
+        files.extend(filled);
+        facts.insert("wear_out".into(), json!(path.display().to_string()));
+        summary::written(&mut text, rows, "cell", path);
     }
     appear(files)?;
     match arguments.summary {

@@ -58,7 +58,8 @@ fn check(before: &[&str], line: &str) {
 #[test]
 fn rows_and_impacts_survive_in_every_format() {
     let run = "run pendulum --duration 30ms --every 3ms --quiet";
-    check(&[], &format!("{run} --out @/a.csv --impacts @/b.csv"));
+    let all = "--out @/a.csv --impacts @/b.csv --wear @/c.csv";
+    check(&[], &format!("{run} {all}"));
     let old = format!("{run} --set contact.friction=0.3 --out @/a.csv --impacts @/b.csv");
     check(
         &[&old],

@@ -137,6 +137,11 @@ impl Contacts {
         self.joints.iter().map(|contact| &contact.gap)
     }
 
+    /// Ball joint `i`.
+    pub(super) fn joint(&self, i: usize) -> &Contact {
+        &self.joints[i]
+    }
+
     /// Joint `i` at the latest evaluation.
     pub fn gap(&self, i: usize) -> &Gap {
         &self.joints[i].gap

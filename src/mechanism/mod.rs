@@ -31,7 +31,7 @@ pub use contacts::{Contacts, Counts, Ramp, Touching};
 pub use elements::{ElementReport, Gap, Pull};
 pub use jet::Jet;
 pub use kinematics::{Kinematics, Wrench};
-pub use power::Powers;
+pub use power::{Powers, Touch};
 pub use spcmm::{Ideal, Trajectory, Unreachable};
 pub use start::{Assembly, Placement};
 pub use summary::Summary;

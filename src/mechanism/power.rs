@@ -25,6 +25,17 @@ pub struct Powers {
     pub external: f64,
 }
 
+/// A ball that presses against the wall of its socket.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Touch {
+    /// Unit vector from the socket's centre to the point of contact, in the axes of the socket's body.
+    pub direction: Vec3,
+    /// F_N, N.
+    pub normal_force: f64,
+    /// Power that friction takes, W.
+    pub friction_power: f64,
+}
+
 impl Powers {
     /// Adds `weight` times `other`.
     pub fn add(&mut self, weight: f64, other: &Self) {
@@ -101,6 +112,17 @@ impl Mechanism {
             self.evaluated = None;
         }
         powers
+    }
+
+    /// What the ball of joint `j` does to the wall of its socket at the latest evaluation; `None` where it does not press.
+    pub fn touch(&self, j: usize) -> Option<Touch> {
+        self.contacts.joint(j).touch(self.motion())
+    }
+
+    /// Unit vector from the socket's centre of joint `j` to the ball's, off the centre, at the latest evaluation, in the axes of
+    /// the socket's body: towards the point of the wall that the ball is next to.
+    pub fn wall_direction(&self, j: usize) -> Vec3 {
+        self.contacts.joint(j).wall_direction(self.motion())
     }
 }
 

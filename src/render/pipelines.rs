@@ -28,6 +28,8 @@ pub(super) struct Pipelines {
     pub halo: wgpu::RenderPipeline,
     pub socket_far: wgpu::RenderPipeline,
     pub socket_near: wgpu::RenderPipeline,
+    pub wear_behind: wgpu::RenderPipeline,
+    pub wear: wgpu::RenderPipeline,
     pub mark_behind: wgpu::RenderPipeline,
     pub mark: wgpu::RenderPipeline,
     pub overlay: wgpu::RenderPipeline,
@@ -188,6 +190,14 @@ impl Pipelines {
             halo: make(glass("halo", "fs_halo", Back)),
             socket_far: make(glass("socket, far side", "fs_socket", Front)),
             socket_near: make(glass("socket, near side", "fs_socket", Back)),
+            wear_behind: make(Recipe {
+                cull: None,
+                compare: Always,
+                write_depth: false,
+                blend: true,
+                ..mesh("wear behind others", "vs_mesh", Some("fs_wear_behind"))
+            }),
+            wear: make(mesh("wear", "vs_mesh", Some("fs_wear"))),
             mark_behind: make(Recipe {
                 compare: Greater,
                 write_depth: false,

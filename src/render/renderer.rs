@@ -167,6 +167,8 @@ impl Renderer {
         let overlay = self.pack(&list.overlay);
         let halos = [self.pack_one(Mesh::Sphere.index(), &list.halos)];
         let sockets = [self.pack_one(Mesh::Socket.index(), &list.sockets)];
+        let wear = self.pack(&list.wear);
+        let clear_balls = [self.pack_one(Mesh::Sphere.index(), &list.clear_balls)];
         self.instances
             .write(device, queue, bytemuck::cast_slice(&self.packed));
         self.lines
@@ -192,6 +194,7 @@ impl Renderer {
             pass.set_bind_group(0, &self.globals_group, &[]);
             self.draw_meshes(&mut pass, &self.pipelines.cast_shadow, &solid);
             self.draw_meshes(&mut pass, &self.pipelines.cast_shadow, &faded);
+            self.draw_meshes(&mut pass, &self.pipelines.cast_shadow, &clear_balls);
         }
 
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -223,6 +226,10 @@ impl Renderer {
         self.draw_meshes(&mut pass, &pipelines.halo, &halos);
         self.draw_meshes(&mut pass, &pipelines.socket_far, &sockets);
         self.draw_meshes(&mut pass, &pipelines.socket_near, &sockets);
+        // After the sockets, whose glass would tint their colours.
+        self.draw_meshes(&mut pass, &pipelines.wear_behind, &wear);
+        self.draw_meshes(&mut pass, &pipelines.wear, &wear);
+        self.draw_meshes(&mut pass, &pipelines.faded, &clear_balls);
         self.draw_meshes(&mut pass, &pipelines.ghost_depth, &ghost);
         self.draw_meshes(&mut pass, &pipelines.ghost, &ghost);
         self.draw_meshes(&mut pass, &pipelines.ghost_edge, &ghost_edges);

@@ -4,11 +4,11 @@ use glam::Vec3;
 
 use super::wgpu::naga;
 use super::{Image, Offscreen, RenderError};
-use crate::scene::Scene;
-use crate::simulate::Frame;
+use crate::scene::{Scene, Vec3 as Vec3d};
+use crate::simulate::{Frame, Simulation};
 use crate::view::{
     Camera, DrawList, Ghost, Palette, PeakMarks, Preset, SceneView, Shot, Theme, ViewOptions,
-    fixture, to_f32,
+    WearMap, WearScale, fixture, to_f32,
 };
 
 const SIZE: [u32; 2] = [480, 360];
@@ -604,6 +604,103 @@ impl eframe::App for OnlyViewport {
             ui.painter()
                 .add(super::Viewport::shape(rect, self.0.clone()));
         });
+    }
+}
+
+#[test]
+fn struck_cells_have_the_colour_of_their_value_and_others_none() {
+    let scene = Scene::load("pendulum", &[]).expect("built in");
+    let mut simulation = Simulation::new(&scene).expect("starts");
+    simulation.keep_wear();
+    simulation.advance_to(0.3).expect("steps");
+    simulation.pass_wear();
+    let mut frame = Frame::default();
+    simulation.sample(simulation.time(), &mut frame);
+    let wear = simulation.wear().expect("kept");
+    let (view, marks) = (SceneView::new(&scene, &frame), PeakMarks::new());
+    let mut device = offscreen();
+    for (theme, map) in [
+        (Theme::Light, WearMap::Impulse),
+        (Theme::Dark, WearMap::FrictionWork),
+    ] {
+        let options = ViewOptions {
+            theme,
+            wear: map,
+            ..bare()
+        };
+        // From above, into the lower half, where the weight presses.
+        let mut camera = view.camera();
+        view.close_up(&mut camera, 0, &scene, &frame, &options);
+        camera.pitch = 1.2;
+        let shot = Shot {
+            scene: &scene,
+            frame: &frame,
+            marks: &marks,
+            options: &options,
+            camera: &camera,
+            trail: &[],
+            size: SIZE,
+            pixels_per_point: 1.0,
+        };
+        let mut list = DrawList::default();
+        view.build(&shot, &mut list);
+        let clear = list.clear_balls.clone();
+        assert_eq!(
+            clear.len(),
+            1,
+            "the ball that hides the wall is seen through"
+        );
+        // Nothing stands before the wall.
+        list.solid.by_mesh.iter_mut().for_each(Vec::clear);
+        list.clear_balls.clear();
+        let without = device.render(&list).expect("a picture");
+        view.add_wear(&shot, wear, &mut list);
+        let with = device.render(&list).expect("a picture");
+        list.clear_balls = clear;
+        let through = device.render(&list).expect("a picture");
+
+        let scale = list.wear_scale.expect("a scale");
+        let socket = to_f32(&frame.joints[0].socket_centre);
+        let inner = 0.01 + 0.3e-3 * list.magnification;
+        let (mut struck, mut clear, mut brightest) = (0, 0, 0.0_f32);
+        for (i, cell) in wear.cells(0).iter().enumerate() {
+            let edges = wear.grid().edges(i);
+            let middle = |[from, to]: [f64; 2]| 0.5 * (from + to);
+            let ((s, c), (sa, ca)) = (
+                middle(edges.polar).sin_cos(),
+                middle(edges.azimuth).sin_cos(),
+            );
+            // Its socket is fixed to the world.
+            let direction = wear.grid_from_body(0).transpose() * Vec3d::new(s * ca, s * sa, c);
+            let point = socket + to_f32(&direction) * (0.99 * inner);
+            let to_eye = (camera.eye() - point).normalize();
+            if to_f32(&direction).dot(to_eye) > -0.3 {
+                continue;
+            }
+            let (before, after) = (at(&without, &camera, point), at(&with, &camera, point));
+            let per_area = match map {
+                WearMap::FrictionWork => cell.friction_work.abs() * 1e3,
+                _ => cell.impulse,
+            } / (wear.area(0) * 1e6);
+            if cell.impulse == 0.0 {
+                assert!(difference(before, after) <= 1, "cell {i} took nothing");
+                clear += 1;
+                continue;
+            }
+            let place = scale.place(per_area as f32);
+            let [r, g, b, _] = WearScale::colour(place).to_rgba8();
+            let off = difference(after, [r, g, b]);
+            assert!(off <= 2, "cell {i}: {after:?} for {:?}", [r, g, b]);
+            let seen = difference(at(&through, &camera, point), [r, g, b]);
+            assert!(seen < 90, "cell {i} through the ball: {seen}");
+            struck += 1;
+            brightest = brightest.max(place);
+        }
+        assert!(
+            struck >= 3 && clear >= 3,
+            "{map:?}: {struck} struck, {clear} clear"
+        );
+        assert_eq!(brightest, 1.0, "the largest value is in the picture");
     }
 }
 

@@ -139,24 +139,32 @@ impl PowerCourse {
             }
             return sum;
         }
-        for (i, x) in nodes.iter().enumerate() {
-            // Lagrange's polynomial of this node by its coefficients, lowest first.
-            let mut coefficients = [0.0; NODES + 1];
-            coefficients[0] = 1.0;
-            let others = nodes.iter().enumerate().filter(|&(j, _)| j != i);
-            for (degree, (_, other)) in others.enumerate() {
-                let scale = 1.0 / (x - other);
-                for k in (0..=degree + 1).rev() {
-                    let below = if k > 0 { coefficients[k - 1] } else { 0.0 };
-                    coefficients[k] = (below - other * coefficients[k]) * scale;
-                }
-            }
-            let terms = (0..nodes.len()).rev();
-            let weight = terms.fold(0.0, |sum, k| end * (sum + coefficients[k] / (k + 1) as f64));
-            sum.add(weight, &self.powers[i]);
+        for (weight, powers) in weights(nodes, end).iter().zip(&self.powers[..nodes.len()]) {
+            sum.add(*weight, powers);
         }
         sum
     }
+}
+
+/// Weights with which values at `nodes`, six at most, give the integral from 0 to `end` of the polynomial through them.
+pub(super) fn weights(nodes: &[f64], end: f64) -> [f64; NODES] {
+    let mut weights = [0.0; NODES];
+    for (i, x) in nodes.iter().enumerate() {
+        // Lagrange's polynomial of this node by its coefficients, lowest first.
+        let mut coefficients = [0.0; NODES + 1];
+        coefficients[0] = 1.0;
+        let others = nodes.iter().enumerate().filter(|&(j, _)| j != i);
+        for (degree, (_, other)) in others.enumerate() {
+            let scale = 1.0 / (x - other);
+            for k in (0..=degree + 1).rev() {
+                let below = if k > 0 { coefficients[k - 1] } else { 0.0 };
+                coefficients[k] = (below - other * coefficients[k]) * scale;
+            }
+        }
+        let terms = (0..nodes.len()).rev();
+        weights[i] = terms.fold(0.0, |sum, k| end * (sum + coefficients[k] / (k + 1) as f64));
+    }
+    weights
 }
 
 /// The ledger of a running simulation, at both ends of the latest step: part of its state.

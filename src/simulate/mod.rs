@@ -13,6 +13,7 @@ mod report;
 mod simulation;
 mod stepper;
 mod stopped;
+mod wear;
 
 pub use angles::angles_of;
 pub use channels::*;
@@ -25,6 +26,7 @@ pub use pace::{LARGEST_BUDGET, LONGEST_FRAME, Pacer, SCALE_RANGE};
 pub use simulation::ideal::{ProbeFault, closed};
 pub use simulation::{CLEARANCE_SPEED, LARGEST_DENSE, LARGEST_IMPLICIT, Simulation};
 pub use stopped::{StopAdvice, StopFault, Stopped};
+pub use wear::{Cell, Edges, Grid, Wear};
 
 use std::sync::Arc;
 

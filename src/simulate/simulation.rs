@@ -13,6 +13,7 @@ mod live;
 mod sample;
 mod search;
 mod snapshot;
+mod wear;
 
 use std::sync::Arc;
 
@@ -20,7 +21,7 @@ use super::impacts::{Impact, Impacts};
 use super::ledger::Account;
 use super::peaks::{Approach, Recent};
 use super::stepper::AnyStepper;
-use super::{Frame, NotUnique, Peak, StartError, Statistics, StopAdvice, StopFault, Stopped};
+use super::{Frame, NotUnique, Peak, StartError, Statistics, StopAdvice, StopFault, Stopped, Wear};
 use crate::contact::Memory;
 use crate::integrate::{Controller, System as _};
 use crate::mechanism::{Counts, Mechanism, MechanismError, Pull, Ramp, Touching};
@@ -162,6 +163,7 @@ struct Control {
 #[derive(Clone, Debug, PartialEq)]
 struct Record {
     account: Account,
+    wear: Option<Wear>,
     impacts: Impacts,
     statistics: Statistics,
     /// Reactions of the ideal joints at the latest two instants, for their peaks between steps.
@@ -203,6 +205,7 @@ impl State {
             control: Control::new(scene),
             record: Record {
                 account: Account::default(),
+                wear: None,
                 impacts: Impacts::new(joints),
                 statistics: Statistics::new(joints),
                 reactions: vec![Recent::default(); joints],

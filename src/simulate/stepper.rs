@@ -118,6 +118,15 @@ impl AnyStepper {
         }
     }
 
+    /// Those instants with the ends that go with them, in units of the step.
+    pub(super) fn quadrature(&self) -> &'static [f64] {
+        const RADAU: [f64; 3] = [Radau::INTERIOR[0], Radau::INTERIOR[1], 1.0];
+        match self {
+            Self::Radau(_) | Self::Pair { implicit: true, .. } => &RADAU,
+            _ => &[0.0, 0.5, 1.0],
+        }
+    }
+
     /// Lets the latest attempt end at `theta` of its length, where its interpolant is.
     pub(super) fn truncate(&mut self, theta: f64) {
         match self {

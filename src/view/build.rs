@@ -13,7 +13,7 @@ use super::instances::{bar, placed, push_label};
 use super::theme::Material;
 use super::{
     Background, Bounds, Camera, DrawList, Floor, Instance, LabelKind, Layer, Light, Line, Mesh,
-    MeshData, Palette, Shot, ViewOptions, to_f32,
+    MeshData, Palette, Shot, ViewOptions, WearMap, to_f32,
 };
 use crate::scene::{Role, Scene, SignedAxis};
 use crate::simulate::Frame;
@@ -41,6 +41,8 @@ pub struct SceneView {
 const SMALLEST_WITH_TRIAD: f32 = 200.0;
 /// Radius of the light about a joint that was hit, in radii of its socket.
 const HALO: f32 = 1.7;
+/// Opacity of a ball that a wear map is seen through.
+const CLEAR_BALL: f32 = 0.25;
 /// Radius of a drawn spring, in radii of the scene.
 const COIL: f32 = 0.025;
 
@@ -224,7 +226,13 @@ impl SceneView {
                 joint.ball_centre,
                 palette.ball,
             );
-            out.solid.push(Mesh::Sphere, ball);
+            if options.wear == WearMap::Off || frame.joints[i].clearance == 0.0 {
+                out.solid.push(Mesh::Sphere, ball);
+            } else {
+                let [r, g, b, _] = ball.colour;
+                let colour = [r, g, b, CLEAR_BALL];
+                out.clear_balls.push(Instance { colour, ..ball });
+            }
             let flash = shot.marks.flash(i);
             if options.flash && flash > 0.02 {
                 let light = Material {
@@ -297,16 +305,18 @@ impl SceneView {
             &mut out.ghost,
             &mut out.ghost_edges,
             &mut out.arrows,
+            &mut out.wear,
             &mut out.overlay,
         ] {
             layer.clear(meshes);
         }
         out.halos.clear();
         out.sockets.clear();
+        out.clear_balls.clear();
         out.lines.clear();
         out.marks.clear();
         out.labels.clear();
-        out.legend = None;
+        (out.legend, out.wear_scale) = (None, None);
         out.size = shot.size;
         out.eye = shot.camera.view(shot.size);
         out.background = Background {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat4, Vec2, Vec3};
 
-use super::Colour;
+use super::{Colour, WearMap};
 
 /// A mesh that many instances share.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -20,7 +20,7 @@ pub enum Mesh {
     Cube,
     /// Half of a spherical shell of outer radius 1, open towards +z; [`Instance::inner_radius`] is its inner radius.
     Socket,
-    /// `DrawList::plates[i]`.
+    /// `DrawList::plates[i]`: a cell of a zone of wear maps, then the plates of the scene.
     Plate(u16),
 }
 
@@ -227,6 +227,15 @@ pub struct Legend {
     pub friction: Option<Colour>,
 }
 
+/// How to read the colours of a wear map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WearScale {
+    /// What they stand for: an impulse in N s/mm^2, or the size of a work in mJ/mm^2.
+    pub map: WearMap,
+    /// Largest value in the picture; 0 while no ball has touched.
+    pub largest: f32,
+}
+
 /// Everything to draw.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DrawList {
@@ -258,6 +267,10 @@ pub struct DrawList {
     pub halos: Vec<Instance>,
     /// Sockets, farthest first: for each the half that stands and, fainter, the half that is cut away.
     pub sockets: Vec<Instance>,
+    /// Cells of wear maps, in their own colours whatever the light; fainter where something stands before them, or the wall.
+    pub wear: Layer,
+    /// Balls that wear maps are seen through.
+    pub clear_balls: Vec<Instance>,
     /// Solid things before all others: the triad.
     pub overlay: Layer,
     /// Lines.
@@ -268,6 +281,8 @@ pub struct DrawList {
     pub labels: Vec<Label>,
     /// How to read the arrows; `None` where none are drawn.
     pub legend: Option<Legend>,
+    /// How to read the wear map; `None` where none is drawn.
+    pub wear_scale: Option<WearScale>,
     /// Magnification of the play that was drawn.
     pub magnification: f32,
     /// What to write about it: "play ×50"; says so where less was drawn than asked.
@@ -304,11 +319,14 @@ impl Default for DrawList {
             arrows: Layer::default(),
             halos: Vec::new(),
             sockets: Vec::new(),
+            wear: Layer::default(),
+            clear_balls: Vec::new(),
             overlay: Layer::default(),
             lines: Vec::new(),
             marks: Vec::new(),
             labels: Vec::new(),
             legend: None,
+            wear_scale: None,
             magnification: 1.0,
             magnification_text: String::new(),
         }

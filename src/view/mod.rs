@@ -27,15 +27,16 @@ mod shot;
 #[cfg(test)]
 mod tests;
 mod theme;
+mod wear;
 
 pub use build::SceneView;
 pub use camera::{Camera, Preset};
 pub use draw_list::{
     Background, DrawList, Eye, Floor, Instance, Label, LabelKind, Layer, Legend, Light, Line, Mesh,
-    MeshData, Tick,
+    MeshData, Tick, WearScale,
 };
 pub use ghost::{Ghost, GhostLook, output_point};
-pub use options::{ArrowOptions, Scaling, ViewOptions};
+pub use options::{ArrowOptions, Scaling, ViewOptions, WearMap};
 pub use peaks::{Mark, PeakMarks, SEEN};
 pub use pick::{Hit, Picked};
 pub use shot::Shot;

@@ -24,6 +24,8 @@ pub struct ViewOptions {
     pub sockets: bool,
     /// Draw the caller's trail.
     pub trail: bool,
+    /// What colours the sockets' inner faces; balls are then seen through.
+    pub wear: WearMap,
 }
 
 impl Default for ViewOptions {
@@ -38,8 +40,21 @@ impl Default for ViewOptions {
             joint_names: true,
             sockets: true,
             trail: true,
+            wear: WearMap::Off,
         }
     }
+}
+
+/// What colours the sockets' inner faces.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum WearMap {
+    /// Nothing.
+    #[default]
+    Off,
+    /// Time integral of the normal force.
+    Impulse,
+    /// Work that friction took.
+    FrictionWork,
 }
 
 /// How contact forces are drawn.

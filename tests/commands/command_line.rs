@@ -1036,6 +1036,29 @@ mod frames {
         );
     }
 
+    #[test]
+    fn a_wear_map_is_that_of_the_run_so_far_whatever_the_frames() {
+        let folder = folder();
+        let common =
+            "--size 320x240 --close-up S1 --magnification 20 --arrows none --hide trail,flash";
+        let slow = "--fps 1000 --slow 0.1111111111111111";
+        for (line, out) in [
+            (format!("--duration 9ms {slow} --wear impulse"), "film"),
+            ("--at 9ms --wear impulse".to_owned(), "single"),
+            ("--at 9ms --wear friction".to_owned(), "friction"),
+            ("--at 9ms".to_owned(), "without"),
+        ] {
+            let line = format!("render spcmm {line} {common} --out {out}");
+            jointplay(folder.path(), &line).expect(0);
+        }
+        let at = |name: &str, frame: &str| picture(&folder.path().join(name).join(frame)).2;
+        let single = at("single", "frame_00000.png");
+        assert!(at("film", "frame_00001.png") == single);
+        for other in ["friction", "without"] {
+            assert!(at(other, "frame_00000.png") != single, "{other}");
+        }
+    }
+
     #[cfg(unix)]
     #[test]
     fn frames_that_are_killed_at_any_instant_are_the_old_or_the_new() {

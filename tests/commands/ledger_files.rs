@@ -200,3 +200,89 @@ fn every_impact_has_its_row() {
     let text = fs::read_to_string(folder.path().join("none.csv")).unwrap();
     assert_eq!(text.lines().count(), 1);
 }
+
+#[test]
+fn the_wear_map_adds_up_to_the_rows_and_the_ledger() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = "run spcmm --duration 30ms";
+    let summary = done(
+        folder.path(),
+        &format!("{run} --every 5us --out rows.json --wear wear.json --summary json"),
+    );
+    let summary: Json = serde_json::from_str(&summary).unwrap();
+    assert_eq!(summary["wear_out"], "wear.json");
+    let (rows, wear) = (
+        json(&folder.path().join("rows.json")),
+        json(&folder.path().join("wear.json")),
+    );
+    let get = |name: &str| column(&wear, name);
+    let (joint, impulse, work) = (get("joint"), get("impulse_N_s"), get("friction_work_J"));
+    let contacts = get("contacts");
+    for (j, name) in ["S1", "S2", "S3"].into_iter().enumerate() {
+        let of = |values: &[f64]| -> f64 {
+            let own = (0..joint.len()).filter(|&k| joint[k] == j as f64);
+            own.map(|k| values[k]).sum()
+        };
+        let force = column(&rows, &format!("{name}_normal_N"));
+        let expected: f64 = force.windows(2).map(|f| 0.5 * (f[0] + f[1]) * 5e-6).sum();
+        // The trapezoidal rule with twenty rows an impact.
+        let error = of(&impulse) / expected - 1.0;
+        assert!(error.abs() < 1e-3, "{name}: {error:e} of {expected} N s");
+        assert_eq!(of(&contacts), summary["impacts"][name].as_f64().unwrap());
+    }
+    let loss = summary["energy_J"]["friction_loss"].as_f64().unwrap();
+    let size: f64 = work.iter().map(|work| work.abs()).sum();
+    assert!((work.iter().sum::<f64>() - loss).abs() < 1e-9 * size);
+    // Equal areas, and the sphere of r + c is covered.
+    let (area, density) = (get("area_m2"), get("impulse_N_s_m2"));
+    let polar = [get("polar_from_rad"), get("polar_to_rad")];
+    let azimuth = [get("azimuth_from_rad"), get("azimuth_to_rad")];
+    let radius: f64 = 10.3e-3;
+    for k in 0..area.len() {
+        let height = polar[0][k].cos() - polar[1][k].cos();
+        let own = radius * radius * height * (azimuth[1][k] - azimuth[0][k]);
+        assert!((own / area[k] - 1.0).abs() < 1e-9, "cell {k}");
+        assert!((density[k] * area[k] - impulse[k]).abs() <= 1e-12 * impulse[k]);
+    }
+    let whole = 3.0 * 4.0 * std::f64::consts::PI * radius * radius;
+    assert!((area.iter().sum::<f64>() / whole - 1.0).abs() < 1e-9);
+    let axes = &wear["meta"]["socket_axes"]["S1"];
+    assert_eq!(
+        wear["meta"]["ball_joints"],
+        serde_json::json!(["S1", "S2", "S3"])
+    );
+    assert!(axes["body"].is_string() && axes["z"].as_array().unwrap().len() == 3);
+
+    // The run is the same without, and the file as whole as the others.
+    let without = done(folder.path(), &format!("{run} --summary json"));
+    let without: Json = serde_json::from_str(&without).unwrap();
+    assert_eq!(without["state_hash"], summary["state_hash"]);
+    assert_eq!(without["evaluations"], summary["evaluations"]);
+    let said = done(folder.path(), &format!("{run} --wear wear.csv"));
+    assert!(
+        said.contains(&format!("{} cells to wear.csv", joint.len())),
+        "{said}"
+    );
+    let text = fs::read_to_string(folder.path().join("wear.csv")).unwrap();
+    assert_eq!(text.lines().count(), joint.len() + 1);
+    assert!(folder.path().join("wear.csv.meta.json").is_file());
+    for (line, code, word) in [
+        ("--wear wear.csv", 1, "--force"),
+        ("--wear wear.txt", 2, ".npz"),
+        ("--wear a.csv --impacts a.csv", 2, "same file"),
+    ] {
+        let output = jointplay(
+            folder.path(),
+            &format!("run pendulum --duration 1000000s {line}"),
+        );
+        assert_eq!(output.code, Some(code), "{line}");
+        assert!(output.stderr.contains(word), "{line}");
+    }
+    // Without play there is no wall to strike.
+    done(
+        folder.path(),
+        "run pendulum --set contact.clearance=0 --duration 1ms --wear none.csv",
+    );
+    let text = fs::read_to_string(folder.path().join("none.csv")).unwrap();
+    assert_eq!(text.lines().count(), 1);
+}

@@ -679,6 +679,44 @@ fn an_arrow_is_a_force_of_the_instant_on_show_and_a_peak_is_marked_apart() {
 }
 
 #[test]
+fn the_wear_map_comes_with_its_scale_and_goes_with_the_reset() {
+    let mut harness = window("spcmm");
+    harness.state_mut().player_mut().run_to(9.0e-3);
+    harness.run();
+    // A colour of the scale that nothing else in the view has.
+    let purple = |harness: &mut Harness<'_, App>| {
+        let view = harness.get_by_label("3D view").rect();
+        let area = [view.left(), view.top(), view.right(), view.bottom()].map(|edge| edge as usize);
+        picture(harness)
+            .coloured(area, [0x47, 0x2D, 0x7B], 12)
+            .len()
+    };
+    let choose = |harness: &mut Harness<'_, App>, name: &str| {
+        click(harness, "View options");
+        harness
+            .get_by_role_and_label(Role::RadioButton, name)
+            .click();
+        harness.run();
+        harness.key_press(Key::Escape);
+        harness.run();
+    };
+    assert_eq!(purple(&mut harness), 0);
+    for name in ["Wear map: Impulse", "Wear map: Friction work"] {
+        choose(&mut harness, name);
+        let seen = purple(&mut harness);
+        assert!(seen > 30, "{name}: {seen}");
+    }
+    click(&mut harness, "Reset");
+    harness.run();
+    assert_eq!(purple(&mut harness), 0, "nothing has touched yet");
+    harness.state_mut().player_mut().run_to(9.0e-3);
+    harness.run();
+    assert!(purple(&mut harness) > 30);
+    choose(&mut harness, "Wear map: Off");
+    assert_eq!(purple(&mut harness), 0);
+}
+
+#[test]
 fn after_a_reset_or_a_step_back_no_force_is_on_show_that_is_yet_to_come() {
     let mut harness = window("spcmm");
     harness.state_mut().player_mut().run_to(9.0e-3);

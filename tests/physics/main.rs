@@ -26,3 +26,4 @@ mod reference;
 mod restitution;
 mod settled;
 mod twin;
+mod wear;

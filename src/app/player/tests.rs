@@ -474,6 +474,49 @@ fn impacts_are_found_one_after_another() {
 }
 
 #[test]
+fn the_wear_map_is_that_of_the_steps_that_are_over() {
+    let mut player = player("spcmm");
+    let kept = |player: &Player| player.wear().expect("kept").clone();
+    let contacts = |player: &Player| -> u64 {
+        let wear = kept(player);
+        let cells = (0..3).flat_map(|j| wear.cells(j));
+        cells.map(|cell| cell.contacts).sum()
+    };
+    player.run_to(7e-3);
+    player.pacer.set_scale(0.001);
+    player.set_playing(true);
+    let mut ahead = 0;
+    while player.pacer.shown() < 7.9e-3 {
+        player.advance(1.0 / 60.0);
+        let shown = player.pacer.shown();
+        // The first contacts of S1, S2 and S3 (`tests/physics/reference.rs`), within the tolerance of the preset.
+        let begun = [7.80142e-3, 7.80768e-3, 7.80781e-3];
+        if begun.iter().all(|time: &f64| (time - shown).abs() > 1e-6) {
+            let expected = begun.iter().filter(|time| **time < shown).count();
+            assert_eq!(contacts(&player), expected as u64, "t = {shown}");
+        }
+        let computed: u64 = player.simulation().statistics().impacts.iter().sum();
+        ahead += usize::from(computed > contacts(&player));
+    }
+    assert!(ahead > 0, "the run itself was further on");
+    player.set_playing(false);
+    player.single_step();
+    let before = kept(&player);
+    for _ in 0..30 {
+        player.single_step();
+    }
+    assert!(kept(&player) != before);
+    for _ in 0..30 {
+        player.step_back();
+    }
+    assert!(kept(&player) == before);
+    player.reset().expect("starts");
+    assert_eq!(contacts(&player), 0);
+    let after = kept(&player);
+    assert!(after.cells(0).iter().all(|cell| cell.impulse == 0.0));
+}
+
+#[test]
 fn a_preset_chosen_here_replaces_what_was_set_by_name() {
     let mut player = player("spcmm");
     player.set("solver.tolerance", "1e-9").expect("in range");

@@ -2,12 +2,12 @@
 
 use crate::app::plate;
 use crate::cli::args::{
-    ArrowChoice, ArrowScale, CameraView, Hideable, RenderArguments, ThemeChoice,
+    ArrowChoice, ArrowScale, CameraView, Hideable, RenderArguments, ThemeChoice, WearChoice,
 };
 use crate::cli::{Failure, quantity};
 use crate::scene::Scene;
 use crate::simulate::Frame;
-use crate::view::{ArrowOptions, Camera, Preset, Scaling, SceneView, Theme, ViewOptions};
+use crate::view::{ArrowOptions, Camera, Preset, Scaling, SceneView, Theme, ViewOptions, WearMap};
 
 /// Point of view that `arguments` ask for, at the frame of t = 0.
 ///
@@ -56,7 +56,9 @@ pub fn camera(
         None => {
             let size = [arguments.size.0, arguments.size.1];
             if arguments.overlay {
-                let plate = plate(scene.ball_joints.len());
+                // A line for each joint, and one for the wear map.
+                let lines = scene.ball_joints.len() + usize::from(arguments.wear.is_some());
+                let plate = plate(lines);
                 view.fit_around(&mut camera, scene, frame, options, size, plate);
             } else {
                 view.fit(&mut camera, scene, frame, options, size);
@@ -104,6 +106,11 @@ pub fn view_options(arguments: &RenderArguments) -> Result<ViewOptions, Failure>
         joint_names: shown(Hideable::Names),
         sockets: shown(Hideable::Sockets),
         trail: shown(Hideable::Trail),
+        wear: match arguments.wear {
+            None => WearMap::Off,
+            Some(WearChoice::Impulse) => WearMap::Impulse,
+            Some(WearChoice::Friction) => WearMap::FrictionWork,
+        },
     })
 }
 

@@ -9,7 +9,9 @@ use crate::cli::{Failure, interrupt, start};
 use crate::render::{Image, NoAdapter, Offscreen, RenderError};
 use crate::scene::{Scene, Vec3};
 use crate::simulate::{Frame, Peak, Simulation};
-use crate::view::{Camera, DrawList, PeakMarks, SEEN, SceneView, Shot, ViewOptions, to_f32};
+use crate::view::{
+    Camera, DrawList, PeakMarks, SEEN, SceneView, Shot, ViewOptions, WearMap, to_f32,
+};
 
 /// A simulation and what draws it.
 pub trait Studio {
@@ -78,8 +80,12 @@ impl SceneStudio {
         let view = SceneView::new(scene, &frame);
         let camera = options::camera(arguments, scene, &view, &frame, &options)?;
         let size = [arguments.size.0, arguments.size.1];
-        // Magnified play is never shown without saying so.
-        let screen = if arguments.overlay || options.magnification != 1.0 {
+        let wear = options.wear != WearMap::Off;
+        if wear {
+            simulation.keep_wear();
+        }
+        // Neither magnified play nor a colour is ever shown without saying so.
+        let screen = if arguments.overlay || options.magnification != 1.0 || wear {
             Screen::Written(Box::new(
                 Headless::new().map_err(|error| no_adapter(&error))?,
             ))
@@ -148,7 +154,11 @@ impl Studio for SceneStudio {
             size: self.size,
             pixels_per_point: 1.0,
         };
-        self.view.build(&shot, Arc::make_mut(&mut self.list));
+        let list = Arc::make_mut(&mut self.list);
+        self.view.build(&shot, list);
+        if let Some(wear) = self.simulation.wear() {
+            self.view.add_wear(&shot, wear, list);
+        }
         match &mut self.screen {
             Screen::Plain(offscreen) => offscreen.render(&self.list),
             Screen::Written(headless) => {

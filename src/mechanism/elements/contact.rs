@@ -2,10 +2,10 @@
 
 use super::{At, Coupling, ForceElement, Loads};
 use crate::contact::{Coefficients, Force, Separation, Slope};
-use crate::mechanism::Powers;
 use crate::mechanism::columns::contact_sides;
 use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::model::{Anchor, BallJoint};
+use crate::mechanism::{Powers, Touch};
 use crate::scene::Vec3;
 
 /// One ball joint at the latest evaluation.
@@ -60,6 +60,36 @@ impl Contact {
         let gap = &self.gap;
         self.law
             .separation(&gap.eccentricity, &gap.eccentricity_rate)
+    }
+
+    /// Power that friction takes where the contact has the normal `n`, W.
+    fn friction_power(&self, n: &Vec3, motion: &[Kinematics]) -> f64 {
+        let (gap, law) = (&self.gap, &self.law);
+        if gap.friction == Vec3::zeros() {
+            return 0.0;
+        }
+        let [ball, socket] = self.spins(motion);
+        let surfaces = law.surface_velocity(n, &gap.eccentricity_rate, ball, socket);
+        -gap.friction.dot(&surfaces)
+    }
+
+    /// What the ball does to the wall of its socket at the latest evaluation; `None` where it does not press.
+    pub fn touch(&self, motion: &[Kinematics]) -> Option<Touch> {
+        if !self.is_loose() || self.gap.normal_force <= 0.0 {
+            return None;
+        }
+        Some(Touch {
+            direction: self.wall_direction(motion),
+            normal_force: self.gap.normal_force,
+            friction_power: self.friction_power(&self.separation().normal, motion),
+        })
+    }
+
+    /// Unit vector from the socket's centre to the ball's, off the centre, at the latest evaluation, in the axes of the socket's
+    /// body: towards the point of the wall that the ball is next to.
+    pub fn wall_direction(&self, motion: &[Kinematics]) -> Vec3 {
+        let socket = &motion[self.joint.socket.body];
+        socket.rotation.tr_mul(&self.separation().normal)
     }
 
     /// Angular velocities of ball and socket, rad/s.
@@ -193,11 +223,6 @@ impl ForceElement for Contact {
         let at = self.separation();
         powers.restitution += law.restitution_power(&at, gap.normal_force);
         powers.clearance += law.clearance_power(&at, gap.normal_force);
-        if gap.friction != Vec3::zeros() {
-            let [ball, socket] = self.spins(motion);
-            let velocity = &gap.eccentricity_rate;
-            let surfaces = law.surface_velocity(&at.normal, velocity, ball, socket);
-            powers.friction -= gap.friction.dot(&surfaces);
-        }
+        powers.friction += self.friction_power(&at.normal, motion);
     }
 }

@@ -6,7 +6,7 @@ use crate::contact::{ApproachPiece, FrictionPiece, Memory};
 impl Simulation {
     /// Adds `offset` to coordinates and velocities (as [`Self::state`] orders them) and goes on from there: quaternions
     /// back to unit length, ideal joints closed again. A joint whose ball the offset puts into its wall is in contact
-    /// from now on, one whose ball it lifts is not; every other contact keeps its memory. Counters stay as they are.
+    /// from now on, one whose ball it lifts is not; every other contact keeps its memory. Counters stay as they are, and no wear map is kept any more.
     ///
     /// Components of `offset` beyond the state's are ignored, missing ones are 0.
     pub fn displace(&mut self, offset: &[f64]) {
@@ -40,6 +40,7 @@ impl Simulation {
                 Memory::default()
             };
         }
+        self.state.record.wear = None;
         self.refresh();
         self.book_change();
     }

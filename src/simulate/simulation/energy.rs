@@ -1,8 +1,8 @@
 //! Keeps the energy ledger: powers at a few instants of each accepted step.
 
-use super::{Simulation, State};
+use super::{Record, Simulation, State};
 use crate::mechanism::{Mechanism, Powers, Touching};
-use crate::simulate::ledger::{Account, Energies};
+use crate::simulate::ledger::{Account, Energies, weights};
 use crate::simulate::{Frame, Ledger};
 
 /// Instants at the ends of past steps from which the works of a scene that is a function of time alone are integrated:
@@ -38,12 +38,16 @@ impl Simulation {
             let energies = energies(mechanism, state);
             state.record.account.book_change(energies);
         }
+        // A wear map has them without a ledger, too.
+        state.record.account.powers = None;
     }
 
-    /// Books the step just accepted, of size `h`. The contact memory in force is still that of the step; `switched` where
-    /// another has been found for its end.
+    /// Books the step just accepted, of size `h`, in the ledger and the wear map. The contact memory in force is still that of the
+    /// step; `switched` where another has been found for its end.
     pub(super) fn book_step(&mut self, h: f64, switched: bool) {
-        if !self.state.record.account.on {
+        let Record { account, wear, .. } = &self.state.record;
+        let keeps_ledger = account.on;
+        if !keeps_ledger && wear.is_none() {
             return;
         }
         let located = self.locates();
@@ -62,10 +66,40 @@ impl Simulation {
             scratch_k.copy_from_slice(&now.k);
             let mut evaluator = mechanism.evaluator(Touching::by(located, &state.before.memory));
             let end = evaluator.powers(now.t, &now.y, scratch_k);
+            self.begin_wear_of_step();
             self.lay_out_course(h, end);
-            self.state.record.account.powers = (!switched).then_some(end);
+            let Record { account, wear, .. } = &mut self.state.record;
+            account.powers = (!switched).then_some(end);
+            if let Some(wear) = wear {
+                let instants = self.stepper.quadrature();
+                wear.book(h, &weights(instants, 1.0)[..instants.len()]);
+            }
         }
-        self.state.record.account.book(h, energies);
+        if keeps_ledger {
+            self.state.record.account.book(h, energies);
+        }
+    }
+
+    /// Begins to book the step just accepted in the wear map: with the contacts that began at its end, and the forces there, those
+    /// of the latest evaluation.
+    fn begin_wear_of_step(&mut self) {
+        let State {
+            before,
+            now,
+            record,
+            ..
+        } = &mut self.state;
+        let Some(wear) = &mut record.wear else {
+            return;
+        };
+        let instants = self.stepper.quadrature();
+        wear.begin_step(instants[0] == 0.0 && record.account.powers.is_some());
+        for (j, (before, now)) in before.memory.iter().zip(&now.memory).enumerate() {
+            if now.active && !before.active {
+                wear.begin_contact(j, &self.mechanism.wall_direction(j));
+            }
+        }
+        wear.read(instants.len() - 1, &self.mechanism);
     }
 
     /// Finds the instants from which the works of the step just accepted are integrated; at its end the powers are `end`.
@@ -105,6 +139,7 @@ impl Simulation {
         let located = self.locates();
         let Self {
             mechanism,
+            stepper,
             state,
             scratch_y,
             scratch_k,
@@ -112,7 +147,13 @@ impl Simulation {
         } = self;
         mechanism.forget_evaluation();
         let mut evaluator = mechanism.evaluator(Touching::by(located, &state.before.memory));
-        evaluator.powers(state.before.t + theta * h, scratch_y, scratch_k)
+        let powers = evaluator.powers(state.before.t + theta * h, scratch_y, scratch_k);
+        if let Some(wear) = &mut state.record.wear {
+            // None of them where the motion is a function of time alone: there no ball touches.
+            let instant = stepper.quadrature().iter().position(|at| *at == theta);
+            wear.read(instant.unwrap_or(0), mechanism);
+        }
+        powers
     }
 
     /// Ledger at the instant of `frame`, within the latest step.

@@ -1,0 +1,75 @@
+//! `run --wear`: one row for each cell of the inner face of each socket, and what it took.
+
+use serde_json::{Map, Value as Json, json};
+
+use super::Failure;
+use super::output::{RowsFile, Table};
+use crate::files::Filled;
+use crate::scene::Scene;
+use crate::simulate::{Edges, Wear};
+
+const COLUMNS: [&str; 12] = [
+    "joint",
+    "cell",
+    "polar_from_rad",
+    "polar_to_rad",
+    "azimuth_from_rad",
+    "azimuth_to_rad",
+    "area_m2",
+    "contacts",
+    "impulse_N_s",
+    "friction_work_J",
+    "impulse_N_s_m2",
+    "friction_work_J_m2",
+];
+
+/// Writes `map` to `file` with `meta`, which says what made it; nothing has its final name yet. Returns the number of rows, too.
+///
+/// # Errors
+/// As [`RowsFile::fill`].
+pub fn fill(
+    file: RowsFile,
+    map: &Wear,
+    scene: &Scene,
+    mut meta: Map<String, Json>,
+) -> Result<(usize, Vec<Filled>), Failure> {
+    let mut rows = Vec::new();
+    let mut axes = Map::new();
+    for (j, joint) in scene.ball_joints.iter().enumerate() {
+        let area = map.area(j);
+        for (cell, took) in map.cells(j).iter().enumerate() {
+            let Edges { polar, azimuth } = map.grid().edges(cell);
+            rows.push([
+                j as f64,
+                cell as f64,
+                polar[0],
+                polar[1],
+                azimuth[0],
+                azimuth[1],
+                area,
+                took.contacts as f64,
+                took.impulse,
+                took.friction_work,
+                took.impulse / area,
+                took.friction_work / area,
+            ]);
+        }
+        let grid = map.grid_from_body(j);
+        let axis = |i: usize| [0, 1, 2].map(|k| grid[(i, k)]);
+        let body = joint.socket.body.map(|b| scene.bodies[b].name.as_str());
+        axes.insert(
+            joint.name.clone(),
+            json!({"body": body, "x": axis(0), "y": axis(1), "z": axis(2)}),
+        );
+    }
+    let names: Vec<&str> = scene.ball_joints.iter().map(|j| j.name.as_str()).collect();
+    meta.insert("rows".into(), json!(rows.len()));
+    // Numbers in the column `joint`, from 0.
+    meta.insert("ball_joints".into(), json!(names));
+    // Of the polar angles and azimuths, in the axes of the socket's body; `null` is the world.
+    meta.insert("socket_axes".into(), Json::Object(axes));
+    let count = rows.len();
+    let table = Table::of_rows(COLUMNS, rows.into_iter());
+    let files = file.fill(&table, meta)?;
+    Ok((count, files))
+}

@@ -1,0 +1,376 @@
+//! Wear maps: where balls struck and rubbed the inner faces of their sockets, how hard, and what friction spent there.
+
+use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
+use std::ops::Range;
+use std::sync::Arc;
+
+use crate::mechanism::Mechanism;
+use crate::scene::{BallJoint, Mat3, Scene, Vec3};
+
+/// Cells on each socket: about 14 degrees across.
+const CELLS: usize = 200;
+
+/// Cells of equal area on the unit sphere: P. Leopardi, "A partition of the unit sphere into regions of equal area and small
+/// diameter", Electronic Transactions on Numerical Analysis 25 (2006) 309-327. A cap about each pole is a cell; the
+/// zones between are divided evenly in azimuth. Cells are counted from the pole +z, and eastwards from azimuth 0.
+#[derive(Debug, PartialEq)]
+pub struct Grid {
+    /// Number of the first cell of each zone, caps included, and behind them the number of all.
+    first: Vec<usize>,
+}
+
+/// Edges of a cell, rad.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Edges {
+    /// Polar angle from +z, 0..=pi.
+    pub polar: [f64; 2],
+    /// Azimuth about z from +x towards +y, 0..=2 pi.
+    pub azimuth: [f64; 2],
+}
+
+impl Grid {
+    /// The one of every wear map.
+    pub fn of_sockets() -> Self {
+        Self::new(CELLS)
+    }
+
+    /// Of `cells` cells, two at least.
+    fn new(cells: usize) -> Self {
+        let n = cells as f64;
+        // Polar angle within which a share of the sphere lies.
+        let within = |share: f64| 2.0 * libm::asin(share.sqrt());
+        let cap = within(1.0 / n);
+        let collars = ((PI - 2.0 * cap) / (4.0 * PI / n).sqrt()).round().max(1.0);
+        let height = (PI - 2.0 * cap) / collars;
+        let mut first = vec![0, 1];
+        for collar in 1..collars as usize {
+            // The whole number of cells next to those down to the collar's lower edge: what it is off enters the next collar.
+            let s = libm::sin(0.5 * (cap + height * collar as f64));
+            first.push((n * s * s).round() as usize);
+        }
+        if cells > 2 {
+            first.push(cells - 1);
+        }
+        first.push(cells);
+        Self { first }
+    }
+
+    /// Number of cells.
+    pub fn cells(&self) -> usize {
+        self.first[self.zones()]
+    }
+
+    fn zones(&self) -> usize {
+        self.first.len() - 1
+    }
+
+    /// Cells of zone `zone`, from +z on; those of one zone are the same but for a turn about z.
+    pub fn zone(&self, zone: usize) -> Option<Range<usize>> {
+        (zone < self.zones()).then(|| self.first[zone]..self.first[zone + 1])
+    }
+
+    /// Zone of `cell`.
+    pub fn zone_of(&self, cell: usize) -> usize {
+        self.first.partition_point(|first| *first <= cell) - 1
+    }
+
+    /// Where `cell` lies.
+    pub fn edges(&self, cell: usize) -> Edges {
+        let zone = self.zone_of(cell);
+        let (from, to) = (self.first[zone], self.first[zone + 1]);
+        let polar = |cells: usize| {
+            let share = cells as f64 / self.cells() as f64;
+            2.0 * libm::asin(share.sqrt())
+        };
+        let azimuth = |sector: usize| TAU * sector as f64 / (to - from) as f64;
+        Edges {
+            polar: [polar(from), polar(to)],
+            azimuth: [azimuth(cell - from), azimuth(cell - from + 1)],
+        }
+    }
+
+    /// Cell in which a unit vector points.
+    pub fn cell(&self, direction: &Vec3) -> usize {
+        // Of equal height are of equal area (Archimedes): as many cells as this lie above.
+        let above = 0.5 * (1.0 - direction.z) * self.cells() as f64;
+        let zone = self.zone_of((above as usize).min(self.cells() - 1));
+        let sectors = self.first[zone + 1] - self.first[zone];
+        let turn = libm::atan2(direction.y, direction.x) / TAU;
+        let turn = if turn < 0.0 { turn + 1.0 } else { turn };
+        let sector = ((turn * sectors as f64) as usize).min(sectors - 1);
+        self.first[zone] + sector
+    }
+}
+
+/// What a cell of a socket's inner face took.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Cell {
+    /// Contacts that began there.
+    pub contacts: u64,
+    /// Time integral of the normal force, N s.
+    pub impulse: f64,
+    /// Time integral of the power that friction took, J. Where friction reads the centres' velocity it may be negative.
+    pub friction_work: f64,
+}
+
+impl Cell {
+    fn add(&mut self, other: &Self) {
+        self.contacts += other.contacts;
+        self.impulse += other.impulse;
+        self.friction_work += other.friction_work;
+    }
+}
+
+#[derive(Clone, Debug, PartialEq)]
+struct Socket {
+    /// From the socket body's axes to the grid's.
+    grid_from_body: Mat3,
+    /// Radius r + c of the inner face, m.
+    radius: f64,
+    /// None in an ideal joint. Copies of the map share those that have not changed since.
+    cells: Arc<[Cell]>,
+}
+
+/// A ball that pressed at one of the instants of a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Press {
+    /// Index among the instants of the quadrature.
+    instant: usize,
+    joint: usize,
+    cell: usize,
+    /// N.
+    normal_force: f64,
+    /// W.
+    friction_power: f64,
+}
+
+/// What the contacts of a run did to the inner faces of its sockets, by cells of equal area.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Wear {
+    grid: Arc<Grid>,
+    sockets: Vec<Socket>,
+    /// Of the step being booked; after it those at its end, which may begin the next.
+    presses: Vec<Press>,
+    /// What the latest step did, by joint and cell: not in the cells yet.
+    latest: Vec<(usize, usize, Cell)>,
+}
+
+/// Most entries of a joint in one step: its instants, and a contact that begins.
+const MOST_ENTRIES: usize = 4;
+
+impl Wear {
+    /// An empty one.
+    pub(super) fn new(scene: &Scene) -> Self {
+        let grid = Arc::new(Grid::of_sockets());
+        let socket = |joint: &BallJoint| {
+            let contact = &joint.contact;
+            let ideal = contact.clearance == 0.0;
+            let cells = vec![Cell::default(); if ideal { 0 } else { grid.cells() }];
+            Socket {
+                grid_from_body: axes(&joint.opening),
+                radius: contact.ball_radius + contact.clearance,
+                cells: cells.into(),
+            }
+        };
+        let sockets: Vec<Socket> = scene.ball_joints.iter().map(socket).collect();
+        let most = MOST_ENTRIES * sockets.len();
+        Self {
+            presses: Vec::with_capacity(most),
+            latest: Vec::with_capacity(most),
+            sockets,
+            grid,
+        }
+    }
+
+    /// The cells of every socket.
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// What the cells of ball joint `joint` took, the latest step left out before
+    /// [`Simulation::pass_wear`](super::Simulation::pass_wear); none in an ideal joint.
+    pub fn cells(&self, joint: usize) -> &[Cell] {
+        &self.sockets[joint].cells
+    }
+
+    /// Area of a cell of ball joint `joint`, m^2, with the clearance that it had when the map was begun.
+    pub fn area(&self, joint: usize) -> f64 {
+        let radius = self.sockets[joint].radius;
+        4.0 * PI * radius * radius / self.grid.cells() as f64
+    }
+
+    /// Rotation from the axes of the socket's body to those of the grid: z is the socket's opening; x lies in the plane of the
+    /// opening and the body's x axis, or its y axis where x is within 45 degrees of the opening.
+    pub fn grid_from_body(&self, joint: usize) -> &Mat3 {
+        &self.sockets[joint].grid_from_body
+    }
+
+    /// The latest step is over: what it did enters the cells.
+    pub(super) fn pass(&mut self) {
+        for (joint, cell, share) in self.latest.drain(..) {
+            let cells = Arc::make_mut(&mut self.sockets[joint].cells);
+            cells[cell].add(&share);
+        }
+    }
+
+    /// A step is about to be booked; where its forces begin as the one before ended, those are taken over for its first
+    /// instant.
+    pub(super) fn begin_step(&mut self, goes_on: bool) {
+        self.pass();
+        if !goes_on {
+            self.presses.clear();
+        }
+    }
+
+    /// The forces of the latest evaluation of `mechanism` are those at instant `instant` of the step.
+    pub(super) fn read(&mut self, instant: usize, mechanism: &Mechanism) {
+        for joint in 0..self.sockets.len() {
+            if let Some(touch) = mechanism.touch(joint) {
+                let cell = self.cell(joint, &touch.direction);
+                self.presses.push(Press {
+                    instant,
+                    joint,
+                    cell,
+                    normal_force: touch.normal_force,
+                    friction_power: touch.friction_power,
+                });
+            }
+        }
+    }
+
+    /// A contact of `joint` begins in the direction `direction` of the socket's body.
+    pub(super) fn begin_contact(&mut self, joint: usize, direction: &Vec3) {
+        let share = Cell {
+            contacts: 1,
+            ..Cell::default()
+        };
+        self.latest
+            .push((joint, self.cell(joint, direction), share));
+    }
+
+    /// Books a step of size `h`, the weights of whose instants are `weights`.
+    pub(super) fn book(&mut self, h: f64, weights: &[f64]) {
+        for press in &self.presses {
+            let weight = h * weights[press.instant];
+            let share = Cell {
+                contacts: 0,
+                impulse: weight * press.normal_force,
+                friction_work: weight * press.friction_power,
+            };
+            self.latest.push((press.joint, press.cell, share));
+        }
+        let last = weights.len() - 1;
+        self.presses.retain(|press| press.instant == last);
+        self.presses.iter_mut().for_each(|press| press.instant = 0);
+    }
+
+    fn cell(&self, joint: usize, direction: &Vec3) -> usize {
+        let direction = self.sockets[joint].grid_from_body * direction;
+        self.grid.cell(&direction)
+    }
+}
+
+fn axes(opening: &Vec3) -> Mat3 {
+    let z = opening.normalize();
+    let near = if z.x.abs() > FRAC_1_SQRT_2 {
+        Vec3::y()
+    } else {
+        Vec3::x()
+    };
+    let x = (near - z * z.dot(&near)).normalize();
+    let y = z.cross(&x);
+    Mat3::from_rows(&[x.transpose(), y.transpose(), z.transpose()])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Unit vector by polar angle and azimuth.
+    fn towards(polar: f64, azimuth: f64) -> Vec3 {
+        let ((s, c), (sa, ca)) = (libm::sincos(polar), libm::sincos(azimuth));
+        Vec3::new(s * ca, s * sa, c)
+    }
+
+    #[test]
+    fn cells_are_of_equal_area_and_cover_the_sphere() {
+        for n in [2, 3, 4, 20, CELLS, 1001] {
+            let grid = Grid::new(n);
+            assert_eq!(grid.cells(), n);
+            let mut whole = 0.0;
+            for cell in 0..n {
+                let Edges { polar, azimuth } = grid.edges(cell);
+                let area = (azimuth[1] - azimuth[0]) * (libm::cos(polar[0]) - libm::cos(polar[1]));
+                assert!(
+                    (area * n as f64 / (4.0 * PI) - 1.0).abs() < 1e-11,
+                    "{n}: {cell}"
+                );
+                whole += area;
+                // Its middle is in it, and in no other.
+                let middle = |[a, b]: [f64; 2]| 0.5 * (a + b);
+                let centre = towards(middle(polar), middle(azimuth));
+                assert_eq!(grid.cell(&centre), cell, "{n}");
+            }
+            assert!((whole - 4.0 * PI).abs() < 1e-9, "{n}: {whole}");
+        }
+    }
+
+    #[test]
+    fn cells_of_a_map_are_about_as_wide_as_high() {
+        let grid = Grid::new(CELLS);
+        let zones: Vec<_> = (0..).map_while(|zone| grid.zone(zone)).collect();
+        let counts: Vec<usize> = zones.iter().map(ExactSizeIterator::len).collect();
+        assert_eq!(counts.iter().sum::<usize>(), CELLS);
+        assert_eq!((counts[0], counts[counts.len() - 1]), (1, 1));
+        for zone in &zones[1..zones.len() - 1] {
+            let Edges { polar, azimuth } = grid.edges(zone.start);
+            let height = polar[1] - polar[0];
+            let width = (azimuth[1] - azimuth[0]) * libm::sin(0.5 * (polar[0] + polar[1]));
+            assert!(
+                (0.7..1.4).contains(&(width / height)),
+                "{zone:?}: {width} by {height}"
+            );
+        }
+    }
+
+    #[test]
+    fn every_direction_has_its_cell() {
+        let grid = Grid::new(CELLS);
+        assert_eq!(grid.cell(&Vec3::z()), 0);
+        assert_eq!(grid.cell(&-Vec3::z()), CELLS - 1);
+        // Rounding beyond the ends.
+        assert_eq!(grid.cell(&Vec3::new(0.0, 0.0, -1.0 - 1e-15)), CELLS - 1);
+        let mut hit = vec![0; CELLS];
+        for i in 0..400 {
+            for k in 0..400 {
+                let z = (f64::from(i) + 0.5) / 200.0 - 1.0;
+                let azimuth = TAU * (f64::from(k) + 0.5) / 400.0 - PI;
+                let cell = grid.cell(&towards(libm::acos(z), azimuth));
+                hit[cell] += 1;
+                let edges = grid.edges(cell);
+                let azimuth = if azimuth < 0.0 {
+                    azimuth + TAU
+                } else {
+                    azimuth
+                };
+                assert!(edges.azimuth[0] <= azimuth && azimuth <= edges.azimuth[1]);
+            }
+        }
+        // Points of equal density: as many in every cell.
+        for (cell, hits) in hit.into_iter().enumerate() {
+            assert!((700..900).contains(&hits), "{cell}: {hits}");
+        }
+    }
+
+    #[test]
+    fn the_opening_is_the_pole_and_the_axes_are_a_rotation() {
+        for opening in [Vec3::x(), -Vec3::y(), Vec3::new(0.6, 0.0, 0.8)] {
+            let rotation = axes(&opening);
+            assert!((rotation * opening - Vec3::z()).norm() < 1e-15);
+            assert!((rotation * rotation.transpose() - Mat3::identity()).norm() < 1e-15);
+            assert!(rotation.determinant() > 0.0);
+        }
+        let x = axes(&Vec3::z()) * Vec3::x();
+        assert!((x - Vec3::x()).norm() < 1e-15);
+    }
+}

@@ -1,0 +1,187 @@
+//! The wear map: cells of the sockets' inner faces coloured by what they took.
+
+use glam::{Mat3, Vec3};
+
+use super::drawn::{self, Pose};
+use super::instances::placed;
+use super::theme::Material;
+use super::{Colour, DrawList, Mesh, MeshData, SceneView, Shot, WearMap, WearScale};
+use crate::simulate::{Cell, Edges, Grid, Wear};
+
+/// Decades of the scale below the largest value.
+const DECADES: f32 = 3.0;
+/// Radius of the drawn cells, in inner radii of the socket: before its wall.
+const BEFORE_WALL: f32 = 0.99;
+/// Widest part of a cell that is drawn flat, rad.
+const FLAT: f64 = 0.07;
+
+impl WearMap {
+    /// What a cell shows, per square millimetre of its `area` (m^2); the sign left out.
+    fn value(self, cell: &Cell, area: f64) -> f32 {
+        let value = match self {
+            Self::Off => 0.0,
+            // From 1/m^2 to 1/mm^2.
+            Self::Impulse => cell.impulse / area * 1e-6,
+            // From J/m^2 to mJ/mm^2.
+            Self::FrictionWork => cell.friction_work.abs() / area * 1e-3,
+        };
+        value as f32
+    }
+}
+
+impl WearScale {
+    /// Least value that has a colour of its own; lesser ones have its.
+    pub fn least(&self) -> f32 {
+        self.largest / 10_f32.powf(DECADES)
+    }
+
+    /// Place of `value` on the scale, logarithmic: 0 for the least, 1 for the largest.
+    pub fn place(&self, value: f32) -> f32 {
+        (1.0 + (value / self.largest).log10() / DECADES).clamp(0.0, 1.0)
+    }
+
+    /// Powers of ten on the scale, rising; none while nothing was touched.
+    pub fn ticks(&self) -> impl Iterator<Item = f32> {
+        let first = self.least().log10().ceil() as i32;
+        let powers = (first..=first + DECADES as i32).map(|power| 10_f32.powi(power));
+        let largest = self.largest;
+        powers.take_while(move |tick| *tick <= largest)
+    }
+
+    /// Colour at a place of the scale: viridis (S. van der Walt and N. Smith, 2015), which rises evenly in lightness, also to
+    /// the colour-blind and in grey.
+    pub fn colour(place: f32) -> Colour {
+        const VIRIDIS: [u32; 9] = [
+            0x440154, 0x472D7B, 0x3B528B, 0x2C728E, 0x21918C, 0x28AE80, 0x5EC962, 0xADDC30,
+            0xFDE725,
+        ];
+        let at = place.clamp(0.0, 1.0) * (VIRIDIS.len() - 1) as f32;
+        let lower = (at as usize).min(VIRIDIS.len() - 2);
+        let [from, to] = [lower, lower + 1].map(|i| Colour::hex(VIRIDIS[i]).0);
+        let part = at - lower as f32;
+        Colour(std::array::from_fn(|i| from[i] + part * (to[i] - from[i])))
+    }
+}
+
+/// A mesh for each zone of the grid: its cell that begins at azimuth 0, on the unit sphere, seen from inside.
+pub(super) fn meshes() -> Vec<MeshData> {
+    let grid = Grid::of_sockets();
+    let zones = (0..).map_while(|zone| grid.zone(zone));
+    zones.map(|cells| patch(&grid.edges(cells.start))).collect()
+}
+
+fn patch(edges: &Edges) -> MeshData {
+    let Edges { polar, azimuth } = *edges;
+    let parts = |[from, to]: [f64; 2]| ((to - from) / FLAT).ceil() as u32;
+    let (rows, columns) = (parts(polar), parts(azimuth));
+    let mut mesh = MeshData::default();
+    for i in 0..=rows {
+        for k in 0..=columns {
+            let at = |[from, to]: [f64; 2], part: u32, parts: u32| {
+                from + (to - from) * f64::from(part) / f64::from(parts)
+            };
+            let (polar, azimuth) = (at(polar, i, rows), at(azimuth, k, columns));
+            let ((s, c), (sa, ca)) = (polar.sin_cos(), azimuth.sin_cos());
+            let [x, y, z] = [s * ca, s * sa, c].map(|part| part as f32);
+            mesh.vertices.push(([x, y, z, 0.0], [-x, -y, -z]));
+        }
+    }
+    for i in 0..rows {
+        for k in 0..columns {
+            let a = i * (columns + 1) + k;
+            let b = a + columns + 1;
+            mesh.indices.extend([a, a + 1, b, b, a + 1, b + 1]);
+        }
+    }
+    mesh
+}
+
+impl SceneView {
+    /// Adds the map that `shot` asks for, from what `wear` holds, to the list that was built of it: cells that took nothing stay
+    /// clear.
+    pub fn add_wear(&self, shot: &Shot<'_>, wear: &Wear, out: &mut DrawList) {
+        let map = shot.options.wear;
+        if map == WearMap::Off {
+            return;
+        }
+        let joints = 0..shot.scene.ball_joints.len().min(shot.frame.joints.len());
+        let value = |joint: usize, cell: &Cell| map.value(cell, wear.area(joint));
+        let values = joints
+            .clone()
+            .flat_map(|j| wear.cells(j).iter().map(move |cell| value(j, cell)));
+        let scale = WearScale {
+            map,
+            largest: values.fold(0.0, f32::max),
+        };
+        out.wear_scale = Some(scale);
+        if scale.largest <= 0.0 {
+            return;
+        }
+        let drawn = drawn::joints(shot.scene, shot.frame, out.magnification);
+        for j in joints {
+            let body = Pose::in_frame(shot.frame, shot.scene.ball_joints[j].socket.body).rotation;
+            let grid = wear.grid_from_body(j);
+            // Rows of one are columns of the other.
+            let axis = |i: usize| super::to_f32(&grid.row(i).transpose());
+            let socket = body * Mat3::from_cols(axis(0), axis(1), axis(2));
+            let size = Mat3::from_diagonal(Vec3::splat(BEFORE_WALL * drawn[j].inner));
+            for (i, cell) in wear.cells(j).iter().enumerate() {
+                let value = value(j, cell);
+                if value <= 0.0 {
+                    continue;
+                }
+                let turn = Mat3::from_rotation_z(wear.grid().edges(i).azimuth[0] as f32);
+                let surface = Material {
+                    colour: WearScale::colour(scale.place(value)),
+                    roughness: 1.0,
+                    metal: 0.0,
+                };
+                let mesh = Mesh::Plate(wear.grid().zone_of(i) as u16);
+                let cell = placed(socket * turn * size, drawn[j].socket_centre, surface);
+                out.wear.push(mesh, cell);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_scale_is_logarithmic_and_ends_at_the_largest_value() {
+        let scale = WearScale {
+            map: WearMap::Impulse,
+            largest: 1.2,
+        };
+        assert_eq!(scale.place(1.2), 1.0);
+        assert!((scale.place(0.12) - 2.0 / 3.0).abs() < 1e-6);
+        assert!(scale.place(scale.least()) < 1e-6);
+        assert_eq!(scale.place(1e-9), 0.0);
+        let ticks: Vec<f32> = scale.ticks().collect();
+        assert_eq!(ticks.len(), 3);
+        for (tick, expected) in ticks.into_iter().zip([0.01, 0.1, 1.0]) {
+            assert!((tick / expected - 1.0).abs() < 1e-5, "{tick}");
+        }
+    }
+
+    #[test]
+    fn a_larger_value_is_lighter() {
+        // Relative luminance (IEC 61966-2-1) of a colour.
+        let luminance = |place: f32| {
+            let [r, g, b, _] = WearScale::colour(place).0.map(|c| {
+                if c > 0.04045 {
+                    ((c + 0.055) / 1.055).powf(2.4)
+                } else {
+                    c / 12.92
+                }
+            });
+            0.2126 * r + 0.7152 * g + 0.0722 * b
+        };
+        for i in 0..40 {
+            let (less, more) = (i as f32 / 40.0, (i + 1) as f32 / 40.0);
+            assert!(luminance(less) < luminance(more), "{less}");
+        }
+        assert!(luminance(0.0) < 0.05 && luminance(1.0) > 0.7);
+    }
+}

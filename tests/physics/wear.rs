@@ -1,0 +1,209 @@
+//! Wear maps: what the cells took adds up to what the run did, lies where it did it, and changes nothing.
+
+use crate::common::{Changes, METHODS, SCENES, run_until, simulation};
+use jointplay::scene::Mat3;
+use jointplay::simulate::{Cell, Frame, Simulation, Wear};
+
+/// A run over `duration` with its map; the last step is cut.
+fn after(name: &str, changes: &Changes, duration: f64) -> Simulation {
+    let mut simulation = simulation(name, changes);
+    simulation.keep_wear();
+    run_until(&mut simulation, duration);
+    simulation.pass_wear();
+    simulation
+}
+
+fn wear(simulation: &Simulation) -> &Wear {
+    simulation.wear().unwrap()
+}
+
+/// Sum over the cells of ball joint `j`.
+fn sum(wear: &Wear, j: usize) -> Cell {
+    let mut sum = Cell::default();
+    for cell in wear.cells(j) {
+        sum.contacts += cell.contacts;
+        sum.impulse += cell.impulse;
+        sum.friction_work += cell.friction_work;
+    }
+    sum
+}
+
+#[test]
+fn friction_work_and_contacts_are_those_of_ledger_and_counters() {
+    let check = |case: &str, simulation: &Simulation| {
+        let wear = wear(simulation);
+        let joints = simulation.statistics().impacts.len();
+        let sums: Vec<Cell> = (0..joints).map(|j| sum(wear, j)).collect();
+        let contacts: Vec<u64> = sums.iter().map(|sum| sum.contacts).collect();
+        assert_eq!(contacts, simulation.statistics().impacts, "{case}");
+        let loss = simulation.ledger().unwrap().friction_loss;
+        let work: f64 = sums.iter().map(|sum| sum.friction_work).sum();
+        let sizes = (0..joints).flat_map(|j| wear.cells(j));
+        let size: f64 = sizes.map(|cell| cell.friction_work.abs()).sum();
+        println!("{case}: {work:e} of {loss:e}, {:e}", work - loss);
+        // The same sums in another order.
+        assert!(size > 1e-7, "{case}: {size:e}");
+        assert!(
+            (work - loss).abs() < 1e-11 * size,
+            "{case}: {work:e}, {loss:e}"
+        );
+    };
+    for name in SCENES {
+        check(name, &after(name, &[], 0.1));
+    }
+    for method in METHODS {
+        let changes = [
+            ("solver.method", method),
+            ("contact.friction_velocity", "surface"),
+        ];
+        check(method, &after("spcmm", &changes, 0.03));
+    }
+    let lagrange = ("formulation", "lagrange");
+    let ideal = ("joint.S2.clearance", "0");
+    let run = after("spcmm", &[lagrange, ideal], 0.03);
+    let cells = wear(&run).cells(1);
+    assert!(cells.is_empty(), "an ideal joint has no wall to strike");
+    check("partly ideal", &run);
+    // Parameters that change in contact.
+    let mut run = after("spcmm", &[], 0.2);
+    for (key, value) in [
+        ("contact.friction", "0.3"),
+        ("contact.youngs_modulus", "150 GPa"),
+        ("contact.clearance", "0.25 mm"),
+    ] {
+        run.set(key, value).unwrap();
+        let end = run.time() + 0.05;
+        run_until(&mut run, end);
+    }
+    run.pass_wear();
+    check("live changes", &run);
+}
+
+#[test]
+fn impulses_are_time_integrals_of_the_normal_force() {
+    for method in ["automatic", "rosenbrock"] {
+        let mut simulation = simulation("spcmm", &[("solver.method", method)]);
+        simulation.keep_wear();
+        let (mut frame, mut expected) = (Frame::default(), [0.0; 3]);
+        while simulation.time() < 0.05 {
+            simulation.step().unwrap();
+            let (from, to) = (simulation.step_start(), simulation.time());
+            // Gauss's five points.
+            let root = (10.0_f64 / 7.0).sqrt();
+            let (near, far) = (
+                (5.0 - 2.0 * root).sqrt() / 3.0,
+                (5.0 + 2.0 * root).sqrt() / 3.0,
+            );
+            let (more, less) = (
+                (322.0 + 13.0 * 70.0_f64.sqrt()) / 1800.0,
+                (322.0 - 13.0 * 70.0_f64.sqrt()) / 1800.0,
+            );
+            let middle = 64.0 / 225.0;
+            for (at, weight) in [
+                (-far, less),
+                (-near, more),
+                (0.0, middle),
+                (near, more),
+                (far, less),
+            ] {
+                simulation.sample(from + 0.5 * (1.0 + at) * (to - from), &mut frame);
+                for (expected, joint) in expected.iter_mut().zip(&frame.joints) {
+                    *expected += weight * (to - from) * joint.normal_force.norm();
+                }
+            }
+        }
+        simulation.pass_wear();
+        for (j, expected) in expected.into_iter().enumerate() {
+            let found = sum(wear(&simulation), j).impulse;
+            println!(
+                "{method}, joint {j}: {found} N s, {:e}",
+                found / expected - 1.0
+            );
+            // Simpson's rule, or Radau's, over steps that resolve an impact.
+            assert!(
+                (found / expected - 1.0).abs() < 1e-4,
+                "{method}: {found} {expected}"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_map_changes_no_bit_and_copies_go_on_alike() {
+    for method in METHODS {
+        let changes = [("solver.method", method)];
+        let mut without = simulation("pendulum", &changes);
+        without.advance_to(0.05).unwrap();
+        let mut with = simulation("pendulum", &changes);
+        with.keep_wear();
+        with.advance_to(0.025).unwrap();
+        let kept = with.snapshot();
+        with.advance_to(0.05).unwrap();
+        assert_eq!(with.state_hash(), without.state_hash(), "{method}");
+        assert_eq!(with.statistics(), without.statistics(), "{method}");
+        assert_eq!(with.ledger(), without.ledger(), "{method}");
+        with.pass_wear();
+        let once = wear(&with).clone();
+        // From the middle on, again.
+        with.restore(&kept).unwrap();
+        assert!(*wear(&with) != once, "{method}");
+        with.advance_to(0.05).unwrap();
+        with.pass_wear();
+        assert_eq!(with.state_hash(), without.state_hash(), "{method}");
+        assert!(*wear(&with) == once, "{method}");
+        // The ledger is not needed for it.
+        let off = [changes[0], ("solver.energy_ledger", "off")];
+        let alone = after("pendulum", &off, 0.05);
+        let paid = after("pendulum", &changes, 0.05);
+        assert!(wear(&alone).cells(0) == wear(&paid).cells(0), "{method}");
+        // A reset ends it.
+        with.reset().unwrap();
+        assert!(with.wear().is_none());
+    }
+}
+
+#[test]
+fn a_cell_lies_where_the_ball_touches() {
+    for name in ["spcmm", "pendulum", "slider-crank"] {
+        let mut simulation = simulation(name, &[]);
+        simulation.advance_to(0.5).unwrap();
+        simulation.keep_wear();
+        let (empty, mut frame) = (wear(&simulation).clone(), Frame::default());
+        let joints = simulation.scene().ball_joints.len();
+        let mut expected = vec![vec![0.0; empty.grid().cells()]; joints];
+        while simulation.time() < 0.6 {
+            simulation.step().unwrap();
+            simulation.sample(simulation.time(), &mut frame);
+            let h = simulation.time() - simulation.step_start();
+            let scene = simulation.scene().clone();
+            for (j, joint) in scene.ball_joints.iter().enumerate() {
+                let turn = match joint.socket.body {
+                    Some(b) => frame.bodies[b].rotation,
+                    None => Mat3::identity(),
+                };
+                let report = &frame.joints[j];
+                let direction = turn.transpose() * report.eccentricity.normalize();
+                let cell = empty.grid().cell(&(empty.grid_from_body(j) * direction));
+                expected[j][cell] += h * report.normal_force.norm();
+            }
+        }
+        simulation.pass_wear();
+        let wear = wear(&simulation);
+        for (j, expected) in expected.iter().enumerate() {
+            if wear.cells(j).is_empty() {
+                continue;
+            }
+            let found = |cell: usize| wear.cells(j)[cell].impulse;
+            let whole: f64 = expected.iter().sum();
+            let apart: f64 = (0..expected.len())
+                .map(|i| (found(i) - expected[i]).abs())
+                .sum();
+            println!("{name}, joint {j}: {apart:e} of {whole:e}");
+            // A step on the edge of two cells gives all of its rectangle to one here.
+            assert!(
+                whole > 0.0 && apart < 0.05 * whole,
+                "{name}, joint {j}: {apart} of {whole}"
+            );
+        }
+    }
+}
