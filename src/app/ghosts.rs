@@ -71,3 +71,65 @@ impl App {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Scene;
+    use crate::simulate::{Frame, Simulation, closed};
+    use crate::view::{LabelKind, PeakMarks, ViewOptions, output_point, to_f32};
+
+    #[test]
+    fn the_arrow_and_its_words_are_the_distance_of_two_runs_apart() {
+        let scene = Scene::load("slider-crank", &[]).expect("built in");
+        let mut player = Player::new(&scene).expect("starts");
+        player.set_ideal(true);
+        player.run_to(0.06);
+        player.place_ghost();
+        let time = player.frame().time;
+        let tip = |scene: &Scene| {
+            let mut frame = Frame::default();
+            let mut run = Simulation::new(scene).expect("starts");
+            run.advance_to(time).expect("runs");
+            run.sample(time, &mut frame);
+            output_point(&scene.output, &frame).expect("has a body")
+        };
+        let (ideal, error) = (tip(&closed(&scene)), tip(&scene) - tip(&closed(&scene)));
+        let view = SceneView::new(&scene, player.frame());
+        let (marks, camera) = (PeakMarks::new(), view.camera());
+        for magnification in [1.0, 10.0] {
+            let options = ViewOptions {
+                magnification,
+                ..ViewOptions::default()
+            };
+            let shot = Shot {
+                scene: &scene,
+                frame: player.frame(),
+                marks: &marks,
+                options: &options,
+                camera: &camera,
+                trail: &[],
+                size: [1280, 720],
+                pixels_per_point: 1.0,
+            };
+            let mut list = DrawList::default();
+            view.build(&shot, &mut list);
+            let notes = add(&view, &shot, &player, &mut list);
+            let length = value::number(error.norm() * 1e6, 4);
+            assert!(
+                notes.contains(&format!("tip error {length} µm")),
+                "{notes:?}"
+            );
+            let label = list.labels.iter().find(|l| l.kind == LabelKind::Error);
+            let label = label.expect("in the picture");
+            let drawn = if magnification > 1.0 {
+                ", drawn ×10"
+            } else {
+                ""
+            };
+            assert_eq!(*label.text, *format!("tip error {length} µm{drawn}"));
+            let head = to_f32(&ideal) + to_f32(&error) * magnification;
+            assert!(label.anchor.distance(head) < 1e-6, "{head}");
+        }
+    }
+}

@@ -245,7 +245,7 @@ impl Player {
         self.twin.as_deref()
     }
 
-    /// Puts the twin where it is at the time on show.
+    /// Puts the ghosts where they are at the time on show.
     pub(super) fn place_ghost(&mut self) {
         if let Some(twin) = &mut self.twin {
             twin.place(self.pacer.shown());

@@ -458,18 +458,20 @@ fn bounds(extents: &[(Vec3, f32)]) -> Bounds {
     }
 }
 
-fn magnification_text(drawn: f32, asked: f32) -> String {
-    let number = |x: f32| {
-        if (x - x.round()).abs() < 0.05 {
-            format!("{x:.0}")
-        } else {
-            format!("{x:.1}")
-        }
-    };
-    if drawn < asked * 0.999 {
-        format!("play ×{} (×{} does not fit)", number(drawn), number(asked))
+/// A magnification in words, without its sign.
+pub(super) fn times(x: f32) -> String {
+    if (x - x.round()).abs() < 0.05 {
+        format!("{x:.0}")
     } else {
-        format!("play ×{}", number(drawn))
+        format!("{x:.1}")
+    }
+}
+
+fn magnification_text(drawn: f32, asked: f32) -> String {
+    if drawn < asked * 0.999 {
+        format!("play ×{} (×{} does not fit)", times(drawn), times(asked))
+    } else {
+        format!("play ×{}", times(drawn))
     }
 }
 

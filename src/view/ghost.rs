@@ -3,7 +3,7 @@
 use glam::{Mat3, Vec3};
 
 use super::arrows::push_error;
-use super::build::push_solid;
+use super::build::{self, push_solid};
 use super::instances::placed;
 use super::theme::Material;
 use super::{Colour, DrawList, Mesh, Palette, SceneView, Shot, drawn, to_f32};
@@ -121,8 +121,7 @@ impl SceneView {
         let times = out.magnification.min(fits).max(1.0);
         let length = format_quantity_digits(error.norm() * 1e6, "", 4);
         let words = if times > 1.0 {
-            let times = format_quantity_digits(f64::from(times), "", 3);
-            format!("tip error {length} µm, drawn ×{times}")
+            format!("tip error {length} µm, drawn ×{}", build::times(times))
         } else {
             format!("tip error {length} µm")
         };
