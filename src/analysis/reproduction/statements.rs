@@ -107,7 +107,10 @@ impl Findings {
                     extent(values.into_iter()) / (values.iter().sum::<f64>() / 3.0)
                 });
                 (
-                    "its three values differ by a larger share of their mean".to_owned(),
+                    format!(
+                        "over the three {} the {of} differs by a larger share of its mean than the {than}",
+                        with.values()
+                    ),
                     this > other,
                     format!(
                         "{of}: {:.1} %, {than}: {:.1} %",
@@ -135,10 +138,7 @@ impl Findings {
                 (
                     format!("no ball leaves its socket after {after} s"),
                     last.iter().all(|t| *t <= after),
-                    format!(
-                        "last separations {}",
-                        each(over, &last, |t| format!("{t:.4} s"))
-                    ),
+                    each(over, &last, |t| format!("last separation {t:.4} s")),
                 )
             }
             Test::Hardest { joint, run } => {
@@ -255,7 +255,7 @@ impl Findings {
                         size(resolution, of)
                     ),
                     spreads.iter().all(|s| *s > resolution) && ascending(&spreads),
-                    format!("spreads {}", each(over, &spreads, |s| size(*s, of))),
+                    each(over, &spreads, |s| size(*s, of)),
                 )
             }
             Test::SectionsCrowd(over) => {
