@@ -159,6 +159,12 @@ pub struct Wear {
 const MOST_ENTRIES: usize = 4;
 
 impl Wear {
+    /// Bytes that it takes, about; the grid, which others share, left out.
+    pub(super) fn bytes(&self) -> usize {
+        let cells: usize = self.sockets.iter().map(|socket| socket.cells.len()).sum();
+        cells * size_of::<Cell>() + size_of_val(self.presses.as_slice())
+    }
+
     /// An empty one.
     pub(super) fn new(scene: &Scene) -> Self {
         let grid = Arc::new(Grid::of_sockets());

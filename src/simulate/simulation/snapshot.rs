@@ -5,7 +5,7 @@ use super::{Simulation, State};
 use crate::integrate::System as _;
 use crate::mechanism::{Mechanism, Touching};
 use crate::simulate::stepper::AnyStepper;
-use crate::simulate::{Snapshot, StartError};
+use crate::simulate::{Snapshot, StartError, Wear};
 
 impl State {
     pub(in crate::simulate) fn time(&self) -> f64 {
@@ -24,7 +24,8 @@ impl State {
         const FIXED: usize = 4096;
         let (coordinates, joints) = (self.now.y.len(), self.now.gaps.len());
         let impacts = std::mem::size_of_val(self.record.impacts.kept());
-        FIXED + coordinates * COPIES * size_of::<f64>() + joints * OF_JOINT + impacts
+        let wear = self.record.wear.as_ref().map_or(0, Wear::bytes);
+        FIXED + wear + coordinates * COPIES * size_of::<f64>() + joints * OF_JOINT + impacts
     }
 }
 
