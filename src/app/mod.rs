@@ -531,10 +531,18 @@ impl App {
             self.advance_load();
             return true;
         }
+        let sought = self.player.is_seeking();
         self.player.advance(dt);
+        if sought && !self.player.is_seeking() {
+            self.viewport.arrive(&self.player);
+        }
         self.announcer.observe(&self.player);
         let moves = self.viewport.advance(&self.player, dt as f32);
-        moves || self.player.is_playing() || self.player.is_ideal_behind()
+        moves
+            || sought
+            || self.player.is_seeking()
+            || self.player.is_playing()
+            || self.player.is_ideal_behind()
     }
 
     fn show_scene(&mut self, scene: &Scene) -> Result<(), String> {

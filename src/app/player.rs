@@ -24,6 +24,7 @@ use crate::simulate::{
 };
 use course::Course;
 use keyframes::Keyframes;
+use travel::Sought;
 pub use travel::{Flag, Left};
 
 /// Narrowest bin of the record, s: shorter than any step that resolves an impact.
@@ -84,6 +85,7 @@ pub struct Player {
     most_steps: u64,
     /// The future that was left when the run went on from its past.
     left: Option<Box<Left>>,
+    sought: Option<Sought>,
     /// What was done since the start.
     log: Log,
     /// Of the log, what was done before the instant on show; and the time of each that ever was, s.
@@ -157,6 +159,7 @@ impl Player {
             reached: 0.0,
             most_steps: 0,
             left: None,
+            sought: None,
             applied: 0,
             event_times: Vec::new(),
             stepped: 0.0,
@@ -334,7 +337,7 @@ impl Player {
 
     /// Lets time pass, or stand still. A stopped run does not start again before a reset, or a way back.
     pub fn set_playing(&mut self, playing: bool) {
-        self.backwards = false;
+        self.set_paused();
         self.playing = playing && self.stopped.is_none();
         if self.playing {
             self.go_on();
@@ -345,6 +348,7 @@ impl Player {
 
     /// Lets time pass backwards, to the start.
     pub fn play_backwards(&mut self) {
+        self.set_paused();
         self.playing = self.pacer.shown() > 0.0;
         self.backwards = self.playing;
         self.pacer.jump(self.pacer.shown());
@@ -367,7 +371,9 @@ impl Player {
 
     /// Moves on by one frame that comes `dt` seconds after the last, and refreshes what is on show.
     pub fn advance(&mut self, dt: f64) {
-        if self.is_playing_backwards() {
+        if let Some(sought) = self.sought {
+            self.seek(sought);
+        } else if self.is_playing_backwards() {
             let shown = self.pacer.shown();
             let ahead = self.pacer.begin(dt);
             self.travel(2.0 * shown - ahead);

@@ -51,8 +51,8 @@ impl Timeline {
             ui.spacing_mut().item_spacing.x = 4.0;
             let of = focus.and_then(|joint| player.scene().ball_joints.get(joint));
             let of = of.map_or("any ball joint".to_owned(), |joint| joint.name.clone());
-            let enabled = player.reached() > 0.0;
-            ui.add_enabled_ui(enabled, |ui| {
+            let past = player.pacer.shown() > 0.0;
+            ui.add_enabled_ui(past, |ui| {
                 let help = format!("To the impact of {of} before (key ,)");
                 if icon_button(ui, Icon::Before, "Previous impact", &help, side, false).clicked() {
                     player.go_to_touch(focus, false);
@@ -73,6 +73,8 @@ impl Timeline {
                     }
                     moved = true;
                 }
+            });
+            ui.add_enabled_ui(player.stopped().is_none() || player.has_future(), |ui| {
                 let help = format!("To the next impact of {of} (key .)");
                 if icon_button(ui, Icon::After, "Next impact", &help, side, false).clicked() {
                     player.go_to_touch(focus, true);

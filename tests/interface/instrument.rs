@@ -341,3 +341,169 @@ fn pictures_of_the_past() {
         results.extend_harness(&mut harness);
     }
 }
+
+/// A class watches: what was done so far for the task at hand.
+struct Lecture {
+    harness: Harness<'static, App>,
+    gestures: usize,
+}
+
+impl Lecture {
+    fn new() -> Self {
+        Self {
+            harness: window("spcmm"),
+            gestures: 0,
+        }
+    }
+
+    fn app(&self) -> &App {
+        self.harness.state()
+    }
+
+    fn key(&mut self, pressed: Key) {
+        self.gestures += 1;
+        self.harness.key_press(pressed);
+        self.harness.step();
+    }
+
+    fn click(&mut self, role: Role, label: &str) {
+        self.gestures += 1;
+        self.harness.get_by_role_and_label(role, label).click();
+        self.harness.run_steps(3);
+    }
+
+    /// A slider dragged to a part of its track.
+    fn slide(&mut self, label: &str, part: f32) {
+        self.gestures += 1;
+        let track = self.harness.get_by_role_and_label(Role::Slider, label);
+        let track = track.rect();
+        let knob = track.left_center() + vec2(track.height() / 2.0, 0.0);
+        let to = track.left_center() + vec2(part * track.width(), 0.0);
+        drag(&mut self.harness, &[knob, to]);
+        self.harness.run_steps(2);
+    }
+
+    fn frames(&mut self, count: usize) {
+        self.harness.run_steps(count);
+    }
+
+    /// The task is done; the next one.
+    fn done(&mut self, task: &str) {
+        assert!(self.gestures <= 3, "{task}: {} gestures", self.gestures);
+        *self = Self::new();
+    }
+}
+
+#[test]
+fn tasks_of_a_lecture_take_at_most_three_gestures() {
+    let mut class = Lecture::new();
+    // 1: the ball rattling in its gap, large and in numbers.
+    class.key(Key::Num5);
+    class.key(Key::L);
+    class.key(Key::Space);
+    class.frames(60);
+    assert!(class.app().microscope().is_open());
+    assert!(class.app().player().paths().between(0, 0.0, 1.0).len() > 10);
+    class.done("the ball in its gap");
+
+    // 2: why the first impact comes at 7.8 ms: there it is, with how fast the ball came.
+    class.key(Key::Period);
+    while class.app().player().is_seeking() {
+        class.frames(1);
+    }
+    assert!((shown(&class.harness) - 7.8e-3).abs() < 0.1e-3);
+    class.key(Key::Num5);
+    class.key(Key::L);
+    assert!(class.app().microscope().is_open());
+    class.done("the first impact");
+
+    // 3: the clearance doubled while it runs.
+    class.key(Key::Space);
+    class.slide("Clearance", 0.62);
+    let clearance = class.app().player().scene().contact.clearance;
+    assert!((0.5e-3..0.8e-3).contains(&clearance), "{clearance}");
+    assert!(class.app().player().is_playing());
+    class.done("clearance live");
+
+    // 4: friction off, and on again.
+    class.slide("Friction coefficient", 0.0);
+    assert_eq!(class.app().player().scene().contact.friction, 0.0);
+    class.click(Role::Button, "Friction coefficient back to 0.15");
+    assert_eq!(class.app().player().scene().contact.friction, 0.15);
+    class.done("friction off and on");
+
+    // 5: an impact a thousand times slower, the next one, the one before.
+    class.key(Key::Period);
+    while class.app().player().is_seeking() {
+        class.frames(1);
+    }
+    class.slide("Time scale", 0.25);
+    let scale = class.app().player().pacer.scale();
+    assert!((0.5e-3..2e-3).contains(&scale), "{scale}");
+    class.key(Key::Space);
+    let first = shown(&class.harness);
+    class.frames(30);
+    let passed = shown(&class.harness) - first;
+    assert!(
+        (passed / (30.0 * scale / 60.0) - 1.0).abs() < 0.2,
+        "{passed}"
+    );
+    class.done("an impact slowly");
+    class.harness.state_mut().player_mut().run_to(30e-3);
+    class.key(Key::Comma);
+    let last = shown(&class.harness);
+    class.key(Key::Comma);
+    assert!(shown(&class.harness) < last && last < 30e-3);
+    class.key(Key::Period);
+    assert_eq!(shown(&class.harness), last);
+    class.done("impact before, impact after");
+
+    // 6: the ideal machine beside the real one, with the error of the probe.
+    class.key(Key::G);
+    class.key(Key::Space);
+    class.frames(90);
+    let player = class.app().player();
+    let error = player
+        .ideal()
+        .and_then(|ideal| ideal.output_error(player.frame()));
+    assert!(error.expect("came there").norm() > 1e-6);
+    class.done("ideal beside real");
+
+    // 7: forces against time, one impact enlarged, a value read: the wheel over it, and the pointer on it.
+    class.harness.state_mut().player_mut().run_to(30e-3);
+    class.frames(2);
+    let plots = class.harness.state_mut().plots_mut();
+    let at = plots
+        .place(Quantity::NormalForce, 7.85e-3, 100.0)
+        .expect("shown");
+    class.gestures += 2;
+    class.harness.hover_at(at);
+    class.harness.step();
+    class.harness.event(egui::Event::MouseWheel {
+        unit: egui::MouseWheelUnit::Point,
+        delta: vec2(0.0, 600.0),
+        phase: egui::TouchPhase::Move,
+        source: egui::MouseWheelSource::Unknown,
+        modifiers: egui::Modifiers::NONE,
+    });
+    class.frames(30);
+    let plots = class.harness.state_mut().plots_mut();
+    let [a, b] = [7.8e-3, 7.9e-3].map(|time| plots.place(Quantity::NormalForce, time, 0.0));
+    let wide = b.expect("shown").x - a.expect("shown").x;
+    assert!(wide > 4.0, "{wide} points for a tenth of a millisecond");
+    class.done("an impact enlarged");
+
+    // 8: a billionth apart.
+    class.key(Key::B);
+    class.click(Role::CheckBox, "Twin run");
+    class.key(Key::Space);
+    class.frames(30);
+    assert!(
+        class
+            .app()
+            .player()
+            .twin()
+            .is_some_and(|twin| twin.distances().len() > 5)
+    );
+    class.done("a billionth apart");
+}

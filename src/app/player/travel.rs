@@ -13,6 +13,18 @@ use crate::simulate::{Bin, Effect, History, Pull};
 /// Most steps taken again before an instant of the past, so that the plots have what led to it in detail.
 const LEAD: u64 = 512;
 
+/// How far the next touch is looked for, s.
+const FARTHEST: f64 = 5.0;
+
+/// A touch that the run is on its way to.
+#[derive(Clone, Copy)]
+pub(super) struct Sought {
+    /// Of this ball joint, or of any.
+    joint: Option<usize>,
+    /// Given up there, s.
+    until: f64,
+}
+
 /// Something that was done to the run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Flag {
@@ -122,12 +134,45 @@ impl Player {
     }
 
     /// The instant after the one on show, or before it, at which the ball of joint `joint` (of any joint) came to touch; goes
-    /// there, or to the end of what was on show, or to the start.
+    /// there, or to the start. One that has not been yet is run to, frame by frame.
     pub fn go_to_touch(&mut self, joint: Option<usize>, forward: bool) {
         let shown = self.pacer.shown();
         let found = self.course.next_touch(joint, shown, forward);
-        let end = if forward { self.reached } else { 0.0 };
-        self.go_to(found.filter(|time| *time <= self.reached).unwrap_or(end));
+        match found.filter(|time| *time <= self.reached) {
+            Some(time) => self.go_to(time),
+            None if !forward => self.go_to(0.0),
+            None => {
+                self.go_to(self.reached);
+                let until = self.reached + FARTHEST;
+                self.sought = Some(Sought { joint, until });
+            }
+        }
+    }
+
+    /// Whether the run is on its way to the next touch.
+    pub fn is_seeking(&self) -> bool {
+        self.sought.is_some()
+    }
+
+    /// Goes on towards the touch that is sought, within the budget of a frame.
+    pub(super) fn seek(&mut self, sought: Sought) {
+        self.go_on();
+        let from = self.pacer.shown();
+        let start = (self.clock)();
+        let found = loop {
+            let found = self.course.next_touch(sought.joint, from, true);
+            let over = self.simulation.time() > sought.until || self.stopped.is_some();
+            if found.is_some() || over || !self.pacer.may_step((self.clock)() - start) {
+                break found.map_or(over.then_some(f64::INFINITY), Some);
+            }
+            self.step();
+            self.record_until(self.simulation.time());
+        };
+        self.reached = self.reached.max(self.recorded_to);
+        if let Some(time) = found {
+            self.sought = None;
+            self.travel(time.min(self.reached));
+        }
     }
 
     /// Takes the latest step back: to where it began, or the one before where that is on show.
@@ -145,8 +190,9 @@ impl Player {
         }
     }
 
-    fn set_paused(&mut self) {
+    pub(super) fn set_paused(&mut self) {
         (self.playing, self.backwards) = (false, false);
+        self.sought = None;
     }
 
     /// Puts `time`, s, on show.
@@ -347,6 +393,7 @@ impl Player {
         self.keyframes.clear();
         self.near = None;
         self.left = None;
+        self.sought = None;
         self.course.begin(0.0);
         self.event_times.clear();
         (self.applied, self.most_steps) = (0, 0);
