@@ -428,7 +428,7 @@ fn tasks_of_a_lecture_take_at_most_three_gestures() {
     // 4: friction off, and on again.
     class.slide("Friction coefficient", 0.0);
     assert_eq!(class.app().player().scene().contact.friction, 0.0);
-    class.click(Role::Button, "Friction coefficient back to 0.15");
+    class.click(Role::Button, "Reset Friction coefficient");
     assert_eq!(class.app().player().scene().contact.friction, 0.15);
     class.done("friction off and on");
 
