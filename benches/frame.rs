@@ -8,10 +8,10 @@ use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use jointplay::app::{AppOptions, Headless};
+use jointplay::app::{App, AppOptions, Headless};
 use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation};
-use jointplay::view::{DrawList, PeakMarks, SceneView, Shot, ViewOptions};
+use jointplay::view::{DrawList, PeakMarks, SceneView, Shot, ViewOptions, WearMap};
 
 const SIZE: [u32; 2] = [1280, 800];
 /// Simulated before the frame, s: the plots have something to show.
@@ -21,14 +21,37 @@ fn default_scene() -> Scene {
     Scene::load("spcmm", &[]).expect("built in")
 }
 
-fn frame(c: &mut Criterion) {
+/// As the window opens, and with everything on that shows more of it: microscope, ideal ghost, twin, wear map, a future that was
+/// left, over a second of run.
+fn frames(c: &mut Criterion) {
+    frame(c, "frame of the window", |app| {
+        app.player_mut().run_to(TIME);
+    });
+    frame(c, "frame with all instruments", |app| {
+        app.microscope_mut().set_open(true);
+        let player = app.player_mut();
+        player.set_ideal(true);
+        player.run_to(1.0);
+        player.set_twin(true).expect("starts");
+        player.go_to(0.5);
+        player.set("contact.friction", "0.2").expect("in range");
+        player.run_to(0.6);
+        player.go_to(0.55);
+    });
+}
+
+fn frame(c: &mut Criterion, name: &str, prepare: impl FnOnce(&mut App)) {
     let mut headless = Headless::new().expect("a graphics adapter");
-    let mut app = headless
-        .app(AppOptions::new(default_scene()))
-        .expect("starts");
-    app.player_mut().run_to(TIME);
+    let mut options = AppOptions::new(default_scene());
+    options.view.wear = if name.contains("all") {
+        WearMap::Impulse
+    } else {
+        WearMap::Off
+    };
+    let mut app = headless.app(options).expect("starts");
+    prepare(&mut app);
     headless.app_frame(&mut app, SIZE, 1.0).expect("drawn");
-    c.bench_function("frame of the window", |b| {
+    c.bench_function(name, |b| {
         b.iter_custom(|frames| {
             let mut total = Duration::ZERO;
             for _ in 0..frames {
@@ -74,5 +97,5 @@ fn draw_list(c: &mut Criterion) {
     });
 }
 
-criterion_group!(benches, frame, draw_list);
+criterion_group!(benches, frames, draw_list);
 criterion_main!(benches);

@@ -383,6 +383,11 @@ impl App {
         &self.microscope
     }
 
+    /// The microscope, to open it.
+    pub fn microscope_mut(&mut self) -> &mut Microscope {
+        &mut self.microscope
+    }
+
     /// Puts ball joint `joint` into focus where the scene has it: the view follows its centre.
     pub(super) fn focus(&mut self, joint: usize) {
         self.microscope.focus(joint);
