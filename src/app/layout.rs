@@ -222,10 +222,12 @@ impl App {
                     })
                     .inner
             });
+        // In a low window the picture keeps more than a strip.
+        let plots_height = (0.34 * ui.available_height()).clamp(150.0, 230.0);
         Panel::bottom("plots")
             .frame(bar)
             .resizable(true)
-            .default_size(230.0)
+            .default_size(plots_height)
             .size_range(150.0..=600.0)
             .show_collapsible(ui, show_plots, |ui| {
                 // Else the panel would shrink to what the plots leave of it.
