@@ -314,37 +314,6 @@ fn any_instant_of_the_past_has_the_bits_of_the_first_time() {
 }
 
 #[test]
-#[ignore = "minutes: `cargo test --lib -- --ignored a_thousand_jumps`"]
-fn a_thousand_jumps_among_a_thousand_impacts_have_the_hashes_of_the_run() {
-    let mut player = player("slider-crank-driven");
-    let mut hashes = Vec::new();
-    let touches = |player: &Player| -> usize {
-        let course = player.course();
-        (0..course.joints())
-            .map(|joint| course.touches(joint, 0.0, f64::INFINITY).count())
-            .sum()
-    };
-    while touches(&player) < 1000 {
-        let end = player.reached() + 0.5;
-        hashes.extend(run_with(&mut player, &[], end));
-    }
-    let mut random = Uniform(1);
-    let (mut longest, clock) = (0.0_f64, player.clock);
-    for _ in 0..1000 {
-        let (time, hash) = hashes[(random.next() * hashes.len() as f64) as usize];
-        let start = clock();
-        player.go_to(time);
-        longest = longest.max(clock() - start);
-        assert_eq!(player.simulation().state_hash(), hash, "at {time}");
-    }
-    let (end, bytes) = (player.reached(), player.bytes_of_travels());
-    println!(
-        "{end:.1} s, {} impacts, longest jump {longest:.3} s, {bytes} bytes",
-        touches(&player)
-    );
-}
-
-#[test]
 #[ignore = "half a minute: `cargo test --release --lib -- --ignored ten_minutes`"]
 fn ten_minutes_stay_within_reach() {
     let mut player = player("spcmm");
