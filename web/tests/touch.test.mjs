@@ -30,10 +30,11 @@ test('one finger orbits, two pan and pinch', async () => {
     assert.equal(turned.distance_m, start.distance_m);
     assert.deepEqual(turned.target_m, start.target_m);
 
-    const apart = (d) => [[200 - d, 220], [200 + d, 220]];
+    // Above the platform: there it is the whole machine that comes nearer, wherever its parts stand in the picture.
+    const apart = (d) => [[200 - d, 140], [200 + d, 140]];
     const pinch = [30, 50, 80].map(apart);
     const near = await gesture(pinch.map(([left]) => left), pinch.map(([, right]) => right));
-    assert.ok(near.distance_m < 0.8 * turned.distance_m, `${turned.distance_m} m to ${near.distance_m} m`);
+    assert.ok(near.distance_m < 0.7 * turned.distance_m, `${turned.distance_m} m to ${near.distance_m} m`);
     assert.ok(Math.abs(near.yaw_rad - turned.yaw_rad) < 0.02, 'a pinch does not orbit');
 
     const moved = await gesture([[150, 180], [170, 200], [190, 230]], [[250, 180], [270, 200], [290, 230]]);
