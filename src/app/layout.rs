@@ -407,8 +407,9 @@ impl App {
         self.viewport.ui(ui, &self.player, plain);
         if let Some(pull) = self.viewport.take_pull()
             && !self.is_under_way()
+            && let Err(error) = self.player.pull(pull)
         {
-            self.player.pull(pull);
+            self.problem = Some(error.to_string());
         }
         if plain {
             // A saved picture has no buttons in it.

@@ -515,10 +515,14 @@ impl Player {
     }
 
     /// Somebody pulls on a body from now on, elsewhere or otherwise than before, or lets go.
-    pub fn pull(&mut self, pull: Option<Pull>) {
+    ///
+    /// # Errors
+    /// As [`Simulation::pull`]; the run is as it was then.
+    pub fn pull(&mut self, pull: Option<Pull>) -> Result<(), SceneError> {
         if self.simulation.pulled() == pull {
-            return;
+            return Ok(());
         }
+        pull.map_or(Ok(()), |pull| self.simulation.check_pull(&pull))?;
         self.branch();
         // Of several moves between two steps the last one counts.
         let steps = self.steps();
@@ -528,16 +532,13 @@ impl Player {
             self.log.entries.pop();
             self.event_times.pop();
         }
-        if self.apply_pull(pull).is_ok() {
-            self.note(Event::Pull(pull.map(Into::into)));
-        }
+        self.apply_pull(pull)?;
+        self.note(Event::Pull(pull.map(Into::into)));
+        Ok(())
     }
 
     fn apply_pull(&mut self, pull: Option<Pull>) -> Result<Effect, SceneError> {
-        self.change(|run| {
-            run.pull(pull);
-            Ok(())
-        })?;
+        self.change(|run| run.pull(pull))?;
         self.after_change();
         Ok(Effect::Now)
     }
@@ -784,12 +785,7 @@ impl Player {
         let mut frame = std::mem::take(&mut self.frame);
         self.run_at(shown).sample(shown, &mut frame);
         // The hand is where it is now, though the run feels it from its next step on.
-        frame.pull = self.simulation.pulled().and_then(|pull| {
-            let motion = frame.bodies.get(pull.body)?;
-            let arm = motion.rotation * pull.point;
-            let velocity = motion.velocity + motion.angular_velocity.cross(&arm);
-            Some(pull.report(motion.position + arm, velocity))
-        });
+        frame.pull = self.simulation.pull_in(&frame);
         self.frame = frame;
     }
 

@@ -7,20 +7,10 @@ use crate::scene::Vec3 as Exact;
 use crate::simulate::Pull;
 use crate::view::{Camera, Hit, Picked};
 
-/// Frequency at which all that moves would swing on the spring, Hz: soft enough for every method, and in the length of a hand's
-/// move a few times the weight.
-const FREQUENCY: f64 = 3.0;
-/// Damping of that swinging, in parts of the critical one.
-const DAMPING: f64 = 0.3;
-
 /// What a pointer holds.
 #[derive(Clone, Copy, Debug)]
 pub struct Grip {
-    body: usize,
-    /// In the body's frame, m.
-    point: Exact,
-    stiffness: f64,
-    damping: f64,
+    pull: Pull,
     /// Where the pointer holds it now, m.
     hand: Vec3,
 }
@@ -36,13 +26,9 @@ impl Grip {
         };
         let motion = player.frame().bodies.get(body)?;
         let point = Exact::from(hit.point.to_array().map(f64::from));
-        let mass: f64 = scene.bodies.iter().map(|body| body.mass).sum();
-        let rate = std::f64::consts::TAU * FREQUENCY;
+        let inside = motion.rotation.tr_mul(&(point - motion.position));
         Some(Self {
-            body,
-            point: motion.rotation.tr_mul(&(point - motion.position)),
-            stiffness: mass * rate * rate,
-            damping: 2.0 * DAMPING * mass * rate,
+            pull: Pull::softly(scene, body, inside, point),
             hand: hit.point,
         })
     }
@@ -65,11 +51,8 @@ impl Grip {
     /// As the run takes it.
     pub fn pull(&self) -> Pull {
         Pull {
-            body: self.body,
-            point: self.point,
             hand: Exact::from(self.hand.to_array().map(f64::from)),
-            stiffness: self.stiffness,
-            damping: self.damping,
+            ..self.pull
         }
     }
 }
@@ -94,8 +77,8 @@ mod tests {
         let mut grip = Grip::new(&player, hit(Picked::Body(0))).expect("moves");
         // Length of the spring, m.
         let stretch = |grip: &Grip, player: &Player| {
-            let motion = &player.frame().bodies[grip.body];
-            let point = motion.position + motion.rotation * grip.point;
+            let motion = &player.frame().bodies[grip.pull.body];
+            let point = motion.position + motion.rotation * grip.pull.point;
             grip.hand.distance(to_f32(&point))
         };
         assert!(stretch(&grip, &player) < 1e-6);
@@ -118,11 +101,13 @@ mod tests {
         assert!(moved.dot(back) < 0.0 && moved.cross(back).length() < 1e-6);
 
         // The force is the spring's, and what it does is in the energy balance.
-        player.pull(Some(grip.pull()));
+        player.pull(Some(grip.pull())).expect("in reach");
         let pulled = player.frame().pull.expect("pulls");
-        let expected = f64::from(stretch(&grip, &player)) * grip.stiffness;
+        let expected = f64::from(stretch(&grip, &player)) * grip.pull.stiffness;
         let speed = player.frame().bodies[0].velocity.norm();
-        assert!((pulled.force.norm() - expected).abs() <= 1e-5 * expected + grip.damping * speed);
+        assert!(
+            (pulled.force.norm() - expected).abs() <= 1e-5 * expected + grip.pull.damping * speed
+        );
         player.run_to(0.4);
         let ledger = player.frame().ledger.expect("kept");
         assert!(ledger.external_work.abs() > 1e-3, "{ledger:?}");
@@ -130,7 +115,7 @@ mod tests {
             ledger.residual().abs() < 1e-3 * ledger.external_work.abs(),
             "{ledger:?}"
         );
-        player.pull(None);
+        player.pull(None).expect("lets go");
         let work = |player: &Player| player.frame().ledger.expect("kept").external_work;
         // The rest of the step on show was pulled, too.
         player.run_to(0.41);

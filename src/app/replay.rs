@@ -146,8 +146,8 @@ fn apply(player: &mut Player, entry: &Entry) -> Result<(), String> {
             return Ok(());
         }
         Event::Pull(pulled) => {
-            player.pull(pulled.map(Into::into));
-            return Ok(());
+            let pull = pulled.map(Into::into);
+            return player.pull(pull).map_err(|error| error.to_string());
         }
         // Taken by the step before.
         Event::Stop => return Ok(()),
@@ -327,6 +327,16 @@ mod tests {
             panic!("a mass is no clearance");
         };
         assert!(reason.contains("wrong unit"), "{reason}");
+
+        for pull in ["3 @7 0 0 0 0 0 0 1 0", "3 @0 0 0 0 1e300 0 0 1 0"] {
+            let mut link = link_to(&original);
+            link.log = Log::read(Vec::new(), pull).expect("a log");
+            let Verdict::Failed(reason) = follow(link, 50).1 else {
+                panic!("nobody can pull there: {pull}");
+            };
+            let said = ["body 7 is pulled, of 1", "1000000 m"];
+            assert!(said.iter().any(|words| reason.contains(words)), "{reason}");
+        }
 
         let mut link = link_to(&original);
         link.log.push(3, Event::Stop);

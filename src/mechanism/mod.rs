@@ -461,7 +461,7 @@ impl Mechanism {
     pub fn set_pull(&mut self, scene: &Scene, pull: Option<Pull>) {
         self.elements.truncate(self.of_scene);
         self.pull = pull;
-        if let Some(pull) = pull.filter(|pull| pull.body < scene.bodies.len()) {
+        if let Some(pull) = pull {
             let hand = elements::hand(scene, &self.model, pull);
             self.elements.push(hand);
         }

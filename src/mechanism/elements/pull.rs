@@ -6,7 +6,13 @@ use super::{
 };
 use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::model::Anchor;
-use crate::scene::Vec3;
+use crate::scene::{Scene, Vec3};
+
+/// Frequency at which all that moves would swing on the spring, Hz: soft enough for every method, and in the length of a hand's
+/// move a few times the weight.
+const FREQUENCY: f64 = 3.0;
+/// Damping of that swinging, in parts of the critical one.
+const DAMPING: f64 = 0.3;
 
 /// Where somebody pulls, and how.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,6 +35,19 @@ pub(super) struct Hand {
 }
 
 impl Pull {
+    /// On `point` of body `body` of `scene`, m in its scene frame, as softly as suits its masses; the hand is at `hand`, m.
+    pub fn softly(scene: &Scene, body: usize, point: Vec3, hand: Vec3) -> Self {
+        let mass: f64 = scene.bodies.iter().map(|body| body.mass).sum();
+        let rate = std::f64::consts::TAU * FREQUENCY;
+        Self {
+            body,
+            point,
+            hand,
+            stiffness: mass * rate * rate,
+            damping: 2.0 * DAMPING * mass * rate,
+        }
+    }
+
     /// What it does with the point at a place, m, with a velocity, m/s: from the hand to the point.
     pub fn report(&self, point: Vec3, velocity: Vec3) -> ElementReport {
         ElementReport {

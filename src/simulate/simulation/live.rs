@@ -5,10 +5,13 @@ use std::sync::Arc;
 use super::automatic::{Choice, controller_of, prepare_implicit};
 use super::{CLEARANCE_SPEED, Simulation};
 use crate::contact::Memory;
-use crate::mechanism::{Pull, Ramp};
+use crate::mechanism::{ElementReport, Pull, Ramp};
 use crate::scene::{Scene, SceneError};
-use crate::simulate::Effect;
 use crate::simulate::stepper::AnyStepper;
+use crate::simulate::{Effect, Frame};
+
+/// Farthest that a hand, or the point that it holds, may be, m: beyond it a force is no pull any more.
+const FARTHEST_HAND: f64 = 1e6;
 
 impl Simulation {
     /// Changes a parameter (`contact.clearance`, `joint.S1.friction`, …) to a value as a user writes it.
@@ -40,11 +43,47 @@ impl Simulation {
     }
 
     /// Somebody pulls on a body from now on, elsewhere or otherwise than before, or lets go.
-    pub fn pull(&mut self, pull: Option<Pull>) {
+    ///
+    /// # Errors
+    /// As [`Self::check_pull`]: the running simulation is unchanged.
+    pub fn pull(&mut self, pull: Option<Pull>) -> Result<(), SceneError> {
+        pull.map_or(Ok(()), |pull| self.check_pull(&pull))?;
         self.state.pull = pull;
         self.mechanism.set_pull(&self.running, pull);
         self.refresh();
         self.book_change();
+        Ok(())
+    }
+
+    /// Whether somebody can pull like this.
+    ///
+    /// # Errors
+    /// A body that the scene has not, a place out of reach.
+    pub fn check_pull(&self, pull: &Pull) -> Result<(), SceneError> {
+        let bodies = self.running.bodies.len();
+        let far = pull.hand.amax().max(pull.point.amax());
+        let message = if pull.body >= bodies {
+            format!("body {} is pulled, of {bodies} (counted from 0)", pull.body)
+        } else if far > FARTHEST_HAND {
+            format!(
+                "a hand, or the point that it holds, is {far:e} m away; allowed at most {FARTHEST_HAND} m"
+            )
+        } else {
+            return Ok(());
+        };
+        Err(SceneError {
+            message,
+            ..SceneError::default()
+        })
+    }
+
+    /// What the hand that pulls, if one does, does where the bodies are as in `frame`.
+    pub fn pull_in(&self, frame: &Frame) -> Option<ElementReport> {
+        let pull = self.state.pull?;
+        let motion = frame.bodies.get(pull.body)?;
+        let arm = motion.rotation * pull.point;
+        let velocity = motion.velocity + motion.angular_velocity.cross(&arm);
+        Some(pull.report(motion.position + arm, velocity))
     }
 
     /// Where somebody pulls.
