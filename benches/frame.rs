@@ -1,8 +1,8 @@
-//! What one frame of the window costs the processor, stepping left out: interface, draw list, tessellation, encoding;
-//! and the draw list by itself. Asked for: at most 2 ms at the default scene.
+//! CPU cost of one frame of the window without stepping: interface, draw list, tessellation, encoding; and of the draw
+//! list alone. Target: at most 2 ms for the default scene.
 //!
-//! `cargo bench --bench frame`; without a GPU, the drawing itself happens on the same processor and is waited for
-//! outside the clock.
+//! `cargo bench --bench frame`; without a GPU, drawing itself runs on the same processor and is waited for outside the
+//! measured time.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -14,15 +14,15 @@ use jointplay::simulate::{Frame, Simulation};
 use jointplay::view::{DrawList, PeakMarks, SceneView, Shot, ViewOptions, WearMap};
 
 const SIZE: [u32; 2] = [1280, 800];
-/// Simulated before the frame, s: the plots have something to show.
+/// Time simulated before the frame, s, so that the plots have something to show.
 const TIME: f64 = 0.1;
 
 fn default_scene() -> Scene {
     Scene::load("spcmm", &[]).expect("built in")
 }
 
-/// As the window opens, and with everything on that shows more of it: microscope, ideal ghost, twin, wear map, a future that was
-/// left, over a second of run.
+/// As the window opens, and with every instrument on: microscope, ideal ghost, twin, wear map, an abandoned future, over a
+/// second of simulation.
 fn frames(c: &mut Criterion) {
     frame(c, "frame of the window", |app| {
         app.player_mut().run_to(TIME);

@@ -1,7 +1,7 @@
-//! What the equations of motion cost: one evaluation, real time with Runge-Kutta 4, growth with the number of links, and
-//! the setting up of the largest scenes.
+//! Cost of the equations of motion: one evaluation, real time with Runge-Kutta 4, growth with the number of links, and
+//! set-up of the largest scenes.
 //!
-//! `cargo bench --bench physics`; figures are ratios of one run or of one machine, never absolute promises.
+//! `cargo bench --bench physics`; figures are only comparable within one run or on one machine, never absolute promises.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use jointplay::contact::Memory;
@@ -97,7 +97,7 @@ fn real_time(c: &mut Criterion) {
     group.finish();
 }
 
-/// Going back to a state: asked are 5 us in the default scene.
+/// Restoring a state: the target is 5 us in the default scene.
 fn snapshots(c: &mut Criterion) {
     let mut group = c.benchmark_group("snapshot");
     for name in ["spcmm", "chain"] {
@@ -115,7 +115,7 @@ fn snapshots(c: &mut Criterion) {
     group.finish();
 }
 
-/// Simulated spans with the methods that are meant for them, beside Runge-Kutta 4 at 10 us over the same span.
+/// Simulated spans with the methods that are meant for them, beside Runge-Kutta 4 at 10 us, which runs a tenth of each.
 fn spans(c: &mut Criterion) {
     let span =
         |c: &mut Criterion, name: &str, changes: &Changes, from: f64, to: f64, rk4_to: f64| {
@@ -162,7 +162,7 @@ fn spans(c: &mut Criterion) {
         &[("contact.clearance", "0")],
         0.0,
         10.0,
-        10.0,
+        1.0,
     );
 }
 
@@ -186,7 +186,7 @@ fn chain(c: &mut Criterion) {
     group.finish();
 }
 
-/// From a text to a simulation at t = 0, for the largest scene of each kind: `docs/scene-format.md` says what the limits are.
+/// From scene text to a simulation at t = 0, for the largest scene of each kind: `docs/scene-format.md` gives the limits.
 fn set_up(c: &mut Criterion) {
     let mut group = c.benchmark_group("set up");
     group.sample_size(10);

@@ -1,5 +1,5 @@
 // Shows the finished picture in the current viewport. The picture is already encoded: bytes are copied, unless the
-// surface encodes by itself (`fs_linear`).
+// surface does its own encoding (`fs_linear`).
 
 @group(0) @binding(0) var picture: texture_2d<f32>;
 @group(0) @binding(1) var picture_sampler: sampler;

@@ -1,5 +1,5 @@
-// The picture: background, solids with one shadow, floor, lines, translucent sockets, marks before all others.
-// Colours come in sRGB-encoded and are shaded linear; `finish` encodes, here and nowhere else.
+// The picture: background, solids with one shadow, floor, lines, translucent sockets, marks in front of everything.
+// Input colours are sRGB-encoded and shaded in linear space; `finish` encodes, the only place that does.
 
 struct Globals {
     clip_from_world: mat4x4<f32>,
@@ -29,7 +29,7 @@ fn to_linear(c: vec3<f32>) -> vec3<f32> {
     return select(pow((c + 0.055) / 1.055, vec3<f32>(2.4)), c / 12.92, c <= vec3<f32>(0.04045));
 }
 
-// Encodes to sRGB, with half a step of noise against banding.
+// Encodes to sRGB, dithered by half a step against banding.
 fn finish(linear: vec3<f32>, pixel: vec2<f32>, opacity: f32) -> vec4<f32> {
     let c = clamp(linear, vec3<f32>(0.0), vec3<f32>(1.0));
     let encoded = select(1.055 * pow(c, vec3<f32>(1.0 / 2.4)) - 0.055, c * 12.92, c <= vec3<f32>(0.0031308));
@@ -37,7 +37,7 @@ fn finish(linear: vec3<f32>, pixel: vec2<f32>, opacity: f32) -> vec4<f32> {
     return vec4<f32>(encoded + noise / 255.0, opacity);
 }
 
-// Share of the key light that reaches a point: 3 x 3 filtered comparisons.
+// Fraction of the key light that reaches a point: 3 x 3 filtered comparisons.
 fn lit(world: vec3<f32>, normal: vec3<f32>) -> f32 {
     let grazing = 1.0 - max(dot(normal, globals.light.xyz), 0.0);
     let lifted = world + normal * globals.up.w * (1.0 + 2.5 * grazing);
@@ -55,7 +55,7 @@ fn lit(world: vec3<f32>, normal: vec3<f32>) -> f32 {
     return select(sum / 9.0, 1.0, outside);
 }
 
-// Light of the surroundings from a direction: bright above, with the window of a studio; dim below.
+// Environment light from a direction: bright above, with a studio window; dim below.
 fn surroundings(direction: vec3<f32>, roughness: f32) -> f32 {
     let height = dot(direction, globals.up.xyz);
     let sky = mix(0.22, 0.85, smoothstep(-0.5 - roughness, 0.6 + roughness, height));
@@ -113,7 +113,7 @@ fn place(in: Vertex) -> Surface {
     let inner = in.position.w - 2.0 * cut;
     let p = vec4<f32>(in.position.xyz * mix(1.0, in.surface.z, inner), 1.0);
     let world = vec3<f32>(dot(in.row_0, p), dot(in.row_1, p), dot(in.row_2, p));
-    // Cofactors carry normals through any scaling.
+    // The cofactor matrix transforms normals correctly under any scaling.
     let x = in.row_0.xyz;
     let y = in.row_1.xyz;
     let z = in.row_2.xyz;
@@ -133,13 +133,13 @@ fn place(in: Vertex) -> Surface {
 
 @vertex fn vs_overlay(in: Vertex) -> Surface {
     var out = place(in);
-    // Before everything else, yet in order among themselves.
+    // In front of everything else, but depth-sorted among themselves.
     out.clip.z *= 0.001;
     return out;
 }
 
-// Before everything but the triad, each ghost in a slice of depth of its own (its `metal`): it takes turns neither with the
-// machine nor with another, and yet it is in order in itself.
+// In front of everything but the triad, each ghost in its own depth slice (its `metal`): it interpenetrates neither the
+// machine nor another ghost, but is depth-sorted in itself.
 fn before_all(clip: vec4<f32>, slice: f32) -> vec4<f32> {
     return vec4<f32>(clip.xy, 0.001 * (clip.z + (1.0 + slice) * clip.w), clip.w);
 }
@@ -150,7 +150,7 @@ fn before_all(clip: vec4<f32>, slice: f32) -> vec4<f32> {
     return out;
 }
 
-// Its far side grown by the width of an outline (its `roughness`, pixels): what shows of it around the near side is one.
+// Its far side, expanded by the outline width (its `roughness`, pixels): what shows around the near side is the outline.
 @vertex fn vs_ghost_edge(in: Vertex) -> Surface {
     var out = place(in);
     let n = globals.clip_from_world * vec4<f32>(out.normal, 0.0);
@@ -172,7 +172,7 @@ fn before_all(clip: vec4<f32>, slice: f32) -> vec4<f32> {
     return finish(colour, in.clip.xy, in.colour.a);
 }
 
-// Marks keep their colour: only enough shading to show their form.
+// Marks keep their colour: just enough shading to show their shape.
 fn mark(in: Surface) -> vec3<f32> {
     let n = normalize(in.normal);
     let v = normalize(globals.eye.xyz - in.world);
@@ -192,12 +192,12 @@ fn mark(in: Surface) -> vec3<f32> {
     return finish(to_linear(in.colour.rgb), in.clip.xy, 1.0);
 }
 
-// The same where something stands before it, or where it is seen from behind, through the wall.
+// The same where something is in front of it, or where it is seen from behind, through the wall.
 @fragment fn fs_wear_behind(in: Surface) -> @location(0) vec4<f32> {
     return finish(to_linear(in.colour.rgb), in.clip.xy, 0.5);
 }
 
-// Another state of the machine, seen through: clearest along its edge.
+// Another state of the machine, translucent: most opaque along its edges.
 @fragment fn fs_ghost(in: Surface) -> @location(0) vec4<f32> {
     let facing = max(dot(normalize(in.normal), normalize(globals.eye.xyz - in.world)), 0.0);
     let edge = pow(1.0 - facing, 1.5);
@@ -208,10 +208,10 @@ fn mark(in: Surface) -> vec3<f32> {
     return finish(to_linear(in.colour.rgb), in.clip.xy, in.colour.a);
 }
 
-// Light about a joint that was hit: a ring outside of its socket, which hides nothing of the contact.
+// Halo of a joint that was hit: a ring outside its socket, which hides nothing of the contact.
 @fragment fn fs_halo(in: Surface) -> @location(0) vec4<f32> {
     let facing = max(dot(normalize(in.normal), normalize(globals.eye.xyz - in.world)), 0.0);
-    // The socket's outline lies where this ball of 1.7 times its radius faces the eye by 0.81.
+    // The socket's outline lies where this sphere, of 1.7 times its radius, has `facing` = 0.81.
     let ring = smoothstep(0.1, 0.65, facing) * (1.0 - smoothstep(0.7, 0.79, facing));
     return finish(to_linear(in.colour.rgb) * 1.15, in.clip.xy, 0.85 * in.colour.a * ring);
 }
@@ -246,7 +246,7 @@ fn mark(in: Surface) -> vec3<f32> {
 struct FloorPoint {
     @builtin(position) clip: vec4<f32>,
     @location(0) world: vec3<f32>,
-    // From the middle, m, along and across the lines.
+    // From the centre, m, along and across the lines.
     @location(1) plane: vec2<f32>,
 }
 
@@ -301,7 +301,7 @@ struct LinePoint {
 @vertex fn vs_line(in: LineEnds, @builtin(vertex_index) i: u32) -> LinePoint {
     var a = globals.clip_from_world * vec4<f32>(in.start.xyz, 1.0);
     var b = globals.clip_from_world * vec4<f32>(in.end.xyz, 1.0);
-    // An end behind the eye is brought to the near plane (z = 0), else its projection is upside down.
+    // An end behind the eye is clipped to the near plane (z = 0); otherwise its projection would be inverted.
     if (a.z < 0.0) { a = mix(a, b, a.z / (a.z - b.z)); }
     if (b.z < 0.0) { b = mix(b, a, b.z / (b.z - a.z)); }
     let along = (b.xy / b.w - a.xy / a.w) * globals.picture.xy;

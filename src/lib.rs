@@ -1,8 +1,8 @@
 //! Jointplay: a 3D laboratory that shows what play in a ball joint does to a machine.
 //!
-//! Floors from the ground up; a module uses only what stands below it (`ARCHITECTURE.md`):
-//! [`contact`], [`files`] and [`integrate`], [`scene`], [`mechanism`], [`simulate`], [`analysis`], [`chart`] and [`view`], [`render`], [`app`],
-//! and the entries [`cli`], `main.rs` and [`web`].
+//! Layers from the bottom up; a module uses only those below it (`ARCHITECTURE.md`): [`contact`], [`files`] and [`integrate`],
+//! [`scene`], [`mechanism`], [`simulate`], [`analysis`], [`chart`] and [`view`], [`render`], [`app`], and the entries [`cli`],
+//! `main.rs` and [`web`].
 
 /// The version that every output file names.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");

@@ -1,8 +1,8 @@
-//! Enums that files and people name by words.
+//! Enums whose variants are named by words in files and in the interface.
 
-/// An enum each of whose variants has a word.
+/// An enum with a word for each variant.
 pub trait Words: Copy + 'static {
-    /// The words, in the order of menus.
+    /// The words, in menu order.
     const WORDS: &'static [&'static str];
 
     /// Word of this variant.
@@ -12,11 +12,12 @@ pub trait Words: Copy + 'static {
     fn of_word(word: &str) -> Option<Self>;
 }
 
-/// Gives an enum `ALL`, `word`, [`Words`], and its word where it is printed or serialised. A variant without a word does not compile.
+/// Gives an enum `ALL`, `word`, [`Words`], and prints and serialises it as its word. A variant without a word does not
+/// compile.
 macro_rules! words {
     ($name:ident { $($variant:ident => $word:literal),+ $(,)? }) => {
         impl $name {
-            /// Every variant, in the order of menus.
+            /// Every variant, in menu order.
             #[allow(dead_code, reason = "some enums of the file format are never listed")]
             pub const ALL: [Self; [$($word),+].len()] = [$(Self::$variant),+];
 

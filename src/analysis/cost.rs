@@ -6,29 +6,29 @@ use crate::integrate::System as _;
 use crate::mechanism::{Mechanism, Touching};
 use crate::scene::{Preset, Scene};
 
-/// Preset of the runs.
+/// Preset used for the runs.
 const PRESET: Preset = Preset::Accurate;
-/// Evaluations that are timed at once.
+/// Evaluations per timed batch.
 const BATCH: u32 = 200;
 const BATCHES: u32 = 40;
 
 /// A variation of a built-in scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Part {
+pub struct CostCase {
     /// Built-in scene.
     pub scene: &'static str,
-    /// What is different.
+    /// What differs from the unchanged scene.
     pub label: &'static str,
-    /// The changes that make it so.
+    /// The parameter changes.
     pub changes: &'static [(&'static str, &'static str)],
-    /// When an evaluation is timed, s: contacts carry load then.
+    /// Instant at which an evaluation is timed, s: the contacts carry load by then.
     loaded: f64,
     /// Simulated time of the run, s.
     pub span: f64,
 }
 
-const fn spcmm(label: &'static str, changes: &'static [(&'static str, &'static str)]) -> Part {
-    Part {
+const fn spcmm(label: &'static str, changes: &'static [(&'static str, &'static str)]) -> CostCase {
+    CostCase {
         scene: "spcmm",
         label,
         changes,
@@ -37,8 +37,8 @@ const fn spcmm(label: &'static str, changes: &'static [(&'static str, &'static s
     }
 }
 
-const fn chain(label: &'static str, changes: &'static [(&'static str, &'static str)]) -> Part {
-    Part {
+const fn chain(label: &'static str, changes: &'static [(&'static str, &'static str)]) -> CostCase {
+    CostCase {
         scene: "chain",
         label,
         changes,
@@ -47,8 +47,8 @@ const fn chain(label: &'static str, changes: &'static [(&'static str, &'static s
     }
 }
 
-/// The variations; the first is what the others are compared with.
-const PARTS: [Part; 11] = [
+/// The variations; the others are compared with the first.
+const PARTS: [CostCase; 11] = [
     spcmm("3 joints with clearance, with friction, tree", &[]),
     spcmm(
         "the same without the energy ledger",
@@ -74,14 +74,14 @@ const PARTS: [Part; 11] = [
     chain("256 links", &[("chain.links", "256")]),
 ];
 
-/// What a variation costs.
+/// Measured cost of a variation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PartCost {
-    /// Which.
-    pub part: Part,
-    /// Seconds by the clock that an evaluation of its equations takes.
+pub struct CaseCost {
+    /// The variation.
+    pub part: CostCase,
+    /// Clock seconds per evaluation of its equations.
     pub evaluation_s: f64,
-    /// Seconds by the clock for a simulated one over `part.span`.
+    /// Clock seconds per simulated second over `part.span`.
     pub cost: f64,
     /// Evaluations in that span.
     pub evaluations: u64,
@@ -94,20 +94,24 @@ pub struct PartCost {
 pub fn model_costs(
     effort: &Effort,
     context: &mut RunContext,
-) -> Result<Vec<PartCost>, AnalysisError> {
+) -> Result<Vec<CaseCost>, AnalysisError> {
     let parts = PARTS.iter().enumerate();
     parts
         .map(|(n, part)| one(part, effort, &mut context.part(n, PARTS.len())))
         .collect()
 }
 
-fn one(part: &Part, effort: &Effort, context: &mut RunContext) -> Result<PartCost, AnalysisError> {
+fn one(
+    part: &CostCase,
+    effort: &Effort,
+    context: &mut RunContext,
+) -> Result<CaseCost, AnalysisError> {
     let owned = |(key, value): &(&str, &str)| ((*key).to_owned(), (*value).to_owned());
     let changes: Vec<(String, String)> = part.changes.iter().map(owned).collect();
     let scene = Scene::load(part.scene, &changes)?;
     let setting = Setting::of_preset(PRESET);
     let mut simulation = setting.start(&scene)?;
-    // Its number of evaluations, to its end whatever that takes: the times below end with it.
+    // Counts the evaluations up to the end of the span, without a cap; the timed runs below cover the same span.
     while simulation.time() < part.span {
         simulation.step_until(part.span)?;
         context.go_on(0.0)?;
@@ -123,7 +127,7 @@ fn one(part: &Part, effort: &Effort, context: &mut RunContext) -> Result<PartCos
         context,
         |_| setting.start(&scene),
     )?;
-    Ok(PartCost {
+    Ok(CaseCost {
         part: *part,
         evaluation_s: evaluation(&setting, &scene, part.loaded, context)?,
         cost: seconds / part.span,
@@ -131,7 +135,7 @@ fn one(part: &Part, effort: &Effort, context: &mut RunContext) -> Result<PartCos
     })
 }
 
-/// Seconds of one evaluation at a new instant, the shortest of some batches.
+/// Seconds per evaluation at a new instant: the shortest average over several batches.
 fn evaluation(
     setting: &Setting,
     scene: &Scene,
@@ -143,7 +147,7 @@ fn evaluation(
     let (t, y) = (simulation.time(), simulation.state());
     let mut mechanism =
         Mechanism::new(simulation.running_scene()).map_err(crate::simulate::StartError)?;
-    // Its rank is known from its start.
+    // Starting it determines its rank.
     mechanism.start().map_err(crate::simulate::StartError)?;
     let joints = 0..mechanism.contacts.len();
     let memory: Vec<_> = joints.map(|j| simulation.contact_memory(j)).collect();
@@ -154,7 +158,7 @@ fn evaluation(
     for _ in 0..BATCHES {
         let before = context.now();
         for _ in 0..BATCH {
-            // The drives are computed anew only at a new instant.
+            // Drives are re-evaluated only at a new instant.
             instant += 1e-15;
             mechanism.derivative(t + instant, std::hint::black_box(y), &mut dy);
             std::hint::black_box(&mut dy);

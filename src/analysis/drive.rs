@@ -4,10 +4,10 @@ use super::orbit::Orbit;
 use crate::scene::{Drive, JointKind, Scene};
 use crate::simulate::{Frame, Pose, Simulation, StartError, Stopped};
 
-/// Why a scene has no sections at a drive phase.
+/// Why a scene has no sections at a fixed drive phase.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NoPeriod {
-    /// Nothing repeats.
+    /// No drive repeats.
     #[error(
         "the scene `{scene}` has no drive that repeats, so there is no drive phase to take sections at"
     )]
@@ -15,7 +15,7 @@ pub enum NoPeriod {
         /// Name of the scene.
         scene: String,
     },
-    /// Drives of different periods.
+    /// Drives with different periods.
     #[error(
         "the drives of the scene `{scene}` have different periods ({first} s and {second} s): there is no one drive phase"
     )]
@@ -29,10 +29,10 @@ pub enum NoPeriod {
     },
 }
 
-/// Period that all drives of `scene` share, s. Drives that stand still do not count.
+/// Common period of all drives of `scene`, s. Drives at rest do not count.
 ///
 /// # Errors
-/// A scene without one.
+/// A scene without a common period.
 pub fn drive_period(scene: &Scene) -> Result<f64, NoPeriod> {
     let mut period: Option<f64> = None;
     for joint in &scene.joints {
@@ -77,7 +77,7 @@ pub fn drive_period(scene: &Scene) -> Result<f64, NoPeriod> {
     })
 }
 
-/// What a section of a scene records: pose of the output body and its rates, named as in the rows of a run.
+/// What a section of a scene records: pose and rates of the output body, named as in the rows of a run.
 pub const OBSERVABLES: [&str; 12] = [
     "x_m",
     "y_m",
@@ -114,7 +114,7 @@ impl Machine {
         Ok(Self::resume(Simulation::new(scene)?))
     }
 
-    /// Goes on with a simulation.
+    /// Continues a running simulation.
     pub fn resume(simulation: Simulation) -> Self {
         Self {
             simulation,
@@ -127,12 +127,12 @@ impl Machine {
         &self.simulation
     }
 
-    /// The simulation, to change a parameter between two sections or take its peaks.
+    /// The simulation, to change a parameter between two sections or read its peaks.
     pub fn simulation_mut(&mut self) -> &mut Simulation {
         &mut self.simulation
     }
 
-    /// Everything at the latest state.
+    /// All quantities at the latest state.
     pub fn frame(&mut self) -> &Frame {
         let now = self.simulation.time();
         self.simulation.sample(now, &mut self.frame);
@@ -140,13 +140,13 @@ impl Machine {
     }
 }
 
-/// Why a machine cannot go on.
+/// Why a machine cannot continue.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MachineError {
-    /// It cannot start.
+    /// The scene does not start.
     #[error(transparent)]
     Start(#[from] StartError),
-    /// The divergence guard.
+    /// The divergence guard stopped it.
     #[error(transparent)]
     Stopped(#[from] Stopped),
 }
@@ -180,7 +180,7 @@ impl Orbit for Machine {
         self.simulation.displace(offset);
     }
 
-    /// The same balls touch: elsewhere one run is inside an impact that the other has before it or behind it.
+    /// Only while the same balls touch: otherwise one run is inside an impact that the other has before or behind it.
     fn comparable(&self, twin: &Self) -> bool {
         (0..self.simulation.running_scene().ball_joints.len()).all(|j| {
             let touches = |machine: &Self| machine.simulation.contact_memory(j).active;

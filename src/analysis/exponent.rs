@@ -1,38 +1,39 @@
 //! Largest Lyapunov exponent from two nearby runs with renormalisation.
 //!
-//! Benettin, Galgani & Strelcyn, Phys. Rev. A 14 (1976) 2338. The twin starts at a small separation d0 and is brought back
-//! to it whenever it has grown or shrunk by more than a factor; the exponent is the sum of the logarithms of these
-//! factors over the time.
+//! Benettin, Galgani & Strelcyn, Phys. Rev. A 14 (1976) 2338. The twin starts at a small separation d0 and is rescaled to
+//! it whenever the separation has grown or shrunk by more than a given factor; the exponent is the sum of the logarithms
+//! of these factors divided by the time.
 
 use super::orbit::Orbit;
 
-/// The twin is brought back to its separation once that has changed by more than this factor.
+/// The twin is rescaled once its separation has changed by more than this factor.
 const RENORMALISE_AT: f64 = 4.0;
-/// A comparison that finds a larger change than this came late: the next ones come twice as often.
+/// If a comparison finds a larger change than this, it came late: the interval to the next one is halved.
 const LATE_AT: f64 = 16.0;
-/// Comparisons in one interval between sections, at first and at most; of these powers of two.
+/// Time between comparisons over the section interval: the longest, which is also the initial one, and the shortest;
+/// powers of two.
 const FEWEST: f64 = 1.0 / 16.0;
 const MOST: f64 = 1.0 / 65536.0;
-/// A separation this many times the wanted one is renormalised even if the two runs differ in their contacts.
+/// A separation this many times the nominal one is renormalised even if the two runs differ in their contacts.
 const FAR: f64 = 1e3;
-/// A separation that vanished in rounding counts as this fraction of the wanted one.
+/// A separation lost in rounding counts as this fraction of the nominal one.
 const VANISHED: f64 = 1e-9;
 /// Blocks for the standard error.
 const BLOCKS: usize = 10;
 
-/// An exponent with what its convergence shows.
+/// An exponent and the evidence of its convergence.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Exponent {
     /// Largest Lyapunov exponent, 1/s; for a map per iteration.
     pub value: f64,
-    /// Standard error of the mean over blocks of consecutive sections (10, or one a section where there are fewer),
-    /// 1/s; infinite for less than two.
+    /// Standard error of the mean over blocks of consecutive sections (10 blocks, or one per section if there are fewer),
+    /// 1/s; infinite for fewer than two.
     pub standard_error: f64,
     /// Estimate after each kept section, 1/s.
     pub running: Vec<f64>,
 }
 
-/// The twin's separation and its history.
+/// Separation of the twin and its history.
 #[derive(Clone, Debug)]
 pub struct Benettin {
     separation: f64,
@@ -42,20 +43,20 @@ pub struct Benettin {
     /// Separation after the latest renormalisation, and at the latest comparison.
     from: f64,
     latest: f64,
-    /// Sum of logarithms since counting began, without that of `latest` over `from`.
+    /// Sum of the logarithms since counting began, without that of `latest` over `from`.
     sum: f64,
     counting: bool,
-    /// ln of the growth from counting's beginning to the end of each section.
+    /// ln of the growth from the start of counting to the end of each section.
     at_sections: Vec<f64>,
-    /// What is subtracted: `ln(latest / from)` when counting began.
+    /// To be subtracted: `ln(latest / from)` at the start of counting.
     offset: f64,
     renormalisations: u64,
     difference: Vec<f64>,
 }
 
 impl Benettin {
-    /// For a twin at `separation` (in units of the scales), sections every `interval`, from time `now`, at most
-    /// `sections` of them.
+    /// For a twin at `separation` (in units of the scales), with at most `sections` sections at every `interval`,
+    /// starting at time `now`.
     pub fn new(separation: f64, interval: f64, now: f64, sections: usize) -> Self {
         let check = interval * FEWEST;
         Self {
@@ -74,14 +75,14 @@ impl Benettin {
         }
     }
 
-    /// Displaces a fresh twin.
+    /// Displaces a new twin.
     pub fn start<O: Orbit>(&mut self, orbit: &O, twin: &mut O) {
         self.push_away(orbit, twin);
         self.from = distance(orbit, twin);
         self.latest = self.from;
     }
 
-    /// From now on growth counts.
+    /// Starts accumulating growth.
     pub fn begin_counting(&mut self) {
         self.counting = true;
         self.sum = 0.0;
@@ -89,20 +90,20 @@ impl Benettin {
         self.at_sections.clear();
     }
 
-    /// Whether the twin is to be compared at `time`.
+    /// Whether the twin is due for comparison at `time`.
     pub fn is_due(&self, time: f64) -> bool {
         time >= self.next
     }
 
-    /// Times the twin was brought back.
+    /// Number of renormalisations so far.
     pub fn renormalisations(&self) -> u64 {
         self.renormalisations
     }
 
-    /// Brings the twin to the orbit's time and looks how far it is.
+    /// Advances the twin to the orbit's time and measures the separation.
     ///
     /// # Errors
-    /// The twin cannot go on.
+    /// The twin cannot continue.
     pub fn compare<O: Orbit>(&mut self, orbit: &O, twin: &mut O) -> Result<(), O::Stop> {
         let now = orbit.time();
         while twin.time() < now {
@@ -132,7 +133,7 @@ impl Benettin {
             return Ok(());
         }
         if !orbit.comparable(twin) && off < FAR {
-            // At the next step of the orbit both may have the contact.
+            // After the orbit's next step both may be in contact.
             self.next = now;
             return Ok(());
         }
@@ -143,14 +144,14 @@ impl Benettin {
         self.difference.extend(pairs.map(|(a, b)| part * (a - b)));
         self.sum += ln_ratio(self.latest, self.from);
         twin.displace(&self.difference);
-        // What was asked for and what came out differ where loops are closed again.
+        // The requested and the actual separation differ because loops are closed again.
         self.from = distance(orbit, twin).max(VANISHED * self.separation);
         self.latest = self.from;
         self.renormalisations += 1;
         Ok(())
     }
 
-    /// A section was reached; the comparison there was made.
+    /// Records a section, at which the twin has been compared.
     pub fn end_section(&mut self) {
         if self.counting {
             let growth = self.sum + ln_ratio(self.latest, self.from) - self.offset;
@@ -158,7 +159,7 @@ impl Benettin {
         }
     }
 
-    /// The exponent so far; `None` before the first section that counts.
+    /// The exponent so far; `None` before the first counted section.
     pub fn result(&self) -> Option<Exponent> {
         let n = self.at_sections.len();
         let last = *self.at_sections.last()?;
@@ -172,7 +173,7 @@ impl Benettin {
         })
     }
 
-    /// Moves the twin away from the orbit in a direction that is nobody's own.
+    /// Displaces the twin from the orbit in a generic direction.
     fn push_away<O: Orbit>(&mut self, orbit: &O, twin: &mut O) {
         let scales = orbit.scales();
         self.difference.clear();
@@ -185,9 +186,9 @@ impl Benettin {
     }
 }
 
-/// An offset of length `separation` in units of `scales`, in a direction that is nobody's own.
+/// An offset of length `separation` in units of `scales`, in a generic direction.
 pub fn offset(scales: &[f64], separation: f64) -> impl Iterator<Item = f64> {
-    // Weyl's sequence: fixed, spread, and aligned with no coordinate.
+    // Weyl sequence: fixed, well spread, and aligned with no coordinate.
     let part = |i: usize| (0.618_033_988_749_894_9 * (i + 1) as f64).fract() - 0.5;
     let square: f64 = (0..scales.len()).map(|i| part(i) * part(i)).sum();
     let factor = separation / square.sqrt();
@@ -215,7 +216,7 @@ fn ln_ratio(a: f64, b: f64) -> f64 {
     libm::log(a / b)
 }
 
-/// Standard error of the mean growth per section, from the means of blocks: neighbouring sections are not independent.
+/// Standard error of the mean growth per section, from block means: neighbouring sections are not independent.
 fn standard_error(cumulative: &[f64]) -> f64 {
     let blocks = cumulative.len().min(BLOCKS);
     if blocks < 2 {

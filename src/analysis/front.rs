@@ -1,7 +1,8 @@
-//! Which of several choices nothing beats.
+//! Pareto front of a set of choices.
 
-/// Marks the Pareto front of (cost, error) pairs, both better when smaller: those that no other pair beats in one without
-/// being worse in the other. Errors below `floor` are as good as the floor. A pair that is not finite is never on it.
+/// Marks the Pareto front of (cost, error) pairs, both better when smaller: pairs that no other pair beats in one value
+/// without being worse in the other. Errors below `floor` count as equal to it. A pair that is not finite is never on the
+/// front.
 pub fn front(pairs: &[(f64, f64)], floor: f64) -> Vec<bool> {
     let known: Vec<(f64, f64)> = pairs
         .iter()
@@ -33,12 +34,12 @@ mod tests {
         let pairs = [
             (1.0, 0.5),
             (2.0, 0.1),
-            // Dearer and no better than the one before.
+            // Costs more and is no better than the one before.
             (3.0, 0.1),
             // Beaten by the first.
             (1.5, 0.6),
             (4.0, 1e-9),
-            // Better only below what can be told.
+            // Better only below the floor.
             (5.0, 1e-12),
             (0.5, f64::NAN),
             (f64::INFINITY, 0.0),
@@ -49,7 +50,7 @@ mod tests {
             [true, true, false, false, true, false, false, false]
         );
         assert!(front(&pairs, 0.0)[5]);
-        // Equals do not beat each other.
+        // Equal pairs do not beat each other.
         assert_eq!(front(&[(1.0, 1.0), (1.0, 1.0)], 0.0), [true, true]);
         assert!(front(&[], 0.0).is_empty());
     }

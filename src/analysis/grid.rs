@@ -1,4 +1,4 @@
-//! The points of a sweep: which parameters vary over which values, and in which blocks they are computed.
+//! The points of a sweep: the varied parameters, their values, and the blocks in which the points are computed.
 
 use std::ops::Range;
 
@@ -6,24 +6,24 @@ use serde::{Deserialize, Serialize};
 
 use crate::scene::{Kind, Scene, SceneError, Value, ValueError};
 
-/// Points that `follow` joins into one block: each block starts cold at its first point, so that neither threads nor
-/// shards decide what continues from what.
+/// Points per block in a `follow` sweep: each block starts cold at its first point, so that neither threads nor shards
+/// affect which point continues from which.
 pub const FOLLOW_BLOCK: usize = 25;
-/// Most points of a sweep.
+/// Largest number of points in a sweep.
 const MOST_POINTS: usize = 1 << 24;
-/// Most parameters that vary together.
+/// Largest number of parameters varied together.
 const MOST_AXES: usize = 2;
 
-/// Why a range is none.
+/// Why a range is invalid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RangeError {
-    /// Not of the form.
+    /// Malformed.
     #[error("--vary {text}: expected KEY=A..B:N, e.g. contact.clearance=0.01mm..1mm:200")]
     Form {
         /// As written.
         text: String,
     },
-    /// A wrong key or an end that it does not take.
+    /// An unknown key, or an end that the parameter does not accept.
     #[error("--vary {text}: {error}")]
     Scene {
         /// As written.
@@ -31,7 +31,7 @@ pub enum RangeError {
         /// What is wrong.
         error: Box<SceneError>,
     },
-    /// An end that is no value of the parameter.
+    /// An end that is not a value of the parameter.
     #[error("--vary {text}: {end}: {error}")]
     End {
         /// As written.
@@ -41,7 +41,7 @@ pub enum RangeError {
         /// What is wrong and what is allowed.
         error: ValueError,
     },
-    /// A parameter of words.
+    /// A parameter with words for values.
     #[error("--vary {text}: {key} is no number; only numbers can be varied")]
     Words {
         /// As written.
@@ -49,7 +49,7 @@ pub enum RangeError {
         /// Key.
         key: String,
     },
-    /// Whole numbers that the steps miss.
+    /// A whole-number parameter whose equal steps are not whole.
     #[error(
         "--vary {text}: {key} takes whole numbers, and {count} equal steps from {from} to {to} are none"
     )]
@@ -65,7 +65,7 @@ pub enum RangeError {
         /// Number of values.
         count: usize,
     },
-    /// No point at all.
+    /// No points.
     #[error("--vary {text}: the range is empty: {what}")]
     Empty {
         /// As written.
@@ -93,7 +93,7 @@ pub enum RangeError {
 
 /// One varied parameter with its values, equally spaced, both ends included.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Axis {
+pub struct ParameterRange {
     key: String,
     from: f64,
     to: f64,
@@ -101,11 +101,11 @@ pub struct Axis {
     whole: bool,
 }
 
-impl Axis {
-    /// Reads `KEY=A..B:N` for `scene`, and tries both ends in it.
+impl ParameterRange {
+    /// Parses `KEY=A..B:N` for `scene`, and tries both ends in it.
     ///
     /// # Errors
-    /// Anything but a range that the scene takes.
+    /// Anything but a range that the scene accepts.
     pub fn parse(scene: &Scene, text: &str) -> Result<Self, RangeError> {
         let own = || text.to_owned();
         let parts = || {
@@ -212,7 +212,7 @@ impl Axis {
         (0..self.count).map(|i| self.value(i))
     }
 
-    /// Value `i` as the scene takes it.
+    /// Value `i` in the form that the scene accepts.
     pub fn parameter_value(&self, i: usize) -> Value {
         let value = self.value(i);
         if self.whole {
@@ -223,14 +223,14 @@ impl Axis {
     }
 }
 
-/// Where a point starts from.
+/// State from which a point starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Start {
-    /// Every point from the scene's own start.
+    /// Every point from the scene's own initial state.
     Cold,
-    /// From the end of the point with the next lower value.
+    /// From the final state of the point with the next lower value.
     FollowUp,
-    /// From the end of the point with the next higher value.
+    /// From the final state of the point with the next higher value.
     FollowDown,
 }
 
@@ -245,10 +245,10 @@ impl Start {
     }
 }
 
-/// All points of a sweep, the last axis running fastest.
+/// All points of a sweep; the last axis varies fastest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
-    axes: Vec<Axis>,
+    axes: Vec<ParameterRange>,
     start: Start,
 }
 
@@ -256,9 +256,8 @@ impl Grid {
     /// The points of `axes`.
     ///
     /// # Errors
-    /// No axis, more than two, a key twice, more points than a sweep takes, or a followed parameter that only a reset
-    /// changes.
-    pub fn new(scene: &Scene, axes: Vec<Axis>, start: Start) -> Result<Self, RangeError> {
+    /// No axis, more than two, a repeated key, too many points, or a followed parameter that changes only on reset.
+    pub fn new(scene: &Scene, axes: Vec<ParameterRange>, start: Start) -> Result<Self, RangeError> {
         let wrong = |message: String| Err(RangeError::Together(message));
         let Some(last) = axes.last() else {
             return wrong(
@@ -302,7 +301,7 @@ impl Grid {
     }
 
     /// Varied parameters.
-    pub fn axes(&self) -> &[Axis] {
+    pub fn axes(&self) -> &[ParameterRange] {
         &self.axes
     }
 
@@ -313,10 +312,10 @@ impl Grid {
 
     /// Number of points.
     pub fn points(&self) -> usize {
-        self.axes.iter().map(Axis::count).product()
+        self.axes.iter().map(ParameterRange::count).product()
     }
 
-    /// Index along each axis of a point.
+    /// Index of a point along each axis.
     pub fn indices(&self, point: usize) -> Vec<usize> {
         let mut rest = point;
         let mut indices: Vec<usize> = self
@@ -345,7 +344,7 @@ impl Grid {
     /// The scene of a point.
     ///
     /// # Errors
-    /// Values that the scene does not take together.
+    /// Values that the scene does not accept together.
     pub fn scene(&self, base: &Scene, point: usize) -> Result<Scene, SceneError> {
         let mut scene = base.clone();
         for (key, value) in self.settings(point) {
@@ -354,12 +353,12 @@ impl Grid {
         Ok(scene)
     }
 
-    /// Number of blocks: what is computed in one go, whatever the threads and shards.
+    /// Number of blocks. A block is computed in one go, whatever the threads and shards.
     pub fn blocks(&self) -> usize {
         self.rows() * self.blocks_per_row()
     }
 
-    /// Points of block `b`: one point, or for `follow` up to [`FOLLOW_BLOCK`] neighbours of one row.
+    /// Points of block `b`: one point, or for `follow` up to [`FOLLOW_BLOCK`] neighbours in one row.
     pub fn block(&self, b: usize) -> Range<usize> {
         let (row, part) = (b / self.blocks_per_row(), b % self.blocks_per_row());
         let (row_length, length) = (self.row_length(), self.block_length());
@@ -386,7 +385,7 @@ impl Grid {
     }
 
     fn row_length(&self) -> usize {
-        self.axes.last().map_or(1, Axis::count)
+        self.axes.last().map_or(1, ParameterRange::count)
     }
 
     fn rows(&self) -> usize {
@@ -406,8 +405,8 @@ mod tests {
         Scene::load("spcmm", &[]).expect("built in")
     }
 
-    fn axis(text: &str) -> Result<Axis, RangeError> {
-        Axis::parse(&spcmm(), text)
+    fn axis(text: &str) -> Result<ParameterRange, RangeError> {
+        ParameterRange::parse(&spcmm(), text)
     }
 
     #[test]
@@ -420,7 +419,8 @@ mod tests {
             assert!((pair[1] - pair[0] - 0.99e-3 / 199.0).abs() < 1e-15);
         }
         assert_eq!(
-            super::Axis::parse(&spcmm(), "contact.friction=0.2..0.2:1").map(|a| a.value(0)),
+            super::ParameterRange::parse(&spcmm(), "contact.friction=0.2..0.2:1")
+                .map(|a| a.value(0)),
             Ok(0.2)
         );
     }
@@ -450,10 +450,10 @@ mod tests {
             assert!(error.starts_with("--vary"), "{error}");
         }
         let chain = Scene::load("chain", &[]).expect("built in");
-        let links = Axis::parse(&chain, "chain.links=2..6:3").expect("whole numbers");
+        let links = ParameterRange::parse(&chain, "chain.links=2..6:3").expect("whole numbers");
         assert_eq!(links.parameter_value(1), Value::Count(4));
         assert!(matches!(
-            Axis::parse(&chain, "chain.links=2..6:4"),
+            ParameterRange::parse(&chain, "chain.links=2..6:4"),
             Err(RangeError::NotWhole { .. })
         ));
     }

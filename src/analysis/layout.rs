@@ -1,18 +1,18 @@
-//! The columns of a sweep's result and the order of its numbers: one record of a fixed length for every point.
+//! The columns of a sweep's result and the order of its values: one fixed-length record per point.
 
 use super::drive::OBSERVABLES;
 use super::exponent::Exponent;
 use super::point::{JointResult, Plan, PointResult};
 use crate::scene::Scene;
 
-/// What a point's numbers are worth.
+/// How a point ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
-    /// All periods are through.
+    /// All periods were run.
     Done,
     /// The divergence guard stopped it.
     Diverged,
-    /// The scene could not start.
+    /// The scene did not start.
     NoStart,
 }
 
@@ -47,13 +47,13 @@ pub struct Layout {
     kept: usize,
 }
 
-/// An array of one value a point: its name, whether that is a whole number, and what it tells of a result.
+/// An array with one value per point: its name, whether it is an integer, and how to read it from a result.
 type OfPoint = (&'static str, bool, fn(&PointResult, Status) -> f64);
 
 const POINT: [OfPoint; 10] = [
     ("status", true, |_, status| status.code() as f64),
     ("stopped_at_s", false, |r, _| r.stopped.unwrap_or(f64::NAN)),
-    // A point that did not end has no regime: its code is that of none, -1.
+    // A point that did not reach its end has no regime: code -1.
     ("regime", true, |r, status| match status {
         Status::Done => r.regime.code() as f64,
         Status::Diverged | Status::NoStart => -1.0,
@@ -73,7 +73,7 @@ const POINT: [OfPoint; 10] = [
     }),
 ];
 
-/// The same for each ball joint, whose name goes before it.
+/// The same per ball joint, prefixed with the joint's name.
 type OfJoint = (&'static str, bool, fn(&JointResult) -> f64);
 
 const JOINT: [OfJoint; 6] = [
@@ -85,7 +85,7 @@ const JOINT: [OfJoint; 6] = [
     ("last_separation_s", false, |joint| joint.last_separation),
 ];
 
-/// What only a point that ended knows.
+/// A value that only a point that reached its end has.
 fn known(status: Status, value: f64) -> f64 {
     if status == Status::Done {
         value
@@ -99,7 +99,7 @@ fn exponent(result: &PointResult, of: fn(&Exponent) -> f64) -> f64 {
 }
 
 impl Layout {
-    /// The arrays that a sweep of `scene` has.
+    /// The arrays of a sweep of `scene`.
     pub fn new(scene: &Scene, plan: &Plan) -> Self {
         let mut columns = Vec::new();
         let mut add = |name: &str, whole: bool, per_section: bool| {
@@ -139,22 +139,22 @@ impl Layout {
         &self.columns
     }
 
-    /// Sections kept of a point.
+    /// Kept sections per point.
     pub fn kept(&self) -> usize {
         self.kept
     }
 
-    /// Values that a point has in `column`.
+    /// Number of values per point in `column`.
     pub fn values_in(&self, column: &Column) -> usize {
         if column.per_section { self.kept } else { 1 }
     }
 
-    /// Numbers of a record.
+    /// Number of values in a record.
     pub fn record_length(&self) -> usize {
         self.columns.iter().map(|c| self.values_in(c)).sum()
     }
 
-    /// Where in a record the values of array `column` begin.
+    /// Offset of array `column` in a record.
     pub fn offset(&self, column: usize) -> usize {
         self.columns[..column]
             .iter()
@@ -162,7 +162,7 @@ impl Layout {
             .sum()
     }
 
-    /// Appends the record of a point; `None` stands for one that could not start.
+    /// Appends the record of a point; `None` is a point that could not start.
     pub fn append(&self, result: Option<&PointResult>, record: &mut Vec<f64>) {
         let unknown;
         let (status, result) = match result {

@@ -1,5 +1,6 @@
-//! What is computed from whole runs: what a method costs and how wrong it is, what each part of the model costs, responses
-//! beside the ideal motion, sections, exponents, regimes, sweeps, the paper's section 4. Knows no thread, and its clock comes from outside ([`RunContext`]).
+//! Results computed from whole runs: cost and error of the methods, cost of the parts of the model, responses beside the
+//! ideal motion, Poincaré sections, Lyapunov exponents, regimes, sweeps, the paper's section 4. Starts no threads, and
+//! its clock comes from outside ([`RunContext`]).
 
 mod cost;
 pub mod drive;
@@ -26,7 +27,7 @@ pub mod swept;
 pub mod task;
 mod work_precision;
 
-pub use cost::{Part, PartCost, model_costs};
+pub use cost::{CaseCost, CostCase, model_costs};
 pub use front::front;
 pub use reach::{Goal, Reach, reach};
 pub use reference_solution::{Errors, ReferenceSolution, SettledSpan, Slot};

@@ -1,8 +1,9 @@
-//! What sections and exponents ask of a motion.
+//! What sections and exponents require of a motion.
 
-/// A motion that can be stepped, observed and followed by a twin: a map, a driven oscillator, a mechanism.
+/// A motion that can be stepped, observed and copied as a twin: a map, a driven oscillator, a mechanism.
 ///
-/// All that [`Watch`](super::section::Watch) knows of a system; known systems (`tests/physics/known_systems.rs`) and mechanisms go through the same code.
+/// [`SectionRun`](super::section::SectionRun) knows a system only through this trait, so that known systems
+/// (`tests/physics/known_systems.rs`) and mechanisms run through the same code.
 pub trait Orbit: Sized {
     /// Why a step failed.
     type Stop;
@@ -10,19 +11,19 @@ pub trait Orbit: Sized {
     /// Time, s; for a map the number of iterations.
     fn time(&self) -> f64;
 
-    /// One step of the system's own choice that ends at `end` at the latest, exactly there if it would pass it.
+    /// One step of a size that the system chooses, ending no later than `end`, and exactly there if it would pass it.
     ///
     /// # Errors
-    /// The system cannot go on; it is then where it was.
+    /// The system cannot continue; its state is then unchanged.
     fn step_until(&mut self, end: f64) -> Result<(), Self::Stop>;
 
-    /// Everything that decides the future and moves continuously: coordinates and velocities.
+    /// The continuous part of the state: coordinates and velocities.
     fn state(&self) -> &[f64];
 
-    /// What a difference of 1 means for each component of [`Self::state`].
+    /// Scale of each component of [`Self::state`]: what a difference of 1 means.
     fn scales(&self) -> &[f64];
 
-    /// A second run in the same state with the same future.
+    /// A second run in the same state and with the same future.
     ///
     /// # Errors
     /// As [`Self::step_until`].
@@ -31,8 +32,8 @@ pub trait Orbit: Sized {
     /// Adds `offset` to the state.
     fn displace(&mut self, offset: &[f64]);
 
-    /// Whether the difference of the two states is one in continuous variables alone: where only one of them is in
-    /// contact, a small difference is about to become another one.
+    /// Whether the two states differ in continuous variables alone: while only one of them is in contact, a small
+    /// difference is about to jump.
     fn comparable(&self, _twin: &Self) -> bool {
         true
     }
@@ -40,6 +41,6 @@ pub trait Orbit: Sized {
     /// Number of values that [`Self::observe`] writes.
     fn observables(&self) -> usize;
 
-    /// The observed values now.
+    /// Writes the observed values of the current state.
     fn observe(&mut self, out: &mut [f64]);
 }

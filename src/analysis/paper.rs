@@ -1,5 +1,5 @@
-//! What Sheng & Chen show, print and say in sections 4.2, 4.3 and 5, as a table (`assets/paper.toml`), and the runs that it
-//! names. Nothing is tuned to match; the paper leaves one dimension out and contradicts itself in places.
+//! What Sheng & Chen show, print and say in sections 4.2, 4.3 and 5, as a table (`assets/paper.toml`), and the runs that
+//! it names. Nothing is tuned to match; the paper omits one dimension and contradicts itself in places.
 
 mod quantity;
 
@@ -8,7 +8,7 @@ use std::sync::LazyLock;
 
 use serde::Deserialize;
 
-pub use quantity::{Agreement, Comparison, Quantity};
+pub use quantity::{Agreement, Comparison, FigureValue};
 
 use crate::words::words;
 
@@ -43,7 +43,7 @@ impl Case {
         }
     }
 
-    /// The changes that make the default scene this case.
+    /// The changes that turn the default scene into this case.
     pub fn changes(self) -> Vec<(String, String)> {
         vec![
             (
@@ -55,7 +55,7 @@ impl Case {
     }
 }
 
-/// Every run that the figures need, each once.
+/// Every run that the figures need, once each.
 pub const CASES: [Case; 5] = [
     Case::new(0.3, 0.2),
     Case::new(0.5, 0.2),
@@ -64,7 +64,7 @@ pub const CASES: [Case; 5] = [
     Case::new(0.3, 0.25),
 ];
 
-/// Runs that differ in one parameter alone.
+/// Runs that differ in a single parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Series {
@@ -80,7 +80,7 @@ words!(Series {
 });
 
 impl Series {
-    /// Its runs, by the parameter ascending.
+    /// Its runs, in ascending order of the parameter.
     pub const fn cases(self) -> [Case; 3] {
         match self {
             Self::Clearance => [CASES[0], CASES[1], CASES[2]],
@@ -88,7 +88,7 @@ impl Series {
         }
     }
 
-    /// What its parameter is called with a value, in the unit of [`Case`].
+    /// Name of its parameter together with a value, in the unit of [`Case`].
     pub fn name(self, value: impl std::fmt::Display) -> String {
         match self {
             Self::Clearance => format!("{value} mm"),
@@ -104,7 +104,7 @@ impl Series {
         }
     }
 
-    /// More than one value of its parameter.
+    /// The parameter in the plural.
     pub fn values(self) -> &'static str {
         match self {
             Self::Clearance => "clearances",
@@ -113,7 +113,7 @@ impl Series {
     }
 }
 
-/// One of the two coordinates that the paper shows.
+/// One of the two coordinates plotted in the paper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Coordinate {
@@ -134,46 +134,46 @@ impl Coordinate {
         [0, 4][self as usize]
     }
 
-    /// Amplitude in the ideal motion of the coordinate (m or rad) or its `nth` derivative: the drive turns at pi rad/s.
+    /// Amplitude of the coordinate (m or rad) or of its `nth` derivative in the ideal motion: the drive turns at pi rad/s.
     pub fn amplitude(self, nth: usize) -> f64 {
         AMPLITUDES[self as usize] * [1.0, PI, PI * PI][nth]
     }
 }
 
-/// Curves that are compared with each other.
+/// Curves to compare with each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Curves {
-    /// The runs by clearance.
+    /// The runs with different clearances.
     Clearance,
-    /// The runs by friction.
+    /// The runs with different friction.
     Friction,
-    /// The same run by two formulations that share no equations of motion.
+    /// The same run in two formulations that share no equations of motion.
     Formulations,
 }
 
-/// Sections that are compared with each other.
+/// Sections to compare with each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Sections {
-    /// Those of the paper's three runs.
+    /// Sections of the paper's three runs.
     Runs,
-    /// Those of all values of a sweep from cold starts.
+    /// Sections at all values of a sweep from cold starts.
     Sweep,
 }
 
-/// One number that the paper prints.
+/// A number printed in the paper.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Published {
-    /// Figure that it belongs to.
+    /// Figure it belongs to.
     pub figure: String,
     /// The run.
     #[serde(rename = "run")]
     pub case: Case,
-    /// What it measures.
-    pub quantity: Quantity,
-    /// The value printed in the text of section 4.2, SI units.
+    /// The quantity measured.
+    pub quantity: FigureValue,
+    /// The value given in the text of section 4.2, SI units.
     pub value: f64,
 }
 
@@ -181,13 +181,13 @@ pub struct Published {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Verification {
-    /// Part of the figure.
+    /// Part of the figure, such as `17e`.
     pub figure: String,
-    /// What is measured.
-    pub quantity: Quantity,
-    /// By the paper's own program.
+    /// The quantity measured.
+    pub quantity: FigureValue,
+    /// From the paper's own program.
     pub own: f64,
-    /// By the commercial one that it is compared with.
+    /// From the commercial program it is compared with.
     pub commercial: f64,
 }
 
@@ -195,40 +195,40 @@ pub struct Verification {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Shows {
-    /// Columns of three runs over the whole period, and as the balls bounce.
+    /// Columns of three runs over the whole period, and while the balls bounce.
     Response {
         /// The runs.
         to: Series,
-        /// Columns above.
+        /// Columns of the upper charts.
         whole: Vec<String>,
-        /// Columns below.
+        /// Columns of the lower charts.
         early: Vec<String>,
     },
     /// The contact forces of a run.
     Forces(Case),
     /// Columns of two formulations and the ideal motion.
     Verification(Vec<String>),
-    /// How far the formulations part, and by how much constraints are violated.
+    /// Divergence of the formulations, and constraint violation.
     Drift,
-    /// Phase portraits, settled and with impacts.
+    /// Phase portraits, settled and during impacts.
     Portraits(Series),
     /// Sections of three runs.
     Sections(Series),
-    /// Sections of a sweep, their spread and hysteresis.
+    /// Sections of a sweep, with their spread and hysteresis.
     Bifurcation(Series),
     /// Largest Lyapunov exponents of a sweep.
     Exponents(Series),
-    /// Clearance and friction together.
+    /// A grid over clearance and friction.
     Map,
-    /// Error of the probe against clearance.
+    /// Probe error against clearance.
     Probe,
 }
 
-/// A figure of the paper, or one beyond it.
+/// A figure of the paper, or an additional one.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct Figure {
-    /// Name in files: `figure-` and two digits for those of the paper.
+    /// Name in files: `figure-` and two digits for a figure of the paper.
     pub name: String,
     /// Heading.
     pub heading: String,
@@ -236,13 +236,13 @@ pub struct Figure {
     pub caption: String,
     /// What is drawn.
     pub shows: Shows,
-    /// Figures whose largest forces are compared below it.
+    /// Figures whose largest forces are tabulated below it.
     #[serde(default)]
     pub strongest_of: Vec<String>,
 }
 
 impl Figure {
-    /// Whether it is the figure of the paper that `figure`, such as `6a`, is a part of.
+    /// Whether `figure`, such as `6a`, is a part of this figure.
     pub fn contains(&self, figure: &str) -> bool {
         let number = figure.trim_end_matches(char::is_alphabetic);
         self.name == format!("figure-{number:0>2}")
@@ -262,43 +262,42 @@ pub struct Section {
     pub figures: Vec<Figure>,
 }
 
-/// What must hold here for a statement to count as confirmed; [`super::reproduction::Findings::statements`] has the criteria in
-/// words.
+/// What must hold here for a statement to count as confirmed; [`super::reproduction::Findings::statements`] words the criteria.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 #[allow(missing_docs, reason = "fields read as the sentences of the table")]
 pub enum Test {
-    /// A coordinate of a run leaves the ideal motion by little of its amplitude.
+    /// In a run, a coordinate deviates from the ideal motion by a small fraction of its amplitude.
     StaysNearIdeal { coordinate: Coordinate, run: Case },
     /// A quantity grows from run to run.
-    Grows { of: Quantity, with: Series },
-    /// All quantities do that are said to grow.
+    Grows { of: FigureValue, with: Series },
+    /// All quantities said to grow do grow.
     AllGrow(Series),
-    /// One quantity is the larger number in every run.
+    /// One quantity exceeds another in every run.
     Exceeds {
-        of: Quantity,
-        that: Quantity,
+        of: FigureValue,
+        that: FigureValue,
         over: Series,
     },
-    /// The middle run has an extreme of a quantity.
-    NoRule { of: Quantity, with: Series },
-    /// One quantity differs by a larger share of its mean than another.
+    /// A quantity has its extreme in the middle run.
+    NoRule { of: FigureValue, with: Series },
+    /// One quantity varies by a larger fraction of its mean than another.
     DiffersMore {
-        of: Quantity,
-        than: Quantity,
+        of: FigureValue,
+        than: FigureValue,
         with: Series,
     },
-    /// A quantity changes more over one series than over the other.
+    /// A quantity varies more over one series than over the other.
     ChangesMoreWith {
-        of: Quantity,
+        of: FigureValue,
         with: Series,
         than: Series,
     },
-    /// No ball leaves its socket after an instant, s.
+    /// No ball leaves its socket after a given instant, s.
     Steady { after: f64, over: Series },
-    /// A joint, counted from 1, has the largest peak force of a run.
+    /// A joint, counted from 1, has the largest peak force in a run.
     Hardest { joint: usize, run: Case },
-    /// Curves are close to each other, and to the ideal motion, from an instant (s) on.
+    /// Curves stay close to each other and to the ideal motion from a given instant (s) on.
     Coincide {
         curves: Curves,
         #[serde(default)]
@@ -306,34 +305,34 @@ pub enum Test {
         columns: Vec<String>,
         from: f64,
     },
-    /// Two formulations stay close, measured by the largest deviation from the ideal motion.
+    /// Two formulations stay close, relative to the largest deviation from the ideal motion.
     FormulationsAgree(Vec<Coordinate>),
-    /// Settled curves are close to each other.
+    /// Settled curves stay close to each other.
     PortraitsCoincide { of: Coordinate, over: Series },
-    /// Settled curves do not close, and if `growing`, the less the larger the parameter.
+    /// Settled curves do not close and, if `growing`, are further from closing the larger the parameter.
     PortraitsWide {
         of: Coordinate,
         over: Series,
         #[serde(default)]
         growing: bool,
     },
-    /// The last sections of three runs ascend.
+    /// The last sections of three runs are in ascending order.
     SectionsAscend { of: Coordinate, over: Series },
-    /// The sections of three runs spread, and more from run to run.
+    /// The sections of three runs spread, increasingly from run to run.
     SectionsSpread { of: Coordinate, over: Series },
-    /// Sections lie denser the nearer to their centre.
+    /// Sections are denser towards their centre.
     SectionsCrowd(Series),
-    /// Sections move little over a series.
+    /// Sections barely move over a series.
     SectionsStay { of: Sections, over: Series },
-    /// Sections of every value of a sweep agree.
+    /// Sections agree at every value of a sweep.
     SectionsRepeat { of: Coordinate, over: Series },
     /// Three runs are quasi-periodic.
     QuasiPeriodic(Series),
-    /// Every value of a sweep repeats after one period.
+    /// Every value of a sweep gives motion of period one.
     AllPeriodic(Series),
     /// The first value of a sweep is periodic, the last chaotic.
     PeriodicToChaotic(Series),
-    /// More chaos in the upper half of a sweep.
+    /// The upper half of a sweep has more chaotic values.
     ChaosGrows(Series),
     /// Every value of a sweep is chaotic, or none.
     ChaosAllOrNone(Series),
@@ -343,22 +342,22 @@ pub enum Test {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Claim {
-    /// Where the paper makes it.
+    /// Where in the paper it is made.
     pub place: String,
-    /// What it says, in other words.
+    /// The statement, paraphrased.
     pub says: String,
-    /// What it is held against.
+    /// The test applied to it.
     pub test: Test,
 }
 
-/// Everything that is held against the paper, in its order.
+/// Everything compared with the paper, in its order.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Paper {
-    /// Numbers whose run is named.
+    /// Numbers from a named run.
     #[serde(rename = "number")]
     pub numbers: Vec<Published>,
-    /// Numbers whose run is not.
+    /// Numbers from an unnamed run.
     pub verification: Vec<Verification>,
     /// Figures.
     #[serde(rename = "section")]
@@ -368,7 +367,7 @@ pub struct Paper {
     pub statements: Vec<Claim>,
 }
 
-/// The table.
+/// The parsed table.
 pub static PAPER: LazyLock<Paper> = LazyLock::new(|| {
     let text = include_str!("../../assets/paper.toml");
     toml::from_str(text).expect("a test reads it")

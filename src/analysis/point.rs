@@ -1,32 +1,32 @@
-//! One point of a sweep: a scene through its periods, and what is told of it.
+//! One point of a sweep: a scene run through its periods, and what is recorded of it.
 
 use super::drive::{Machine, MachineError, OBSERVABLES};
 use super::orbit::Orbit;
 use super::regime::{Evidence, Regime, classify};
-use super::section::{Schedule, Watch};
+use super::section::{Schedule, SectionRun};
 use crate::scene::{Scene, Value};
 use crate::simulate::{Effect, Peak};
 
-/// Samples a period, at most, from which means and the probe's error come.
+/// Largest number of samples per period for the means and the probe error.
 const SAMPLES: f64 = 400.0;
-/// A twin's separation over the tolerance: well above what two runs differ by from their steps alone.
+/// Twin separation over the tolerance: well above the difference between two runs due to their steps alone.
 const OVER_TOLERANCE: f64 = 10.0;
-/// Beyond this tolerance a twin's separation is not well above the error of a step any more.
+/// Above this tolerance the twin separation is no longer well above the error of a step.
 pub const LOOSEST_FOR_EXPONENT: f64 = SEPARATIONS.1 / OVER_TOLERANCE;
-/// The separation's range, in units of the scales of the tolerance: 10 nm to 1 um in every built-in scene.
+/// Range of the separation, in units of the scales of the tolerance: 10 nm to 1 um in every built-in scene.
 const SEPARATIONS: (f64, f64) = (1e-6, 1e-4);
-/// What tells two coordinates of a section apart over the tolerance, and what two rates: errors of many steps add up, and
-/// a stiff contact turns those of coordinates into larger ones of rates.
+/// Resolution of the coordinates of a section, and of its rates, over the tolerance: the errors of many steps add up, and
+/// a stiff contact turns coordinate errors into larger rate errors.
 const RESOLUTION: [f64; 2] = [10.0, 100.0];
-/// Stands for the tolerance of a fixed-step method.
+/// Used as the tolerance of a fixed-step method.
 const FIXED_STEP: f64 = 1e-5;
 
 /// How long a point runs and where its sections lie.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plan {
-    /// Periods of the drive, those discarded included.
+    /// Drive periods, including those discarded.
     pub periods: usize,
-    /// Periods at the beginning that are a transient.
+    /// Initial periods that are a transient.
     pub discard: usize,
     /// Drive phase of the sections as a fraction of the period, 0 <= phase < 1.
     pub phase: f64,
@@ -34,7 +34,7 @@ pub struct Plan {
     pub exponent: bool,
 }
 
-/// Per ball joint.
+/// Result for one ball joint.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct JointResult {
     /// Largest normal force of all periods, in continuous time, N.
@@ -51,27 +51,27 @@ pub struct JointResult {
     pub last_separation: f64,
 }
 
-/// What came out of a point.
+/// Result of a point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointResult {
-    /// When it stopped, s from its start, where the divergence guard stopped it.
+    /// Time at which the divergence guard stopped it, s from its start; `None` if it did not.
     pub stopped: Option<f64>,
     /// Ball joints in scene order.
     pub joints: Vec<JointResult>,
     /// Largest and root-mean-square distance of the probe tip from the ideal tip over the kept periods, m; `None` where
     /// the scene has no such reference.
     pub probe: Option<(f64, f64)>,
-    /// What kind of motion it is.
+    /// Kind of motion.
     pub regime: Regime,
-    /// From what that was told.
+    /// Evidence for the regime.
     pub evidence: Evidence,
-    /// Kept sections, one after the other, in the order of [`OBSERVABLES`].
+    /// Kept sections, concatenated, in the order of [`OBSERVABLES`].
     pub sections: Vec<f64>,
 }
 
-/// A point on its way.
+/// A point being computed.
 pub struct PointRun {
-    watch: Watch<Machine>,
+    watch: SectionRun<Machine>,
     plan: Plan,
     period: f64,
     resolution: Vec<f64>,
@@ -89,7 +89,7 @@ impl PointRun {
     /// # Errors
     /// A scene that cannot start.
     pub fn cold(scene: &Scene, plan: Plan, period: f64) -> Result<Self, MachineError> {
-        // Sections lie at (k + phase) T, k = 1, 2, … for phase 0 and k = 0, 1, … else: always as many as periods.
+        // Sections lie at (k + phase) T, k = 1, 2, … for phase 0 and k = 0, 1, … otherwise: always as many as periods.
         let part = if plan.phase > 0.0 { plan.phase } else { 1.0 };
         Ok(Self::begin(
             Machine::new(scene)?,
@@ -99,8 +99,8 @@ impl PointRun {
         ))
     }
 
-    /// Goes on from the latest section of another point with some parameters changed; `None` where such a change waits
-    /// for a reset, or the scene does not take it.
+    /// Continues from the latest section of another point with some parameters changed; `None` if a change takes effect
+    /// only on reset, or the scene does not accept it.
     pub fn follow(
         mut machine: Machine,
         changes: &[(&str, Value)],
@@ -129,7 +129,7 @@ impl PointRun {
             sections: plan.periods,
             discard: plan.discard,
         };
-        // A scene that is a function of time alone has no neighbouring motions.
+        // The motion of a purely kinematic scene has no neighbours.
         let twin = plan.exponent && !machine.simulation().mechanism().is_kinematic();
         let separation =
             twin.then(|| (OVER_TOLERANCE * tolerance).clamp(SEPARATIONS.0, SEPARATIONS.1));
@@ -144,7 +144,7 @@ impl PointRun {
         let mut run = Self {
             resolution: resolution(simulation.running_scene(), tolerance),
             means: Means::new(joints, period / SAMPLES),
-            watch: Watch::new(machine, schedule, separation),
+            watch: SectionRun::new(machine, schedule, separation),
             plan,
             period,
             started,
@@ -159,22 +159,22 @@ impl PointRun {
         run
     }
 
-    /// Time of the first section, discarded ones included, s.
+    /// Time of the first section, including discarded ones, s.
     pub fn first(&self) -> f64 {
         self.watch.schedule().first
     }
 
-    /// Whether it began at the scene's own start.
+    /// Whether it started from the scene's own initial state.
     pub fn is_cold(&self) -> bool {
         self.started == 0.0
     }
 
-    /// Whether all periods are through.
+    /// Whether all periods have been run.
     pub fn is_done(&self) -> bool {
         self.watch.is_done()
     }
 
-    /// Sections taken, discarded ones included.
+    /// Number of sections taken, including discarded ones.
     pub fn taken(&self) -> usize {
         self.watch.taken()
     }
@@ -206,7 +206,7 @@ impl PointRun {
         Ok(())
     }
 
-    /// The transient is over.
+    /// Ends the transient and starts keeping.
     fn begin_keeping(&mut self) {
         let machine = self.watch.orbit_mut();
         let simulation = machine.simulation_mut();
@@ -219,7 +219,7 @@ impl PointRun {
         self.means.begin(machine);
     }
 
-    /// What came out, and the scene in the state of the latest section for the next point to follow.
+    /// The result, and the scene in the state of the latest section for the next point to follow.
     pub fn finish(mut self) -> (PointResult, Machine) {
         let simulation = self.watch.orbit_mut().simulation_mut();
         simulation.take_peaks(&mut self.peaks);
@@ -263,7 +263,7 @@ impl PointRun {
         (result, self.watch.into_orbit())
     }
 
-    /// What came out of a point that the divergence guard stopped: nothing but when.
+    /// Result of a point that the divergence guard stopped: only the time.
     pub fn stopped(self) -> PointResult {
         PointResult {
             stopped: Some(self.machine().time() - self.started),
@@ -273,7 +273,7 @@ impl PointRun {
 }
 
 impl PointResult {
-    /// A point of which nothing is known.
+    /// A result in which nothing is known.
     pub fn empty(joints: usize) -> Self {
         let unknown = JointResult {
             peak: f64::NAN,
@@ -294,8 +294,8 @@ impl PointResult {
     }
 }
 
-/// What two sections of `scene` must differ by to be different, in the order of [`OBSERVABLES`]: the tolerance times its
-/// scales, and a factor.
+/// Smallest differences that distinguish two sections of `scene`, in the order of [`OBSERVABLES`]: the tolerance times
+/// its scales and a factor.
 pub fn resolution(scene: &Scene, tolerance: f64) -> Vec<f64> {
     let radii = scene.ball_joints.iter().map(|j| j.contact.ball_radius);
     let length = radii.fold(1.0, f64::min);
@@ -305,7 +305,7 @@ pub fn resolution(scene: &Scene, tolerance: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Means over time by the trapezoidal rule.
+/// Time averages by the trapezoidal rule.
 struct Means {
     least: f64,
     latest: f64,
@@ -313,7 +313,7 @@ struct Means {
     /// Integral of the normal force per ball joint, N s, and its value at the latest sample.
     normal: Vec<f64>,
     normal_now: Vec<f64>,
-    /// Integral of the squared probe error, m^2 s, and its size at the latest sample.
+    /// Integral of the squared probe error, m^2 s, and its magnitude at the latest sample.
     probe_square: f64,
     probe_now: Option<f64>,
     probe_largest: f64,
@@ -340,7 +340,7 @@ impl Means {
         self.take(machine, 0.0);
     }
 
-    /// Takes a sample where the latest one is long enough ago.
+    /// Takes a sample if the latest one is old enough.
     fn look(&mut self, machine: &mut Machine, at_section: bool) {
         let ago = machine.time() - self.latest;
         if ago >= self.least || (at_section && ago > 0.0) {
@@ -358,7 +358,7 @@ impl Means {
             *sum += 0.5 * h * (*now + force);
             *now = force;
         }
-        // An ideal motion that ends on the way leaves no mean over all of it.
+        // If the ideal motion ends on the way, there is no mean over the whole span.
         self.probe_lost |= frame.probe_error.is_none();
         if let Some(error) = frame.probe_error.filter(|_| !self.probe_lost) {
             let size = error.norm();

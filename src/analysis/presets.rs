@@ -1,5 +1,5 @@
-//! Presets as measured points: what each costs and how wrong it is, for the built-in scenes as measured once and kept in
-//! the program, and for any scene when asked.
+//! Presets as measured points: cost and error, for the built-in scenes as measured once and stored in the program, and
+//! for any scene on request.
 
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
@@ -13,7 +13,7 @@ use crate::scene::{Preset, Scene};
 /// What `jointplay tradeoff --all --write` measured.
 const RECORD: &str = include_str!("../../assets/presets.json");
 
-/// A preset on one scene.
+/// A preset measured on one scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Measured {
     /// Largest relative error of the peak forces of the first impacts.
@@ -22,7 +22,7 @@ pub struct Measured {
     pub position_error_m: Option<f64>,
     /// Largest relative error of the mean settled forces; `None` where the scene does not settle.
     pub settled_error: Option<f64>,
-    /// Speed over the first impacts, over that of Runge-Kutta 4 at 10 microseconds.
+    /// Speed over the first impacts, relative to Runge-Kutta 4 at 10 microseconds.
     pub impacts_ratio: Option<f64>,
     /// The same in settled motion.
     pub settled_ratio: Option<f64>,
@@ -41,29 +41,29 @@ impl Measured {
     }
 }
 
-/// What the program keeps of measured presets.
+/// Measured presets as stored in the program.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Record {
-    /// Where it was measured.
+    /// Machine it was measured on.
     pub machine: String,
-    /// Method and value of each preset when it was measured.
+    /// Method and value of each preset when measured.
     pub points: BTreeMap<String, (String, f64)>,
     /// By scene, then by preset.
     pub scenes: BTreeMap<String, BTreeMap<String, Measured>>,
 }
 
-/// The record in the program.
+/// The stored record.
 pub fn record() -> &'static Record {
     static READ: OnceLock<Record> = OnceLock::new();
     READ.get_or_init(|| serde_json::from_str(RECORD).expect("a test reads the same file"))
 }
 
-/// What `preset` was measured to do on the built-in scene `scene`, with its parameters as they come.
+/// Measured performance of `preset` on the built-in scene `scene` with its default parameters.
 pub fn measured(scene: &str, preset: Preset) -> Option<Measured> {
     record().scenes.get(scene)?.get(preset.word()).copied()
 }
 
-/// Largest error of the peak forces of the first impacts that a preset is to have on any built-in scene.
+/// Error of the peak forces of the first impacts that a preset must not exceed on any built-in scene.
 pub fn limit(preset: Preset) -> f64 {
     match preset {
         Preset::Preview => 0.05,
@@ -73,8 +73,8 @@ pub fn limit(preset: Preset) -> f64 {
     }
 }
 
-/// The setting that a limit asks for: of those whose peak forces err by at most `limit` on every scene of `found`, the one
-/// with the largest product of its ratios, over the impacts and in settled motion of every scene.
+/// The best setting within a limit: of those whose peak-force error is at most `limit` on every scene of `found`, the one
+/// with the largest product of speed ratios, over the impacts and in settled motion of every scene.
 pub fn choose(found: &[WorkPrecision], limit: f64) -> Option<Setting> {
     let candidates = found.first()?.points.iter().map(|point| point.setting);
     let worth = |setting: &Setting| {
@@ -97,7 +97,7 @@ pub fn choose(found: &[WorkPrecision], limit: f64) -> Option<Setting> {
         .map(|(setting, _)| setting)
 }
 
-/// Measures `presets` on `scene` as it is now, in seconds; in the same order.
+/// Measures `presets` on `scene` as it is now, within seconds; results in the same order.
 ///
 /// # Errors
 /// As [`super::work_precision`].

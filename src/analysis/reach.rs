@@ -1,4 +1,4 @@
-//! How far the program gets: three spans of the default scene, each with what is asked of it.
+//! Speed goals of the program: three spans of the default scene, each with the speed required of it.
 
 use super::reference_solution::{MeanForces, done};
 use super::stretch::{stretch, time_to};
@@ -6,13 +6,13 @@ use super::{AnalysisError, Effort, ReferenceSolution, RunContext, Setting};
 use crate::scene::Scene;
 use crate::simulate::Simulation;
 
-/// Tolerance of the automatic pair that is asked to reach them.
+/// Tolerance of the automatic pair that is to reach them.
 const TOLERANCE: f64 = 1e-5;
-/// Tolerance of the run that settled forces are compared with.
+/// Tolerance of the reference run for the settled forces.
 const CONVERGED: f64 = 1e-10;
-/// Error that is allowed where there is one, relative.
+/// Allowed relative error, where there is one.
 const ALLOWED: f64 = 0.01;
-/// Instants of the settled span whose forces are averaged.
+/// Number of instants over which settled forces are averaged.
 const SAMPLES: u32 = 3000;
 
 /// One of the three spans.
@@ -30,7 +30,7 @@ impl Goal {
     /// All three.
     pub const ALL: [Self; 3] = [Self::FirstSecond, Self::Settled, Self::Ideal];
 
-    /// What it is, for a person.
+    /// Display name.
     pub fn label(self) -> &'static str {
         match self {
             Self::FirstSecond => "first second, impacts included",
@@ -39,7 +39,7 @@ impl Goal {
         }
     }
 
-    /// What its error is the error of.
+    /// What its error measures.
     pub fn error_of(self) -> &'static str {
         match self {
             Self::FirstSecond => "peaks of the first six impacts",
@@ -48,7 +48,7 @@ impl Goal {
         }
     }
 
-    /// Simulated seconds in a second by the clock that are asked for.
+    /// Required simulated seconds per clock second.
     pub fn asked(self) -> f64 {
         match self {
             Self::FirstSecond => 40.0,
@@ -66,24 +66,24 @@ impl Goal {
     }
 }
 
-/// What was reached.
+/// A measured result.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reach {
-    /// Of what.
+    /// The goal.
     pub goal: Goal,
-    /// With which method.
+    /// The method.
     pub setting: Setting,
-    /// Simulated seconds in a second by the clock.
+    /// Simulated seconds per clock second.
     pub speed: f64,
-    /// The same of Runge-Kutta 4 at 10 microseconds; `None` where no differential equation is solved, so that a stepper has
-    /// no part in it.
+    /// Speed of Runge-Kutta 4 at 10 microseconds; `None` where no differential equation is solved, so that the stepper
+    /// does not matter.
     pub yardstick: Option<f64>,
-    /// Error, relative; `None` where nothing is approximated.
+    /// Relative error; `None` where nothing is approximated.
     pub error: Option<f64>,
 }
 
 impl Reach {
-    /// Whether it is what is asked.
+    /// Whether the goal is met.
     pub fn met(&self) -> bool {
         self.speed >= self.goal.asked() && self.error.is_none_or(|error| error <= ALLOWED)
     }
@@ -124,7 +124,7 @@ fn one(scene: &Scene, goal: Goal, context: &mut RunContext) -> Result<Reach, Ana
         })?;
         Ok::<_, AnalysisError>((to - from) / seconds)
     };
-    // Before and after, so that a machine that turns busy in between slows both.
+    // Timed before and after the yardstick, so that a load that sets in between slows both.
     let first = speed(&setting, &mut context.part(0, 4))?;
     let yardstick = if integrates {
         Some(speed(&yardstick, &mut context.part(1, 4))?)
@@ -159,7 +159,7 @@ fn one(scene: &Scene, goal: Goal, context: &mut RunContext) -> Result<Reach, Ana
     })
 }
 
-/// The run from the start to `end`, every step of which `seen` looks at.
+/// Runs from the start to `end`; `seen` is called after every step.
 fn run_to(
     setting: &Setting,
     scene: &Scene,

@@ -1,8 +1,8 @@
-//! What every run of a scene is measured against: the peaks of its first impacts, where its output body is at the third,
-//! the mean contact forces once it has settled; and how far a tighter run still moves these.
+//! The reference that every run of a scene is measured against: the peaks of its first impacts, the position of its
+//! output body at the third, the mean contact forces once it has settled; and how much a tighter run still changes these.
 //!
-//! The motion is sensitive: after some tens of impacts two good runs have parted. So the first impacts are compared one by
-//! one, each within a slot of time that the reference sets, and settled motion starts, for every method, from the same state.
+//! The motion is sensitive: after some tens of impacts two good runs have diverged. So the first impacts are compared one
+//! by one, each within a time slot set by the reference, and settled motion starts from the same state for every method.
 
 use serde::Serialize;
 
@@ -11,101 +11,102 @@ use super::{AnalysisError, Effort, End, RunContext, Setting};
 use crate::scene::{Scene, Vec3};
 use crate::simulate::{Frame, Peak, Simulation, Snapshot};
 
-/// Impacts that are compared.
+/// Number of impacts compared.
 const IMPACTS: usize = 6;
 /// The impact at which the position is compared.
 const POSITION_AT: usize = 3;
-/// Simulated time within which the impacts must come, s; and what is compared of a scene without any.
+/// Simulated time within which the impacts must occur, s; and the span compared in a scene without any, s.
 const IMPACTS_WITHIN: f64 = 0.5;
 const WITHOUT_IMPACTS: f64 = 0.1;
 /// A contact that lasts longer than this counts as ended, s: an impact takes 0.1 ms.
 const LONG_CONTACT: f64 = 5e-3;
-/// What is run on after the last impact, s.
+/// Extra time run after the last impact, s.
 const AFTERWARDS: f64 = 0.1e-3;
-/// Contacts that are all closed for so long have settled, s; and when they must have.
+/// Contacts that have all been closed for this long have settled, s; and the time within which they must, s.
 const QUIET: f64 = 0.15;
 const SETTLED_WITHIN: f64 = 1.2;
-/// Tolerance of the run that brings a scene there: the state that it comes to is given to all alike.
+/// Tolerance of the run that settles a scene: all methods start from its final state.
 const SETTLING: f64 = 1e-6;
-/// Untimed beginning of a settled run, in which a method finds its step, and the span that counts, s.
+/// Untimed beginning of a settled run, in which a method finds its step size, and the timed span, s.
 const WARM_UP: f64 = 0.05;
 const SETTLED_SPAN: f64 = 0.2;
-/// Instants whose forces are averaged.
+/// Number of instants over which forces are averaged.
 const SAMPLES: u32 = 200;
-/// A mean force below this part of the largest one has no relative error worth telling.
+/// A mean force below this fraction of the largest one has no meaningful relative error.
 const SMALL_FORCE: f64 = 1e-3;
 /// Tolerance of the reference.
 const REFERENCE: f64 = 1e-12;
 
-/// What is compared of one impact.
+/// The comparison slot of one impact.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Slot {
     /// Ball joint, index in the scene.
     pub joint: usize,
-    /// Begin of the contact in the reference, s.
+    /// Start of the contact in the reference, s.
     pub begin_s: f64,
-    /// The peak is the largest normal force (reaction of an ideal joint) from here on, s,
+    /// Start of the slot, s: half-way from the joint's previous contact. The peak is the largest normal force (reaction
+    /// of an ideal joint) in the slot.
     pub from_s: f64,
-    /// to here, s: half-way to the joint's contacts before and after.
+    /// End of the slot, s: half-way to the joint's next contact.
     pub to_s: f64,
-    /// That of the reference, N.
+    /// Peak in the reference, N.
     pub peak_n: f64,
 }
 
 /// Settled motion.
 #[derive(Clone, Debug)]
 pub struct SettledSpan {
-    /// Begin and end of the span over which forces are averaged, s.
+    /// Start of the span over which forces are averaged, s.
     pub from: f64,
-    /// End, s.
+    /// End of that span, s.
     pub to: f64,
-    /// Mean size of each joint's contact force (reaction of an ideal joint), N.
+    /// Mean magnitude of each joint's contact force (reaction of an ideal joint), N.
     pub means: Vec<f64>,
-    /// Where every run starts.
+    /// State from which every run starts.
     start: Snapshot,
 }
 
-/// Errors against the reference. `None`: the run did not come so far, or the scene has no such thing.
+/// Errors against the reference. `None`: the run did not get that far, or the scene has no such quantity.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Errors {
-    /// Of the peak forces of the first impacts, the largest, relative.
+    /// Largest relative error of the peak forces of the first impacts.
     pub peak: Option<f64>,
-    /// Of the output body's position at the third impact, m.
+    /// Error of the output body's position at the third impact, m.
     pub position_m: Option<f64>,
-    /// Of the joints' mean settled forces, the largest, relative.
+    /// Largest relative error of the joints' mean settled forces.
     pub settled: Option<f64>,
-    /// Residual of the energy balance over the first impacts, of the energy exchanged.
+    /// Residual of the energy balance over the first impacts, relative to the energy exchanged.
     pub energy: Option<f64>,
 }
 
-/// What a run did in one phase.
+/// Work of a run in one phase.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Work {
+pub(super) struct PhaseCost {
     pub steps: u64,
     pub evaluations: u64,
     pub rejected: u64,
 }
 
-/// The reference of a scene.
+/// The reference solution of a scene.
 #[derive(Clone, Debug)]
 pub struct ReferenceSolution {
     scene: Scene,
-    /// The first impacts in the order in which they begin; one entry for each joint where there is no impact.
+    /// The first impacts in the order in which they begin; one entry per joint if there is no impact.
     pub slots: Vec<Slot>,
-    /// Number of impacts that are compared.
+    /// Number of impacts compared.
     pub impacts: usize,
     /// End of the span with the first impacts, s.
     pub span: f64,
-    /// When the position is compared, s: at the third impact, the last if there are fewer, the end if there is none.
+    /// Instant at which the position is compared, s: the third impact, the last if there are fewer, the end if there is none.
     pub instant: f64,
     /// Number of that impact, from 1; 0 if there is none.
     pub instant_impact: usize,
     position: Vec3,
-    /// Settled motion, where the scene comes to it in time.
+    /// Settled motion, if the scene reaches it in time.
     pub settled: Option<SettledSpan>,
     /// The method and tolerance of the reference.
     pub setting: Setting,
-    /// By how much the reference itself changes at half its tolerance: no error below this can be told.
+    /// Change of the reference itself at half its tolerance: smaller errors cannot be resolved.
     pub floor: Errors,
 }
 
@@ -117,7 +118,7 @@ struct Contact {
 }
 
 impl Contact {
-    /// Its end, or when it has lasted long enough to count as ended; `None` while neither is known at `now`.
+    /// Its end, or the time after which it counts as ended for its length; `None` while neither is known at `now`.
     fn over(&self, now: f64) -> Option<f64> {
         let long = self.begin + LONG_CONTACT;
         self.end
@@ -127,10 +128,11 @@ impl Contact {
 }
 
 impl ReferenceSolution {
-    /// Runs the reference of `scene`.
+    /// Computes the reference of `scene`.
     ///
     /// # Errors
-    /// A scene that does not start, or whose reference does not reach the end of the first impacts; [`RunContext`]'s no.
+    /// A scene that does not start, or whose reference does not reach the end of the first impacts; cancellation by
+    /// [`RunContext`].
     pub fn new(scene: &Scene, context: &mut RunContext) -> Result<Self, AnalysisError> {
         let setting = Setting::reference(REFERENCE);
         let (contacts, impacts) = first_contacts(&setting, scene, &mut context.part(0, 5))?;
@@ -152,7 +154,7 @@ impl ReferenceSolution {
             tolerance: 0.5 * REFERENCE,
             ..setting
         };
-        // First the peaks, then what half the tolerance changes.
+        // First the peaks, then the change at half the tolerance.
         let (peaks, position) = reference.reference_impacts(&setting, &mut context.part(1, 5))?;
         for (slot, peak) in reference.slots.iter_mut().zip(&peaks) {
             slot.peak_n = *peak;
@@ -165,7 +167,7 @@ impl ReferenceSolution {
         Ok(reference)
     }
 
-    /// Slots of the first impacts: half-way to the same joint's contacts before and after.
+    /// Sets the slots of the first impacts: half-way to the same joint's contacts before and after.
     fn lay_slots(&mut self, contacts: &[Contact], joints: usize) {
         let first = &contacts[..self.impacts];
         if first.is_empty() {
@@ -211,7 +213,7 @@ impl ReferenceSolution {
         Ok((peaks, position.unwrap_or_default()))
     }
 
-    /// Runs over the first impacts: how that ended, the largest force in every slot, the position at the instant.
+    /// Runs over the first impacts; returns how that ended, the largest force in every slot, and the position at the instant.
     fn look(
         &self,
         simulation: &mut Simulation,
@@ -239,7 +241,7 @@ impl ReferenceSolution {
         Ok((end, found, position))
     }
 
-    /// Largest relative difference of the slots' peaks; `None` where there is nothing to compare.
+    /// Largest relative difference between the slots' peaks; `None` if there is nothing to compare.
     fn peak_error(&self, peaks: &[f64]) -> Option<f64> {
         let pairs = self.slots.iter().zip(peaks);
         pairs
@@ -248,13 +250,13 @@ impl ReferenceSolution {
             .reduce(f64::max)
     }
 
-    /// Errors of a run over the first impacts, what it did, and how it ended.
+    /// Errors of a run over the first impacts, its work, and how it ended.
     pub(super) fn impacts_of(
         &self,
         setting: &Setting,
         effort: &Effort,
         context: &mut RunContext,
-    ) -> Result<(End, Errors, Work), AnalysisError> {
+    ) -> Result<(End, Errors, PhaseCost), AnalysisError> {
         let mut simulation = setting.start(&self.scene)?;
         let (end, peaks, position) = self.look(&mut simulation, effort, context)?;
         let mut errors = Errors::default();
@@ -263,7 +265,7 @@ impl ReferenceSolution {
             errors.position_m = position.map(|p| (p - self.position).norm());
             errors.energy = energy_residual(&simulation);
         }
-        Ok((end, errors, work(&simulation, &Work::default())))
+        Ok((end, errors, work(&simulation, &PhaseCost::default())))
     }
 
     /// Finds settled motion and averages its forces.
@@ -288,7 +290,7 @@ impl ReferenceSolution {
         for (n, (setting, means)) in [setting, tighter].into_iter().zip(&mut means).enumerate() {
             let (end, found, _) = self.averages(setting, &effort, &mut context.part(n + 1, 3))?;
             if end != End::Reached {
-                // Settled motion that the reference cannot follow is no measure.
+                // Settled motion that the reference cannot follow is no basis for comparison.
                 self.settled = None;
                 return Ok(());
             }
@@ -302,7 +304,7 @@ impl ReferenceSolution {
         Ok(())
     }
 
-    /// The settled simulation with `setting`, after its warm-up.
+    /// The settled simulation under `setting`, after its warm-up.
     pub(super) fn resume(
         &self,
         span: &SettledSpan,
@@ -320,13 +322,13 @@ impl ReferenceSolution {
         setting: &Setting,
         effort: &Effort,
         context: &mut RunContext,
-    ) -> Result<(End, Vec<f64>, Work), AnalysisError> {
+    ) -> Result<(End, Vec<f64>, PhaseCost), AnalysisError> {
         let span = self
             .settled
             .as_ref()
             .expect("asked only of a scene that settles");
         let (end, mut simulation) = self.resume(span, setting, effort, context)?;
-        let before = work(&simulation, &Work::default());
+        let before = work(&simulation, &PhaseCost::default());
         let mut forces = MeanForces::new(&self.scene, (span.from, span.to), SAMPLES);
         if end != End::Reached {
             return Ok((end, forces.means, work(&simulation, &before)));
@@ -348,13 +350,13 @@ impl ReferenceSolution {
             .reduce(f64::max)
     }
 
-    /// Error of the settled forces, what the run did, and how it ended; `None` where the scene does not settle.
+    /// Error of the settled forces, the run's work, and how it ended; `None` if the scene does not settle.
     pub(super) fn settled_of(
         &self,
         setting: &Setting,
         effort: &Effort,
         context: &mut RunContext,
-    ) -> Result<Option<(End, Option<f64>, Work)>, AnalysisError> {
+    ) -> Result<Option<(End, Option<f64>, PhaseCost)>, AnalysisError> {
         if self.settled.is_none() {
             return Ok(None);
         }
@@ -363,34 +365,34 @@ impl ReferenceSolution {
         Ok(Some((end, error.flatten(), work)))
     }
 
-    /// The scene that it belongs to.
+    /// The scene it belongs to.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
 }
 
-fn work(simulation: &Simulation, before: &Work) -> Work {
+fn work(simulation: &Simulation, before: &PhaseCost) -> PhaseCost {
     let now = simulation.statistics();
-    Work {
+    PhaseCost {
         steps: now.steps - before.steps,
         evaluations: now.evaluations - before.evaluations,
         rejected: now.rejected - before.rejected,
     }
 }
 
-/// Size of the residual of the energy balance since the start, of the energy exchanged; `None` where none was kept.
+/// Magnitude of the residual of the energy balance since the start, relative to the energy exchanged; `None` without a ledger.
 fn energy_residual(simulation: &Simulation) -> Option<f64> {
     let ledger = simulation.ledger()?;
     Some(ledger.relative_residual().abs())
 }
 
-/// Mean size of each joint's contact force over a span, of instants at equal distances.
+/// Mean magnitude of each joint's contact force over a span, from equally spaced instants.
 pub(super) struct MeanForces {
     span: (f64, f64),
     samples: u32,
     next: u32,
     frame: Frame,
-    /// N; whole once a run has been seen to the end of the span.
+    /// N; complete once a run has been sampled to the end of the span.
     pub means: Vec<f64>,
 }
 
@@ -405,7 +407,7 @@ impl MeanForces {
         }
     }
 
-    /// Takes the instants of the latest step.
+    /// Samples the instants that lie in the latest step.
     pub(super) fn see(&mut self, simulation: &mut Simulation) {
         let (from, to) = self.span;
         while self.next < self.samples {
@@ -424,19 +426,19 @@ impl MeanForces {
     }
 }
 
-/// The reference must reach its end: the error says why it did not.
+/// The reference must reach its end; the error says why it did not.
 pub(super) fn done(end: End, simulation: &mut Simulation) -> Result<(), AnalysisError> {
     match end {
         End::Reached => Ok(()),
         End::Capped => Err(AnalysisError::TooLong {
             evaluations: Effort::REFERENCE.evaluations,
         }),
-        // The guard gives the same answer when asked again.
+        // Stepping again returns the guard's error.
         End::Stopped(_) => Ok(simulation.step()?),
     }
 }
 
-/// Contacts of the reference until the first impacts are over and a little longer, and how many of them to compare.
+/// Contacts of the reference until shortly after the first impacts, and how many of them to compare.
 fn first_contacts(
     setting: &Setting,
     scene: &Scene,
@@ -490,12 +492,12 @@ fn first_contacts(
         },
     )?;
     match end {
-        // A large scene may take long to its sixth impact: what came until then is compared.
+        // A large scene may be capped before its sixth impact: those until then are compared.
         End::Capped if !contacts.is_empty() => {}
         end => done(end, &mut simulation)?,
     }
     let last = simulation.time();
-    // What has not ended by then cannot be compared to its end.
+    // A contact that has not ended by then cannot be compared to its end.
     let over = |contact: &&Contact| {
         contact
             .over(last)
@@ -505,7 +507,7 @@ fn first_contacts(
     Ok((contacts, compared))
 }
 
-/// The state in which every joint with clearance has been in contact, without a new one, for a while.
+/// The state in which every joint with clearance has been in contact, without a new impact, for a while.
 fn settled_state(
     scene: &Scene,
     context: &mut RunContext,
@@ -561,8 +563,8 @@ mod tests {
     #[test]
     fn the_reference_of_the_default_scene_has_the_published_impacts() {
         let reference = reference("spcmm", &[]);
-        // (joint, begin in ms, peak in N) of an independent solution, whose last digit is rounded; two contacts at nearly one
-        // instant may come in either order.
+        // (joint, start in ms, peak in N) of an independent solution, whose last digit is rounded; two nearly
+        // simultaneous contacts may come in either order.
         let published = [
             (0, 7.801422908, 621.35),
             (1, 7.807677416, 560.67),
@@ -590,7 +592,7 @@ mod tests {
     fn a_scene_without_play_is_compared_by_its_reactions() {
         let reference = reference("pendulum", &[("contact.clearance", "0")]);
         assert_eq!((reference.impacts, reference.slots.len()), (0, 1));
-        // The reaction of a pendulum that is let go grows: m g cos(theta) and what turns the path.
+        // The reaction of a released pendulum grows: m g cos(theta) plus the centripetal force.
         assert!(reference.slots[0].peak_n > 0.384 * 9.81 * 0.75);
         assert!(reference.settled.is_some());
         assert!(reference.floor.peak.is_some_and(|e| e < 1e-9));

@@ -1,9 +1,9 @@
-//! What kind of motion a row of sections shows, with the evidence for it.
+//! Classification of a motion from its sections, with the evidence.
 //!
-//! In this order: sections that return to themselves within the resolution are periodic, whatever happens below it; of the
-//! others an exponent above its own uncertainty is chaos, one below it a transient that has not ended, and one that
-//! cannot be told from 0 together with a regular 0-1 test is quasi-periodic, unless the sections still close in on a
-//! cycle. What fits none of these is unclear.
+//! In this order: sections that return to themselves within the resolution are periodic, whatever happens below it;
+//! otherwise an exponent clearly above 0 is chaos, one clearly below 0 an unfinished transient, and one indistinguishable
+//! from 0 together with a regular 0-1 test is quasi-periodic, unless the sections still converge to a cycle. Anything
+//! else is unclear.
 
 use super::exponent::Exponent;
 
@@ -12,18 +12,18 @@ use super::exponent::Exponent;
 pub enum Regime {
     /// The evidence is too short or contradicts itself.
     Unclear,
-    /// It repeats after so many intervals; a motion at rest repeats after one.
+    /// It repeats after this many intervals; a motion at rest repeats after one.
     Periodic(usize),
     /// Regular, but it never repeats.
     QuasiPeriodic,
-    /// Neighbouring motions part exponentially.
+    /// Neighbouring motions diverge exponentially.
     Chaotic,
-    /// Neighbouring motions meet, but the sections have not settled yet: discard more.
+    /// Neighbouring motions converge, but the sections have not settled yet: discard more.
     NotSettled,
 }
 
 impl Regime {
-    /// The word for people and files.
+    /// Its word for people and files.
     pub fn word(self) -> &'static str {
         match self {
             Self::Unclear => "unclear",
@@ -34,7 +34,7 @@ impl Regime {
         }
     }
 
-    /// The number in files.
+    /// Its code in files.
     pub fn code(self) -> i64 {
         match self {
             Self::Unclear => 0,
@@ -45,7 +45,7 @@ impl Regime {
         }
     }
 
-    /// Intervals after which it repeats; 0 where it does not.
+    /// Intervals after which it repeats; 0 if it does not.
     pub fn period(self) -> usize {
         match self {
             Self::Periodic(n) => n,
@@ -54,39 +54,39 @@ impl Regime {
     }
 }
 
-/// What a regime was told from.
+/// The evidence for a regime.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Evidence {
-    /// Sections looked at: the latest half of the kept ones, but at least 32 where there are so many.
+    /// Number of sections examined: the latter half of the kept ones, but at least 32 if there are that many.
     pub sections: usize,
-    /// Largest distance between two of these sections that should coincide, in units of the resolution: of the period
-    /// named, or without one of period 1.
+    /// Largest distance between two of these sections that should coincide, in units of the resolution: for the period
+    /// found, or for period 1 without one.
     pub return_distance: f64,
-    /// Sections that the resolution tells apart.
+    /// Number of sections that the resolution tells apart.
     pub distinct: usize,
-    /// Median correlation of the 0-1 test, near 0 for regular motion and near 1 for chaos; NaN for less than 40 sections.
+    /// Median correlation of the 0-1 test, near 0 for regular motion and near 1 for chaos; NaN for fewer than 40 sections.
     pub zero_one: f64,
-    /// Size of an exponent that may still be none: a separation that grows in proportion to time would show
-    /// ln(n) / n intervals; 1/s.
+    /// Magnitude below which an exponent may still be zero: a separation that grows linearly in time would show ln(n) / n
+    /// intervals; 1/s.
     pub exponent_bound: f64,
-    /// Largest Lyapunov exponent, where a twin ran.
+    /// Largest Lyapunov exponent, if a twin was run.
     pub exponent: Option<Exponent>,
 }
 
-/// Fewer sections than this tell nothing.
+/// Fewer sections than this allow no verdict.
 pub const FEWEST: usize = 8;
-/// So many sections are looked at where there are so many.
+/// At least this many sections are examined, if there are that many.
 const LOOKED_AT: usize = 32;
-/// A period must be seen so many times.
+/// A period must be seen this many times.
 const RETURNS: usize = 3;
-/// Sections that spread by less than this fraction of what they spread by before are on their way to a cycle.
+/// Sections whose spread falls below this fraction of their earlier spread are converging to a cycle.
 const CLOSING: f64 = 0.7;
-/// Above and below this the 0-1 test speaks for chaos and for regular motion where no exponent does.
+/// Without an exponent, the 0-1 test indicates chaos above the first of these and regular motion below the second.
 const CHAOS: f64 = 0.8;
 const REGULAR: f64 = 0.2;
 
-/// Names the regime of `sections` (one after the other, each as long as `resolution`), taken every `interval` seconds;
-/// `resolution` is what two values must differ by to be different.
+/// Classifies `sections` (concatenated, each as long as `resolution`), taken every `interval` seconds; `resolution` is
+/// the smallest difference that distinguishes two values.
 pub fn classify(
     sections: &[f64],
     resolution: &[f64],
@@ -103,19 +103,19 @@ pub fn classify(
         sections: used.len(),
         return_distance: spread(used, period.unwrap_or(1), resolution),
         distinct: distinct(used, resolution),
-        zero_one: zero_one(&all, liveliest(used, resolution)),
+        zero_one: zero_one(&all, most_varying(used, resolution)),
         exponent_bound: libm::log(many) / (many * interval),
         exponent,
     };
     let regime = match judge(period, &evidence) {
-        // Close to a bifurcation a cycle attracts so weakly that its exponent looks like none.
+        // Close to a bifurcation a cycle attracts so weakly that its exponent is indistinguishable from 0.
         Regime::QuasiPeriodic if still_closing(used, resolution) => Regime::NotSettled,
         regime => regime,
     };
     (regime, evidence)
 }
 
-/// Whether the sections of the period that fits best come nearer to each other as time goes on.
+/// Whether the sections of the best-fitting period keep approaching each other.
 fn still_closing(sections: &[&[f64]], resolution: &[f64]) -> bool {
     let (first, second) = sections.split_at(sections.len() / 2);
     let by_spread = |&a: &usize, &b: &usize| {
@@ -153,7 +153,7 @@ fn judge(period: Option<usize>, evidence: &Evidence) -> Regime {
     }
 }
 
-/// Largest extent, in resolutions, of the sections that coincide if the motion repeats after `n`.
+/// Largest extent, in resolutions, of the sections that would coincide if the motion repeated after `n`.
 fn spread(sections: &[&[f64]], n: usize, resolution: &[f64]) -> f64 {
     let mut largest: f64 = 0.0;
     for first in 0..n.min(sections.len()) {
@@ -169,7 +169,7 @@ fn spread(sections: &[&[f64]], n: usize, resolution: &[f64]) -> f64 {
     largest
 }
 
-/// Sections of which no two are within the resolution of each other, taken greedily.
+/// Number of sections of which no two are within the resolution of each other, selected greedily.
 fn distinct(sections: &[&[f64]], resolution: &[f64]) -> usize {
     let mut kept: Vec<&[f64]> = Vec::new();
     for section in sections {
@@ -185,8 +185,8 @@ fn distinct(sections: &[&[f64]], resolution: &[f64]) -> usize {
     kept.len()
 }
 
-/// The observable that moves most in units of its resolution.
-fn liveliest(sections: &[&[f64]], resolution: &[f64]) -> usize {
+/// The observable with the largest extent in units of its resolution.
+fn most_varying(sections: &[&[f64]], resolution: &[f64]) -> usize {
     let extent = |i: usize| {
         let values = sections.iter().map(|section| section[i]);
         let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
@@ -210,14 +210,14 @@ fn zero_one(sections: &[&[f64]], observable: usize) -> f64 {
     let mean = sections.iter().map(|s| s[observable]).sum::<f64>() / n as f64;
     let mut correlations: Vec<f64> = (0..FREQUENCIES)
         .map(|m| {
-            // In (pi/5, 4 pi/5): away from resonances with the sampling itself.
+            // In (pi/5, 4 pi/5): away from resonances with the sampling.
             let part = (m as f64 + 0.5) / FREQUENCIES as f64;
             let c = std::f64::consts::PI * (0.2 + 0.6 * part);
             let (mut p, mut q) = (0.0, 0.0);
             let walk: Vec<(f64, f64)> = (0..n)
                 .map(|j| {
                     let (sine, cosine) = libm::sincos((j + 1) as f64 * c);
-                    // Less its mean, the observable has no oscillating part to be taken off.
+                    // With the mean removed, there is no oscillating term to subtract.
                     let value = sections[j][observable] - mean;
                     p += value * cosine;
                     q += value * sine;
@@ -285,7 +285,7 @@ mod tests {
     fn a_drift_is_not_settled_and_never_called_periodic() {
         let drift: Vec<f64> = (0..60).map(|k| 1e-3 * f64::from(k)).collect();
         let (regime, evidence) = classify(&drift, &[1.5e-3], 1.0, exponent(-0.5));
-        // Neighbours are within the resolution, the whole is not.
+        // Neighbours are within the resolution, the whole set is not.
         assert_eq!(regime, Regime::NotSettled);
         assert!(evidence.return_distance > 10.0);
     }

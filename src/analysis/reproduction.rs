@@ -1,4 +1,4 @@
-//! Everything that section 4 of the paper needs, as jobs that any number of threads may do in any order, and what comes out of them.
+//! All computations for section 4 of the paper, as jobs that any number of threads may run in any order, and their results.
 
 mod findings;
 mod record;
@@ -7,12 +7,12 @@ mod statements;
 pub use findings::{Combination, Findings, Report};
 use record::row;
 pub use record::{
-    COLUMNS, Column, Loop, Row, SweepData, Swept, Traced, column_of, derivative, exponents,
-    regime_word,
+    COLUMNS, Column, SettledCurve, SweepData, Swept, Traced, TracedRow, column_of, derivative,
+    exponents, regime_word,
 };
 pub use statements::Statement;
 
-use super::grid::{Axis, Grid, RangeError, Start};
+use super::grid::{Grid, ParameterRange, RangeError, Start};
 use super::paper::{CASES, Case, Coordinate, DURATION, SAMPLING, Series};
 use super::point::{Plan, resolution};
 use super::response::{Look, Response, ResponseError, derivatives, respond};
@@ -22,15 +22,15 @@ use crate::simulate::{Frame, Simulation};
 
 /// Period of trajectory (59), s.
 pub const PERIOD: f64 = 2.0;
-/// Points of a settled curve in a period.
+/// Points per period of a settled curve.
 const CURVE_POINTS: usize = 800;
 
-/// Changes to the default scene under which the paper's runs are made.
+/// Changes to the default scene for the paper's runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Variant {
-    /// Begins the names of its files.
+    /// Prefix of its file names.
     pub prefix: &'static str,
-    /// What it is.
+    /// Title.
     pub title: &'static str,
     /// Keys and values.
     pub changes: &'static [(&'static str, &'static str)],
@@ -38,22 +38,22 @@ pub struct Variant {
 
 const AS_PRINTED: (&str, &str) = ("contact.friction_velocity", "printed");
 
-/// The contract of this program: friction reads the velocity of the centres, (15)-(16).
+/// The model of this program: friction uses the velocity of the centres, (15)-(16).
 pub const CORRECTED: Variant = Variant {
     prefix: "",
     title: "as corrected",
     changes: &[],
 };
 
-/// Friction reads the velocities of (13) as printed.
+/// Friction uses the velocities of (13) as printed.
 pub const PRINTED: Variant = Variant {
     prefix: "printed_",
     title: "(13) as printed",
     changes: &[AS_PRINTED],
 };
 
-/// (13) as printed together with what else the paper prints wrongly or leaves out. (19) as printed has the elastic force over
-/// four times the approach speed in m/s, 3.2 times that of a steel ball in the first impacts, and next to no damping.
+/// (13) as printed together with other misprints and omissions of the paper. (19) as printed divides the elastic force by four
+/// times the approach speed in m/s: 3.2 times that of a steel ball in the first impacts, and next to no damping.
 pub const COMBINATIONS: [Variant; 3] = [
     Variant {
         prefix: "printed_a1_24mm_",
@@ -76,25 +76,25 @@ pub const COMBINATIONS: [Variant; 3] = [
     },
 ];
 
-/// How much is computed.
+/// Extent of the computation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Extent {
-    /// Periods before a settled curve is taken.
+    /// Periods run before a settled curve is taken.
     pub settle: usize,
-    /// Periods of the paper's runs and how many of them are discarded.
+    /// Periods of the paper's runs, and how many of them are discarded.
     pub runs: (usize, usize),
-    /// Values of clearance and of friction in the bifurcation diagrams.
+    /// Number of clearance and of friction values in the bifurcation diagrams.
     pub values: [usize; 2],
-    /// Periods and discarded periods of each.
+    /// Periods and discarded periods per value.
     pub sweep: (usize, usize),
-    /// Values of friction and of clearance in the map.
+    /// Number of friction and of clearance values in the map.
     pub map: [usize; 2],
-    /// Periods and discarded periods of each.
+    /// Periods and discarded periods per point.
     pub map_periods: (usize, usize),
 }
 
 impl Extent {
-    /// The whole report.
+    /// The full report.
     pub const FULL: Self = Self {
         settle: 30,
         runs: (200, 50),
@@ -103,14 +103,14 @@ impl Extent {
         map: [16, 16],
         map_periods: (40, 16),
     };
-    /// A report that shows how it looks, within seconds.
+    /// A shortened report that shows the layout within seconds.
     pub const QUICK: Self = Self {
-        settle: 5,
-        runs: (14, 4),
-        values: [5, 4],
-        sweep: (12, 4),
-        map: [2, 3],
-        map_periods: (12, 4),
+        settle: 3,
+        runs: (9, 3),
+        values: [4, 3],
+        sweep: (8, 3),
+        map: [2, 2],
+        map_periods: (8, 3),
     };
 }
 
@@ -120,13 +120,13 @@ pub enum ReproductionError {
     /// A scene that does not load.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// An axis that no sweep can have.
+    /// An invalid axis.
     #[error(transparent)]
     Range(#[from] RangeError),
-    /// A sweep that is none.
+    /// An invalid sweep.
     #[error(transparent)]
     Sweep(#[from] SweepError),
-    /// A run that did not come to its end.
+    /// A run that did not reach its end.
     #[error("{name}: {error}")]
     Run {
         /// Its name in files.
@@ -136,35 +136,35 @@ pub enum ReproductionError {
     },
 }
 
-/// What there is to do.
-pub struct Work {
+/// The work of a report.
+pub struct Agenda {
     extent: Extent,
-    /// Runs of section 4.2 by name: of each variant in the order of [`CASES`], then with all bodies and multipliers; of each
-    /// combination by clearance; with ideal joints.
+    /// Runs of section 4.2 by name: for each variant in the order of [`CASES`], then with all bodies and multipliers; for
+    /// each combination by clearance; with ideal joints.
     runs: Vec<(String, Case, Scene)>,
-    /// Scenes of settled curves, of each variant in the order of [`CASES`].
+    /// Scenes of the settled curves, for each variant in the order of [`CASES`].
     curves: Vec<(Case, Scene)>,
-    /// [`SWEEPS`] of each variant, one of each combination.
+    /// [`SWEEPS`] for each variant, one for each combination.
     sweeps: Vec<SweepData>,
-    jobs: Vec<Job>,
+    jobs: Vec<ReportJob>,
 }
 
-/// Sweeps of a variant.
+/// Number of sweeps per variant.
 const SWEEPS: usize = 9;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Job {
+enum ReportJob {
     Run(usize),
     Curve(usize),
     Block(usize, usize),
 }
 
-/// What came out of a job.
+/// Result of a job.
 pub enum Outcome {
     /// A run of section 4.2.
-    Run(Box<(Response, Vec<Row>)>),
+    Run(Box<(Response, Vec<TracedRow>)>),
     /// A settled curve.
-    Curve(Loop),
+    Curve(SettledCurve),
     /// Records of a block.
     Block(Vec<f64>),
 }
@@ -188,7 +188,7 @@ fn sweep_data(
     exponent: bool,
 ) -> Result<SweepData, ReproductionError> {
     let scene = scene(variant, case, &[])?;
-    let axes = vary.iter().map(|text| Axis::parse(&scene, text));
+    let axes = vary.iter().map(|text| ParameterRange::parse(&scene, text));
     let grid = Grid::new(&scene, axes.collect::<Result<Vec<_>, _>>()?, start)?;
     let plan = Plan {
         periods,
@@ -205,11 +205,11 @@ fn sweep_data(
     })
 }
 
-impl Work {
+impl Agenda {
     /// All jobs of a report.
     ///
     /// # Errors
-    /// An extent that no sweep can have.
+    /// An extent that gives an invalid sweep.
     pub fn new(extent: Extent) -> Result<Self, ReproductionError> {
         let mut runs = Vec::new();
         let mut run = |variant: Variant, name: String, case: Case, more: &[(&str, &str)]| {
@@ -268,13 +268,13 @@ impl Work {
         let sweeps = all
             .map(|(variant, s)| of(variant, s))
             .collect::<Result<Vec<_>, ReproductionError>>()?;
-        // Blocks that take longest come first, so that no thread is left with one at the end.
-        let mut jobs: Vec<Job> = Vec::new();
+        // Blocks take longest and come first, so that no thread is left with one at the end.
+        let mut jobs: Vec<ReportJob> = Vec::new();
         for (s, data) in sweeps.iter().enumerate() {
-            jobs.extend((0..data.sweep.grid().blocks()).map(|b| Job::Block(s, b)));
+            jobs.extend((0..data.sweep.grid().blocks()).map(|b| ReportJob::Block(s, b)));
         }
-        jobs.extend((0..curves.len()).map(Job::Curve));
-        jobs.extend((0..runs.len()).map(Job::Run));
+        jobs.extend((0..curves.len()).map(ReportJob::Curve));
+        jobs.extend((0..runs.len()).map(ReportJob::Run));
         Ok(Self {
             extent,
             runs,
@@ -294,20 +294,20 @@ impl Work {
         &self.sweeps
     }
 
-    /// Number of the sweep and of its block that job `job` computes, if it does.
+    /// Sweep number and block number that job `job` computes, if any.
     pub fn block(&self, job: usize) -> Option<(usize, usize)> {
         match self.jobs[job] {
-            Job::Block(s, b) => Some((s, b)),
+            ReportJob::Block(s, b) => Some((s, b)),
             _ => None,
         }
     }
 
-    /// Simulated time of a job, s; a twin run counts as another.
+    /// Simulated time of a job, s; a twin counts as a second run.
     pub fn length(&self, job: usize) -> f64 {
         match self.jobs[job] {
-            Job::Run(_) => DURATION,
-            Job::Curve(_) => PERIOD * (self.extent.settle + 2) as f64,
-            Job::Block(s, b) => {
+            ReportJob::Run(_) => DURATION,
+            ReportJob::Curve(_) => PERIOD * (self.extent.settle + 2) as f64,
+            ReportJob::Block(s, b) => {
                 let sweep = &self.sweeps[s].sweep;
                 let twin = if sweep.plan().exponent { 2.0 } else { 1.0 };
                 let points = sweep.grid().block(b).len();
@@ -316,10 +316,10 @@ impl Work {
         }
     }
 
-    /// Does job `job`; `go_on` hears how much of [`Self::length`] is done and may end it by false.
+    /// Runs job `job`; `go_on` receives how much of [`Self::length`] is done and returns false to cancel.
     ///
     /// # Errors
-    /// A run that the divergence guard stopped, `go_on`. Points of a sweep that diverge are no error.
+    /// A run stopped by the divergence guard; cancellation by `go_on`. Points of a sweep that diverge are no error.
     pub fn run(
         &self,
         job: usize,
@@ -330,7 +330,7 @@ impl Work {
             error: Box::new(error),
         };
         match self.jobs[job] {
-            Job::Run(n) => {
+            ReportJob::Run(n) => {
                 let (name, _, scene) = &self.runs[n];
                 let mut rows = Vec::new();
                 let see = |look: &Look| rows.push(row(look));
@@ -338,14 +338,14 @@ impl Work {
                 let response = response.map_err(|e| failed(name, e))?;
                 Ok(Outcome::Run(Box::new((response, rows))))
             }
-            Job::Curve(n) => {
+            ReportJob::Curve(n) => {
                 let (case, scene) = &self.curves[n];
                 let curve = curve(*case, scene, self.extent.settle, go_on);
                 Ok(Outcome::Curve(
                     curve.map_err(|e| failed("settled curve", e))?,
                 ))
             }
-            Job::Block(s, b) => {
+            ReportJob::Block(s, b) => {
                 let sweep = &self.sweeps[s].sweep;
                 let all = sweep.plan().periods as f64;
                 let share = self.length(job) / sweep.grid().block(b).len() as f64;
@@ -365,7 +365,7 @@ impl Work {
         }
     }
 
-    /// Puts the outcomes of all jobs together, in their order.
+    /// Assembles the outcomes of all jobs, in job order.
     ///
     /// # Panics
     /// If there is not one outcome for each job.
@@ -375,7 +375,7 @@ impl Work {
         let mut curves = Vec::new();
         for (job, outcome) in self.jobs.iter().zip(outcomes) {
             match (job, outcome) {
-                (Job::Run(n), Outcome::Run(found)) => {
+                (ReportJob::Run(n), Outcome::Run(found)) => {
                     let (name, case, _) = &self.runs[*n];
                     let (response, rows) = *found;
                     runs.push(Traced {
@@ -385,9 +385,9 @@ impl Work {
                         rows,
                     });
                 }
-                (Job::Curve(_), Outcome::Curve(curve)) => curves.push(curve),
-                // Blocks of a sweep come in order of their points.
-                (Job::Block(s, _), Outcome::Block(records)) => {
+                (ReportJob::Curve(_), Outcome::Curve(curve)) => curves.push(curve),
+                // Blocks of a sweep come in the order of their points.
+                (ReportJob::Block(s, _), Outcome::Block(records)) => {
                     self.sweeps[*s].records.extend(records);
                 }
                 _ => unreachable!("a job has an outcome of its kind"),
@@ -424,21 +424,21 @@ impl Work {
     }
 }
 
-/// Name of a run in files.
+/// File name of a run.
 fn file_name(case: Case) -> String {
     format!("response_c{}mm_cf{}", case.clearance, case.friction)
 }
 
-/// The period after `settle` and one more, at equal phases.
+/// The period after `settle` periods and the next one, at equal phases.
 fn curve(
     case: Case,
     scene: &Scene,
     settle: usize,
     mut go_on: impl FnMut(f64) -> bool,
-) -> Result<Loop, ResponseError> {
+) -> Result<SettledCurve, ResponseError> {
     let mut simulation = Simulation::new(scene)?;
     let mut frame = Frame::default();
-    let mut found = Loop {
+    let mut found = SettledCurve {
         case,
         coordinates: [Vec::new(), Vec::new()],
         rates: [Vec::new(), Vec::new()],

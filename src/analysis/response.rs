@@ -5,10 +5,10 @@ use crate::simulate::{Frame, Pose, Simulation, StartError, Stopped};
 
 /// Coordinates of the output body: x, y, z, alpha, beta, gamma.
 pub const COORDINATES: usize = 6;
-/// Instants at which a step is looked at: accelerations peak inside an impact's steps, not at their ends.
-const LOOKS_PER_STEP: u32 = 4;
+/// Instants examined per step: accelerations peak within an impact's steps, not at their ends.
+const OBSERVATIONS_PER_STEP: u32 = 4;
 
-/// Largest sizes over a run. SI units; coordinates in the order x, y, z, alpha, beta, gamma.
+/// Largest magnitudes over a run. SI units; coordinates in the order x, y, z, alpha, beta, gamma.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Extremes {
     /// Largest |coordinate less that of the ideal motion|, m or rad; NaN where there is no ideal motion.
@@ -72,14 +72,14 @@ fn deviation(pose: &Pose, ideal: &Pose) -> [f64; COORDINATES] {
     })
 }
 
-/// What one run did.
+/// Response of one run.
 #[derive(Clone, Debug)]
 pub struct Response {
     /// Names of the ball joints.
     pub joints: Vec<String>,
-    /// In continuous time: forces by the cubic through each step, the rest at four instants of each step.
+    /// In continuous time: forces from the cubic interpolant of each step, the rest at four instants of each step.
     pub full: Extremes,
-    /// At whole multiples of the sampling interval alone, as a solver with that output step would report.
+    /// Only at whole multiples of the sampling interval, as a solver with that output step would report.
     pub sampled: Extremes,
     /// Time of the last separation of each joint, s; NaN if there was none.
     pub last_separation: Vec<f64>,
@@ -99,12 +99,12 @@ pub enum ResponseError {
     /// The divergence guard stopped the run.
     #[error(transparent)]
     Stopped(#[from] Stopped),
-    /// The caller asked to end.
+    /// The caller cancelled it.
     #[error("cancelled")]
     Cancelled,
 }
 
-/// The same scene with every ball joint ideal; `None` where it cannot move so.
+/// The same scene with every ball joint ideal; `None` if it cannot move then.
 fn ideal_of(scene: &Scene) -> Option<Simulation> {
     let mut ideal = scene.clone();
     ideal.set("contact.clearance", "0").ok()?;
@@ -115,14 +115,14 @@ fn ideal_of(scene: &Scene) -> Option<Simulation> {
     Simulation::new(&ideal).ok()
 }
 
-/// The pose of the ideal motion at one instant after another.
+/// Pose of the ideal motion at successive instants.
 struct Ideal {
     simulation: Option<Simulation>,
     frame: Frame,
 }
 
 impl Ideal {
-    /// The pose at `time`, not before the time asked for last; `None` where there is none.
+    /// The pose at `time`, which must not precede the last requested time; `None` where there is none.
     fn at(&mut self, time: f64) -> Option<&Pose> {
         let simulation = self.simulation.as_mut()?;
         if simulation.advance_to(time).is_err() {
@@ -134,11 +134,11 @@ impl Ideal {
     }
 }
 
-/// One instant of a run.
+/// One examined instant of a run.
 pub struct Look<'a> {
     /// Time, s.
     pub time: f64,
-    /// The run.
+    /// State of the run.
     pub frame: &'a Frame,
     /// The ideal motion, where there is one.
     pub ideal: Option<&'a Pose>,
@@ -162,12 +162,12 @@ impl Look<'_> {
     }
 }
 
-/// Runs `scene` for `duration` (s) and compares it with its ideal motion; `every` (s) is the interval of
-/// [`Response::sampled`]. `see` is shown every instant that is looked at, in order of time; `go_on` hears the simulated time
-/// after every step and may end the run by false.
+/// Runs `scene` for `duration` (s) and compares it with its ideal motion; `every` (s) is the sampling interval of
+/// [`Response::sampled`]. `see` receives every examined instant in order of time; `go_on` receives the simulated time
+/// after every step and returns false to cancel.
 ///
 /// # Errors
-/// A scene that does not start, the divergence guard, `go_on`.
+/// A scene that does not start, the divergence guard, cancellation by `go_on`.
 pub fn respond(
     scene: &Scene,
     duration: f64,
@@ -187,13 +187,14 @@ pub fn respond(
     let mut next_sample = 0_u64;
     loop {
         let (start, end) = (simulation.step_start(), simulation.time());
-        // Looks and samples of the step, in order of time: the ideal motion only goes forward.
+        // Examined instants and samples of the step, in order of time: the ideal motion only goes forward.
         let mut look = 0;
         loop {
-            let look_at = start + (end - start) * f64::from(look) / f64::from(LOOKS_PER_STEP);
+            let look_at =
+                start + (end - start) * f64::from(look) / f64::from(OBSERVATIONS_PER_STEP);
             let sample_at = next_sample as f64 * every;
             let is_sample = sample_at <= end.min(duration) && sample_at <= look_at;
-            if !is_sample && look > LOOKS_PER_STEP {
+            if !is_sample && look > OBSERVATIONS_PER_STEP {
                 break;
             }
             let time = if is_sample {
@@ -277,7 +278,7 @@ mod tests {
         for (coarse, fine) in response.sampled.normal.iter().zip(&response.full.normal) {
             assert!(coarse < fine);
         }
-        // Free fall through the clearance, and no more than all of it.
+        // Free fall through the clearance, and no further.
         assert!(response.full.deviation[0] > 0.25e-3 && response.full.deviation[0] < 0.5e-3);
         assert!(response.full.rate[0] >= response.sampled.rate[0]);
     }

@@ -1,22 +1,22 @@
-//! What an analysis needs from outside: a clock, and leave to go on.
+//! What an analysis needs from outside: a clock, and permission to continue.
 
 use std::ops::ControlFlow;
 
 use crate::scene::SceneError;
 use crate::simulate::{StartError, Stopped};
 
-/// Clock and progress of whoever asked for an analysis: the command line, a background thread, a worker in a browser.
+/// Clock and progress callback from the caller of an analysis: the command line, a background thread, a worker in a browser.
 pub struct RunContext<'a> {
     clock: &'a mut dyn FnMut() -> f64,
     progress: &'a mut dyn FnMut(f64) -> ControlFlow<()>,
-    /// Part of the whole that is being done, as fractions of it.
+    /// Current part of the whole, as fractions.
     from: f64,
     to: f64,
 }
 
 impl<'a> RunContext<'a> {
-    /// `clock` gives seconds from any start; `progress` takes the fraction done, 0 to 1, some thousand times, and may break
-    /// off.
+    /// `clock` returns seconds from any origin; `progress` receives the fraction done, 0 to 1, some thousand times, and
+    /// may cancel.
     pub fn new(
         clock: &'a mut dyn FnMut() -> f64,
         progress: &'a mut dyn FnMut(f64) -> ControlFlow<()>,
@@ -29,7 +29,7 @@ impl<'a> RunContext<'a> {
         }
     }
 
-    /// Seconds by the clock.
+    /// Seconds on the clock.
     pub(super) fn now(&mut self) -> f64 {
         (self.clock)()
     }
@@ -37,7 +37,7 @@ impl<'a> RunContext<'a> {
     /// Reports how much of the current part is done.
     ///
     /// # Errors
-    /// [`AnalysisError::Cancelled`] where it may not go on.
+    /// [`AnalysisError::Cancelled`] if it may not continue.
     pub(super) fn go_on(&mut self, done: f64) -> Result<(), AnalysisError> {
         let fraction = self.from + (self.to - self.from) * done.clamp(0.0, 1.0);
         match (self.progress)(fraction) {
@@ -46,7 +46,7 @@ impl<'a> RunContext<'a> {
         }
     }
 
-    /// The same for one of `parts` equal parts of the current one.
+    /// The context of one of `parts` equal parts of the current one.
     pub fn part(&mut self, index: usize, parts: usize) -> RunContext<'_> {
         let share = (self.to - self.from) / parts.max(1) as f64;
         let from = self.from + share * index as f64;
@@ -62,19 +62,19 @@ impl<'a> RunContext<'a> {
 /// Why an analysis has no result.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum AnalysisError {
-    /// Whoever asked for it broke it off.
+    /// The caller cancelled it.
     #[error("cancelled")]
     Cancelled,
     /// The scene does not start.
     #[error(transparent)]
     Start(#[from] StartError),
-    /// A setting that the scene does not take.
+    /// A setting that the scene does not accept.
     #[error(transparent)]
     Setting(#[from] SceneError),
-    /// The run that all others are measured against was stopped by the divergence guard.
+    /// The divergence guard stopped the reference run.
     #[error("the reference run cannot be made: {0}")]
     Stopped(#[from] Stopped),
-    /// The same, within the cap on work.
+    /// The reference run reached the cap on work.
     #[error(
         "the reference run takes more than {evaluations} evaluations of the equations: the scene is too large to be measured"
     )]

@@ -1,10 +1,10 @@
-//! A motion watched at equal intervals of time, the Poincaré section of a driven system, with a twin run beside it that
-//! measures how fast neighbouring motions part.
+//! A motion sampled at equal intervals of time, the Poincaré section of a driven system, with a twin run beside it that
+//! measures how fast neighbouring motions diverge.
 
 use super::exponent::Benettin;
 use super::orbit::Orbit;
 
-/// When sections are taken, and from where on they count.
+/// When sections are taken, and from which one on they are kept.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Schedule {
     /// Time of the first section, s.
@@ -13,7 +13,7 @@ pub struct Schedule {
     pub interval: f64,
     /// Number of sections, discarded ones included.
     pub sections: usize,
-    /// Sections at the beginning that are a transient and not kept.
+    /// Initial sections that are a transient and not kept.
     pub discard: usize,
 }
 
@@ -23,24 +23,24 @@ impl Schedule {
         self.first + k as f64 * self.interval
     }
 
-    /// Sections kept.
+    /// Number of sections kept.
     pub fn kept(&self) -> usize {
         self.sections - self.discard
     }
 }
 
-/// Sections for which the twin runs before it counts, so that its offset turns into the direction that grows fastest.
+/// Sections for which the twin runs before growth counts, so that its offset aligns with the fastest-growing direction.
 const ALIGNMENT: usize = 5;
 
-/// A motion on its way through its sections.
-pub struct Watch<O: Orbit> {
+/// A motion being run through its sections.
+pub struct SectionRun<O: Orbit> {
     orbit: O,
     schedule: Schedule,
     taken: usize,
-    /// Kept sections, one after the other.
+    /// Kept sections, concatenated.
     kept: Vec<f64>,
     twin: Twin<O>,
-    /// Separation asked for, in units of the scales; `None` measures no exponent.
+    /// Requested separation in units of the scales; `None` measures no exponent.
     separation: Option<f64>,
 }
 
@@ -49,9 +49,9 @@ enum Twin<O> {
     Running(Box<O>, Box<Benettin>),
 }
 
-impl<O: Orbit> Watch<O> {
-    /// Watches `orbit` from now on. `separation` is that of the twin run in units of the scales of the state: well above
-    /// the error of a step, well below what the motion itself moves; `None` runs no twin.
+impl<O: Orbit> SectionRun<O> {
+    /// Watches `orbit` from now on. `separation` is that of the twin in units of the scales of the state: well above the
+    /// error of a step, well below the amplitude of the motion; `None` runs no twin.
     pub fn new(orbit: O, schedule: Schedule, separation: Option<f64>) -> Self {
         let mut watch = Self {
             kept: Vec::with_capacity(schedule.kept() * orbit.observables()),
@@ -65,7 +65,7 @@ impl<O: Orbit> Watch<O> {
         watch
     }
 
-    /// When its sections are.
+    /// Times of its sections.
     pub fn schedule(&self) -> &Schedule {
         &self.schedule
     }
@@ -80,12 +80,12 @@ impl<O: Orbit> Watch<O> {
         &mut self.orbit
     }
 
-    /// Gives the motion back, in the state of its latest section.
+    /// Returns the motion, in the state of its latest section.
     pub fn into_orbit(self) -> O {
         self.orbit
     }
 
-    /// Sections taken so far.
+    /// Number of sections taken so far.
     pub fn taken(&self) -> usize {
         self.taken
     }
@@ -95,12 +95,12 @@ impl<O: Orbit> Watch<O> {
         self.taken >= self.schedule.sections
     }
 
-    /// Kept sections so far, one after the other, each as long as [`Orbit::observables`].
+    /// Kept sections so far, concatenated, each as long as [`Orbit::observables`].
     pub fn sections(&self) -> &[f64] {
         &self.kept
     }
 
-    /// What the twin has told so far; `None` without one, or after it failed.
+    /// Growth of the twin's separation so far; `None` without a twin, or after it failed.
     pub fn exponent(&self) -> Option<&Benettin> {
         match &self.twin {
             Twin::Running(_, benettin) => Some(benettin),
@@ -111,7 +111,7 @@ impl<O: Orbit> Watch<O> {
     /// One step of the motion; `true` where it ended at a section.
     ///
     /// # Errors
-    /// The motion cannot go on.
+    /// The motion cannot continue.
     pub fn step(&mut self) -> Result<bool, O::Stop> {
         if self.is_done() {
             return Ok(false);
@@ -167,7 +167,7 @@ impl<O: Orbit> Watch<O> {
         }
     }
 
-    /// Brings the twin to the time of the motion where it is due. The motion itself never waits for its twin.
+    /// Advances the twin to the time of the motion if it is due. The motion itself never waits for its twin.
     fn follow(&mut self, at_section: bool) {
         let Twin::Running(twin, benettin) = &mut self.twin else {
             return;
@@ -176,7 +176,7 @@ impl<O: Orbit> Watch<O> {
             match benettin.compare(&self.orbit, twin) {
                 Ok(()) if at_section => benettin.end_section(),
                 Ok(()) => {}
-                // A twin that fails leaves the motion without an exponent, not without its sections.
+                // A failing twin costs the motion its exponent, not its sections.
                 Err(_) => {
                     self.twin = Twin::None;
                     self.separation = None;

@@ -1,4 +1,4 @@
-//! A method with its step or tolerance.
+//! A method with its step size or tolerance.
 
 use serde::Serialize;
 
@@ -7,25 +7,25 @@ use crate::integrate::Method;
 use crate::scene::{Preset, Scene, Value};
 use crate::simulate::{Simulation, Snapshot};
 
-/// A method with its step or tolerance.
+/// A method with its step size or tolerance.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Setting {
     /// Method.
     pub method: Method,
-    /// Whether `tolerance` decides, and not `step_s`.
+    /// Whether `tolerance` applies rather than `step_s`.
     pub adaptive: bool,
-    /// Fixed step, or first step of an adaptive method, s.
+    /// Fixed step size, or initial step size of an adaptive method, s.
     pub step_s: f64,
     /// Relative tolerance of an adaptive method.
     pub tolerance: f64,
 }
 
-/// First step of an adaptive method and tolerance of a fixed-step one, which it does not use.
+/// Initial step size of an adaptive method, and tolerance of a fixed-step one, which ignores it.
 const FIRST_STEP: f64 = 10e-6;
 const UNUSED_TOLERANCE: f64 = 1e-6;
 
 impl Setting {
-    /// `method` at `value`: a step in s where its step is fixed, else a tolerance.
+    /// `method` at `value`: a step size in s if its step is fixed, otherwise a tolerance.
     pub fn new(method: Method, value: f64) -> Self {
         let adaptive = method.is_adaptive();
         Self {
@@ -36,7 +36,7 @@ impl Setting {
         }
     }
 
-    /// The one that a preset stands for.
+    /// The setting of a preset.
     pub fn of_preset(preset: Preset) -> Self {
         let (method, step_s, tolerance) = preset.point();
         Self {
@@ -47,7 +47,7 @@ impl Setting {
         }
     }
 
-    /// Runge-Kutta 4 at 10 microseconds, by which speeds are divided.
+    /// Runge-Kutta 4 at 10 microseconds, relative to which speeds are given.
     pub fn yardstick() -> Self {
         Self::new(Method::RungeKutta4, 10e-6)
     }
@@ -62,7 +62,7 @@ impl Setting {
         Self::new(Method::Automatic, tolerance)
     }
 
-    /// The step of a fixed-step method, s, the tolerance of an adaptive one.
+    /// The step size of a fixed-step method, s, or the tolerance of an adaptive one.
     pub fn value(&self) -> f64 {
         if self.adaptive {
             self.tolerance
@@ -71,7 +71,7 @@ impl Setting {
         }
     }
 
-    /// `scene` with this setting, at its start.
+    /// Starts `scene` with this setting.
     pub(super) fn start(&self, scene: &Scene) -> Result<Simulation, AnalysisError> {
         let mut scene = scene.clone();
         for (key, value) in self.changes() {
@@ -80,7 +80,7 @@ impl Setting {
         Ok(Simulation::new(&scene)?)
     }
 
-    /// Goes on from `snapshot`, whichever setting that has, with this one.
+    /// Continues from `snapshot` with this setting, whichever setting that has.
     pub(super) fn resume(
         &self,
         scene: &Scene,

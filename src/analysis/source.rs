@@ -1,11 +1,11 @@
-//! A scene on its way to a thread or worker, and why what was asked of it has no result.
+//! A scene in transferable form for a thread or worker, and why a task has no result.
 
 use serde::{Deserialize, Serialize};
 
 use super::AnalysisError;
 use crate::scene::{Scene, SceneError};
 
-/// A scene as it travels: text and changes, from which it is read again.
+/// A scene in transferable form: text and changes, from which it is parsed again.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SceneSource {
     /// The TOML text.
@@ -17,7 +17,7 @@ pub struct SceneSource {
 }
 
 impl SceneSource {
-    /// What `scene` was read from.
+    /// The source of `scene`.
     pub fn of(scene: &Scene) -> Self {
         Self {
             text: scene.source.text.clone(),
@@ -26,7 +26,7 @@ impl SceneSource {
         }
     }
 
-    /// The scene.
+    /// Parses the scene.
     ///
     /// # Errors
     /// As [`Scene::parse`].
@@ -36,12 +36,12 @@ impl SceneSource {
 }
 
 /// Why there is no result.
-pub(super) enum Failure {
+pub(super) enum TaskFault {
     Cancelled,
     Said(String),
 }
 
-impl From<AnalysisError> for Failure {
+impl From<AnalysisError> for TaskFault {
     fn from(error: AnalysisError) -> Self {
         match error {
             AnalysisError::Cancelled => Self::Cancelled,
@@ -50,7 +50,7 @@ impl From<AnalysisError> for Failure {
     }
 }
 
-impl From<SceneError> for Failure {
+impl From<SceneError> for TaskFault {
     fn from(error: SceneError) -> Self {
         Self::Said(error.to_string())
     }

@@ -5,9 +5,9 @@ use serde::Serialize;
 use super::{AnalysisError, RunContext};
 use crate::simulate::Simulation;
 
-/// Steps between two looks at the clock, the cap, and whether to go on.
+/// Steps between two checks of the clock, the cap and cancellation.
 const STEPS_IN_A_PIECE: u32 = 32;
-/// Runs of one setting: at least and at most; and after how many times the time to be measured two are enough.
+/// Fewest and most runs of one setting; and the multiple of the time to be measured after which two runs are enough.
 const FEWEST_RUNS: usize = 3;
 const MOST_RUNS: usize = 40;
 const LONG: f64 = 4.0;
@@ -15,13 +15,13 @@ const LONG: f64 = 4.0;
 /// How much work an analysis may take.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Effort {
-    /// Evaluations of the equations after which a run has done enough.
+    /// Evaluations of the equations after which a run is capped.
     pub evaluations: u64,
-    /// Seconds by the clock after which it has, too: the algebra of implicit methods is no evaluation.
+    /// Clock seconds after which it is capped, too: the linear algebra of implicit methods is no evaluation.
     pub seconds: f64,
-    /// Seconds that are measured of each run, by repeating it.
+    /// Seconds to measure for each run, by repeating it.
     pub measured: f64,
-    /// Steps of the fixed-step methods, s.
+    /// Step sizes of the fixed-step methods, s.
     pub steps: &'static [f64],
     /// Tolerances of the adaptive methods.
     pub tolerances: &'static [f64],
@@ -46,7 +46,7 @@ impl Effort {
         ],
         tolerances: &[1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11],
     };
-    /// What the reference may take, whose result everything needs.
+    /// Cap for the reference, on which everything else depends.
     pub(super) const REFERENCE: Self = Self {
         evaluations: 40_000_000,
         seconds: f64::INFINITY,
@@ -58,15 +58,15 @@ impl Effort {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum End {
-    /// Where it was to.
+    /// It reached its end.
     Reached,
-    /// At the cap on work.
+    /// It reached the cap on work.
     Capped,
-    /// By the divergence guard, which says why.
+    /// The divergence guard stopped it, for this reason.
     Stopped(String),
 }
 
-/// Steps `simulation` to exactly `end`; `seen` looks at it after every step and says whether that is enough.
+/// Steps `simulation` to exactly `end`; `seen` is called after every step and returns whether that is enough.
 pub(super) fn stretch(
     simulation: &mut Simulation,
     end: f64,
@@ -74,11 +74,11 @@ pub(super) fn stretch(
     context: &mut RunContext,
     mut seen: impl FnMut(&mut Simulation) -> bool,
 ) -> Result<End, AnalysisError> {
-    timed_stretch(simulation, end, effort, context, &mut Vec::new(), &mut seen)
+    run_until_timed(simulation, end, effort, context, &mut Vec::new(), &mut seen)
 }
 
-/// The same; `pieces` keeps the shortest time that each piece has taken so far, s.
-fn timed_stretch(
+/// The same; `pieces` keeps the shortest time so far of each piece, s.
+fn run_until_timed(
     simulation: &mut Simulation,
     end: f64,
     effort: &Effort,
@@ -109,7 +109,7 @@ fn timed_stretch(
     unreachable!("pieces are counted for ever")
 }
 
-/// Whether `end` is reached, or `seen` has seen enough, after a piece.
+/// Steps one piece; whether `end` is reached or `seen` has returned true.
 fn some_steps(
     simulation: &mut Simulation,
     end: f64,
@@ -127,8 +127,8 @@ fn some_steps(
     Ok(simulation.time() >= end)
 }
 
-/// Seconds that stepping to `end` takes: that of the shortest run of every piece of it, so that what else the machine does
-/// counts as little as can be. Every run begins with what `start` makes; making it does not count.
+/// Seconds to step to `end`: the sum of the shortest times of all pieces, so that other load on the machine counts as
+/// little as possible. Every run starts from what `start` returns; the time for that does not count.
 pub(super) fn time_to(
     end: f64,
     effort: &Effort,
@@ -140,7 +140,7 @@ pub(super) fn time_to(
     for run in 0..MOST_RUNS {
         let mut simulation = start(context)?;
         let before = context.now();
-        timed_stretch(
+        run_until_timed(
             &mut simulation,
             end,
             effort,
@@ -197,7 +197,7 @@ mod tests {
     #[test]
     fn a_run_takes_the_time_of_its_shortest_pieces() {
         let scene = Scene::load("pendulum", &[]).expect("built in");
-        // A clock that goes on by 1 s at every look, but by 100 s where a look falls on a busy moment.
+        // A clock that advances by 1 s per reading, but by 100 s if the reading falls on a busy moment.
         let (mut time, mut look) = (0.0, 0);
         let mut clock = || {
             look += 1;

@@ -1,20 +1,20 @@
-//! A whole sweep: its scene, its points, and what computes one block of them. Who runs which block, and when, is up to the
-//! caller: a block's record depends on nothing but the sweep and the block's number.
+//! A whole sweep: its scene, its points, and the computation of one block of them. The caller decides who runs which
+//! block and when: a block's records depend only on the sweep and the block's number.
 
 use super::drive::{Machine, NoPeriod, drive_period};
-use super::grid::{Axis, Grid, Start};
+use super::grid::{Grid, ParameterRange, Start};
 use super::layout::Layout;
 use super::point::{Plan, PointResult, PointRun};
 use crate::scene::{Scene, SceneError, Value};
 use crate::simulate::{LONGEST_RUN, Simulation};
 
-/// Most kept sections of all points together: an array of them takes 512 MiB.
+/// Largest total number of kept sections: an array of them takes 512 MiB.
 const MOST_SECTIONS: usize = 1 << 26;
 
-/// Most values along each range of a map at which the inside of it is tried before anything runs.
+/// Largest number of values per range of a map at which its interior is tried before anything runs.
 const MOST_WITHIN: usize = 64;
 
-/// Why a sweep cannot be.
+/// Why a sweep is invalid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SweepError {
     /// No period to keep.
@@ -57,7 +57,7 @@ pub enum SweepError {
     /// No drive phase.
     #[error("{0}; a sweep needs a driven scene such as spcmm or slider-crank-driven")]
     NoPeriod(#[from] NoPeriod),
-    /// A point that the scene does not take, or that cannot start.
+    /// A point that the scene does not accept, or that cannot start.
     #[error("the range leaves what the scene can do at {point}: {error}")]
     Infeasible {
         /// Parameters of the point.
@@ -77,8 +77,8 @@ pub struct Sweep {
 }
 
 impl Sweep {
-    /// A sweep of `scene`. Every value of each range is tried with the other range at its ends, and values within a map, all of
-    /// them where they are not too many.
+    /// A sweep of `scene`. Every value of each range is tried with the other range at its ends, and values inside a map,
+    /// all of them if there are few enough.
     ///
     /// # Errors
     /// Nothing to keep, no drive phase, a value at which the scene cannot start.
@@ -134,13 +134,13 @@ impl Sweep {
         Ok(sweep)
     }
 
-    /// Points that are tried before anything runs: every value of each range with the other at its ends, and a lattice
-    /// within, which is every point of a small map.
+    /// Points tried before anything runs: every value of each range with the other at its ends, and a lattice inside,
+    /// which is every point of a small map.
     fn tried(&self) -> Vec<usize> {
         let tried = |point: &usize| {
             let indices = self.grid.indices(*point);
             let along = || self.grid.axes().iter().zip(&indices);
-            let is_end = |(axis, i): (&Axis, &usize)| *i == 0 || *i + 1 == axis.count();
+            let is_end = |(axis, i): (&ParameterRange, &usize)| *i == 0 || *i + 1 == axis.count();
             let ends = along().filter(|&of| is_end(of)).count();
             ends + 1 >= indices.len()
                 || along().all(|(axis, i)| i % axis.count().div_ceil(MOST_WITHIN) == 0)
@@ -161,7 +161,7 @@ impl Sweep {
         settings.map(written).collect::<Vec<_>>().join(", ")
     }
 
-    /// The scene, without what varies.
+    /// The scene, without the varied parameters.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
@@ -171,7 +171,7 @@ impl Sweep {
         &self.grid
     }
 
-    /// What each point runs through.
+    /// What each point runs.
     pub fn plan(&self) -> &Plan {
         &self.plan
     }
@@ -181,7 +181,7 @@ impl Sweep {
         &self.layout
     }
 
-    /// Block `b`, not yet begun.
+    /// Block `b`, not yet started.
     pub fn begin(&self, b: usize) -> BlockRun<'_> {
         BlockRun {
             sweep: self,
@@ -194,25 +194,24 @@ impl Sweep {
     }
 }
 
-/// A block of points on its way.
+/// A block of points being computed.
 pub struct BlockRun<'a> {
     sweep: &'a Sweep,
     order: Vec<usize>,
     at: usize,
     run: Option<PointRun>,
-    /// Where the point before ended, if the next one follows it.
+    /// Machine at the end of the previous point, if the next one follows it.
     machine: Option<Machine>,
     done: Vec<(usize, Option<PointResult>)>,
 }
 
 impl BlockRun<'_> {
-    /// Points finished so far, in the order in which they were computed: index and result, `None` for one that could not
-    /// start.
+    /// Points finished so far, in the order of computation: index and result, `None` for one that could not start.
     pub fn finished(&self) -> &[(usize, Option<PointResult>)] {
         &self.done
     }
 
-    /// The point on its way.
+    /// The point being computed.
     pub fn current(&self) -> Option<&PointRun> {
         self.run.as_ref()
     }
@@ -222,7 +221,7 @@ impl BlockRun<'_> {
         self.at >= self.order.len()
     }
 
-    /// Goes on by at most `steps` steps of the simulation, at most to the end of a point.
+    /// Advances by at most `steps` simulation steps, not past the end of a point.
     pub fn advance(&mut self, steps: u32) {
         if self.is_done() {
             return;
@@ -245,7 +244,7 @@ impl BlockRun<'_> {
         self.run = Some(run);
     }
 
-    /// Starts the point that is next, from the one before it if it follows that.
+    /// Starts the next point, from the previous one if it follows that.
     fn start(&mut self) -> Option<PointRun> {
         let sweep = self.sweep;
         let point = self.order[self.at];
@@ -258,14 +257,14 @@ impl BlockRun<'_> {
         followed.or_else(|| PointRun::cold(&scene, sweep.plan, period).ok())
     }
 
-    /// The point is through; the next one follows `machine`, or starts cold without one.
+    /// Finishes the current point; the next one follows `machine`, or starts cold without one.
     fn close(&mut self, result: Option<PointResult>, machine: Option<Machine>) {
         self.done.push((self.order[self.at], result));
         self.at += 1;
         self.machine = machine.filter(|_| self.sweep.grid.start() != Start::Cold);
     }
 
-    /// The records of the finished block, in order of its points.
+    /// Records of the finished block, in point order.
     pub fn records(mut self) -> Vec<f64> {
         self.done.sort_by_key(|(point, _)| *point);
         let mut records = Vec::new();
@@ -288,7 +287,7 @@ mod tests {
                 format!("contact.clearance=0.2mm..0.5mm:{rows}"),
                 format!("contact.friction=0.1..0.2:{columns}"),
             ];
-            let axes = ranges.map(|text| Axis::parse(&scene, &text).expect("a range"));
+            let axes = ranges.map(|text| ParameterRange::parse(&scene, &text).expect("a range"));
             let grid = Grid::new(&scene, axes.to_vec(), Start::Cold).expect("a map");
             let plan = Plan {
                 periods: 2,
@@ -306,7 +305,7 @@ mod tests {
             sweep.tried()
         };
         assert_eq!(tried(3, 5), (0..15).collect::<Vec<_>>());
-        // The border, and every second value of the first and every third of the second range.
+        // The border, and every second value of the first range and every third of the second.
         let large = tried(128, 130);
         for (i, j, is) in [
             (0, 1, true),

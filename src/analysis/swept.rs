@@ -1,42 +1,42 @@
-//! A sweep as a computation that travels as plain data, and tells every point as soon as it is through.
+//! A sweep as a job in plain data, which reports every point as soon as it is finished.
 
 use std::ops::ControlFlow;
 
 use serde::{Deserialize, Serialize};
 
 use super::drive::drive_period;
-use super::grid::{Axis, Grid, Start};
+use super::grid::{Grid, ParameterRange, Start};
 use super::point::{Plan, PointResult};
-use super::source::{Failure, SceneSource};
+use super::source::{SceneSource, TaskFault};
 use super::sweep::{BlockRun, Sweep};
 
-/// Steps of a simulation between two looks at whether to go on.
+/// Simulation steps between two checks for cancellation.
 const STEPS: u32 = 400;
 /// Coordinates of the output body: x, y, z in m, alpha, beta, gamma in rad.
 pub const COORDINATES: usize = 6;
-/// Most kept sections of all points together: what a window holds and draws.
+/// Largest total number of kept sections: what a window holds and draws.
 const MOST_SECTIONS: usize = 50_000;
 
-/// What a sweep is asked for.
+/// A sweep to be computed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SweepTask {
-    /// The scene, without what varies.
+    /// The scene, without the varied parameters.
     pub scene: SceneSource,
     /// Ranges as on the command line: `contact.clearance=0.01mm..1mm:200`.
     pub vary: Vec<String>,
-    /// Periods of the drive at each point, those discarded included.
+    /// Drive periods per point, including those discarded.
     pub periods: usize,
-    /// Of these a transient.
+    /// Of these, the transient.
     pub discard: usize,
     /// Drive phase of the sections as a fraction of the period, 0 <= phase < 1.
     pub phase: f64,
-    /// Where points start from.
+    /// State from which points start.
     pub start: Start,
     /// Whether the largest Lyapunov exponent is measured.
     pub exponent: bool,
 }
 
-/// One varied parameter of a sweep that runs.
+/// One varied parameter of a running sweep.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Range {
     /// Key.
@@ -49,26 +49,26 @@ pub struct Range {
     pub count: usize,
 }
 
-/// One point of a sweep. What is not known of it is `None`, so that it travels as JSON.
+/// One point of a sweep. Unknown values are `None`, so that they survive in JSON.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SweptPoint {
-    /// Number in the sweep, the last range running fastest.
+    /// Number in the sweep; the last range varies fastest.
     pub index: usize,
     /// Value of each varied parameter, SI.
     pub values: Vec<f64>,
-    /// Keys and values as a user writes them; they read back to the same bits.
+    /// Keys and values as a user writes them; they parse back to the same bits.
     pub settings: Vec<(String, String)>,
-    /// The point that it followed; `None` for a cold start.
+    /// The point it followed; `None` for a cold start.
     pub after: Option<usize>,
-    /// Time of its first section, discarded ones included, s.
+    /// Time of its first section, including discarded ones, s.
     pub first: f64,
     /// Time from one section to the next, s.
     pub interval: f64,
-    /// When the divergence guard stopped it, s from its start; it has no sections then.
+    /// Time at which the divergence guard stopped it, s from its start; it then has no sections.
     pub diverged: Option<f64>,
-    /// What kind of motion it is, in a word, with its period where it has one; "" where it did not end.
+    /// Kind of motion in a word, with its period if it has one; "" if the point did not reach its end.
     pub regime: String,
-    /// Number of the regime in files; -1 where it did not end.
+    /// Regime code in files; -1 if the point did not reach its end.
     pub regime_code: i64,
     /// Largest Lyapunov exponent and its standard error, 1/s.
     pub exponent: Option<(f64, Option<f64>)>,
@@ -80,27 +80,30 @@ pub struct SweptPoint {
     pub probe: Option<(f64, f64)>,
 }
 
-/// What a sweep says on its way.
+/// Messages of a running sweep.
 pub(super) enum SweepMessage {
     /// Fraction done, 0 to 1.
     Progress(f64),
-    /// The ranges that can be; points follow.
+    /// The accepted ranges; points follow.
     Ranges(Vec<Range>),
     /// A point.
     Point(Box<SweptPoint>),
 }
 
-/// Computes a sweep point by point, the coarse outline first where points do not follow each other.
+/// Computes a sweep point by point, from coarse to fine if points do not follow each other.
 pub(super) fn run(
     task: &SweepTask,
     tell: &mut dyn FnMut(SweepMessage) -> ControlFlow<()>,
-) -> Result<(), Failure> {
+) -> Result<(), TaskFault> {
     let mut say = |message| match tell(message) {
         ControlFlow::Continue(()) => Ok(()),
-        ControlFlow::Break(()) => Err(Failure::Cancelled),
+        ControlFlow::Break(()) => Err(TaskFault::Cancelled),
     };
     let scene = task.scene.scene()?;
-    let axes = task.vary.iter().map(|text| Axis::parse(&scene, text));
+    let axes = task
+        .vary
+        .iter()
+        .map(|text| ParameterRange::parse(&scene, text));
     let axes = axes.collect::<Result<Vec<_>, _>>().map_err(said)?;
     let ranges = axes.iter().map(|axis| Range {
         key: axis.key().to_owned(),
@@ -110,7 +113,7 @@ pub(super) fn run(
     });
     let ranges: Vec<Range> = ranges.collect();
     if !(0.0..1.0).contains(&task.phase) {
-        return Err(Failure::Said(format!(
+        return Err(TaskFault::Said(format!(
             "drive phase {}: allowed 0 to below 1 period",
             task.phase
         )));
@@ -124,7 +127,7 @@ pub(super) fn run(
     let grid = Grid::new(&scene, axes, task.start).map_err(said)?;
     let kept = task.periods.saturating_sub(task.discard);
     if kept.saturating_mul(grid.points()) > MOST_SECTIONS {
-        return Err(Failure::Said(format!(
+        return Err(TaskFault::Said(format!(
             "{} points with {kept} kept sections each are more than the window draws ({MOST_SECTIONS} sections): take fewer \
              values or periods, or run `jointplay sweep`",
             grid.points()
@@ -154,11 +157,11 @@ pub(super) fn run(
     Ok(())
 }
 
-fn said(error: impl ToString) -> Failure {
-    Failure::Said(error.to_string())
+fn said(error: impl ToString) -> TaskFault {
+    TaskFault::Said(error.to_string())
 }
 
-/// 0 to n - 1, each number once: the ends, then what halves the gaps, and so on.
+/// 0 to n - 1, each number once: the ends, then the midpoints of the gaps, and so on.
 fn coarse_first(n: usize) -> Vec<usize> {
     let mut order = Vec::with_capacity(n);
     let Some(last) = n.checked_sub(1) else {
@@ -177,14 +180,14 @@ fn coarse_first(n: usize) -> Vec<usize> {
     order
 }
 
-/// A block on its way, with what it takes to tell how its points can be reached again.
+/// A block being computed, with what is needed to tell how its points can be reached again.
 struct Block<'a> {
     sweep: &'a Sweep,
     run: BlockRun<'a>,
     told: usize,
-    /// First section of the point on its way, s, and whether it starts cold.
+    /// Time of the first section of the current point, s, and whether it starts cold.
     first: Option<(f64, bool)>,
-    /// The point before: its number and the time of its last section, s.
+    /// The previous point: its number and the time of its last section, s.
     before: Option<(usize, f64)>,
 }
 
@@ -201,7 +204,7 @@ impl<'a> Block<'a> {
 
     fn advance(&mut self) {
         if self.run.current().is_none() {
-            // One step begins the point, whose start tells the times of its sections.
+            // The first step starts the point, which fixes the times of its sections.
             self.run.advance(1);
             self.first = self.run.current().map(|run| (run.first(), run.is_cold()));
         } else {
@@ -209,7 +212,7 @@ impl<'a> Block<'a> {
         }
     }
 
-    /// The point that was just finished, if one was.
+    /// The point just finished, if any.
     fn latest(&mut self) -> Option<SweptPoint> {
         let (index, result) = self.run.finished().get(self.told)?;
         self.told += 1;

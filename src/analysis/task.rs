@@ -1,4 +1,4 @@
-//! Long computations as plain data, so that a thread on the desktop and a worker in the browser do the same.
+//! Long computations as plain data, so that a thread on the desktop and a worker in the browser run the same code.
 
 use std::ops::ControlFlow;
 
@@ -6,11 +6,11 @@ use serde::{Deserialize, Serialize};
 
 use super::RunContext;
 use super::presets::{self, Measured};
-use super::source::{Failure, SceneSource};
+use super::source::{SceneSource, TaskFault};
 use super::swept::{self, Range, SweepMessage, SweepTask, SweptPoint};
 use crate::scene::Preset;
 
-/// What is to be computed.
+/// What to compute.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Job {
     /// Cost and error of presets on a scene as it is.
@@ -24,18 +24,18 @@ pub enum Job {
     Sweep(SweepTask),
 }
 
-/// What a computation says on its way.
+/// Messages of a running computation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Message {
     /// Fraction done, 0 to 1.
     Progress(f64),
-    /// The presets asked for, by their words.
+    /// The requested presets, by their words.
     Presets(Vec<(String, Measured)>),
-    /// The ranges of a sweep that can be; its points follow.
+    /// The accepted ranges of a sweep; its points follow.
     Ranges(Vec<Range>),
     /// A point of a sweep.
     Point(Box<SweptPoint>),
-    /// All was said.
+    /// End of the results.
     Done,
     /// Why there is no result.
     Failed(String),
@@ -51,8 +51,8 @@ impl From<SweepMessage> for Message {
     }
 }
 
-/// Computes `job`. `clock` gives seconds from any start; `tell` takes each message and may break off.
-/// The last message is [`Message::Done`] or [`Message::Failed`], unless it was broken off.
+/// Runs `job`. `clock` returns seconds from any origin; `tell` receives each message and may cancel. The last message is
+/// [`Message::Done`] or [`Message::Failed`], unless cancelled.
 pub fn perform(
     job: &Job,
     clock: &mut dyn FnMut() -> f64,
@@ -64,10 +64,10 @@ pub fn perform(
     };
     let last = match outcome {
         Ok(()) => Message::Done,
-        Err(Failure::Cancelled) => return,
-        Err(Failure::Said(words)) => Message::Failed(words),
+        Err(TaskFault::Cancelled) => return,
+        Err(TaskFault::Said(words)) => Message::Failed(words),
     };
-    // Nothing follows that could be broken off.
+    // Nothing follows that could be cancelled.
     let _ = tell(last);
 }
 
@@ -76,13 +76,13 @@ fn measure_presets(
     words: &[String],
     clock: &mut dyn FnMut() -> f64,
     tell: &mut dyn FnMut(Message) -> ControlFlow<()>,
-) -> Result<(), Failure> {
+) -> Result<(), TaskFault> {
     let scene = scene.scene()?;
     let presets: Vec<Preset> = words
         .iter()
         .map(|word| {
             let found = Preset::ALL.into_iter().find(|preset| preset.word() == word);
-            found.ok_or_else(|| Failure::Said(format!("no preset is called {word}")))
+            found.ok_or_else(|| TaskFault::Said(format!("no preset is called {word}")))
         })
         .collect::<Result<_, _>>()?;
     let mut progress = |done| tell(Message::Progress(done));
@@ -91,7 +91,7 @@ fn measure_presets(
     let message = Message::Presets(words.iter().cloned().zip(measured).collect());
     match tell(message) {
         ControlFlow::Continue(()) => Ok(()),
-        ControlFlow::Break(()) => Err(Failure::Cancelled),
+        ControlFlow::Break(()) => Err(TaskFault::Cancelled),
     }
 }
 

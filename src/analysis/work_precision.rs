@@ -1,23 +1,23 @@
-//! What every method costs and how wrong it is, on one scene.
+//! Cost and error of every method on one scene.
 
 use serde::Serialize;
 
-use super::reference_solution::Work;
+use super::reference_solution::PhaseCost;
 use super::stretch::time_to;
 use super::{AnalysisError, Effort, End, Errors, ReferenceSolution, RunContext, Setting, front};
 use crate::integrate::Method;
 use crate::scene::{Preset, Scene};
 
-/// What a run did over the first impacts, or in settled motion.
+/// A run over the first impacts, or in settled motion.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Phase {
-    /// How it ended. Where it did not reach its end there is no time and no error.
+    /// How it ended. If it did not reach its end, there is no time and no error.
     pub end: End,
     /// Simulated time, s.
     pub simulated_s: f64,
-    /// Seconds by the clock that stepping over it takes.
+    /// Clock seconds to step over it.
     pub wall_s: Option<f64>,
-    /// Speed over that of Runge-Kutta 4 at 10 microseconds on the same span, measured in the same run.
+    /// Speed relative to Runge-Kutta 4 at 10 microseconds on the same span, measured in the same run.
     pub ratio: Option<f64>,
     /// Accepted steps.
     pub steps: u64,
@@ -25,19 +25,19 @@ pub struct Phase {
     pub evaluations: u64,
     /// Rejected steps.
     pub rejected: u64,
-    /// No other point is both faster and more accurate in this phase.
+    /// Whether it is on the front: no other point is both faster and more accurate in this phase.
     pub front: bool,
 }
 
 impl Phase {
-    /// Simulated seconds in a second by the clock.
+    /// Simulated seconds per clock second.
     pub fn speed(&self) -> Option<f64> {
         self.wall_s
             .filter(|wall| *wall > 0.0)
             .map(|wall| self.simulated_s / wall)
     }
 
-    /// Seconds by the clock for a simulated one.
+    /// Clock seconds per simulated second.
     pub fn cost(&self) -> Option<f64> {
         self.wall_s.map(|wall| wall / self.simulated_s)
     }
@@ -48,13 +48,13 @@ impl Phase {
 pub struct Point {
     /// Method, step, tolerance.
     pub setting: Setting,
-    /// The preset that stands for it.
+    /// The preset with this setting.
     pub preset: Option<Preset>,
     /// The first impacts.
     pub impacts: Phase,
-    /// Settled motion, in a scene that comes to it.
+    /// Settled motion, if the scene reaches it.
     pub settled: Option<Phase>,
-    /// How wrong it is.
+    /// Errors against the reference.
     pub errors: Errors,
 }
 
@@ -76,24 +76,24 @@ impl Point {
 /// All points of a scene.
 #[derive(Clone, Debug)]
 pub struct WorkPrecision {
-    /// What they are measured against.
+    /// The reference.
     pub reference: ReferenceSolution,
     /// In the order of the methods, each from coarse to fine.
     pub points: Vec<Point>,
 }
 
 impl WorkPrecision {
-    /// The point that a preset stands for.
+    /// The point of a preset.
     pub fn preset(&self, preset: Preset) -> Option<&Point> {
         self.points.iter().find(|p| p.preset == Some(preset))
     }
 
-    /// The fastest point over the first impacts whose peak forces err by at most `error`.
+    /// The fastest point over the first impacts with a peak-force error of at most `error`.
     pub fn fastest_within(&self, error: f64) -> Option<&Point> {
         self.fastest(Point::in_impacts, error)
     }
 
-    /// The fastest point in settled motion whose mean forces err by at most `error`.
+    /// The fastest point in settled motion with a mean-force error of at most `error`.
     pub fn fastest_settled_within(&self, error: f64) -> Option<&Point> {
         self.fastest(Point::in_settled, error)
     }
@@ -109,10 +109,10 @@ impl WorkPrecision {
     }
 }
 
-/// Runs every method over its steps or tolerances, and the presets.
+/// Runs every method over its step sizes or tolerances, and the presets.
 ///
 /// # Errors
-/// A scene that has no reference ([`ReferenceSolution::new`]); [`RunContext`]'s no.
+/// A scene without a reference ([`ReferenceSolution::new`]); cancellation by [`RunContext`].
 pub fn work_precision(
     scene: &Scene,
     effort: &Effort,
@@ -129,7 +129,7 @@ pub fn work_precision(
         point.preset = preset;
         points.push(point);
     }
-    // What else the machine did while the points ran slows the yardstick as little as them.
+    // Timed again after the points, so that other load on the machine slows the yardstick as little as them.
     yardstick.again(&reference, effort, &mut context.part(parts - 1, parts))?;
     for point in &mut points {
         yardstick.divide(point);
@@ -138,7 +138,7 @@ pub fn work_precision(
     Ok(WorkPrecision { reference, points })
 }
 
-/// Every method at its values, the presets among them.
+/// Every method at its values, including those of the presets.
 fn grid(effort: &Effort) -> Result<Vec<(Setting, Option<Preset>)>, AnalysisError> {
     let mut presets = Vec::new();
     for preset in Preset::ALL {
@@ -169,7 +169,7 @@ fn grid(effort: &Effort) -> Result<Vec<(Setting, Option<Preset>)>, AnalysisError
     Ok(settings)
 }
 
-/// Runs one setting against `standard`: errors, work and time, without ratios and fronts.
+/// Runs one setting against `reference`: errors, work and time, without ratios and fronts.
 pub(super) fn measure(
     reference: &ReferenceSolution,
     setting: Setting,
@@ -184,7 +184,7 @@ pub(super) fn measure(
             return Ok(Point {
                 setting,
                 preset: None,
-                impacts: phase(end, reference.span, None, &Work::default()),
+                impacts: phase(end, reference.span, None, &PhaseCost::default()),
                 settled: None,
                 errors: Errors::default(),
             });
@@ -220,7 +220,7 @@ pub(super) fn measure(
     })
 }
 
-fn phase(end: End, simulated_s: f64, wall_s: Option<f64>, work: &Work) -> Phase {
+fn phase(end: End, simulated_s: f64, wall_s: Option<f64>, work: &PhaseCost) -> Phase {
     Phase {
         end,
         simulated_s,
@@ -233,7 +233,7 @@ fn phase(end: End, simulated_s: f64, wall_s: Option<f64>, work: &Work) -> Phase 
     }
 }
 
-/// Times of Runge-Kutta 4 at 10 microseconds over both phases, s: the shortest so far.
+/// Shortest times so far of Runge-Kutta 4 at 10 microseconds over both phases, s.
 pub(super) struct Yardstick {
     setting: Setting,
     impacts: Option<f64>,

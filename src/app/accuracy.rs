@@ -1,4 +1,4 @@
-//! How far the numbers on show can be trusted: what the preset was measured to do, and how the running scene does.
+//! How far the displayed numbers can be trusted: the measured accuracy of the preset, and how the running scene does.
 
 use eframe::egui::{Button, Label, ProgressBar, RichText, Ui, vec2};
 
@@ -14,30 +14,30 @@ use crate::simulate::Impact;
 
 /// Width of the names, points.
 const LABELS: f32 = 122.0;
-/// Height of a row, points, and of the place where doubts stand, lines.
+/// Height of a row, points, and of the space for doubts, lines.
 const ROW: f32 = 20.0;
 const DOUBTS: usize = 3;
-/// Width of the button that starts and ends a measurement, points: it stays where it is.
+/// Width of the button that starts and ends a measurement, points; fixed, so that it does not move.
 const MEASURE: f32 = 130.0;
-/// What stands where there was no impact yet.
+/// Shown where there has been no impact yet.
 const NONE: &str = "—";
 /// Fewer steps than this do not resolve an impact.
 const STEPS_OF_AN_IMPACT: u64 = 10;
-/// Error beyond which a measured preset is to be doubted.
+/// Error beyond which a measured preset is doubtful.
 const DOUBTFUL_ERROR: f64 = 0.05;
-/// Share of the exchanged energy beyond which the balance is out.
+/// Energy residual, relative to the exchanged energy, beyond which the balance is doubtful.
 const BALANCED: f64 = 1e-3;
 
-/// A row: what it is, its value, whether that is reason for doubt, and what to know about it. There are the same rows at all
-/// times, so that nothing moves while the scene plays.
-struct Row {
+/// A row: label, value, whether the value is doubtful, and its tooltip. The rows are always the same, so that nothing moves
+/// while the scene plays.
+struct AccuracyLine {
     label: &'static str,
     value: String,
     doubtful: bool,
     help: String,
 }
 
-impl Row {
+impl AccuracyLine {
     fn ui(&self, ui: &mut Ui) {
         // No control: it needs no height for fingers.
         ui.spacing_mut().interact_size.y = ROW;
@@ -56,14 +56,14 @@ impl Row {
     }
 }
 
-/// What the preset was measured to do on a scene.
+/// Measured accuracy of a preset on a scene.
 struct Found {
     scene: SceneSource,
     preset: Preset,
     measured: Measured,
 }
 
-/// The panel: a measurement under way, and the latest one.
+/// The panel: a measurement in progress, and the latest one.
 #[derive(Default)]
 pub struct Accuracy {
     asked: Option<(Job, SceneSource, Preset)>,
@@ -74,7 +74,7 @@ pub struct Accuracy {
 }
 
 impl Accuracy {
-    /// Starts what was asked for, and takes in what a measurement said; whether one is under way.
+    /// Starts a requested measurement and takes messages from a running one; returns whether one is running.
     pub fn update(&mut self, host: &mut dyn Host) -> bool {
         if let Some((job, scene, preset)) = self.asked.take() {
             self.progress = 0.0;
@@ -119,9 +119,9 @@ impl Accuracy {
         self.doubts_ui(ui, player);
     }
 
-    /// Why the result is not to be trusted, in a place of its own height.
+    /// Reasons to doubt the result, in a space of fixed height.
     fn doubts_ui(&self, ui: &mut Ui, player: &Player) {
-        // What a control says already is not said again.
+        // A doubt already shown beside a control is not repeated.
         let said = player.warnings();
         let doubts = player.simulation().doubts().into_iter();
         let mut doubts: Vec<String> = doubts.map(|doubt| doubt.to_string()).collect();
@@ -141,7 +141,7 @@ impl Accuracy {
             }
             if doubts.is_empty() && self.problem.is_none() {
                 ui.label(small(none).weak())
-                    .on_hover_text("Here stands why the numbers are not to be trusted, if anything speaks against them");
+                    .on_hover_text("Reasons not to trust the numbers, if there are any");
             }
         });
     }
@@ -187,8 +187,8 @@ impl Accuracy {
         });
     }
 
-    /// What `preset` was measured to do on the scene as it is.
-    fn measured(&self, player: &Player, preset: Option<Preset>) -> [Row; 2] {
+    /// Measured accuracy of `preset` on the present scene.
+    fn measured(&self, player: &Player, preset: Option<Preset>) -> [AccuracyLine; 2] {
         let scene = model_of(player);
         let own = self.found.as_ref();
         let here = own.filter(|found| Some(found.preset) == preset && found.scene == scene);
@@ -207,7 +207,7 @@ impl Accuracy {
             }
             _ => (None, ""),
         };
-        let row = |label, error: Option<f64>, what: &str| Row {
+        let row = |label, error: Option<f64>, what: &str| AccuracyLine {
             label,
             value: match (&measured, error) {
                 (None, _) if preset.is_none() => "no preset".to_owned(),
@@ -240,7 +240,7 @@ impl Accuracy {
     }
 }
 
-/// The preset whose method and tolerance are in force, chosen by its name or not.
+/// The preset whose method and tolerance (fixed step) are in force, whether or not it was chosen by name.
 pub fn preset_of(player: &Player) -> Option<Preset> {
     let solver = &player.wanted().solver;
     let is = |preset: &Preset| {
@@ -256,7 +256,7 @@ pub fn preset_of(player: &Player) -> Option<Preset> {
     chosen.or_else(|| Preset::ALL.into_iter().find(is))
 }
 
-/// The scene with what makes its motion, without choices of solver and view.
+/// The scene with everything that determines its motion, without solver and view settings.
 fn model_of(player: &Player) -> SceneSource {
     let mut scene = SceneSource::of(player.wanted());
     let kept = |key: &str| !key.starts_with("solver.") && !key.starts_with("view.");
@@ -270,12 +270,12 @@ fn joint(player: &Player, index: usize) -> &str {
     joints.get(index).map_or("", |joint| &joint.name)
 }
 
-fn solver(player: &Player, preset: Option<Preset>) -> Row {
+fn solver(player: &Player, preset: Option<Preset>) -> AccuracyLine {
     let name = preset.map_or_else(
         || "no preset".to_owned(),
         |preset| format!("what the preset {} has", preset.word()),
     );
-    Row {
+    AccuracyLine {
         label: "Runs with",
         value: value::solver(player.wanted()),
         doubtful: false,
@@ -286,7 +286,7 @@ fn solver(player: &Player, preset: Option<Preset>) -> Row {
     }
 }
 
-fn capacity(player: &Player) -> Row {
+fn capacity(player: &Player) -> AccuracyLine {
     let (value, doubtful) = match player.capacity() {
         Some(ratio) => (
             format!("{} × real time", value::number(ratio, 2)),
@@ -294,7 +294,7 @@ fn capacity(player: &Player) -> Row {
         ),
         None => ("not measured yet".to_owned(), false),
     };
-    Row {
+    AccuracyLine {
         label: "Can run at",
         value,
         doubtful,
@@ -304,10 +304,10 @@ fn capacity(player: &Player) -> Row {
     }
 }
 
-/// What the latest impact was like: where, how finely it was resolved, and what became of the speed.
-fn latest_impact(player: &Player) -> [Row; 3] {
+/// The latest impact: where it was, how finely it was resolved, and its restitution.
+fn latest_impact(player: &Player) -> [AccuracyLine; 3] {
     let impact = player.simulation().impacts().next_back();
-    let row = |label, value: Option<String>, doubtful, help: String| Row {
+    let row = |label, value: Option<String>, doubtful, help: String| AccuracyLine {
         label,
         value: value.unwrap_or_else(|| NONE.to_owned()),
         doubtful,
@@ -332,7 +332,7 @@ fn latest_impact(player: &Player) -> [Row; 3] {
             "Latest impact",
             Some(what),
             false,
-            "Ball joint of the latest impact that is over. Disturbed: another joint touched meanwhile, or the parameters of the \
+            "Ball joint of the latest impact that is over. Disturbed: another joint was in contact meanwhile, or the parameters of the \
              contact changed, so that the ratio of the speeds is not the law's alone. Slow: it began below the impact speed \
              floor, so it rebounds higher than asked."
                 .to_owned(),
@@ -349,7 +349,7 @@ fn latest_impact(player: &Player) -> [Row; 3] {
         row(
             "Restitution in it",
             impact.map(ratio),
-            // An impact that nothing disturbed gives what its law gives, or else the steps were too long.
+            // An undisturbed impact yields the restitution of its law, unless the steps were too long.
             impact.is_some_and(|impact| {
                 !impact.disturbed && !impact.floored && (impact.given() - impact.law).abs() > 0.02
             }),
@@ -358,7 +358,7 @@ fn latest_impact(player: &Player) -> [Row; 3] {
     ]
 }
 
-/// Whether the restitution of an impact can be its law's.
+/// Kind of an impact: only an undisturbed one has the restitution of its law.
 fn kind(impact: &Impact) -> &'static str {
     match (impact.disturbed, impact.floored) {
         (true, _) => "disturbed",
@@ -367,7 +367,7 @@ fn kind(impact: &Impact) -> &'static str {
     }
 }
 
-fn residual(player: &Player) -> Row {
+fn residual(player: &Player) -> AccuracyLine {
     let ledger = player.frame().ledger;
     let share = ledger.map(|ledger| ledger.relative_residual().abs());
     let exchanged = ledger.map_or_else(
@@ -377,7 +377,7 @@ fn residual(player: &Player) -> Row {
             format!("{energy} were exchanged.")
         },
     );
-    Row {
+    AccuracyLine {
         label: "Energy residual",
         value: share.map_or_else(
             || NONE.to_owned(),

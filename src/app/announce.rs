@@ -1,4 +1,4 @@
-//! What the mechanism is doing, in sentences for somebody who does not see the picture.
+//! What the mechanism is doing, in sentences for users who do not see the picture.
 
 use super::player::Player;
 use super::value;
@@ -7,7 +7,7 @@ use crate::simulate::ContactState;
 
 /// Least time between two reports unless something happens, s.
 const INTERVAL: f64 = 1.0;
-/// Ball joints that are told one by one; of more, only how many.
+/// Most ball joints reported one by one; of more, only counts.
 const MOST_JOINTS: usize = 6;
 
 /// Makes a report about once a second, and at once when something happens.
@@ -31,7 +31,7 @@ impl Announcer {
         &self.text
     }
 
-    /// Whether the latest report was made because something happened, and not because time has passed.
+    /// Whether the latest report was made because something happened, not because time has passed.
     pub fn is_event(&self) -> bool {
         self.event
     }
@@ -45,8 +45,8 @@ impl Announcer {
         }
     }
 
-    /// Reports at `now`, s of viewing, if it is time: whether there is a new report, and after how long to ask again where
-    /// one is due later. `news` is what the application itself has to say.
+    /// Makes a report at `now`, s of viewing, if one is due. Returns whether it did and, if one is due later, after how long to
+    /// ask again. `news` is what the application itself has to say.
     pub fn update(&mut self, now: f64, player: &Player, news: &str) -> (bool, Option<f64>) {
         let occasion = format!(
             "{} {} {} {news}",

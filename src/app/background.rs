@@ -17,7 +17,7 @@ pub struct Thread {
 }
 
 impl Thread {
-    /// Starts `job`; `None` where the system gives no thread.
+    /// Starts `job`; `None` if the system provides no thread.
     pub fn start(job: Job) -> Option<Self> {
         let (sender, messages) = channel();
         let cancelled = Arc::new(AtomicBool::new(false));
@@ -55,7 +55,7 @@ impl Running for Thread {
             Err(TryRecvError::Empty) => None,
             Err(TryRecvError::Disconnected) => {
                 self.messages = None;
-                // A thread that ends without a last word was cancelled, or something in it broke.
+                // A thread that ends without a final message was cancelled or has failed.
                 let cancelled = self.cancelled.load(Ordering::Relaxed);
                 (!cancelled).then(|| Message::Failed("the computation broke off".to_owned()))
             }

@@ -15,7 +15,7 @@ use super::load::Load;
 use super::player::Player;
 use coordinate::Coordinate;
 use portrait::Portrait;
-use sweep::Sweep;
+use sweep::SweepPanel;
 pub use swept::Swept;
 
 /// The panel.
@@ -23,12 +23,12 @@ pub use swept::Swept;
 pub struct Bench {
     coordinate: Coordinate,
     portrait: Portrait,
-    sweep: Sweep,
+    sweep: SweepPanel,
     problem: Option<String>,
 }
 
 impl Bench {
-    /// Takes in what a sweep said; whether one is under way.
+    /// Takes messages from a sweep; returns whether one is running.
     pub fn update(&mut self, host: &mut dyn Host) -> bool {
         self.sweep.update(host)
     }
@@ -38,17 +38,17 @@ impl Bench {
         self.sweep.swept()
     }
 
-    /// Whether a sweep is under way.
+    /// Whether a sweep is running.
     pub fn is_sweeping(&self) -> bool {
         self.sweep.is_running()
     }
 
-    /// Where the diagram drew a kept section of a point last, points of the screen.
+    /// Where the diagram last drew a kept section of a point, points of the screen.
     pub fn place(&self, index: usize, section: usize) -> Option<eframe::egui::Pos2> {
         self.sweep.diagram().place(index, section)
     }
 
-    /// Everything, one below the other; the way to a section that was clicked.
+    /// The whole bench; returns the run to a section that was clicked.
     pub fn ui(&mut self, ui: &mut Ui, player: &mut Player) -> Option<Load> {
         ui.horizontal_wrapped(|ui| {
             ui.label(RichText::new("Chaos bench").strong());
@@ -61,10 +61,6 @@ impl Bench {
             sweep,
             problem,
         } = self;
-        let help = "The running scene in its phase space";
-        part(ui, "Portrait and section", help, |ui| {
-            portrait.ui(ui, player, *coordinate);
-        });
         let help = "How fast neighbouring motions of the running scene part";
         part(ui, "Neighbouring motion", help, |ui| {
             divergence::ui(ui, player, problem);
@@ -73,12 +69,16 @@ impl Bench {
                 ui.label(words.color(ui.visuals().error_fg_color));
             }
         });
+        let help = "The running scene in its phase space";
+        part(ui, "Portrait and section", help, |ui| {
+            portrait.ui(ui, player, *coordinate);
+        });
         let help = "The scene at many values of a parameter: the bifurcation diagram";
         part(ui, "Sweep", help, |ui| sweep.ui(ui, player, *coordinate)).flatten()
     }
 }
 
-/// A part of the bench that folds away; what it gives where it is open.
+/// A collapsible part of the bench; returns the result of `content` if it is open.
 fn part<R>(ui: &mut Ui, name: &str, help: &str, content: impl FnOnce(&mut Ui) -> R) -> Option<R> {
     let header = CollapsingHeader::new(RichText::new(name).strong()).default_open(true);
     let shown = header.show_unindented(ui, content);

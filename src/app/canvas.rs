@@ -24,7 +24,7 @@ pub struct Canvas {
 }
 
 impl Canvas {
-    /// Draws with `state`, which is its own.
+    /// A canvas that draws with `state`, which is its own.
     pub fn new(state: RenderState) -> Self {
         render::install(&state);
         Self {
@@ -34,9 +34,9 @@ impl Canvas {
         }
     }
 
-    /// Draws on the device of a window, of whose textures and pipelines it uses none.
+    /// A canvas on the device of a window; it shares none of the window's textures and pipelines.
     pub fn beside(window: &RenderState) -> Self {
-        // Rows are read back as red, green, blue, whatever the order of the window's own.
+        // Pixels are read back as red, green, blue, whatever the order in the window.
         let target_format = wgpu::TextureFormat::Rgba8Unorm;
         let renderer =
             egui_wgpu::Renderer::new(&window.device, target_format, RendererOptions::PREDICTABLE);
@@ -150,10 +150,10 @@ impl Canvas {
         (commands, texture)
     }
 
-    /// Draws a pass and has it read back.
+    /// Draws a pass and starts reading it back.
     pub fn paint(&mut self, output: egui::FullOutput, size: [u32; 2], scale: f32) -> Pending {
         let device = self.state.device.clone();
-        // Else a picture that is too large for the adapter's memory would end the program.
+        // Otherwise a picture too large for the adapter's memory would end the program.
         let short = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let wrong = device.push_error_scope(wgpu::ErrorFilter::Validation);
         let (mut commands, texture) = self.encode(output, size, scale);
@@ -183,7 +183,7 @@ impl Canvas {
         let mapped = Arc::new(OnceLock::new());
         let report = mapped.clone();
         buffer.map_async(wgpu::MapMode::Read, .., move |result| {
-            // It is told once.
+            // It is reported once.
             let _ = report.set(result.map_err(|error| error.to_string()));
         });
         let wrong = wrong.pop();
@@ -199,7 +199,7 @@ impl Canvas {
     }
 }
 
-/// What the device can draw along an edge, pixels.
+/// Largest edge that the device can draw, pixels.
 ///
 /// # Errors
 /// [`RenderError::Size`]: `size` is beyond that, or 0.
@@ -217,19 +217,19 @@ fn check_size(device: &wgpu::Device, [width, height]: [u32; 2]) -> Result<u32, R
 
 type Fault = Pin<Box<dyn Future<Output = Option<wgpu::Error>>>>;
 
-/// A picture on its way back from the graphics adapter.
+/// A picture being read back from the graphics adapter.
 pub struct Pending {
     device: wgpu::Device,
     buffer: wgpu::Buffer,
     size: [u32; 2],
     stride: u32,
     mapped: Arc<OnceLock<Result<(), String>>>,
-    /// What may have gone wrong on the device.
+    /// Errors that the device may report.
     faults: Vec<Fault>,
 }
 
 impl Pending {
-    /// The picture once it is there; nothing waits for it.
+    /// The picture once it is there; does not block.
     pub fn take(&mut self) -> Option<Result<Image, RenderError>> {
         if let Err(error) = self.device.poll(wgpu::PollType::Poll) {
             return Some(Err(RenderError::Device(error.to_string())));

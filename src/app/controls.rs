@@ -1,5 +1,5 @@
-//! Controls of the scene's parameters, made from the one table: the three that matter first, one joint's own
-//! below, the rest folded by group.
+//! Controls for the scene's parameters, built from the parameter table: the three most important first, those of one joint
+//! below, the rest collapsed by group.
 
 use std::collections::HashMap;
 
@@ -17,22 +17,22 @@ use crate::scene::{
 };
 use crate::simulate::Effect;
 
-/// Stands with the accuracy that it gives.
+/// Shown with the accuracy that it gives.
 const PRESET: &str = "solver.preset";
-/// Parameters that stand first.
+/// Parameters shown first.
 const FIRST: [&str; 3] = [
     "contact.clearance",
     "contact.friction",
     "contact.restitution",
 ];
 
-/// Side of the button that takes a change back, points.
+/// Side of the undo button, points.
 const UNDO: f32 = 22.0;
-/// Width of a typed entry, and the margin at either side in it, points.
+/// Width of a text field, and its margin on either side, points.
 const ENTRY: f32 = 84.0;
 const MARGIN: i8 = 6;
 
-/// State of the controls that is not the simulation's: half-typed values and what was wrong with them.
+/// State of the controls outside the simulation: half-typed values and their errors.
 #[derive(Default)]
 pub struct Controls {
     drafts: HashMap<String, Draft>,
@@ -46,7 +46,7 @@ struct Draft {
 }
 
 impl Controls {
-    /// Forgets half-typed values, as for a new scene.
+    /// Forgets half-typed values, e.g. for a new scene.
     pub fn clear(&mut self) {
         self.drafts.clear();
         self.joint = 0;
@@ -90,7 +90,7 @@ impl Controls {
         }
     }
 
-    /// The preset, and how the running scene does under it.
+    /// The preset, and the accuracy of the running scene.
     fn accuracy_ui(
         &mut self,
         ui: &mut Ui,
@@ -111,7 +111,7 @@ impl Controls {
         );
     }
 
-    /// Contact parameters of one ball joint, which beat the scene's.
+    /// Contact parameters of one ball joint, which override the scene's.
     fn one_joint(&mut self, ui: &mut Ui, player: &mut Player, table: &[&'static Parameter]) {
         let names: Vec<String> = player
             .wanted()
@@ -155,7 +155,7 @@ impl Controls {
         parameter: &'static Parameter,
         key: &str,
     ) {
-        // A key that the scene lost (a shorter chain) has no control.
+        // A key that the scene no longer has (a shorter chain) has no control.
         let Ok(now) = player.wanted().get(key) else {
             return;
         };
@@ -180,7 +180,7 @@ impl Controls {
                     .color(ui.visuals().error_fg_color),
             );
         }
-        let beats = player.beats_preset();
+        let beats = player.keys_overriding_preset();
         if key == PRESET && !beats.is_empty() {
             let names: Vec<&str> = beats.iter().filter_map(|k| k.split('.').nth(1)).collect();
             let words = format!(
@@ -266,7 +266,7 @@ impl Controls {
             this.default_button(ui, player, parameter, key, name, now);
             let mut chosen = None;
             let width = ui.available_width().min(170.0);
-            // Method and tolerance may be a preset's without its name, and may leave it.
+            // Method and tolerance may match a preset that was not named, or differ from the one that was.
             let (now, text) = match (key, accuracy::preset_of(player)) {
                 (PRESET, Some(preset)) => (Value::Choice(preset.word()), preset.word().to_owned()),
                 (PRESET, None) => (Value::Unset, "own choice".to_owned()),
@@ -325,7 +325,7 @@ impl Controls {
         });
     }
 
-    /// Name on the left, whatever `rest` adds from the right; in a line below where `room` points are not left for it.
+    /// Name on the left, and what `rest` adds from the right; on a line below if fewer than `room` points are left for it.
     fn heading(
         &mut self,
         ui: &mut Ui,
@@ -360,7 +360,7 @@ impl Controls {
         }
     }
 
-    /// Typed entry; what cannot be read stays to be mended.
+    /// Text field; unreadable input stays to be corrected.
     fn entry(
         &mut self,
         ui: &mut Ui,
@@ -418,7 +418,7 @@ impl Controls {
         now: &Value,
     ) {
         let size = theme::side(ui, UNDO);
-        // A place kept free where there is nothing to undo: rows stay aligned.
+        // Keep the space where there is nothing to undo, so that rows stay aligned.
         let Some(original) = player.original(key).filter(|original| original != now) else {
             ui.allocate_space(egui::Vec2::splat(size));
             return;
@@ -436,7 +436,7 @@ impl Controls {
         self.settle(key, text, done);
     }
 
-    /// A value that was taken leaves no draft; one that was not stays with the reason.
+    /// An accepted value clears its draft; a rejected one stays, with the reason.
     fn settle(&mut self, key: &str, text: &str, done: Result<Effect, SceneError>) {
         match done {
             Ok(Effect::Now | Effect::AtReset) => {
@@ -457,7 +457,7 @@ impl Controls {
     }
 }
 
-/// The font of the text, smaller where it does not fit into `room` (points): a unit that is cut off is another unit.
+/// The font of the text, smaller if it does not fit into `room` (points): a unit that is cut off reads as another unit.
 fn fitting(ui: &Ui, text: &str, room: f32) -> FontId {
     let body = egui::TextStyle::Body.resolve(ui.style());
     let colour = ui.visuals().text_color();
@@ -466,12 +466,12 @@ fn fitting(ui: &Ui, text: &str, room: f32) -> FontId {
         .layout_no_wrap(text.to_owned(), body.clone(), colour)
         .size()
         .x;
-    // Rounded down to half a point, so that glyphs of few sizes are kept.
+    // Rounded down to half a point, so that glyphs of few sizes are cached.
     let size = (2.0 * body.size * (room / width).clamp(0.7, 1.0)).floor() / 2.0;
     FontId::new(size, body.family)
 }
 
-/// What a control is about, above or below it within its panel: the control in use and the picture stay in sight.
+/// Tooltip of a control, above or below it within its panel: the control in use and the picture stay visible.
 fn tooltip(ui: &Ui, response: &Response, player: &Player, parameter: &Parameter, key: &str) {
     const ABOVE: [RectAlign; 1] = [RectAlign::TOP_START];
     let panel = ui.clip_rect().x_range();

@@ -1,5 +1,5 @@
-//! Curves of recorded quantities, drawn so that no pixel of colour stands for a value that was not recorded: each column of
-//! pixels from the least to the greatest value that fell into it. Lines with joined corners would overshoot at every peak.
+//! Curves of recorded quantities, drawn so that no coloured pixel stands for a value that was not recorded: each pixel column
+//! is filled from the least to the greatest value in it. Lines with mitred joins would overshoot at every peak.
 
 use std::ops::RangeInclusive;
 use std::sync::Arc;
@@ -27,7 +27,7 @@ pub struct Trace {
 }
 
 impl Trace {
-    /// Least and greatest value recorded about `time`, s.
+    /// Least and greatest value recorded around `time`, s.
     pub fn at(&self, time: f64) -> Option<(f64, f64)> {
         let after = self.bins.partition_point(|bin| bin.from <= time);
         let bin = self.bins[..after].last()?;
@@ -35,19 +35,19 @@ impl Trace {
     }
 }
 
-/// Curves over one time axis. Where one would hide another they share the place: in a column of pixels the taller stands
-/// behind the shorter, and those that coincide take turns.
+/// Curves over one time axis. None hides another: in a pixel column the taller is drawn behind the shorter, and curves that
+/// coincide alternate.
 pub struct Curves<'a> {
     base: PlotItemBase,
     traces: &'a [Trace],
-    /// One of the time axis in s, and of the other in SI units.
+    /// Unit of the time axis in s, and of the value axis in SI units.
     units: [f64; 2],
     width: f32,
     dashed: bool,
 }
 
 impl<'a> Curves<'a> {
-    /// Curves over axes of which one is so many seconds, and so many SI units.
+    /// Curves over axes with the given `units`: of time in s, and of the value in SI units.
     pub fn new(traces: &'a [Trace], units: [f64; 2]) -> Self {
         Self {
             base: PlotItemBase::new("curves".to_owned()),
@@ -58,7 +58,7 @@ impl<'a> Curves<'a> {
         }
     }
 
-    /// Thin and dashed: a level, not a motion.
+    /// Thin and dashed, for a constant level rather than a motion.
     pub fn dashed(mut self) -> Self {
         (self.width, self.dashed) = (1.0, true);
         self
@@ -77,7 +77,7 @@ impl<'a> Curves<'a> {
         ];
         let first = (frame.left() * scale).floor() as i64;
         let count = ((frame.right() * scale).ceil() as i64 - first).max(0) as usize;
-        // Far outside is outside, too.
+        // Far outside is as good as outside.
         let (top, bottom) = (
             frame.top() - frame.height(),
             frame.bottom() + frame.height(),
@@ -135,7 +135,7 @@ impl<'a> Curves<'a> {
     }
 }
 
-/// Paints what stands in the column of pixels at `x`: one bar, or some that coincide and take turns along it.
+/// Paints the pixel column at `x`: one bar, or several that coincide and alternate along it.
 fn paint(
     mesh: &mut Mesh,
     x: f32,
@@ -154,7 +154,7 @@ fn paint(
         );
         return;
     }
-    // Turns along the longer side, so that level stretches and upright ones alternate alike.
+    // Alternate along the longer side, so that level and steep stretches look alike.
     let turn = |piece: i64| group[piece.rem_euclid(group.len() as i64) as usize];
     let tallest = group
         .iter()
@@ -184,7 +184,7 @@ fn paint(
     }
 }
 
-/// The part of a column of pixels that a curve passes, y downwards; nothing where `top` is below `bottom`.
+/// The part of a pixel column that a curve covers, y downwards; empty if `top` is below `bottom`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Span {
     top: f32,
@@ -210,7 +210,7 @@ impl Span {
     }
 }
 
-/// The columns from pixel `first` on that a curve through `bins` passes; `place` turns time and value to pixels.
+/// Spans of the pixel columns from `first` on for a curve through `bins`; `place` maps time and value to pixels.
 fn spans(
     bins: &[Bin],
     place: impl Fn(f64, f64) -> [f64; 2],
@@ -240,7 +240,7 @@ fn spans(
             });
         }
     };
-    // The pen goes through every bin: from where it touches the one before, over its middle, to where it touches the next.
+    // The pen passes through every bin: from its junction with the one before, over its middle, to its junction with the next.
     let mut pen: Option<(f64, f64)> = None;
     let mut extremes: Vec<(f64, f64)> = Vec::new();
     for (index, bin) in bins.iter().enumerate() {
@@ -250,7 +250,7 @@ fn spans(
         }
         let next = bins.get(index + 1).filter(|next| next.from == bin.to);
         let exit = next.map(|next| {
-            // The middle of what both have, or of the jump between them.
+            // The middle of their overlap, or of the gap between them.
             0.5 * (bin.least.max(next.least) + bin.greatest.min(next.greatest))
         });
         let wanted = match (pen, exit) {
@@ -283,7 +283,7 @@ fn spans(
     spans
 }
 
-/// A painted column: full colour between its ends, each of which fades over so many pixels around it.
+/// A painted column: full colour between its ends, each of which fades over the given number of pixels around it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Bar {
     top: f32,
@@ -304,12 +304,12 @@ impl Bar {
         self.bottom - self.top
     }
 
-    /// Whether it would hide the other, and the other it.
+    /// Whether the two would hide each other.
     fn coincides(&self, other: &Self) -> bool {
         (self.top - other.top).abs() < 1.0 && (self.bottom - other.bottom).abs() < 1.0
     }
 
-    /// Adds it to `mesh`, as far as it lies between two heights (pixels).
+    /// Adds it to `mesh`, clipped to the range between two heights (pixels).
     fn paint(&self, mesh: &mut Mesh, x: f32, scale: f32, (low, high): (f32, f32), colour: Color32) {
         let profile = [
             (self.top - 0.5 * self.soft_top, 0.0),
@@ -337,10 +337,10 @@ impl Bar {
     }
 }
 
-/// What is painted of a curve: `width` pixels thick where it runs level, and as wide where it is steep; at its own peaks and
-/// hollows not a pixel more than it reaches.
+/// The bars of a curve: `width` pixels thick where it is level, and as wide where it is steep; never a pixel beyond its own
+/// peaks and troughs.
 fn bars(spans: &[Span], width: f32) -> Vec<Bar> {
-    // Whole columns to either side, and what is left of the width as softer ends.
+    // Whole columns on either side, and the rest of the width as softer ends.
     let beside = (0.5 * (width - 1.0) + 0.25).floor().max(0.0) as usize;
     let rest = (width - 2.0 * beside as f32 - 1.0).max(0.0);
     let wide = |at: usize| {
@@ -356,7 +356,7 @@ fn bars(spans: &[Span], width: f32) -> Vec<Bar> {
         }
         let before = at.checked_sub(1).map_or(Span::NOTHING, |at| wide[at]);
         let around = before.join(wide.get(at + 1).copied().unwrap_or(Span::NOTHING));
-        // How far the curve goes on beyond this column, as far as that is its slope.
+        // How far the curve continues beyond this column, limited to its slope here.
         let goes_on = |by: f32| by.clamp(0.0, (bottom - top).min(SOFTEST));
         let (up, down) = (goes_on(top - around.top), goes_on(around.bottom - bottom));
         let more = |beyond: f32| (0.5 * rest * beyond).min(1.0);
@@ -406,7 +406,7 @@ impl PlotItem for Curves<'_> {
     }
 }
 
-/// Points that the pointer finds, joined by a line where it has a width; its sharp corners are cut off.
+/// Points for the hit test, joined by a line if it has a width; its sharp corners are cut off.
 pub struct Path<'a> {
     base: PlotItemBase,
     points: &'a [PlotPoint],
@@ -473,9 +473,9 @@ impl PlotItem for Path<'_> {
     }
 }
 
-/// A line in parts without sharp corners: no part has a join that sticks out.
+/// Splits a line at its sharp corners, so that no join sticks out.
 fn parts(points: impl Iterator<Item = Pos2>) -> Vec<Vec<Pos2>> {
-    /// Least cosine of a turn that a join follows smoothly.
+    /// Least cosine of the turning angle at which a join is smooth.
     const SMOOTH: f32 = 0.8;
     let mut parts: Vec<Vec<Pos2>> = vec![Vec::new()];
     for point in points {

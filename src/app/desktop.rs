@@ -1,4 +1,4 @@
-//! Services of the desktop: files by their names, threads.
+//! Services of the desktop: files by name, threads.
 
 use std::collections::VecDeque;
 use std::io::Write as _;
@@ -10,7 +10,7 @@ use eframe::egui;
 use super::background::Thread;
 use super::host::{Host, OpenedFile, Running, SaveFile};
 use crate::analysis::task::Job;
-use crate::files::{FileError, Target, appear};
+use crate::files::{FileError, OutputFile, publish};
 use crate::scene::{LARGEST_FILE, too_large};
 
 /// Files of the desktop.
@@ -21,7 +21,7 @@ pub struct DesktopHost {
 }
 
 impl DesktopHost {
-    /// Links are hung on the address `page`; on "" they have none.
+    /// Links are appended to the address `page`; with "" they have none.
     pub fn new(page: String) -> Self {
         Self {
             page,
@@ -49,14 +49,14 @@ impl Host for DesktopHost {
         };
         let mut filled = Vec::new();
         for file in files {
-            let target = Target::claim(Path::new(&file.name), false).map_err(cannot)?;
+            let target = OutputFile::claim(Path::new(&file.name), false).map_err(cannot)?;
             filled.push(
                 target
                     .fill(|out| out.write_all(&file.bytes))
                     .map_err(cannot)?,
             );
         }
-        appear(filled).map_err(cannot)?;
+        publish(filled).map_err(cannot)?;
         let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
         Ok(format!("Saved {}", names.join(" and ")))
     }

@@ -7,7 +7,7 @@ use super::keys::{BINDINGS, POINTER};
 use super::load::Load;
 use super::player::Player;
 
-/// Below this width keys and what they do stand below each other, points.
+/// Below this width, points, keys and their descriptions are stacked.
 const NARROW: f32 = 480.0;
 
 /// Which dialog is open.
@@ -17,14 +17,14 @@ pub enum Dialog {
     Help,
     /// Version and state.
     About,
-    /// Opens a link, a file or a built-in scene: what was typed so far and what was wrong with it.
+    /// Opens a link, a file or a built-in scene: the text typed so far and its error.
     Open {
         /// Link, path or name.
         path: String,
         /// Why it could not be opened.
         error: Option<String>,
     },
-    /// Saves files: the path of the first as typed so far and what was wrong with it.
+    /// Saves files: the path of the first as typed so far and its error.
     Save {
         /// Path.
         path: String,
@@ -33,11 +33,11 @@ pub enum Dialog {
         /// Why they could not be saved.
         error: Option<String>,
     },
-    /// Runs to a section of a sweep that was made of something else than what is on show.
+    /// Runs to a section of a sweep that was not made of the displayed scene.
     Load {
-        /// The way there.
+        /// The run to the section.
         load: Box<Load>,
-        /// What it would change, a phrase each.
+        /// What it would change, one phrase each.
         changes: Vec<String>,
     },
 }
@@ -53,7 +53,7 @@ impl Dialog {
         }
     }
 
-    /// What its button says, and what that asks for; `None` where there is nothing to answer, or nothing typed yet.
+    /// Label of its button and the answer it gives; `None` if there is nothing to answer, or nothing typed yet.
     fn answer(&self) -> Option<(&'static str, Option<Answer>)> {
         let typed = |path: &str| Some(path.trim().to_owned()).filter(|path| !path.is_empty());
         match self {
@@ -68,7 +68,7 @@ impl Dialog {
 /// What a dialog asks for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Answer {
-    /// It wants to be closed.
+    /// Close the dialog.
     Close,
     /// Open this link or scene.
     Open(String),
@@ -94,7 +94,7 @@ pub fn ui(
             ui.set_width(widest);
             ui.heading(dialog.title());
             ui.add_space(6.0);
-            // Title, buttons and frame stay in sight on a low screen, and in a dialog that comes to say more.
+            // Title, buttons and frame stay visible on a low screen and in a dialog whose text grows.
             let most = (ctx.content_rect().height() - 140.0).max(80.0);
             let scrolled = ScrollArea::vertical()
                 .max_height(most)
@@ -135,7 +135,7 @@ fn help(ui: &mut Ui) -> bool {
         .map(|b| (b.written, b.help))
         .chain(POINTER);
     if ui.available_width() < NARROW {
-        // Below each other, else the longer half of each line would be outside.
+        // Stacked, since otherwise the longer half of each line would be cut off.
         for (key, help) in rows {
             ui.label(RichText::new(key).strong());
             ui.indent(key, |ui| ui.label(help));
@@ -212,7 +212,7 @@ fn load(ui: &mut Ui, changes: &[String]) -> bool {
     false
 }
 
-/// What is typed, with what was wrong with it below; whether it was entered.
+/// The text field, with its error below; returns whether Enter was pressed.
 fn path_field(ui: &mut Ui, path: &mut String, hint: &str, error: Option<&str>) -> bool {
     let field = ui.add(
         TextEdit::singleline(path)

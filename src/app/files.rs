@@ -1,4 +1,4 @@
-//! Links and files: what comes in from outside, and what is given out.
+//! Links and files, in and out.
 
 use std::fmt::Write as _;
 
@@ -16,12 +16,12 @@ use crate::scene::Scene;
 /// Rows of a saved record.
 const ROWS: usize = 1000;
 impl App {
-    /// Gives the application the services of the place it runs in.
+    /// Gives the application the services of the platform it runs on.
     pub fn set_host(&mut self, host: Box<dyn Host>) {
         self.host = host;
     }
 
-    /// What leads to the present state.
+    /// A link to the present state.
     pub fn link(&self) -> Link {
         if let Some(replay) = &self.replay {
             return replay.link().clone();
@@ -47,8 +47,8 @@ impl App {
         }
     }
 
-    /// The present state as the fragment of a URL, whatever its length and without the `#`: for a page that has to start
-    /// again. [`super::AppOptions::from_link`] takes it back.
+    /// The present state as a URL fragment of any length, without the `#`, for a page that has to restart.
+    /// [`super::AppOptions::from_link`] reads it back.
     pub fn share_state(&self) -> String {
         self.link().format()
     }
@@ -102,7 +102,7 @@ impl App {
         });
     }
 
-    /// Opens a link that was pasted where nothing is typed; other text is none of our business.
+    /// Opens a link pasted outside a text field; other text is ignored.
     pub(super) fn receive_links(&mut self, ctx: &egui::Context) {
         if self.dialog.is_some() || ctx.text_edit_focused() {
             return;
@@ -120,9 +120,9 @@ impl App {
         }
     }
 
-    /// Files that were dropped, or chosen a while ago.
+    /// Takes files that were dropped, or chosen earlier.
     pub(super) fn receive_files(&mut self, ctx: &egui::Context) {
-        // The last of several dropped at once is the one that shows.
+        // Of several dropped at once, the last one is shown.
         for file in ctx.input(|input| input.raw.dropped_files.clone()) {
             self.host.read_dropped(file);
         }
@@ -157,7 +157,7 @@ impl App {
         let renamed: Vec<SaveFile> = files
             .iter()
             .map(|file| SaveFile {
-                // What belongs to the first file is named after it.
+                // Companion files are named after the first.
                 name: file.name.replacen(&suggested, &path, 1),
                 ..file.clone()
             })
@@ -174,7 +174,7 @@ impl App {
         }
     }
 
-    /// Saves the scene file, the changes in it.
+    /// Saves the scene file with the changes in it.
     pub fn save_scene(&mut self) {
         let scene = self.player.wanted();
         match scene.to_toml() {
@@ -208,7 +208,7 @@ impl App {
         ]);
     }
 
-    /// What a picture shows, for its own text.
+    /// Description of a picture, stored in it.
     pub(super) fn describe(&self) -> String {
         describe(&self.player)
     }
@@ -272,7 +272,7 @@ fn record_csv(player: &Player) -> String {
         let _ = write!(text, "{time:.9e}");
         for (least, greatest) in values.iter().take(player.channels().len()) {
             if least > greatest {
-                // Nothing was recorded of it here.
+                // Nothing was recorded for it here.
                 text.push_str(",NaN,NaN");
                 continue;
             }
@@ -283,7 +283,7 @@ fn record_csv(player: &Player) -> String {
     text
 }
 
-/// What made the record.
+/// Metadata: what made the record.
 fn meta(player: &Player) -> String {
     let scene = player.scene();
     let changed: Map<String, serde_json::Value> = scene
@@ -318,7 +318,7 @@ fn meta(player: &Player) -> String {
     format!("{meta:#}\n")
 }
 
-/// What a picture shows, for its own text; letters that PNG cannot hold are replaced.
+/// Description of a picture, stored in it; letters that PNG cannot hold are replaced.
 fn describe(player: &Player) -> String {
     let mut words = format!(
         "{} at t = {} s, state hash {:016x}",
@@ -347,7 +347,7 @@ mod tests {
         let mut player = player("spcmm");
         player.run_to(9e-3);
         player.advance(0.0);
-        // On show is now the end of the record.
+        // The end of the record is shown now.
         player.single_step();
         let text = record_csv(&player);
         let mut lines = text.lines();

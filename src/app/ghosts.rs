@@ -1,4 +1,4 @@
-//! The ghosts of the 3D view: the twin run and the ideal motion, and what is said of them.
+//! The ghosts of the 3D view, the twin run and the ideal motion, and their notes.
 
 use eframe::egui::{RichText, Ui};
 
@@ -7,7 +7,7 @@ use super::player::Player;
 use super::value;
 use crate::view::{DrawList, Ghost, SceneView, Shot};
 
-/// Draws the ghosts of the instant on show over the list that was built of `shot`; a note on each.
+/// Adds the ghosts at the displayed instant to the draw list built from `shot`; returns a note on each.
 pub fn add(view: &SceneView, shot: &Shot<'_>, player: &Player, list: &mut DrawList) -> Vec<String> {
     let mut notes = Vec::new();
     let mut note = |ghost: &str, apart: bool| {
@@ -19,7 +19,7 @@ pub fn add(view: &SceneView, shot: &Shot<'_>, player: &Player, list: &mut DrawLi
         notes.push(format!("{ghost}{near}"));
     };
     let now = player.frame().time;
-    // One that starts at the end of the step on show has not started yet.
+    // A twin that starts at the end of the displayed step has not started yet.
     if let Some(twin) = player.twin().filter(|twin| twin.frame().time <= now) {
         let apart = view.add_ghost(shot, twin.frame(), Ghost::Twin, list);
         note("violet ghost: the twin run", apart);
@@ -44,7 +44,7 @@ pub fn add(view: &SceneView, shot: &Shot<'_>, player: &Player, list: &mut DrawLi
 }
 
 impl App {
-    /// Shows the ideal ghost, or no longer; says why where there is none.
+    /// Shows or hides the ideal ghost; says why if there is none.
     pub fn show_ideal(&mut self, on: bool) {
         self.player.set_ideal(on);
         if let Some(fault) = self.player.ideal().and_then(|ideal| ideal.fault()) {

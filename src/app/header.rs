@@ -42,7 +42,7 @@ impl App {
                 {
                     self.dialog = Some(Dialog::Help);
                 }
-                // What does not fit is left out rather than laid over the rest; a key stands for the theme.
+                // What does not fit is left out rather than laid over the rest; the theme also has a key.
                 let room = ui.available_width();
                 if room > 80.0 && ui.button("About").clicked() {
                     self.dialog = Some(Dialog::About);
@@ -120,7 +120,7 @@ impl App {
         }
     }
 
-    /// Everything that has no room in a small header.
+    /// Everything that does not fit into a small header.
     fn menu(&mut self, ui: &mut Ui) {
         ui.set_min_width(180.0);
         self.open_button(ui);
@@ -145,7 +145,7 @@ impl App {
         self.problem.is_some() || self.verdict.is_some() || self.is_under_way()
     }
 
-    /// What went wrong, how far a link has come, and what became of it.
+    /// Errors, the progress of a replay, and the verdict on a link.
     pub(super) fn strips(&mut self, ui: &mut Ui) {
         if let Some(problem) = self.problem.clone() {
             let colour = ui.visuals().error_fg_color;
@@ -180,7 +180,7 @@ impl App {
     }
 }
 
-/// The plate of a message; it shines through nothing.
+/// The plate behind a message, opaque.
 fn plate(ui: &Ui, colour: egui::Color32) -> Frame {
     let fill = ui.visuals().panel_fill.lerp_to_gamma(colour, 0.14);
     Frame::new()
@@ -189,7 +189,7 @@ fn plate(ui: &Ui, colour: egui::Color32) -> Frame {
         .inner_margin(egui::Margin::symmetric(12, 8))
 }
 
-/// How far a run is on its way; whether it is to stop.
+/// Progress of a run to its target; returns whether it is to stop.
 fn under_way(ui: &mut Ui, words: &str, fraction: f32) -> bool {
     let plate = plate(ui, ui.visuals().panel_fill);
     let row = plate.show(ui, |ui| {
@@ -207,7 +207,7 @@ fn under_way(ui: &mut Ui, words: &str, fraction: f32) -> bool {
     row.inner
 }
 
-/// A coloured strip with a sentence; whether it was dismissed.
+/// A coloured strip with a sentence; returns whether it was dismissed.
 fn strip(ui: &mut Ui, words: &str, colour: egui::Color32) -> bool {
     let shown = plate(ui, colour).show(ui, |ui| {
         let narrow = ui.available_width() < 520.0;
@@ -217,7 +217,7 @@ fn strip(ui: &mut Ui, words: &str, colour: egui::Color32) -> bool {
             return ui.button("Dismiss").clicked();
         }
         ui.horizontal_top(|ui| {
-            // What the button needs, and the gap before it.
+            // Room for the button and the gap before it.
             let room = ui.available_width() - 90.0;
             ui.vertical(|ui| {
                 ui.set_width(room);

@@ -29,7 +29,7 @@ pub enum HeadlessError {
 /// A frame of the whole application.
 #[derive(Clone, Debug)]
 pub struct UiFrame {
-    /// How the application starts; its theme must not be the system's, of which there is none here.
+    /// How the application starts; its theme must not be the system's, since there is no system theme here.
     pub options: AppOptions,
     /// Simulated time to show, s.
     pub at: f64,
@@ -169,8 +169,8 @@ impl Headless {
         self.canvas.paint(output, list.size, scale).wait()
     }
 
-    /// Everything that one frame of a running window costs the processor but the stepping: interface, draw list,
-    /// tessellation, upload and encoded commands. For benchmarks.
+    /// The CPU work for one frame of a running window without the stepping: interface, draw list, tessellation, upload and
+    /// encoded commands. For benchmarks.
     ///
     /// # Errors
     /// A size that cannot be drawn.

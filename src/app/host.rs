@@ -1,4 +1,4 @@
-//! What the application asks of the place it runs in: a desktop window or a web page.
+//! What the application asks of its platform: a desktop window or a web page.
 
 use std::sync::Arc;
 
@@ -6,16 +6,16 @@ use eframe::egui;
 
 use crate::analysis::task::{Job, Message};
 
-/// A computation beside the interface.
+/// A background computation.
 pub trait Running {
-    /// What it said next, if anything; after [`Message::Done`] or [`Message::Failed`] nothing more comes.
+    /// Its next message, if any; none follows [`Message::Done`] or [`Message::Failed`].
     fn poll(&mut self) -> Option<Message>;
 
-    /// Ends it; what it said so far can still be had.
+    /// Ends it; messages already sent can still be polled.
     fn cancel(&mut self);
 }
 
-/// A file to be saved, with what describes it.
+/// A file to be saved, with its description.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SaveFile {
     /// Name, as suggested by the application or as the user has changed it; on the desktop a path.
@@ -37,26 +37,25 @@ pub struct OpenedFile {
 
 /// Services of the desktop or the page. The application works without any ([`NoHost`]).
 ///
-/// Nothing here waits: what takes time is answered later through [`Self::opened`], after which the host asks egui for a
-/// repaint.
+/// Nothing here blocks: slow requests are answered later through [`Self::opened`], and the host then asks egui for a repaint.
 pub trait Host {
-    /// Address that a share link's fragment is hung on; "" gives out the fragment alone.
+    /// Address to which the fragment of a share link is appended; with "" the link is the fragment alone.
     fn address(&self) -> String {
         String::new()
     }
 
-    /// A link was made: put it where links stand, say the address bar. Whether the host puts it on the clipboard, too; else
-    /// egui does.
+    /// A link was made: put it where the user sees it, e.g. in the address bar. Returns whether the host also copies it to the
+    /// clipboard; otherwise egui does.
     fn shared(&mut self, _link: &str) -> bool {
         false
     }
 
-    /// Whether the user is to be asked for a path before [`Self::save`]; else the host gives the files their places.
+    /// Whether to ask the user for a path before [`Self::save`]; otherwise the host decides where files go.
     fn asks_for_path(&self) -> bool {
         false
     }
 
-    /// Saves `files`; the answer says where they are.
+    /// Saves `files`; returns a text that says where they are.
     ///
     /// # Errors
     /// Why not, in words.
@@ -64,7 +63,7 @@ pub trait Host {
         Err("Files cannot be saved here".to_owned())
     }
 
-    /// Lets the user choose a scene file; false where the application is to ask for a path instead.
+    /// Lets the user choose a scene file; false if the application is to ask for a path instead.
     fn pick_file(&mut self) -> bool {
         false
     }
@@ -75,17 +74,17 @@ pub trait Host {
     /// The next file that was chosen, or dropped and read.
     fn opened(&mut self) -> Option<OpenedFile>;
 
-    /// Starts a long computation beside the interface; `None` where that cannot be.
+    /// Starts a long background computation; `None` if that is not possible.
     fn start(&mut self, _job: Job) -> Option<Box<dyn Running>> {
         None
     }
 
-    /// What goes on, for somebody who does not see the picture; the same sentences are in the accessibility tree. `event`:
-    /// something has happened, rather than gone on.
+    /// What is going on, for users who do not see the picture; the same sentences are in the accessibility tree. `event`:
+    /// something has just happened.
     fn announce(&mut self, _text: &str, _event: bool) {}
 }
 
-/// Nothing to ask: headless frames and tests.
+/// No services: for headless frames and tests.
 #[derive(Debug, Default)]
 pub struct NoHost;
 

@@ -1,4 +1,4 @@
-//! Buttons with painted icons: no font has to carry them, and a screen reader hears their name.
+//! Buttons with painted icons: they need no font, and a screen reader reads their name.
 
 use eframe::egui::{
     self, Color32, Pos2, Rect, Response, Role, Sense, Shape, Stroke, Ui, Vec2, WidgetInfo, pos2,
@@ -18,15 +18,15 @@ pub enum Icon {
     Restart,
     /// Triangle to the left.
     Backwards,
-    /// Two triangles to the left, and to the right: to the impact before or after.
+    /// Two triangles, to the left or to the right: to the previous or the next impact.
     Before,
     #[allow(missing_docs)]
     After,
-    /// Arrow around: back to the default.
+    /// Curved arrow: back to the default.
     Undo,
 }
 
-/// A button with a painted icon, `name` for its label and `help` as its tooltip. `prominent` fills it.
+/// A button with a painted icon, `name` as its label and `help` as its tooltip. `prominent` fills it.
 pub fn icon_button(
     ui: &mut Ui,
     icon: Icon,

@@ -1,38 +1,38 @@
-//! The ideal motion beside the run: the same scene with every ball joint closed, at the same drives and gravity. It is computed
-//! only where it is on show, up to the instant on show; the run knows nothing of it.
+//! The ideal motion beside the run: the same scene with every ball joint closed, under the same drives and gravity. It is
+//! computed only while shown, up to the displayed instant, and does not affect the run.
 
 use super::player::Clock;
 use crate::scene::{Output, Scene, Vec3};
 use crate::simulate::{Frame, Simulation, Snapshot, StartError, Stopped, closed};
 use crate::view::output_point;
 
-/// States kept to go back to; when there are so many, every second one goes.
+/// States kept to go back to; at this number every second one is dropped.
 const KEPT: usize = 32;
-/// Between the first of them, s.
+/// Initial interval between them, s.
 const APART: f64 = 1e-2;
-/// While the run is recorded the ideal motion follows it from so near, s, and by so many steps at most.
+/// While the run is recorded, the ideal motion follows it if less than this behind, s, in at most this many steps.
 const NEAR: f64 = 0.02;
 const STEPS: u32 = 512;
-/// Most stepping of a frame on the way to the instant on show, s.
+/// Stepping budget per frame on the way to the displayed instant, s.
 const BUDGET: f64 = 4e-3;
 
-/// Gravity of a run over time: what a motion beside it has to know of the changes made to the run.
+/// Gravity of a run over time: the changes to the run that a motion computed beside it must follow.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gravity {
-    /// Since when, s, and what, m/s^2; in order.
+    /// Start time, s, and value, m/s^2, in order.
     since: Vec<(f64, Vec3)>,
 }
 
 impl Gravity {
-    /// The same from the start on.
+    /// Constant from the start.
     pub fn new(gravity: Vec3) -> Self {
         Self {
             since: vec![(f64::NEG_INFINITY, gravity)],
         }
     }
 
-    /// The run has taken a step from `start`, s, under `gravity`; what was known of later is another future's. Whether that, or
-    /// the gravity, is news.
+    /// The run has taken a step from `start`, s, under `gravity`; later entries belong to another future and are dropped.
+    /// Returns whether there were any, or whether the gravity is new.
     pub fn observe(&mut self, start: f64, gravity: Vec3) -> bool {
         let kept = self.since.partition_point(|(time, _)| *time <= start);
         let forgets = kept < self.since.len();
@@ -54,7 +54,7 @@ impl Gravity {
         self.since[known.max(1) - 1].1
     }
 
-    /// When it changes next after `time`, s.
+    /// Time of the next change after `time`, s.
     fn next(&self, time: f64) -> f64 {
         let known = self.since.partition_point(|(since, _)| *since <= time);
         self.since.get(known).map_or(f64::INFINITY, |next| next.0)
@@ -69,7 +69,7 @@ pub struct Ideal {
 
 struct Motion {
     simulation: Simulation,
-    /// The latest instant that was asked for and reached.
+    /// At the latest requested instant that was reached.
     frame: Frame,
     /// In order of time; the first is the start.
     kept: Vec<(f64, Snapshot)>,
@@ -78,7 +78,7 @@ struct Motion {
 }
 
 impl Ideal {
-    /// Of `scene`, at its start. Where its loops do not close, or it is too large with closed joints, [`Self::fault`] says so.
+    /// Of `scene`, at its start. If its loops do not close, or it is too large with closed joints, [`Self::fault`] says so.
     pub fn new(scene: &Scene) -> Self {
         let motion = Simulation::new(&closed(scene)).map(|mut simulation| {
             let mut frame = Frame::default();
@@ -97,7 +97,7 @@ impl Ideal {
         }
     }
 
-    /// Comes to `time`, s, where the run is recorded, if that is near.
+    /// Advances to `time`, s, to which the run is recorded, if that is near.
     pub(super) fn follow(&mut self, time: f64, gravity: &Gravity) {
         if let Ok(motion) = &mut self.motion
             && time - motion.simulation.time() < NEAR
@@ -110,7 +110,7 @@ impl Ideal {
         }
     }
 
-    /// Comes to `time`, s, within the budget of a frame.
+    /// Advances to `time`, s, within the budget of a frame.
     pub(super) fn catch_up(&mut self, time: f64, gravity: &Gravity, clock: Clock) {
         if let Ok(motion) = &mut self.motion
             && motion.frame.time != time
@@ -120,7 +120,7 @@ impl Ideal {
         }
     }
 
-    /// Gravity has changed at `time`, s, or the run took another way from there.
+    /// Gravity has changed at `time`, s, or the run branched there.
     pub(super) fn forget_after(&mut self, time: f64) {
         if let Ok(motion) = &mut self.motion {
             motion.kept.retain(|(kept, _)| *kept <= time);
@@ -130,25 +130,25 @@ impl Ideal {
         }
     }
 
-    /// Everything at `time`, s; `None` where it has not come there.
+    /// The frame at `time`, s; `None` if that was not reached.
     pub fn frame(&self, time: f64) -> Option<&Frame> {
         let motion = self.motion.as_ref().ok()?;
         (motion.frame.time == time).then_some(&motion.frame)
     }
 
-    /// Whether it is on its way to `time`, s.
+    /// Whether it still has to reach `time`, s.
     pub fn is_behind(&self, time: f64) -> bool {
         let motion = self.motion.as_ref();
         motion.is_ok_and(|motion| motion.frame.time != time && motion.stopped.is_none())
     }
 
-    /// The output point in `frame` of the run less the ideal one at that time, m; `None` where it has not come there.
+    /// Output point of the run in `frame` minus the ideal one at that time, m; `None` if that time was not reached.
     pub fn output_error(&self, frame: &Frame) -> Option<Vec3> {
         let ideal = self.frame(frame.time)?;
         Some(output_point(&self.output, frame)? - output_point(&self.output, ideal)?)
     }
 
-    /// Why there is none, or none from some time on.
+    /// Why there is none, or none after some time.
     pub fn fault(&self) -> Option<String> {
         match &self.motion {
             Err(error) => Some(format!("with ideal joints, {error}")),
@@ -161,7 +161,7 @@ impl Ideal {
 }
 
 impl Motion {
-    /// Puts the state at `time`, s, into the frame, if it may take as many steps as that needs.
+    /// Samples the state at `time`, s, into the frame, if it may take the steps needed to get there.
     fn place(&mut self, time: f64, gravity: &Gravity, mut may_step: impl FnMut() -> bool) {
         if time < self.simulation.step_start() {
             self.go_back(time);
@@ -181,7 +181,7 @@ impl Motion {
         self.simulation.sample(time, &mut self.frame);
     }
 
-    /// Keeps the present state, if the one before is long ago.
+    /// Keeps the present state if the last one kept is old enough.
     fn keep(&mut self, now: f64) {
         let newest = self.kept.last().map_or(f64::NEG_INFINITY, |kept| kept.0);
         if now < newest + self.apart {
@@ -198,13 +198,13 @@ impl Motion {
         self.kept.push((now, self.simulation.snapshot()));
     }
 
-    /// Back to a kept state at `time`, s, or before it.
+    /// Restores the latest state kept at or before `time`, s.
     fn go_back(&mut self, time: f64) {
         let known = self.kept.partition_point(|(kept, _)| *kept <= time);
         let Some((_, snapshot)) = self.kept.get(known.max(1) - 1) else {
             return;
         };
-        // A state of this very motion can be taken up again.
+        // A state of this same motion can always be restored.
         if self.simulation.restore(snapshot).is_ok() {
             self.stopped = None;
         }
@@ -335,7 +335,7 @@ mod tests {
         let expected = output_point(&scene.output, &frame).expect("has a body");
         let off = (there(&player) - expected).norm();
         assert!(off < 1e-9, "{off:e}");
-        // Switched on late, it knows of the change all the same.
+        // Switched on late, it still knows of the change.
         player.set_ideal(false);
         player.set_ideal(true);
         reach(&mut player);

@@ -10,7 +10,7 @@ pub enum Action {
     Step,
     StepBack,
     Backwards,
-    /// To the impact after, or before.
+    /// To the next or the previous impact.
     Impact {
         forward: bool,
     },
@@ -163,10 +163,10 @@ pub const POINTER: [(&str, &str); 10] = [
     ("Arrows after a drag on a slider", "Move that slider"),
 ];
 
-/// Where the slider that has the focus is noted.
+/// Where the focused slider is stored.
 const SLIDER: &str = "slider with the focus";
 
-/// A slider that keeps the arrow keys once it was dragged, or reached by Tab, until something else is clicked.
+/// A slider that keeps the arrow keys once dragged or reached by Tab, until something else is clicked.
 pub fn slider(ui: &mut Ui, slider: Slider<'_>) -> Response {
     let response = ui.add(slider);
     if response.drag_started() {
@@ -184,8 +184,8 @@ pub fn slider(ui: &mut Ui, slider: Slider<'_>) -> Response {
     response
 }
 
-/// Actions of the keys pressed since the last frame. A field that is being typed in keeps all keys; a slider that has the
-/// focus keeps the arrows, any other control the space bar, too.
+/// Actions of the keys pressed since the last frame. A text field in use keeps all keys; a focused slider keeps the arrows, and
+/// any other focused control the space bar as well.
 pub fn pressed(ctx: &egui::Context) -> Vec<Action> {
     if ctx.text_edit_focused() {
         return Vec::new();
@@ -193,7 +193,7 @@ pub fn pressed(ctx: &egui::Context) -> Vec<Action> {
     let focused = ctx.memory(egui::Memory::focused);
     let slider = focused.is_some() && focused == ctx.data(|data| data.get_temp(Id::unique(SLIDER)));
     if slider {
-        // A slider of egui's knows the arrows along it only.
+        // egui's slider handles only the arrows along it.
         ctx.input_mut(|input| {
             for event in &mut input.events {
                 if let egui::Event::Key { key, .. } = event {
@@ -228,7 +228,7 @@ pub fn pressed(ctx: &egui::Context) -> Vec<Action> {
                     let binding = BINDINGS
                         .iter()
                         .find(|b| b.key == *key && !held_back(*key))?;
-                    // Held down, only these go on.
+                    // Only these repeat while held down.
                     let repeats = matches!(
                         binding.action,
                         Action::Step | Action::StepBack | Action::Faster | Action::Slower

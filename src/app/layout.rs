@@ -14,9 +14,9 @@ enum Arrangement {
     /// Panels beside and below the picture.
     Large,
     /// Picture above, sheet below.
-    Upright,
+    Portrait,
     /// Picture on the left, sheet on the right.
-    Lying,
+    Landscape,
 }
 
 /// What the sheet of a small window shows.
@@ -32,17 +32,17 @@ pub enum Sheet {
 
 /// The entries of a menu; on a low screen they scroll.
 pub(super) fn entries(ui: &mut Ui, add: impl FnOnce(&mut Ui)) {
-    // Its frame, and a strip of what lies under it.
+    // Room for its frame and for a strip of what lies under it.
     let most = ui.ctx().content_rect().height() - 48.0;
     ScrollArea::vertical()
         .max_height(most)
-        // Else it would stay as low as it was at first when an entry comes to need more room.
+        // Otherwise it would keep its first height when an entry later needs more room.
         .min_scrolled_height(most)
         .show(ui, add);
 }
 
-/// A menu. Opened by the keyboard it gives its first entry the focus, and it closes when the focus leaves it; `stays`: a click
-/// on an entry leaves it open.
+/// A menu. Opened by the keyboard, it focuses its first entry, and it closes when it loses the focus; `stays`: a click on an
+/// entry leaves it open.
 pub(super) fn menu(
     ui: &mut Ui,
     name: &str,
@@ -56,7 +56,7 @@ pub(super) fn menu(
         egui::PopupCloseBehavior::CloseOnClick
     };
     let opened = ui.scope_id().with((name, "opened by keyboard"));
-    // In the pass after the opening the entries are there, and this one goes from the button to the first of them.
+    // In the pass after opening the entries exist, and this moves the focus from the button to the first of them.
     if ui
         .data_mut(|data| data.remove_temp::<bool>(opened))
         .is_some()
@@ -74,7 +74,7 @@ pub(super) fn menu(
             .memory(egui::Memory::focused)
             .filter(|focused| *focused != response.id)
             .and_then(|focused| ui.ctx().read_response(focused))
-            // What a menu opens in its turn lies in the foreground, too.
+            // A popup opened from a menu is in the foreground, too.
             .is_some_and(|focused| focused.layer_id.order != egui::Order::Foreground);
         if elsewhere {
             Popup::close_id(ui.ctx(), Popup::default_response_id(&response));
@@ -83,14 +83,14 @@ pub(super) fn menu(
     response
 }
 
-/// Closes the menu that `ui` is in; an entry that stands elsewhere, too, is in none there.
+/// Closes the menu that `ui` is in, if any: an entry may also be shown outside a menu.
 pub(super) fn close_menu(ui: &Ui) {
     if egui::containers::menu::is_in_menu(ui) {
         ui.close();
     }
 }
 
-/// A place of `lines` lines of small text, whatever is in it: what is too long scrolls, and nothing below it moves.
+/// A space of `lines` lines of small text, whatever its content: what is too long scrolls, and nothing below moves.
 pub(super) fn reserved(ui: &mut Ui, id: &str, lines: usize, add: impl FnOnce(&mut Ui)) {
     let line = ui.text_style_height(&egui::TextStyle::Small) + 2.0;
     let height = lines as f32 * line;
@@ -114,7 +114,7 @@ pub(super) fn reserved(ui: &mut Ui, id: &str, lines: usize, add: impl FnOnce(&mu
     });
 }
 
-/// Over the picture, while a file is held above the window.
+/// Hint over the picture while a file is dragged over the window.
 fn drop_hint(ui: &Ui, area: egui::Rect) {
     if ui.input(|input| input.raw.hovered_files.is_empty()) {
         return;
@@ -141,9 +141,9 @@ impl App {
     pub fn show(&mut self, ui: &mut Ui) {
         let size = ui.available_size();
         let arrangement = if size.y < SHORT {
-            Arrangement::Lying
+            Arrangement::Landscape
         } else if size.x < NARROW {
-            Arrangement::Upright
+            Arrangement::Portrait
         } else {
             Arrangement::Large
         };
@@ -154,16 +154,16 @@ impl App {
         if self.fingers != Some(fingers) {
             theme::apply_size(ui.ctx(), fingers);
             self.fingers = Some(fingers);
-            // This pass has it already: the picture is framed in the place that it keeps.
+            // Apply it in this pass already, so that the picture is framed at its final size.
             ui.set_style(ui.ctx().global_style());
         }
         self.summary(ui);
         if self.dialog.is_some() {
-            // Out of reach, and no tooltip stays open above the dialog. The dialog's own backdrop dims what lies under it.
+            // Disabled, so that no tooltip stays open above the dialog. The dialog's own backdrop dims what lies under it.
             ui.visuals_mut().disabled_alpha = 1.0;
             ui.disable();
         }
-        let margin = if arrangement == Arrangement::Lying {
+        let margin = if arrangement == Arrangement::Landscape {
             egui::Margin::symmetric(12, 4)
         } else {
             egui::Margin::symmetric(12, 8)
@@ -174,8 +174,8 @@ impl App {
             .show(ui, |ui| self.header(ui, compact));
         match arrangement {
             Arrangement::Large => self.side_by_side(ui, bar),
-            Arrangement::Upright => self.upright(ui, bar),
-            Arrangement::Lying => self.lying(ui, bar),
+            Arrangement::Portrait => self.portrait(ui, bar),
+            Arrangement::Landscape => self.landscape(ui, bar),
         }
         self.dialog_ui(ui.ctx());
     }
@@ -230,7 +230,7 @@ impl App {
             .default_size(plots_height)
             .size_range(150.0..=600.0)
             .show_collapsible(ui, show_plots, |ui| {
-                // Else the panel would shrink to what the plots leave of it.
+                // Otherwise the panel would shrink to what the plots leave of it.
                 ui.take_available_space();
                 plots.header(ui, player);
                 if let Some(time) = plots.ui(ui, player).filter(|_| free) {
@@ -261,7 +261,7 @@ impl App {
         }
     }
 
-    fn upright(&mut self, ui: &mut Ui, bar: Frame) {
+    fn portrait(&mut self, ui: &mut Ui, bar: Frame) {
         if self.sheet.is_some() {
             let height = (ui.available_height() * 0.42).max(160.0);
             Panel::bottom("sheet")
@@ -287,7 +287,7 @@ impl App {
         }
     }
 
-    fn lying(&mut self, ui: &mut Ui, bar: Frame) {
+    fn landscape(&mut self, ui: &mut Ui, bar: Frame) {
         let free = !self.is_under_way();
         let asked = Panel::bottom("transport")
             .frame(bar)
@@ -331,8 +331,7 @@ impl App {
         }
     }
 
-    /// What the sheet shows; the chosen one chosen again folds it away. `backwards` where the layout runs from right to
-    /// left.
+    /// What the sheet shows; choosing the same again folds it away. `backwards` where the layout runs from right to left.
     fn sheet_tabs(&mut self, ui: &mut Ui, backwards: bool) {
         let mut tabs = [
             (Sheet::Controls, "Controls", "Parameters shown or hidden"),
@@ -351,7 +350,7 @@ impl App {
         }
     }
 
-    /// Shows `sheet`, or folds it away where it is on show.
+    /// Shows `sheet`, or folds it away if it is shown.
     pub(super) fn fold(&mut self, sheet: Sheet) {
         self.sheet = (self.sheet != Some(sheet)).then_some(sheet);
     }
@@ -429,8 +428,9 @@ impl App {
                     ui.horizontal_wrapped(|ui| self.viewport.camera_buttons(ui, false));
                     ui.separator();
                 }
-                self.viewport.options_ui(ui);
                 self.instruments(ui);
+                ui.add_space(4.0);
+                self.viewport.options_ui(ui);
             });
             if !narrow {
                 ui.with_layout(backwards, |ui| self.viewport.camera_buttons(ui, true));
@@ -445,8 +445,8 @@ impl App {
             .inner
     }
 
-    /// What has to be said, over the lower edge of the picture: it comes and goes by itself, and moves nothing. Returns the
-    /// part of `area` that is free of it.
+    /// Messages over the lower edge of the picture: they come and go by themselves, and move nothing. Returns the part of
+    /// `area` left free.
     fn messages(&mut self, ui: &mut Ui, area: egui::Rect) -> egui::Rect {
         let id = Id::unique("height of the messages");
         if !self.has_messages() {
@@ -474,7 +474,7 @@ impl App {
         area.with_max_y(place.top() - 8.0)
     }
 
-    /// What was just done, for a few seconds.
+    /// What was just done, shown for a few seconds.
     fn notice_plate(&mut self, ui: &Ui, area: egui::Rect) {
         let now = ui.input(|input| input.time);
         let Some(notice) = &mut self.notice else {

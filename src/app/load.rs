@@ -1,18 +1,18 @@
-//! Takes a new run to a section of a sweep by the same steps that the sweep took, a bounded share of each frame.
+//! Brings a new run to a section of a sweep by the same steps that the sweep took, within a time budget per frame.
 
 use super::player::Player;
 use crate::analysis::section::Schedule;
 use crate::analysis::source::SceneSource;
 use crate::analysis::swept::SweptPoint;
 
-/// One point on the way: what is set there and where its steps end.
+/// One sweep point on the way: its settings, and when its steps end.
 #[derive(Clone, Debug, PartialEq)]
 struct Leg {
     settings: Vec<(String, String)>,
     schedule: Schedule,
 }
 
-/// A section of a sweep, and the way there.
+/// A section of a sweep, and how to reach it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Load {
     /// The scene as the run starts.
@@ -28,8 +28,8 @@ pub struct Load {
 pub type Arrival = Result<(), String>;
 
 impl Load {
-    /// The way to section `section` (discarded ones included) of the point `index` of a sweep over `scene` with so many
-    /// `periods` at each point. `None` where a point on the way is missing.
+    /// The way to section `section` (discarded ones included) of point `index` of a sweep over `scene` with `periods` periods
+    /// per point. `None` if a point on the way is missing.
     pub fn new<'a>(
         scene: &SceneSource,
         points: impl Fn(usize) -> Option<&'a SweptPoint>,
@@ -76,12 +76,12 @@ impl Load {
         &self.varied
     }
 
-    /// Part of the way that lies behind, 0 to 1.
+    /// Fraction of the way completed, 0 to 1.
     pub fn fraction(&self, player: &Player) -> f32 {
         (player.simulation().time() / self.total).clamp(0.0, 1.0) as f32
     }
 
-    /// Goes on while `may_step`; how it ended once it is there.
+    /// Continues while `may_step`; returns how it ended, once there.
     pub fn advance(
         &mut self,
         player: &mut Player,
@@ -167,7 +167,7 @@ mod tests {
             let wanted = player.wanted().contact.clearance;
             assert_eq!(wanted, point.values[0]);
         }
-        // One that was cancelled away leaves no way to those after it.
+        // A point that was cancelled makes those after it unreachable.
         points[1] = None;
         let find = |index: usize| points.get(index)?.as_ref();
         assert_eq!(Load::new(&task.scene, find, 0, 1, 3), None);

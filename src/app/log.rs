@@ -1,7 +1,7 @@
 //! What was done to a run since its start: enough to take the same steps again and get the same bits.
 //!
-//! A change happens between two steps, so the number of steps taken says exactly when. Sampling and drawing never change a
-//! step and are not in it.
+//! A change happens between two steps, so the number of steps taken says exactly when. Sampling and drawing never change a step
+//! and are not logged.
 
 use crate::analysis::section::Schedule;
 use crate::scene::Vec3;
@@ -20,7 +20,7 @@ pub enum Event {
         /// Value.
         value: String,
     },
-    /// A parameter was given back the value of the scene's file.
+    /// A parameter was reset to the value in the scene's file.
     Original {
         /// Key.
         key: String,
@@ -34,7 +34,7 @@ pub enum Event {
         /// How many.
         sections: u64,
     },
-    /// Somebody pulled, or let go.
+    /// The user pulled, or let go.
     Pull(Option<Pulled>),
     /// A step was tried and the divergence guard refused it.
     Stop,
@@ -45,7 +45,7 @@ impl Event {
     pub fn set(key: &str, value: &str) -> Self {
         Self::Set {
             key: key.to_owned(),
-            // One line for one event: line breaks separate no more than spaces do.
+            // One line per event: line breaks count as spaces.
             value: value.split_whitespace().collect::<Vec<_>>().join(" "),
         }
     }
@@ -68,7 +68,7 @@ impl Event {
         })
     }
 
-    /// What happened, for a reader.
+    /// Description of the event.
     pub fn words(&self) -> String {
         match self {
             Self::Set { key, value } => format!("{key} = {value}"),
@@ -81,7 +81,7 @@ impl Event {
     }
 }
 
-/// A pull: body, and what [`Pull`] holds as numbers: point, hand, stiffness, damping.
+/// A pull: the body, and the numbers of a [`Pull`]: point, hand, stiffness, damping.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pulled {
     body: usize,
@@ -190,7 +190,7 @@ impl Log {
     /// Reads what [`Self::text`] wrote.
     ///
     /// # Errors
-    /// The line that is none.
+    /// The line that is not an entry.
     pub fn read(base: Vec<(String, String)>, text: &str) -> Result<Self, String> {
         let mut log = Self {
             base,

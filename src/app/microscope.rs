@@ -1,4 +1,4 @@
-//! The microscope: an inset over the 3D view that shows one ball joint so large that its play can be seen.
+//! The microscope: an inset over the 3D view that magnifies one ball joint until its play is visible.
 
 mod draw;
 mod sight;
@@ -17,15 +17,15 @@ use sight::Sight;
 
 /// Least size of the inset, points.
 const LEAST: egui::Vec2 = vec2(190.0, 170.0);
-/// Width below which it opens only where there is no more room, points.
+/// Least width at which it opens unless there is no more room, points.
 const USUAL: f32 = 250.0;
 /// Height of the section of the contact, points.
 const SECTION: f32 = 112.0;
-/// From this width on, pictures and numbers stand side by side, points.
+/// From this width on, pictures and numbers are side by side, points.
 const WIDE: f32 = 430.0;
 /// Width of the numbers beside the pictures, points.
 const NUMBERS: f32 = 215.0;
-/// Least reference of the arrow of velocity, m/s.
+/// Least reference speed of the velocity arrow, m/s.
 const SLOWEST: f64 = 1e-4;
 
 /// The inset and its choices.
@@ -38,7 +38,7 @@ pub struct Microscope {
 }
 
 impl Microscope {
-    /// Whether it is on show.
+    /// Whether it is shown.
     pub fn is_open(&self) -> bool {
         self.open
     }
@@ -58,7 +58,7 @@ impl Microscope {
         self.joint = joint;
     }
 
-    /// Where the clearance was drawn last; `None` where nothing with clearance was.
+    /// Where the clearance was last drawn; `None` if nothing with clearance was.
     pub fn circle(&self) -> Option<Circle> {
         self.circle
     }
@@ -388,7 +388,7 @@ impl App {
         &mut self.microscope
     }
 
-    /// Puts ball joint `joint` into focus where the scene has it: the view follows its centre.
+    /// Puts ball joint `joint` into focus if the scene has it: the view follows its centre.
     pub(super) fn focus(&mut self, joint: usize) {
         self.microscope.focus(joint);
         self.viewport.centre(&self.player, joint);
@@ -409,9 +409,8 @@ impl App {
         }
     }
 
-    /// What the menu of the view switches on beside it.
+    /// The instruments in the view menu.
     pub(super) fn instruments(&mut self, ui: &mut Ui) {
-        ui.add_space(4.0);
         ui.label("Instruments");
         ui.checkbox(&mut self.microscope.open, "Microscope")
             .on_hover_text(

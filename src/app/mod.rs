@@ -1,6 +1,6 @@
-//! The application: one [`App`] that the desktop window, the browser and headless frames share.
+//! The application: one [`App`] shared by the desktop window, the browser and headless frames.
 //!
-//! `logic` moves the state (keys, stepping, recording), `ui` shows it.
+//! `logic` advances the state (keys, stepping, recording), `ui` shows it.
 
 mod accuracy;
 mod announce;
@@ -45,12 +45,13 @@ mod viewport;
 mod watch;
 #[cfg(not(target_arch = "wasm32"))]
 mod window;
+mod zoom;
 
 use eframe::egui::{self, ThemePreference, Ui};
 use eframe::egui_wgpu;
 
 use crate::render;
-use crate::scene::{DEFAULT_SCENE, Scene};
+use crate::scene::{DEFAULT_SCENE, Scene, Vec3};
 use crate::simulate::{Simulation, StartError};
 use crate::view::{Preset, ViewOptions};
 
@@ -80,7 +81,7 @@ use viewport::Viewport;
 #[cfg(not(target_arch = "wasm32"))]
 pub use window::{WindowError, run_native};
 
-/// Most stepping towards the state of a link in one frame, s: the window still answers twenty times a second.
+/// Time budget per frame for replaying towards the state of a link, s: the window still responds twenty times a second.
 const REPLAY_BUDGET: f64 = 0.03;
 
 /// Whether a frame that begins now may still step.
@@ -89,32 +90,32 @@ fn replay_budget(clock: Clock) -> impl Fn() -> bool {
     move || clock() - start < REPLAY_BUDGET
 }
 
-/// How often a computation beside the interface is asked how far it is.
+/// How often a background computation is polled for progress.
 const POLL: std::time::Duration = std::time::Duration::from_millis(100);
 
 /// How the application starts.
 #[derive(Clone, Debug)]
 pub struct AppOptions {
-    /// The scene on show.
+    /// The scene to show.
     pub scene: Scene,
     /// Light, dark, or as the system asks.
     pub theme: ThemePreference,
-    /// Whether time passes from the start.
+    /// Whether the run plays from the start.
     pub playing: bool,
     /// Simulated seconds per second.
     pub time_scale: f64,
-    /// Choices about the picture.
+    /// View options.
     pub view: ViewOptions,
     /// The link that `scene` comes from: its state is reproduced.
     pub link: Option<Link>,
-    /// What to tell the user at once, say why a link could not be opened.
+    /// A message to show at once, e.g. why a link could not be opened.
     pub problem: Option<String>,
-    /// What measures how much of a frame is spent on stepping.
+    /// Clock that measures the stepping time of a frame.
     pub clock: Clock,
 }
 
 impl AppOptions {
-    /// Plays `scene` fifty times slower than it is, its play magnified so that it can be seen.
+    /// Plays `scene` fifty times slower than real time, with its play magnified enough to be visible.
     pub fn new(scene: Scene) -> Self {
         Self {
             scene,
@@ -131,10 +132,10 @@ impl AppOptions {
         }
     }
 
-    /// What a link asks for: a URL, a query (`?…`), a fragment (`#…`) or bare pairs. Nothing in it is the default scene.
+    /// Reads a link: a URL, a query (`?…`), a fragment (`#…`) or bare pairs. An empty one gives the default scene.
     ///
     /// # Errors
-    /// A link that cannot be read, a scene that it does not describe rightly or that cannot start; in words.
+    /// A link that cannot be read, or whose scene is invalid or cannot start; in words.
     pub fn from_link(text: &str) -> Result<Self, String> {
         let link = Link::parse(text).map_err(|error| error.to_string())?;
         let scene = link.load().map_err(|error| format!("link: {error}"))?;
@@ -155,7 +156,7 @@ impl AppOptions {
         Ok(options)
     }
 
-    /// As [`Self::from_link`]; of a bad link the default scene, and the reason as [`Self::problem`].
+    /// As [`Self::from_link`], but a bad link gives the default scene, with the reason as [`Self::problem`].
     pub fn from_link_or_default(text: &str) -> Self {
         Self::from_link(text).unwrap_or_else(|problem| {
             let scene = Scene::load(DEFAULT_SCENE, &[]).expect("built-in scenes are right");
@@ -167,12 +168,12 @@ impl AppOptions {
     }
 }
 
-/// Camera, followed part and plots as `link` has them; what it says nothing about stays.
+/// Applies camera, followed part and plots of `link`; what it does not mention stays.
 fn show_link(link: &Link, player: &Player, viewport: &mut Viewport, plots: &mut Plots) {
     if let Some(pose) = link.camera {
         viewport.set_pose(pose);
     }
-    // That there is such a part was found out when the link was read.
+    // Reading the link has already checked that the part exists.
     viewport.follow(link.followed(player.scene()).ok().flatten());
     if let Some(chosen) = &link.plots {
         plots.chosen.clone_from(chosen);
@@ -182,7 +183,7 @@ fn show_link(link: &Link, player: &Player, viewport: &mut Viewport, plots: &mut 
     }
 }
 
-/// What was just done, told for a few seconds.
+/// A message about what was just done, shown for a few seconds.
 struct Notice {
     text: String,
     /// When it was first shown, s of viewing.
@@ -195,7 +196,7 @@ impl Notice {
         Self { text, since }
     }
 
-    /// Longer words take longer to read.
+    /// Longer messages take longer to read.
     fn time_left(&mut self, now: f64) -> f64 {
         let length = 3.0 + 0.05 * self.text.len() as f64;
         *self.since.get_or_insert(now) + length - now
@@ -212,21 +213,21 @@ pub struct App {
     timeline: Timeline,
     bench: Bench,
     dialog: Option<Dialog>,
-    /// What the last attempt to open or reset said.
+    /// Error of the last attempt to open or reset.
     problem: Option<String>,
     show_controls: bool,
     show_plots: bool,
     show_bench: bool,
-    /// Of a small window: what its sheet shows.
+    /// In a small window: what its sheet shows.
     sheet: Option<Sheet>,
     compact: bool,
-    /// Whether a finger was ever seen.
+    /// Whether touch input was ever seen.
     touched: bool,
-    /// Whether the controls have the size for fingers; `None` before the first pass.
+    /// Whether the controls are sized for fingers; `None` before the first pass.
     fingers: Option<bool>,
     host: Box<dyn Host>,
     replay: Option<Replay>,
-    /// The way to a section of a sweep, and whether a twin is to follow from there.
+    /// A run in progress to a section of a sweep, and whether a twin is to start there.
     load: Option<(Load, bool)>,
     verdict: Option<Verdict>,
     notice: Option<Notice>,
@@ -237,7 +238,7 @@ pub struct App {
     picture_rect: egui::Rect,
     /// The graphics adapter and its interface; "" without a window.
     renderer: String,
-    /// The graphics of the window, to draw pictures beside it.
+    /// The graphics of the window, to draw pictures off screen.
     graphics: Option<egui_wgpu::RenderState>,
 }
 
@@ -305,7 +306,7 @@ impl App {
         Ok(app)
     }
 
-    /// Goes on in another window, or with other graphics after the first were lost: nothing else changes.
+    /// Continues in another window, or with new graphics after the old were lost; nothing else changes.
     pub fn attach(
         &mut self,
         ctx: &egui::Context,
@@ -322,7 +323,7 @@ impl App {
         }
         self.fingers = None;
         self.graphics = state.cloned();
-        // A picture on its way is lost.
+        // A pending picture is lost.
         self.picture.forget();
     }
 
@@ -336,9 +337,14 @@ impl App {
         &mut self.player
     }
 
-    /// Where the camera stands or is going; `None` before the first picture.
+    /// Where the camera is or is moving to; `None` before the first picture.
     pub fn camera_pose(&self) -> Option<CameraPose> {
         self.viewport.pose()
+    }
+
+    /// Where a point of the scene, m, is drawn, points of the window; `None` behind the camera.
+    pub fn place_in_view(&self, point: &Vec3) -> Option<egui::Pos2> {
+        self.viewport.place(point, self.picture_rect)
     }
 
     /// Which plots are shown.
@@ -351,18 +357,18 @@ impl App {
         &self.bench
     }
 
-    /// Whether the run is on its way to the state of a link or to a section of a sweep: it is out of reach until then.
+    /// Whether the run is being replayed to the state of a link or to a section of a sweep; until then it takes no commands.
     fn is_under_way(&self) -> bool {
         self.replay.is_some() || self.load.is_some()
     }
 
-    /// How far the way to a section of a sweep is, 0 to 1; `None` where none is on its way.
+    /// Progress of the run to a section of a sweep, 0 to 1; `None` if there is none.
     pub fn loading(&self) -> Option<f32> {
         let (load, _) = self.load.as_ref()?;
         Some(load.fraction(&self.player))
     }
 
-    /// Runs to a section of a sweep; what that would change beyond the varied parameter is asked first.
+    /// Runs to a section of a sweep; asks first if that changes more than the varied parameter.
     fn start_load(&mut self, load: Load) {
         match load.scene.scene() {
             Err(error) => self.problem = Some(error.to_string()),
@@ -378,7 +384,7 @@ impl App {
         }
     }
 
-    /// Runs the scene of a sweep anew towards a section.
+    /// Restarts the scene of a sweep and runs it towards a section.
     fn go_to_section(&mut self, load: Load) {
         let phase = self.player.watch().phase();
         let twin = self.player.twin().is_some();
@@ -396,7 +402,7 @@ impl App {
         }
     }
 
-    /// Goes on towards a section within the budget of a frame.
+    /// Continues towards a section within the budget of a frame.
     fn advance_load(&mut self) {
         let Some((load, twin)) = &mut self.load else {
             return;
@@ -454,7 +460,7 @@ impl App {
         }
     }
 
-    /// What the mechanism is doing, in sentences; about once a second, and when something happens, there are new ones.
+    /// What the mechanism is doing, in sentences; renewed about once a second and when something happens.
     pub fn announcement(&self) -> &str {
         self.announcer.text()
     }
@@ -464,13 +470,13 @@ impl App {
         self.verdict.as_ref()
     }
 
-    /// How far the way to the state of a link is, 0 to 1; `None` where none is on its way.
+    /// Progress of the replay to the state of a link, 0 to 1; `None` if there is none.
     pub fn replaying(&self) -> Option<f32> {
         let replay = self.replay.as_ref()?;
         Some(replay.fraction(&self.player))
     }
 
-    /// Stays where the way to the state of a link, or to a section, has come to.
+    /// Stops the replay to the state of a link, or to a section, where it is.
     fn cancel_replay(&mut self) {
         if self.load.take().is_some() {
             self.viewport.arrive(&self.player);
@@ -482,8 +488,7 @@ impl App {
         }
     }
 
-    /// Opens what a link says in the place of the running scene; on an error that one stays, the reason is shown and
-    /// returned.
+    /// Opens a link in place of the running scene; on an error that scene stays, and the reason is shown and returned.
     ///
     /// # Errors
     /// As [`AppOptions::from_link`].
@@ -509,14 +514,14 @@ impl App {
         opened
     }
 
-    /// Pauses and runs on until `time`, s, whatever it takes. What struck on the way is in the record, and no longer glows.
+    /// Pauses and runs on until `time`, s, however long that takes. Impacts on the way are recorded but no longer glow.
     pub fn run_to(&mut self, time: f64) {
         self.player.run_to(time);
         self.player.advance(0.0);
         self.viewport.arrive(&self.player);
     }
 
-    /// Moves the state on by `dt` seconds; whether it goes on moving by itself.
+    /// Advances the state by `dt` seconds; returns whether it keeps moving by itself.
     pub fn advance(&mut self, dt: f64) -> bool {
         if let Some(replay) = &mut self.replay {
             let may_step = replay_budget(self.player.clock);
@@ -564,7 +569,7 @@ impl App {
     }
 
     fn act(&mut self, ctx: &egui::Context, action: Action) {
-        // Under a dialog the machine is out of reach.
+        // While a dialog is open the machine cannot be operated.
         if self.dialog.is_some() && !matches!(action, Action::Help | Action::Close) {
             return;
         }
@@ -593,7 +598,7 @@ impl App {
             Action::Backwards if player.is_playing_backwards() => player.set_playing(false),
             Action::Backwards => player.play_backwards(),
             Action::Impact { forward } => {
-                player.go_to_touch(self.viewport.focus(), forward);
+                player.go_to_contact(self.viewport.focus(), forward);
                 self.viewport.arrive(&self.player);
             }
             Action::Home | Action::End => {
@@ -660,7 +665,7 @@ impl App {
         }
     }
 
-    /// Tells what goes on, if it is time.
+    /// Announces what is going on, if an announcement is due.
     fn announce(&mut self, ctx: &egui::Context) {
         let now = ctx.input(|input| input.time);
         let (told, wait) = self.announcer.update(now, &self.player, &self.news());
@@ -704,7 +709,7 @@ impl App {
             }
             Some(Answer::Open(argument)) => {
                 if let Err(reason) = self.open_any(ctx, &argument) {
-                    // It is said in the dialog.
+                    // The dialog shows it.
                     self.problem = None;
                     self.dialog = Some(Dialog::Open {
                         path: argument,

@@ -13,13 +13,13 @@ use crate::view::{
 /// Distance of overlays from the edge, points.
 const MARGIN: f32 = 14.0;
 
-/// A colour of the view's as the painter's.
+/// A view colour as a painter colour.
 pub(super) fn colour(colour: Colour) -> Color32 {
     let [r, g, b, a] = colour.to_rgba8();
     Color32::from_rgba_unmultiplied(r, g, b, a)
 }
 
-/// Text with a halo in the colour of the ground, readable over anything.
+/// Text with a halo in the background colour, readable over anything.
 pub(super) fn text(
     painter: &Painter,
     at: Pos2,
@@ -53,7 +53,7 @@ pub fn labels(painter: &Painter, rect: Rect, scale: f32, list: &DrawList) {
     let halo = colour(list.background.bottom);
     let is_peak = |label: &&Label| matches!(label.kind, LabelKind::Peak(_));
     let (mut names, mut peaks) = (Vec::new(), list.labels.iter().filter(is_peak));
-    // Peaks come and go: they make room for the names.
+    // Peaks come and go, so they give way to the names.
     let mut labels = list.labels.iter().filter(|label| !is_peak(label));
     while let Some(label) = labels.next().or_else(|| peaks.next()) {
         let at = rect.min + vec2(label.pixel.x, label.pixel.y) / scale;
@@ -70,6 +70,10 @@ pub fn labels(painter: &Painter, rect: Rect, scale: f32, list: &DrawList) {
             let font = FontId::proportional(size);
             let words = painter.layout_no_wrap(label.text.to_string(), font, colour(label.colour));
             let mut place = anchor.anchor_size(at + beside, words.size());
+            if rect.contains(at) {
+                let over = place.max.x + 6.0 - rect.max.x;
+                place = place.translate(vec2(-over.max(0.0), 0.0));
+            }
             while let Some(name) = names.iter().find(|name: &&Rect| name.intersects(place)) {
                 place = place.translate(vec2(0.0, name.max.y + 1.0 - place.min.y));
             }
@@ -130,7 +134,7 @@ pub fn time(painter: &Painter, rect: Rect, time: f64, notes: &[String], theme: T
     }
 }
 
-/// About the width and height that the time takes with a note for each of so many joints, whatever they come to say; points.
+/// Approximate width and height of the time with one note per joint, whatever the notes say; points.
 pub fn plate(joints: usize) -> [f32; 2] {
     const LONGEST: f32 = 230.0;
     const LINE: f32 = 16.0;
@@ -169,7 +173,7 @@ pub fn legend(painter: &Painter, rect: Rect, scale: f32, legend: &Legend, theme:
     let (ink, halo) = (colour(palette.text), colour(palette.sky));
     let full = legend.pixels / scale;
     let longest = rect.width() * 0.4;
-    // Seen from near, the reference arrow may be wider than the view: show the part that fits.
+    // Close up, the reference arrow may be wider than the view: show the part that fits.
     let shown = full.min(longest);
     // Room for half a number beyond the last mark.
     let corner = lower_right(rect, MARGIN) - vec2(12.0, 0.0);
@@ -191,7 +195,7 @@ pub fn legend(painter: &Painter, rect: Rect, scale: f32, legend: &Legend, theme:
             Stroke::new(1.5, ink),
         );
         let words = format_quantity_digits(f64::from(tick.force), "", 3);
-        // Left out where it would touch the mark before it.
+        // Omitted where it would touch the mark before it.
         if x - 12.0 >= free_from {
             let placed = text(
                 painter,
@@ -314,6 +318,10 @@ pub fn wear_scale(painter: &Painter, rect: Rect, scale: &WearScale, theme: Theme
             ink,
             halo,
         );
+    }
+    if rect.width() < 520.0 {
+        // The note beside the time says what it is; the title would lie over a joint.
+        return;
     }
     let title = format!("Wear: {what}, {unit}");
     let place = pos2(bar.max.x, bar.min.y - 6.0);

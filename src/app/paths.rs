@@ -1,11 +1,11 @@
-//! Where each ball went in its socket lately: what the microscope draws as its path.
+//! The recent path of each ball in its socket, drawn by the microscope.
 
 use crate::scene::{Mat3, Scene};
 use crate::simulate::{Frame, RECORDED_JOINTS};
 
 /// Points kept of each ball joint.
 const KEPT: usize = 4096;
-/// A ball that has moved by less than this part of its clearance is where it was.
+/// A ball that has moved by less than this fraction of its clearance counts as unmoved.
 const GRAIN: f32 = 1e-3;
 
 /// Where a ball's centre was.
@@ -13,7 +13,7 @@ const GRAIN: f32 = 1e-3;
 pub struct Point {
     /// s.
     pub time: f64,
-    /// From the socket's centre, in the axes of the socket's body, m: a socket that turns takes its path along.
+    /// From the socket's centre, in the axes of the socket's body, m: the path turns with its socket.
     pub place: [f32; 3],
 }
 
@@ -24,7 +24,7 @@ pub struct Paths {
 }
 
 struct Path {
-    /// What carries the socket; `None` is the world.
+    /// The body that carries the socket; `None` is the world.
     carrier: Option<usize>,
     points: Vec<Point>,
 }
@@ -36,7 +36,7 @@ pub fn axes_of(frame: &Frame, body: Option<usize>) -> Mat3 {
 }
 
 impl Paths {
-    /// Nothing yet of `scene`.
+    /// Empty paths for `scene`.
     pub fn new(scene: &Scene) -> Self {
         let joints = scene.ball_joints.iter().take(RECORDED_JOINTS);
         let path = |joint: &crate::scene::BallJoint| Path {
@@ -48,8 +48,7 @@ impl Paths {
         }
     }
 
-    /// Takes an instant of the run. One that is earlier than the latest begins another future: what came after it is
-    /// forgotten.
+    /// Records an instant of the run. One earlier than the latest begins another future: what came after it is dropped.
     pub fn record(&mut self, frame: &Frame) {
         for (path, joint) in self.joints.iter_mut().zip(&frame.joints) {
             let points = &mut path.points;
@@ -67,12 +66,12 @@ impl Paths {
                     .map(|(a, b)| (a - b) * (a - b));
                 squares.sum::<f32>() > grain * grain
             };
-            // In an ideal joint there is nowhere to go.
+            // In an ideal joint the ball cannot move.
             if joint.clearance <= 0.0 || !points.last().is_none_or(moved) {
                 continue;
             }
             if points.len() == KEPT {
-                // Half at once: moving all of them for every point would cost more than it shows.
+                // Half at once: shifting all of them for every point would be too costly.
                 points.drain(..KEPT / 2);
             }
             let time = frame.time;
@@ -141,7 +140,7 @@ mod tests {
     fn what_lies_ahead_of_a_step_back_is_forgotten_and_memory_is_bounded() {
         let mut player = player("spcmm");
         player.run_to(8.6e-3);
-        // What is left of the step on show is recorded by the next.
+        // The rest of the displayed step is recorded by the next.
         player.single_step();
         player.step_back();
         let shown = player.pacer.shown();

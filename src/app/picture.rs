@@ -1,5 +1,5 @@
-//! Pictures to save: of the 3D view, with the plots below it, or of the whole window, at any size. They are drawn anew at that
-//! size by the same code, beside the window, so that labels and arrows are as sharp as the rest.
+//! Pictures to save: the 3D view, the view with the plots below it, or the whole window, at any size. They are redrawn off
+//! screen at that size by the same code, so that labels and arrows are as sharp as the rest.
 
 use eframe::egui::{self, Button, CentralPanel, DragValue, Frame, Panel, RichText, Ui, Vec2, vec2};
 use eframe::egui_wgpu::RenderState;
@@ -15,12 +15,12 @@ const PLOTS: f32 = 230.0;
 /// Least edge of a picture of the view, points, where its pixels allow it: a small view is drawn with room for its names and
 /// legend.
 const LEAST_EDGE: f32 = 1.1 * SMALL;
-/// Sizes to choose from, times that of the screen.
+/// Sizes to choose from, as multiples of the size on the screen.
 const TIMES: [u32; 3] = [1, 2, 4];
-/// Range of a typed edge, pixels. The adapter's own limit is told when it is met.
+/// Range of a typed edge, pixels. The adapter's own limit is reported when it is exceeded.
 const EDGE: std::ops::RangeInclusive<u32> = 16..=65_536;
-/// Time after which a picture that never came is given up, s.
-const PATIENCE: f64 = 20.0;
+/// Timeout for a picture that does not arrive, s.
+const TIMEOUT: f64 = 20.0;
 
 /// What a picture shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -50,16 +50,16 @@ impl Contents {
     ];
 }
 
-/// What the next picture is to be, and one that is on its way.
+/// Settings of the next picture, and a pending one.
 pub struct Picture {
     contents: Contents,
-    /// Times the size on the screen; `None`: the own size.
+    /// Multiple of the size on the screen; `None`: the typed size `own`.
     times: Option<u32>,
     own: [u32; 2],
-    /// The size on the screen of what is drawn, points, and pixels per point, where a picture is asked for.
+    /// A picture has been requested.
     asked: bool,
     pending: Option<(Pending, f64)>,
-    /// What is being drawn beside the window, in the middle of it.
+    /// What is being drawn off screen, while it is being drawn.
     drawn: Option<Contents>,
 }
 
@@ -82,12 +82,12 @@ impl Picture {
         self.drawn.is_some_and(|drawn| drawn != Contents::Window)
     }
 
-    /// Gives up what is on its way.
+    /// Gives up a pending picture.
     pub fn forget(&mut self) {
         (self.asked, self.pending) = (false, None);
     }
 
-    /// Pixels of the picture and pixels per point in it, where what it shows is `points` large on the screen.
+    /// Size of the picture in pixels, and its pixels per point, if its content measures `points` on the screen.
     fn size(&self, points: Vec2, screen: f32) -> ([u32; 2], f32) {
         let (pixels, scale) = match self.times {
             Some(times) => {
@@ -102,7 +102,7 @@ impl Picture {
         if self.times == Some(1) {
             return (pixels, scale);
         }
-        // Letters of fewer pixels than on a plain screen cannot be read; on a small view they would leave no room for names.
+        // Text of fewer pixels than on an ordinary screen is illegible; on a small view, larger text leaves no room for names.
         let readable = screen.min(1.0);
         let room = match self.contents {
             Contents::Window => f32::INFINITY,
@@ -113,7 +113,7 @@ impl Picture {
 }
 
 impl App {
-    /// The choices about the picture, and its button.
+    /// The options of the picture, and its button.
     pub(super) fn picture_menu(&mut self, ui: &mut Ui) {
         let help = "A picture as chosen below, PNG";
         if ui.button("Picture…").on_hover_text(help).clicked() {
@@ -168,14 +168,14 @@ impl App {
         points.max(Vec2::splat(1.0))
     }
 
-    /// Saves a picture as chosen, once it is back from the graphics adapter; nothing waits for it.
+    /// Saves a picture as chosen, once it has been read back from the graphics adapter; does not block.
     pub fn save_picture(&mut self, ctx: &egui::Context) {
         self.picture.forget();
         self.picture.asked = true;
         ctx.request_repaint();
     }
 
-    /// Draws the picture that [`Self::save_picture`] is about, and takes it once it is there.
+    /// Draws the picture that [`Self::save_picture`] asked for, and takes it once it is there.
     pub(super) fn receive_picture(&mut self, ctx: &egui::Context) {
         let now = ctx.input(|input| input.time);
         if std::mem::take(&mut self.picture.asked) {
@@ -188,7 +188,7 @@ impl App {
             return;
         };
         let Some(image) = pending.take() else {
-            if now - *since > PATIENCE {
+            if now - *since > TIMEOUT {
                 self.picture.forget();
                 self.problem = Some("The picture never came back from the graphics adapter".into());
             }
@@ -215,7 +215,7 @@ impl App {
         }
     }
 
-    /// Has the picture drawn beside the window.
+    /// Draws the picture off screen.
     fn draw_picture(&mut self, ctx: &egui::Context) -> Result<Pending, String> {
         let state: RenderState = self
             .graphics
@@ -225,7 +225,7 @@ impl App {
             .picture
             .size(self.picture_points(ctx), ctx.pixels_per_point());
         let mut canvas = Canvas::beside(&state);
-        // Panels, folded parts and what is scrolled to are as in the window.
+        // Panels, collapsed parts and scroll positions are as in the window.
         let memory = ctx.memory(Clone::clone);
         canvas.ctx.memory_mut(|own| *own = memory);
         canvas.ctx.options_mut(|options| options.zoom_factor = 1.0);

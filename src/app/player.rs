@@ -1,6 +1,6 @@
 //! A running scene with its transport: playing, pacing, recording, peaks and what went wrong. No egui here.
 
-pub mod course;
+pub mod contact_history;
 mod keyframes;
 #[cfg(test)]
 mod tests;
@@ -15,25 +15,25 @@ use super::log::{Entry, Event, Log, Number};
 use super::paths::Paths;
 use super::settled::Settling;
 use super::twin::Twin;
-use super::watch::Watch;
+use super::watch::RunWatch;
 use crate::analysis::section::Schedule;
 use crate::scene::{Scene, SceneError, Value};
 use crate::simulate::{
     Channels, Effect, Frame, History, Pacer, Peak, Pull, RECORDED_JOINTS, Simulation, StartError,
     Stopped, Wear,
 };
-use course::Course;
+use contact_history::ContactHistory;
 use keyframes::Keyframes;
-use travel::Sought;
-pub use travel::{Flag, Left};
+use travel::ContactSearch;
+pub use travel::{AbandonedFuture, Flag};
 
 /// Narrowest bin of the record, s: shorter than any step that resolves an impact.
 const FINEST_BIN: f64 = 2e-6;
 
-/// Seconds from any start: what a frame has spent on stepping is measured by it.
+/// Seconds since an arbitrary origin, to measure the stepping time of a frame.
 pub type Clock = fn() -> f64;
 
-/// The clock on the wall.
+/// Wall-clock time.
 pub fn wall() -> f64 {
     static START: OnceLock<Instant> = OnceLock::new();
     START.get_or_init(Instant::now).elapsed().as_secs_f64()
@@ -41,21 +41,20 @@ pub fn wall() -> f64 {
 
 /// A simulation and everything needed to play and plot it.
 ///
-/// There is one instant on show, the pacer's: frame, peaks, sections and link are those of it. The simulation itself is
-/// further on by a part of its latest step, of which nothing is told before its time. The record goes as far as the run was
-/// ever shown ([`Self::reached`]): an instant of the past is put on show by going back to a state that was kept and taking the
-/// same steps again.
+/// There is one displayed instant, the pacer's: frame, peaks, sections and link all refer to it. The simulation itself is ahead
+/// by part of its latest step, which stays hidden until its time. The record extends as far as the run was ever shown
+/// ([`Self::reached`]): a past instant is displayed by restoring a kept state and taking the same steps again.
 pub struct Player {
     /// How fast simulated time passes.
     pub pacer: Pacer,
-    /// What measures how long stepping takes.
+    /// Clock that measures stepping time.
     pub clock: Clock,
     simulation: Simulation,
-    /// The run as it was before a change in the middle of the latest step: what that step did until the change.
+    /// The run before a change made within the displayed step: it still holds what that step did until the change.
     unchanged: Option<Box<Simulation>>,
     /// The scene as its file gives it.
     original: Scene,
-    /// What is allowed but may not mean what the user expects.
+    /// What is allowed but may not do what the user expects.
     warnings: Vec<String>,
     playing: bool,
     /// Time runs backwards while it plays.
@@ -63,60 +62,60 @@ pub struct Player {
     stopped: Option<Stopped>,
     frame: Frame,
     peaks: Vec<Peak>,
-    /// Of the latest step, as far as they are still to come.
+    /// Peaks of the latest step that are still to come.
     coming: Vec<Peak>,
-    /// Since the frame before.
+    /// Peaks since the previous frame.
     passed: Vec<Peak>,
     channels: Channels,
-    /// Of the channels, and behind them the clearance of each recorded ball joint.
+    /// Record of the channels, followed by the clearance of each recorded ball joint.
     history: History,
-    /// The stretch of the past that was last gone through again, in all detail.
+    /// Record, in full detail, of the past stretch that was last retraced.
     near: Option<Box<History>>,
-    course: Course,
+    contact_history: ContactHistory,
     recorded: Frame,
-    /// Up to where the latest steps were recorded, s.
+    /// Time up to which the latest steps were recorded, s.
     recorded_to: f64,
     values: Vec<f64>,
     settling: Settling,
     paths: Paths,
     keyframes: Keyframes,
-    /// Latest instant that was on show, s, and most steps taken.
+    /// Latest instant ever displayed, s, and most steps taken.
     reached: f64,
     most_steps: u64,
-    /// The future that was left when the run went on from its past.
-    left: Option<Box<Left>>,
-    sought: Option<Sought>,
+    /// The future abandoned when the run branched from its past.
+    left: Option<Box<AbandonedFuture>>,
+    sought: Option<ContactSearch>,
     /// What was done since the start.
     log: Log,
-    /// Of the log, what was done before the instant on show; and the time of each that ever was, s.
+    /// Number of log entries before the displayed instant; and the time of every entry, s.
     applied: usize,
     event_times: Vec<f64>,
     /// Instants at which steps end.
     sections: Option<Schedule>,
-    watch: Watch,
+    watch: RunWatch,
     twin: Option<Box<Twin>>,
     /// Gravity since the start, for the ideal motion.
     gravity: Gravity,
     ideal: Option<Box<Ideal>>,
-    /// Simulated time and seconds of stepping that it took, both fading.
+    /// Simulated time and the stepping time that it took, s, both fading.
     stepped: f64,
     stepping: f64,
 }
 
-/// Keys of the solver that win over its preset.
+/// Solver keys that override its preset.
 const SOLVER_KEYS: [&str; 3] = ["solver.method", "solver.step", "solver.tolerance"];
 
 /// Seconds of viewing that the automatic window of the plots shows.
 const VIEWING: f64 = 5.0;
 
-/// Seconds of stepping over which the capacity is averaged, and the fewest that say something.
+/// Stepping time over which the capacity is averaged, s, and the least that gives a value.
 const MEASURED: f64 = 0.3;
 const LEAST_MEASURED: f64 = 1e-3;
 
-/// Most instants recorded of one long step.
+/// Most instants recorded within one long step.
 const MOST_RECORDED: f64 = 64.0;
 
-/// What the interface says of a scene.
+/// The warnings of a scene, in sentences.
 fn sentences(scene: &Scene) -> Vec<String> {
     let warnings = scene.warnings().into_iter();
     warnings.map(|warning| warning.to_string()).collect()
@@ -129,7 +128,7 @@ impl Player {
     /// As [`Simulation::new`].
     pub fn new(scene: &Scene) -> Result<Self, StartError> {
         let simulation = Simulation::new(scene)?;
-        // The text was read once already; should it no longer read, a control's default is its present value.
+        // The text has been parsed before; should that fail now, a control's default is its present value.
         let original = Scene::parse(&scene.source.text, scene.source.file.as_deref(), &[])
             .unwrap_or_else(|_| scene.clone());
         let channels = Channels::of(scene);
@@ -148,7 +147,7 @@ impl Player {
             unchanged: None,
             history: record_of(scene, &channels),
             near: None,
-            course: Course::default(),
+            contact_history: ContactHistory::default(),
             channels,
             recorded: Frame::default(),
             recorded_to: 0.0,
@@ -166,7 +165,7 @@ impl Player {
             stepping: 0.0,
             log: Log::new(&scene.changes),
             sections: None,
-            watch: Watch::new(scene),
+            watch: RunWatch::new(scene),
             twin: None,
             gravity: Gravity::new(scene.gravity),
             ideal: None,
@@ -181,7 +180,7 @@ impl Player {
         &self.simulation
     }
 
-    /// The scene as the user wants it: with the changes that still wait for a reset.
+    /// The scene as the user wants it, including changes that still wait for a reset.
     pub fn wanted(&self) -> &Scene {
         self.simulation.scene()
     }
@@ -191,12 +190,12 @@ impl Player {
         self.simulation.running_scene()
     }
 
-    /// What is on show.
+    /// What is displayed.
     pub fn frame(&self) -> &Frame {
         &self.frame
     }
 
-    /// Strongest instants since the frame before, per ball joint.
+    /// Largest forces since the previous frame, per ball joint.
     pub fn peaks(&self) -> &[Peak] {
         &self.peaks
     }
@@ -206,22 +205,22 @@ impl Player {
         &self.channels
     }
 
-    /// Where the record has the clearances of the ball joints, as they were in force.
+    /// Channels of the record that hold the clearances of the ball joints in force at the time.
     pub fn clearances(&self) -> std::ops::Range<usize> {
         self.channels.len()..self.history.channels()
     }
 
-    /// The record of the run, as far as it was ever on show.
+    /// The record of the run, as far as it was ever displayed.
     pub fn history(&self) -> &History {
         &self.history
     }
 
-    /// Where the balls went lately.
+    /// The recent paths of the balls.
     pub fn paths(&self) -> &Paths {
         &self.paths
     }
 
-    /// What was done to the run from its start to the instant on show.
+    /// What was done to the run from its start to the displayed instant.
     pub fn log(&self) -> Log {
         let mut log = self.log.clone();
         log.entries.truncate(self.applied);
@@ -229,16 +228,16 @@ impl Player {
     }
 
     /// What the chaos bench keeps of the run.
-    pub fn watch(&self) -> &Watch {
+    pub fn watch(&self) -> &RunWatch {
         &self.watch
     }
 
-    /// What the steps that are over at the instant on show did to the sockets since the start.
+    /// Wear of the sockets since the start, over the steps completed at the displayed instant.
     pub fn wear(&self) -> Option<&Wear> {
         self.simulation.wear()
     }
 
-    /// Another drive phase of the sections.
+    /// Sets the drive phase of the sections.
     pub fn set_phase(&mut self, phase: f64) {
         self.watch.set_phase(phase, self.pacer.shown());
     }
@@ -248,7 +247,7 @@ impl Player {
         self.twin.as_deref()
     }
 
-    /// Puts the ghosts where they are at the time on show.
+    /// Moves the ghosts to the displayed instant.
     pub(super) fn place_ghost(&mut self) {
         if let Some(twin) = &mut self.twin {
             twin.place(self.pacer.shown());
@@ -258,23 +257,23 @@ impl Player {
         }
     }
 
-    /// The ideal motion, where it is on.
+    /// The ideal motion, if it is switched on.
     pub fn ideal(&self) -> Option<&Ideal> {
         self.ideal.as_deref()
     }
 
-    /// Whether the ideal motion is on its way to the instant on show.
+    /// Whether the ideal motion still has to reach the displayed instant.
     pub fn is_ideal_behind(&self) -> bool {
         let shown = self.pacer.shown();
         self.ideal().is_some_and(|ideal| ideal.is_behind(shown))
     }
 
-    /// Has the ideal motion computed beside the run, or no longer. The run itself never changes by it.
+    /// Switches the ideal motion on or off. This never affects the run itself.
     pub fn set_ideal(&mut self, on: bool) {
         self.ideal = on.then(|| Box::new(Ideal::new(self.simulation.running_scene())));
     }
 
-    /// Starts a twin run from the present state, or ends it. The run itself never changes by it.
+    /// Starts a twin run from the present state, or ends it. This never affects the run itself.
     ///
     /// # Errors
     /// The twin cannot start.
@@ -286,10 +285,10 @@ impl Player {
         Ok(())
     }
 
-    /// The state changed by other means than a step.
+    /// The state changed other than by a step.
     fn restart_twin(&mut self) {
         if self.twin.is_some() {
-            // A scene that runs starts again.
+            // A running scene can be started again.
             self.twin = Twin::new(&self.simulation).ok().map(Box::new);
         }
     }
@@ -306,7 +305,7 @@ impl Player {
         self.note(event);
     }
 
-    /// Adds to the log what was just done.
+    /// Logs what was just done.
     fn note(&mut self, event: Event) {
         self.log.push(self.steps(), event);
         self.event_times.push(self.simulation.time());
@@ -325,7 +324,7 @@ impl Player {
         self.simulation.statistics().steps
     }
 
-    /// Length of the past that plots show unless told otherwise, s: some seconds of viewing.
+    /// Length of the past that plots show by default, s: a few seconds of viewing.
     pub fn automatic_window(&self) -> f64 {
         VIEWING * self.pacer.scale()
     }
@@ -335,18 +334,18 @@ impl Player {
         self.playing
     }
 
-    /// Lets time pass, or stand still. A stopped run does not start again before a reset, or a way back.
+    /// Plays or pauses. A stopped run does not continue before it is reset or taken back.
     pub fn set_playing(&mut self, playing: bool) {
         self.set_paused();
         self.playing = playing && self.stopped.is_none();
         if self.playing {
             self.go_on();
-            // The average of the reached speed starts anew.
+            // Restart the average of the speed reached.
             self.pacer.jump(self.pacer.shown());
         }
     }
 
-    /// Lets time pass backwards, to the start.
+    /// Plays backwards, to the start.
     pub fn play_backwards(&mut self) {
         self.set_paused();
         self.playing = self.pacer.shown() > 0.0;
@@ -369,7 +368,7 @@ impl Player {
         self.settling.has_settled()
     }
 
-    /// Moves on by one frame that comes `dt` seconds after the last, and refreshes what is on show.
+    /// Advances by one frame, `dt` seconds after the last, and refreshes what is displayed.
     pub fn advance(&mut self, dt: f64) {
         if let Some(sought) = self.sought {
             self.seek(sought);
@@ -400,7 +399,7 @@ impl Player {
         self.stepping = self.stepping * keep + stepping;
     }
 
-    /// Simulated seconds per second of stepping lately, the record included; `None` before enough was stepped.
+    /// Recent simulated seconds per second of stepping, recording included; `None` until enough was stepped.
     pub fn capacity(&self) -> Option<f64> {
         (self.stepping > LEAST_MEASURED).then(|| self.stepped / self.stepping)
     }
@@ -412,13 +411,13 @@ impl Player {
             return;
         }
         self.go_on();
-        // Where the step begins, not the instant on show within the one before.
+        // Record to the start of the step, not to the displayed instant within the one before.
         self.record_until(self.simulation.time());
         self.step();
         self.show_latest();
     }
 
-    /// Pauses and runs on until `time`, s, whatever it takes: the start of a headless frame.
+    /// Pauses and runs on until `time`, s, however long that takes: the start of a headless frame.
     pub fn run_to(&mut self, time: f64) {
         self.set_playing(false);
         self.go_on();
@@ -428,12 +427,12 @@ impl Player {
         self.show(time);
     }
 
-    /// One step towards an instant that a link names, with its record; false when the guard stopped the run.
+    /// One recorded step towards the instant of a link; false if the guard stopped the run.
     pub(super) fn replay_step(&mut self) -> bool {
         self.step()
     }
 
-    /// Puts `time`, s, on show, as far as it lies in what is left of the latest step: no way leads back.
+    /// Displays `time`, s, limited to what is left of the latest step: this never goes back.
     pub(super) fn show(&mut self, time: f64) {
         let shown = time.max(self.recorded_to).min(self.simulation.time());
         self.pacer.jump(shown);
@@ -466,7 +465,7 @@ impl Player {
     /// As [`Simulation::set`]; nothing has changed then.
     pub fn set(&mut self, key: &str, value: &str) -> Result<Effect, SceneError> {
         if self.has_future() {
-            // What is refused leaves no future.
+            // A refused change must not abandon the future.
             self.wanted().clone().set(key, value)?;
             self.branch();
         }
@@ -478,7 +477,7 @@ impl Player {
     fn apply_set(&mut self, key: &str, value: &str) -> Result<Effect, SceneError> {
         let effect = self.change(|run| run.set(key, value))?;
         if key == "solver.preset" {
-            // Chosen here, a preset is to have effect: it replaces what was set by name before.
+            // A preset chosen here must take effect: it replaces solver keys set by name before.
             for by_name in SOLVER_KEYS {
                 self.simulation.set_value(by_name, &Value::Unset)?;
             }
@@ -487,14 +486,14 @@ impl Player {
         Ok(effect)
     }
 
-    /// Keys that the scene's file gives by name and that therefore win over any preset.
-    pub fn beats_preset(&self) -> Vec<&'static str> {
+    /// Keys that the scene's file sets by name and that therefore override any preset.
+    pub fn keys_overriding_preset(&self) -> Vec<&'static str> {
         let places = &self.original.source.places;
         let given = |key: &&str| places.contains_key(*key);
         SOLVER_KEYS.into_iter().filter(given).collect()
     }
 
-    /// Gives a parameter the value that the scene's file has.
+    /// Resets a parameter to its value in the scene's file.
     ///
     /// # Errors
     /// As [`Simulation::set_value`]; nothing has changed then.
@@ -514,7 +513,7 @@ impl Player {
         Ok(effect)
     }
 
-    /// Somebody pulls on a body from now on, elsewhere or otherwise than before, or lets go.
+    /// Starts, changes or ends a pull on a body.
     ///
     /// # Errors
     /// As [`Simulation::pull`]; the run is as it was then.
@@ -524,7 +523,7 @@ impl Player {
         }
         pull.map_or(Ok(()), |pull| self.simulation.check_pull(&pull))?;
         self.branch();
-        // Of several moves between two steps the last one counts.
+        // Of several moves between two steps only the last one counts.
         let steps = self.steps();
         let moved =
             |entry: &Entry| entry.steps == steps && matches!(entry.event, Event::Pull(Some(_)));
@@ -543,7 +542,7 @@ impl Player {
         Ok(Effect::Now)
     }
 
-    /// Changes the run at its latest state. What is left to show of the step before is shown as it was.
+    /// Changes the run at its latest state. The rest of the latest step is still shown as it was.
     fn change<T>(
         &mut self,
         change: impl FnOnce(&mut Simulation) -> Result<T, SceneError>,
@@ -554,7 +553,7 @@ impl Player {
         }
         let mut copy = match Simulation::new(run.running_scene()) {
             Ok(copy) => copy,
-            // A scene that runs starts again; should it not, the rest of the step is left out.
+            // A running scene can be started again; should that fail, the rest of the step is skipped.
             Err(_) => return change(run),
         };
         if copy.restore(&run.snapshot()).is_err() {
@@ -587,7 +586,7 @@ impl Player {
             .any(|(key, _)| self.is_waiting(key))
     }
 
-    /// What is allowed but may not mean what the user expects.
+    /// What is allowed but may not do what the user expects.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
@@ -608,7 +607,7 @@ impl Player {
         self.original.get(key).ok()
     }
 
-    /// One step, the rest of the one before recorded first; false when the guard stopped it.
+    /// One step, after recording the rest of the one before; false if the guard stopped it.
     fn step(&mut self) -> bool {
         self.record_until(self.simulation.time());
         self.keep();
@@ -643,7 +642,7 @@ impl Player {
         }
     }
 
-    /// Where the next step ends at the latest, s.
+    /// Latest end of the next step, s.
     fn next_section(&self) -> f64 {
         let now = self.simulation.time();
         let schedule = self.sections.as_ref();
@@ -653,7 +652,7 @@ impl Player {
         })
     }
 
-    /// The run that knows what was at `time`, s, in the latest step.
+    /// The run to sample at `time`, s, within the latest step.
     fn run_at(&mut self, time: f64) -> &mut Simulation {
         match &mut self.unchanged {
             Some(run) if time < self.simulation.time() => run,
@@ -661,11 +660,11 @@ impl Player {
         }
     }
 
-    /// Takes what the latest step did until `until`, s, into the record.
+    /// Records the latest step up to `until`, s.
     fn record_until(&mut self, until: f64) {
         let start = self.recorded_to;
         if until > start {
-            // A long step is recorded at instants within it, so that a curve stays one on a plot.
+            // A long step is also recorded at instants within it, so that plots stay smooth.
             let parts = ((until - start) / self.automatic_window() * 400.0)
                 .ceil()
                 .clamp(1.0, MOST_RECORDED);
@@ -675,7 +674,7 @@ impl Player {
                 } else {
                     start + (until - start) * f64::from(part) / parts
                 };
-                // A peak between two instants is one more.
+                // A peak between two instants adds one more.
                 let close = end - 1e-3 * (end - start) / parts;
                 while let Some(peak) = self.next_peak().filter(|peak| *peak < close) {
                     self.record(peak);
@@ -692,7 +691,7 @@ impl Player {
         self.watch.step(run, until);
     }
 
-    /// When the next peak comes, s.
+    /// Time of the next peak, s.
     fn next_peak(&self) -> Option<f64> {
         let forces = self.coming.iter().filter(|peak| peak.normal > 0.0);
         forces.map(|peak| peak.time).min_by(f64::total_cmp)
@@ -705,7 +704,7 @@ impl Player {
         let joints = frame.joints.iter().take(self.clearances().len());
         self.values.extend(joints.map(|joint| joint.clearance));
         for (joint, peak) in self.coming.iter().enumerate() {
-            // The peak of the step is that of its cubic, not of the interpolated state.
+            // The peak comes from the cubic of the step, not from the interpolated state.
             if peak.normal > 0.0
                 && peak.time == time
                 && let Some(channel) = self.channels.normal_force(joint)
@@ -723,19 +722,19 @@ impl Player {
         if let Some(near) = &mut self.near {
             near.push(time, &self.values);
         }
-        self.course.record(&frame);
+        self.contact_history.record(&frame);
         self.watch.record(&frame);
         self.settling.record(&frame);
         self.paths.record(&frame);
         self.recorded = frame;
     }
 
-    /// Takes the peaks up to `time`, s, into the record and among those of the frame.
+    /// Adds the peaks up to `time`, s, to the record and to those of the frame.
     fn pass_peaks(&mut self, time: f64) {
         self.passed.resize(self.coming.len(), Peak::default());
         let all = time >= self.simulation.time();
         if all {
-            self.simulation.pass_wear();
+            self.simulation.commit_wear();
         }
         for joint in 0..self.coming.len() {
             let peak = self.coming[joint];
@@ -761,7 +760,7 @@ impl Player {
         }
     }
 
-    /// Peaks since the call before.
+    /// Hands out the peaks since the previous call.
     fn hand_out_peaks(&mut self) {
         std::mem::swap(&mut self.peaks, &mut self.passed);
         self.passed.clear();
@@ -776,7 +775,7 @@ impl Player {
         }
     }
 
-    /// Records up to the instant on show and fills the frame with it.
+    /// Records up to the displayed instant and samples the frame there.
     fn present(&mut self) {
         let shown = self.pacer.shown();
         self.record_until(shown);
@@ -784,7 +783,7 @@ impl Player {
         self.watch.show(shown);
         let mut frame = std::mem::take(&mut self.frame);
         self.run_at(shown).sample(shown, &mut frame);
-        // The hand is where it is now, though the run feels it from its next step on.
+        // The hand is shown where it is now, though the run feels it only from its next step on.
         frame.pull = self.simulation.pull_in(&frame);
         self.frame = frame;
     }
@@ -796,14 +795,14 @@ impl Player {
 
     fn start_record(&mut self) {
         self.history.clear();
-        self.forget_travels();
+        self.clear_rewind();
         self.unchanged = None;
         self.settling = Settling::new(self.simulation.running_scene());
         self.paths = Paths::new(self.simulation.running_scene());
         self.gravity = Gravity::new(self.simulation.running_scene().gravity);
         self.set_ideal(self.ideal.is_some());
         self.simulation.keep_wear();
-        // Forces at the start are those of the first frame: nothing has struck yet.
+        // Forces at the start belong to the first frame: there has been no impact yet.
         self.simulation.take_peaks(&mut self.coming);
         self.forget_peaks();
         self.record(self.simulation.time());
@@ -821,7 +820,7 @@ fn record_of(scene: &Scene, channels: &Channels) -> History {
 /// Instants of `schedule` up to `now`, s.
 fn passed(schedule: &Schedule, now: f64) -> usize {
     let guess = ((now - schedule.first) / schedule.interval).floor();
-    // Within one, whatever the rounding; a negative guess is 0.
+    // Off by at most one through rounding; a negative guess is 0.
     let mut k = (guess as usize).saturating_sub(1).min(schedule.sections);
     while k < schedule.sections && schedule.time(k) <= now {
         k += 1;

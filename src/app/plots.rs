@@ -9,22 +9,23 @@ use super::curve::{Curves, Path, Trace};
 use super::layout;
 use super::player::Player;
 use super::stack::stack;
+use super::zoom::{self, Zoom};
 use super::{theme, value};
 use crate::simulate::{Bin, Quantity, RECORDED_JOINTS};
 
 /// Windows to choose from, s.
 const WINDOWS: [f64; 6] = [1e-3, 1e-2, 0.05, 0.1, 1.0, 10.0];
-/// The shortest time that a plot comes near to, s.
+/// The shortest time range that a plot zooms to, s.
 const SHORTEST_WINDOW: f64 = 1e-6;
-/// Height below which a plot says nothing.
+/// Least useful height of a plot.
 const LEAST_HEIGHT: f32 = 110.0;
-/// Least distance of two marks on an axis, points: the height of their numbers.
+/// Least distance between two marks on an axis, points: the height of their numbers.
 const MARKS_APART: f32 = 16.0;
-/// Width of a letter of the numbers, points, generously.
+/// Generous width of a character of the numbers, points.
 const LETTER: f64 = 7.0;
-/// Marks that an axis has at most, about.
+/// Approximate maximum number of marks on an axis.
 const MARKS: f64 = 5.0;
-/// A range smaller than this share of the values, or than this in the unit of the axis, is rounding and no motion.
+/// A range smaller than this fraction of the values, or than this in axis units, is rounding and not motion.
 const GRAIN: f64 = 1e-9;
 
 /// How much of the past the plots show.
@@ -32,7 +33,7 @@ const GRAIN: f64 = 1e-9;
 pub enum Window {
     /// The last seconds of viewing, whatever the time scale.
     Automatic,
-    /// The last so many simulated seconds.
+    /// The last simulated time, of this many seconds.
     Last(f64),
     /// Since the reset.
     Everything,
@@ -40,19 +41,19 @@ pub enum Window {
 
 /// Which plots are shown and how.
 pub struct Plots {
-    /// Quantities on show, in the order of [`Quantity::ALL`].
+    /// Quantities shown, in the order of [`Quantity::ALL`].
     pub chosen: Vec<Quantity>,
     /// Time window.
     pub window: Window,
     /// Channels whose lines are hidden.
     hidden: Vec<usize>,
-    /// Those of one plot at a time, and the points of each that the pointer finds.
+    /// Traces of one plot at a time, and their points for the hit test.
     traces: Vec<Trace>,
     levels: Vec<Trace>,
     readings: Vec<Vec<PlotPoint>>,
-    /// Where each plot was last.
+    /// Latest place of each plot.
     places: Vec<(Quantity, Place)>,
-    /// The stretch of time that somebody has come nearer to, s, in place of the window.
+    /// Time range that the user has zoomed to, s, in place of the window.
     zoomed: Option<(f64, f64)>,
 }
 
@@ -78,14 +79,14 @@ impl Default for Plots {
 }
 
 impl Plots {
-    /// Where the plot of `quantity` drew a value (SI) at `time`, s, last; points of the screen. `None` where it is not shown.
+    /// Where the plot of `quantity` last drew a value (SI) at `time`, s; points of the screen. `None` if it is not shown.
     pub fn place(&self, quantity: Quantity, time: f64, value: f64) -> Option<Pos2> {
         let (_, place) = self.places.iter().find(|(shown, _)| *shown == quantity)?;
         let point = PlotPoint::new(time / place.units[0], value / place.units[1]);
         Some(place.transform.position_from_point(&point))
     }
 
-    /// Which quantities and how much of the past.
+    /// Selection of the quantities and of the time window.
     pub fn header(&mut self, ui: &mut Ui, player: &Player) {
         ui.horizontal_wrapped(|ui| {
             ui.label(RichText::new("Plots").strong());
@@ -155,7 +156,7 @@ impl Plots {
         }
     }
 
-    /// The window chosen again.
+    /// Back to the chosen window.
     pub fn reset(&mut self) {
         self.zoomed = None;
     }
@@ -172,23 +173,17 @@ impl Plots {
         match self.window {
             Window::Automatic => player.automatic_window(),
             Window::Last(length) => length,
-            Window::Everything => {
-                let left = player.left().map_or(0.0, |left| left.to);
-                left.max(player.reached()).max(1e-4)
-            }
+            Window::Everything => player.known_to().max(1e-4),
         }
     }
 
-    /// The time that the plots show, s. The instant on show is its end; where there is a future, three quarters of the way.
+    /// Time range of the plots, s. It ends at the displayed instant, which moves to three quarters of it if there is a future.
     fn range(&self, player: &Player) -> (f64, f64) {
         if let Some(range) = self.zoomed {
             return range;
         }
         let shown = player.pacer.shown();
-        let known = player
-            .left()
-            .map_or(0.0, |left| left.to)
-            .max(player.reached());
+        let known = player.known_to();
         let length = self.window_length(player);
         let end = if self.window == Window::Everything {
             known
@@ -204,7 +199,7 @@ impl Plots {
         }
     }
 
-    /// The chosen plots, beside each other where there is room, else below each other. Returns the instant that was clicked on, s.
+    /// The chosen plots, side by side if there is room, otherwise stacked. Returns the instant that was clicked, s.
     pub fn ui(&mut self, ui: &mut Ui, player: &Player) -> Option<f64> {
         self.places.clear();
         let chosen: Vec<Quantity> = self
@@ -265,7 +260,7 @@ impl Plots {
             .collect();
         let dark = ui.visuals().dark_mode;
         let faint = ui.visuals().weak_text_color();
-        // No bin is wider than a column of pixels, as long as the record has them.
+        // No bin is wider than a pixel column, as long as the record has such bins.
         let bins = (2.0 * space.x * ui.ctx().pixels_per_point()) as usize;
         let query = |channel: usize, out: &mut Vec<Bin>| {
             out.clear();
@@ -282,7 +277,7 @@ impl Plots {
         }
         self.levels.clear();
         if quantity == Quantity::Eccentricity {
-            // As they were: today's value says nothing about the past.
+            // As recorded: the present value says nothing about the past.
             for index in player.clearances() {
                 let mut trace = Trace {
                     colour: faint,
@@ -346,7 +341,7 @@ impl Plots {
                 .formatter(move |mark, range| {
                     let words = time_mark(&mark);
                     let beyond = (range.end() - mark.value) / (range.end() - range.start()) * frame;
-                    // One that reached into the next plot is left out.
+                    // Omit one that would reach into the next plot.
                     if 0.5 * LETTER * words.chars().count() as f64 > beyond + 28.0 {
                         return String::new();
                     }
@@ -359,7 +354,7 @@ impl Plots {
                     let most = range.start().abs().max(range.end().abs());
                     tick(mark.value, mark.step_size, most)
                 });
-            // Numbers of a late time are long: fewer of them stand side by side.
+            // Late times have long numbers, of which fewer fit side by side.
             let letters = |mark: &GridMark| time_mark(mark).chars().count();
             let marks_across = move |input: GridInput| {
                 let marks = marks(&input, MARKS);
@@ -452,9 +447,11 @@ impl Plots {
             };
             let frame = *transform.frame();
             if (from..to).contains(&now)
-                && (player.has_future() || self.zoomed.is_some() || player.left().is_some())
+                && (player.has_future()
+                    || self.zoomed.is_some()
+                    || player.abandoned_future().is_some())
             {
-                // What is to come is pale.
+                // The future is pale.
                 let painter = ui.painter_at(frame);
                 let veil = ui.visuals().panel_fill.gamma_multiply(0.65);
                 painter.rect_filled(frame.with_min_x(x(now)), 0.0, veil);
@@ -474,7 +471,7 @@ impl Plots {
         .inner
     }
 
-    /// What the pointer asks of a plot: another stretch of time, or the instant that is returned, s.
+    /// Pointer input on a plot: another time range, or the instant that is returned, s.
     fn pointer(
         &mut self,
         ui: &Ui,
@@ -485,32 +482,23 @@ impl Plots {
     ) -> Option<f64> {
         let (from, to) = self.range(player);
         let time = |pos: Pos2| transform.value_from_position(pos).x * time_size;
-        let end = player
-            .left()
-            .map_or(0.0, |left| left.to)
-            .max(player.reached());
+        let end = player.known_to();
         if response.double_clicked() {
             self.zoomed = None;
             return None;
         }
-        if let Some(pos) = response.hover_pos() {
-            let (wheel, pinch) = ui.input(|i| (i.smooth_scroll_delta().y, i.zoom_delta()));
-            let factor = f64::from((wheel * 0.004).exp() * pinch);
-            if factor != 1.0 {
-                let length = ((to - from) / factor).max(SHORTEST_WINDOW);
-                let all = end.max(self.window_length(player));
-                let share = (time(pos) - from) / (to - from);
-                let from = (time(pos) - share * length).max(0.0);
-                self.zoomed = (length < all).then_some((from, from + length));
-            }
+        if let Some(zoom) = Zoom::over(ui, response) {
+            let width = transform.frame().width();
+            let range = zoom.apply((from, to), time(zoom.place), width, SHORTEST_WINDOW);
+            let part = range.1 - range.0 < end.max(self.window_length(player));
+            self.zoomed = part.then(|| zoom::within(range, f64::INFINITY));
         }
-        if response.dragged_by(egui::PointerButton::Primary) {
+        if zoom::drags(ui, response) {
             let width = f64::from(transform.frame().width());
             let length = to - from;
             let by = f64::from(response.drag_delta().x) / width * length;
-            let from = (from - by).clamp(0.0, (end - length).max(0.0));
             if by != 0.0 {
-                self.zoomed = Some((from, from + length));
+                self.zoomed = Some(zoom::within((from - by, to - by), end));
             }
         }
         let clicked = response.clicked().then(|| response.interact_pointer_pos());
@@ -520,7 +508,7 @@ impl Plots {
             .filter(|time| *time <= player.reached())
     }
 
-    /// The terms of the energy balance, stacked: what gives energy above zero, what takes or holds it below.
+    /// The terms of the energy balance, stacked: energy supplied above zero, energy absorbed or stored below.
     fn bands<'a>(&self, members: &[(usize, &'a str)], units: [f64; 2]) -> Vec<Band<'a>> {
         let mut bands: Vec<Band<'a>> = Vec::new();
         let mut terms = Vec::new();
@@ -595,7 +583,7 @@ fn widened(all: Option<(f64, f64)>, least: f64, greatest: f64) -> Option<(f64, f
     Some((a.min(least), b.max(greatest)))
 }
 
-/// The least and the greatest of everything in `traces`, in units of `size`.
+/// The least and the greatest value in `traces`, in units of `size`.
 fn extremes<'a>(traces: impl Iterator<Item = &'a Trace>, size: f64) -> Option<(f64, f64)> {
     let bins = traces.flat_map(|trace| &trace.bins);
     bins.fold(None, |all, bin| {
@@ -603,8 +591,8 @@ fn extremes<'a>(traces: impl Iterator<Item = &'a Trace>, size: f64) -> Option<(f
     })
 }
 
-/// What an axis shows for values in a range, or for none: all of them with a margin, and where there is nothing but rounding
-/// a range in which that is flat.
+/// Axis range for values in a range, or for none: all of them with a margin, or a range in which they look flat if they differ
+/// by rounding only.
 fn range(values: Option<(f64, f64)>, from_zero: bool) -> (f64, f64) {
     let (mut least, mut greatest) = values.unwrap_or((0.0, 0.0));
     if from_zero {
@@ -622,7 +610,7 @@ fn range(values: Option<(f64, f64)>, from_zero: bool) -> (f64, f64) {
     (least - margin, greatest + margin)
 }
 
-/// About `count` marks at 1, 2 or 5 times a power of ten, no closer than the axis allows; two at least where there is room.
+/// About `count` marks at 1, 2 or 5 times a power of ten, no closer than the axis allows; at least two if there is room.
 pub(super) fn marks(input: &GridInput, count: f64) -> Vec<GridMark> {
     const ROUND: &[f64] = &[1.0, 2.0, 5.0, 10.0];
     const ROUND_ENOUGH: &[f64] = &[1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
@@ -681,7 +669,7 @@ pub(super) fn time_axis(length: f64) -> (&'static str, f64) {
     }
 }
 
-/// A mark on an axis that reaches to `most` and has marks `step` apart: as many digits as tell it from its neighbours.
+/// Label of a mark on an axis that reaches to `most` with marks `step` apart: enough digits to tell it from its neighbours.
 pub(super) fn tick(mark: f64, step: f64, most: f64) -> String {
     if mark.abs() < 1e-6 * step {
         return "0".to_owned();
@@ -753,7 +741,7 @@ mod tests {
 
     #[test]
     fn rounding_is_drawn_flat_and_motion_is_not() {
-        // Nothing at all has an axis of its own, and its zero is on it.
+        // An empty plot has an axis, too, and its zero is on it.
         assert_eq!(range(None, true), (-0.05, 1.05));
         assert_eq!(range(Some((0.0, 0.0)), true), (-0.05, 1.05));
         assert_eq!(range(Some((0.0, 0.0)), false), (-1.1, 1.1));

@@ -1,4 +1,4 @@
-//! Pulling on a body: a press on it and a drag hold it by a spring from the point that was pressed to the pointer.
+//! Pulling on a body: a press and a drag attach a spring from the pressed point to the pointer.
 
 use glam::{Vec2, Vec3};
 
@@ -16,7 +16,7 @@ pub struct Grip {
 }
 
 impl Grip {
-    /// Takes hold of what was met; `None` of what does not move.
+    /// Takes hold of what was hit; `None` if it does not move.
     pub fn new(player: &Player, hit: Hit) -> Option<Self> {
         let scene = player.scene();
         let body = match hit.what {
@@ -33,7 +33,8 @@ impl Grip {
         })
     }
 
-    /// The pointer came to `pixel`: the hand moves parallel to the picture, or with `depth` along the line of sight, upwards away.
+    /// The pointer has moved to `pixel`: the hand moves parallel to the picture or, with `depth`, along the line of sight (up
+    /// is away).
     pub fn drag(&mut self, camera: &Camera, pixel: Vec2, moved: Vec2, size: [u32; 2], depth: bool) {
         let (eye, ray) = camera.ray(pixel, size);
         let (_, _, back) = camera.axes();
@@ -48,7 +49,7 @@ impl Grip {
         }
     }
 
-    /// As the run takes it.
+    /// As input to the run.
     pub fn pull(&self) -> Pull {
         Pull {
             hand: Exact::from(self.hand.to_array().map(f64::from)),
@@ -117,7 +118,7 @@ mod tests {
         );
         player.pull(None).expect("lets go");
         let work = |player: &Player| player.frame().ledger.expect("kept").external_work;
-        // The rest of the step on show was pulled, too.
+        // The rest of the displayed step was pulled, too.
         player.run_to(0.41);
         let pulled = work(&player);
         player.run_to(0.5);

@@ -1,15 +1,15 @@
-//! Takes a run to the instant that a link names, a bounded share of each frame, and says whether the state is the same.
+//! Brings a run to the instant of a link, within a time budget per frame, and checks that the state is the same.
 
 use super::log::{Entry, Event};
 use super::player::Player;
 use super::share::Link;
 
-/// What became of a link.
+/// The outcome of a link.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Verdict {
     /// The state has the hash of the link.
     Agrees(u64),
-    /// It has another.
+    /// The state has another hash.
     Differs {
         /// Hash of the link.
         expected: u64,
@@ -24,7 +24,7 @@ pub enum Verdict {
     Failed(String),
 }
 
-/// A link on its way.
+/// A link that is being replayed.
 #[derive(Debug)]
 pub struct Replay {
     link: Link,
@@ -32,7 +32,7 @@ pub struct Replay {
 }
 
 impl Replay {
-    /// The way to the instant of `link`; `None` where it names none.
+    /// A replay to the instant of `link`; `None` if it names none.
     pub fn new(link: Link) -> Option<Self> {
         link.has_instant().then_some(Self { link, next: 0 })
     }
@@ -42,7 +42,7 @@ impl Replay {
         &self.link
     }
 
-    /// Part of the way that lies behind, 0 to 1.
+    /// Fraction of the way completed, 0 to 1.
     pub fn fraction(&self, player: &Player) -> f32 {
         let part = match (self.link.steps, self.link.time) {
             (Some(steps), _) if steps > 0 => player.steps() as f64 / steps as f64,
@@ -52,7 +52,7 @@ impl Replay {
         part.clamp(0.0, 1.0) as f32
     }
 
-    /// Goes on while `may_step`; the verdict once it is there.
+    /// Continues while `may_step`; returns the verdict once there.
     pub fn advance(
         &mut self,
         player: &mut Player,
@@ -78,7 +78,7 @@ impl Replay {
             }
             if !player.replay_step() {
                 return Some(match self.due(player) {
-                    // As it was: the guard's refusal is itself the next event of the log.
+                    // As in the original run: the guard's refusal is itself the next event of the log.
                     Some(Entry {
                         event: Event::Stop, ..
                     }) => {
@@ -92,14 +92,14 @@ impl Replay {
         }
     }
 
-    /// The next event, if it belongs between the steps taken and the next one. A stop is due only as the outcome of a step.
+    /// The next event, if it is due before the next step. A stop is due only as the outcome of a step.
     fn due(&self, player: &Player) -> Option<Entry> {
         let entry = self.link.log.entries.get(self.next)?;
         let stop_to_come = entry.event == Event::Stop && player.stopped().is_none();
         (entry.steps <= player.steps() && !stop_to_come).then(|| entry.clone())
     }
 
-    /// Whether a step was taken that the link's run was refused.
+    /// Whether a step succeeded that was refused in the link's run.
     fn missed_stop(&self, player: &Player) -> bool {
         self.link.log.entries.get(self.next).is_some_and(|entry| {
             entry.event == Event::Stop && entry.steps < player.steps() && player.stopped().is_none()
@@ -149,7 +149,7 @@ fn apply(player: &mut Player, entry: &Entry) -> Result<(), String> {
             let pull = pulled.map(Into::into);
             return player.pull(pull).map_err(|error| error.to_string());
         }
-        // Taken by the step before.
+        // Handled by the step before.
         Event::Stop => return Ok(()),
     };
     Ok(())
@@ -251,7 +251,7 @@ mod tests {
             play(&mut original, 5);
             assert!(original.log().entries.len() >= 8);
             agrees(&original);
-            // The change comes at the end of a step whose beginning is on show.
+            // The change comes at the end of a step whose beginning is displayed.
             original.pacer.set_scale(1e-4);
             original.set_playing(true);
             original.advance(1.0 / 60.0);
@@ -274,7 +274,7 @@ mod tests {
         assert!(original.log().entries.is_empty());
         assert_eq!(original.log().base.len(), 2);
         original.run_to(40e-3);
-        // One that waits for the next reset travels, too.
+        // A change that waits for the next reset is in the link, too.
         original
             .set("spcmm.frequency", "0.45 Hz")
             .expect("in range");

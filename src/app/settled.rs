@@ -1,29 +1,28 @@
 //! Whether the motion of a run relative to its drives has ended.
 //!
-//! - A scene whose drives move has settled where every ball with play has stayed in contact over the last eighth of the
-//!   drives' period, has moved in its socket by no more than [`STILL`] of the clearance (at that rate, hardly once
-//!   across its play in a period), and has borne the same load within [`LOAD`]. A machine that went on after such a
-//!   stretch is believed only after a whole period of it: where the play is taken to the other side once in a turn,
-//!   there is quiet between.
-//! - A scene without a drive that moves is at rest where no point of a body has moved by more than [`STILL`] of the least
-//!   clearance for [`REST`]. A pendulum stands still at the end of each swing, but not for so long.
+//! - A scene with moving drives has settled when every ball with play has, over the last eighth of the drives' period, stayed
+//!   in contact, moved in its socket by no more than [`STILL`] of the clearance (at that rate, hardly once across its play in a
+//!   period), and borne the same load within [`LOAD`]. If motion resumes after such a stretch, the next one must last a whole
+//!   period: where the ball crosses its play once per turn, it is quiet in between.
+//! - A scene without a moving drive is at rest when no point of a body has moved by more than [`STILL`] of the least clearance
+//!   for [`REST`]. A pendulum stands still at the end of each swing, but not for so long.
 //! - A scene without play never settles: nothing in it rattles.
 //!
-//! All of it from the frames of the run.
+//! All of this is judged from the frames of the run.
 
 use crate::analysis::drive::{NoPeriod, drive_period};
 use crate::scene::{Scene, Vec3};
 use crate::simulate::{ContactState, Frame, JointReport};
 
-/// Part of the period over which a driven scene is watched.
+/// Fraction of the period over which a driven scene is watched.
 const PART: f64 = 1.0 / 8.0;
 /// How long a scene without drives is watched, s.
 const REST: f64 = 0.5;
-/// Farthest that a ball, or a point of a body, moves meanwhile, in clearances.
+/// Largest displacement of a ball, or of a point of a body, meanwhile, in clearances.
 const STILL: f64 = 0.15;
-/// Largest change of a contact force meanwhile, in parts of it.
+/// Largest relative change of a contact force meanwhile.
 const LOAD: f64 = 0.25;
-/// Instants kept of such a stretch.
+/// Instants kept per stretch.
 const KEPT: f64 = 16.0;
 
 /// One instant to compare with.
@@ -35,21 +34,21 @@ struct Instant {
     loads: Vec<f64>,
 }
 
-/// What the frames of a run say about it.
+/// Judges from the frames of a run whether it has settled.
 #[derive(Clone, Debug)]
 pub struct Settling {
     /// Longest period of the drives, s.
     period: Option<f64>,
     /// Body of each socket, and clearance of each joint with play, m.
     joints: Vec<Option<(Option<usize>, f64)>>,
-    /// Instants since which everything has stayed as it was, oldest first.
+    /// Instants since which nothing has changed, oldest first.
     past: Vec<Instant>,
     /// The latest.
     here: Instant,
     /// Since when it has been quiet.
     quiet: Option<f64>,
-    /// It was quiet before and went on.
-    broke: bool,
+    /// It was quiet before, and motion resumed.
+    has_resumed: bool,
 }
 
 impl Settling {
@@ -70,21 +69,21 @@ impl Settling {
             past: Vec::new(),
             here: Instant::default(),
             quiet: None,
-            broke: false,
+            has_resumed: false,
         }
     }
 
     /// Whether it has settled.
     pub fn has_settled(&self) -> bool {
         let needed = match self.period {
-            Some(period) if self.broke => period,
+            Some(period) if self.has_resumed => period,
             _ => 0.0,
         };
         self.quiet
             .is_some_and(|since| self.here.time - since >= needed)
     }
 
-    /// Takes the next instant of the run.
+    /// Records the next instant of the run.
     pub fn record(&mut self, frame: &Frame) {
         let least = self.joints.iter().flatten().map(|(_, c)| *c);
         let least = least.fold(f64::INFINITY, f64::min);
@@ -112,7 +111,7 @@ impl Settling {
                 clearance.is_none_or(|clearance| (a - b).norm() <= STILL * clearance)
             });
             let mut loads = then.loads.iter().zip(&here.loads);
-            // Those of two stretches ago have told all they can.
+            // Those older than two stretches are no longer needed.
             still
                 && here.time - then.time < 2.0 * stretch
                 && loads.all(|(a, b)| (a - b).abs() <= LOAD * a)
@@ -121,7 +120,7 @@ impl Settling {
         let quiet = since(self.past.first()).is_some_and(|age| age >= stretch);
         match (quiet, self.quiet) {
             (true, None) => self.quiet = Some(here.time),
-            (false, Some(_)) => (self.quiet, self.broke) = (None, true),
+            (false, Some(_)) => (self.quiet, self.has_resumed) = (None, true),
             _ => {}
         }
         if since(self.past.last()).is_none_or(|age| age >= stretch / KEPT) {
@@ -129,7 +128,7 @@ impl Settling {
         }
     }
 
-    /// Of a driven scene where each ball stands in its socket, by the socket's axes; else where points of the bodies are.
+    /// Takes the positions: in a driven scene, of the balls in the axes of their sockets; otherwise, of points of the bodies.
     fn take(&mut self, frame: &Frame) {
         let Instant {
             time,
@@ -161,7 +160,7 @@ mod tests {
     use super::*;
     use crate::simulate::Simulation;
 
-    /// Runs `scene` to `to`, s: the times at which it came to be settled and ceased to be.
+    /// Runs `scene` to `to`, s: the times at which it became settled or ceased to be.
     fn turns(scene: &Scene, to: f64) -> Vec<f64> {
         let mut simulation = Simulation::new(scene).expect("starts");
         let mut settling = Settling::new(scene);

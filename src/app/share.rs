@@ -1,9 +1,9 @@
 //! Share links: a scene, what was changed in it, and how to take a run to the same instant again, as the query or the
 //! fragment of a URL.
 //!
-//! A link carries the log of a run and no state: what it holds is checked by the same table as anything a user types, a
-//! person can read and write it, and it outlives the program's inner layout. The price is the stepping from t = 0, which
-//! takes no longer than the run itself did. The state hash proves the result.
+//! A link carries the log of a run but no state: its values are checked by the same table as user input, a person can read and
+//! write it, and it does not depend on internal data structures. The price is stepping from t = 0, which takes no longer than
+//! the run itself did. The state hash verifies the result.
 
 use std::fmt::Write as _;
 
@@ -20,9 +20,9 @@ use crate::scene::{
 use crate::simulate::{Quantity, SCALE_RANGE};
 use crate::view::Picked;
 
-/// Longest link that is given out and read, characters: what mail, chats and every browser still pass on.
+/// Longest link written and read, characters: what mail, chats and every browser still pass on.
 pub const LONGEST_LINK: usize = 32_000;
-/// Most bytes that a packed part of a link may unpack to: what a scene file may have.
+/// Most bytes that a packed part of a link may unpack to: the size limit of a scene file.
 const LARGEST_UNPACKED: usize = LARGEST_FILE as usize;
 
 /// Short names of parameters.
@@ -33,7 +33,7 @@ pub const ALIASES: [(&str, &str); 4] = [
     ("method", "solver.method"),
 ];
 
-/// Words of a link that are no parameters.
+/// Words of a link that are not parameters.
 const WORDS: [&str; 17] = [
     "scene",
     "file",
@@ -54,7 +54,7 @@ const WORDS: [&str; 17] = [
     "theme",
 ];
 
-/// Ways to draw that a page takes; the program's window finds its own.
+/// Renderers that a page accepts; the desktop window chooses its own.
 const RENDERERS: [&str; 2] = ["webgpu", "webgl"];
 
 const THEMES: [(&str, ThemePreference); 3] = [
@@ -67,7 +67,7 @@ const THEMES: [(&str, ThemePreference); 3] = [
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{}{}", place(.key, .value), visible(.message))]
 pub struct LinkError {
-    /// Word or key at fault; empty where it is the whole link.
+    /// Word or key at fault; empty if it is the whole link.
     pub key: String,
     /// Value at fault, shortened.
     pub value: String,
@@ -88,7 +88,7 @@ fn place(key: &str, value: &str) -> String {
 pub enum SceneText {
     /// A built-in scene, by name.
     BuiltIn(String),
-    /// A file that travels in the link.
+    /// A file contained in the link.
     File {
         /// Its name, without folders.
         name: String,
@@ -97,19 +97,19 @@ pub enum SceneText {
     },
 }
 
-/// Where the camera stands.
+/// Pose of the camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CameraPose {
     /// Turn about the vertical, rad.
     pub yaw: f32,
-    /// Height angle, rad.
+    /// Elevation, rad.
     pub pitch: f32,
     /// Eye to target, m.
     pub distance: f32,
     /// What it looks at, m.
     pub target: [f32; 3],
-    /// Width over height of the picture that everything was fitted into, and nobody has moved the camera since; a picture
-    /// of another shape fits it anew. `None`: it stands where somebody put it.
+    /// Width over height of the picture into which everything was fitted, if the camera has not been moved since; a picture of
+    /// another shape is fitted anew. `None`: the user has placed it.
     pub fitted: Option<f32>,
 }
 
@@ -128,17 +128,17 @@ pub struct Link {
     pub hash: Option<u64>,
     /// Simulated seconds per second.
     pub time_scale: Option<f64>,
-    /// Point of view; without it everything is shown as when a scene opens.
+    /// Point of view; without it everything is fitted as when a scene opens.
     pub camera: Option<CameraPose>,
     /// Magnification of the play.
     pub magnification: Option<f32>,
     /// Part that the view follows, `joint.NAME` or `body.NAME`.
     pub follow: Option<String>,
-    /// Plots on show.
+    /// Plots shown.
     pub plots: Option<Vec<Quantity>>,
     /// Time that they show.
     pub window: Option<Window>,
-    /// Whether time passes once the state is there; where it is left out, only if the link names no instant.
+    /// Whether the run plays once the state is reached; by default, only if the link names no instant.
     pub playing: Option<bool>,
     /// Light, dark, or as the system asks.
     pub theme: Option<ThemePreference>,
@@ -181,12 +181,12 @@ fn is_file(text: &str) -> bool {
 }
 
 impl Link {
-    /// Reads a whole URL, a query (`?…`), a fragment (`#…`) or the bare pairs. A fragment that names a scene stands for
-    /// itself; else the query's pairs come first and the fragment's win over them.
+    /// Reads a whole URL, a query (`?…`), a fragment (`#…`) or the bare pairs. A fragment that names a scene stands alone;
+    /// otherwise the query's pairs come first and the fragment's override them.
     ///
     /// # Errors
-    /// An unknown word, a value that is none, a packed part that does not unpack. Whether the scene has the parameters and
-    /// allows the values shows only in [`Self::load`].
+    /// An unknown word, an invalid value, a packed part that does not unpack. Whether the scene has the parameters and allows
+    /// the values is checked only in [`Self::load`].
     pub fn parse(text: &str) -> Result<Self, LinkError> {
         let text = text.trim();
         let length = text.chars().count();
@@ -278,7 +278,7 @@ impl Link {
                 // Chosen before the application starts, by `web/main.js`.
                 "renderer" if RENDERERS.contains(&value) => {}
                 "renderer" => return Err(wrong("allowed webgpu and webgl")),
-                // What other sites hang on to links.
+                // Appended to links by other sites.
                 "fbclid" | "gclid" => {}
                 other if other.starts_with("utm_") => {}
                 other => {
@@ -317,7 +317,7 @@ impl Link {
         Ok(link)
     }
 
-    /// The pairs, as a query or a fragment holds them, without the sign before it.
+    /// The pairs as in a query or a fragment, without the leading sign.
     pub fn format(&self) -> String {
         let mut out = form_urlencoded::Serializer::new(String::new());
         let mut packed = Vec::new();

@@ -1,4 +1,4 @@
-//! Terms that add up to nothing, stacked: what gives above zero, what takes below, so that both sides reach equally far.
+//! Stacks terms that add up to zero: positive ones above zero, negative ones below, so that both sides reach equally far.
 
 /// Lower and upper edge of one term at each instant.
 pub type Band = (Vec<f64>, Vec<f64>);

@@ -5,8 +5,8 @@ use eframe::egui::{
     vec2,
 };
 
-/// Series colours for plots, dark enough on white and light enough on black; apart for the colour-blind
-/// (after Okabe & Ito).
+/// Series colours for plots, dark enough on white and light enough on black; distinguishable for the colour-blind (after Okabe
+/// & Ito).
 const SERIES: [(Color32, Color32); 9] = [
     (
         Color32::from_rgb(0x00, 0x72, 0xB2),
@@ -52,10 +52,10 @@ pub fn series(index: usize, dark: bool) -> Color32 {
     if dark { on_dark } else { on_light }
 }
 
-/// Least side of what a finger hits, points.
+/// Least side of a touch target, points.
 pub const FINGER: f32 = 44.0;
 
-/// Gives controls the size for a mouse, or for fingers.
+/// Sizes the controls for a mouse, or for fingers.
 pub fn apply_size(ctx: &egui::Context, fingers: bool) {
     ctx.all_styles_mut(|style| {
         let spacing = &mut style.spacing;
@@ -67,7 +67,7 @@ pub fn apply_size(ctx: &egui::Context, fingers: bool) {
         spacing.icon_width = if fingers { 22.0 } else { 16.0 };
         spacing.combo_height = if fingers { 320.0 } else { 200.0 };
     });
-    // A finger moves on the way and does not come down twice on the same point.
+    // A finger moves during a tap and does not come down twice on the same point.
     ctx.options_mut(|options| {
         options.input_options.max_click_dist = if fingers { 16.0 } else { 6.0 };
     });

@@ -1,5 +1,5 @@
-//! The timeline: the run so far from end to end. A lane for each ball joint shows when it was free, slid or stuck, and where its
-//! ball came to touch; flags show what was done. A click or a drag puts any instant on show.
+//! The timeline: the run so far from end to end. A lane for each ball joint shows when it was free, slid or stuck, and where
+//! its ball came into contact; flags show what was done. A click or a drag displays any instant.
 
 use eframe::egui::{
     self, Color32, EventFilter, Key, Mesh, Pos2, Rect, Response, Sense, Shape, Stroke, Ui,
@@ -7,40 +7,41 @@ use eframe::egui::{
 };
 
 use super::icons::{Icon, icon_button};
-use super::player::course::Course;
+use super::player::contact_history::ContactHistory;
 use super::player::{Flag, Player};
+use super::zoom::{self, Zoom};
 use super::{theme, value};
 use crate::simulate::{ContactState, RECORDED_JOINTS};
 
-/// Height of the row that the flags stand in, and of all lanes together, points.
+/// Height of the row of flags, and of all lanes together, points.
 const FLAGS: f32 = 9.0;
 const LANES: f32 = 24.0;
-/// Height of a window below which the strip stands alone and low, points.
+/// Window height below which only the strip is shown, and low, points.
 const LOW: f32 = 360.0;
-/// The shortest time that is shown, s.
+/// The shortest time range shown, s.
 const SHORTEST: f64 = 1e-6;
-/// How much stands out what is, of what was left or is to come.
+/// Opacity of what was abandoned or is to come.
 const PALE: f32 = 0.35;
-/// Part of the shown time that an arrow key moves by.
+/// Fraction of the shown time range that an arrow key moves by.
 const NUDGE: f64 = 0.01;
-/// Nearer than this to the pointer a flag is meant, points.
+/// Largest distance at which the pointer hits a flag, points.
 const NEAR: f32 = 6.0;
 
 /// The strip under the picture.
 #[derive(Default)]
 pub struct Timeline {
-    /// The part of the run that is shown, s; all of it unless somebody has come nearer.
+    /// Time range shown, s; the whole run unless the user has zoomed.
     zoomed: Option<(f64, f64)>,
 }
 
 impl Timeline {
-    /// All of the run again.
+    /// Shows the whole run again.
     pub fn reset(&mut self) {
         self.zoomed = None;
     }
 
-    /// The row: to the impact before and after, backwards, and the strip. `focus`: the ball joint whose impacts are meant.
-    /// Returns whether another instant was put on show.
+    /// The row: buttons for the previous and the next impact and for playing backwards, and the strip. `focus`: the ball joint
+    /// whose impacts are meant. Returns whether the displayed instant was changed.
     pub fn ui(&mut self, ui: &mut Ui, player: &mut Player, focus: Option<usize>) -> bool {
         if ui.ctx().content_rect().height() < LOW {
             return self.strip(ui, player, FLAGS + 0.6 * LANES);
@@ -53,9 +54,9 @@ impl Timeline {
             let of = of.map_or("any ball joint".to_owned(), |joint| joint.name.clone());
             let past = player.pacer.shown() > 0.0;
             ui.add_enabled_ui(past, |ui| {
-                let help = format!("To the impact of {of} before (key ,)");
+                let help = format!("To the previous impact of {of} (key ,)");
                 if icon_button(ui, Icon::Before, "Previous impact", &help, side, false).clicked() {
-                    player.go_to_touch(focus, false);
+                    player.go_to_contact(focus, false);
                     moved = true;
                 }
                 let help = "Let time pass backwards, to the start (key J)";
@@ -77,7 +78,7 @@ impl Timeline {
             ui.add_enabled_ui(player.stopped().is_none() || player.has_future(), |ui| {
                 let help = format!("To the next impact of {of} (key .)");
                 if icon_button(ui, Icon::After, "Next impact", &help, side, false).clicked() {
-                    player.go_to_touch(focus, true);
+                    player.go_to_contact(focus, true);
                     moved = true;
                 }
             });
@@ -86,18 +87,17 @@ impl Timeline {
         moved
     }
 
-    /// What is shown, s.
+    /// Time range shown, s.
     fn range(&self, player: &Player) -> (f64, f64) {
-        let left = player.left().map_or(0.0, |left| left.to);
-        let end = player.reached().max(left).max(SHORTEST);
+        let end = player.known_to().max(SHORTEST);
         let Some((from, to)) = self.zoomed else {
             return (0.0, end);
         };
-        // Time that passes takes the shown part along.
+        // While playing, the range follows the displayed instant.
         let (shown, length) = (player.pacer.shown(), to - from);
         if player.is_playing() && !(from..=to).contains(&shown) {
-            let from = (shown - 0.8 * length).clamp(0.0, (end - length).max(0.0));
-            return (from, from + length);
+            let from = shown - 0.8 * length;
+            return zoom::within((from, from + length), end);
         }
         (from, to)
     }
@@ -132,7 +132,7 @@ impl Timeline {
         asked.is_some()
     }
 
-    /// What pointer and keys ask for: an instant, or another part of the run.
+    /// Pointer and key input: returns an instant, or changes the time range.
     fn input(
         &mut self,
         ui: &Ui,
@@ -154,36 +154,20 @@ impl Timeline {
                 return Some(player.pacer.shown() + by * NUDGE * length);
             }
         }
-        if let Some(pos) = response.hover_pos() {
-            let (wheel, pinch) = ui.input(|i| (i.smooth_scroll_delta().y, i.zoom_delta()));
-            let factor = f64::from((wheel * 0.004).exp() * pinch);
-            if factor != 1.0 {
-                self.zoomed = zoomed(scale, scale.time(pos.x), factor, player);
-            }
+        if let Some(zoom) = Zoom::over(ui, response) {
+            let (end, width) = (player.known_to(), scale.rect.width());
+            let range = zoom.apply(scale.range, scale.time(zoom.place.x), width, SHORTEST);
+            let part = range.1 - range.0 < end;
+            self.zoomed = part.then(|| zoom::within(range, end));
         }
         if response.double_clicked() {
             self.zoomed = None;
             return None;
         }
-        let held = response.clicked() || response.dragged_by(egui::PointerButton::Primary);
+        let held = response.clicked() || zoom::drags(ui, response);
         let pos = response.interact_pointer_pos().filter(|_| held)?;
         Some(scale.time(pos.x).clamp(0.0, player.reached()))
     }
-}
-
-/// The part of the run that is shown after coming nearer to `time` by `factor`; `None` for all of it.
-fn zoomed(scale: &Scale, time: f64, factor: f64, player: &Player) -> Option<(f64, f64)> {
-    let (from, to) = scale.range;
-    let end = player
-        .reached()
-        .max(player.left().map_or(0.0, |left| left.to));
-    let length = ((to - from) / factor).max(SHORTEST);
-    if length >= end {
-        return None;
-    }
-    let share = (time - from) / (to - from);
-    let from = (time - share * length).clamp(0.0, end - length);
-    Some((from, from + length))
 }
 
 /// Time across the strip.
@@ -207,7 +191,7 @@ impl Scale {
         self.rect.with_min_y(self.rect.top() + FLAGS)
     }
 
-    /// The lane of ball joint `joint` of so many.
+    /// The lane of ball joint `joint` out of `joints`.
     fn lane(&self, joint: usize, joints: usize) -> Rect {
         let lanes = self.lanes();
         let height = lanes.height() / joints.max(1) as f32;
@@ -224,11 +208,23 @@ fn paint(ui: &Ui, player: &Player, scale: &Scale, response: &Response) {
     painter.rect_filled(lanes, 3.0, visuals.extreme_bg_color);
     let shown = player.pacer.shown();
     let (_, end) = scale.range;
-    if let Some(left) = player.left() {
-        course(ui, &left.course, scale, (player.reached(), end), PALE);
+    if let Some(left) = player.abandoned_future() {
+        contact_lanes(
+            ui,
+            &left.contact_history,
+            scale,
+            (player.reached(), end),
+            PALE,
+        );
     }
-    course(ui, player.course(), scale, (0.0, shown), 1.0);
-    course(ui, player.course(), scale, (shown, player.reached()), PALE);
+    contact_lanes(ui, player.contact_history(), scale, (0.0, shown), 1.0);
+    contact_lanes(
+        ui,
+        player.contact_history(),
+        scale,
+        (shown, player.reached()),
+        PALE,
+    );
     let flags = |flags: &mut dyn Iterator<Item = Flag>, pale: bool| {
         for flag in flags {
             let later = pale || flag.time > shown;
@@ -237,7 +233,7 @@ fn paint(ui: &Ui, player: &Player, scale: &Scale, response: &Response) {
         }
     };
     flags(&mut player.flags(), false);
-    if let Some(left) = player.left() {
+    if let Some(left) = player.abandoned_future() {
         let ahead = left
             .flags
             .iter()
@@ -257,9 +253,15 @@ fn paint(ui: &Ui, player: &Player, scale: &Scale, response: &Response) {
     painter.rect_stroke(lanes, 3.0, edge, egui::StrokeKind::Outside);
 }
 
-/// The lanes between two times, s: sliding in half of the joint's colour, sticking in all of it, and a mark where its ball came to
-/// touch. A column of pixels has as much colour as it has of each state.
-fn course(ui: &Ui, course: &Course, scale: &Scale, between: (f64, f64), part: f32) {
+/// The lanes between two times, s: sliding in half the joint's colour, sticking in full colour, and a mark where its ball came
+/// into contact. A pixel column is coloured in proportion to the time in each state.
+fn contact_lanes(
+    ui: &Ui,
+    contacts: &ContactHistory,
+    scale: &Scale,
+    between: (f64, f64),
+    part: f32,
+) {
     let dark = ui.visuals().dark_mode;
     let pixel = 1.0 / ui.ctx().pixels_per_point();
     let from = between.0.max(scale.range.0);
@@ -267,7 +269,7 @@ fn course(ui: &Ui, course: &Course, scale: &Scale, between: (f64, f64), part: f3
     if to <= from {
         return;
     }
-    let joints = course.joints().min(RECORDED_JOINTS);
+    let joints = contacts.joints().min(RECORDED_JOINTS);
     let columns = (scale.rect.width() / pixel).ceil() as usize;
     let per_second = columns as f64 / (scale.range.1 - scale.range.0);
     let mut shares = vec![0.0_f32; columns + 1];
@@ -276,7 +278,7 @@ fn course(ui: &Ui, course: &Course, scale: &Scale, between: (f64, f64), part: f3
         let lane = scale.lane(joint, joints);
         let colour = theme::series(joint, dark).gamma_multiply(part);
         shares.fill(0.0);
-        for (begins, ends, state) in course.states(joint, from, to) {
+        for (begins, ends, state) in contacts.states(joint, from, to) {
             let weight = match state {
                 ContactState::Free => continue,
                 ContactState::Slip => 0.5,
@@ -292,7 +294,7 @@ fn course(ui: &Ui, course: &Course, scale: &Scale, between: (f64, f64), part: f3
                 *share += weight * covered.max(0.0) as f32;
             }
         }
-        // Columns of one colour make one rectangle.
+        // Columns of one colour form one rectangle.
         let mut start = 0;
         while start < columns {
             let share = shares[start];
@@ -304,13 +306,13 @@ fn course(ui: &Ui, course: &Course, scale: &Scale, between: (f64, f64), part: f3
                 let left = scale.rect.left() + start as f32 * pixel;
                 let place =
                     Rect::from_x_y_ranges(left..=left + count as f32 * pixel, lane.y_range());
-                // Something is to be seen of the shortest contact.
+                // Even the shortest contact stays visible.
                 mesh.add_colored_rect(place, colour.gamma_multiply(share.clamp(0.12, 1.0)));
             }
             start += count.max(1);
         }
         let mut drawn = f32::NEG_INFINITY;
-        for time in course.touches(joint, from, to) {
+        for time in contacts.touches(joint, from, to) {
             let x = scale.x(time);
             if x - drawn >= pixel {
                 let mark = Rect::from_min_size(pos2(x, lane.top()), vec2(1.0, lane.height()));
@@ -339,16 +341,16 @@ fn flag_at(ui: &Ui, scale: &Scale, time: f64, part: f32) {
 fn describe(ui: &mut Ui, player: &Player, scale: &Scale, pos: Pos2) {
     let time = scale.time(pos.x);
     ui.strong(value::time(time));
-    let joints = player.course().joints().min(RECORDED_JOINTS);
+    let joints = player.contact_history().joints().min(RECORDED_JOINTS);
     let under = (0..joints).find(|&joint| scale.lane(joint, joints).y_range().contains(pos.y));
-    let course = if time > player.reached() {
-        player.left().map(|left| &left.course)
+    let contacts = if time > player.reached() {
+        player.abandoned_future().map(|left| &left.contact_history)
     } else {
-        Some(player.course())
+        Some(player.contact_history())
     };
-    if let (Some(joint), Some(course)) = (under, course) {
+    if let (Some(joint), Some(contacts)) = (under, contacts) {
         let name = &player.scene().ball_joints[joint].name;
-        let state = course.states(joint, time, time + SHORTEST).next();
+        let state = contacts.states(joint, time, time + SHORTEST).next();
         let words = match state {
             None => "not recorded",
             Some((.., ContactState::Free)) => "free",
@@ -359,7 +361,7 @@ fn describe(ui: &mut Ui, player: &Player, scale: &Scale, pos: Pos2) {
         ui.label(format!("{name}: {words}"));
     }
     let left = player
-        .left()
+        .abandoned_future()
         .into_iter()
         .flat_map(|left| left.flags.iter().cloned());
     for flag in player.flags().chain(left) {
@@ -367,7 +369,7 @@ fn describe(ui: &mut Ui, player: &Player, scale: &Scale, pos: Pos2) {
             ui.label(format!("{}: {}", value::time(flag.time), flag.words));
         }
     }
-    let known = player.course().known_from();
+    let known = player.contact_history().known_from();
     if time < known {
         let words = format!("Contacts before {} are no longer kept", value::time(known));
         ui.label(words);

@@ -1,6 +1,6 @@
 //! Transport: play, step, reset, time scale, and how fast time really passes.
 
-use eframe::egui::{self, ComboBox, RichText, Slider, Ui, Vec2};
+use eframe::egui::{self, ComboBox, RichText, Sense, Slider, Ui, Vec2};
 
 use super::icons::{Icon, icon_button};
 use super::player::Player;
@@ -12,6 +12,8 @@ pub const SCALES: [f64; 8] = [1.0, 0.5, 0.1, 0.05, 0.02, 0.01, 1e-3, 1e-4];
 
 /// Width of the list of time scales, points: room for the longest.
 const SCALES_WIDTH: f32 = 94.0;
+/// Length of a drag from one of them to the next, points.
+const SCALE_APART: f32 = 20.0;
 
 /// Size of the button that plays and pauses, points.
 const PLAY: f32 = 40.0;
@@ -67,11 +69,11 @@ pub fn ui(ui: &mut Ui, player: &mut Player) -> Option<Asked> {
     asked
 }
 
-/// The bar in one row, without what has no room there.
+/// The bar in one row, without what does not fit.
 pub fn row(ui: &mut Ui, player: &mut Player) -> Option<Asked> {
     ui.horizontal(|ui| {
         let asked = buttons(ui, player);
-        // Else the time scale would stick out; the time stands over the picture, too.
+        // Otherwise the time scale would stick out; the time is shown over the picture as well.
         if ui.available_width() > clock(ui).x + SCALES_WIDTH + ui.spacing().item_spacing.x {
             time(ui, player);
         }
@@ -85,7 +87,7 @@ pub fn row(ui: &mut Ui, player: &mut Player) -> Option<Asked> {
     .inner
 }
 
-/// What to do when nothing happens any more, at the right end, where nothing else gives way for it.
+/// Hint for a settled run, at the right end, where nothing else has to make room for it.
 fn settled(ui: &mut Ui, player: &Player) {
     if !player.is_playing() || !player.has_settled() || ui.available_width() < 130.0 {
         return;
@@ -131,7 +133,7 @@ fn buttons(ui: &mut Ui, player: &mut Player) -> Option<Asked> {
     asked
 }
 
-/// Room for any time: what stands beside the clock does not move with its digits.
+/// Room for any time, so that what is beside the clock does not move with its digits.
 fn clock(ui: &Ui) -> Vec2 {
     let font = egui::TextStyle::Monospace.resolve(ui.style());
     let digits = "0".repeat(value::LONGEST_TIME);
@@ -167,9 +169,9 @@ fn speed(ui: &mut Ui, player: &mut Player, narrow: bool) {
     reached(ui, player);
 }
 
-/// Time scales to choose from.
+/// Time scales to choose from: the list, or a drag across it.
 fn scales(ui: &mut Ui, player: &mut Player) {
-    ComboBox::from_id_salt("time scale")
+    let list = ComboBox::from_id_salt("time scale")
         .width(SCALES_WIDTH)
         .truncate()
         .selected_text(value::time_scale(player.pacer.scale()))
@@ -185,11 +187,27 @@ fn scales(ui: &mut Ui, player: &mut Player) {
             }
         })
         .response
-        .on_hover_text("Simulated against real time")
+        .on_hover_text("Simulated against real time: choose one, or drag to the right for faster")
         .accessible_name("Time scale preset");
+    let drag = ui.interact(list.rect, list.id.with("drag"), Sense::drag());
+    if !drag.dragged() {
+        return;
+    }
+    // What is left of the drag since the last scale.
+    let left: Option<f32> = ui.data(|data| data.get_temp(drag.id));
+    let left = left.filter(|_| !drag.drag_started());
+    let mut way = left.unwrap_or(0.0) + drag.drag_delta().x;
+    while way.abs() >= SCALE_APART {
+        let faster = way > 0.0;
+        player
+            .pacer
+            .set_scale(next_scale(player.pacer.scale(), faster));
+        way -= SCALE_APART.copysign(way);
+    }
+    ui.data_mut(|data| data.insert_temp(drag.id, way));
 }
 
-/// What the machine makes of it.
+/// The time scale that the computer actually reaches.
 fn reached(ui: &mut Ui, player: &Player) {
     if !player.is_playing() {
         return;

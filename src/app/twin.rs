@@ -1,14 +1,14 @@
-//! A second run beside the first, displaced by next to nothing: how fast neighbouring motions part, without ever bringing
-//! them together again. The run knows nothing of its twin.
+//! A second run beside the first, minimally displaced: how fast neighbouring motions diverge, without ever renormalising their
+//! distance. The twin does not affect the run.
 
 use crate::analysis::exponent::{offset, scaled_distance};
 use crate::simulate::{Frame, Simulation, StartError};
 
 /// The displacement, in units of the scales of the state.
 pub const DISPLACEMENT: f64 = 1e-9;
-/// Distances kept: when there are so many, every second one goes.
+/// Distances kept; at this number every second one is dropped.
 const KEPT: usize = 4096;
-/// The growing part ends where the distance first reaches this share of its largest value.
+/// The growing part ends where the distance first reaches this fraction of its largest value.
 const GROWN: f64 = 0.1;
 /// Fewer distances than this give no slope.
 const FEWEST: usize = 8;
@@ -26,16 +26,16 @@ pub struct Fit {
     pub to: f64,
 }
 
-/// The twin and what it told.
+/// The twin and its distances so far.
 pub struct Twin {
     simulation: Simulation,
     frame: Frame,
     /// Time in s, distance in units of the scales.
     distances: Vec<[f64; 2]>,
-    /// Every so manyth step is kept.
+    /// Every `stride`-th step is kept.
     stride: u64,
     steps: u64,
-    /// Time to which the run has come, s, and its state there: the twin meets it when that is on show.
+    /// Time that the run has reached, s, and its state there: the twin catches up when that is displayed.
     goal: f64,
     goal_state: Vec<f64>,
     ended: Option<String>,
@@ -45,7 +45,7 @@ impl Twin {
     /// Displaces a copy of `run` as it is now.
     ///
     /// # Errors
-    /// The copy cannot start; a scene that runs can.
+    /// The copy cannot start; a running scene can.
     pub fn new(run: &Simulation) -> Result<Self, StartError> {
         let mut simulation = Simulation::new(run.running_scene())?;
         simulation.restore(&run.snapshot())?;
@@ -66,7 +66,7 @@ impl Twin {
         Ok(twin)
     }
 
-    /// Takes in where `run` is, which has just taken a step; the twin has come to where it was before.
+    /// To be called after a step of `run`: the twin advances to where the run was before that step.
     pub fn follow(&mut self, run: &Simulation) {
         self.come_to(self.goal);
         self.goal = run.time();
@@ -89,7 +89,7 @@ impl Twin {
         }
     }
 
-    /// Records how far it is from the run.
+    /// Records its distance from the run.
     fn measure(&mut self) {
         let scales = self.simulation.scales();
         let distance = scaled_distance(&self.goal_state, self.simulation.state(), scales);
@@ -101,19 +101,19 @@ impl Twin {
             });
             self.stride *= 2;
         }
-        // Two motions that have become one to the last bit have no logarithm.
+        // Motions identical to the last bit have no logarithm of their distance.
         if distance > 0.0 && distance.is_finite() {
             self.distances.push([self.goal, distance]);
         }
     }
 
-    /// Puts the state at `time`, s, in [`Self::frame`]; the start, where that is later; where it ended.
+    /// Samples the state at `time`, s, into [`Self::frame`], limited to the twin's start and to where it ended.
     pub fn place(&mut self, time: f64) {
         self.come_to(time);
         self.simulation.sample(time, &mut self.frame);
     }
 
-    /// The state on show.
+    /// The displayed state.
     pub fn frame(&self) -> &Frame {
         &self.frame
     }
@@ -192,7 +192,7 @@ mod tests {
             run.step().expect("runs");
             let start = run.step_start();
             twin.follow(&run);
-            // Whatever instant of the step is on show, the twin is there.
+            // Whatever instant of the step is displayed, the twin is there.
             for part in [0.3, 0.9, 1.0] {
                 let time = start + part * (run.time() - start);
                 twin.place(time);

@@ -1,4 +1,4 @@
-//! Values as text on the screen: the words that files and the command line take, their units as they are printed.
+//! Values as text on the screen: words as in files and on the command line, typeset units.
 
 use crate::scene::{Kind, Scene, Value, format_quantity, format_quantity_digits};
 
@@ -6,7 +6,7 @@ use crate::scene::{Kind, Scene, Value, format_quantity, format_quantity_digits};
 pub fn typeset(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     let mut word = String::new();
-    // A last separator, so that the last word is seen.
+    // A final separator, so that the last word is handled.
     for letter in text.chars().chain(['\0']) {
         if letter.is_alphanumeric() {
             word.push(letter);
@@ -33,12 +33,12 @@ pub fn typeset(text: &str) -> String {
     out
 }
 
-/// An SI value in `unit` for a person.
+/// An SI value in `unit`, as shown to the user.
 pub fn quantity(si: f64, unit: &str, digits: usize) -> String {
     typeset(&format_quantity_digits(si, unit, digits))
 }
 
-/// `value` for a person: display unit, six digits.
+/// `value` as shown to the user: display unit, six digits.
 pub fn shown(value: &Value, kind: &Kind) -> String {
     match (value, kind) {
         (Value::Number(si), Kind::Number { display, .. }) => quantity(*si, display, 6),
@@ -49,7 +49,7 @@ pub fn shown(value: &Value, kind: &Kind) -> String {
     }
 }
 
-/// The value of `key` of `scene` for a person, after its name; `None` where the scene has no such key.
+/// Name and displayed value of `key` of `scene`; `None` if the scene has no such key.
 fn named(scene: &Scene, key: &str) -> Option<(String, String)> {
     let (value, parameter) = (scene.get(key).ok()?, scene.parameter(key).ok()?);
     let name = match key
@@ -62,10 +62,10 @@ fn named(scene: &Scene, key: &str) -> Option<(String, String)> {
     Some((name, shown(&value, &parameter.kind)))
 }
 
-/// A scene in a line: its name, what is changed in it except for the keys `except`, and what solves it.
+/// A scene in one line: its name, its changes except for the keys `except`, and its solver.
 pub fn scene_line(scene: &Scene, except: &[String]) -> String {
     let changed = scene.changes.iter().map(|(key, _)| key);
-    let changed = changed.filter(|key| !except.contains(key) && !is_about_the_way(key));
+    let changed = changed.filter(|key| !except.contains(key) && !is_solver_or_view_key(key));
     let mut parts = vec![scene.name.clone()];
     parts.extend(
         changed
@@ -76,8 +76,8 @@ pub fn scene_line(scene: &Scene, except: &[String]) -> String {
     parts.join(", ")
 }
 
-/// Keys that say how a scene is solved or looked at: the solver is named as a whole, the look changes no motion.
-fn is_about_the_way(key: &str) -> bool {
+/// Keys of solver and view: the solver is named as a whole, and the view does not affect the motion.
+fn is_solver_or_view_key(key: &str) -> bool {
     key.starts_with("solver.") || key.starts_with("view.")
 }
 
@@ -91,8 +91,8 @@ pub fn solver(scene: &Scene) -> String {
     }
 }
 
-/// What would change with `there` in the place of `here`, a phrase each, but for the keys `except`; empty where it is the same
-/// motion.
+/// What would change with `there` in place of `here`, one phrase each, except for the keys `except`; empty if the motion is the
+/// same.
 pub fn differences(there: &Scene, here: &Scene, except: &[String]) -> Vec<String> {
     if there.source.text != here.source.text {
         let (new, old) = (&there.name, &here.name);
@@ -104,7 +104,7 @@ pub fn differences(there: &Scene, here: &Scene, except: &[String]) -> Vec<String
     }
     let mut keys: Vec<&String> = Vec::new();
     for (key, _) in there.changes.iter().chain(&here.changes) {
-        if !keys.contains(&key) && !except.contains(key) && !is_about_the_way(key) {
+        if !keys.contains(&key) && !except.contains(key) && !is_solver_or_view_key(key) {
             keys.push(key);
         }
     }
@@ -141,7 +141,7 @@ pub fn number(value: f64, digits: usize) -> String {
     format_quantity_digits(value, "", digits)
 }
 
-/// Digits that tell values apart which lie as close as a thousandth of `span`, where they are as large as `most`.
+/// Digits that distinguish values of size up to `most` that differ by a thousandth of `span`.
 pub fn digits_within(span: f64, most: f64) -> usize {
     let more = (most / span).log10().ceil();
     if more.is_finite() {
@@ -170,14 +170,14 @@ pub fn percent(share: f64) -> String {
     }
 }
 
-/// Most characters of [`time`] up to 10^9 s: what a clock keeps free.
+/// Most characters of [`time`] up to 10^9 s: the width reserved for a clock.
 pub const LONGEST_TIME: usize = 11;
 
 /// A time with the unit that suits its size; a long one has fewer decimals, so that it takes no more room.
 pub fn time(seconds: f64) -> String {
     let size = seconds.abs();
     for (unit, name, decimals) in [(1e-6, "µs", 3), (1e-3, "ms", 4)] {
-        // A value that rounds up to the next unit is written in that one.
+        // A value that rounds up to the next unit is written in that unit.
         let whole = 1000.0 - 0.5 * libm::pow(10.0, -f64::from(decimals));
         if size > 0.0 && size / unit < whole {
             return format!("{:.*} {name}", decimals as usize, seconds / unit);

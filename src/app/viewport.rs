@@ -11,8 +11,9 @@ use glam::{Vec2, Vec3};
 use super::player::Player;
 use super::pull::Grip;
 use super::share::CameraPose;
-use super::{ghosts, keys, overlay, value};
+use super::{ghosts, keys, overlay, value, zoom};
 use crate::render;
+use crate::scene::Vec3 as Exact;
 use crate::simulate::{ContactState, Pull};
 use crate::view::{
     Camera, DrawList, PeakMarks, Picked, Preset, SEEN, Scaling, SceneView, Shot, Theme,
@@ -22,12 +23,12 @@ use crate::view::{
 /// Points of the probe's trail that are kept.
 const TRAIL: usize = 1500;
 
-/// Farthest that the wheel goes away, in radii of the machine.
+/// Farthest camera distance by the wheel, in radii of the machine.
 const FARTHEST: f32 = 30.0;
 
-/// A shot of what the player shows. A macro, since the list that it is drawn to is borrowed beside it.
+/// A shot of what the player shows. A macro, since the draw list is borrowed at the same time.
 macro_rules! shot {
-    ($self:ident, $player:ident, $camera:expr, $size:ident, $scale:ident) => {
+    ($self:ident, $player:ident, $camera:expr, $screen:expr) => {
         Shot {
             scene: $player.scene(),
             frame: $player.frame(),
@@ -35,38 +36,38 @@ macro_rules! shot {
             options: &$self.options,
             camera: $camera,
             trail: &$self.trail,
-            size: $size,
-            pixels_per_point: $scale,
+            size: $screen.size,
+            pixels_per_point: $screen.scale,
         }
     };
 }
 
-/// Camera, view options and everything that is remembered between two pictures of one scene.
+/// Camera, view options and everything kept between two pictures of one scene.
 pub struct Viewport {
     /// What to draw and how.
     pub options: ViewOptions,
     view: SceneView,
     camera: Camera,
-    /// Where the camera is going; `None` once it is there.
+    /// Where the camera is moving to; `None` once it is there.
     goal: Option<Camera>,
     fit_pending: bool,
     /// Width over height of the picture that was last fitted.
     fitted: f32,
-    /// While a picture is drawn beside the window: width over height of the view on the screen.
+    /// While a picture is drawn off screen: width over height of the view on the screen.
     frozen: Option<f32>,
     marks: PeakMarks,
     list: Arc<DrawList>,
     trail: Vec<Vec3>,
     followed: Option<Picked>,
     time: f64,
-    /// The user has turned, moved or chosen the view: it is no longer the one that a scene opens with.
+    /// The user has turned, moved or chosen the view: it is no longer the one with which a scene opens.
     moved: bool,
     /// What the pointer holds, and whether that changed.
     grip: Option<Grip>,
     grip_changed: bool,
-    /// More than one finger was down since the last time that none was.
+    /// More than one finger has been down since none was.
     pinched: bool,
-    /// Ball joint that was clicked, until somebody asks.
+    /// Ball joint that was clicked, until it is taken.
     clicked: Option<usize>,
 }
 
@@ -95,7 +96,7 @@ impl Viewport {
         }
     }
 
-    /// Where the camera stands or is going; `None` before the first picture.
+    /// Where the camera is or is moving to; `None` before the first picture.
     pub fn pose(&self) -> Option<CameraPose> {
         let camera = self.goal.unwrap_or(self.camera);
         let own = self.moved || self.followed.is_some();
@@ -108,7 +109,7 @@ impl Viewport {
         })
     }
 
-    /// Puts the camera there.
+    /// Places the camera.
     pub fn set_pose(&mut self, pose: CameraPose) {
         self.camera.yaw = pose.yaw;
         self.camera.pitch = pose.pitch;
@@ -118,7 +119,7 @@ impl Viewport {
         self.fitted = pose.fitted.unwrap_or(self.fitted);
     }
 
-    /// After a leap in time: what was remembered from before has no part in the picture.
+    /// After a jump in time: drops marks and trail from before it.
     pub fn arrive(&mut self, player: &Player) {
         self.time = player.pacer.shown();
         self.marks.clear(self.time);
@@ -137,15 +138,15 @@ impl Viewport {
         self.followed = None;
     }
 
-    /// Takes what happened since the last frame, `dt` seconds ago: marks of peaks, flashes, trail, moving camera.
-    /// Returns whether something still moves by itself.
+    /// Updates peak marks, flashes, trail and moving camera, `dt` seconds after the last frame. Returns whether something still
+    /// moves by itself.
     pub fn advance(&mut self, player: &Player, dt: f32) -> bool {
         let shown = player.pacer.shown();
         let fade = SEEN * player.pacer.scale();
         self.marks.update(player.frame(), player.peaks(), fade);
         if shown != self.time || player.is_playing() {
             if shown < self.time {
-                // What comes after the instant on show has not been yet.
+                // What comes after the displayed instant has not happened yet.
                 self.trail.clear();
             }
             self.time = shown;
@@ -201,7 +202,7 @@ impl Viewport {
         }
     }
 
-    /// Puts the centre of ball joint `joint` into the middle and keeps it there.
+    /// Centres the view on ball joint `joint` and keeps it there.
     pub fn centre(&mut self, player: &Player, joint: usize) {
         if let Some(centre) = self.view.anchor(player.frame(), Picked::Joint(joint)) {
             let mut goal = self.goal.unwrap_or(self.camera);
@@ -210,7 +211,7 @@ impl Viewport {
         }
     }
 
-    /// Goes to `goal`, and along with ball joint `joint` from now on.
+    /// Moves to `goal`, and follows ball joint `joint` from now on.
     fn glide(&mut self, player: &Player, goal: Camera, joint: usize) {
         self.goal = Some(goal);
         (self.fit_pending, self.moved) = (false, true);
@@ -243,7 +244,7 @@ impl Viewport {
         }
     }
 
-    /// What the pointer pulls at by now, if that changed; `None` where it let go.
+    /// The present pull of the pointer, if it has changed; `Some(None)` if the pointer let go.
     pub fn take_pull(&mut self) -> Option<Option<Pull>> {
         let changed = std::mem::take(&mut self.grip_changed);
         changed.then(|| self.grip.as_ref().map(Grip::pull))
@@ -262,8 +263,8 @@ impl Viewport {
         self.followed
     }
 
-    /// From now on the view is drawn as it is, whatever the shape of the picture: all is in it that a view of this `aspect`
-    /// (width by height) holds. `None`: it fits itself again where that is due.
+    /// From now on the view is drawn as it is, whatever the shape of the picture: everything in a view of this `aspect` (width
+    /// by height) stays in the picture. `None`: it refits itself when that is due.
     pub fn freeze(&mut self, aspect: Option<f32>) {
         self.frozen = aspect;
     }
@@ -278,6 +279,14 @@ impl Viewport {
         camera
     }
 
+    /// Where a point of the scene, m, is drawn, points, in a picture over `rect`; `None` behind the camera.
+    pub fn place(&self, point: &Exact, rect: Rect) -> Option<Pos2> {
+        let Screen { size, .. } = Screen::new(rect, 1.0);
+        let camera = self.framed(size[0] as f32 / size[1] as f32);
+        let pixel = camera.project(to_f32(point), size)?;
+        Some(rect.min + vec2(pixel.x, pixel.y))
+    }
+
     /// The next factor of a short list for the magnification of the play.
     pub fn next_magnification(&mut self) {
         const STEPS: [f32; 6] = [1.0, 5.0, 10.0, 20.0, 50.0, 100.0];
@@ -287,15 +296,15 @@ impl Viewport {
         self.options.magnification = *next.unwrap_or(&STEPS[0]);
     }
 
-    /// The picture with its overlays, over all of `ui`; a `plain` one says nothing about what the cursor is on.
+    /// The picture with its overlays, over all of `ui`; a `plain` one shows nothing about what is under the cursor.
     pub fn ui(&mut self, ui: &mut Ui, player: &Player, plain: bool) {
         let (rect, response) = ui.allocate_exact_size(
             ui.available_size().max(vec2(16.0, 16.0)),
             Sense::click_and_drag(),
         );
         response.widget_info(|| WidgetInfo::labeled(Role::Image, true, "3D view"));
-        let scale = ui.ctx().pixels_per_point();
-        let size = [pixels(rect.width() * scale), pixels(rect.height() * scale)];
+        let screen = Screen::new(rect, ui.ctx().pixels_per_point());
+        let Screen { size, scale, .. } = screen;
         self.options.theme = if ui.visuals().dark_mode {
             Theme::Dark
         } else {
@@ -303,12 +312,12 @@ impl Viewport {
         };
 
         let aspect = size[0] as f32 / size[1] as f32;
-        // A sheet that folds away, or a phone that is turned, would leave half of the mechanism outside.
+        // Folding the sheet or turning a phone would leave half of the mechanism outside.
         let reshaped = !(0.8..=1.25).contains(&(aspect / self.fitted));
         if self.frozen.is_none() && (self.fit_pending || (reshaped && !self.moved)) {
             self.fit_pending = false;
             self.fitted = aspect;
-            // The first picture of a scene starts where it should be.
+            // The first picture of a scene does not move into place.
             let first = self.list.size == [0, 0];
             let mut goal = self.goal.unwrap_or(self.camera);
             self.view.fit(
@@ -325,15 +334,14 @@ impl Viewport {
                 ui.ctx().request_repaint();
             }
         }
-        self.drag(ui, &response, player, rect, size, scale);
+        self.drag(ui, &response, player, &screen);
         let camera = self.framed(aspect);
-        let shot = shot!(self, player, &camera, size, scale);
+        let shot = shot!(self, player, &camera, screen);
         let hovered = response
             .hover_pos()
             .filter(|_| !plain && !response.dragged())
-            .map(|pos| (pos - rect.min) * scale)
-            .and_then(|pixel| self.view.pick(&shot, Vec2::new(pixel.x, pixel.y)));
-        // egui has dropped the clone of the frame before: nothing is copied.
+            .and_then(|pos| self.view.pick(&shot, screen.pixel(pos)));
+        // egui has dropped the clone of the previous frame: nothing is copied.
         self.view.build(&shot, Arc::make_mut(&mut self.list));
         let list = Arc::make_mut(&mut self.list);
         let said = ghosts::add(&self.view, &shot, player, list);
@@ -341,11 +349,10 @@ impl Viewport {
             self.view.add_wear(&shot, wear, list);
         }
         if response.clicked() {
-            // A finger that has left hovers over nothing.
+            // A lifted finger does not hover.
             let tapped = response
                 .interact_pointer_pos()
-                .map(|pos| (pos - rect.min) * scale)
-                .and_then(|pixel| self.view.pick(&shot, Vec2::new(pixel.x, pixel.y)))
+                .and_then(|pos| self.view.pick(&shot, screen.pixel(pos)))
                 .map(|hit| hit.what);
             if let Some(Picked::Joint(joint)) = tapped {
                 self.clicked = Some(joint);
@@ -393,15 +400,8 @@ impl Viewport {
         }
     }
 
-    fn drag(
-        &mut self,
-        ui: &Ui,
-        response: &egui::Response,
-        player: &Player,
-        rect: Rect,
-        size: [u32; 2],
-        scale: f32,
-    ) {
+    fn drag(&mut self, ui: &Ui, response: &egui::Response, player: &Player, screen: &Screen) {
+        let Screen { rect, size, scale } = *screen;
         let (shift, fingers, touches) =
             ui.input(|i| (i.modifiers.shift, i.multi_touch(), i.any_touches()));
         self.pinched &= touches;
@@ -413,22 +413,15 @@ impl Viewport {
             self.goal = None;
             let shift = fingers.translation_delta * scale;
             self.camera.pan(Vec2::new(shift.x, shift.y), size);
-            self.zoom(
-                player,
-                fingers.zoom_delta,
-                fingers.center_pos,
-                rect,
-                size,
-                scale,
-            );
+            self.zoom(player, fingers.zoom_delta, fingers.center_pos, screen);
         }
         if self.pinched {
-            // The finger that stays down longer turns nothing.
+            // The finger that stays down longer does not rotate the view.
             return;
         }
         let delta = response.drag_delta() * scale;
         let delta = Vec2::new(delta.x, delta.y);
-        if self.pull(ui, response, player, rect, size, scale) {
+        if self.pull(ui, response, player, screen) {
             return;
         }
         let pans = response.dragged_by(PointerButton::Secondary)
@@ -444,21 +437,17 @@ impl Viewport {
             self.camera.orbit(delta);
         }
         if let Some(pos) = response.hover_pos() {
-            let (scroll, pinch) = ui.input(|i| (i.smooth_scroll_delta().y, i.zoom_delta()));
-            let factor = (scroll * 0.004).exp() * pinch;
-            self.zoom(player, factor, pos, rect, size, scale);
+            self.zoom(player, zoom::factor(ui), pos, screen);
         }
     }
 
-    /// Takes hold of a body by a press on it and a drag, by a finger that stays on it; whether the pointer holds one.
+    /// Takes hold of a body by press and drag, or by a long touch; returns whether the pointer holds one.
     fn pull(
         &mut self,
         ui: &Ui,
         response: &egui::Response,
         player: &Player,
-        rect: Rect,
-        size: [u32; 2],
-        scale: f32,
+        screen: &Screen,
     ) -> bool {
         let (finger, shift, origin) =
             ui.input(|i| (i.any_touches(), i.modifiers.shift, i.pointer.press_origin()));
@@ -467,13 +456,9 @@ impl Viewport {
         } else {
             response.drag_started_by(PointerButton::Primary)
         };
-        let pixel = |pos: Pos2| {
-            let pixel = (pos - rect.min) * scale;
-            Vec2::new(pixel.x, pixel.y)
-        };
         if let Some(origin) = origin.filter(|_| taken) {
-            let shot = shot!(self, player, &self.camera, size, scale);
-            let hit = self.view.pick(&shot, pixel(origin));
+            let shot = shot!(self, player, &self.camera, screen);
+            let hit = self.view.pick(&shot, screen.pixel(origin));
             self.grip = hit.and_then(|hit| Grip::new(player, hit));
             self.grip_changed |= self.grip.is_some();
         }
@@ -487,10 +472,10 @@ impl Viewport {
                 self.grip_changed = true;
             }
             Some(pos) => {
-                let moved = ui.input(|i| i.pointer.delta()) * scale;
+                let moved = ui.input(|i| i.pointer.delta()) * screen.scale;
                 if moved != egui::Vec2::ZERO || taken {
                     let moved = Vec2::new(moved.x, moved.y);
-                    grip.drag(&self.camera, pixel(pos), moved, size, shift);
+                    grip.drag(&self.camera, screen.pixel(pos), moved, screen.size, shift);
                     self.grip_changed = true;
                 }
             }
@@ -498,26 +483,17 @@ impl Viewport {
         true
     }
 
-    /// Comes nearer by `factor` to what is at `pos`, points.
-    fn zoom(
-        &mut self,
-        player: &Player,
-        factor: f32,
-        pos: Pos2,
-        rect: Rect,
-        size: [u32; 2],
-        scale: f32,
-    ) {
+    /// Zooms in by `factor` on what is at `pos`, points.
+    fn zoom(&mut self, player: &Player, factor: f32, pos: Pos2, screen: &Screen) {
         if factor == 1.0 {
             return;
         }
         self.goal = None;
         self.moved = true;
-        let cursor = (pos - rect.min) * scale;
-        let shot = shot!(self, player, &self.camera, size, scale);
-        let hit = self.view.pick(&shot, Vec2::new(cursor.x, cursor.y));
+        let shot = shot!(self, player, &self.camera, screen);
+        let hit = self.view.pick(&shot, screen.pixel(pos));
         let bounds = self.view.bounds();
-        // Over the ground the whole machine stays in place, and neither end of the way loses it.
+        // Over the background the zoom is about the whole machine, and neither end of its range loses it.
         let point = hit.map_or(bounds.centre, |hit| hit.point);
         let from = self.camera.eye().distance(bounds.centre);
         let lost = match hit {
@@ -526,7 +502,7 @@ impl Viewport {
             None => from < bounds.radius,
         };
         if !lost {
-            self.camera.zoom_about(factor, point, size);
+            self.camera.zoom_about(factor, point, screen.size);
         }
     }
 
@@ -562,7 +538,7 @@ impl Viewport {
         }
     }
 
-    /// Choices about the picture.
+    /// View options.
     pub fn options_ui(&mut self, ui: &mut Ui) {
         let options = &mut self.options;
         ui.label("Magnification of the play").on_hover_text(
@@ -674,7 +650,7 @@ impl Viewport {
             return;
         };
         if self.trail.len() == TRAIL {
-            // Half at once: moving the whole trail for every point would cost more than it shows.
+            // Half at once: shifting the whole trail for every point would be too costly.
             self.trail.drain(..TRAIL / 2);
         }
         self.trail
@@ -682,8 +658,32 @@ impl Viewport {
     }
 }
 
-fn pixels(length: f32) -> u32 {
-    (length.round() as u32).max(1)
+/// Where the picture is in the window.
+#[derive(Clone, Copy)]
+struct Screen {
+    /// Points.
+    rect: Rect,
+    /// Pixels.
+    size: [u32; 2],
+    /// Pixels per point.
+    scale: f32,
+}
+
+impl Screen {
+    fn new(rect: Rect, scale: f32) -> Self {
+        let pixels = |length: f32| ((length * scale).round() as u32).max(1);
+        Self {
+            rect,
+            size: [pixels(rect.width()), pixels(rect.height())],
+            scale,
+        }
+    }
+
+    /// Pixel of the picture at `pos`, points of the window.
+    fn pixel(&self, pos: Pos2) -> Vec2 {
+        let pixel = (pos - self.rect.min) * self.scale;
+        Vec2::new(pixel.x, pixel.y)
+    }
 }
 
 fn name_of(player: &Player, picked: Picked) -> Option<&str> {
@@ -698,7 +698,7 @@ fn name_of(player: &Player, picked: Picked) -> Option<&str> {
     }
 }
 
-/// What is known about the thing under the cursor.
+/// What is known about the part under the cursor.
 fn describe(ui: &mut Ui, player: &Player, picked: Picked) {
     // A tooltip is as wide as its longest line, not as the first.
     ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Extend);

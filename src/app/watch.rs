@@ -7,33 +7,33 @@ use crate::analysis::drive::{OBSERVABLES, drive_period, observed};
 use crate::scene::Scene;
 use crate::simulate::{Frame, Simulation};
 
-/// Instants kept in one period of the drive, at most.
+/// Most instants kept per drive period.
 const PER_PERIOD: f64 = 1000.0;
 /// Periods whose orbit is kept.
 pub const PERIODS: usize = 6;
-/// Sections kept: the oldest go.
+/// Most sections kept; the oldest are dropped.
 const SECTIONS: usize = 20_000;
-/// Stands for the period where there is none, s.
+/// Used in place of the period if there is none, s.
 const NO_PERIOD: f64 = 1.0;
 
 /// Pose of the output body and its rates, in the order of [`OBSERVABLES`].
 pub type Observed = [f64; OBSERVABLES.len()];
 
 /// The orbit and the section of one run.
-pub struct Watch {
+pub struct RunWatch {
     period: Result<f64, String>,
     phase: f64,
-    /// Number of the section that comes next: it is at (next + phase) T.
+    /// Number of the next section, which is at (next + phase) T.
     next: u64,
-    /// The instant on show, s: what is known of later ones waits for its time.
+    /// The displayed instant, s: later ones that are already known stay hidden until their time.
     shown: f64,
     orbit: VecDeque<(f64, Observed)>,
     sections: VecDeque<(f64, Observed)>,
     frame: Frame,
 }
 
-impl Watch {
-    /// Watches a run of `scene` that begins; its start is no section.
+impl RunWatch {
+    /// Watches a new run of `scene`; its start is not a section.
     pub fn new(scene: &Scene) -> Self {
         let mut watch = Self {
             period: drive_period(scene).map_err(|why| why.to_string()),
@@ -58,7 +58,7 @@ impl Watch {
         self.phase
     }
 
-    /// Another drive phase: sections at the old one go.
+    /// Sets another drive phase: sections at the old one are dropped.
     pub fn set_phase(&mut self, phase: f64, now: f64) {
         if phase != self.phase && (0.0..1.0).contains(&phase) {
             self.phase = phase;
@@ -77,12 +77,12 @@ impl Watch {
         self.sections.range(..known(&self.sections, self.shown))
     }
 
-    /// Another instant is on show, s.
+    /// Sets the displayed instant, s.
     pub fn show(&mut self, shown: f64) {
         self.shown = shown;
     }
 
-    /// After a change at `now`, s: what was is another motion's.
+    /// Starts again after a change at `now`, s: what was recorded belongs to another motion.
     pub fn begin(&mut self, scene: &Scene, now: f64) {
         self.period = drive_period(scene).map_err(|why| why.to_string());
         self.orbit.clear();
@@ -90,7 +90,7 @@ impl Watch {
         self.seek(now);
     }
 
-    /// Another future begins at `now`, s.
+    /// Drops what follows `now`, s: another future begins.
     pub fn cut(&mut self, now: f64) {
         for list in [&mut self.orbit, &mut self.sections] {
             list.truncate(known(list, now));
@@ -98,7 +98,7 @@ impl Watch {
         self.seek(now);
     }
 
-    /// The run goes on from `now`, s, where it was before. What is known already stays; an orbit that would have a gap does not.
+    /// The run continues from `now`, s, where it was before. What is known stays, except an orbit that would have a gap.
     pub fn go_to(&mut self, now: f64) {
         let ends = self.orbit.front().zip(self.orbit.back());
         if ends.is_some_and(|((first, _), (last, _))| !(*first..=*last).contains(&now)) {
@@ -107,7 +107,7 @@ impl Watch {
         self.seek(now);
     }
 
-    /// The section after `now`, s, is the next.
+    /// Makes the section after `now`, s, the next.
     fn seek(&mut self, now: f64) {
         if let Ok(period) = self.period {
             let passed = (now / period - self.phase).floor() + 1.0;
@@ -120,11 +120,11 @@ impl Watch {
         Some((self.next as f64 + self.phase) * period)
     }
 
-    /// An instant that was recorded; those too close to the one before are left out.
+    /// Keeps a recorded instant, unless it is too close to the one before.
     pub fn record(&mut self, frame: &Frame) {
         let period = self.period.as_ref().copied().unwrap_or(NO_PERIOD);
         let before = self.orbit.back().map(|(time, _)| *time);
-        // Also one that was recorded before the run was taken back.
+        // Including one recorded before the run was taken back.
         if before.is_some_and(|before| frame.time - before < period / PER_PERIOD) {
             return;
         }
@@ -135,7 +135,7 @@ impl Watch {
         self.orbit.push_back((frame.time, observed(&frame.pose)));
     }
 
-    /// The latest step is on show until `until`, s: sections within it are interpolated. Sampling never changes a run.
+    /// The latest step is displayed up to `until`, s: sections within it are interpolated. Sampling never changes a run.
     pub fn step(&mut self, simulation: &mut Simulation, until: f64) {
         while let Some(time) = self.next_time().filter(|time| *time <= until) {
             self.next += 1;
@@ -160,7 +160,7 @@ fn known(list: &VecDeque<(f64, Observed)>, now: f64) -> usize {
 mod tests {
     use super::*;
 
-    fn run(watch: &mut Watch, simulation: &mut Simulation, to: f64) {
+    fn run(watch: &mut RunWatch, simulation: &mut Simulation, to: f64) {
         let mut frame = Frame::default();
         while simulation.time() < to {
             simulation.step().expect("runs");
@@ -176,7 +176,7 @@ mod tests {
         let changes = [("spcmm.frequency".to_owned(), "5 Hz".to_owned())];
         let scene = Scene::load("spcmm", &changes).expect("built in");
         let mut simulation = Simulation::new(&scene).expect("starts");
-        let mut watch = Watch::new(&scene);
+        let mut watch = RunWatch::new(&scene);
         assert_eq!(watch.period(), Ok(0.2));
         // Not the start itself.
         run(&mut watch, &mut simulation, 0.21);
@@ -185,14 +185,14 @@ mod tests {
         watch.begin(&scene, 0.0);
         watch.set_phase(0.25, 0.0);
         run(&mut watch, &mut simulation, 0.7);
-        let times = |watch: &Watch| watch.sections().map(|(time, _)| *time).collect::<Vec<_>>();
+        let times = |watch: &RunWatch| watch.sections().map(|(time, _)| *time).collect::<Vec<_>>();
         let near = |a: &[f64], b: &[f64]| {
             a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12)
         };
         assert!(near(&times(&watch), &[0.05, 0.25, 0.45, 0.65]));
         watch.show(0.5);
         assert!(near(&times(&watch), &[0.05, 0.25, 0.45]));
-        // Gone through again they are what they were; with another future they are cut.
+        // Retraced, they are what they were; with another future they are cut.
         watch.show(0.7);
         assert_eq!(watch.sections().len(), 4);
         watch.cut(0.5);
@@ -212,7 +212,7 @@ mod tests {
     fn a_scene_without_a_drive_has_an_orbit_and_no_sections() {
         let scene = Scene::load("pendulum", &[]).expect("built in");
         let mut simulation = Simulation::new(&scene).expect("starts");
-        let mut watch = Watch::new(&scene);
+        let mut watch = RunWatch::new(&scene);
         assert!(
             watch
                 .period()

@@ -21,7 +21,7 @@ pub enum WindowError {
     Window(String),
 }
 
-/// Opens the window and returns when it is closed. Links that are copied in it are hung on the address `page`.
+/// Opens the window and returns when it is closed. Links copied in it are appended to the address `page`.
 ///
 /// # Errors
 /// A scene that cannot start, no graphics adapter, no display.
@@ -34,7 +34,7 @@ pub fn run_native(options: AppOptions, page: String) -> Result<(), WindowError> 
             .with_min_inner_size([360.0, 480.0]),
         ..Default::default()
     };
-    // The scene's own error must come out typed, not as the window's.
+    // A scene error must keep its type and not become one of the window.
     Player::new(&options.scene).map_err(|error| error.located(&options.scene))?;
     let create: eframe::AppCreator<'_> = Box::new(|cc| {
         let mut app = App::new(cc, options)?;

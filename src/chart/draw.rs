@@ -1,4 +1,4 @@
-//! From a description to SVG, by `plotters`.
+//! Renders a description to SVG with `plotters`.
 
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
@@ -12,14 +12,14 @@ use super::{Chart, Colour, Marker, Series};
 use super::{heat, thin};
 use crate::scene::visible;
 
-/// Some charts on one page with one legend.
+/// Several charts on one page with a common legend.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sheet {
     /// Title over all charts; "" leaves it out.
     pub title: String,
     /// Row by row.
     pub charts: Vec<Chart>,
-    /// Charts in a row.
+    /// Charts per row.
     pub columns: usize,
     /// Width and height, pixels.
     pub size: (u32, u32),
@@ -35,10 +35,10 @@ const HEADING: f64 = 14.0;
 const ROW: f64 = 20.0;
 const SAMPLE: f64 = 26.0;
 const GAP: f64 = 18.0;
-/// Half the size of a marker, width of a line, pixels.
+/// Half the size of a marker, line width, pixels.
 const MARKER: f64 = 4.0;
 const LINE: f64 = 1.6;
-/// Width of a letter over the size of the text, on average, generously.
+/// Average letter width over text size, on the generous side.
 const LETTER: f64 = 0.51;
 
 const GRID: Colour = (214, 214, 214);
@@ -58,8 +58,8 @@ impl Sheet {
             self.draw(&root)?;
             root.present().map_err(failed)?;
         }
-        // The page is as large as asked; inside it the finer units stay. Corners are rounded: joined to a point, a line would
-        // stand higher than its peaks.
+        // The page has the requested size; inside it the finer units remain. Line joins are rounded: pointed, a line would
+        // rise above its peaks.
         let (found, wanted) = (
             format!("width=\"{width}\" height=\"{height}\""),
             format!(
@@ -67,7 +67,7 @@ impl Sheet {
                 self.size.0, self.size.1
             ),
         );
-        // XML has no control characters, not even escaped ones.
+        // XML allows no control characters, not even escaped ones.
         Ok(visible(&text).replacen(&found, &wanted, 1))
     }
 
@@ -106,7 +106,7 @@ impl Sheet {
         Ok(())
     }
 
-    /// What the legend names, each once, broken into rows.
+    /// Legend entries without duplicates, broken into rows.
     fn legend_rows(&self, width: f64) -> Vec<Vec<&Series>> {
         let mut rows: Vec<Vec<&Series>> = Vec::new();
         let mut used = f64::INFINITY;
@@ -185,7 +185,7 @@ fn draw_chart(root: &Canvas, area: &Canvas, chart: &Chart) -> Result<(), SheetEr
     } else {
         0.0
     };
-    // Room for the longest word at the left.
+    // Room for the longest word on the left.
     let longest = y
         .ticks
         .iter()
@@ -241,7 +241,7 @@ fn draw_chart(root: &Canvas, area: &Canvas, chart: &Chart) -> Result<(), SheetEr
                     .iter()
                     .filter_map(|point| inside(point).map(|place| plot.backend_coord(&place)))
                     .collect();
-                // Finer than a quarter of a pixel nobody sees.
+                // Finer than a quarter of a pixel is invisible.
                 let path = thin::line(&path, 1.0);
                 if !chart.labels.is_empty() {
                     along(&path, &mut taken);
@@ -276,7 +276,7 @@ fn draw_chart(root: &Canvas, area: &Canvas, chart: &Chart) -> Result<(), SheetEr
     draw_labels(root, &plot, chart, inside, taken)
 }
 
-/// Small areas along a line, for the texts to keep clear of.
+/// Small areas along a line, for the texts to avoid.
 fn along(path: &[(i32, i32)], taken: &mut Vec<Area>) {
     let step = f64::from(fine(MARKER));
     for ends in path.windows(2) {
@@ -317,7 +317,7 @@ fn draw_levels(
             let style = rgb(FAINT).stroke_width(FINE);
             root.draw(&PathElement::new(ends, style)).map_err(failed)?;
         }
-        // Over the line, but under it where the chart ends there.
+        // Above the line, or below it near the top of the chart.
         let (_, top) = plot.backend_coord(&(x.from, y.to));
         let below = at - top < fine(TEXT + 4.0);
         let (vertical, gap) = if below {
@@ -374,7 +374,7 @@ fn draw_labels(
             (area.x + 0.5 * area.width) as i32,
             (area.y + 0.5 * area.height) as i32,
         );
-        // A thin line ties a text to its point.
+        // A thin line connects a text to its point.
         let edge = (
             (*x).clamp(area.x as i32, (area.x + area.width) as i32),
             (*y).clamp(area.y as i32, (area.y + area.height) as i32),

@@ -1,4 +1,4 @@
-//! Maps: a field of cells whose colours are values, with the scale beside it.
+//! Heat maps: a field of cells coloured by value, with the colour scale beside it.
 
 use plotters::prelude::*;
 
@@ -9,12 +9,12 @@ use super::ticks::Ruler;
 use super::{Axis, Colour, Map, PALETTE};
 use plotters::style::text_anchor::{HPos, VPos};
 
-/// Width of the scale with its words, pixels.
+/// Width of the scale with its labels, pixels.
 pub(super) const SCALE_WIDTH: f64 = 92.0;
 const BAR: f64 = 16.0;
 const GROUND: Colour = (225, 225, 225);
 
-/// What a map's values mean in colours.
+/// Mapping from a map's values to colours.
 pub(super) struct Legend {
     ruler: Ruler,
 }
@@ -58,7 +58,7 @@ impl Legend {
     }
 }
 
-/// The edges of cells around `centres`: half way between them; the outermost cells end at their values.
+/// The edges of cells around `centres`: midway between them; the outermost cells end at their centres.
 fn edges(centres: &[f64]) -> Vec<f64> {
     let Some((&first, &last)) = centres.first().zip(centres.last()) else {
         return Vec::new();
@@ -71,7 +71,7 @@ fn edges(centres: &[f64]) -> Vec<f64> {
     [&[first], &middles[..], &[last]].concat()
 }
 
-/// Ends of the cells along both axes, for the axes to reach.
+/// Ends of the cells along both axes, for the axes to include.
 pub(super) fn ends(map: &Map) -> Vec<(f64, f64)> {
     let (xs, ys) = (edges(&map.xs), edges(&map.ys));
     let corner = |(x, y): (Option<&f64>, Option<&f64>)| Some((*x?, *y?));
@@ -101,7 +101,7 @@ pub(super) fn cells(
             let a = plot.backend_coord(&(x.place(columns[0]), y.place(rows[0])));
             let b = plot.backend_coord(&(x.place(columns[1]), y.place(rows[1])));
             let filled = rgb(legend.colour(map, value)).filled();
-            // A little into the next cells, which are drawn over it: no seams.
+            // Overlap the next cells a little, which are drawn on top: no seams.
             let more = |edge: usize, cells: usize| if edge + 1 < cells { 2 } else { 0 };
             let b = (b.0 + more(i, map.xs.len()), b.1 - more(j, map.ys.len()));
             root.draw(&Rectangle::new([a, b], filled)).map_err(failed)?;

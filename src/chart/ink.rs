@@ -1,4 +1,4 @@
-//! What charts and maps are drawn with.
+//! Drawing primitives of charts and maps.
 
 use plotters::coord::Shift;
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
@@ -8,12 +8,12 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use super::Colour;
 use super::ticks::Ruler;
 
-/// Why there is no picture.
+/// Why a chart could not be drawn.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("cannot draw the chart: {0}")]
 pub struct SheetError(pub(super) String);
 
-/// The drawing library counts in whole numbers: so many of them are a pixel.
+/// The drawing library uses integers: this many units make a pixel.
 pub(super) const FINE: u32 = 4;
 
 pub(super) const TEXT: f64 = 12.0;
@@ -66,7 +66,7 @@ pub(super) fn style(
     horizontal: HPos,
     vertical: VPos,
 ) -> TextStyle<'static> {
-    // The library takes the height of a line; the size of the letters is that over 1.24.
+    // The library takes a line height; letters are that divided by 1.24.
     TextStyle {
         font: ("sans-serif", 1.24 * size * f64::from(FINE)).into_font(),
         color: rgb(colour).to_backend_color(),

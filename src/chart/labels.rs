@@ -20,7 +20,7 @@ impl Area {
     }
 }
 
-/// Where each text, of the given size, goes: as near to its point as it can without covering anything in `taken`, inside
+/// Places each text, of the given size, as near to its point as possible without covering anything in `taken`, inside
 /// `frame`.
 pub(super) fn arrange(
     wanted: &[(Pair, Pair)],
@@ -54,7 +54,7 @@ pub(super) fn arrange(
                 };
                 let outside = width * height - area.overlap(&frame);
                 let covered: f64 = taken.iter().map(|other| area.overlap(other)).sum();
-                // Nearness breaks ties.
+                // Distance breaks ties.
                 let cost = covered + 4.0 * outside + 1e-3 * gap * unit;
                 if best.is_none_or(|(least, _)| cost < least) {
                     best = Some((cost, area));

@@ -1,6 +1,6 @@
-//! Charts as data, and their pictures: one description gives an SVG, and a PNG that is drawn from it.
+//! Charts as data, and their pictures: one description gives an SVG, and a PNG drawn from it.
 //!
-//! Knows nothing of mechanisms and needs no screen.
+//! Knows nothing of mechanisms and needs no display.
 
 mod draw;
 mod heat;
@@ -16,8 +16,8 @@ pub use ink::SheetError;
 /// A colour, red, green, blue.
 pub type Colour = (u8, u8, u8);
 
-/// Colours that people with any kind of colour vision tell apart (Okabe & Ito, "Color universal design"), dark enough for lines
-/// on white; the first is for what all others are compared with.
+/// Colours that can be told apart with any kind of colour vision (Okabe & Ito, "Color universal design"), dark enough for
+/// lines on white; the first is for the reference that the others are compared with.
 pub const PALETTE: [Colour; 8] = [
     (0, 0, 0),
     (0, 114, 178),
@@ -29,13 +29,13 @@ pub const PALETTE: [Colour; 8] = [
     (117, 112, 79),
 ];
 
-/// How an axis counts.
+/// Scale of an axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Scale {
     /// Equal differences.
     #[default]
     Linear,
-    /// Equal ratios; what is not positive does not appear.
+    /// Equal ratios; values that are not positive are not shown.
     Logarithmic,
 }
 
@@ -46,9 +46,9 @@ pub struct Axis {
     pub label: String,
     /// Unit, "" for a pure number.
     pub unit: String,
-    /// How it counts.
+    /// Linear or logarithmic.
     pub scale: Scale,
-    /// Ends; `None` follows the data.
+    /// Range; `None` follows the data.
     pub range: Option<(f64, f64)>,
 }
 
@@ -77,7 +77,7 @@ pub enum Marker {
     Dot,
 }
 
-/// Points with one look.
+/// Points drawn in one style.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
     /// Name in the legend; "" leaves it out.
@@ -88,44 +88,44 @@ pub struct Series {
     pub colour: Colour,
     /// Whether a line joins the points.
     pub line: bool,
-    /// What stands at the points.
+    /// Marker at each point.
     pub marker: Option<Marker>,
 }
 
 /// Text at a point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Label {
-    /// Where, in the units of the axes.
+    /// Position, in axis units.
     pub at: (f64, f64),
-    /// What.
+    /// The text.
     pub text: String,
 }
 
-/// A straight line across the chart, with its name.
+/// A horizontal line across the chart, with its name.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Level {
     /// Value on the y axis.
     pub y: f64,
-    /// Name, written over the line.
+    /// Name, written along the line.
     pub text: String,
 }
 
-/// A field of cells whose colours are values.
+/// A field of cells coloured by value.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Map {
-    /// Middles of the cells along the horizontal axis, ascending.
+    /// Centres of the cells along the horizontal axis, ascending.
     pub xs: Vec<f64>,
-    /// Middles of the cells along the vertical axis, ascending.
+    /// Centres of the cells along the vertical axis, ascending.
     pub ys: Vec<f64>,
-    /// Values row by row, from the lowest row; one that is not finite is grey.
+    /// Values row by row, from the lowest row; those not finite are grey.
     pub values: Vec<f64>,
-    /// How values count, and their unit.
+    /// Scale and unit of the values.
     pub scale: Axis,
-    /// For kinds instead of sizes: the value of each kind and its name. Empty for sizes.
+    /// For categories: the value and name of each. Empty for quantities.
     pub names: Vec<(f64, String)>,
 }
 
-/// One pair of axes with what is in it.
+/// One pair of axes with its contents.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Chart {
     /// Title, sentence case.
@@ -138,8 +138,8 @@ pub struct Chart {
     pub series: Vec<Series>,
     /// Texts at points, placed so that they cover neither points nor each other.
     pub labels: Vec<Label>,
-    /// Lines across.
+    /// Horizontal lines.
     pub levels: Vec<Level>,
-    /// Cells under everything else.
+    /// Cells below everything else.
     pub map: Option<Map>,
 }

@@ -1,4 +1,4 @@
-//! From SVG to PNG, by `resvg`, with a face of its own: no font of the system has a say.
+//! Converts SVG to PNG with `resvg`, using a bundled font: system fonts have no influence.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use super::{Sheet, SheetError};
 const LARGEST: f32 = 16384.0;
 
 impl Sheet {
-    /// The picture as PNG, `scale` pixels for one of the description.
+    /// The picture as PNG, with `scale` pixels per pixel of the description.
     ///
     /// # Errors
     /// As [`Sheet::svg`]; a picture without area or with an edge of more than 16384 pixels.
@@ -19,7 +19,7 @@ impl Sheet {
         let failed = |error: &dyn std::fmt::Display| SheetError(error.to_string());
         let mut fonts = fontdb::Database::new();
         fonts.load_font_data(epaint_default_fonts::UBUNTU_LIGHT.to_vec());
-        // Has what the first has not, such as a raised minus sign.
+        // Provides glyphs that the first lacks, such as a raised minus sign.
         fonts.load_font_data(epaint_default_fonts::HACK_REGULAR.to_vec());
         let family = fonts
             .faces()

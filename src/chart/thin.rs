@@ -1,10 +1,10 @@
-//! Lines and clouds without what nobody sees: pictures stay small whatever the number of points.
+//! Drops invisible points of lines and clouds: pictures stay small whatever the number of points.
 
 use std::collections::HashSet;
 
 type Point = (i32, i32);
 
-/// The part of `path` that a line needs to stay within `tolerance` of every point (Ramer 1972, Douglas & Peucker 1973).
+/// A subset of `path` whose line stays within `tolerance` of every point (Ramer 1972, Douglas & Peucker 1973).
 pub(super) fn line(path: &[Point], tolerance: f64) -> Vec<Point> {
     let mut path = path.to_vec();
     path.dedup();
@@ -43,7 +43,7 @@ fn distance(p: Point, a: Point, b: Point) -> f64 {
     (px - theta * bx).hypot(py - theta * by)
 }
 
-/// One point of each cell of `cell` units, the first there.
+/// One point per cell of `cell` units: the first in it.
 pub(super) fn cloud(points: impl Iterator<Item = Point>, cell: i32) -> Vec<Point> {
     let mut seen = HashSet::new();
     points

@@ -1,23 +1,23 @@
-//! Ranges and ticks of an axis, and the words on them.
+//! Ranges and ticks of an axis, and the tick labels.
 
 use super::{Axis, Scale};
 
-/// An axis as it is drawn: positions are linear in `place`.
+/// An axis as drawn: positions are linear in `place`.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Ruler {
     scale: Scale,
     /// Ends, in places.
     pub from: f64,
     pub to: f64,
-    /// Places with a word, and those without.
+    /// Places with and without a label.
     pub ticks: Vec<f64>,
     pub minor: Vec<f64>,
     step: f64,
-    /// Whether the words are powers of ten.
+    /// Whether the labels are powers of ten.
     powers: bool,
 }
 
-/// Ticks that an axis has at most.
+/// Most ticks on an axis.
 const MOST: f64 = 8.0;
 
 impl Ruler {
@@ -72,7 +72,7 @@ impl Ruler {
             _ => multiples(minor, from, to),
         };
         if ruler.scale == Scale::Logarithmic && ruler.ticks.len() < 2 {
-            // Less than two powers of ten: ordinary numbers at ordinary places say more.
+            // Fewer than two powers of ten: plain numbers at 1, 2 and 5 are more informative.
             let inside = |p: &f64| (from..=to).contains(p);
             let first = from.floor() as i32;
             let places = (first..=to.ceil() as i32)
@@ -82,7 +82,7 @@ impl Ruler {
         ruler
     }
 
-    /// Ends at these values.
+    /// Sets the ends to these values.
     pub(super) fn narrow(&mut self, from: f64, to: f64) {
         (self.from, self.to) = (self.place(from), self.place(to));
         let inside = |tick: &f64| (self.from..=self.to).contains(tick);
@@ -90,12 +90,12 @@ impl Ruler {
         self.minor.retain(inside);
     }
 
-    /// Where `value` is; not finite where the axis has no such place.
+    /// Position of `value`; not finite where the axis has none.
     pub(super) fn place(&self, value: f64) -> f64 {
         place(self.scale, value)
     }
 
-    /// Word at a tick.
+    /// Label of a tick.
     pub(super) fn word(&self, tick: f64) -> String {
         match self.scale {
             Scale::Logarithmic => {
@@ -138,7 +138,7 @@ fn multiples(step: f64, from: f64, to: f64) -> Vec<f64> {
     (first..=last).map(|n| n as f64 * step).collect()
 }
 
-/// Step between ticks, and between the small ones: 1, 2 or 5 times a power of ten.
+/// Step between major ticks, and between minor ones: 1, 2 or 5 times a power of ten.
 fn linear_step(span: f64) -> (f64, f64) {
     let least = span / MOST;
     let unit = 10f64.powf(least.log10().floor());

@@ -1,4 +1,4 @@
-//! What may be written on the command line.
+//! Command-line arguments.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -29,15 +29,15 @@ pub enum Command {
     Run(RunArguments),
     /// Draw frames without a window.
     Render(RenderArguments),
-    /// Measure what every method costs on a scene and how wrong it is.
+    /// Measure the cost and error of every method on a scene.
     Tradeoff(TradeoffArguments),
-    /// Measure how fast the default scene runs, against what is asked.
+    /// Measure how fast the default scene runs, against its speed goals.
     Bench(BenchArguments),
     /// Run a driven scene at many parameter values: sections, forces, regimes, exponents.
     Sweep(SweepArguments),
-    /// Put the shards of a sweep together.
+    /// Merge the shards of a sweep.
     Merge(MergeArguments),
-    /// Compute everything of the paper's section 4 and set it beside the paper: data, plots and one page.
+    /// Compute everything in the paper's section 4 and compare it with the paper: data, plots and one page.
     Reproduce(ReproduceArguments),
     /// Print the reference page of all parameters (Markdown).
     Parameters,
@@ -62,11 +62,11 @@ pub struct ViewArguments {
     /// Change a parameter, e.g. `contact.clearance=0.5mm`; may be repeated, the last wins.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = change)]
     pub changes: Vec<(String, String)>,
-    /// Open a share link, e.g. `?scene=pendulum&c=0.5mm&t=20ms`, and reproduce its state; with or without an address before
-    /// its `?` or `#`.
+    /// Open a share link, e.g. `?scene=pendulum&c=0.5mm&t=20ms`, and reproduce its state; the address before its `?` or
+    /// `#` is optional.
     #[arg(long, value_name = "LINK", conflicts_with_all = ["scene", "changes"])]
     pub link: Option<String>,
-    /// Address of a page with the laboratory, e.g. `https://example.org/lab/`: `Copy link` hangs its links on it
+    /// Address of a page with the laboratory, e.g. `https://example.org/lab/`, to which `Copy link` appends its links
     /// [default: the environment variable JOINTPLAY_PAGE; without either a link begins with its `#`].
     #[arg(long, value_name = "URL")]
     pub page: Option<String>,
@@ -92,11 +92,11 @@ pub struct RunArguments {
     /// File to write; its ending chooses the format: .csv, .json or .npz.
     #[arg(long, value_name = "FILE", requires = "every")]
     pub out: Option<PathBuf>,
-    /// File for one row per finished impact, with the restitution that it really gave: .csv, .json or .npz.
+    /// File for one row per finished impact, with its effective restitution: .csv, .json or .npz.
     #[arg(long, value_name = "FILE")]
     pub impacts: Option<PathBuf>,
-    /// File for the wear map: one row per cell of the sockets' inner faces, with the contacts that began there, the impulse and
-    /// the work of friction that it took: .csv, .json or .npz.
+    /// File for the wear map: one row per cell of the sockets' inner faces, with the contacts that began there, the
+    /// impulse and the friction work: .csv, .json or .npz.
     #[arg(long, value_name = "FILE")]
     pub wear: Option<PathBuf>,
     /// Form of the summary on standard output.
@@ -116,14 +116,14 @@ pub struct SweepArguments {
     /// Scene.
     #[command(flatten)]
     pub scene: SceneArguments,
-    /// Parameter to vary and its values, N of them, equally spaced, both ends included, e.g.
-    /// `contact.clearance=0.01mm..1mm:200`; twice for a map, the second running fastest.
+    /// Parameter to vary, with N equally spaced values including both ends, e.g. `contact.clearance=0.01mm..1mm:200`;
+    /// twice for a map, the second varying fastest.
     #[arg(long, value_name = "KEY=A..B:N", required = true)]
     pub vary: Vec<String>,
-    /// Drive periods that each point runs, those discarded included.
+    /// Drive periods per point, including those discarded.
     #[arg(long, value_name = "P", value_parser = periods)]
     pub periods: usize,
-    /// Of these, periods at the beginning that are a transient.
+    /// Initial periods of these that are a transient.
     #[arg(long, value_name = "D", value_parser = periods)]
     pub discard: usize,
     /// Where the sections are taken.
@@ -143,7 +143,7 @@ pub struct SweepArguments {
     /// Leave out the twin runs that measure the largest Lyapunov exponent.
     #[arg(long)]
     pub no_exponent: bool,
-    /// Compute one part of the sweep, e.g. `3/16`; `jointplay merge` puts the parts together.
+    /// Compute one part of the sweep, e.g. `3/16`; `jointplay merge` combines the parts.
     #[arg(long, value_name = "K/M", allow_hyphen_values = true)]
     pub shard: Option<String>,
     /// Threads to use [default: one for each core]; the result does not depend on it.
@@ -166,7 +166,7 @@ pub struct SweepArguments {
 /// `merge`.
 #[derive(Debug, Args)]
 pub struct MergeArguments {
-    /// Files that `sweep --shard` wrote: all of one sweep.
+    /// Files that `sweep --shard` wrote, all from one sweep.
     #[arg(value_name = "SHARD", required = true)]
     pub shards: Vec<PathBuf>,
     /// File to write, a NumPy archive (.npz).
@@ -190,11 +190,11 @@ pub enum SectionChoice {
 /// Where each point of a sweep starts from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum StartChoice {
-    /// From the scene's own start.
+    /// From the scene's own initial state.
     Cold,
-    /// From where the point with the next lower value ended.
+    /// From the final state of the point with the next lower value.
     FollowUp,
-    /// From where the point with the next higher value ended.
+    /// From the final state of the point with the next higher value.
     FollowDown,
 }
 
@@ -269,7 +269,7 @@ pub struct RenderArguments {
         help_heading = "Picture"
     )]
     pub yaw: Option<String>,
-    /// Height angle, e.g. `20deg`; positive looks down.
+    /// Elevation angle, e.g. `20deg`; positive looks down.
     #[arg(
         long,
         value_name = "ANGLE",
@@ -277,7 +277,7 @@ pub struct RenderArguments {
         help_heading = "Picture"
     )]
     pub pitch: Option<String>,
-    /// Come nearer by this factor.
+    /// Zoom in by this factor.
     #[arg(
         long,
         value_name = "FACTOR",
@@ -285,7 +285,7 @@ pub struct RenderArguments {
         help_heading = "Picture"
     )]
     pub zoom: f32,
-    /// Look at one ball joint from near by.
+    /// Look at one ball joint from close up.
     #[arg(long, value_name = "BALL JOINT", help_heading = "Picture", conflicts_with_all = ["camera", "yaw", "pitch"])]
     pub close_up: Option<String>,
     /// Which contact forces to draw.
@@ -297,7 +297,7 @@ pub struct RenderArguments {
         help_heading = "Picture"
     )]
     pub arrows: ArrowChoice,
-    /// Length of an arrow against its force.
+    /// Scale of arrow length against force.
     #[arg(
         long,
         value_enum,
@@ -309,7 +309,7 @@ pub struct RenderArguments {
     /// Force whose arrow has the reference length, e.g. `500N`; follows the forces if not given.
     #[arg(long, value_name = "FORCE", help_heading = "Picture")]
     pub arrow_reference: Option<String>,
-    /// Factor on eccentricity and clearance together, 1 to 100 [default: 1; with --ui as the window starts].
+    /// Magnification of eccentricity and clearance together, 1 to 100 [default: 1; with --ui as the window starts].
     #[arg(long, value_name = "FACTOR", help_heading = "Picture")]
     pub magnification: Option<f32>,
     /// Colours.
@@ -330,7 +330,7 @@ pub struct RenderArguments {
         help_heading = "Picture"
     )]
     pub hide: Vec<Hideable>,
-    /// Colour the sockets' inner faces by what they took since the start, with a scale; balls are seen through.
+    /// Colour the sockets' inner faces by their wear since the start, with a scale; balls become translucent.
     #[arg(long, value_enum, value_name = "WHAT", help_heading = "Picture")]
     pub wear: Option<WearChoice>,
     /// Write time, forces and labels over the picture.
@@ -365,7 +365,7 @@ pub struct TradeoffArguments {
     /// All built-in scenes.
     #[arg(long, requires = "write")]
     pub all: bool,
-    /// Folder of the program's source: write `docs/tradeoff.md` with its diagrams, and `assets/presets.json`, anew.
+    /// Source folder of the program: rewrite `docs/tradeoff.md` with its diagrams, and `assets/presets.json`.
     #[arg(long, value_name = "FOLDER", requires = "all")]
     pub write: Option<PathBuf>,
     /// Replace a folder of earlier results.
@@ -379,13 +379,13 @@ pub struct TradeoffArguments {
 /// `reproduce`.
 #[derive(Debug, Args)]
 pub struct ReproduceArguments {
-    /// Folder to write: `index.html`, `data/` and `plots/`; what is done until then is kept in `FOLDER.partial`.
+    /// Folder to write: `index.html`, `data/` and `plots/`; until then finished blocks are kept in `FOLDER.partial`.
     #[arg(long, value_name = "FOLDER")]
     pub out: PathBuf,
-    /// Few points and few periods, in about a minute instead of half an hour on two cores.
+    /// Few points and few periods: about a minute instead of half an hour on two cores.
     #[arg(long)]
     pub quick: bool,
-    /// Threads; default: one a core. The files are the same for any number.
+    /// Threads to use [default: one for each core]; the files do not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
     /// Replace a folder of earlier results.
@@ -433,12 +433,12 @@ pub enum ArrowChoice {
     None,
 }
 
-/// Length of an arrow against its force.
+/// Scale of arrow length against force.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum ArrowScale {
     /// Proportional.
     Linear,
-    /// Three decades below the reference force.
+    /// Logarithmic over three decades below the reference force.
     Logarithmic,
 }
 
@@ -447,16 +447,16 @@ pub enum ArrowScale {
 pub enum WearChoice {
     /// Time integral of the normal force.
     Impulse,
-    /// Work that friction took, its size.
+    /// Magnitude of the friction work.
     Friction,
 }
 
 /// Colours of the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum ThemeChoice {
-    /// Dark things on a light ground.
+    /// Dark objects on a light background.
     Light,
-    /// Light things on a dark ground.
+    /// Light objects on a dark background.
     Dark,
 }
 
@@ -475,7 +475,7 @@ pub enum Hideable {
     Trail,
     /// Flash of a joint that was hit.
     Flash,
-    /// Hollow arrows of peaks that are over.
+    /// Hollow arrows of past peaks.
     Peaks,
 }
 
@@ -488,7 +488,7 @@ fn change(text: &str) -> Result<(String, String), String> {
     }
 }
 
-/// A whole number, also one like `1e3`; what is too many is said where the period is known.
+/// A whole number, also one like `1e3`; too large a number is reported where the period is known.
 fn periods(text: &str) -> Result<usize, String> {
     let number = text
         .parse::<f64>()
@@ -516,7 +516,7 @@ fn size(text: &str) -> Result<(u32, u32), String> {
 }
 
 impl Default for ViewArguments {
-    /// As where no command is given.
+    /// As if no command were given.
     fn default() -> Self {
         Self {
             scene: super::DEFAULT_SCENE.into(),

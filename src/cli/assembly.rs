@@ -1,4 +1,4 @@
-//! What assembling the start made of a scene's values, and which forces are not unique: in words and as JSON.
+//! How assembly changed a scene's values at the start, and which forces are not unique: in words and as JSON.
 
 use serde_json::{Map, Value as Json, json};
 
@@ -8,13 +8,13 @@ use crate::mechanism::Placement;
 use crate::scene::format_quantity_digits;
 use crate::simulate::Simulation;
 
-/// Moved or turned by more than this, a body is not where its scene says: m, rad.
+/// A body moved or turned by more than this is not where its scene puts it: m, rad.
 const FAR: Placement = Placement {
     moved: 5e-3,
     turned: 5.0 * DEGREE,
 };
 
-/// Moved and turned by less than this a body counts as not moved: m, rad.
+/// A body moved and turned by less than this counts as not moved: m, rad.
 const NEAR: Placement = Placement {
     moved: 1e-6,
     turned: 1e-3 * DEGREE,
@@ -81,7 +81,7 @@ fn lines(simulation: &Simulation) -> Vec<(String, String)> {
     lines
 }
 
-/// What of the assembly is hardly what the scene means.
+/// Assembly results that the scene can hardly intend.
 fn warnings(simulation: &Simulation) -> Vec<String> {
     let scene = simulation.scene();
     let assembly = simulation.mechanism().assembly();
@@ -114,11 +114,11 @@ fn warnings(simulation: &Simulation) -> Vec<String> {
     warnings
 }
 
-/// What is known at the start about a scene that is about to run.
+/// What is known about a scene at the start of its run.
 pub struct Start {
     /// Label and text of each line about the assembly.
     pub lines: Vec<(String, String)>,
-    /// What of the assembly is hardly what the scene means.
+    /// Assembly results that the scene can hardly intend.
     pub warnings: Vec<String>,
     /// Ideal ball joints whose reactions are not unique.
     pub reactions: Vec<String>,
@@ -128,7 +128,7 @@ pub struct Start {
 }
 
 impl Start {
-    /// Of a simulation at its start.
+    /// From a simulation at its start.
     pub fn of(simulation: &mut Simulation) -> Self {
         let loose = simulation.not_unique();
         let scene = simulation.scene();
@@ -146,7 +146,7 @@ impl Start {
         }
     }
 
-    /// That forces are not unique, where some are not.
+    /// The message that some forces are not unique, if that is so.
     pub fn not_unique(&self) -> Option<String> {
         if self.reactions.is_empty() {
             return None;
@@ -162,7 +162,7 @@ impl Start {
         ))
     }
 
-    /// Adds all of it to the summary of a run.
+    /// Adds everything to the summary of a run.
     pub fn describe(&self, facts: &mut Map<String, Json>, text: &mut String) {
         facts.insert("assembly".into(), self.assembly.clone());
         let loose = json!({"reactions": self.reactions, "actuators": self.actuators});

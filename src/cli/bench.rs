@@ -1,4 +1,4 @@
-//! `bench`: how fast the default scene runs, against what is asked of it.
+//! `bench`: how fast the default scene runs, against its speed goals.
 
 use std::fmt::Write as _;
 
@@ -8,7 +8,7 @@ use super::{DEFAULT_SCENE, Failure, machine, measuring, print};
 use crate::analysis::{Reach, reach};
 use crate::scene::Scene;
 
-/// Does what `bench` asks.
+/// Runs `bench`.
 ///
 /// # Errors
 /// Bad changes, Ctrl-C.

@@ -13,13 +13,13 @@ use crate::mechanism::Summary;
 use crate::scene::{BallJoint, Formulation, JointKind, Scene};
 use crate::simulate::{Frame, LARGEST_IMPLICIT, Simulation};
 
-/// Does what `check` asks.
+/// Runs `check`.
 ///
 /// # Errors
 /// Anything wrong with the scene, a start that does not close included.
 pub fn check(arguments: &SceneArguments) -> Result<(), Failure> {
     let scene = load(arguments)?;
-    // Starting it finds what reading it cannot: joints that do not close, rods that do not reach.
+    // Starting the scene finds what parsing cannot: joints that do not close, rods that do not reach.
     let mut simulation = start(&scene)?;
     let begun = Start::of(&mut simulation);
     let mut frame = Frame::default();
@@ -217,7 +217,7 @@ fn method(scene: &Scene, contents: &Summary) -> String {
     }
 }
 
-/// What the run will compute, and what it has no need to.
+/// What the run will compute, and what it need not.
 fn work(scene: &Scene, contents: &Summary) -> (Vec<String>, Vec<String>) {
     let with = |ideal| {
         names(
@@ -239,7 +239,7 @@ fn work(scene: &Scene, contents: &Summary) -> (Vec<String>, Vec<String>) {
     sort(
         contents.solves_differential_equation,
         match contents.degrees_of_freedom as u64 {
-            // Whoever is a function of time alone, but not by as many rows as coordinates.
+            // Purely kinematic, but with a number of constraint rows that differs from that of the coordinates.
             0 => "the motion that the drives prescribe, step by step, closed after each".to_owned(),
             free => format!(
                 "differential equations of {} of freedom",
@@ -292,20 +292,20 @@ fn work(scene: &Scene, contents: &Summary) -> (Vec<String>, Vec<String>) {
     (computed, left_out)
 }
 
-/// Instants of the drive's period at which the ideal mechanism is looked at.
+/// Instants per drive period at which the ideal mechanism is examined.
 const INSTANTS: u32 = 400;
 
-/// Drive frequency at which it is looked at, Hz: the paper's.
+/// Drive frequency for that, Hz: the paper's.
 const SLOW: f64 = 0.5;
 
-/// Reactions above this many times the weight of all bodies mean that the mechanism is about to lose its stiffness.
+/// Reactions above this many times the weight of all bodies indicate a mechanism about to lose its stiffness.
 const MOST_WEIGHTS: f64 = 5.0;
 
-/// That a mechanism comes near a singular pose.
+/// A mechanism that comes near a singular pose.
 pub(super) enum NearSingular {
-    /// It cannot pass it, s.
+    /// It cannot pass the pose at this time, s.
     Stuck(f64),
-    /// It has this largest reaction (N) at this instant (s).
+    /// Its largest reaction (N), at this instant (s).
     Loaded(f64, f64),
 }
 
@@ -326,15 +326,15 @@ impl std::fmt::Display for NearSingular {
     }
 }
 
-/// Rods that reach do not make a good mechanism yet: near a singular pose the reactions of the ideal joints explode.
+/// Rods that reach do not yet make a good mechanism: near a singular pose the reactions of the ideal joints explode.
 pub(super) fn near_singular(scene: &Scene) -> Option<NearSingular> {
     let mut rigid = scene.clone();
     rigid.formulation = Formulation::Tree;
     rigid.elements.clear();
     let drive = rigid.spcmm.as_mut()?;
-    // Sliders that rest have one pose.
+    // Sliders at rest have a single pose.
     let instants = if drive.frequency > 0.0 { INSTANTS } else { 0 };
-    // Slow, so that weight alone makes the reactions: the poses are the same.
+    // Slow, so that the reactions come from weight alone: the poses are the same.
     drive.frequency = SLOW;
     let period = 1.0 / SLOW;
     for joint in &mut rigid.ball_joints {
@@ -342,7 +342,7 @@ pub(super) fn near_singular(scene: &Scene) -> Option<NearSingular> {
     }
     let limit = MOST_WEIGHTS * 9.81 * rigid.bodies.iter().map(|body| body.mass).sum::<f64>();
     let mut simulation = Simulation::new(&rigid).ok()?;
-    // What else moves would take a simulation of any length.
+    // Any other motion would need a simulation of arbitrary length.
     if !simulation.mechanism().is_kinematic() {
         return None;
     }

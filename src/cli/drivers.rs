@@ -1,12 +1,12 @@
-//! Keeps graphics drivers from speaking to our user.
+//! Keeps graphics drivers from writing to the user's terminal.
 
-/// Begins this program again with a runtime folder where it has none, before anything else is done.
+/// Restarts this program with a runtime folder if it has none, before anything else is done.
 ///
 /// Mesa asks Wayland's library for a display, with a window or without one, and that library complains on standard error
-/// where `XDG_RUNTIME_DIR` does not name a folder. One that is not there it takes in silence. An environment can be changed
-/// safely for a new program alone.
+/// if `XDG_RUNTIME_DIR` does not name a folder; a named folder that does not exist it accepts silently. The environment
+/// can be changed safely only for a new program.
 #[cfg(target_os = "linux")]
-pub fn quieten() {
+pub fn restart_with_runtime_dir() {
     use std::os::unix::process::CommandExt;
     use std::path::{Path, PathBuf};
     use std::process::Command;
@@ -26,10 +26,10 @@ pub fn quieten() {
         .args(arguments)
         .env(FOLDER, Path::new("/nonexistent"))
         .exec();
-    // Then with the complaints.
+    // Then continue with the complaints.
     log::info!("cannot begin again: {error}");
 }
 
-/// Nothing is known of others.
+/// Other systems are not known to need it.
 #[cfg(not(target_os = "linux"))]
-pub fn quieten() {}
+pub fn restart_with_runtime_dir() {}

@@ -1,4 +1,4 @@
-//! Why a command ended early, and the exit code that says so to a script.
+//! Why a command ended early, and the exit code that tells a script.
 
 use crate::files::FileError;
 use crate::scene::SceneError;

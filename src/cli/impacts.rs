@@ -1,4 +1,4 @@
-//! `run --impacts`: one row for each finished impact, and what they come to.
+//! `run --impacts`: one row per finished impact, and a summary of them.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use serde_json::{Map, Value as Json, json};
 
 use super::Failure;
 use super::output::{RowsFile, Table};
-use crate::files::Filled;
+use crate::files::PendingFile;
 use crate::scene::Scene;
 use crate::simulate::{Impact, Simulation};
 
@@ -45,17 +45,17 @@ impl ImpactsFile {
         })
     }
 
-    /// Takes what finished since the last call; to be called after every step.
+    /// Collects the impacts finished since the last call; to be called after every step.
     pub fn collect(&mut self, simulation: &mut Simulation) {
         simulation.take_impacts(&mut self.impacts);
     }
 
-    /// All so far, in the order in which they finished.
+    /// All impacts so far, in the order in which they finished.
     pub fn impacts(&self) -> &[Impact] {
         &self.impacts
     }
 
-    /// Writes them with `meta`, which says what made them; nothing has its final name yet. Returns the number of rows, too.
+    /// Writes them with `meta`, their provenance; nothing has its final name yet. Also returns the number of rows.
     ///
     /// # Errors
     /// As [`RowsFile::fill`].
@@ -63,10 +63,10 @@ impl ImpactsFile {
         self,
         scene: &Scene,
         mut meta: Map<String, Json>,
-    ) -> Result<(usize, Vec<Filled>), Failure> {
+    ) -> Result<(usize, Vec<PendingFile>), Failure> {
         let names: Vec<&str> = scene.ball_joints.iter().map(|j| j.name.as_str()).collect();
         meta.insert("rows".into(), json!(self.impacts.len()));
-        // Numbers in the column `joint`, from 0.
+        // Indices in the column `joint`, from 0.
         meta.insert("ball_joints".into(), json!(names));
         let flag = |is: bool| f64::from(u8::from(is));
         let rows = self.impacts.iter().map(|impact| {
@@ -93,19 +93,19 @@ impl ImpactsFile {
     }
 }
 
-/// What the impacts of one ball joint come to.
+/// Summary of the impacts of one ball joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Restitution {
-    /// Impacts, and how many of them nothing disturbed that were no slower than the floor.
+    /// Number of impacts.
     pub impacts: usize,
-    /// See `impacts`.
+    /// Of these, undisturbed ones that were no slower than the floor.
     pub undisturbed: usize,
-    /// Median of restitution given less restitution asked for over the undisturbed ones; `None` without any.
+    /// Median of effective less requested restitution over the undisturbed ones; `None` without any.
     pub median_excess: Option<f64>,
 }
 
 impl Restitution {
-    /// Of ball joint `joint`.
+    /// Summary for ball joint `joint`.
     pub fn of(impacts: &[Impact], joint: usize) -> Self {
         let own = || impacts.iter().filter(|impact| impact.joint == joint);
         let clean = own().filter(|impact| !impact.disturbed && !impact.floored);

@@ -1,4 +1,4 @@
-//! Ctrl-C ends a run in good order, and so do SIGTERM and SIGHUP; who insists ends it at once.
+//! Ctrl-C, SIGTERM and SIGHUP end a run in an orderly way; repeating the signal ends it at once.
 
 use std::sync::Once;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -6,20 +6,20 @@ use std::time::{Duration, Instant};
 
 use super::Failure;
 
-/// `timeout` signals its child and then the child's group: what follows this soon is the same wish.
+/// `timeout` signals its child and then the child's group: signals this close together are one request.
 const ONE_WISH: Duration = Duration::from_secs(1);
 
 static ASKED: AtomicBool = AtomicBool::new(false);
 static LISTEN: Once = Once::new();
 
-/// From now on these signals are noted instead of ending the process.
+/// From now on these signals are recorded instead of ending the process.
 pub fn listen() {
-    // A test that runs a command within itself is still to be ended by Ctrl-C.
+    // A test that runs a command in its own process must still end on Ctrl-C.
     if cfg!(test) {
         return;
     }
     LISTEN.call_once(|| {
-        let mut wishes = Wishes::default();
+        let mut wishes = Signals::default();
         let outcome = catch(move || {
             ASKED.store(true, Ordering::Relaxed);
             if wishes.insist(Instant::now()) {
@@ -32,20 +32,20 @@ pub fn listen() {
     });
 }
 
-/// Whether a run is to end.
+/// Whether the run is to end.
 pub fn asked() -> bool {
     ASKED.load(Ordering::Relaxed)
 }
 
-/// The signals so far.
+/// The signals received so far.
 #[derive(Default)]
-struct Wishes {
+struct Signals {
     count: u32,
     first: Option<Instant>,
 }
 
-impl Wishes {
-    /// Notes one; whether it means at once: the third, and the second if it is no echo of the first.
+impl Signals {
+    /// Records a signal; whether to exit at once: on the third, or on the second if it does not just echo the first.
     fn insist(&mut self, now: Instant) -> bool {
         self.count += 1;
         let first = *self.first.get_or_insert(now);
@@ -66,7 +66,7 @@ fn catch(mut told: impl FnMut() + Send + 'static) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Whether `nohup` started the program: it goes on when its terminal is closed.
+/// Whether `nohup` started the program, which then continues when its terminal is closed.
 #[cfg(unix)]
 fn outlives_its_terminal() -> bool {
     use std::io::IsTerminal;
@@ -76,7 +76,7 @@ fn outlives_its_terminal() -> bool {
             let ignored = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
             ignored.is_some_and(|mask| mask & 1 != 0)
         }
-        // Elsewhere than on Linux: `nohup` leaves no output on a terminal.
+        // Other than on Linux: `nohup` leaves no output on a terminal.
         Err(_) => !std::io::stderr().is_terminal(),
     }
 }
@@ -94,7 +94,7 @@ mod tests {
     fn an_echo_is_no_second_wish_and_a_third_is_final() {
         let start = Instant::now();
         let insisted = |after: &[u64]| {
-            let mut wishes = Wishes::default();
+            let mut wishes = Signals::default();
             let mut each = after.iter().map(|ms| start + Duration::from_millis(*ms));
             each.position(|now| wishes.insist(now))
         };

@@ -1,6 +1,6 @@
-//! What the program runs on, by name: figures mean something only beside it.
+//! Name of the machine the program runs on: timings mean something only beside it.
 
-/// Model of the processor, as far as the system tells.
+/// Model of the processor, as far as the system reports it.
 pub fn name() -> String {
     let model = std::fs::read_to_string("/proc/cpuinfo")
         .ok()

@@ -43,7 +43,7 @@ pub fn measure<T>(
     })
 }
 
-/// Seconds of processor time of this thread, which does the stepping: what else runs on the machine does not count.
+/// Processor time of this thread, which does the stepping, s: other load on the machine does not count.
 #[cfg(unix)]
 fn clock() -> impl FnMut() -> f64 {
     use rustix::time::{ClockId, clock_gettime};
@@ -53,7 +53,7 @@ fn clock() -> impl FnMut() -> f64 {
     }
 }
 
-/// Seconds on the wall.
+/// Wall-clock time, s.
 #[cfg(not(unix))]
 fn clock() -> impl FnMut() -> f64 {
     let started = std::time::Instant::now();

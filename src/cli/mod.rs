@@ -1,4 +1,4 @@
-//! Command line: what is written there, what comes out, and with which exit code.
+//! The command line: its arguments, its output and its exit codes.
 
 mod args;
 mod assembly;
@@ -40,12 +40,12 @@ pub use crate::scene::DEFAULT_SCENE;
 use crate::scene::{BUILT_IN, Scene, reference_page, visible};
 use crate::simulate::Simulation;
 
-/// Does what the command line says; returns the exit code.
+/// Runs the command line; returns the exit code.
 pub fn main() -> u8 {
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error) if error.use_stderr() => {
-            // What was typed stands in it.
+            // The message quotes what was typed.
             complain(error.render().to_string().trim_end());
             return Failure::USAGE;
         }
@@ -70,7 +70,7 @@ fn dispatch(arguments: Arguments) -> Result<(), Failure> {
         Some(Command::Run(arguments)) => run::run(&arguments),
         #[cfg(feature = "gui")]
         Some(Command::Render(arguments)) => {
-            drivers::quieten();
+            drivers::restart_with_runtime_dir();
             render::render(&arguments)
         }
         #[cfg(not(feature = "gui"))]
@@ -87,7 +87,7 @@ fn dispatch(arguments: Arguments) -> Result<(), Failure> {
 #[cfg(feature = "gui")]
 fn view(arguments: &ViewArguments) -> Result<(), Failure> {
     use crate::app::{AppOptions, WindowError, run_native};
-    drivers::quieten();
+    drivers::restart_with_runtime_dir();
     let page = page::address(arguments.page.as_deref())?;
     let options = match &arguments.link {
         Some(link) => AppOptions::from_link(link).map_err(Failure::usage)?,
@@ -99,7 +99,7 @@ fn view(arguments: &ViewArguments) -> Result<(), Failure> {
             WindowError::NoAdapter(_) => Failure::NO_ADAPTER,
             WindowError::Window(_) => Failure::INPUT_OUTPUT,
         };
-        // The window system's own words do not say what works instead.
+        // The window system's own message does not say what works instead.
         let message = if matches!(error, WindowError::Window(_)) && no_display() {
             "cannot open a window: there is no display; `jointplay render` draws frames without one"
                 .to_owned()
@@ -141,14 +141,15 @@ fn load(arguments: &SceneArguments) -> Result<Scene, Failure> {
     Ok(Scene::load(&arguments.scene, &arguments.changes)?)
 }
 
-/// Starts a scene; an error names the line of its file and the change that it is about.
+/// Starts a scene; an error names the line of its file and the change that it concerns.
 fn start(scene: &Scene) -> Result<Simulation, Failure> {
     Simulation::new(scene).map_err(|error| error.located(scene).into())
 }
 
-/// Results go to standard output, with what others wrote in them made visible; a reader that has seen enough (`| head`) is no error.
+/// Writes results to standard output, with control characters in foreign text made visible; a reader that stops early (`|
+/// head`) is no error.
 fn print(text: &str) -> Result<(), Failure> {
-    // What a test prints is caught.
+    // In a test the output of `print!` is captured.
     #[cfg(test)]
     return {
         print!("{text}");
@@ -176,7 +177,7 @@ fn warn(text: &str) {
     complain(&format!("warning: {text}"));
 }
 
-/// Standard error may be closed: then there is nobody to tell.
+/// Writes to standard error; if that is closed, there is nobody to tell.
 fn complain(text: &str) {
     let _ = writeln!(io::stderr(), "{}", visible(text));
 }

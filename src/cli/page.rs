@@ -1,14 +1,14 @@
-//! Which page the links of the window open.
+//! The page that the window's links open.
 
 use super::Failure;
 
-/// Environment variable with the address that links are hung on.
+/// Environment variable with the address that links are appended to.
 const PAGE: &str = "JOINTPLAY_PAGE";
 
-/// The address that links are hung on, from `--page` or else from [`PAGE`]; "" for none.
+/// The address that links are appended to, from `--page` or else from [`PAGE`]; "" for none.
 ///
 /// # Errors
-/// Usage: it is no address of a page.
+/// Usage: it is not the address of a page.
 pub fn address(option: Option<&str>) -> Result<String, Failure> {
     choose(option, std::env::var(PAGE).ok())
 }

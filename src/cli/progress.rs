@@ -1,4 +1,4 @@
-//! How far a long command is, on standard error: a bar on a terminal, elsewhere a line now and then.
+//! Progress of a long command on standard error: a bar on a terminal, otherwise a line now and then.
 
 use std::io::IsTerminal;
 use std::thread;
@@ -9,7 +9,7 @@ use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle, W
 /// Time between two lines.
 const INTERVAL: Duration = Duration::from_secs(10);
 
-/// A bar of `length`, or one that nobody sees.
+/// A bar of `length`, hidden unless `wanted`.
 pub fn bar(wanted: bool, length: u64) -> ProgressBar {
     if !wanted {
         return ProgressBar::hidden();
@@ -21,14 +21,14 @@ pub fn bar(wanted: bool, length: u64) -> ProgressBar {
             thread::sleep(INTERVAL);
             start.elapsed()
         };
-        // Without the thread it goes on in silence.
+        // Without the thread the command continues silently.
         let _ = thread::Builder::new()
             .name("progress".to_owned())
             .spawn(move || tell(&told, wait, super::complain));
         return bar;
     }
     let bar = ProgressBar::with_draw_target(Some(length), ProgressDrawTarget::stderr());
-    // Without the style the bar has its standard look.
+    // Without the style the bar keeps its default look.
     if let Ok(style) =
         ProgressStyle::with_template("{bar:40} {percent:>3} %  {elapsed} elapsed, {eta} to go")
     {
@@ -37,9 +37,9 @@ pub fn bar(wanted: bool, length: u64) -> ProgressBar {
     bar
 }
 
-/// Says how far `bar` is whenever `wait` comes back, which gives the time since the start; until the work is over.
+/// Reports the progress of `bar` whenever `wait` returns, which gives the time since the start; until the work is over.
 fn tell(bar: &WeakProgressBar, mut wait: impl FnMut() -> Duration, mut say: impl FnMut(&str)) {
-    // What was done before the first look may be from an earlier run, and says nothing about the speed.
+    // Progress before the first report may be from an earlier run, and says nothing about the speed.
     let mut first = None;
     loop {
         let elapsed = wait();

@@ -1,4 +1,4 @@
-//! What made an output: program version, scene, changed parameters and method. Every output carries it.
+//! Provenance of an output: program version, scene, changed parameters and method. Every output carries it.
 
 use serde_json::{Map, Value as Json, json};
 
@@ -33,7 +33,7 @@ pub fn meta(scene: &Scene) -> Map<String, Json> {
 /// Every parameter of `scene` with its value as a user would write it.
 ///
 /// # Errors
-/// None in a scene that was read.
+/// None for a scene that was parsed.
 #[cfg(feature = "gui")]
 pub fn parameters(scene: &Scene) -> Result<Json, Failure> {
     let mut all = Map::new();

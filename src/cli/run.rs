@@ -13,10 +13,10 @@ use super::impacts::ImpactsFile;
 use super::output::{NoRow, RowsFile, Table, check_distinct, check_size};
 use super::summary::{self, Status};
 use super::{Failure, interrupt, load, print, progress, quantity, start, warn, wear};
-use crate::files::{FileError, appear};
+use crate::files::{FileError, publish};
 use crate::simulate::{Frame, Simulation};
 
-/// Steps between two looks at the clock, the progress bar and Ctrl-C.
+/// Steps between two checks of the clock, the progress bar and Ctrl-C.
 const STEPS_BETWEEN_LOOKS: u32 = 256;
 
 /// Instants k x `every`, k = 0..=`last`, of a run of `duration`.
@@ -62,13 +62,13 @@ impl Times {
     }
 }
 
-/// How stepping ended, and the message for a person if it was not at the end.
+/// How stepping ended, with a message for the user if it ended early.
 struct End {
     status: Status,
     failure: Option<Failure>,
 }
 
-/// Does what `run` asks.
+/// Runs `run`.
 ///
 /// # Errors
 /// Any: bad input before it starts; the divergence guard, Ctrl-C and the file system afterwards.
@@ -166,12 +166,12 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     );
     facts.insert("rows".into(), json!(table.len()));
     let mut meta = facts.clone();
-    // Files of the same run are the same, byte for byte: the machine's speed stays out of them.
+    // Files of the same run are the same, byte for byte: the machine's speed is left out.
     meta.shift_remove("wall_s");
     meta.shift_remove("ratio");
     meta.shift_remove("slower_than_asked");
     meta.insert("duration_s".into(), json!(duration));
-    // With the changed parameters it makes the same run again, wherever the file went.
+    // With the changed parameters it reproduces the run, wherever the file went.
     meta.insert("scene_text".into(), json!(scene.source.text));
     let mut files = Vec::new();
     if let (Some(file), Some(times)) = (file, times) {
@@ -192,14 +192,14 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         facts.insert("impacts_out".into(), json!(path.display().to_string()));
         summary::written(&mut text, rows, "impact", path);
     }
-    simulation.pass_wear();
+    simulation.commit_wear();
     if let (Some(file), Some(map), Some(path)) = (wear, simulation.wear(), &arguments.wear) {
         let (rows, filled) = wear::fill(file, map, &scene, meta)?;
         files.extend(filled);
         facts.insert("wear_out".into(), json!(path.display().to_string()));
         summary::written(&mut text, rows, "cell", path);
     }
-    appear(files)?;
+    publish(files)?;
     match arguments.summary {
         SummaryForm::Text => print(&text)?,
         SummaryForm::Json => print(&format!("{:#}\n", Json::Object(facts)))?,
@@ -207,7 +207,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     end.failure.map_or(Ok(()), Err)
 }
 
-/// Steps to `duration` and fills `table`; `stopwatch` runs while the simulation steps and at no other time.
+/// Steps to `duration` and fills `table`; `stopwatch` runs only while the simulation steps.
 ///
 /// # Errors
 /// The disk that takes the rows.
@@ -223,7 +223,7 @@ fn simulate(
 ) -> io::Result<End> {
     let mut next = 0;
     loop {
-        // Rows that lie in the step just taken (at first: the row at 0).
+        // Rows that lie in the latest step (initially: the row at 0).
         if let Some(times) = times {
             while next <= times.last && times.at(next) <= simulation.time() {
                 simulation.sample(times.at(next), frame);
@@ -279,7 +279,7 @@ fn simulate(
     }
 }
 
-/// Steps until `row` is reached, the run ends, or it is time to look at the clock. A row never shortens a step.
+/// Steps until `row` is reached, the run ends, or a check is due. A row never shortens a step.
 fn step_some(
     simulation: &mut Simulation,
     row: f64,

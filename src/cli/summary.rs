@@ -33,7 +33,7 @@ impl Status {
     }
 }
 
-/// The summary as JSON: what made the run, then what it did; `impacts` where all of them were collected.
+/// The summary as JSON: provenance, then results; `impacts` if all of them were collected.
 pub fn json(
     simulation: &Simulation,
     status: Status,
@@ -82,7 +82,7 @@ pub fn json(
     summary
 }
 
-/// The ledger as JSON, J; `relative_residual` is the residual over the energy exchanged.
+/// The ledger as JSON, J; `relative_residual` is the residual relative to the energy exchanged.
 fn energy(ledger: &Ledger) -> Json {
     json!({
         "drive_work": ledger.drive_work,
@@ -101,7 +101,7 @@ fn energy(ledger: &Ledger) -> Json {
     })
 }
 
-/// The summary as text; `impacts` where all of them were collected.
+/// The summary as text; `impacts` if all of them were collected.
 pub fn text(
     simulation: &Simulation,
     status: Status,
@@ -147,7 +147,7 @@ pub fn text(
             let impacts = count(statistics.impacts[i], "impact");
             match statistics.floored[i] {
                 0 => format!("{impacts}, {peak}"),
-                // The damping term divides by the floor there: they rebound higher than asked.
+                // There the damping term divides by the floor: they rebound higher than requested.
                 slow => format!("{impacts} ({slow} slower than impact_speed_floor), {peak}"),
             }
         };
@@ -227,12 +227,12 @@ pub fn count(number: u64, what: &str) -> String {
     format!("{number} {what}{plural}")
 }
 
-/// Simulated seconds in a second; `None` where no time was spent.
+/// Simulated seconds per second; `None` if no time was spent.
 fn ratio(time: f64, wall: f64) -> Option<f64> {
     (wall > 0.0).then(|| time / wall)
 }
 
-/// Whether real time was asked for, by the preset of that name, and not reached.
+/// Whether real time was requested, by the preset of that name, and not reached.
 fn slower_than_asked(scene: &Scene, ratio: Option<f64>) -> bool {
     scene.solver.preset == Some(Preset::RealTime) && ratio.is_some_and(|ratio| ratio < 1.0)
 }

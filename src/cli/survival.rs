@@ -1,5 +1,5 @@
-//! Every command that writes, on a file system that fails at any call: what was there or the whole result, nothing beside it, and
-//! the same again makes the same bytes. `JOINTPLAY_FAULTS` sets how many faults each command meets.
+//! Every command that writes, on a file system that fails at any call: it leaves what was there or the whole result and
+//! nothing beside it, and repeating it makes the same bytes. `JOINTPLAY_FAULTS` sets the number of faults per command.
 
 use std::path::Path;
 
@@ -9,14 +9,14 @@ use serde_json::Value as Json;
 use super::{Arguments, Failure, dispatch};
 use crate::files::faults::{Kind, Tree, survive};
 
-/// Does the command of `line`; `@` is the folder.
+/// Runs the command `line`; `@` stands for the folder.
 fn command(folder: &Path, line: &str) -> Result<(), Failure> {
     let words = line.split_whitespace();
     let words = words.map(|word| word.replace('@', &folder.display().to_string()));
     dispatch(Arguments::try_parse_from(["jointplay".to_owned()].into_iter().chain(words)).unwrap())
 }
 
-/// As a script sees it: what the disk does is an input or output error.
+/// As a script sees it: a disk fault is an input/output error.
 fn outcome(result: Result<(), Failure>) -> Result<(), String> {
     result.map_err(|failure| {
         assert_eq!(failure.code, Failure::INPUT_OUTPUT, "{failure}");
@@ -25,12 +25,12 @@ fn outcome(result: Result<(), Failure>) -> Result<(), String> {
     })
 }
 
-/// Every file is the old or the new one, and of rows with an account beside them the checksum tells whether both are one run's.
+/// Every file is the old or the new one, and the checksum in metadata tells whether it and its rows are from the same run.
 fn whole_or_told(old: &Tree, new: &Tree, found: &Tree) -> bool {
     let is = |of: &Tree, name: &str| of.get(name) == found.get(name);
     found.iter().all(|(name, content)| {
         let Some(rows) = name.strip_suffix(".meta.json") else {
-            // Rows have their account, whatever happens.
+            // Rows always have their metadata.
             let account = format!("{name}.meta.json");
             return (is(old, name) || is(new, name))
                 && (!name.ends_with(".csv") || found.contains_key(&account));
@@ -112,7 +112,7 @@ fn an_account_that_lost_its_rows_stands_in_no_way() {
     command(folder.path(), line).unwrap();
     std::fs::remove_file(at("a.csv")).unwrap();
     command(folder.path(), line).unwrap();
-    // One that somebody else wrote is left alone.
+    // A file that this program did not write is left alone.
     std::fs::remove_file(at("a.csv")).unwrap();
     std::fs::write(at("a.csv.meta.json"), "{}").unwrap();
     let failure = command(folder.path(), line).unwrap_err();

@@ -1,13 +1,13 @@
-//! Tables of pages and of data files, and the gaps in pages.
+//! Tables for pages and data files, and the gaps in pages.
 
 use std::fmt::Write as _;
 
 use super::output::significant;
 
-/// `page` with something in place of every gap `{name}`.
+/// Fills every gap `{name}` of `page`.
 ///
 /// # Panics
-/// If there is nothing to put into a gap.
+/// If there is no text for a gap.
 pub fn fill(page: &str, gaps: &[(&str, String)]) -> String {
     let mut parts = page.split('{');
     let mut out = parts.next().unwrap_or_default().to_owned();
@@ -21,8 +21,8 @@ pub fn fill(page: &str, gaps: &[(&str, String)]) -> String {
     out
 }
 
-/// A table of a web page, whose cells are mark-up already. The heads stand between bars; after a point, the class of the cells
-/// below: `Run | Largest force (N) .n`. The class of numbers, `n`, is that of the head, too.
+/// An HTML table whose cells are already mark-up. Heads are separated by bars; ` .` after a head gives the class of the cells
+/// below: `Run | Largest force (N) .n`. The class of numbers, `n`, also applies to the head.
 pub fn html(heads: &str, rows: impl IntoIterator<Item = Vec<String>>) -> String {
     let heads: Vec<(&str, &str)> = heads
         .split(" | ")
@@ -48,7 +48,7 @@ pub fn html(heads: &str, rows: impl IntoIterator<Item = Vec<String>>) -> String 
     out + "</tbody></table></div>\n"
 }
 
-/// A table in Markdown; the heads stand between bars.
+/// A Markdown table; heads are separated by bars.
 pub fn markdown(heads: &str, rows: impl IntoIterator<Item = Vec<String>>) -> String {
     let rule = "|---".repeat(heads.split(" | ").count());
     let mut out = format!("| {heads} |\n{rule}|\n");
@@ -58,7 +58,7 @@ pub fn markdown(heads: &str, rows: impl IntoIterator<Item = Vec<String>>) -> Str
     out
 }
 
-/// Rows in CSV under their `head`, a line.
+/// CSV rows under the header line `head`.
 pub fn csv(head: &str, rows: impl IntoIterator<Item = Vec<String>>) -> String {
     let mut out = format!("{head}\n");
     for row in rows {
@@ -77,7 +77,7 @@ fn quoted(text: &str) -> String {
     }
 }
 
-/// A number in CSV; nothing where there is none.
+/// A number in CSV; empty if there is none.
 pub fn number(value: impl Into<Option<f64>>) -> String {
     let value = value.into().filter(|v| !v.is_nan());
     value.map_or_else(String::new, |v| significant(v, 12))

@@ -1,10 +1,10 @@
-//! `run --wear`: one row for each cell of the inner face of each socket, and what it took.
+//! `run --wear`: one row per cell of each socket's inner face, with its contacts, impulse and friction work.
 
 use serde_json::{Map, Value as Json, json};
 
 use super::Failure;
 use super::output::{RowsFile, Table};
-use crate::files::Filled;
+use crate::files::PendingFile;
 use crate::scene::Scene;
 use crate::simulate::{Edges, Wear};
 
@@ -23,7 +23,7 @@ const COLUMNS: [&str; 12] = [
     "friction_work_J_m2",
 ];
 
-/// Writes `map` to `file` with `meta`, which says what made it; nothing has its final name yet. Returns the number of rows, too.
+/// Writes `map` to `file` with `meta`, its provenance; nothing has its final name yet. Also returns the number of rows.
 ///
 /// # Errors
 /// As [`RowsFile::fill`].
@@ -32,7 +32,7 @@ pub fn fill(
     map: &Wear,
     scene: &Scene,
     mut meta: Map<String, Json>,
-) -> Result<(usize, Vec<Filled>), Failure> {
+) -> Result<(usize, Vec<PendingFile>), Failure> {
     let mut rows = Vec::new();
     let mut axes = Map::new();
     for (j, joint) in scene.ball_joints.iter().enumerate() {
@@ -64,9 +64,9 @@ pub fn fill(
     }
     let names: Vec<&str> = scene.ball_joints.iter().map(|j| j.name.as_str()).collect();
     meta.insert("rows".into(), json!(rows.len()));
-    // Numbers in the column `joint`, from 0.
+    // Indices in the column `joint`, from 0.
     meta.insert("ball_joints".into(), json!(names));
-    // Of the polar angles and azimuths, in the axes of the socket's body; `null` is the world.
+    // Axes of the polar angles and azimuths: those of the socket's body; `null` is the world.
     meta.insert("socket_axes".into(), Json::Object(axes));
     let count = rows.len();
     let table = Table::of_rows(COLUMNS, rows.into_iter());

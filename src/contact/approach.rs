@@ -1,15 +1,15 @@
-//! The speed that the damping term divides by, as a function of what the contact remembers and of the rate just now.
+//! The speed that the damping term divides by, as a function of the contact's memory and the current rate.
 //!
-//! With `approach_speed = "largest"` it is the running maximum of the penetration rate. While the rate is the largest so far the
-//! damping term is chi itself; once it falls, the maximum stands. A step across such an instant has no more than order 1
-//! where the rate passes the maximum, so that a stepper that locates corners holds one piece over a whole step.
+//! With `approach_speed = "largest"` it is the running maximum of the penetration rate. While the rate is the largest so far,
+//! the damping term is chi itself; once it falls, the maximum stays. A step across an instant at which the rate passes the
+//! maximum is only of order 1, so a stepper that locates corners keeps to one piece over a whole step.
 
 use super::Coefficients;
 
-/// Piece of that rule that is in force.
+/// Active piece of that rule.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ApproachPiece {
-    /// The rule as it stands: for the approach speed at the start, and for steppers that locate no corners.
+    /// The whole rule: for the approach speed at the start, and for steppers that do not locate corners.
     #[default]
     Unsplit,
     /// The rate is below the largest so far, which the term divides by.
@@ -19,8 +19,8 @@ pub enum ApproachPiece {
 }
 
 impl Coefficients {
-    /// What the damping term divides by, m/s, for a contact whose memory holds `remembered` (m/s) and whose penetration grows
-    /// at `rate` (m/s).
+    /// Speed that the damping term divides by, m/s, for a contact whose memory holds `remembered` (m/s) and whose penetration
+    /// grows at `rate` (m/s).
     #[inline]
     pub fn approach(&self, pace: ApproachPiece, remembered: f64, rate: f64) -> f64 {
         match pace {
@@ -30,7 +30,7 @@ impl Coefficients {
         }
     }
 
-    /// Whether that is the rate itself, so that the damping term does not answer to it.
+    /// Whether that is the rate itself, so that the damping term does not depend on it.
     pub fn approach_follows(&self, pace: ApproachPiece, remembered: f64, rate: f64) -> bool {
         match pace {
             ApproachPiece::Unsplit => self.largest && rate > remembered,
@@ -39,8 +39,8 @@ impl Coefficients {
         }
     }
 
-    /// The piece on which a contact is whose memory holds `remembered`.
-    pub fn pace_at(&self, remembered: f64, rate: f64) -> ApproachPiece {
+    /// Active piece for a contact whose memory holds `remembered`.
+    pub fn approach_piece_at(&self, remembered: f64, rate: f64) -> ApproachPiece {
         if !self.largest {
             ApproachPiece::Unsplit
         } else if rate >= remembered {
@@ -66,7 +66,7 @@ mod tests {
         let remembered = 0.05;
         for rate in [-0.2, 0.0, 0.01, 0.05, 0.0501, 0.4] {
             let whole = c.approach(ApproachPiece::Unsplit, remembered, rate);
-            let piece = c.pace_at(remembered, rate);
+            let piece = c.approach_piece_at(remembered, rate);
             assert_eq!(c.approach(piece, remembered, rate), whole, "{rate}");
             assert!(c.damping * rate / whole <= c.damping * (1.0 + 1e-15));
             let elastic = c.stiffness * libm::pow(1e-6, 1.5);
@@ -74,7 +74,10 @@ mod tests {
             assert!(force <= elastic * (1.0 + c.damping) * (1.0 + 1e-12));
         }
         let start = Coefficients::new(&Parameters::default(), 3e-4);
-        assert_eq!(start.pace_at(remembered, 0.4), ApproachPiece::Unsplit);
+        assert_eq!(
+            start.approach_piece_at(remembered, 0.4),
+            ApproachPiece::Unsplit
+        );
         assert_eq!(
             start.approach(ApproachPiece::Unsplit, remembered, 0.4),
             remembered

@@ -1,5 +1,5 @@
-//! Where the laws meet the geometry: the force between a ball and the wall of its socket, and how it answers to
-//! displacement and velocity. Everything that needs a contact force or its derivatives reads it here.
+//! The laws applied to the geometry: the force between a ball and the wall of its socket, and its derivatives with respect
+//! to displacement and velocity. Everything that needs a contact force or its derivatives gets them here.
 
 use super::{Coefficients, FrictionPiece, FrictionVelocity, Mat3, Memory, Vec3};
 
@@ -16,23 +16,23 @@ pub struct Separation {
     pub rate: f64,
 }
 
-/// Force on a ball and what decided it.
+/// Force on a ball, and the sliding speed behind it.
 #[derive(Clone, Copy, Debug)]
 pub struct Force {
     /// F_N, N (19).
     pub normal: f64,
     /// F_T on the ball, N (20).
     pub friction: Vec3,
-    /// |v_t| that the friction law read, m/s; 0 where it read none.
+    /// |v_t| used by the friction law, m/s; 0 if it used none.
     pub slip_speed: f64,
 }
 
-/// How full friction enters derivatives; its ramp always does by its tangent.
+/// How full friction enters the derivatives; the ramp always enters by its tangent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Slope {
-    /// As it is.
+    /// By its tangent.
     Tangent,
-    /// By F_T / v_t, which brings sliding to rest within a step and cannot reverse it.
+    /// By F_T / v_t, which can stop sliding within a step but cannot reverse it.
     Secant,
 }
 
@@ -41,18 +41,18 @@ pub enum Slope {
 pub struct Stiffness {
     /// dF/de, N/m.
     pub by_displacement: Mat3,
-    /// Part of dF that follows the centres' relative velocity through the penetration rate, N s/m.
+    /// Derivative with respect to the centres' relative velocity, through the penetration rate, N s/m.
     pub by_rate: Mat3,
-    /// Part of dF that follows the velocity [`Coefficients::friction_reads`], N s/m.
+    /// Derivative with respect to the velocity [`Coefficients::friction_reads`], N s/m.
     pub by_slip: Mat3,
-    /// dF/dt at a fixed eccentricity, by a clearance under way, N/s.
+    /// dF/dt at fixed eccentricity, due to a ramping clearance, N/s.
     pub by_clearance: Vec3,
     /// dn/de, 1/m.
     pub normal: Mat3,
 }
 
 impl Stiffness {
-    /// Of a force that acts between two points, whatever makes it.
+    /// For any force that acts between two points.
     pub fn between_points(by_displacement: Mat3, by_rate: Mat3) -> Self {
         Self {
             by_displacement,
@@ -78,7 +78,7 @@ impl Coefficients {
         }
     }
 
-    /// Velocity of the ball's point of contact against the socket's, m/s, from de/dt and the angular velocities of both.
+    /// Velocity of the ball's contact point relative to the socket's, m/s, from de/dt and the angular velocities of both.
     #[inline]
     pub fn surface_velocity(
         &self,
@@ -92,7 +92,7 @@ impl Coefficients {
             - socket.cross(&(normal * (radius + self.clearance)))
     }
 
-    /// Relative velocity that friction reads, not yet projected onto the tangent plane, m/s; arguments as
+    /// Relative velocity used by friction, not yet projected onto the tangent plane, m/s; arguments as in
     /// [`Self::surface_velocity`].
     #[inline]
     pub fn friction_reads(
@@ -108,12 +108,12 @@ impl Coefficients {
         }
     }
 
-    /// Whether that is the velocity of the surfaces and not of the centres.
-    pub fn reads_surfaces(&self) -> bool {
+    /// Whether that is the velocity of the surfaces rather than the centres.
+    pub fn uses_surface_velocity(&self) -> bool {
         self.friction_velocity == FrictionVelocity::Surface
     }
 
-    /// Part of that velocity's projection that is v_t: all of it, or (1 - c/|e|) where (13) is read as printed.
+    /// Fraction of that velocity's projection that is v_t: all of it, or (1 - c/|e|) with (13) as printed.
     #[inline]
     fn share(&self, gap: &Separation) -> f64 {
         match self.friction_velocity {
@@ -122,7 +122,7 @@ impl Coefficients {
         }
     }
 
-    /// Sliding velocity v_t, m/s, from the velocity that friction reads.
+    /// Sliding velocity v_t, m/s, from the velocity used by friction.
     #[inline]
     pub fn sliding(&self, gap: &Separation, read: &Vec3) -> Vec3 {
         let tangential = read - gap.normal * gap.normal.dot(read);
@@ -132,7 +132,7 @@ impl Coefficients {
         }
     }
 
-    /// Force on a ball that touches; `read` gives the velocity that friction reads, and is asked only where there is friction.
+    /// Force on a ball in contact; `read` gives the velocity used by friction and is called only if there is friction.
     #[inline]
     pub fn force(&self, memory: &Memory, gap: &Separation, read: impl FnOnce() -> Vec3) -> Force {
         let approach = memory.approach(self, gap.rate);
@@ -152,7 +152,7 @@ impl Coefficients {
         force
     }
 
-    /// Derivatives of `force` = [`Self::force`] > 0 there.
+    /// Derivatives of `force`, the result of [`Self::force`] there, which must be > 0.
     pub fn linearise(
         &self,
         memory: &Memory,
@@ -218,7 +218,7 @@ impl Coefficients {
         }
     }
 
-    /// How far a contact is beyond the pieces of the laws that its memory holds, if at all: a step that did so is searched for corners.
+    /// Whether a contact may have left the pieces of the laws that its memory holds: the step is then searched for corners.
     #[inline]
     pub fn leaves_piece(&self, memory: &Memory, gap: &Separation, force: &Force) -> bool {
         memory.may_turn(gap.rate)
@@ -237,14 +237,14 @@ impl Coefficients {
         0.4 * self.stiffness * penetration * penetration * penetration.sqrt()
     }
 
-    /// Power that the damping part of `force` takes, W: (F_N - K delta^1.5) d(delta)/dt.
+    /// Power dissipated by the damping part of `force`, W: (F_N - K delta^1.5) d(delta)/dt.
     #[inline]
     pub fn restitution_power(&self, gap: &Separation, force: f64) -> f64 {
         let elastic = self.stiffness * gap.penetration * gap.penetration.sqrt();
         (force - elastic) * gap.rate
     }
 
-    /// Power that a clearance on its way gives, W: -F_N dc/dt + 2/5 dK/dt delta^2.5.
+    /// Power supplied by a ramping clearance, W: -F_N dc/dt + 2/5 dK/dt delta^2.5.
     #[inline]
     pub fn clearance_power(&self, gap: &Separation, force: f64) -> f64 {
         if self.clearance_rate == 0.0 {
@@ -268,7 +268,7 @@ mod tests {
         FrictionVelocity::Printed,
     ];
 
-    /// A ball pressed 2 µm into its wall that slides at `speed` m/s and goes on sinking at 5 mm/s, its clearance on its way.
+    /// A ball pressed 2 µm into its wall that slides at `speed` m/s and sinks further at 5 mm/s while its clearance ramps.
     fn pressed(friction_velocity: FrictionVelocity, speed: f64) -> (Coefficients, Vec3, Vec3) {
         let parameters = Parameters {
             friction_velocity,
@@ -294,8 +294,8 @@ mod tests {
     const BALL: Vec3 = Vec3::new(0.3, -0.2, 0.5);
     const SOCKET: Vec3 = Vec3::new(-0.1, 0.4, 0.2);
 
-    /// Force on the ball. The surfaces' turning is kept at the normal `n0`: its change with the arms is not stiff and left out of
-    /// the derivatives.
+    /// Force on the ball. The surface velocity due to rotation is kept at the normal `n0`: its change with the arms is not stiff
+    /// and is left out of the derivatives.
     fn on_ball(c: &Coefficients, memory: &Memory, e: &Vec3, v: &Vec3, n0: &Vec3) -> Vec3 {
         let at = c.separation(e, v);
         let force = c.force(memory, &at, || c.friction_reads(n0, v, &BALL, &SOCKET));
@@ -311,7 +311,7 @@ mod tests {
                 (FrictionPiece::Unsplit, 0.04),
             ] {
                 for pace in [ApproachPiece::Held, ApproachPiece::Rising] {
-                    // With the printed velocity so little counts that it takes more to get there.
+                    // The printed velocity is so much smaller that it takes a higher speed to get there.
                     let speed = match friction_velocity {
                         FrictionVelocity::Printed => speed * 150.0,
                         _ => speed,

@@ -1,7 +1,7 @@
 //! Normal-force and friction laws.
 //!
-//! Every law here has the form F_N = K delta^1.5 (1 + chi delta_dot / delta_dot0), cut at 0 from below: they differ
-//! in the damping factor chi(ce) alone, so the force itself is one kernel.
+//! Every law here has the form F_N = K delta^1.5 (1 + chi delta_dot / delta_dot0), cut off below 0: they differ only in
+//! the damping factor chi(ce), so the force itself is one kernel.
 
 use super::{ApproachSpeed, FrictionLaw, FrictionVelocity, NormalLaw, Parameters};
 
@@ -13,20 +13,20 @@ pub fn hertz_stiffness(parameters: &Parameters, clearance: f64) -> f64 {
     4.0 / (6.0 * s) * ((r + clearance) * r / clearance).sqrt()
 }
 
-/// Penetration at which the undamped law carries `force` (N), m: where a settled contact of this load rests.
+/// Penetration at which the undamped law carries `force` (N), m: where a settled contact under this load rests.
 pub fn settled_penetration(stiffness: f64, force: f64) -> f64 {
     libm::cbrt((force / stiffness) * (force / stiffness))
 }
 
 /// Estimated duration of an impact of a mass `mass` (kg) at `speed` (m/s) on a contact of `stiffness` K and damping factor
-/// `damping`, s: 2.94 delta / v with the deepest penetration of Hertz's theory, shallower where the damping is strong.
+/// `damping`, s: 2.94 delta / v with the maximum penetration of Hertz's theory, reduced for strong damping.
 pub fn impact_duration(stiffness: f64, damping: f64, mass: f64, speed: f64) -> f64 {
     let effective = stiffness * (1.0 + 0.5 * damping);
     let deepest = libm::pow(1.25 * mass * speed * speed / effective, 0.4);
     2.94 * deepest / speed
 }
 
-/// Damping factor chi of a law for the restitution asked for.
+/// Damping factor chi of a law for the requested restitution.
 ///
 /// - Lankarani & Nikravesh (1990): 3 (1 - ce^2) / 4, derived for ce near 1.
 /// - Hertz: 0.
@@ -35,7 +35,7 @@ pub fn impact_duration(stiffness: f64, damping: f64, mass: f64, speed: f64) -> f
 /// - Gonthier et al. (2004): the chi for which an undisturbed impact rebounds with exactly ce, the root of
 ///   chi (1 + ce) = ln((1 + chi) / (1 - ce chi)).
 ///
-/// Infinite where a law that divides by ce is given 0.
+/// Infinite for ce = 0 in a law that divides by ce.
 pub fn damping_factor(law: NormalLaw, restitution: f64) -> f64 {
     let ce = restitution;
     match law {
@@ -48,7 +48,7 @@ pub fn damping_factor(law: NormalLaw, restitution: f64) -> f64 {
 }
 
 /// Excess of chi (1 + ce) over ln((1 + chi) / (1 - ce chi)): from dv/ddelta of m v dv = -K delta^1.5 (1 + chi v / v0)
-/// ddelta, whose right side integrates to zero over a whole impact whatever K and m.
+/// ddelta, whose right-hand side integrates to zero over a whole impact for any K and m.
 fn impact_balance(chi: f64, ce: f64) -> f64 {
     chi * (1.0 + ce) - libm::log1p(chi) + libm::log1p(-ce * chi)
 }
@@ -70,7 +70,7 @@ fn exact_damping_factor(ce: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// Restitution that an undisturbed impact really gives under damping factor `chi`, from the closed integral of the law.
+/// Restitution that an undisturbed impact actually gives with damping factor `chi`, from the closed integral of the law.
 pub fn restitution_given(chi: f64) -> f64 {
     if chi <= 0.0 {
         return 1.0;
@@ -87,35 +87,35 @@ pub fn restitution_given(chi: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// What the force kernel reads, made once from [`Parameters`].
+/// Coefficients of the force kernel, computed once from [`Parameters`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coefficients {
     /// Hertz stiffness K, N/m^1.5.
     pub stiffness: f64,
     /// Damping factor chi.
     pub damping: f64,
-    /// Coulomb coefficient; 0 where the friction law is none.
+    /// Coulomb coefficient; 0 if the friction law is none.
     pub friction: f64,
     /// v_a, m/s.
     pub slip_low: f64,
     /// v_theta, m/s.
     pub slip_high: f64,
-    /// Least approach speed the damping term divides by, m/s.
+    /// Smallest approach speed the damping term divides by, m/s.
     pub speed_floor: f64,
     /// Ball radius r, m.
     pub ball_radius: f64,
-    /// Which relative velocity friction reads.
+    /// Which relative velocity friction uses.
     pub friction_velocity: FrictionVelocity,
-    /// Clearance c > 0 just now, m.
+    /// Current clearance c > 0, m.
     pub clearance: f64,
-    /// Its rate while it is on its way to a new value, m/s.
+    /// Its rate while it ramps to a new value, m/s.
     pub clearance_rate: f64,
-    /// The damping term divides by the largest rate of the contact so far, not by the one at its start.
+    /// The damping term divides by the contact's largest rate so far, not by that at its start.
     pub largest: bool,
 }
 
 impl Coefficients {
-    /// For a joint whose clearance is `clearance` > 0 just now.
+    /// For a joint whose current clearance is `clearance` > 0.
     pub fn new(parameters: &Parameters, clearance: f64) -> Self {
         Self {
             stiffness: hertz_stiffness(parameters, clearance),
@@ -135,7 +135,7 @@ impl Coefficients {
         }
     }
 
-    /// Takes over a clearance on its way, and the stiffness that goes with it.
+    /// Sets the current clearance of a ramp, and the stiffness that goes with it.
     pub fn move_clearance(&mut self, parameters: &Parameters, clearance: f64, rate: f64) {
         self.stiffness = hertz_stiffness(parameters, clearance);
         (self.clearance, self.clearance_rate) = (clearance, rate);
@@ -163,7 +163,7 @@ impl Coefficients {
         }
     }
 
-    /// Derivative of [`Self::friction_ratio`] by the sliding speed, s/m.
+    /// Derivative of [`Self::friction_ratio`] with respect to the sliding speed, s/m.
     #[inline]
     pub fn friction_slope(&self, slip_speed: f64) -> f64 {
         if slip_speed <= self.slip_low || slip_speed >= self.slip_high {

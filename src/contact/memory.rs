@@ -7,19 +7,19 @@ use super::{ApproachPiece, Coefficients, FrictionPiece};
 pub struct Memory {
     /// In contact.
     pub active: bool,
-    /// What the damping term divides by: delta_dot0 of this contact, or its largest rate so far, not below the scene's floor,
-    /// m/s; 0 while free.
+    /// Speed that the damping term divides by: delta_dot0 of this contact, or its largest rate so far, not below the scene's
+    /// floor, m/s; 0 while free.
     pub approach_speed: f64,
-    /// The floor was used: this contact rebounds higher than asked.
+    /// The floor was used: this contact rebounds higher than requested.
     pub floored: bool,
-    /// Piece of the friction law in force.
+    /// Active piece of the friction law.
     pub friction_piece: FrictionPiece,
-    /// Piece of the rule for the approach speed in force.
+    /// Active piece of the rule for the approach speed.
     pub approach_piece: ApproachPiece,
 }
 
 impl Memory {
-    /// Of a contact that begins at `rate` (m/s).
+    /// Memory of a contact that begins at `rate` (m/s).
     pub fn begun(c: &Coefficients, rate: f64) -> Self {
         Self {
             active: true,
@@ -29,8 +29,8 @@ impl Memory {
         }
     }
 
-    /// What the damping term divides by where the penetration grows at `rate`, m/s. Until a contact has a memory it is the
-    /// rate itself.
+    /// Speed that the damping term divides by if the penetration grows at `rate`, m/s: the rate itself until a contact has a
+    /// memory.
     #[inline]
     pub fn approach(&self, c: &Coefficients, rate: f64) -> f64 {
         if self.active {
@@ -40,12 +40,12 @@ impl Memory {
         }
     }
 
-    /// Whether that is the rate itself, so that the damping term does not answer to it.
+    /// Whether that is the rate itself, so that the damping term does not depend on it.
     pub(super) fn follows(&self, c: &Coefficients, rate: f64) -> bool {
         self.active && c.approach_follows(self.approach_piece, self.approach_speed, rate)
     }
 
-    /// Whether the rate may pass from one piece of the rule to the next. A rising one may pass its largest value in any step.
+    /// Whether the rate may pass from one piece of the rule to the next. A rising rate may pass its maximum in any step.
     #[inline]
     pub(super) fn may_turn(&self, rate: f64) -> bool {
         match self.approach_piece {

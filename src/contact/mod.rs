@@ -23,13 +23,13 @@ type Mat3 = nalgebra::Matrix3<f64>;
 /// Normal-force law of a contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NormalLaw {
-    /// Lankarani & Nikravesh (1990), paper eq. (19). Right for a restitution near 1 only.
+    /// Lankarani & Nikravesh (1990), paper eq. (19). Valid only for restitution near 1.
     LankaraniNikravesh,
     /// Hertz without damping: elastic.
     Hertz,
     /// Hunt & Crossley (1975).
     HuntCrossley,
-    /// Flores, Machado, Silva & Martins (2011): right for low restitution too.
+    /// Flores, Machado, Silva & Martins (2011): valid for low restitution too.
     Flores,
     /// Gonthier, McPhee, Lange & Piedbœuf (2004): exact restitution over the whole range 0 < ce <= 1.
     Gonthier,
@@ -57,7 +57,7 @@ words!(FrictionLaw {
     None => "none",
 });
 
-/// Which sliding velocity the friction law reads.
+/// Which sliding velocity the friction law uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrictionVelocity {
     /// Relative velocity of the two centres, paper eqs. (15)-(16).
@@ -65,7 +65,7 @@ pub enum FrictionVelocity {
     /// Relative velocity of the two material points in contact.
     Surface,
     /// Relative velocity of the two geometric points of contact, paper eq. (13) as printed: (1 - c/|e|) times that of the
-    /// centres. Not objective; to compare with the paper.
+    /// centres. Not objective; for comparison with the paper.
     Printed,
 }
 
@@ -89,14 +89,14 @@ words!(ApproachSpeed {
     Largest => "largest",
 });
 
-/// What a ball joint's contact is made of. SI units.
+/// Contact parameters of a ball joint. SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameters {
     /// Radial clearance c = R - r, m; 0 makes the joint ideal.
     pub clearance: f64,
     /// Coulomb coefficient cf.
     pub friction: f64,
-    /// Restitution ce asked for, 0..=1.
+    /// Requested restitution ce, 0..=1.
     pub restitution: f64,
     /// Young's modulus E of both bodies, Pa.
     pub youngs_modulus: f64,
@@ -104,13 +104,13 @@ pub struct Parameters {
     pub poisson_ratio: f64,
     /// Ball radius r, m.
     pub ball_radius: f64,
-    /// Which sliding velocity friction reads.
+    /// Which sliding velocity friction uses.
     pub friction_velocity: FrictionVelocity,
     /// v_a: below it there is no friction, m/s.
     pub slip_speed_low: f64,
     /// v_theta: above it friction is full, m/s.
     pub slip_speed_high: f64,
-    /// Least approach speed that the damping term divides by, m/s.
+    /// Smallest approach speed that the damping term divides by, m/s.
     pub impact_speed_floor: f64,
     /// Which speed the damping term divides by.
     pub approach_speed: ApproachSpeed,

@@ -1,14 +1,14 @@
 //! Pieces of the friction law between its corners, each continued smoothly beyond them.
 //!
-//! A step that crosses a corner has no more than order 1 there. A stepper that locates corners holds one piece over a
-//! whole step, finds where the sliding speed leaves it, and goes on from there with the next.
+//! A step across a corner is only of order 1. A stepper that locates corners keeps to one piece over a whole step, finds
+//! where the sliding speed leaves it, and continues from there with the next.
 
 use super::Coefficients;
 
-/// Piece of the friction law (21) that is in force.
+/// Active piece of the friction law (21).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum FrictionPiece {
-    /// The law as it stands, corners included: for steppers that do not locate them.
+    /// The whole law, corners included: for steppers that do not locate them.
     #[default]
     Unsplit,
     /// Below v_a: no friction.
@@ -21,7 +21,7 @@ pub enum FrictionPiece {
 
 impl Coefficients {
     /// The piece that a sliding speed (m/s) lies on.
-    pub fn slip_at(&self, speed: f64) -> FrictionPiece {
+    pub fn friction_piece_at(&self, speed: f64) -> FrictionPiece {
         if speed >= self.slip_high {
             FrictionPiece::Full
         } else if speed > self.slip_low || self.slip_low == 0.0 {
@@ -36,15 +36,15 @@ impl Coefficients {
         match slip {
             FrictionPiece::Unsplit => f64::NEG_INFINITY,
             FrictionPiece::DeadBand => speed - self.slip_low,
-            // Without a dead band the ramp is smooth through rest.
+            // Without a dead band the ramp is smooth through zero speed.
             FrictionPiece::Ramp if self.slip_low == 0.0 => speed - self.slip_high,
             FrictionPiece::Ramp => (speed - self.slip_high).max(self.slip_low - speed),
             FrictionPiece::Full => self.slip_high - speed,
         }
     }
 
-    /// Friction force over normal force and sliding velocity, s/m, of a piece continued beyond its corners: twice
-    /// continuously differentiable even through rest.
+    /// Friction force divided by normal force and sliding velocity, s/m, for a piece continued beyond its corners: twice
+    /// continuously differentiable, even through zero velocity.
     pub fn friction_per_speed(&self, slip: FrictionPiece, speed: f64) -> f64 {
         match slip {
             FrictionPiece::Unsplit => {
@@ -65,7 +65,7 @@ impl Coefficients {
         }
     }
 
-    /// Derivative of [`Self::friction_per_speed`] by the sliding speed, s^2/m^2.
+    /// Derivative of [`Self::friction_per_speed`] with respect to the sliding speed, s^2/m^2.
     pub fn friction_per_speed_slope(&self, slip: FrictionPiece, speed: f64) -> f64 {
         match slip {
             FrictionPiece::Unsplit => {
@@ -91,7 +91,7 @@ impl Coefficients {
     }
 }
 
-/// 1 / speed and its derivative; below half the `corner` the polynomial in the speed's square that joins it with two
+/// 1 / speed and its derivative; below half the `corner`, the polynomial in the squared speed that joins it with two
 /// continuous derivatives.
 fn inverse(speed: f64, corner: f64) -> (f64, f64) {
     let join = 0.5 * corner;
@@ -119,7 +119,7 @@ mod tests {
     fn pieces_are_the_law_between_their_corners_and_meet_there() {
         let c = coefficients();
         for speed in [1e-7, 1e-6, 2e-6, 5e-5, 9.99e-5, 1e-4, 3e-4, 1.0] {
-            let slip = c.slip_at(speed);
+            let slip = c.friction_piece_at(speed);
             let got = c.friction_per_speed(slip, speed) * speed;
             let want = c.friction_ratio(speed);
             assert!((got - want).abs() < 1e-15, "{speed}: {got} {want}");
@@ -160,7 +160,7 @@ mod tests {
             slip_low: 0.0,
             ..coefficients()
         };
-        assert_eq!(c.slip_at(0.0), FrictionPiece::Ramp);
+        assert_eq!(c.friction_piece_at(0.0), FrictionPiece::Ramp);
         assert!(c.beyond(FrictionPiece::Ramp, 0.0) < 0.0);
         assert!(c.friction_per_speed(FrictionPiece::Ramp, 0.0).is_finite());
     }

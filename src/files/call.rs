@@ -1,4 +1,4 @@
-//! The calls to the file system that a test can have fail.
+//! File system calls that a test can make fail.
 
 /// Kinds of calls.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -15,10 +15,10 @@ pub enum Call {
     Truncate,
     /// Waits until bytes are on the disk.
     Sync,
-    /// Gives another name.
+    /// Renames.
     Rename,
     /// Swaps two names.
     Exchange,
-    /// Takes a file or an empty folder away.
+    /// Removes a file or an empty folder.
     Remove,
 }

@@ -1,5 +1,5 @@
-//! The calls to the file system by which outputs are made. Each goes through one gate, so that a test can have the n-th of a
-//! kind fail, or the program end there.
+//! The file system calls that make outputs. Each passes one gate, so that a test can make the n-th call of a kind fail,
+//! or end the program there.
 
 use std::fs::{self, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -9,7 +9,7 @@ use super::call::Call;
 #[cfg(test)]
 pub use super::faults::Gate;
 
-/// Lets everything through; tests have another.
+/// Lets everything through; tests have another gate.
 #[cfg(not(test))]
 #[derive(Clone, Copy, Debug)]
 pub struct Gate;
@@ -21,46 +21,46 @@ impl Gate {
         Self
     }
 
-    /// Lets a call through, or has it fail.
+    /// Lets a call pass, or makes it fail.
     ///
     /// # Errors
-    /// What the call is to return.
+    /// The error that the call is to return.
     pub fn pass(&self, _call: Call) -> io::Result<()> {
         Ok(())
     }
 
-    /// How much of `bytes` a failing write still writes.
+    /// The part of `bytes` that a failing write still writes.
     fn torn<'a>(&self, _bytes: &'a [u8]) -> &'a [u8] {
         &[]
     }
 
-    /// Whether `path` is there under another spelling of its name.
+    /// Whether `path` exists under another spelling of its name.
     fn folded(&self, _path: &Path) -> bool {
         false
     }
 }
 
-/// A file that is written, and read back.
+/// A file that is written and read back.
 #[derive(Debug)]
 pub struct File {
     file: fs::File,
-    /// That of the thread which opened it: others may write it.
+    /// Gate of the thread that opened it: others may write it.
     gate: Gate,
 }
 
 impl File {
-    /// Makes a file that is not there yet.
+    /// Creates a file that does not exist yet.
     ///
     /// # Errors
-    /// As the file system says.
+    /// Whatever the file system reports.
     pub fn create_new(path: &Path) -> io::Result<Self> {
         Self::with(path, OpenOptions::new().create_new(true))
     }
 
-    /// Opens one that is there.
+    /// Opens an existing file.
     ///
     /// # Errors
-    /// As the file system says.
+    /// Whatever the file system reports.
     pub fn open(path: &Path) -> io::Result<Self> {
         Self::with(path, &mut OpenOptions::new())
     }
@@ -72,7 +72,7 @@ impl File {
         Ok(Self { file, gate })
     }
 
-    /// Waits until nobody else has it locked, and locks it until it is closed.
+    /// Waits until nobody else holds its lock, and locks it until it is closed.
     ///
     /// # Errors
     /// A file system without locks.
@@ -93,15 +93,15 @@ impl File {
     /// Its length, bytes.
     ///
     /// # Errors
-    /// As the file system says.
+    /// Whatever the file system reports.
     pub fn length(&self) -> io::Result<u64> {
         Ok(self.file.metadata()?.len())
     }
 
-    /// Cuts it to `length` bytes.
+    /// Truncates it to `length` bytes.
     ///
     /// # Errors
-    /// As the file system says.
+    /// Whatever the file system reports.
     pub fn set_length(&self, length: u64) -> io::Result<()> {
         self.gate.pass(Call::Truncate)?;
         self.file.set_len(length)
@@ -110,7 +110,7 @@ impl File {
     /// Waits until its content is on the disk.
     ///
     /// # Errors
-    /// As the file system says.
+    /// Whatever the file system reports.
     pub fn sync(&self) -> io::Result<()> {
         self.gate.pass(Call::Sync)?;
         // Waiting would prove nothing in a test.
@@ -124,7 +124,7 @@ impl File {
 impl Write for &File {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         if let Err(error) = self.gate.pass(Call::Write) {
-            // A full disk and a kill leave the beginning.
+            // A full disk or a kill leaves the beginning.
             (&self.file).write_all(self.gate.torn(bytes))?;
             return Err(error);
         }
@@ -148,14 +148,14 @@ impl Seek for &File {
     }
 }
 
-/// A folder that no other run changes the names in while this is held; none where there are no such locks.
+/// Held while the names in a folder are changed, so that no other run does so; empty where there are no such locks.
 pub struct FolderLock(#[expect(dead_code, reason = "held until dropped")] Option<fs::File>);
 
-/// Waits for the names in `folder`.
+/// Waits for the lock on the names in `folder`.
 pub fn lock_folder(folder: &Path) -> FolderLock {
     let lock = || {
         Gate::here().pass(Call::Lock)?;
-        // Elsewhere than on Unix a folder cannot be opened, and two runs of one output are the user's to avoid.
+        // Other than on Unix a folder cannot be opened, and avoiding two runs of one output is up to the user.
         let file = fs::File::open(folder)?;
         file.lock()?;
         io::Result::Ok(file)
@@ -163,42 +163,42 @@ pub fn lock_folder(folder: &Path) -> FolderLock {
     FolderLock(lock().inspect_err(|e| log::debug!("no lock: {e}")).ok())
 }
 
-/// Makes a folder that is not there yet.
+/// Creates a folder that does not exist yet.
 ///
 /// # Errors
-/// As the file system says.
+/// Whatever the file system reports.
 pub fn create_folder(path: &Path) -> io::Result<()> {
     Gate::here().pass(Call::Folder)?;
     fs::create_dir(path)
 }
 
-/// Makes a folder and those it lies in, as far as they are missing.
+/// Creates a folder and its missing parents.
 ///
 /// # Errors
-/// As the file system says.
+/// Whatever the file system reports.
 pub fn create_folders(path: &Path) -> io::Result<()> {
     Gate::here().pass(Call::Folder)?;
     fs::create_dir_all(path)
 }
 
-/// Whether something has this name: a dangling link is something, too.
+/// Whether something has this name; a dangling link counts.
 pub fn exists(path: &Path) -> bool {
     fs::symlink_metadata(path).is_ok() || Gate::here().folded(path)
 }
 
-/// Gives a file another name, replacing what has it.
+/// Renames a file, replacing whatever has the new name.
 ///
 /// # Errors
-/// As the file system says.
+/// Whatever the file system reports.
 pub fn rename(from: &Path, to: &Path) -> io::Result<()> {
     Gate::here().pass(Call::Rename)?;
     fs::rename(from, to)
 }
 
-/// Gives a file a name that nothing has.
+/// Renames a file to a name that must be free.
 ///
 /// # Errors
-/// `AlreadyExists`; as the file system says.
+/// `AlreadyExists`; whatever else the file system reports.
 pub fn rename_new(from: &Path, to: &Path) -> io::Result<()> {
     Gate::here().pass(Call::Rename)?;
     #[cfg(any(target_os = "linux", target_os = "macos"))]
@@ -210,17 +210,17 @@ pub fn rename_new(from: &Path, to: &Path) -> io::Result<()> {
             other => return other.map_err(io::Error::from),
         }
     }
-    // Only a program that is none of this one can come between.
+    // Only another program can come in between.
     if fs::symlink_metadata(to).is_ok() {
         return Err(io::ErrorKind::AlreadyExists.into());
     }
     fs::rename(from, to)
 }
 
-/// Swaps two names in one step.
+/// Swaps two names atomically.
 ///
 /// # Errors
-/// A system or file system that has no such step; as the file system says.
+/// A system or file system without such a call; whatever else the file system reports.
 pub fn exchange(a: &Path, b: &Path) -> io::Result<()> {
     Gate::here().pass(Call::Exchange)?;
     #[cfg(any(target_os = "linux", target_os = "macos"))]
@@ -235,25 +235,25 @@ pub fn exchange(a: &Path, b: &Path) -> io::Result<()> {
     }
 }
 
-/// Takes a file away.
+/// Removes a file.
 ///
 /// # Errors
-/// As the file system says.
+/// Whatever the file system reports.
 pub fn remove_file(path: &Path) -> io::Result<()> {
     Gate::here().pass(Call::Remove)?;
     fs::remove_file(path)
 }
 
-/// Takes an empty folder away.
+/// Removes an empty folder.
 ///
 /// # Errors
-/// As the file system says.
+/// Whatever the file system reports.
 pub fn remove_folder(path: &Path) -> io::Result<()> {
     Gate::here().pass(Call::Remove)?;
     fs::remove_dir(path)
 }
 
-/// Takes away all that is in a folder but what is called `except`; goes on past what cannot be removed.
+/// Removes everything in a folder except `except`; continues past what cannot be removed.
 pub fn remove_content(path: &Path, except: &str) {
     for entry in fs::read_dir(path).into_iter().flatten().flatten() {
         // A link to a folder is a file here.

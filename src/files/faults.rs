@@ -1,4 +1,4 @@
-//! A file system that fails where a test says so, for the thread that asks for it and the files it opens.
+//! A file system that fails where a test says so, for the thread that requests it and the files it opens.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -8,18 +8,18 @@ use std::sync::{Arc, Mutex};
 
 use super::call::Call;
 
-/// What is to go wrong.
+/// What goes wrong.
 #[derive(Clone, Copy, Debug)]
 pub enum Fault {
     /// Nothing: calls are counted.
     None,
     /// The n-th call of a kind, from 1, finds the disk full.
     Fails(Call, usize),
-    /// The program is killed at the n-th call, from 1: neither this one nor any later one does anything.
+    /// The program is killed at the n-th call, from 1: neither this call nor any later one has an effect.
     Kills(usize),
 }
 
-/// How the file system is.
+/// Properties of the file system.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Kind {
     /// Whether it cannot swap two names.
@@ -51,7 +51,7 @@ impl Gate {
         HERE.with_borrow(Clone::clone)
     }
 
-    /// Lets a call through, or has it fail.
+    /// Lets a call pass, or makes it fail.
     pub fn pass(&self, call: Call) -> io::Result<()> {
         let Some((fault, kind, state)) = self.0.as_deref() else {
             return Ok(());
@@ -80,14 +80,14 @@ impl Gate {
         }
     }
 
-    /// How much of `bytes` a failing write still writes: half on a full disk and at the kill, nothing after it.
+    /// The part of `bytes` that a failing write still writes: half on a full disk and at the kill, nothing after it.
     pub(super) fn torn<'a>(&self, bytes: &'a [u8]) -> &'a [u8] {
         let state = self.0.as_deref().map(|(_, _, state)| state);
         let torn = state.is_some_and(|state| std::mem::take(&mut state.lock().unwrap().torn));
         &bytes[..if torn { bytes.len() / 2 } else { 0 }]
     }
 
-    /// Whether `path` is there under another spelling of its name.
+    /// Whether `path` exists under another spelling of its name.
     pub(super) fn folded(&self, path: &Path) -> bool {
         let folds = self
             .0
@@ -103,7 +103,7 @@ impl Gate {
     }
 }
 
-/// What `work` does on such a file system, and how many calls of each kind it made.
+/// Runs `work` on such a file system; also returns the number of calls of each kind.
 pub fn with<T>(fault: Fault, kind: Kind, work: impl FnOnce() -> T) -> (T, BTreeMap<Call, usize>) {
     let gate = Gate(Some(Arc::new((fault, kind, Mutex::default()))));
     HERE.replace(gate.clone());
@@ -128,7 +128,7 @@ pub fn tree(folder: &Path) -> Tree {
             if entry.file_type().unwrap().is_dir() {
                 todo.push(path);
             } else {
-                // Nothing is read through a link that leads nowhere.
+                // Nothing is read through a dangling link.
                 let content = std::fs::read(&path).unwrap_or_default();
                 all.insert(relative(folder, &path), content);
             }
@@ -142,7 +142,7 @@ fn relative(folder: &Path, path: &Path) -> String {
     path.display().to_string()
 }
 
-/// What users see of `tree`: no scratch, nothing that a later run goes on from.
+/// What users see of `tree`: no scratch, nothing that a later run resumes from.
 fn results(tree: &Tree) -> Tree {
     let mut results = tree.clone();
     results.retain(|name, _| {
@@ -151,13 +151,13 @@ fn results(tree: &Tree) -> Tree {
     results
 }
 
-/// Faults that each case meets; the environment may ask for more.
+/// Number of faults per case; the environment may ask for more.
 fn most() -> usize {
     let asked = std::env::var("JOINTPLAY_FAULTS").ok();
     asked.and_then(|number| number.parse().ok()).unwrap_or(24)
 }
 
-/// Some of 1..=`count`, both ends included.
+/// Some of 1..=`count`, including both ends.
 fn some(count: usize, most: usize) -> Vec<usize> {
     let mut all: Vec<usize> = (0..most.min(count))
         .map(|k| 1 + k * (count - 1) / (most.min(count) - 1).max(1))
@@ -166,9 +166,9 @@ fn some(count: usize, most: usize) -> Vec<usize> {
     all
 }
 
-/// Has `work` in a folder that `before` prepared meet faults: it leaves what was there or what it makes, never anything between,
-/// and nothing else; the same again then makes what it makes without a fault. After a kill `may_be` says which mixtures of
-/// old, new and present results are right.
+/// Runs `work` with faults in a folder prepared by `before`: it leaves what was there or its whole result, never anything
+/// between, and nothing else; repeating it then gives the result of a run without faults. After a kill `may_be` decides
+/// which mixtures of old, new and present results are right.
 pub fn survive(
     kind: Kind,
     before: &dyn Fn(&Path),
@@ -226,7 +226,7 @@ pub fn survive(
         assert!(may_be(&results(&old), &new, &found), "{what}");
         let again = with(Fault::None, kind, || work(folder.path())).0;
         let after = tree(folder.path());
-        // Without --force what is there already is refused.
+        // Without --force existing results are refused.
         if again.is_err() {
             let known = |name: &String| new.contains_key(name) && !old.contains_key(name);
             let same = results(&after) == found && found.keys().any(known);

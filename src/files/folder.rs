@@ -11,38 +11,38 @@ use serde_json::{Map, Value as Json, json};
 use super::disk::{self, File};
 use super::names::{is_mount_point, parent, place};
 use super::scratch::{self, ScratchFolder};
-use super::target::Target;
+use super::target::OutputFile;
 use super::{FileError, PROGRAM};
 
-/// The file that says what a folder of results holds.
+/// The file that lists the content of a results folder.
 pub const MANIFEST: &str = "manifest.json";
 
-/// What the folder is called in its scratch.
+/// Name of the folder within its scratch folder.
 const NEW: &str = "new";
 
-/// Foreign files that an error names.
+/// Largest number of foreign files that an error names.
 const MOST_NAMED: usize = 4;
 
 /// A folder to be filled.
 #[derive(Debug)]
 pub struct Folder {
-    /// As it was asked for.
+    /// The path as requested.
     path: PathBuf,
-    /// Where a link leads.
+    /// The path with links resolved.
     place: PathBuf,
     replace: bool,
     scratch: ScratchFolder,
-    /// Names of the files, beside that of the folder.
+    /// Names of its files, relative to the folder.
     files: RefCell<BTreeSet<String>>,
 }
 
 impl Folder {
-    /// Makes the scratch folder beside `path`; takes away what killed runs left there. `replace` allows that there are results
-    /// of this program.
+    /// Makes the scratch folder beside `path`; removes what killed runs left there. `replace` permits existing results of
+    /// this program.
     ///
     /// # Errors
-    /// `path` cannot be given to a new folder: it is a file or a mount point, the command runs in it, or it has something in it
-    /// that is not to be replaced. Nothing can be written beside it.
+    /// `path` cannot be given to a new folder: it is a file or a mount point, the command runs in it, or it contains
+    /// something that may not be replaced. Nothing can be written beside it.
     pub fn claim(path: &Path, replace: bool) -> Result<Self, FileError> {
         let failed = |error: io::Error| FileError::of(path, &error);
         let place = place(path).map_err(failed)?;
@@ -81,7 +81,7 @@ impl Folder {
     ///
     /// # Errors
     /// Input/output.
-    pub fn file(&self, name: &str) -> Result<Target, FileError> {
+    pub fn file(&self, name: &str) -> Result<OutputFile, FileError> {
         let path = self.path.join(name);
         let place = self.scratch.join(NEW).join(name);
         let folder = parent(&place);
@@ -89,7 +89,7 @@ impl Folder {
             disk::create_folders(folder).map_err(|error| FileError::of(&path, &error))?;
         }
         self.files.borrow_mut().insert(name.to_owned());
-        Ok(Target::within(path, place))
+        Ok(OutputFile::within(path, place))
     }
 
     /// Writes a file in it.
@@ -98,7 +98,7 @@ impl Folder {
     /// Input/output.
     pub fn write(&self, name: &str, content: &[u8]) -> Result<(), FileError> {
         let path = self.file(name)?;
-        // The folder appears whole: its files need no care of their own.
+        // The folder appears whole: its files need no protection of their own.
         let place = self.scratch.join(NEW).join(name);
         let write = || (&File::create_new(&place)?).write_all(content);
         write().map_err(|error| FileError::of(path.path(), &error))
@@ -116,7 +116,7 @@ impl Folder {
         let new = self.scratch.join(NEW);
         let _lock = disk::lock_folder(parent(&self.place));
         if !has_content(&self.place) {
-            // A rename over a folder works if that is empty, and where there is no such rename after it is gone.
+            // Renaming onto a folder works if that is empty; elsewhere than on Unix it has to be removed first.
             if cfg!(not(unix)) && self.place.is_dir() {
                 disk::remove_folder(&self.place).map_err(failed)?;
             }
@@ -126,7 +126,7 @@ impl Folder {
             return Err(FileError::NotEmpty(self.path.clone()));
         }
         if disk::exchange(&new, &self.place).is_ok() {
-            // Looked at where nobody puts anything in any more.
+            // Checked where nobody adds anything any more.
             return check_own(&self.path, &new).inspect_err(|_| {
                 let _ = disk::exchange(&new, &self.place);
             });
@@ -155,7 +155,7 @@ fn check_own(path: &Path, place: &Path) -> Result<(), FileError> {
     if own {
         let listed = |key: &str| manifest[key].as_array().into_iter().flatten();
         files.extend(listed("files").filter_map(Json::as_str));
-        // Before there was a list of files, frames alone had theirs.
+        // Older manifests list only frames.
         files.extend(listed("frames").filter_map(|frame| frame["file"].as_str()));
         files.insert(MANIFEST);
     }
@@ -185,7 +185,7 @@ fn check_own(path: &Path, place: &Path) -> Result<(), FileError> {
     ))
 }
 
-/// Tells the names of all files under `folder`, and of folders with nothing in them.
+/// Calls `tell` with the names of all files under `folder`, and of empty folders.
 fn collect(folder: &Path, before: &str, tell: &mut impl FnMut(&str)) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = format!("{before}{}", entry.file_name().display());

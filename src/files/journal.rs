@@ -1,4 +1,4 @@
-//! Files that are seen while they grow, so that an interrupted run goes on from them: they begin whole.
+//! Files that are visible while they grow, so that an interrupted run resumes from them: their beginning appears whole.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -9,7 +9,7 @@ use super::scratch::ScratchFile;
 
 pub use super::disk::{create_folders, remove_file, remove_folder as remove_empty_folder};
 
-/// Opens a file that is there, or makes it with `beginning` in it.
+/// Opens an existing file, or creates it with `beginning` in it.
 ///
 /// # Errors
 /// Input/output.
@@ -18,7 +18,7 @@ pub fn open_or_create(path: &Path, beginning: &[u8]) -> io::Result<File> {
     loop {
         let empty = match File::open(&place) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => false,
-            // As good as none.
+            // As good as missing.
             Ok(file) if file.length()? == 0 => true,
             other => return other,
         };

@@ -1,5 +1,5 @@
-//! Files and folders that appear whole or not at all: written beside their final name, then renamed. What a killed run leaves
-//! beside them is taken away by the next.
+//! Files and folders that appear whole or not at all: written beside their final name, then renamed. The next run removes
+//! what a killed run left beside them.
 
 mod call;
 mod disk;
@@ -18,27 +18,27 @@ pub use disk::File;
 pub use folder::{Folder, MANIFEST};
 pub use journal::{create_folders, open_or_create, remove_empty_folder, remove_file};
 pub use names::same_file;
-pub use target::{Filled, Sink, Spool, Target, appear};
+pub use target::{OutputFile, PendingFile, Sink, Spool, publish};
 
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// What every output calls the program that made it.
+/// Name of this program in every output.
 pub const PROGRAM: &str = env!("CARGO_PKG_NAME");
 
 /// Why an output cannot be written.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FileError {
-    /// Something has its name.
+    /// Something already has its name.
     #[error("{} already exists", .0.display())]
     Exists(PathBuf),
-    /// There is a folder of its name with something in it.
+    /// A folder that is not empty has its name.
     #[error("{} already exists and is not empty", .0.display())]
     NotEmpty(PathBuf),
     /// Anything else.
     #[error("cannot write {}: {cause}", .path.display())]
     Cannot {
-        /// The name that was asked for.
+        /// The requested name.
         path: PathBuf,
         /// Why.
         cause: String,

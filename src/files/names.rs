@@ -1,4 +1,4 @@
-//! What a name leads to: links, and names that are one.
+//! What a name leads to: links, and different names for one file.
 
 use std::fs;
 use std::io;
@@ -7,15 +7,15 @@ use std::path::{Component, Path, PathBuf};
 use super::disk::{self, File};
 use super::scratch::ScratchFolder;
 
-/// Links that may follow one another, as in Linux.
+/// Longest chain of links, as in Linux.
 const MOST_LINKS: usize = 40;
 
-/// Where something called `path` lies or would lie: no link in it, and its folder is there.
+/// Where `path` lies or would lie: without links, in a folder that exists.
 ///
 /// # Errors
-/// No such folder; links without end.
+/// No such folder; circular links.
 pub(super) fn place(path: &Path) -> io::Result<PathBuf> {
-    // Through its parts, so that a slash at the end is none.
+    // By components, which drops a trailing slash.
     let mut path: PathBuf = path.components().collect();
     for _ in 0..MOST_LINKS {
         match fs::read_link(&path) {
@@ -41,8 +41,8 @@ pub(super) fn parent(path: &Path) -> &Path {
     }
 }
 
-/// The first of `others` that would be the same file as `path`: by a link, another way to it, or a spelling that its file system
-/// takes for the same.
+/// The first of `others` that would be the same file as `path`: by a link, by another route, or by a spelling that its
+/// file system treats as equal.
 pub fn same_file(path: &Path, others: &[&Path]) -> Option<usize> {
     let own = place(path).ok()?;
     let name = own.file_name()?;
@@ -64,7 +64,7 @@ pub fn same_file(path: &Path, others: &[&Path]) -> Option<usize> {
     if beside.iter().all(Option::is_none) {
         return None;
     }
-    // How a file system compares names is its own affair: ask it. What cannot be written here is said elsewhere.
+    // Only the file system knows how it compares names: ask it. A failure to write here is reported elsewhere.
     let trial = ScratchFolder::new(parent(&own)).ok()?;
     let at = |name: &std::ffi::OsStr| trial.path().join(name);
     File::create_new(&at(name)).ok()?;
@@ -77,7 +77,7 @@ pub fn same_file(path: &Path, others: &[&Path]) -> Option<usize> {
 #[cfg(unix)]
 fn one_folder(a: &Path, b: &Path) -> bool {
     use std::os::unix::fs::MetadataExt;
-    // By what they are: a folder may be mounted in two places.
+    // By identity: a folder may be mounted in two places.
     let id = |path| fs::metadata(path).map(|it| (it.dev(), it.ino())).ok();
     id(a).is_some() && id(a) == id(b)
 }
@@ -87,14 +87,14 @@ fn one_folder(a: &Path, b: &Path) -> bool {
     a == b
 }
 
-/// Whether a file system is mounted at `path`: its name cannot be given to something else.
+/// Whether a file system is mounted at `path`, whose name then cannot be given to something else.
 #[cfg(unix)]
 pub(super) fn is_mount_point(path: &Path) -> bool {
     use std::os::unix::fs::MetadataExt;
     #[cfg(target_os = "linux")]
     {
         use rustix::fs::{AtFlags, CWD, StatxAttributes, StatxFlags, statx};
-        // A folder mounted elsewhere on its own file system shows only here.
+        // A bind mount from the same file system shows only here.
         let mounted = statx(CWD, path, AtFlags::empty(), StatxFlags::empty());
         if mounted.is_ok_and(|it| it.stx_attributes.contains(StatxAttributes::MOUNT_ROOT)) {
             return true;

@@ -1,5 +1,5 @@
-//! Where outputs are until they are whole: files and folders beside their final name, held locked while their run is alive,
-//! so that the next run beside them tells the scratch of a killed one and takes it away.
+//! Where outputs are until they are whole: files and folders beside their final name, locked while their run is alive, so
+//! that the next run beside them recognises the scratch of a killed one and removes it.
 
 use std::fs;
 use std::hash::{BuildHasher, Hasher};
@@ -9,11 +9,11 @@ use std::sync::OnceLock;
 
 use super::disk::{self, File};
 
-/// What all scratch is called.
+/// Prefix of all scratch names.
 const PREFIX: &str = ".jointplay-";
-/// Locked for as long as a scratch folder is in use.
+/// Locked as long as a scratch folder is in use.
 const LOCK: &str = "lock";
-/// Where a scratch folder keeps what it is to replace, under its own name, between two renames.
+/// Where a scratch folder keeps what it replaces, under its own name, between two renames.
 const OLD: &str = "old";
 
 /// A file without its final name.
@@ -23,7 +23,7 @@ pub(super) struct ScratchFile {
     file: File,
 }
 
-/// A name that goes away with this, unless it was changed.
+/// A name that is removed on drop, unless it was changed.
 #[derive(Debug)]
 struct Name(Option<PathBuf>);
 
@@ -45,9 +45,9 @@ impl ScratchFile {
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists => continue,
                 other => other?,
             };
-            // No locks on this file system: then nothing is taken away there either.
+            // No locks on this file system: then nothing is removed there either.
             let _ = file.lock();
-            // Before it was locked it looked like what a killed run leaves.
+            // Before it was locked, it looked like the remains of a killed run.
             if disk::exists(&path) {
                 let name = Name(Some(path));
                 return Ok(Self { name, file });
@@ -55,12 +55,12 @@ impl ScratchFile {
         }
     }
 
-    /// What is written to.
+    /// The file to write to.
     pub fn file(&self) -> &File {
         &self.file
     }
 
-    /// Gives it its final name, which nothing else has unless `replace`; it stays locked until it is closed.
+    /// Gives it its final name, which must be free unless `replace`; it stays locked until it is closed.
     pub fn rename(mut self, path: &Path, replace: bool) -> io::Result<File> {
         if let Some(scratch) = &self.name.0 {
             if replace {
@@ -73,7 +73,7 @@ impl ScratchFile {
         Ok(self.file)
     }
 
-    /// Takes its name away: the content is there until it is closed, where the system has files without a name.
+    /// Removes its name: the content lasts until it is closed, on systems that have nameless files.
     pub fn forget_name(&mut self) {
         if cfg!(unix) {
             self.name = Name(None);
@@ -81,7 +81,7 @@ impl ScratchFile {
     }
 }
 
-/// A folder for what is to become a folder, and for what that replaces.
+/// A folder for the future folder, and for what that replaces.
 #[derive(Debug)]
 pub(super) struct ScratchFolder {
     path: PathBuf,
@@ -99,7 +99,7 @@ impl ScratchFolder {
                 other => other?,
             }
             let lock = match File::create_new(&path.join(LOCK)) {
-                // Taken for what a killed run left, before the lock was in it.
+                // Another run took it for the remains of a killed run, before the lock was in it.
                 Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
                 Err(error) => {
                     let _ = disk::remove_folder(&path);
@@ -114,17 +114,17 @@ impl ScratchFolder {
         }
     }
 
-    /// Where it is.
+    /// Its path.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Something in it.
+    /// Path of something in it.
     pub fn join(&self, name: &str) -> PathBuf {
         self.path.join(name)
     }
 
-    /// Moves `path` in here, to be moved back should the run end before something else has its name.
+    /// Moves `path` in here, to be moved back if the run ends before something else has its name.
     pub fn put_aside(&self, path: &Path) -> io::Result<PathBuf> {
         let old = self.path.join(OLD);
         if !disk::exists(&old) {
@@ -142,14 +142,14 @@ impl Drop for ScratchFolder {
     }
 }
 
-/// Takes a scratch folder away, its lock last: a kill in the middle leaves what the next run knows.
+/// Removes a scratch folder, its lock last: a kill in between leaves what the next run recognises.
 fn remove(path: &Path) {
     disk::remove_content(path, LOCK);
     let _ = disk::remove_file(&path.join(LOCK));
     let _ = disk::remove_folder(path);
 }
 
-/// Takes away what killed runs of this machine left in `folder`; leaves alone what a live run has locked.
+/// Removes what killed runs of this machine left in `folder`; leaves alone what a live run has locked.
 pub(super) fn clear(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name();
@@ -168,11 +168,11 @@ pub(super) fn clear(folder: &Path) {
 
 fn clear_folder(folder: &Path, scratch: &Path) {
     let Some(_lock) = abandoned(&scratch.join(LOCK)) else {
-        // Killed before the lock was in it, if it is empty; else this does nothing.
+        // If it is empty, its run was killed before the lock was in it; otherwise this does nothing.
         let _ = disk::remove_folder(scratch);
         return;
     };
-    // Killed between two renames: what stood there goes back to its name.
+    // Killed between two renames: what was moved aside gets its name back.
     for old in fs::read_dir(scratch.join(OLD))
         .into_iter()
         .flatten()
@@ -193,7 +193,7 @@ fn abandoned(path: &Path) -> Option<File> {
     Some(file)
 }
 
-/// A name that nothing has yet.
+/// An unused name.
 fn fresh(folder: &Path) -> PathBuf {
     // Seeded anew by the system each time.
     let random = std::hash::RandomState::new().build_hasher().finish();
@@ -201,7 +201,7 @@ fn fresh(folder: &Path) -> PathBuf {
     folder.join(format!("{PREFIX}{host}-{start}-{random:016x}"))
 }
 
-/// This machine, by name and by its last start. A lock holds among the programs of one running system, whatever name a
+/// This machine, by name and by its last boot. A lock holds among the programs of one running system, whatever name a
 /// container has there; between machines that share a folder it may not.
 fn machine() -> &'static [String; 2] {
     static MACHINE: OnceLock<[String; 2]> = OnceLock::new();

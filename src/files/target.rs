@@ -1,4 +1,4 @@
-//! Files, one or some that belong together: all of them appear, or none.
+//! Output files, alone or in groups: all of a group appear, or none.
 
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -10,20 +10,20 @@ use super::scratch::{self, ScratchFile};
 
 /// A file to be written.
 #[derive(Debug)]
-pub struct Target {
-    /// As it was asked for.
+pub struct OutputFile {
+    /// The path as requested.
     path: PathBuf,
-    /// Where a link leads.
+    /// The path with links resolved.
     place: PathBuf,
     replace: bool,
 }
 
-impl Target {
-    /// Checks, by writing an empty file beside it and removing that, that `path` can be written; takes away what killed runs left
-    /// there. `replace` allows that there is one.
+impl OutputFile {
+    /// Checks that `path` can be written, by writing and removing an empty file beside it; removes what killed runs left
+    /// there. `replace` permits an existing file.
     ///
     /// # Errors
-    /// It exists and `replace` is not given, is no file, or its folder is missing or read-only.
+    /// It exists and `replace` is not given, it is not a file, or its folder is missing or read-only.
     pub fn claim(path: &Path, replace: bool) -> Result<Self, FileError> {
         if path.file_name().is_none() || path.is_dir() {
             return Err(FileError::cannot(path, "it names a folder"));
@@ -45,7 +45,7 @@ impl Target {
         })
     }
 
-    /// A file of a folder that has not appeared yet.
+    /// A file in a folder that has not appeared yet.
     pub(super) fn within(path: PathBuf, place: PathBuf) -> Self {
         Self {
             path,
@@ -54,7 +54,7 @@ impl Target {
         }
     }
 
-    /// The name that was asked for.
+    /// The requested name.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -63,7 +63,10 @@ impl Target {
     ///
     /// # Errors
     /// Input/output.
-    pub fn fill(self, fill: impl FnOnce(&mut Sink) -> io::Result<()>) -> Result<Filled, FileError> {
+    pub fn fill(
+        self,
+        fill: impl FnOnce(&mut Sink) -> io::Result<()>,
+    ) -> Result<PendingFile, FileError> {
         let content = || {
             let scratch = ScratchFile::new(parent(&self.place))?;
             Sink::fill(scratch.file(), fill)?;
@@ -71,7 +74,7 @@ impl Target {
             Ok(scratch)
         };
         match content() {
-            Ok(scratch) => Ok(Filled {
+            Ok(scratch) => Ok(PendingFile {
                 target: self,
                 scratch,
             }),
@@ -84,7 +87,7 @@ impl Target {
     /// # Errors
     /// Input/output; the final name is then as it was.
     pub fn write(self, fill: impl FnOnce(&mut Sink) -> io::Result<()>) -> Result<(), FileError> {
-        appear(vec![self.fill(fill)?])
+        publish(vec![self.fill(fill)?])
     }
 
     /// A nameless file beside it for what does not fit in memory.
@@ -99,12 +102,12 @@ impl Target {
     }
 }
 
-/// Bytes on the disk that nobody else sees, and that are gone when this is dropped.
+/// Bytes on the disk that nobody else sees, deleted when this is dropped.
 #[derive(Debug)]
 pub struct Spool(ScratchFile);
 
 impl Spool {
-    /// Puts `bytes` at the end.
+    /// Appends `bytes`.
     ///
     /// # Errors
     /// Input/output.
@@ -114,7 +117,7 @@ impl Spool {
         file.write_all(bytes)
     }
 
-    /// Fills `bytes` with what stands from `at` on.
+    /// Fills `bytes` from position `at` on.
     ///
     /// # Errors
     /// Input/output.
@@ -125,33 +128,33 @@ impl Spool {
     }
 }
 
-/// A file with its content, waiting for its name.
+/// A file with its content, but not yet its name.
 #[derive(Debug)]
-pub struct Filled {
-    target: Target,
+pub struct PendingFile {
+    target: OutputFile,
     scratch: ScratchFile,
 }
 
-/// Gives files that belong together their final names, in order, while no other run does so in the same folders.
+/// Gives a group of files their final names, in order, while no other run does so in the same folders.
 ///
 /// # Errors
 /// Input/output; all names are then as they were.
-pub fn appear(files: Vec<Filled>) -> Result<(), FileError> {
+pub fn publish(files: Vec<PendingFile>) -> Result<(), FileError> {
     let mut folders: Vec<&Path> = files.iter().map(|f| parent(&f.target.place)).collect();
-    // In one order everywhere, so that no two runs wait for each other.
+    // The same order everywhere, so that no two runs wait for each other.
     folders.sort_unstable();
     folders.dedup();
     let locks: Vec<_> = folders.into_iter().map(disk::lock_folder).collect();
-    for Filled { target, .. } in &files {
+    for PendingFile { target, .. } in &files {
         if !target.replace && disk::exists(&target.place) {
             return Err(FileError::Exists(target.path.clone()));
         }
     }
     let mut undo = Vec::new();
     let mut left = files.len();
-    for Filled { target, scratch } in files {
+    for PendingFile { target, scratch } in files {
         left -= 1;
-        // After the last nothing can go wrong any more.
+        // After the last rename nothing can go wrong any more, so it needs no backup.
         let named = backup(&target.place, left > 0).and_then(|old| {
             scratch.rename(&target.place, target.replace)?;
             Ok(old)
@@ -174,7 +177,7 @@ pub fn appear(files: Vec<Filled>) -> Result<(), FileError> {
     Ok(())
 }
 
-/// A copy of what is at `place`, if anything is and one is `wanted`.
+/// A copy of what is at `place`, if there is anything and it is `wanted`.
 fn backup(place: &Path, wanted: bool) -> io::Result<Option<ScratchFile>> {
     if !wanted || !disk::exists(place) {
         return Ok(None);
@@ -184,12 +187,12 @@ fn backup(place: &Path, wanted: bool) -> io::Result<Option<ScratchFile>> {
     Ok(Some(copy))
 }
 
-/// What content is written to. After its first failure it takes everything and keeps nothing: a writer that ends its file in
-/// good order even then, as those of archives do, has no failure of its own to complain of.
+/// Writer for the content. After its first failure it accepts everything and keeps nothing: a writer that even then
+/// finishes its file in good order, as archive writers do, has no failure of its own to report.
 pub struct Sink<'a> {
     inner: BufWriter<&'a File>,
     failure: Option<io::Error>,
-    /// Where the next byte belongs and where the last one ends, once nothing is kept.
+    /// Position of the next byte and end of the last one, once nothing is kept.
     position: u64,
     end: u64,
 }
@@ -210,7 +213,7 @@ impl<'a> Sink<'a> {
         sink.failure.map_or(outcome, Err)
     }
 
-    /// The result of a call, noted if it is the first failure.
+    /// The result of a call, recorded if it is the first failure.
     fn noted<T>(&mut self, result: io::Result<T>) -> io::Result<T> {
         result.map_err(|error| {
             let copy = match error.raw_os_error() {
@@ -218,7 +221,7 @@ impl<'a> Sink<'a> {
                 None => error.kind().into(),
             };
             self.failure = Some(error);
-            // A header that was being corrected lies before what it is the header of.
+            // A header being corrected lies before the data that it describes.
             self.position = self.end;
             copy
         })

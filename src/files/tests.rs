@@ -7,13 +7,13 @@ use std::path::Path;
 use serde_json::{Map, json};
 
 use super::faults::{Fault, Kind, Tree, survive, tree, with};
-use super::{FileError, Folder, MANIFEST, PROGRAM, Target, appear, same_file};
+use super::{FileError, Folder, MANIFEST, OutputFile, PROGRAM, publish, same_file};
 
 fn write(path: &Path, content: &str, replace: bool) -> Result<(), FileError> {
-    Target::claim(path, replace)?.write(|file| file.write_all(content.as_bytes()))
+    OutputFile::claim(path, replace)?.write(|file| file.write_all(content.as_bytes()))
 }
 
-/// Two files in one folder, one of them deeper, and the manifest.
+/// Two files in one folder, one of them nested, and the manifest.
 fn fill(path: &Path, content: &str, replace: bool) -> Result<(), FileError> {
     let folder = Folder::claim(path, replace)?;
     folder.write("a.txt", content.as_bytes())?;
@@ -28,7 +28,7 @@ fn fill(path: &Path, content: &str, replace: bool) -> Result<(), FileError> {
 fn a_file_appears_only_when_it_is_whole() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("rows.csv");
-    let target = Target::claim(&path, false).unwrap();
+    let target = OutputFile::claim(&path, false).unwrap();
     assert!(
         tree(folder.path()).contains_key("/"),
         "claiming leaves nothing"
@@ -47,10 +47,10 @@ fn a_file_appears_only_when_it_is_whole() {
 fn an_existing_file_is_replaced_only_where_that_is_allowed() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("rows.csv");
-    let early = Target::claim(&path, false).unwrap();
+    let early = OutputFile::claim(&path, false).unwrap();
     fs::write(&path, "mine").unwrap();
     let exists = FileError::Exists(path.clone());
-    assert_eq!(Target::claim(&path, false).unwrap_err(), exists);
+    assert_eq!(OutputFile::claim(&path, false).unwrap_err(), exists);
     // One that appears during the run is not lost either.
     assert_eq!(early.write(|file| file.write_all(b"new")), Err(exists));
     assert_eq!(fs::read(&path).unwrap(), b"mine");
@@ -63,12 +63,12 @@ fn an_unwritable_place_is_refused_at_once() {
     let folder = tempfile::tempdir().unwrap();
     for bad in ["no/such/folder/rows.csv", "", ".", ".."] {
         assert!(
-            Target::claim(&folder.path().join(bad), true).is_err(),
+            OutputFile::claim(&folder.path().join(bad), true).is_err(),
             "{bad}"
         );
     }
     #[cfg(unix)]
-    assert!(Target::claim(Path::new("/dev/null"), true).is_err());
+    assert!(OutputFile::claim(Path::new("/dev/null"), true).is_err());
 }
 
 #[test]
@@ -79,12 +79,12 @@ fn a_file_that_fails_leaves_everything_as_it_was() {
     survive(Kind::default(), &old, &work, &whole);
     let two = |folder: &Path| {
         let fill = |name: &str| {
-            let target = Target::claim(&folder.join(name), true)?;
+            let target = OutputFile::claim(&folder.join(name), true)?;
             target.fill(|file| file.write_all(b"new"))
         };
-        appear(vec![fill("b")?, fill("a")?])
+        publish(vec![fill("b")?, fill("a")?])
     };
-    // Of two one may be there after a kill, never part of one.
+    // After a kill one of the two may be there, never part of one.
     let each = |old: &Tree, new: &Tree, found: &Tree| {
         let known =
             |(name, content)| old.get(name) == Some(content) || new.get(name) == Some(content);
@@ -111,7 +111,7 @@ fn a_folder_that_fails_leaves_the_old_or_the_new() {
         &|old, new, found| whole(old, new, found),
     );
     survive(Kind::default(), &old, &new, &whole);
-    // Where names cannot be swapped a kill may leave neither; the next run brings the old one back.
+    // Where names cannot be swapped, a kill may leave neither; the next run brings the old one back.
     let kind = Kind {
         no_exchange: true,
         ..Kind::default()
@@ -132,7 +132,7 @@ fn a_folder_replaces_what_this_program_wrote_and_nothing_else() {
     );
     fill(&out, "2", true).unwrap();
     assert_eq!(fs::read(out.join("a.txt")).unwrap(), b"2");
-    // Foreign files are named and left alone, at whatever time they came.
+    // Foreign files are named and left alone, whenever they appeared.
     let early = Folder::claim(&out, true).unwrap();
     fs::create_dir_all(out.join("data/notes")).unwrap();
     fs::write(out.join("film.mp4"), "x").unwrap();
@@ -235,11 +235,11 @@ fn scratch_of_a_killed_run_goes_and_that_of_a_live_one_stays() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     let live = Folder::claim(&at("live"), false).unwrap();
-    let filled = Target::claim(&at("b"), false)
+    let filled = OutputFile::claim(&at("b"), false)
         .unwrap()
         .fill(|file| file.write_all(b"b"))
         .unwrap();
-    // Of another machine, or none of ours.
+    // From another machine, or not ours.
     let names = [
         ".jointplay-00000000-00000000-0123456789abcdef",
         ".jointplay-notes",
@@ -260,7 +260,7 @@ fn scratch_of_a_killed_run_goes_and_that_of_a_live_one_stays() {
     write(&at("d"), "d", false).unwrap();
     assert_eq!(count(), before + 1, "{:?}", tree(folder.path()).keys());
     live.finish(Map::new()).unwrap();
-    appear(vec![filled]).unwrap();
+    publish(vec![filled]).unwrap();
     assert!(at("live").join(MANIFEST).is_file() && at("b").is_file());
     names.iter().for_each(|name| assert!(at(name).is_file()));
 }

@@ -61,7 +61,7 @@ pub struct DormandPrince {
     /// End state and derivative as the method left them: the caller may project its own copy.
     raw_end: Vec<f64>,
     raw_k_end: Vec<f64>,
-    /// Part of the latest attempt that counts.
+    /// Fraction of the latest attempt that is kept.
     kept: f64,
 }
 
@@ -82,7 +82,7 @@ impl DormandPrince {
         }
     }
 
-    /// Lets the latest attempt end at `theta` of its length: the same interpolant over the shorter step.
+    /// Ends the latest attempt at `theta` of its length: the same interpolant over the shorter step.
     pub fn truncate(&mut self, theta: f64) {
         self.kept *= theta;
     }
@@ -106,8 +106,8 @@ impl DormandPrince {
         }
     }
 
-    /// h |lambda| of the step just attempted, from the two evaluations at its end, 0 where it was truncated: beyond about 3.25 the step is held
-    /// by stability and not by accuracy (Hairer & Wanner II, IV.2, eq. (2.8)).
+    /// Estimate of h |lambda| for the step just attempted, from the two evaluations at its end; 0 if it was truncated. Beyond
+    /// about 3.25 the step is limited by stability, not accuracy (Hairer & Wanner II, IV.2, eq. (2.8)).
     pub fn stiffness(&self, h: f64, y_end: &[f64], k_end: &[f64]) -> f64 {
         let (mut rate, mut distance) = (0.0, 0.0);
         for i in 0..y_end.len() {

@@ -41,7 +41,7 @@ impl Stepper for SemiImplicitEuler {
 }
 
 /// Implicit-explicit Euler: [`SemiImplicitEuler`] but with the contact forces at the end of the step; order 1, L-stable in
-/// the contacts as the implicit Euler method is, so that steps need not resolve how a settled contact rings.
+/// the contacts like the implicit Euler method, so that steps need not resolve the ringing of a settled contact.
 pub struct ImexEuler {
     rate: Vec<f64>,
     push: Vec<f64>,
@@ -67,7 +67,7 @@ impl ImexEuler {
     ) -> f64 {
         let positions = system.positions();
         let Self { rate, push } = self;
-        system.derivative_apart(t, y, rate);
+        system.derivative_without_contacts(t, y, rate);
         y_end[..positions].copy_from_slice(&y[..positions]);
         for i in positions..y.len() {
             y_end[i] = y[i] + h * rate[i];
@@ -76,8 +76,8 @@ impl ImexEuler {
         for i in 0..positions {
             y_end[i] += h * rate[i];
         }
-        if system.contact_push(t + h, h, y_end, push) {
-            // The positions' rate that goes with the added velocities alone.
+        if system.contact_velocity_change(t + h, h, y_end, push) {
+            // Position rates due to the added velocities alone.
             push[..positions].copy_from_slice(&y_end[..positions]);
             system.position_rate(t + h, push, rate);
             for i in 0..positions {

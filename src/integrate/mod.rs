@@ -51,7 +51,7 @@ words!(Method {
 });
 
 impl Method {
-    /// Whether every step of it solves with the Jacobian.
+    /// Whether each of its steps solves a system with the Jacobian.
     pub fn is_implicit(self) -> bool {
         matches!(self, Self::Rosenbrock | Self::Radau5)
     }
@@ -79,10 +79,10 @@ pub trait System {
     fn scale(&self) -> &[f64];
 }
 
-/// A system that a linearly implicit method can solve: it knows an approximation of its Jacobian J = df/dy, good in
-/// what is stiff.
+/// A system that a linearly implicit method can solve: it provides an approximation of its Jacobian J = df/dy that is good
+/// in the stiff part.
 pub trait StiffSystem: System {
-    /// Takes J and df/dt at (t, y) and keeps them.
+    /// Evaluates J and df/dt at (t, y) and stores them.
     fn linearise(&mut self, t: f64, y: &[f64]);
     /// Prepares to solve with `shift` I - J.
     fn factor_shifted(&mut self, shift: f64);
@@ -92,17 +92,17 @@ pub trait StiffSystem: System {
     fn factor_shifted_pair(&mut self, real: f64, imaginary: f64);
     /// Solves that in place for `b_real` + i `b_imaginary`.
     fn solve_shifted_pair(&mut self, b_real: &mut [f64], b_imaginary: &mut [f64]);
-    /// df/dt where J was taken.
+    /// df/dt at the point where J was evaluated.
     fn time_derivative(&self) -> &[f64];
 }
 
-/// A system whose contacts can be stepped implicitly by themselves.
+/// A system in which the contacts alone can be stepped implicitly.
 pub trait ContactSystem: System {
     /// f(t, y) into `dy` as if no contact carried a force.
-    fn derivative_apart(&mut self, t: f64, y: &[f64], dy: &mut [f64]);
-    /// With `y` where a step of size `h` without contact forces ends, at `t`: puts it onto the constraints, and the change of
-    /// its velocities by the contact forces at the step's end into `dv` (zero for positions). False where there are none.
-    fn contact_push(&mut self, t: f64, h: f64, y: &mut [f64], dv: &mut [f64]) -> bool;
+    fn derivative_without_contacts(&mut self, t: f64, y: &[f64], dy: &mut [f64]);
+    /// Given `y` at the end, `t`, of a step of size `h` without contact forces: projects it onto the constraints, and writes
+    /// its velocity change due to the contact forces at the step's end to `dv` (zero for positions). False if there are none.
+    fn contact_velocity_change(&mut self, t: f64, h: f64, y: &mut [f64], dv: &mut [f64]) -> bool;
 }
 
 /// One-step method.

@@ -2,8 +2,8 @@
 //! *Solving Ordinary Differential Equations I*, 2nd ed., II.2 and II.6; for methods that solve with a matrix that need
 //! not be the Jacobian, Hairer & Wanner II, IV.7, W-methods).
 //!
-//! Tableaus are read out of the running code: a system whose stages answer with unit vectors shows them in the states
-//! that the method asks for and in the one that it ends with.
+//! Butcher tableaux are read out of the running code: a system whose stage derivatives are unit vectors reveals them in the
+//! states at which the method evaluates and in its end state.
 
 use super::*;
 
@@ -19,7 +19,7 @@ impl Tree {
         1 + self.sons.iter().map(Tree::order).sum::<usize>()
     }
 
-    /// gamma(t): the exact solution has its elementary differential with the factor 1 / gamma.
+    /// gamma(t): in the exact solution, its elementary differential has the factor 1 / gamma.
     fn density(&self) -> f64 {
         let sons: f64 = self.sons.iter().map(Tree::density).product();
         self.order() as f64 * sons
@@ -47,7 +47,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// All trees of at most `order` vertices; with fat vertices too where `fat`.
+/// All trees of at most `order` vertices; including fat vertices if `fat`.
 fn trees(order: usize, fat: bool) -> Vec<Tree> {
     let mut all: Vec<Tree> = Vec::new();
     for n in 1..=order {
@@ -64,7 +64,7 @@ fn trees(order: usize, fat: bool) -> Vec<Tree> {
     all
 }
 
-/// All multisets of trees from `all[from..]` with so many vertices together.
+/// All multisets of trees from `all[from..]` with this many vertices in total.
 fn forests(all: &[Tree], vertices: usize, from: usize) -> Vec<Vec<Tree>> {
     if vertices == 0 {
         return vec![Vec::new()];
@@ -94,7 +94,7 @@ impl Tableau {
         Self { alpha, gamma }
     }
 
-    /// Largest violation of the conditions of each order up to `order` by the weights that lead to the part `theta` of a step.
+    /// Largest violation of the conditions of each order up to `order` by the weights for the fraction `theta` of a step.
     fn defects(&self, weights: &[f64], theta: f64, order: usize, fat: bool) -> Vec<f64> {
         let mut worst = vec![0.0_f64; order];
         for tree in trees(order, fat) {
@@ -110,7 +110,7 @@ impl Tableau {
         worst
     }
 
-    /// That the weights have this order to rounding, and none higher.
+    /// Asserts that the weights have this order to rounding, and none higher.
     fn assert_order(&self, what: &str, weights: &[f64], theta: f64, order: usize, fat: bool) {
         let defects = self.defects(weights, theta, order + 1, fat);
         assert!(
@@ -121,17 +121,17 @@ impl Tableau {
     }
 }
 
-/// What the rounding of some twenty products of tabulated coefficients may come to.
+/// Bound on the rounding error of some twenty products of tabulated coefficients.
 const ROUNDING: f64 = 2e-14;
-/// Where interpolants are looked at.
+/// Fractions of a step at which interpolants are checked.
 const PARTS: [f64; 4] = [0.13, 0.5, 0.77, 1.0];
 
-/// Answers the n-th evaluation with `slopes[n]`, whatever the state. Its matrix, where one is asked for, adds the first half
-/// of the components to the second.
+/// Returns `slopes[n]` for the n-th evaluation, whatever the state. Its matrix, where one is used, adds the first half of
+/// the components to the second.
 struct Probe {
     slopes: Vec<Vec<f64>>,
     calls: usize,
-    /// Times and states asked for.
+    /// Times and states of the evaluations.
     asked: Vec<(f64, Vec<f64>)>,
     scale: Vec<f64>,
     shift: f64,
@@ -143,7 +143,7 @@ impl Probe {
         let n = slopes[0].len();
         Self {
             slopes,
-            // The first slope goes in as the derivative at the start.
+            // The first slope is passed in as the derivative at the start.
             calls: 1,
             asked: vec![(0.0, vec![0.0; n])],
             scale: vec![1.0; n],
@@ -162,7 +162,7 @@ impl Probe {
         Self::new((0..stages).map(unit).collect())
     }
 
-    /// Rows of the coefficient matrix, whose sums are the times asked for.
+    /// Rows of the coefficient matrix, whose sums are the times of the evaluations.
     fn rows(&self, stages: usize) -> Vec<Vec<f64>> {
         let rows: Vec<Vec<f64>> = self
             .asked
@@ -216,7 +216,7 @@ impl StiffSystem for Probe {
     }
 }
 
-/// Tableau and weights of an explicit method of so many stages; the last is the end where it evaluates there.
+/// Tableau and weights of an explicit method of this many stages; the last is the end if it evaluates there.
 fn explicit(stepper: &mut impl Stepper, stages: usize) -> (Tableau, Vec<f64>) {
     let mut probe = Probe::units(stages, stages);
     let k = probe.slopes[0].clone();
@@ -329,7 +329,7 @@ fn ros34pw2_has_order_three_with_any_matrix_and_two_embedded() {
             .map(|j| f64::from(u8::from(i == j)))
             .collect::<Vec<f64>>()
     };
-    // f at the start is k_1 less its product with the matrix: in the trees without fat vertices they are one.
+    // f at the start is k_1 minus its product with the matrix: for trees without fat vertices the two are the same.
     for theta in PARTS {
         let mut at = vec![0.0; 5];
         let end = [&weights[..], &[0.0]].concat();
@@ -424,10 +424,16 @@ impl System for Falling {
 }
 
 impl ContactSystem for Falling {
-    fn derivative_apart(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
+    fn derivative_without_contacts(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
         self.derivative(t, y, dy);
     }
-    fn contact_push(&mut self, _t: f64, _h: f64, _y: &mut [f64], _dv: &mut [f64]) -> bool {
+    fn contact_velocity_change(
+        &mut self,
+        _t: f64,
+        _h: f64,
+        _y: &mut [f64],
+        _dv: &mut [f64],
+    ) -> bool {
         false
     }
 }

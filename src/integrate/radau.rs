@@ -1,7 +1,7 @@
 //! Radau IIA with three stages: implicit, order 5, stiffly accurate, L-stable, stage order 3
 //! (Hairer & Wanner, *Solving Ordinary Differential Equations II*, 2nd ed., IV.8; coefficients of Table IV.5.6).
 //!
-//! Unlike a linearly implicit method it iterates: a stiff contact on a curved path leaves a linearised step off the
+//! Unlike a linearly implicit method it iterates: with a stiff contact on a curved path, a linearised step ends off the
 //! contact by (h v)^2 / (2 L), which is more than a settled penetration at steps of a millisecond.
 
 use super::StiffSystem;
@@ -50,17 +50,17 @@ const T_INVERSE: [[f64; 3]; 3] = [
 ];
 const MOST_ITERATIONS: u32 = 7;
 
-/// The latest step's collocation polynomial: it interpolates that step and starts the iteration of the next, so it is
+/// The latest step's collocation polynomial: the interpolant of that step and the starting guess for the next, so it is
 /// part of what a snapshot needs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Polynomial {
-    /// Step size, s; 0 where there is none.
+    /// Step size, s; 0 if there is none.
     h: f64,
     /// End of the step, s.
     end: f64,
     /// Increments of the three stages.
     z: [Vec<f64>; 3],
-    /// theta / (1 - theta) of the latest iteration that showed its contraction theta.
+    /// theta / (1 - theta) of the latest iteration that gave an estimate of its contraction rate theta.
     contraction: f64,
 }
 
@@ -81,7 +81,7 @@ pub struct Radau {
 }
 
 impl Radau {
-    /// Its instants within a step; the third is the end. The polynomial through a quantity there has the step's own order.
+    /// Its interior nodes within a step; the third is the end. The polynomial through a quantity there has the step's own order.
     pub const INTERIOR: [f64; 2] = [C[0], C[1]];
 
     /// For `dimension` components.
@@ -105,24 +105,24 @@ impl Radau {
         }
     }
 
-    /// Forgets the Jacobian and the previous step: the state was changed by something else than a step.
+    /// Discards the Jacobian and the previous step: the state was changed by something other than a step.
     pub fn invalidate(&mut self) {
         self.linearised_at = None;
         self.previous.h = 0.0;
         self.previous.contraction = 1.0;
     }
 
-    /// What a resumed run needs to give the same bits.
+    /// What a resumed run needs to reproduce the same bits.
     pub fn polynomial(&self) -> &Polynomial {
         &self.previous
     }
 
-    /// Takes it back, after [`Self::invalidate`].
+    /// Restores it, after [`Self::invalidate`].
     pub fn set_polynomial(&mut self, polynomial: &Polynomial) {
         self.previous.clone_from(polynomial);
     }
 
-    /// As [`super::Stepper::attempt`]; `tolerance` sets how far the iteration goes. Infinite where it fails.
+    /// As [`super::Stepper::attempt`]; `tolerance` sets how far the iteration converges. Infinite if it fails.
     pub fn attempt<S: StiffSystem>(
         &mut self,
         system: &mut S,
@@ -154,7 +154,7 @@ impl Radau {
         error
     }
 
-    /// First guess of the stages: the previous step's polynomial, continued, or that of a longer attempt from here.
+    /// Starting guess for the stages: the previous step's polynomial, extrapolated, or that of a longer attempt from here.
     fn begin(&mut self, t: f64, h: f64, n: usize) {
         let again =
             self.previous.h > 0.0 && (self.previous.end - self.previous.h - t).abs() <= 1e-9 * h;
@@ -193,7 +193,7 @@ impl Radau {
         // The iteration's own error stays well below the step's.
         let target = (10.0 * f64::EPSILON / tolerance).max(tolerance.sqrt().min(0.01));
         let (real, alpha, beta) = (REAL / h, PAIR.0 / h, PAIR.1 / h);
-        // Where the steps before converged fast, one iteration may do; trust in that wears off (Hairer & Wanner II, IV.8).
+        // If previous steps converged fast, one iteration may be enough; that trust decays (Hairer & Wanner II, IV.8).
         let trusted = libm::pow(self.previous.contraction.max(f64::EPSILON), 0.8);
         self.previous.contraction = trusted;
         let mut before = 0.0;
@@ -310,7 +310,7 @@ impl Radau {
         self.previous.end = t + h;
     }
 
-    /// Lets the latest attempt end at `theta` of its length: the same polynomial over the shorter step.
+    /// Ends the latest attempt at `theta` of its length: the same polynomial over the shorter step.
     pub fn truncate(&mut self, theta: f64) {
         let n = self.stage.len();
         for i in 0..n {
@@ -332,7 +332,7 @@ impl Radau {
     }
 }
 
-/// Largest component against its scale; NaN if any is.
+/// Largest component relative to its scale; NaN if any is.
 fn largest(x: &[f64], scale: &[f64]) -> f64 {
     let mut size: f64 = 0.0;
     for (x, s) in x.iter().zip(scale) {
@@ -356,8 +356,8 @@ fn polynomial(z: &[f64; 3], s: f64) -> f64 {
     z[2] + s * (a1 + (s - c2m1) * (a2 + (s - c1m1) * a3))
 }
 
-/// Coefficient matrix that the transformation stands for, and the weights of the embedded method with that of the derivative at
-/// the start first.
+/// Coefficient matrix behind the transformation, and the weights of the embedded method, that of the derivative at the
+/// start first.
 #[cfg(test)]
 pub(super) fn tableau() -> ([Vec<f64>; 3], [f64; 4]) {
     use nalgebra::Matrix3;
@@ -376,7 +376,7 @@ pub(super) fn tableau() -> ([Vec<f64>; 3], [f64; 4]) {
     (rows, embedded)
 }
 
-/// Weights of the stages' derivatives in the collocation polynomial at the part `theta` of a step.
+/// Weights of the stages' derivatives in the collocation polynomial at the fraction `theta` of a step.
 #[cfg(test)]
 pub(super) fn weights_within(theta: f64, a: &[Vec<f64>; 3]) -> Vec<f64> {
     let unit = |i: usize| std::array::from_fn(|j| f64::from(u8::from(i == j)));
@@ -396,7 +396,7 @@ mod tests {
     use crate::integrate::System;
     use nalgebra::{Complex, Matrix2, Vector2};
 
-    /// Van der Pol's oscillator in Lienard's form is stiff for a small `epsilon`; here also with a forcing in time.
+    /// Van der Pol's oscillator in Lienard's form, stiff for small `epsilon`; here also with forcing in time.
     struct VanDerPol {
         epsilon: f64,
         j: Matrix2<f64>,

@@ -3,7 +3,7 @@
 /// Root of `f` in [`a`, `b`], a < b, where `f(a)` = `fa` and `f(b)` = `fb` differ in sign, by the Illinois form of regula falsi
 /// (Dowell & Jarratt 1971), to an interval of `width` or until `|f|` <= `small`.
 ///
-/// Returns the end of the last interval on the side of `b`'s sign, so that the event has happened there.
+/// Returns the end of the last interval that has the sign of `fb`, so that the event has happened there.
 pub fn find_root(
     mut a: f64,
     mut fa: f64,
@@ -16,7 +16,7 @@ pub fn find_root(
     if fb == 0.0 {
         return b;
     }
-    // Which end moved last: Illinois halves the value at the end that stays a second time.
+    // Which end moved last: Illinois halves the value at an end that stays put twice in a row.
     let mut moved = 0_i8;
     for _ in 0..80 {
         if (b - a).abs() <= width {

@@ -45,7 +45,7 @@ pub(super) const EMBEDDED: [f64; STAGES] = [
 ];
 
 /// Coefficients in the variables U.
-struct Table {
+struct Tableau {
     a: [[f64; STAGES]; STAGES],
     c: [[f64; STAGES]; STAGES],
     weights: [f64; STAGES],
@@ -55,7 +55,7 @@ struct Table {
     gamma: [f64; STAGES],
 }
 
-impl Table {
+impl Tableau {
     /// A = alpha Gamma^-1, C = diag(1 / gamma) - Gamma^-1, m = b Gamma^-1.
     fn new() -> Self {
         let mut inverse = [[0.0; STAGES]; STAGES];
@@ -87,11 +87,11 @@ impl Table {
 
 /// ROS34PW2.
 pub struct Rosenbrock {
-    table: Table,
+    table: Tableau,
     u: [Vec<f64>; STAGES],
     stage: Vec<f64>,
     rate: Vec<f64>,
-    /// Where the Jacobian was taken last; a rejected step keeps it.
+    /// Time at which the Jacobian was last evaluated; a rejected step keeps it.
     linearised_at: Option<f64>,
 }
 
@@ -99,7 +99,7 @@ impl Rosenbrock {
     /// For `dimension` components.
     pub fn new(dimension: usize) -> Self {
         Self {
-            table: Table::new(),
+            table: Tableau::new(),
             u: std::array::from_fn(|_| vec![0.0; dimension]),
             stage: vec![0.0; dimension],
             rate: vec![0.0; dimension],
@@ -107,7 +107,7 @@ impl Rosenbrock {
         }
     }
 
-    /// Forgets the Jacobian: the state was changed by something else than a step.
+    /// Discards the Jacobian: the state was changed by something other than a step.
     pub fn invalidate(&mut self) {
         self.linearised_at = None;
     }

@@ -1,7 +1,7 @@
-//! What the equations of a scene take, counted in time linear in its size and before anything of it is allocated.
+//! Cost of a scene's equations, counted in time linear in its size and before anything is allocated.
 //!
-//! Sparse as they are, the matrices of a body that carries many joints, or of a long row of hinges, fill; there their
-//! memory grows with the square and an evaluation with the cube of the size. `docs/scene-format.md` says what the limits
+//! The matrices are sparse, but fill in for a body that carries many joints or for a long row of hinges: memory then grows
+//! with the square of the size, and the cost of an evaluation with its cube. `docs/scene-format.md` says what the limits
 //! mean for such scenes.
 
 use super::MechanismError;
@@ -10,22 +10,22 @@ use super::lagrange::Layout;
 use super::model::{BodyIndex, Model, Motion};
 use crate::scene::{Formulation, Scene, StartRule};
 
-/// Most numbers in the matrices of one scene: 32 MiB.
+/// Maximum number of matrix entries of one scene: 32 MiB.
 pub const MOST_ENTRIES: u64 = 1 << 22;
-/// Most multiplications of one evaluation, about: some 40 ms on a processor of 2020.
+/// Approximate maximum number of multiplications per evaluation: some 40 ms on a processor of 2020.
 pub const MOST_PRODUCTS: u64 = 1 << 25;
 
-/// Multiplications for one ancestor of a body, and for one pair of constraint rows of bodies.
+/// Multiplications per ancestor of a body, and per pair of constraint rows on a body.
 const OF_AN_ANCESTOR: u64 = 20;
 const OF_A_PAIR: u64 = 25;
 
-/// What a limit was exceeded by.
+/// What exceeded a limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CostOf {
-    /// The `tree` form.
+    /// The `tree` formulation.
     #[error("formulation tree")]
     Tree,
-    /// The `lagrange` form.
+    /// The `lagrange` formulation.
     #[error("formulation lagrange")]
     Lagrange,
     /// Closing the joints at the start.
@@ -36,12 +36,12 @@ pub enum CostOf {
     ImplicitContacts,
 }
 
-/// Upper bounds of what one form of the equations takes.
+/// Upper bounds on the cost of one formulation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cost {
-    /// Numbers in matrices.
+    /// Matrix entries.
     pub entries: u64,
-    /// Multiplications of one evaluation.
+    /// Multiplications per evaluation.
     pub products: u64,
 }
 
@@ -51,7 +51,7 @@ impl Cost {
         self.products += products;
     }
 
-    /// Adds a matrix stored by its envelope and factored, whose rows begin at these columns.
+    /// Adds storing and factoring an envelope matrix whose rows begin at these columns.
     fn add_envelope(&mut self, first: &[u64]) {
         for (i, f) in (0_u64..).zip(first) {
             self.entries += i - f + 1;
@@ -69,10 +69,10 @@ impl Cost {
         self.entries <= MOST_ENTRIES && self.products <= MOST_PRODUCTS
     }
 
-    /// Of the `tree` form with these joints closed.
+    /// Cost of the `tree` formulation with these joints closed.
     pub fn of_tree(model: &Model, joints: &[usize]) -> Self {
         let mut cost = Self::default();
-        // Coordinates that each block's solution passes through.
+        // Coordinates visited when solving with each block's mass matrix.
         let mut solution = Vec::with_capacity(model.blocks.len());
         for block in &model.blocks {
             let n = block.n as u64;
@@ -129,13 +129,13 @@ impl Cost {
         cost.add_envelope(&rows);
         let n = model.nv as u64;
         if n > 0 && 3 * joints.len() as u64 == n {
-            // On which side of a singular pose.
+            // Determinant that tells which side of a singular pose the loops are on.
             cost.add(n * n, n.saturating_pow(3) / 3);
         }
         cost
     }
 
-    /// Of the `lagrange` form.
+    /// Cost of the `lagrange` formulation.
     pub fn of_lagrange(layout: &Layout, model: &Model) -> Self {
         let mut cost = Self::default();
         let world = model.world();
@@ -150,7 +150,7 @@ impl Cost {
                     first_on[body] = first_on[body].min(at);
                     first = first.min(first_on[body]);
                     rows_on[body] += rows;
-                    // Two numbers for the place of each pair.
+                    // Two indices are stored per pair.
                     let pairs = rows * rows_on[body];
                     cost.add(2 * pairs, OF_A_PAIR * pairs);
                 }
@@ -161,22 +161,23 @@ impl Cost {
         cost
     }
 
-    /// Of contacts that are stepped implicitly: `joints` of which each feels so many before and behind it, with columns
-    /// of `width` numbers altogether.
+    /// Cost of contacts that are stepped implicitly: `joints`, each coupled with `reach` joints before and after it, with
+    /// columns of `width` numbers in total.
     pub fn of_implicit_contacts(joints: usize, reach: usize, width: usize) -> Self {
         let (joints, reach, width) = (joints as u64, reach as u64, width as u64);
         let band = joints * (2 * reach + 1);
-        // Three blocks of 3 x 3; three columns, and ten numbers for what a coordinate moves. One elimination, and the blocks.
+        // Entries: three 3 x 3 blocks; three columns, and ten numbers for what a coordinate moves.
+        // Products: one elimination, and the blocks.
         Self {
             entries: 27 * band + 13 * width,
             products: 40 * joints * (reach + 1) * (reach + 1) + 250 * band,
         }
     }
 
-    /// Refuses what is beyond a limit; it is the cost `of` this.
+    /// Rejects a cost beyond a limit; `of` says what it is the cost of.
     ///
     /// # Errors
-    /// What is needed, and the most that there may be.
+    /// The amount needed, and the limit.
     pub fn check(&self, of: CostOf, advice: &'static str) -> Result<(), MechanismError> {
         let (what, needed, most) = if self.entries > MOST_ENTRIES {
             ("numbers in its matrices", self.entries, MOST_ENTRIES)
@@ -199,10 +200,10 @@ impl Cost {
     }
 }
 
-/// Refuses a scene whose equations, or whose assembly at the start, take more than the limits.
+/// Rejects a scene whose equations or whose assembly at the start exceed the limits.
 ///
 /// # Errors
-/// As [`Cost::check`], with the other formulation as advice where it would do.
+/// As [`Cost::check`]; the advice is the other formulation if that one is within the limits.
 pub fn check(scene: &Scene, model: &Model) -> Result<(), MechanismError> {
     let closed = |start| match start {
         StartRule::AsGiven => model.ideal_joints.clone(),
@@ -275,7 +276,7 @@ mod tests {
         }
     }
 
-    /// Whether `kind` with `n` parts is taken; what it is refused with.
+    /// Whether `kind` with `n` parts is accepted, or the message with which it is rejected.
     fn taken(kind: &str, n: usize, formulation: &str) -> Result<(), String> {
         let changes = [("formulation".to_owned(), formulation.to_owned())];
         let scene = Scene::parse(&scene_text(kind, n, "0 m"), None, &changes).expect("a scene");
@@ -306,7 +307,7 @@ mod tests {
             let column = 2 + usize::from(formulation == "lagrange");
             let said = line.expect(row).split('|').nth(column).map(str::trim);
             let said: usize = said.and_then(|most| most.parse().ok()).expect("a number");
-            // The one that carries them is one more.
+            // One more for the body that carries them.
             let most = said + usize::from(kind.ends_with("one body"));
             assert_eq!(taken(kind, most, formulation), Ok(()), "{kind}");
             let words = taken(kind, most + 1, formulation).expect_err("beyond the limit");

@@ -1,24 +1,24 @@
-//! How each coordinate moves a contact.
+//! Jacobian columns of a contact: how each coordinate moves it.
 
 use super::equations::Equations;
 use super::model::{Anchor, BallJoint, Model};
 use crate::contact::Coefficients;
 use crate::scene::Vec3;
 
-/// Columns of one contact: how each coordinate moves it.
+/// Jacobian columns of one contact for one coordinate: relative velocities per unit rate.
 #[derive(Clone, Copy)]
 pub struct Column {
     /// Velocity coordinate.
     pub coordinate: usize,
-    /// Ball centre against socket centre.
+    /// Ball centre relative to socket centre.
     pub centre: Vec3,
-    /// Ball's contact point against the socket's.
+    /// Ball's contact point relative to the socket's.
     pub surface: Vec3,
     /// r omega_ball - R omega_socket.
     pub turn: Vec3,
 }
 
-/// Points that a contact acts on: of the ball, then of the socket, each with the radius from there to the wall, m.
+/// Centres of ball and socket, in that order, each with its radius to the wall, m.
 pub fn contact_sides(joint: &BallJoint, c: &Coefficients) -> [(Anchor, f64); 2] {
     [
         (joint.ball, c.ball_radius),
@@ -26,8 +26,8 @@ pub fn contact_sides(joint: &BallJoint, c: &Coefficients) -> [(Anchor, f64); 2] 
     ]
 }
 
-/// Fills `columns`: how each coordinate moves the first of two points against the second, and points of their bodies that lie
-/// beyond them along `n`.
+/// Fills `columns`: how each coordinate moves the first of two points relative to the second, and likewise the points of
+/// their bodies offset from them along `n`.
 pub fn collect_columns(
     columns: &mut Vec<Column>,
     model: &Model,
@@ -48,7 +48,7 @@ pub fn collect_columns(
                 let centre = velocity * sign;
                 let surface = (velocity + omega.cross(&to_surface)) * sign;
                 let turn = omega * (*radius * sign);
-                // A coordinate above both bodies of the joint moves both.
+                // A coordinate that is an ancestor of both bodies moves both.
                 if let Some(column) = columns.iter_mut().find(|c| c.coordinate == coordinate) {
                     column.centre += centre;
                     column.surface += surface;

@@ -1,5 +1,5 @@
-//! Ideal ball joints in tree coordinates: three rows each, (45), solved for their multipliers, and the projection that
-//! keeps closed loops closed.
+//! Ideal ball joints in tree coordinates: three constraint rows each, (45), solved for their Lagrange multipliers, and the
+//! projection that keeps closed loops closed.
 
 use super::model::{BodyIndex, Model};
 use super::rows::RowSystem;
@@ -13,7 +13,7 @@ struct Side {
     n: usize,
 }
 
-/// Constraint rows of some ball joints.
+/// Constraint rows of a set of ball joints.
 pub struct Constraints {
     joints: Vec<usize>,
     sides: Vec<Vec<Side>>,
@@ -67,7 +67,7 @@ impl Constraints {
             .collect();
         let mut pairs = Vec::new();
         let mut first: Vec<usize> = (0..joints.len()).collect();
-        // Joints, with their sides, that act on each block so far.
+        // (joint, side) pairs that act on each block so far.
         let mut on_block = vec![Vec::new(); model.blocks.len()];
         for (i, sides) in sides.iter().enumerate() {
             let from = pairs.len();
@@ -100,13 +100,13 @@ impl Constraints {
         }
     }
 
-    /// Whether the determinant of the Jacobian of the latest factorisation is positive, where it is square: its sign
-    /// changes where the loops pass a singular pose.
+    /// Whether the Jacobian of the latest factorisation, if square, has a positive determinant: the sign changes when the
+    /// loops pass through a singular pose.
     pub fn is_right_handed(&mut self, model: &Model) -> bool {
         self.is_minor_positive(model, Some)
     }
 
-    /// The same for as many rows as there are coordinates: `place` says where in the square a row goes.
+    /// The same for a subset of as many rows as coordinates: `place` maps a row to its place in the square matrix.
     pub fn is_minor_positive(
         &mut self,
         model: &Model,
@@ -131,10 +131,10 @@ impl Constraints {
         super::factor::is_determinant_positive(a, n)
     }
 
-    /// Treats rows as dependent from now on: at most `rank` of them count.
-    pub fn reveal(&mut self, rank: usize) {
+    /// Treats the rows as dependent from now on, with a rank of at most `rank`.
+    pub fn treat_as_dependent(&mut self, rank: usize) {
         let group = (0..self.rows()).map(|i| i - i % 3).collect();
-        self.matrix.reveal(rank, 0, group);
+        self.matrix.treat_as_dependent(rank, 0, group);
         self.time = None;
     }
 
@@ -143,7 +143,7 @@ impl Constraints {
         self.matrix.is_dependent()
     }
 
-    /// Number of independent rows: of the latest factorisation where rows are treated as dependent, else all.
+    /// Number of independent rows: as found by the latest factorisation if rows are treated as dependent, else all.
     pub fn rank(&self) -> usize {
         self.matrix.rank()
     }
@@ -153,7 +153,7 @@ impl Constraints {
         self.matrix.is_unique(3 * k, 3)
     }
 
-    /// The coupled rows.
+    /// The system J M^-1 J^T.
     pub fn system(&self) -> &RowSystem {
         &self.matrix
     }
@@ -173,8 +173,8 @@ impl Constraints {
         Vec3::from_column_slice(&self.multipliers[3 * k..3 * k + 3])
     }
 
-    /// Jacobians and J M^-1 J^T, factored, for a tree that has been moved forward and assembled at (t, q); nothing to do
-    /// where they are those of the latest call.
+    /// Computes the Jacobians and factors J M^-1 J^T for a tree that has been moved forward and assembled at (t, q); does
+    /// nothing if the latest call was for the same (t, q).
     fn factor(&mut self, model: &Model, tree: &Tree, t: f64, q: &[f64]) {
         if self.is_factored(t, q) {
             return;
@@ -278,9 +278,9 @@ impl Constraints {
         self.add_weighted(model, &self.multipliers, vdot);
     }
 
-    /// Takes from the accelerations `vdot` what would open the joints: the linear part of [`Self::correct`], with its
-    /// matrices.
-    pub fn restrain(&mut self, model: &Model, vdot: &mut [f64]) {
+    /// Removes from the accelerations `vdot` the part that would open the joints: the linear part of [`Self::correct`], with
+    /// its matrices.
+    pub fn project_accelerations(&mut self, model: &Model, vdot: &mut [f64]) {
         for k in 0..self.joints.len() {
             let residual = self.apply(model, k, vdot);
             for i in 0..3 {
@@ -293,7 +293,7 @@ impl Constraints {
 
     /// Projects positions, then velocities, onto the constraints in the metric of the mass matrix.
     ///
-    /// Returns the closure error that is left, m: above `1e-12` the loops could not be closed.
+    /// Returns the remaining closure error, m: above `1e-12` the loops could not be closed.
     pub fn project(&mut self, model: &Model, tree: &mut Tree, t: f64, y: &mut [f64]) -> f64 {
         let gravity = Vec3::zeros();
         let mut error = f64::INFINITY;
@@ -307,15 +307,15 @@ impl Constraints {
                     self.multipliers[3 * k + i] = -e[i];
                 }
             }
-            // Newton converges quadratically: stop where another step only stirs rounding.
-            // Rows that depend on others leave what the parts' dimensions are off by.
+            // Newton converges quadratically: stop once another step would only change rounding errors.
+            // Dependent rows leave a residual: the inconsistency of the parts' dimensions.
             let stirred = if self.is_dependent() { 1e-8 } else { 1e-13 };
             if largest <= 1e-15 || (largest < stirred && largest >= 0.5 * error) || largest.is_nan()
             {
                 error = largest;
                 break;
             }
-            // Once close, the matrix of the iteration before is as good as a new one.
+            // Once close, the previous iteration's matrix is as good as a new one.
             if error.is_infinite() || !(largest < 1e-4 * error && largest < 1e-9) {
                 self.prepare(model, tree, t, &y[..model.nq], &gravity);
             }
@@ -345,7 +345,7 @@ impl Constraints {
         error
     }
 
-    /// Jacobians and J M^-1 J^T, factored, for a tree that has been moved forward to (t, q).
+    /// Computes the Jacobians and factors J M^-1 J^T for a tree that has been moved forward to (t, q).
     pub fn prepare(&mut self, model: &Model, tree: &mut Tree, t: f64, q: &[f64], gravity: &Vec3) {
         if self.is_factored(t, q) {
             return;

@@ -1,5 +1,5 @@
-//! The ball joints of a scene: what decides which of them carry a force, their clearances under way, their gaps. Allocates
-//! nothing. What one does stands in `elements/contact.rs`.
+//! The ball joints of a scene: which of them carry a force, their clearance ramps, their gaps. Allocates nothing. The force
+//! of a single joint is in `elements/contact.rs`.
 
 use super::elements::{At, Contact, ForceElement, Gap, Loads};
 use super::kinematics::Kinematics;
@@ -7,16 +7,16 @@ use super::model::Model;
 use crate::contact::{Coefficients, Memory, Parameters};
 use crate::scene::{Scene, Vec3};
 
-/// A clearance on its way to a new value.
+/// A clearance that ramps to a new value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ramp {
     /// Time at which it started, s.
     pub start: f64,
-    /// Clearance there, m.
+    /// Clearance at the start, m.
     pub from: f64,
     /// Signed rate, m/s.
     pub rate: f64,
-    /// Where it ends, m.
+    /// Clearance at the end, m.
     pub to: f64,
 }
 
@@ -35,16 +35,16 @@ impl Ramp {
 /// What decides which contacts carry a force.
 #[derive(Clone, Copy, Debug)]
 pub enum Touching<'a> {
-    /// The memory: the stepper locates the instants at which it changes.
+    /// The contact memory: the stepper locates the events at which it changes.
     Located(&'a [Memory]),
-    /// Penetration at every evaluation: for steppers that locate nothing.
+    /// Penetration, at every evaluation: for steppers without event location.
     Immediate(&'a [Memory]),
-    /// None does.
+    /// No contact carries a force.
     Nothing,
 }
 
 impl<'a> Touching<'a> {
-    /// As `memory` says where instants are `located`, by penetration elsewhere.
+    /// By the memory if events are `located`, else by penetration.
     pub fn by(located: bool, memory: &'a [Memory]) -> Self {
         if located {
             Self::Located(memory)
@@ -53,7 +53,7 @@ impl<'a> Touching<'a> {
         }
     }
 
-    /// Memory of joint `j` where it may carry a force.
+    /// Memory of joint `j` if it may carry a force.
     #[inline]
     pub(super) fn memory(self, j: usize) -> Option<&'a Memory> {
         match self {
@@ -64,7 +64,7 @@ impl<'a> Touching<'a> {
     }
 }
 
-/// Evaluations made.
+/// Evaluation counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Of the equations of motion.
@@ -127,12 +127,12 @@ impl Contacts {
         self.joints[i].is_loose()
     }
 
-    /// Those with clearance.
+    /// Joints with clearance.
     pub(super) fn loose(&self) -> impl Iterator<Item = &Contact> {
         self.joints.iter().filter(|contact| contact.is_loose())
     }
 
-    /// All at the latest evaluation.
+    /// Gaps of all joints at the latest evaluation.
     pub fn gaps(&self) -> impl Iterator<Item = &Gap> {
         self.joints.iter().map(|contact| &contact.gap)
     }
@@ -142,7 +142,7 @@ impl Contacts {
         &self.joints[i]
     }
 
-    /// Joint `i` at the latest evaluation.
+    /// Gap of joint `i` at the latest evaluation.
     pub fn gap(&self, i: usize) -> &Gap {
         &self.joints[i].gap
     }
@@ -157,7 +157,7 @@ impl Contacts {
         self.joints[i].law.clearance
     }
 
-    /// Clearances under way.
+    /// Clearance ramps that are running, by joint.
     pub fn ramps(&self) -> &[Option<Ramp>] {
         &self.ramps
     }
@@ -168,13 +168,13 @@ impl Contacts {
         self.any_ramp = self.ramps.iter().any(Option::is_some);
     }
 
-    /// New parameters for joint `i` from now on; `clearance` is the one in force now.
+    /// Sets new parameters for joint `i`; `clearance` is its current clearance.
     pub fn set_parameters(&mut self, i: usize, parameters: &Parameters, clearance: f64) {
         self.parameters[i] = *parameters;
         self.joints[i].law = Coefficients::new(parameters, clearance);
     }
 
-    /// Moves clearances under way to `t`.
+    /// Updates ramping clearances to `t`.
     #[inline]
     fn update_ramps(&mut self, t: f64) {
         if !self.any_ramp {
@@ -189,7 +189,7 @@ impl Contacts {
         }
     }
 
-    /// Gaps and forces of all, where any may carry one.
+    /// Gaps and forces of all contacts, if any may carry a force.
     pub(super) fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
         if !self.any_contact || matches!(at.touching, Touching::Nothing) {
             return;
@@ -211,12 +211,12 @@ impl Contacts {
         self.finish();
     }
 
-    /// Relative velocity that friction reads at the contact of joint `i` with the normal `n`, m/s.
+    /// Relative velocity used by friction at the contact of joint `i` for the normal `n`, m/s.
     pub fn friction_reads(&self, i: usize, n: &Vec3, motion: &[Kinematics]) -> Vec3 {
         self.joints[i].friction_reads(n, motion)
     }
 
-    /// Sliding speed of joint `i`, off the centre, in the motion last measured, m/s.
+    /// Sliding speed of joint `i`, whose ball must be off centre, in the motion last measured, m/s.
     pub fn slip_speed(&self, i: usize, motion: &[Kinematics]) -> f64 {
         let contact = &self.joints[i];
         let at = contact.separation();

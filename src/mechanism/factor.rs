@@ -4,12 +4,12 @@
 /// No parent coordinate.
 pub const NONE: usize = usize::MAX;
 
-/// Which coordinates each one couples with.
+/// Sparsity pattern: which coordinates each one couples with.
 #[derive(Clone, Debug)]
 pub struct Pattern {
     /// Parent coordinate of each; [`NONE`] at a root.
     pub parent: Vec<usize>,
-    /// All coordinates hang on a free body's six, directly: the shape that is worth fixed-size loops.
+    /// All further coordinates are direct children of a free body's six: the case that is worth fixed-size loops.
     on_free_body: bool,
 }
 
@@ -92,7 +92,7 @@ fn six(h: &[f64], n: usize, k: usize) -> [f64; 6] {
     std::array::from_fn(|j| h[k * n..k * n + 6][j])
 }
 
-/// [`Pattern::factor`] where coordinates 6.. hang on the six of a free body: the same operations in fixed-size loops.
+/// [`Pattern::factor`] where coordinates 6.. are children of a free body's six: the same operations in fixed-size loops.
 fn factor_on_free_body(h: &mut [f64], n: usize, inverse_diagonal: &mut [f64]) {
     let mut base: [[f64; 6]; 6] = std::array::from_fn(|i| six(h, n, i));
     for k in 6..n {
@@ -220,7 +220,7 @@ impl Skyline {
         self.first.len()
     }
 
-    /// Forgets all values.
+    /// Sets all entries to zero.
     pub fn clear(&mut self) {
         self.values.fill(0.0);
     }
@@ -240,15 +240,15 @@ impl Skyline {
         }
     }
 
-    /// Diagonal entry i as it was, and its pivot, after [`Self::factor`].
+    /// Original diagonal entry i and its pivot, after [`Self::factor`].
     pub fn diagonal_and_pivot(&self, i: usize) -> (f64, f64) {
         let row = &self.values[self.offset[i]..][..=i - self.first[i]];
         let pivot = self.get(i, i) * self.get(i, i);
         (row.iter().map(|l| l * l).sum(), pivot)
     }
 
-    /// Factors in place. Returns the smallest ratio of a pivot to its diagonal entry: at rounding level or below, rows
-    /// depend on one another.
+    /// Factors in place. Returns the smallest ratio of a pivot to its diagonal entry: at rounding level or below, rows are
+    /// dependent.
     pub fn factor(&mut self) -> f64 {
         let mut least = f64::INFINITY;
         for i in 0..self.len() {

@@ -1,4 +1,4 @@
-//! The `tree` formulation whole: the spanning forest, and the ideal ball joints that close loops in it.
+//! The complete `tree` formulation: the spanning forest, and the ideal ball joints that close loops in it.
 
 use super::constraints::Constraints;
 use super::equations::Equations;
@@ -24,7 +24,7 @@ impl Forest {
         }
     }
 
-    /// Forces of the drives for the accelerations in the tree's motion, from the bodies for which `moved` says so.
+    /// Drive forces for the accelerations in the tree's motion, from the bodies selected by `moved`.
     fn find_drive_forces(
         &mut self,
         model: &Model,
@@ -57,9 +57,9 @@ impl Equations for Forest {
         &model.scale
     }
 
-    fn reveal(&mut self, rank: usize) {
+    fn treat_as_dependent(&mut self, rank: usize) {
         if let Some(constraints) = &mut self.constraints {
-            constraints.reveal(rank);
+            constraints.treat_as_dependent(rank);
         }
     }
 
@@ -143,7 +143,7 @@ impl Equations for Forest {
     fn apply_inverse_mass(&mut self, model: &Model, x: &mut [f64]) {
         self.tree.solve(model, x);
         if let Some(constraints) = &mut self.constraints {
-            constraints.restrain(model, x);
+            constraints.project_accelerations(model, x);
         }
     }
 
@@ -160,7 +160,7 @@ impl Equations for Forest {
         self.constraints.is_none()
     }
 
-    fn motion_by_time_alone(&mut self, model: &Model, t: f64, y: &[f64]) -> Option<&[Kinematics]> {
+    fn prescribed_motion(&mut self, model: &Model, t: f64, y: &[f64]) -> Option<&[Kinematics]> {
         self.tree.forward(model, t, y);
         Some(&self.tree.motion)
     }
@@ -231,9 +231,9 @@ impl Equations for Forest {
             force
         };
         let without = force_under(None);
-        constraints.system().idle_multipliers().all(|null| {
+        constraints.system().null_multipliers().all(|null| {
             let largest = null.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-            // Of a lever arm of a metre a millionth of it is rounding.
+            // With a lever arm of a metre, a millionth of the largest multiplier is rounding.
             (force_under(Some(null)) - without).abs() <= 1e-6 * largest
         })
     }
@@ -260,7 +260,7 @@ impl Equations for Forest {
             driven,
             ..
         } = &mut self.tree;
-        // Where forces suffice, all that hangs on a drive depends on time alone.
+        // If forces suffice, everything carried by a drive depends on time alone.
         let moved = |b: usize| all || model.bodies[b].driven_only;
         let mut power = 0.0;
         inverse_dynamics(model, motion, wrench, gravity, moved, |drive, force| {
@@ -270,7 +270,7 @@ impl Equations for Forest {
     }
 }
 
-/// Adds reactions of the ideal joints, by their order, to the loads on the bodies.
+/// Adds the reactions of the ideal joints, in their order, to the loads on the bodies.
 fn load_reactions(model: &Model, tree: &mut Tree, reaction: impl Fn(usize) -> Vec3) {
     let mut load = |anchor: &Anchor, force: Vec3| {
         let arm = tree.motion[anchor.body].rotation * anchor.offset;

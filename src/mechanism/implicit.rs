@@ -1,10 +1,10 @@
 //! Contact forces at the end of a step: the implicit part of a semi-implicit step.
 //!
-//! The step is first taken as if no contact carried a force. Each joint that then touches couples with the coordinates
-//! through three directions alone: with W the relative velocity at a contact per coordinate and S its contact point's, the
-//! velocities w that the contacts add and their forces f at the step's end solve w = h W M^-1 S^T f(w): three rows a joint
-//! instead of a row for every coordinate. Newton's method needs the mass matrix once. The arms of the contact points are
-//! those of a normal that is found anew where it turns much.
+//! The step is first taken as if no contact carried a force. Each joint then in contact couples with the coordinates
+//! through only three directions: with W the Jacobian of the relative velocity at a contact and S that of its contact
+//! point, the velocities w added by the contacts and their forces f at the end of the step solve
+//! w = h W M^-1 S^T f(w): three rows per joint instead of one per coordinate. Newton's method needs the mass matrix only
+//! once. The lever arms of the contact points belong to a fixed normal, which is updated if it turns too far.
 
 use super::MechanismError;
 use super::bounds::{Cost, CostOf};
@@ -15,41 +15,41 @@ use super::model::Model;
 use crate::contact::{ApproachPiece, Coefficients, Memory, Slope};
 use crate::scene::{Mat3, Vec3};
 
-/// Most Newton iterations, and the change of a force against the largest at which they end.
+/// Maximum number of Newton iterations, and the change of a force relative to the largest at which they stop.
 const ITERATIONS: usize = 24;
 const CONVERGED: f64 = 1e-3;
-/// How often in a row an iteration is taken half-way back.
+/// Maximum number of successive halvings of a Newton step.
 const HALVINGS: u32 = 3;
-/// Part of its clearance within which a ball is too far from the wall to reach it unasked.
+/// Fraction of the clearance within which a ball is too far from the wall to be pushed into it.
 const NEAR: f64 = 0.5;
-/// A normal that turns by more (rad) takes its arms along.
+/// Rotation of a normal (rad) beyond which its lever arms are updated.
 const TURNED: f64 = 0.03;
-/// How often at most.
+/// Maximum number of passes with updated arms.
 pub const TURNS: usize = 4;
 
-/// One joint that touches at the end of the step, or may be pushed there by others.
+/// One joint in contact at the end of the step, or that others may push into contact.
 struct Touch {
     joint: usize,
     law: Coefficients,
     memory: Memory,
-    /// Without contact forces: eccentricity (m), its rate and the velocity that friction reads (m/s).
+    /// Without contact forces: eccentricity (m), its rate and the velocity used by friction (m/s).
     eccentricity: Vec3,
     rate: Vec3,
     read: Vec3,
-    /// Velocities that the contacts add: of the centres, and of what friction reads, m/s.
+    /// Added by the contacts: to the velocity of the centres, and to that used by friction, m/s.
     added: Vec3,
     slipping: Vec3,
-    /// Normal of the arms, and the latest.
+    /// Normal that the lever arms belong to, and the latest normal.
     arm: Vec3,
     normal: Vec3,
-    /// Force, N, and its derivatives by the added velocities, N s/m.
+    /// Force, N, and its derivatives with respect to the added velocities, N s/m.
     force: Vec3,
     impedance: Mat3,
     resistance: Mat3,
 }
 
 impl Touch {
-    /// Force and its derivatives for the velocities now added, over a step of size `h`.
+    /// Force and its derivatives for the current added velocities, over a step of size `h`.
     fn evaluate(&mut self, h: f64, counts: &mut Counts) {
         let eccentricity = self.eccentricity + self.added * h;
         let rate = self.rate + self.added;
@@ -79,31 +79,31 @@ impl Touch {
     }
 }
 
-/// Scratch of the implicit part, allocated once.
+/// Workspace of the implicit part, allocated once.
 pub struct ImplicitContacts {
     n: usize,
-    /// First and last velocity coordinate that a force at each joint may accelerate.
+    /// Range of velocity coordinates that a force at each joint may accelerate.
     ranges: Vec<(usize, usize)>,
-    /// Joints further apart than this in their order do not feel each other.
+    /// Joints further apart than this in their order are not coupled.
     reach: usize,
     touches: Vec<Touch>,
     columns: Vec<Vec<Column>>,
-    /// M^-1 S^T, three columns a joint over its range, interleaved.
+    /// M^-1 S^T, three columns per joint over its range, interleaved.
     weighted: Vec<Vec<f64>>,
-    /// Block band matrix and its right side.
+    /// Block-banded matrix and its right-hand side.
     blocks: Vec<Mat3>,
     right: Vec<Vec3>,
     before: Vec<Vec3>,
-    /// W M^-1 S^T in the same band, W for the centres and for what friction reads.
+    /// W M^-1 S^T in the same band, with W for the centres and for the velocity used by friction.
     mobility: Vec<[Mat3; 2]>,
     scratch: Vec<f64>,
 }
 
 impl ImplicitContacts {
-    /// For `n` velocity coordinates. With `blocks`, a force accelerates only the trees that it acts on; else all.
+    /// For `n` velocity coordinates. With `blocks`, a force accelerates only the trees it acts on; otherwise all.
     ///
     /// # Errors
-    /// Contacts that couple too widely.
+    /// Contacts that are coupled too widely.
     pub fn new(model: &Model, n: usize, blocks: bool) -> Result<Self, MechanismError> {
         let joints = model.joints.len();
         let block_of = |body: usize| {
@@ -125,7 +125,7 @@ impl ImplicitContacts {
             }
             (range.0.min(range.1), range.1)
         };
-        // Joints feel each other through a tree that both act on.
+        // Joints are coupled through a tree that both act on.
         let mut first_on = vec![usize::MAX; model.blocks.len()];
         let mut reach = if blocks { 0 } else { joints.saturating_sub(1) };
         for j in 0..joints {
@@ -156,8 +156,8 @@ impl ImplicitContacts {
         })
     }
 
-    /// Takes the joints that touch, from the gaps just measured where the step ends without contact forces; whether
-    /// there are any.
+    /// Collects the joints in contact, from the gaps just measured at the end of the step without contact forces. Returns
+    /// whether there are any.
     pub fn gather(&mut self, model: &Model, contacts: &Contacts, touching: Touching<'_>) -> bool {
         self.touches.clear();
         self.right.clear();
@@ -200,7 +200,7 @@ impl ImplicitContacts {
         near
     }
 
-    /// Lays out how the coordinates move the contacts, and what slides there, for the normals found last.
+    /// Computes the contacts' Jacobian columns and sliding velocities for the latest normals.
     pub fn arrange(&mut self, model: &Model, contacts: &Contacts, equations: &dyn Equations) {
         for touch in &mut self.touches {
             let (j, n) = (touch.joint, touch.normal);
@@ -212,7 +212,7 @@ impl ImplicitContacts {
         }
     }
 
-    /// Finds the forces at the end of a step of size `h`. Whether a normal turned so much that its arms must follow.
+    /// Finds the forces at the end of a step of size `h`. Returns whether a normal turned so far that its arms need updating.
     pub fn solve(
         &mut self,
         model: &Model,
@@ -241,7 +241,7 @@ impl ImplicitContacts {
             }
         }
         self.couple();
-        // From the forces found for the arms before, if any.
+        // Start from the forces found for the previous arms, if any.
         self.right.resize(self.touches.len(), Vec3::zeros());
         let (mut worst, mut halvings) = (f64::INFINITY, 0);
         for _ in 0..ITERATIONS {
@@ -263,7 +263,7 @@ impl ImplicitContacts {
                 self.before.clone_from(&self.right);
                 self.eliminate(h);
             } else {
-                // Too far: damping and the cut at 0 bend the force law both ways.
+                // Overshoot: damping and the cut-off at 0 make the force law neither convex nor concave.
                 halvings += 1;
                 for (force, before) in self.right.iter_mut().zip(&self.before) {
                     *force = (*force + before) * 0.5;
@@ -272,7 +272,7 @@ impl ImplicitContacts {
         }
         let mut turned = false;
         for (touch, force) in self.touches.iter().zip(&mut self.right) {
-            // What the last iteration leaves must not pull.
+            // The last iterate must not pull.
             if touch.normal.dot(force) > 0.0 {
                 *force = Vec3::zeros();
             }
@@ -281,7 +281,7 @@ impl ImplicitContacts {
         turned
     }
 
-    /// Adds to `v` what the forces found last do over a step of size `h`.
+    /// Adds to `v` the velocity change due to the latest forces over a step of size `h`.
     pub fn push(&self, h: f64, v: &mut [f64]) {
         for (touch, force) in self.touches.iter().zip(&self.right) {
             let (first, end) = self.ranges[touch.joint];
@@ -292,13 +292,13 @@ impl ImplicitContacts {
         }
     }
 
-    /// How the contacts move each other.
+    /// Computes how the contacts move each other.
     fn couple(&mut self) {
         let m = self.touches.len();
         for i in 0..m {
             let touch = &self.touches[i];
             let columns = &self.columns[touch.joint];
-            let surface = touch.law.reads_surfaces() && touch.law.friction > 0.0;
+            let surface = touch.law.uses_surface_velocity() && touch.law.friction > 0.0;
             for j in i.saturating_sub(self.reach)..=(i + self.reach).min(m - 1) {
                 let other = self.touches[j].joint;
                 let (first, end) = self.ranges[other];
@@ -327,7 +327,7 @@ impl ImplicitContacts {
         i * (2 * self.reach + 1) + j + self.reach - i
     }
 
-    /// Velocities that the forces in `right` add at touch `i`.
+    /// Velocities added at touch `i` by the forces in `right`.
     fn driven_by(&self, i: usize, h: f64) -> [Vec3; 2] {
         let last = (i + self.reach).min(self.touches.len() - 1);
         let mut sum = [Vec3::zeros(); 2];
@@ -340,7 +340,7 @@ impl ImplicitContacts {
         sum
     }
 
-    /// Contact forces of the next iteration into `right`, by block elimination within the band.
+    /// Contact forces of the next Newton iteration into `right`, by block elimination within the band.
     fn eliminate(&mut self, h: f64) {
         let (m, reach) = (self.touches.len(), self.reach);
         let at = |i: usize, j: usize| i * (2 * reach + 1) + j + reach - i;

@@ -1,7 +1,6 @@
 //! A number with its first two time derivatives, carried exactly through every operation.
 //!
-//! Own code rather than a dual-number crate, because those call std's elementary functions, whose bits differ between
-//! native and wasm.
+//! Written here because dual-number crates call std's elementary functions, whose bits differ between native and wasm.
 
 use std::ops::{Add, Mul, Neg, Sub};
 

@@ -85,7 +85,7 @@ impl BallJoint {
         self.relative(motion, Kinematics::point_acceleration)
     }
 
-    /// Ball's minus socket's `rate` at the centres.
+    /// Difference of `rate` at the centres, ball minus socket.
     fn relative(&self, motion: &[Kinematics], rate: fn(&Kinematics, &Vec3) -> Vec3) -> Vec3 {
         let at = |a: &Anchor| rate(&motion[a.body], &(motion[a.body].rotation * a.offset));
         at(&self.ball) - at(&self.socket)
@@ -169,7 +169,7 @@ pub fn quaternion_of(rotation: &Mat3) -> Quat {
     Quat::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(*rotation))
 }
 
-/// Motion of a body that hangs on `parent`, for a coordinate (q, rate, acceleration) of its joint.
+/// Motion of a child body of `parent` for its joint coordinate (q, rate, acceleration).
 #[inline]
 pub fn follow(
     body: &Body,
@@ -223,7 +223,7 @@ pub fn follow(
     }
 }
 
-/// Adds to a body's acceleration what its own coordinate's acceleration and its parent's full acceleration contribute.
+/// Completes a body's acceleration with its own coordinate's acceleration and its parent's full acceleration.
 #[inline]
 pub fn accelerate(
     child: &mut Kinematics,
@@ -252,7 +252,7 @@ pub fn accelerate(
     }
 }
 
-/// Motion prescribed by time alone, computed once for each instant.
+/// Motion prescribed by time alone, computed once per instant.
 pub struct Driven {
     time: Option<f64>,
     /// Driven coordinates.
@@ -275,7 +275,7 @@ impl Driven {
         }
     }
 
-    /// From now on moves no body: their motion is part of the state.
+    /// Stops moving bodies from now on: their motion is part of the state.
     pub fn only_coordinates(&mut self) {
         self.bodies.clear();
     }
@@ -297,7 +297,7 @@ impl Driven {
             let body = &model.bodies[b];
             let parent = &motion[body.parent];
             motion[b] = match body.motion {
-                // A slider on the world: nothing but its line.
+                // A slider on the world moves only along its line.
                 Motion::Driven {
                     drive,
                     revolute: false,

@@ -1,5 +1,5 @@
-//! The paper's formulation (44)-(58): every body with six velocity coordinates, constraints with multipliers, Baumgarte
-//! stabilisation. Orientations are unit quaternions, so nothing is singular; gyroscopic terms are kept.
+//! The paper's formulation (44)-(58): six velocity coordinates per body, constraints with Lagrange multipliers, Baumgarte
+//! stabilisation. Orientations are unit quaternions, so there are no singularities; gyroscopic terms are kept.
 //!
 //! The KKT system (55) is solved by its Schur complement J M^-1 J^T. Allocates nothing after `new`.
 
@@ -13,7 +13,7 @@ use crate::scene::{JointKind, Mat3, Scene, Vec3};
 /// Baumgarte parameters of the paper: Phi'' + 2 alpha Phi' + beta^2 Phi = 0, 1/s.
 const BAUMGARTE: (f64, f64) = (5.0, 5.0);
 
-/// One kind of row, of a child against a parent.
+/// Kinds of constraint rows between a child and a parent.
 #[derive(Clone, Copy, Debug)]
 enum Rows {
     /// Two points coincide: 3 rows, (45) and the first three of (47).
@@ -46,7 +46,7 @@ impl Rows {
     }
 }
 
-/// Rows of one joint, of a child against a parent.
+/// Rows of one joint, between a child and a parent.
 pub struct Group {
     rows: Rows,
     pub child: BodyIndex,
@@ -55,7 +55,7 @@ pub struct Group {
 }
 
 impl Group {
-    /// Its rows among all.
+    /// Indices of its rows.
     pub fn rows(&self) -> std::ops::Range<usize> {
         self.first..self.first + self.rows.count()
     }
@@ -63,7 +63,7 @@ impl Group {
 
 /// J of one row for its two bodies: (velocity, angular velocity) of the child, then of the parent.
 #[derive(Clone, Copy)]
-struct Row {
+struct JacobianRow {
     child: [Vec3; 2],
     parent: [Vec3; 2],
 }
@@ -77,14 +77,14 @@ pub struct Lagrange {
     /// Driven coordinates.
     driven: Driven,
     groups: Vec<Group>,
-    /// Group index of each driven coordinate's row.
+    /// Row of each driven coordinate.
     driver_row: Vec<usize>,
     /// First row of each ideal ball joint.
     ideal_row: Vec<usize>,
-    rows: Vec<Row>,
+    rows: Vec<JacobianRow>,
     /// Group of each row.
     group_of: Vec<usize>,
-    /// Rows that share a body with a row, at or before it.
+    /// Pairs (i, j), j <= i, of rows that share a body.
     pairs: Vec<(usize, usize)>,
     matrix: RowSystem,
     multipliers: Vec<f64>,
@@ -126,7 +126,7 @@ impl Layout {
         };
         for (b, (body, joint)) in model.bodies.iter().zip(&scene.joints).enumerate() {
             let parent = body.parent;
-            // Vectors of the parent, and the same vectors as the child sees them at q = 0.
+            // Vectors of the parent, and the same vectors in the child's axes at q = 0.
             let x = joint.axis;
             let across = if x.x.abs() < 0.7 {
                 Vec3::x()
@@ -233,11 +233,11 @@ impl Lagrange {
             first[i] = first[i].min(j);
         }
         let n = model.bodies.len();
-        let empty = Row {
+        let empty = JacobianRow {
             child: [Vec3::zeros(); 2],
             parent: [Vec3::zeros(); 2],
         };
-        // Bodies that depend on time alone are states here too.
+        // Bodies that depend on time alone are part of the state here too.
         let mut driven = Driven::new(model);
         driven.only_coordinates();
         Self {
@@ -283,7 +283,7 @@ impl Lagrange {
         sum
     }
 
-    /// Jacobian rows, and what is missing from the free accelerations: -(J a0 + bias) - 2 alpha Phi' - beta^2 Phi.
+    /// Jacobian rows, and the residual of the unconstrained accelerations: -(J a0 + bias) - 2 alpha Phi' - beta^2 Phi.
     fn linearise(&mut self) {
         self.drift = 0.0;
         let zero = Vec3::zeros();
@@ -300,7 +300,7 @@ impl Lagrange {
                     for i in 0..3 {
                         let mut e = zero;
                         e[i] = 1.0;
-                        self.rows[at + i] = Row {
+                        self.rows[at + i] = JacobianRow {
                             child: [e, dc.cross(&e)],
                             parent: [-e, e.cross(&dp)],
                         };
@@ -317,7 +317,7 @@ impl Lagrange {
                     let acceleration = (c.angular_acceleration - p.angular_acceleration)
                         .dot(&cross)
                         + relative.dot(&turning);
-                    self.rows[at] = Row {
+                    self.rows[at] = JacobianRow {
                         child: [zero, cross],
                         parent: [zero, -cross],
                     };
@@ -341,7 +341,7 @@ impl Lagrange {
                     let phi = b.dot(&d) - f.value;
                     let rate = b1.dot(&d) + b.dot(&d1) - f.rate;
                     let acceleration = b2.dot(&d) + 2.0 * b1.dot(&d1) + b.dot(&d2) - f.acceleration;
-                    self.rows[at] = Row {
+                    self.rows[at] = JacobianRow {
                         child: [b, dc.cross(&b)],
                         parent: [-b, b.cross(&dp) + b.cross(&d)],
                     };
@@ -368,7 +368,7 @@ impl Lagrange {
                     let acceleration = (c.angular_acceleration - p.angular_acceleration).dot(&x)
                         + relative.dot(&wp.cross(&x))
                         - f.acceleration;
-                    self.rows[at] = Row {
+                    self.rows[at] = JacobianRow {
                         child: [zero, x],
                         parent: [zero, -x],
                     };
@@ -393,11 +393,11 @@ impl Equations for Lagrange {
         &self.scale
     }
 
-    fn reveal(&mut self, rank: usize) {
+    fn treat_as_dependent(&mut self, rank: usize) {
         let balls = self.ideal_row.first().copied().unwrap_or(self.rows.len());
         let group = |&g: &usize| self.groups[g].first;
         let group = self.group_of.iter().map(group).collect();
-        self.matrix.reveal(balls + rank, balls, group);
+        self.matrix.treat_as_dependent(balls + rank, balls, group);
     }
 
     fn state_of(&self, model: &Model, _: Vec<f64>, motion: &[Kinematics]) -> Vec<f64> {
@@ -478,7 +478,7 @@ impl Equations for Lagrange {
         }
     }
 
-    /// Nothing to do: [`Self::accelerate`] left them there.
+    /// Nothing to do: [`Self::accelerate`] has already written them.
     fn complete_motion(&mut self, _: &Model, _: &[f64], _: &[f64]) {}
 
     fn position_rate(&self, model: &Model, y: &[f64], dq: &mut [f64]) {
@@ -574,7 +574,7 @@ impl Equations for Lagrange {
         false
     }
 
-    fn motion_by_time_alone(&mut self, _: &Model, _: f64, _: &[f64]) -> Option<&[Kinematics]> {
+    fn prescribed_motion(&mut self, _: &Model, _: f64, _: &[f64]) -> Option<&[Kinematics]> {
         None
     }
 
@@ -631,7 +631,7 @@ impl Equations for Lagrange {
     }
 }
 
-/// Rate of a driven joint from the motion of the two bodies that it holds.
+/// Rate of a driven joint from the motion of the two bodies it connects.
 fn rate_of(model: &Model, motion: &[Kinematics], b: usize) -> f64 {
     let body = &model.bodies[b];
     let (child, parent) = (&motion[b], &motion[body.parent]);
@@ -641,7 +641,7 @@ fn rate_of(model: &Model, motion: &[Kinematics], b: usize) -> f64 {
             axis.dot(&(child.angular_velocity - parent.angular_velocity))
         }
         _ => {
-            // Of the point of the parent that is at the child's joint point just now.
+            // Relative to the parent's point that currently coincides with the child's joint point.
             let arm = child.rotation * -body.to_centroid;
             let at = child.position + arm - parent.position;
             axis.dot(&(child.point_velocity(&arm) - parent.point_velocity(&at)))
@@ -649,7 +649,7 @@ fn rate_of(model: &Model, motion: &[Kinematics], b: usize) -> f64 {
     }
 }
 
-/// Each row with those at or before it that share a body with it, in order.
+/// Pairs of each row with the rows at or before it that share a body with it, in order.
 fn pairs_of(groups: &[Group], world: BodyIndex) -> Vec<(usize, usize)> {
     let mut pairs = Vec::new();
     // Groups that act on each body so far.
@@ -673,14 +673,14 @@ fn pairs_of(groups: &[Group], world: BodyIndex) -> Vec<(usize, usize)> {
     pairs
 }
 
-/// What the constraint acceleration must change by: -(Phi'' + 2 alpha Phi' + beta^2 Phi).
+/// Required change of the constraint acceleration: -(Phi'' + 2 alpha Phi' + beta^2 Phi).
 #[inline]
 fn stabilised(phi: f64, rate: f64, acceleration: f64) -> f64 {
     let (alpha, beta) = BAUMGARTE;
     -(acceleration + 2.0 * alpha * rate + beta * beta * phi)
 }
 
-/// Scales of body coordinates: those that a free body has in the tree, taken from the model's smallest.
+/// Scales of the body coordinates: those of a free body in the tree, from the model's length scale.
 fn body_scales(model: &Model) -> Vec<f64> {
     let n = model.bodies.len();
     let (length, speed) = (model.length_scale, model.length_scale / 0.1);

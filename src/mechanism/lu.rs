@@ -2,7 +2,7 @@
 
 use nalgebra::ComplexField;
 
-/// Dense elimination with row exchanges, for real and complex numbers.
+/// Dense LU factorisation with partial pivoting, for real and complex numbers.
 pub struct Lu<X> {
     n: usize,
     rows: Vec<X>,

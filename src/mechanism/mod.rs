@@ -1,7 +1,7 @@
 //! Equations of motion of a scene.
 //!
-//! Ball joints are always the cut joints. Cut them and every scene is a forest of trees; each ball joint is then either
-//! three constraint rows (ideal) or one contact force (clearance). A scene pays only for what it has.
+//! Ball joints are always the cut joints: without them every scene is a forest of trees. Each ball joint then adds either
+//! three constraint rows (ideal) or one contact force (clearance). A scene pays only for what it contains.
 
 mod bounds;
 mod columns;
@@ -53,7 +53,7 @@ pub enum MechanismError {
     /// A rod cannot reach its slider somewhere along the trajectory.
     #[error("{0}")]
     Unreachable(#[from] Unreachable),
-    /// An ideal ball joint that the scene's values leave open, where they are to stand as given.
+    /// An ideal ball joint left open by the scene's values, which are to be used as given.
     #[error(
         "ball joint {joint}: ball and socket centres are {} apart as given, and an ideal joint may be open by at most {}: \
          correct the start values, or let start = \"ideal\" close it",
@@ -65,33 +65,33 @@ pub enum MechanismError {
         /// |Z_j - Z_i| as the scene gives it, m.
         given: f64,
     },
-    /// Loops that no pose near the guess closes.
+    /// Loops that cannot be closed near the initial guess.
     #[error(
         "ball joint {joint}: ball and socket centres are {} apart as given and cannot be closed{}",
         length(*.given), unclosed(.stays)
     )]
     NoClosure {
-        /// Name of the joint that is widest open as given.
+        /// Name of the joint with the widest gap as given.
         joint: String,
         /// |Z_j - Z_i| as the scene gives it, m.
         given: f64,
-        /// Where assembling came to rest with joints open: their names and Z_j - Z_i, m, world axes. No motion that the
-        /// mechanism has makes these smaller. Empty where it came to no rest.
+        /// Joints still open where assembly converged: names and Z_j - Z_i, m, world axes. No admissible motion of the
+        /// mechanism makes these gaps smaller. Empty if assembly did not converge.
         stays: Vec<(String, Vec3)>,
     },
-    /// Loops that close, but whose drives tear them apart at once.
+    /// Loops that close, but that the drives open again at once.
     #[error(
         "ball joint {joint}: the drives ask for speeds at which it opens at {} along {}; no motion that the mechanism has \
          follows both",
         speed(.rate.norm()), axes(.rate)
     )]
-    Torn {
+    InconsistentDrives {
         /// Name of the joint.
         joint: String,
         /// d(Z_j - Z_i)/dt, m/s, world axes.
         rate: Vec3,
     },
-    /// A ball that starts deeper in its socket wall than a contact can mean.
+    /// A ball that starts deeper in its socket wall than is plausible for a contact.
     #[error(
         "ball joint {joint}: ball and socket centres are {} apart as given, \
          deeper in the wall than the clearance {} and a hundredth of the ball radius allow",
@@ -105,12 +105,12 @@ pub enum MechanismError {
         /// c, m.
         clearance: f64,
     },
-    /// The loops closed at the start, but not where the drives' closed form has them.
+    /// The loops closed at the start, but on another branch than that of the drives' closed form.
     #[error(
         "the loops close on another branch than the drives ask for: start poses are too far off"
     )]
     OtherBranch,
-    /// A start pose in which the ideal joints do not fix the velocities.
+    /// A start pose in which the ideal joints do not determine the velocities.
     #[error(
         "the mechanism starts in a singular pose, in which its drives do not fix its velocities: \
          move the start of the trajectory away from it"
@@ -124,24 +124,24 @@ pub enum MechanismError {
     TooLarge {
         /// Velocity coordinates.
         velocities: usize,
-        /// Most that are taken.
+        /// Most that are accepted.
         most: usize,
     },
     /// Equations that would take more memory or time than is allowed.
     #[error("too large for {of}: {needed} {what}; allowed at most {most}: {advice}")]
     TooCostly {
-        /// What would take it.
+        /// What is too costly.
         of: CostOf,
-        /// What it would take.
+        /// What was counted.
         what: &'static str,
-        /// How much of it.
+        /// Amount needed.
         needed: u64,
-        /// Most that is taken.
+        /// Most that is allowed.
         most: u64,
         /// What to do instead.
         advice: &'static str,
     },
-    /// A start pose in which constraints lose their independence that have it in every pose around.
+    /// A start pose in which constraints become dependent that are independent in every neighbouring pose.
     #[error(
         "the mechanism starts in a singular pose: at {} directions that the ideal joints hold elsewhere coincide here, \
          and the motion could go on in more than one way; start it beside that pose",
@@ -153,7 +153,7 @@ pub enum MechanismError {
     },
 }
 
-/// An ideal joint may be open by this much where values stand as given, m.
+/// Largest gap of an ideal joint where start values are used as given, m.
 const OPEN_AS_GIVEN: f64 = 1e-5;
 
 fn length(si: f64) -> String {
@@ -164,7 +164,7 @@ fn speed(si: f64) -> String {
     format_quantity_digits(si, "m/s", 4)
 }
 
-/// World axes that a vector has a part along: `x and z`.
+/// World axes along which a vector has a significant component: `x and z`.
 fn axes(vector: &Vec3) -> String {
     let largest = vector.amax();
     let named = ["x", "y", "z"].into_iter().zip(vector.iter());
@@ -189,7 +189,7 @@ fn unclosed(stays: &[(String, Vec3)]) -> String {
     )
 }
 
-/// What tells the equations of one mechanism from those of another: they are equal where their states can be exchanged.
+/// Identifies the equations of a mechanism: two are equal if their states are interchangeable.
 #[derive(Clone, Debug)]
 pub struct Structure {
     model: Arc<Model>,
@@ -199,24 +199,24 @@ pub struct Structure {
 /// The equations of motion of one scene in one formulation.
 pub struct Mechanism {
     model: Arc<Model>,
-    /// Independent rows of the ideal joints, where some depend on others.
+    /// Rank of the ideal joints' constraint rows, if some are dependent.
     rank: Option<usize>,
     equations: Box<dyn Equations>,
     /// Ball joints with clearance.
     pub contacts: Contacts,
-    /// Those of the scene in its order, then the hand that pulls, if one does.
+    /// The scene's elements in its order, then the pulling hand, if any.
     elements: Vec<Box<dyn SceneElement>>,
     of_scene: usize,
     pull: Option<Pull>,
     /// World gravity, m/s^2.
     pub gravity: Vec3,
     joint_names: Vec<String>,
-    /// Linearisation; made where an implicit method is chosen.
+    /// Linearisation; allocated if an implicit method is chosen.
     stiff: Option<Box<stiff::Stiff>>,
     sources: power::Sources,
-    /// Instant at which motion and forces are those of the latest evaluation, s; `None` where something was measured since.
+    /// Time of the latest evaluation, s, while motion and forces still belong to it; `None` once they have been overwritten.
     evaluated: Option<f64>,
-    /// Made where contacts alone are stepped implicitly.
+    /// Allocated if only the contacts are stepped implicitly.
     implicit: Option<Box<implicit::ImplicitContacts>>,
     assembly: Assembly,
 }
@@ -225,7 +225,7 @@ impl Mechanism {
     /// Sets up the equations of `scene`.
     ///
     /// # Errors
-    /// A trajectory that the rods cannot reach; equations that would take too much.
+    /// A trajectory that the rods cannot reach; equations that would be too costly.
     pub fn new(scene: &Scene) -> Result<Self, MechanismError> {
         let model = Arc::new(Model::new(scene));
         if let Some(trajectory) = &model.trajectory {
@@ -255,7 +255,7 @@ impl Mechanism {
         })
     }
 
-    /// For a state of the mechanism that `structure` is of, without a start.
+    /// For resuming from a state that belongs to `structure`, without computing a start state.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -263,12 +263,12 @@ impl Mechanism {
         let mut mechanism = Self::new(scene)?;
         mechanism.rank = structure.rank;
         if let Some(rank) = structure.rank {
-            mechanism.equations.reveal(rank);
+            mechanism.equations.treat_as_dependent(rank);
         }
         Ok(mechanism)
     }
 
-    /// What a snapshot keeps of the equations.
+    /// What a snapshot stores about the equations.
     pub fn structure(&self) -> Structure {
         Structure {
             model: self.model.clone(),
@@ -276,7 +276,7 @@ impl Mechanism {
         }
     }
 
-    /// Whether these are the equations that `structure` is of.
+    /// Whether `structure` belongs to these equations.
     pub fn has_structure(&self, structure: &Structure) -> bool {
         Arc::ptr_eq(&self.model, &structure.model)
     }
@@ -291,19 +291,19 @@ impl Mechanism {
         self.equations.is_kinematic(&self.model)
     }
 
-    /// Longest step of a scene that is a function of time alone, s: a fiftieth of the shortest period of drives and loads.
+    /// Longest step where the motion is a function of time alone, s: a fiftieth of the shortest period of drives and loads.
     pub fn kinematic_step(&self) -> f64 {
         let loads = self.elements.iter().map(|element| element.period());
         loads.fold(self.model.shortest_period(), f64::min) / 50.0
     }
 
-    /// For a scene that is a function of time alone, on which side of a singular pose its loops are.
+    /// Where the motion is a function of time alone: which side of a singular pose the loops are on. True elsewhere.
     pub fn is_right_handed(&mut self) -> bool {
         !self.is_kinematic() || self.equations.is_right_handed(&self.model)
     }
 
-    /// For a scene that is a function of time alone and knows its motion in closed form: how far its output body is from
-    /// that motion at the latest evaluation, m. 0 elsewhere.
+    /// Where the motion is a function of time alone and known in closed form: distance of the output body from that motion
+    /// at the latest evaluation, m. 0 elsewhere.
     pub fn distance_from_ideal(&self) -> f64 {
         let Some(ideal) = self.ideal().filter(|_| self.is_kinematic()) else {
             return 0.0;
@@ -314,7 +314,7 @@ impl Mechanism {
         (origin - Vec3::from_fn(|i, _| ideal.position[i].value)).norm()
     }
 
-    /// Predicts the state of a scene that is a function of time alone a step `h` on: second order in positions.
+    /// Predicts the state after a step `h` where the motion is a function of time alone: second order in positions.
     pub fn predict(&self, h: f64, y: &[f64], k: &[f64], step: &mut [f64], out: &mut [f64]) {
         let nq = self.model.nq;
         out.copy_from_slice(y);
@@ -325,7 +325,7 @@ impl Mechanism {
         Tree::displace(&self.model, out, step);
     }
 
-    /// After a step: orientations back to unit length, loops closed again. Returns the closure error left, m.
+    /// Projects the state after a step: quaternions to unit length, loops closed. Returns the remaining closure error, m.
     pub fn project(&mut self, t: f64, y: &mut [f64]) -> f64 {
         self.evaluated = None;
         self.equations.project(&self.model, t, y)
@@ -358,7 +358,7 @@ impl Mechanism {
         self.equations.scale(&self.model)
     }
 
-    /// Rates of the positions from the velocities in `y`, into the front of `dy`.
+    /// Position rates from the velocities in `y`, into the leading components of `dy`.
     pub fn position_rate(&self, y: &[f64], dy: &mut [f64]) {
         let dq = &mut dy[..self.positions()];
         self.equations.position_rate(&self.model, y, dq);
@@ -369,25 +369,25 @@ impl Mechanism {
         self.equations.motion()
     }
 
-    /// The paper's ideal mechanism at the latest instant, where the scene follows it.
+    /// The paper's ideal mechanism at the latest instant, if the scene follows it.
     pub fn ideal(&self) -> Option<&Ideal> {
         self.equations.driven().ideal.as_ref()
     }
 
-    /// Force of the constraint on the ball of joint `j` at the latest evaluation, N; `None` where it has clearance.
+    /// Constraint force on the ball of joint `j` at the latest evaluation, N; `None` if the joint has clearance.
     pub fn reaction(&self, j: usize) -> Option<Vec3> {
         let k = self.model.joints[j].ideal?;
         Some(self.equations.reaction(k))
     }
 
-    /// Whether the reaction of joint `j` is the only one that fits the motion, at the latest evaluation. Where ideal joints
-    /// hold a direction that others hold already, [`Self::reaction`] is the one of least squares over all ideal joints.
+    /// Whether the reaction of joint `j` is unique at the latest evaluation. Where ideal joints constrain a direction
+    /// redundantly, [`Self::reaction`] is the one with the least sum of squares over all ideal joints.
     pub fn is_reaction_unique(&self, j: usize) -> bool {
         let ideal = self.model.joints[j].ideal;
         ideal.is_none_or(|k| self.equations.is_reaction_unique(k))
     }
 
-    /// Whether a ball joint is ideal: [`Self::reaction`] is then another at every evaluation.
+    /// Whether any ball joint is ideal, so that [`Self::reaction`] changes with every evaluation.
     pub fn has_reactions(&self) -> bool {
         !self.model.ideal_joints.is_empty()
     }
@@ -397,8 +397,8 @@ impl Mechanism {
         self.equations.drift()
     }
 
-    /// Smallest pivot ratio of the constraint matrix at the latest evaluation: near rounding level where rows depend on
-    /// one another. Infinite without constraints.
+    /// Smallest pivot ratio of the constraint matrix at the latest evaluation: near rounding level if rows are dependent.
+    /// Infinite without constraints.
     pub fn least_pivot(&self) -> f64 {
         self.equations.least_pivot()
     }
@@ -429,7 +429,7 @@ impl Mechanism {
         (kinetic, potential)
     }
 
-    /// Energy stored in contacts and springs where gaps were measured last, J.
+    /// Energy stored in contacts and springs at the gaps last measured, J.
     pub fn elastic_energy(&self) -> f64 {
         let motion = self.equations.motion();
         let mut energy = 0.0;
@@ -445,19 +445,19 @@ impl Mechanism {
         self.elements.iter().map(|e| e.stored(motion)).sum()
     }
 
-    /// What the force elements do at `t`, that of the latest evaluation, in the order of the scene.
+    /// Reports of the force elements at `t`, the time of the latest evaluation, in the order of the scene.
     pub fn element_reports(&self, t: f64) -> impl Iterator<Item = ElementReport> {
         let motion = self.equations.motion();
         let of_scene = self.elements[..self.of_scene].iter();
         of_scene.map(move |e| e.report(t, motion))
     }
 
-    /// Where a hand pulls.
+    /// The hand's pull, if any.
     pub fn pull(&self) -> Option<Pull> {
         self.pull
     }
 
-    /// From now on a hand pulls on a body of `scene`, whose equations these are, or none does.
+    /// Sets or removes the hand's pull on a body of `scene`, whose equations these are.
     pub fn set_pull(&mut self, scene: &Scene, pull: Option<Pull>) {
         self.elements.truncate(self.of_scene);
         self.pull = pull;
@@ -469,7 +469,7 @@ impl Mechanism {
         self.sources = power::Sources::new(&self.model, &*self.equations, elements);
     }
 
-    /// Whether an element answers to motion, so that it can be stiff.
+    /// Whether any element's force depends on motion in a way that can be stiff.
     pub fn has_couplings(&self) -> bool {
         self.elements.iter().any(|e| e.ends().is_some())
     }
@@ -479,7 +479,7 @@ impl Mechanism {
         self.model.bodies[b].origin
     }
 
-    /// Allocates what [`linearise`](crate::integrate::StiffSystem::linearise) needs, so that no step does.
+    /// Allocates what [`linearise`](crate::integrate::StiffSystem::linearise) needs, so that no step has to.
     pub fn prepare_linearisation(&mut self) {
         if self.stiff.is_none() {
             let (dimension, positions) = (self.dimension(), self.positions());
@@ -492,10 +492,10 @@ impl Mechanism {
         }
     }
 
-    /// Allocates what [`ContactSystem`](crate::integrate::ContactSystem) needs, so that no step does.
+    /// Allocates what [`ContactSystem`](crate::integrate::ContactSystem) needs, so that no step has to.
     ///
     /// # Errors
-    /// Contacts that couple too widely for it.
+    /// Contacts that are coupled too widely.
     pub fn prepare_implicit_contacts(&mut self) -> Result<(), MechanismError> {
         if self.implicit.is_none() {
             let velocities = self.dimension() - self.positions();

@@ -6,7 +6,7 @@ use super::spcmm::Trajectory;
 use crate::contact;
 use crate::scene::{Attachment, Drive, JointKind, JointStart, Mat3, Quat, Scene, StartRule, Vec3};
 
-/// Index that stands for the world among bodies: one past the last.
+/// Index of a body; one past the last stands for the world.
 pub type BodyIndex = usize;
 
 /// A body in its centroid frame: axes of the scene's body frame, origin at the centroid.
@@ -16,7 +16,7 @@ pub struct Body {
     /// About the centroid, body axes, kg m^2.
     pub inertia: Mat3,
     pub inertia_inverse: Mat3,
-    /// Parent body; the world's index where it hangs on the world.
+    /// Parent body; the world's index if it is attached to the world.
     pub parent: BodyIndex,
     pub motion: Motion,
     /// Joint point from the parent's centroid, parent axes (world: absolute), m.
@@ -33,13 +33,13 @@ pub struct Body {
     pub origin: Vec3,
     /// Whether its motion depends on time alone.
     pub driven_only: bool,
-    /// Whether another body that does not hangs on it.
+    /// Whether it has a child whose motion does not depend on time alone.
     pub carries: bool,
     /// Inertia is diagonal in body axes.
     pub diagonal: bool,
 }
 
-/// How a body moves against its parent.
+/// How a body moves relative to its parent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Motion {
     Fixed,
@@ -74,7 +74,7 @@ pub struct TreeBlock {
     pub n: usize,
     /// Which of its coordinates couple.
     pub pattern: Pattern,
-    /// The one free body of this block, where it is a lone one: its mass matrix is block diagonal.
+    /// The free body of this block, if it is the block's only body: its mass matrix is block diagonal.
     pub lone: Option<BodyIndex>,
 }
 
@@ -120,9 +120,9 @@ pub struct Model {
     pub start: StartRule,
     /// Position and velocity coordinates at t = 0 as the scene gives them.
     pub start_state: Vec<f64>,
-    /// What an error of one tolerance means for each coordinate of (q, v).
+    /// Scale by which the tolerance is multiplied for each coordinate of (q, v).
     pub scale: Vec<f64>,
-    /// Length behind the position scales, m.
+    /// Length from which the position scales are derived, m.
     pub length_scale: f64,
     pub output_body: BodyIndex,
     /// Probe tip from the output body's centroid, body axes.
@@ -261,7 +261,7 @@ impl Model {
         }
     }
 
-    /// Numbers coordinates tree by tree, so that each tree's are contiguous, and lays out the start and the scales.
+    /// Numbers the coordinates tree by tree, so that each tree's are contiguous, and fills in start state and scales.
     fn number_coordinates(&mut self, scene: &Scene, root: &[usize]) {
         let scales = Scales::of(scene);
         let mut start_q: Vec<f64> = Vec::new();
@@ -278,7 +278,7 @@ impl Model {
                 trees[self.block_of[b]].push(b);
             }
         }
-        // Last coordinate, within its tree, on the path to each body.
+        // Last coordinate, within its tree, on the path from the root to each body.
         let mut last = vec![NONE; self.bodies.len()];
         for bodies in trees {
             let (tree, count) = (bodies[0], bodies.len());
@@ -427,7 +427,7 @@ struct Scales {
 }
 
 impl Scales {
-    /// Length: the smallest ball radius. Speed: that length in a tenth of a second. Angles: 0.1 rad, 1 rad/s.
+    /// Length: the smallest ball radius, at most 1 m. Speed: that length in a tenth of a second. Angles: 0.1 rad, 1 rad/s.
     fn of(scene: &Scene) -> Self {
         let length = scene
             .ball_joints

@@ -1,5 +1,5 @@
-//! Powers of what gives and takes energy, each from the force that does it and the velocity of the point where it acts.
-//! Allocates nothing.
+//! Powers of all energy sources and sinks, each from its force and the velocity of the point where it acts. Allocates
+//! nothing.
 
 use super::Mechanism;
 use super::elements::ForceElement;
@@ -8,20 +8,20 @@ use super::kinematics::{Kinematics, Wrench};
 use super::model::{Model, Motion};
 use crate::scene::Vec3;
 
-/// Powers at one instant, or their integrals over a time (then J).
+/// Powers at one instant, or their integrals over time (then in J).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Powers {
-    /// Given by the drives: actuator force times rate, W.
+    /// Supplied by the drives: actuator force times rate, W.
     pub drive: f64,
-    /// Taken by the damping of the normal forces, W: (F_N - K delta^1.5) d(delta)/dt.
+    /// Dissipated by the damping of the normal forces, W: (F_N - K delta^1.5) d(delta)/dt.
     pub restitution: f64,
-    /// Taken by friction, W: -F_T . (velocity of the ball's point - velocity of the socket's point) (24).
+    /// Dissipated by friction, W: -F_T . (velocity of the ball's point - velocity of the socket's point) (24).
     pub friction: f64,
-    /// Given by clearances on their way, W: -F_N dc/dt + 2/5 dK/dt delta^2.5.
+    /// Supplied by ramping clearances, W: -F_N dc/dt + 2/5 dK/dt delta^2.5.
     pub clearance: f64,
-    /// Taken by the dampers of force elements, W.
+    /// Dissipated by the dampers of force elements, W.
     pub damping: f64,
-    /// Given by loads from outside, W.
+    /// Supplied by external loads, W.
     pub external: f64,
 }
 
@@ -32,7 +32,7 @@ pub struct Touch {
     pub direction: Vec3,
     /// F_N, N.
     pub normal_force: f64,
-    /// Power that friction takes, W.
+    /// Power dissipated by friction, W.
     pub friction_power: f64,
 }
 
@@ -48,11 +48,11 @@ impl Powers {
     }
 }
 
-/// What of a scene can have a power.
+/// Which parts of a scene can have power.
 pub(super) struct Sources {
     /// Neither drives, nor contacts, nor force elements: every power is zero.
     pub none: bool,
-    /// No drive feels an acceleration that the equations of motion have to be solved for: forces alone will do.
+    /// No drive force depends on an acceleration that the equations of motion have to be solved for: forces are enough.
     pub forces_suffice: bool,
 }
 
@@ -78,7 +78,7 @@ impl Sources {
 }
 
 impl Mechanism {
-    /// Whether anything can give or take energy but gravity.
+    /// Whether anything other than gravity can supply or dissipate energy.
     pub fn has_powers(&self) -> bool {
         !self.sources.none
     }
@@ -88,12 +88,12 @@ impl Mechanism {
         self.evaluated == Some(t)
     }
 
-    /// What was evaluated last is not to be read any more.
+    /// Marks the latest evaluation as stale.
     pub fn forget_evaluation(&mut self) {
         self.evaluated = None;
     }
 
-    /// Powers at the latest evaluation, whose derivative is `dy` where accelerations enter.
+    /// Powers at the latest evaluation; `dy` is its derivative, needed where accelerations enter.
     pub(super) fn powers_of_latest(&mut self, t: f64, y: &[f64], dy: &[f64]) -> Powers {
         let mut powers = Powers::default();
         let motion = self.equations.motion();
@@ -114,20 +114,20 @@ impl Mechanism {
         powers
     }
 
-    /// What the ball of joint `j` does to the wall of its socket at the latest evaluation; `None` where it does not press.
+    /// Contact of the ball of joint `j` with its socket wall at the latest evaluation; `None` if it does not press on it.
     pub fn touch(&self, j: usize) -> Option<Touch> {
         self.contacts.joint(j).touch(self.motion())
     }
 
-    /// Unit vector from the socket's centre of joint `j` to the ball's, off the centre, at the latest evaluation, in the axes of
-    /// the socket's body: towards the point of the wall that the ball is next to.
+    /// Unit vector from the socket centre of joint `j` to the ball centre, which must differ from it, at the latest evaluation,
+    /// in the axes of the socket's body: towards the point of the wall nearest to the ball.
     pub fn wall_direction(&self, j: usize) -> Vec3 {
         self.contacts.joint(j).wall_direction(self.motion())
     }
 }
 
-/// Forces that the drives must give for the accelerations in `motion` under the loads in `wrench`, which it changes, from
-/// the bodies for which `moved` says so: calls `found(drive, force)` for each.
+/// Drive forces required for the accelerations in `motion` under the loads in `wrench`, which are overwritten, from the
+/// bodies selected by `moved`: calls `found(drive, force)` for each.
 pub(super) fn inverse_dynamics(
     model: &Model,
     motion: &[Kinematics],

@@ -5,13 +5,13 @@ use super::factor::Skyline;
 
 /// Scaled pivots at or below this are rounding.
 const ROUNDING: f64 = 1e-12;
-/// Scaled pivots far below this, near a pose in which one more row depends on the others, press less and less on their
-/// multiplier instead of more and more: whoever passes such a pose passes it in finite steps, with an error of its square.
+/// Regularisation near a pose in which one more row becomes dependent: for scaled pivots far below this the multiplier
+/// shrinks instead of growing, so that such a pose is passed in finite steps, with an error of its square.
 const WEAK: f64 = 1e-10;
-/// Part of a null vector's largest component below which a row has no part in it.
+/// Fraction of a null vector's largest component below which a component counts as zero.
 const NO_PART: f64 = 1e-7;
 
-/// Constraint rows, coupled.
+/// The coupled constraint rows.
 pub struct RowSystem {
     skyline: Skyline,
     dependent: Option<Box<Dependent>>,
@@ -26,13 +26,13 @@ impl RowSystem {
         }
     }
 
-    /// Treats the rows as dependent from now on: at most `rank` of them count. Of the multipliers that fit, those from
-    /// `counted` on are the smallest in the sum of squares. Rows from `group[i]` on have the same unit as row i.
-    pub fn reveal(&mut self, rank: usize, counted: usize, group: Vec<usize>) {
+    /// Treats the rows as dependent from now on, with a rank of at most `rank`. Among the possible solutions, the multipliers
+    /// from `counted` on have the smallest sum of squares. Rows from `group[i]` on have the same unit as row i.
+    pub fn treat_as_dependent(&mut self, rank: usize, counted: usize, group: Vec<usize>) {
         self.dependent = Some(Box::new(Dependent::new(rank, counted, group)));
     }
 
-    /// Number of independent rows: as found at the latest factorisation where they are treated as dependent, else all.
+    /// Number of independent rows: as found by the latest factorisation if they are treated as dependent, else all.
     pub fn rank(&self) -> usize {
         let all = self.skyline.len();
         self.dependent.as_ref().map_or(all, |rows| rows.rank)
@@ -55,22 +55,22 @@ impl RowSystem {
         }
     }
 
-    /// Multipliers, one set for each dropped row, that load nothing: any amount of them may be added to a solution.
-    pub fn idle_multipliers(&self) -> impl Iterator<Item = &[f64]> {
+    /// Null vectors, one for each dropped row: multipliers that load nothing, so that any multiple may be added to a solution.
+    pub fn null_multipliers(&self) -> impl Iterator<Item = &[f64]> {
         let rows = self.dependent.iter();
         rows.flat_map(|rows| rows.null.chunks_exact(rows.n).take(rows.n - rows.rank))
     }
 
     /// Whether the multipliers of rows `first..first + count` are unique.
     pub fn is_unique(&self, first: usize, count: usize) -> bool {
-        self.idle_multipliers().all(|null| {
+        self.null_multipliers().all(|null| {
             let largest = null.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
             let own = null[first..first + count].iter();
             own.fold(0.0_f64, |most, x| most.max(x.abs())) <= NO_PART * largest
         })
     }
 
-    /// Forgets all values.
+    /// Sets all entries to zero.
     #[inline]
     pub fn clear(&mut self) {
         self.skyline.clear();
@@ -82,8 +82,8 @@ impl RowSystem {
         self.skyline.add(i, j, value);
     }
 
-    /// Factors in place. Returns the smallest pivot ratio, without the rows that are known to depend on others: near
-    /// rounding level, more of them do.
+    /// Factors in place. Returns the smallest pivot ratio, without the rows known to be dependent: near rounding level,
+    /// further rows are dependent.
     #[inline]
     pub fn factor(&mut self) -> f64 {
         match &mut self.dependent {
@@ -92,8 +92,8 @@ impl RowSystem {
         }
     }
 
-    /// After a plain factorisation: the smallest ratio of a pivot to the largest diagonal entry of `count` rows that
-    /// belong together. A row that is zero but for rounding has a ratio of its own that says nothing.
+    /// After a plain factorisation: the smallest ratio of a pivot to the largest diagonal entry of the `count` rows of its
+    /// joint. For a row that is zero up to rounding, the ratio to its own diagonal entry would be meaningless.
     pub fn least_joint_pivot(&self, count: usize) -> f64 {
         let mut least = f64::INFINITY;
         for first in (0..self.skyline.len()).step_by(count) {
@@ -119,11 +119,11 @@ impl RowSystem {
     }
 }
 
-/// Rows of which some depend on others. With S A S scaled to diagonal entries of 1 at most and P its pivot order,
-/// P^T S A S P = L L^T over the first `rank` columns; the rows left over give the null vectors of A.
+/// Rows of which some are dependent. With S A S scaled to diagonal entries of at most 1 and P its pivot order,
+/// P^T S A S P = L L^T over the first `rank` columns; the remaining rows give the null vectors of A.
 struct Dependent {
     n: usize,
-    /// Most rows that may count: near the constraints, but not on them, more seem to be independent.
+    /// Upper bound on the rank: close to the constraints, but not on them, more rows appear independent.
     most: usize,
     counted: usize,
     group: Vec<usize>,
@@ -188,7 +188,7 @@ impl Dependent {
         least
     }
 
-    /// Right-looking Cholesky with diagonal pivoting; returns the smallest pivot, 0 where fewer rows than asked for are
+    /// Right-looking Cholesky with diagonal pivoting; returns the smallest pivot, 0 if fewer rows than asked for are
     /// independent.
     fn eliminate(&mut self) -> f64 {
         let (n, a) = (self.n, &mut self.factor);
@@ -237,7 +237,7 @@ impl Dependent {
         let l = &self.factor;
         for (dropped, null) in (rank..n).zip(self.null.chunks_exact_mut(n)) {
             null.fill(0.0);
-            // L1^T x = -(row of L2), then back to file order and units.
+            // L1^T x = -(row of L2), then back to original order and units.
             for k in (0..rank).rev() {
                 let mut x = -l[dropped * n + k];
                 for i in k + 1..rank {
@@ -286,7 +286,7 @@ impl Dependent {
             work[k] = sum / l[k * n + k];
             x[self.order[k]] = work[k] * self.scale[self.order[k]];
         }
-        // Less what loads nothing, so that the counted ones are as small as they can be.
+        // Subtract the null vectors' part, so that the counted multipliers are as small as possible.
         let free = n - rank;
         for i in 0..free {
             let null = &self.null[i * n..][..n];
@@ -347,7 +347,7 @@ mod tests {
         assert!(plain.factor() < 1e-12 || plain.least_joint_pivot(5) < 1e-12);
         for most in [3, 5] {
             let mut system = system(&a);
-            system.reveal(most, 0, vec![0; 5]);
+            system.treat_as_dependent(most, 0, vec![0; 5]);
             system.factor();
             assert_eq!(system.rank(), 3);
             let mut x = right.clone();
@@ -357,12 +357,12 @@ mod tests {
         }
         // Only the last four count: no idle set can make them smaller.
         let mut system = system(&a);
-        system.reveal(3, 1, vec![0, 1, 2, 3, 4]);
+        system.treat_as_dependent(3, 1, vec![0, 1, 2, 3, 4]);
         system.factor();
         let mut x = right.clone();
         system.solve(x.as_mut_slice());
         assert!((&a * &x - &right).norm() < 1e-9 * right.norm());
-        for null in system.idle_multipliers() {
+        for null in system.null_multipliers() {
             let null = DVector::from_row_slice(null);
             assert!((&a * &null).norm() < 1e-12 * null.norm());
             let (own, idle) = (x.rows(1, 4), null.rows(1, 4));
@@ -385,7 +385,7 @@ mod tests {
         for (i, j) in [(0, 0), (2, 0), (2, 2)] {
             system.add(i, j, a[(i, j)]);
         }
-        system.reveal(3, 0, vec![0; 3]);
+        system.treat_as_dependent(3, 0, vec![0; 3]);
         system.factor();
         assert_eq!((system.rank(), system.independent()), (2, vec![0, 2]));
         let mut x = [3.0, 0.0, 4.0];

@@ -1,6 +1,6 @@
 //! The paper's mechanism: trajectory (59), accompanying motion and slider laws (39), all with exact derivatives.
 //!
-//! Square roots that turn imaginary mean that a rod is too short for the trajectory.
+//! An imaginary square root means that a rod is too short for the trajectory.
 
 use super::jet::Jet;
 use crate::scene::{Spcmm, Vec3};
@@ -39,14 +39,14 @@ pub struct Unreachable {
 }
 
 impl Unreachable {
-    /// Decimals that tell the two lengths apart, four at least.
+    /// Decimals needed to tell the two lengths apart, at least four.
     fn digits(&self) -> usize {
         let missing = libm::log10((self.needs - self.has).max(1e-12));
         (1.0 - missing.floor()).clamp(4.0, 12.0) as usize
     }
 }
 
-/// What depends on the parameters alone.
+/// Quantities that depend on the parameters alone.
 #[derive(Clone, Copy, Debug)]
 pub struct Trajectory {
     p: Spcmm,
@@ -74,8 +74,8 @@ impl Trajectory {
         1.0 / self.p.frequency
     }
 
-    /// Squares that the three rods have left for their slider direction: L2^2 minus the squared offset across it, m^2,
-    /// with everything needed to go on. Negative where the rod is too short.
+    /// Squared length that each of the three rods has left along its slider direction: L2^2 minus the squared transverse
+    /// offset, m^2 (of the third a quarter of the discriminant), with the intermediate results. Negative if the rod is too short.
     fn evaluate(&self, t: f64) -> ([Jet; 3], Parts) {
         let p = &self.p;
         let omega = std::f64::consts::TAU * p.frequency;
@@ -147,10 +147,10 @@ impl Trajectory {
         }
     }
 
-    /// Looks along one whole period for a rod that is too short.
+    /// Searches one whole period for a rod that is too short.
     ///
     /// # Errors
-    /// The rod that falls shortest, where it does.
+    /// The rod that is too short by the most, where it is.
     pub fn check(&self) -> Result<(), Unreachable> {
         const SAMPLES: u32 = 4000;
         let period = if self.p.frequency > 0.0 {

@@ -1,4 +1,4 @@
-//! How a mechanism starts: assembled from the scene's values, with what that moved, and the rank of its constraints.
+//! Start of a mechanism: assembly from the scene's values, how far it moved the bodies, and the rank of the constraints.
 
 use super::constraints::Constraints;
 use super::kinematics::{self, Kinematics};
@@ -8,44 +8,44 @@ use super::tree::Tree;
 use super::{Mechanism, MechanismError, OPEN_AS_GIVEN};
 use crate::scene::{StartRule, Vec3};
 
-/// Smallest pivot ratio at which a start still has its velocities to three digits.
+/// Smallest pivot ratio at which the start velocities still have three correct digits.
 const DEPENDENT_ROWS: f64 = 1e-13;
-/// Loops are closed at the start where they are open by no more than this, m.
+/// Largest gap at which a loop counts as closed at the start, m.
 const CLOSED: f64 = 1e-9;
-/// Where rows depend on others, joints may open at this speed at the start, m/s: rounding of the drives.
+/// With dependent rows, largest speed at which a joint may open at the start, m/s: rounding of the drives.
 const HELD: f64 = 1e-8;
-/// Poses around the start at which the rank is looked at lie this long away at the scales' speeds, s: a tenth of the
+/// Distance of the neighbouring poses at which the rank is checked, as a time at the scales' speeds, s: a tenth of the
 /// length scale, 0.01 rad.
 const BESIDE: f64 = 0.01;
-/// Closing moves nothing any more below this part of the scales.
+/// Assembly has come to rest once it moves by less than this fraction of the scales.
 const AT_REST: f64 = 1e-9;
 
-/// What assembling the start made of the scene's values. In a scene with the paper's inverse kinematics the guess is that of
-/// their closed form.
+/// How assembly at the start changed the scene's values. In a scene with the paper's inverse kinematics the guess comes
+/// from their closed form.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Assembly {
     /// How far each body was moved from the guess.
     pub bodies: Vec<Placement>,
-    /// Of the joints that start closed the one that the guess leaves widest open, and |Z_j - Z_i| there, m.
+    /// Of the joints that start closed, the one with the widest gap in the guess, and |Z_j - Z_i| there, m.
     pub widest: Option<(usize, f64)>,
-    /// Whether the loops closed in another assembly mode than that of the guess. Known only where closed joints and drives
-    /// leave nothing free: a singular pose then lies between the two.
+    /// Whether the loops closed in another assembly mode than that of the guess, with a singular pose between the two. Known
+    /// only if closed joints and drives leave no degree of freedom.
     pub other_mode: bool,
-    /// Whether the guess is the closed form's.
+    /// Whether the guess comes from the closed form.
     pub closed_form: bool,
 }
 
 /// How far assembling moved a body.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Placement {
-    /// Distance of its frame's origin from where the guess has it, m.
+    /// Distance of its frame's origin from that in the guess, m.
     pub moved: f64,
     /// Angle from its orientation in the guess, rad.
     pub turned: f64,
 }
 
 impl Mechanism {
-    /// What [`Self::start`] made of the scene's values.
+    /// How [`Self::start`] changed the scene's values.
     pub fn assembly(&self) -> &Assembly {
         &self.assembly
     }
@@ -84,7 +84,7 @@ impl Mechanism {
             let joint = || self.joint_names[j].clone();
             let clearance = self.contacts.clearance(j);
             if all.contains(&j) {
-                // Newton starts from the scene's guess: anything like closed will do for an assembled start.
+                // An assembled start only needs a rough guess, which Newton's method then closes.
                 if d > OPEN_AS_GIVEN && !assembled {
                     return Err(MechanismError::Open {
                         joint: joint(),
@@ -122,7 +122,7 @@ impl Mechanism {
         self.assembly = assembly;
         self.rank = rank;
         if let Some(rank) = rank {
-            self.equations.reveal(rank);
+            self.equations.treat_as_dependent(rank);
         }
         Ok(self.equations.state_of(&self.model, y, &tree.motion))
     }
@@ -142,30 +142,30 @@ impl Mechanism {
         if error <= CLOSED && constraints.system().least_joint_pivot(3) >= DEPENDENT_ROWS {
             return Ok(());
         }
-        // Rows depend on one another here, or on the way here: once more, by those that do not.
-        constraints.reveal(constraints.rows());
+        // Rows are dependent here or were on the way here: try again with the independent ones.
+        constraints.treat_as_dependent(constraints.rows());
         y.clone_from(&guess);
         let error = constraints.project(model, tree, T, y);
         tree.forward(model, T, y);
         if !(error <= CLOSED) {
             return Err(self.no_closure(constraints, tree, &guess, y));
         }
-        // A singular pose of the paper's mechanism does not let its drives fix its velocities, with clearance or without.
+        // In a singular pose of the paper's mechanism the drives do not determine the velocities, with clearance or without.
         if model.trajectory.is_some() && rank_around(model, constraints, tree, y).is_none() {
             return Err(MechanismError::Singular);
         }
         Ok(())
     }
 
-    /// That no ideal joint opens in the velocities of `y`: directions held more than once, by drives say, may contradict
-    /// one another.
+    /// Checks that no ideal joint opens at the velocities in `y`: where directions are constrained more than once, for
+    /// example by drives, these may contradict one another.
     fn check_speeds(&self, tree: &mut Tree, y: &[f64]) -> Result<(), MechanismError> {
         tree.forward(&self.model, 0.0, y);
         for &j in &self.model.ideal_joints {
             let rate = self.model.joints[j].opening_rate(&tree.motion);
             if !(rate.norm() <= HELD) {
                 let joint = self.joint_names[j].clone();
-                return Err(MechanismError::Torn { joint, rate });
+                return Err(MechanismError::InconsistentDrives { joint, rate });
             }
         }
         Ok(())
@@ -210,7 +210,7 @@ impl Mechanism {
         }
     }
 
-    /// Rank of the rows of the ideal joints in the assembled pose `y` and around it; `None` where all are independent.
+    /// Rank of the ideal joints' rows in the assembled pose `y` and around it; `None` if all are independent.
     fn rank_of_ideal_joints(
         &self,
         tree: &mut Tree,
@@ -226,7 +226,7 @@ impl Mechanism {
         if constraints.system().least_joint_pivot(3) >= DEPENDENT_ROWS {
             return Ok(None);
         }
-        constraints.reveal(constraints.rows());
+        constraints.treat_as_dependent(constraints.rows());
         let rank = rank_around(model, &mut constraints, tree, y);
         rank.map(Some).ok_or_else(|| {
             if model.trajectory.is_some() {
@@ -241,15 +241,15 @@ impl Mechanism {
         })
     }
 
-    /// Whether the force of actuator `i` is the only one that fits the motion, at the latest evaluation.
+    /// Whether the force of actuator `i` is unique at the latest evaluation.
     pub fn is_actuator_unique(&mut self, i: usize) -> bool {
         self.equations
             .is_actuator_unique(&self.model, &self.gravity, i)
     }
 }
 
-/// Rank of revealed `constraints` at the assembled state `y`, where it is the same in the poses around; `None` where it is
-/// larger there: the pose is singular.
+/// Rank of `constraints`, treated as dependent, at the assembled state `y` if it is the same in neighbouring poses; `None`
+/// if it is larger there: the pose is singular.
 fn rank_around(
     model: &Model,
     constraints: &mut Constraints,
@@ -262,7 +262,7 @@ fn rank_around(
     if rank == model.nv {
         return Some(rank);
     }
-    // Nothing but a narrow miss made the rows look dependent.
+    // The rows looked dependent only because a singular pose is narrowly missed.
     if rank == constraints.rows() {
         return None;
     }
@@ -280,7 +280,7 @@ fn rank_around(
             let mut free: Vec<f64> = (0..model.nv)
                 .map(|i| model.scale[model.nq + i] * libm::sin((direction * (2 * i + 1)) as f64))
                 .collect();
-            constraints.restrain(model, &mut free);
+            constraints.project_accelerations(model, &mut free);
             let sizes = free.iter().zip(&model.scale[model.nq..]);
             let largest = sizes.fold(0.0_f64, |most, (v, scale)| most.max(v.abs() / scale));
             let step: Vec<f64> = free.iter().map(|v| sign * BESIDE * v / largest).collect();
@@ -303,8 +303,8 @@ fn factor_at(model: &Model, constraints: &mut Constraints, tree: &mut Tree, t: f
     constraints.prepare(model, tree, t, &y[..model.nq], &Vec3::zeros());
 }
 
-/// Whether closed joints leave nothing free and a singular pose lies between the guess and the assembled state `y`: a
-/// determinant of as many independent rows as coordinates has another sign at each.
+/// Whether closed joints leave no degree of freedom and a singular pose lies between the guess and the assembled state
+/// `y`: the determinant of as many independent rows as coordinates then has opposite signs at the two.
 fn is_other_mode(
     model: &Model,
     constraints: &mut Constraints,
@@ -331,7 +331,7 @@ fn is_other_mode(
 fn placement(body: &model::Body, from: &Kinematics, to: &Kinematics) -> Placement {
     let origin = |m: &Kinematics| m.position + m.rotation * body.origin;
     let turn = from.rotation.tr_mul(&to.rotation);
-    // Sine and cosine of the angle: a cosine alone has no small angles.
+    // Sine and cosine of the angle: the cosine alone does not resolve small angles.
     let sine = Vec3::new(
         turn[(2, 1)] - turn[(1, 2)],
         turn[(0, 2)] - turn[(2, 0)],
@@ -343,7 +343,7 @@ fn placement(body: &model::Body, from: &Kinematics, to: &Kinematics) -> Placemen
     }
 }
 
-/// Puts the free output body where the ideal mechanism has it at t = 0, so that assembling has little left to do.
+/// Places the free output body as in the ideal mechanism at t = 0, so that assembly has little left to do.
 fn place_output_body(model: &Model, trajectory: &Trajectory, y: &mut [f64]) {
     let ideal = trajectory.at(0.0);
     let body = &model.bodies[model.output_body];
@@ -361,8 +361,8 @@ fn place_output_body(model: &Model, trajectory: &Trajectory, y: &mut [f64]) {
     }
 }
 
-/// Turns every hinged body that carries a ball until the ball comes closest to its socket, so that loops close on the
-/// branch that the closed form means.
+/// Turns every hinged body that carries a ball so that the ball is closest to its socket and loops close on the branch of
+/// the closed form.
 fn turn_hinges(model: &Model, motion: &[Kinematics], y: &mut [f64]) {
     for joint in &model.joints {
         let motion_of = |b: usize| model.bodies.get(b).map(|body| body.motion);

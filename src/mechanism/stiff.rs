@@ -1,8 +1,8 @@
-//! The stiff part of the equations of motion, linearised analytically: forces of contacts and of
-//! force elements against displacement and velocity.
+//! The stiff part of the equations of motion, linearised analytically: derivatives of the forces of contacts and force
+//! elements with respect to displacement and velocity.
 //!
-//! A W-method keeps its order with any approximation of the Jacobian, so what is not stiff (gravity, gyroscopic terms,
-//! the turning of arms) is left out. With a = M^-1 (Q + ...), K = dQ/dq and D = dQ/dv in velocity space,
+//! A W-method keeps its order with any approximation of the Jacobian, so non-stiff terms (gravity, gyroscopic terms,
+//! rotation of lever arms) are left out. With a = M^-1 (Q + ...), K = dQ/dq and D = dQ/dv in velocity space,
 //! (s I - J) (x_q, x_v) = (b_q, b_v) becomes (s I - M^-1 D - M^-1 K / s) x_v = b_v + M^-1 K T^+ b_q / s,
 //! x_q = (b_q + T x_v) / s, where T maps velocities to position rates.
 
@@ -16,7 +16,7 @@ use super::model::{BallJoint, Model};
 use crate::scene::Vec3;
 use nalgebra::Complex;
 
-/// Partial time derivatives of the motion of one point against another at fixed coordinates.
+/// Partial time derivatives of the motion of one point relative to another at fixed coordinates.
 #[derive(Clone, Copy, Default)]
 struct Drift {
     eccentricity: Vec3,
@@ -36,7 +36,7 @@ pub struct Stiff {
     pub time_derivative: Vec<f64>,
     /// Scratch for the derivative at the point of linearisation.
     pub derivative: Vec<f64>,
-    /// How the points of each contact and element move with time alone.
+    /// Explicit time dependence of the points of each contact and element.
     drift: Vec<Drift>,
     /// Positions at which the linearisation was taken.
     y: Vec<f64>,
@@ -47,12 +47,12 @@ pub struct Stiff {
     rate: Vec<f64>,
     rate_im: Vec<f64>,
     pair: Vec<Complex<f64>>,
-    /// Neither a contact nor an element carries a force: J is taken as zero but for q' = T v.
+    /// No contact or element carries a force: J is taken as zero except for q' = T v.
     empty: bool,
 }
 
 impl Stiff {
-    /// For `velocities` velocity coordinates in a state of `dimension`, with as many `couplings` by ball joints and elements.
+    /// For `velocities` velocity coordinates in a state of `dimension`, with `couplings` ball joints and elements.
     pub fn new(velocities: usize, dimension: usize, couplings: usize) -> Self {
         let n = velocities;
         Self {
@@ -113,7 +113,7 @@ impl Stiff {
         }
     }
 
-    /// Takes how the points of contacts and elements move with time alone from a motion with all coordinates at rest.
+    /// Records the explicit time dependence of the points of contacts and elements, from a motion with all coordinates at rest.
     pub fn observe_drift(
         &mut self,
         contacts: &Contacts,
@@ -137,7 +137,7 @@ impl Stiff {
         }
     }
 
-    /// dQ_k/dt of one coupling. The sliding of driven bodies' surfaces by their turning is not stiff and left out.
+    /// dQ_k/dt of one coupling. Sliding of driven bodies' surfaces due to their rotation is not stiff and is left out.
     fn add_drift(&mut self, coupling: &Coupling, i: usize) {
         let (s, drift) = (&coupling.stiffness, self.drift[i]);
         let force = s.by_displacement * drift.eccentricity
@@ -157,7 +157,7 @@ impl Stiff {
         for l in &self.columns {
             let force_q = s.by_displacement * l.centre;
             let normal_q = s.normal * l.centre;
-            let slip = if coupling.reads_surfaces {
+            let slip = if coupling.uses_surface_velocity {
                 l.surface
             } else {
                 l.centre
@@ -172,7 +172,7 @@ impl Stiff {
         }
     }
 
-    /// Turns forces into accelerations.
+    /// Converts forces to accelerations.
     pub fn apply_inverse_mass(&mut self, model: &Model, equations: &mut dyn Equations) {
         if self.empty {
             return;
@@ -322,7 +322,7 @@ mod tests {
 
     #[test]
     fn jacobian_is_that_of_central_differences_in_everything_stiff() {
-        // With the last, the rate is the largest so far: the damping term does not answer to it.
+        // In the last case the rate is the largest so far: the damping term does not depend on it.
         for (surface, approach, remembered) in [
             ("centres", "start", 1e-3),
             ("printed", "start", 1e-3),

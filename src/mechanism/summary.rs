@@ -17,7 +17,7 @@ pub struct Summary {
     pub position_coordinates: usize,
     /// Constraint rows of the formulation.
     pub constraint_rows: usize,
-    /// Of these, rows that others imply; known once the mechanism was assembled.
+    /// Of these, redundant rows; known once the mechanism has been assembled.
     pub dependent_rows: usize,
     /// Degrees of freedom left.
     pub degrees_of_freedom: usize,

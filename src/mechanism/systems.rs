@@ -1,4 +1,4 @@
-//! The equations of motion as what the steppers ask for.
+//! The equations of motion in the form required by the steppers.
 
 use super::contacts::{Counts, Touching};
 use super::elements::{At, Loads};
@@ -7,18 +7,18 @@ use super::kinematics::Wrench;
 use super::{Mechanism, Powers};
 use crate::integrate::{ContactSystem, StiffSystem, System};
 
-/// The equations of motion under what decides the contacts over a step.
+/// The equations of motion, with what decides over a step which contacts carry a force.
 pub struct Evaluator<'a> {
     mechanism: &'a mut Mechanism,
     touching: Touching<'a>,
-    /// Evaluations made through it.
+    /// Counts of the evaluations made through it.
     pub counts: Counts,
-    /// In one of them a sliding speed or a penetration rate was beyond the piece of its law that the memory holds.
+    /// In one of them a sliding speed or penetration rate was beyond the piece of its law held in the memory.
     pub left_piece: bool,
 }
 
 impl Mechanism {
-    /// The equations of motion under what decides the contacts.
+    /// The equations of motion, with what decides which contacts carry a force.
     pub fn evaluator<'a>(&'a mut self, touching: Touching<'a>) -> Evaluator<'a> {
         Evaluator {
             mechanism: self,
@@ -139,7 +139,7 @@ impl StiffSystem for Evaluator<'_> {
             return;
         };
         let mut scratch = std::mem::take(&mut stiff.derivative);
-        // Prescribed motion is what moves contacts by time alone; bodies that are states stand still in that sense.
+        // Only prescribed motion moves contacts by time alone; bodies in the state are at rest in that sense.
         scratch[..positions].copy_from_slice(&y[..positions]);
         scratch[positions..].fill(0.0);
         let Mechanism {
@@ -149,7 +149,7 @@ impl StiffSystem for Evaluator<'_> {
             elements,
             ..
         } = &mut *self.mechanism;
-        if let Some(motion) = equations.motion_by_time_alone(model, t, &scratch) {
+        if let Some(motion) = equations.prescribed_motion(model, t, &scratch) {
             stiff.observe_drift(contacts, elements, motion);
         }
         self.derivative(t, y, &mut scratch);
@@ -212,18 +212,18 @@ impl StiffSystem for Evaluator<'_> {
 }
 
 impl ContactSystem for Evaluator<'_> {
-    fn derivative_apart(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
+    fn derivative_without_contacts(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
         let touching = std::mem::replace(&mut self.touching, Touching::Nothing);
         self.derivative(t, y, dy);
         self.touching = touching;
     }
 
-    fn contact_push(&mut self, t: f64, h: f64, y: &mut [f64], dv: &mut [f64]) -> bool {
+    fn contact_velocity_change(&mut self, t: f64, h: f64, y: &mut [f64], dv: &mut [f64]) -> bool {
         let positions = self.positions();
-        // Ideal joints close first: contacts feel less than these may be open by.
+        // Close ideal joints first: contact forces already depend on distances smaller than the gaps these may have.
         self.mechanism.project(t, y);
         self.mechanism.measure(t, y);
-        // Refused, if at all, where the method was chosen.
+        // An error was already reported when the method was chosen.
         let _ = self.mechanism.prepare_implicit_contacts();
         let Mechanism {
             model,

@@ -1,13 +1,13 @@
 //! The tree formulation: coordinates of the spanning forest that remains when every ball joint is cut.
 //!
-//! Mass matrix by composite rigid bodies, bias by one pass outward and one inward (Featherstone 2008, chapters 5 and 6),
-//! in world axes with each body's own centroid as reference. Allocates nothing after `new`.
+//! Mass matrix by the composite-rigid-body algorithm, bias by one outward and one inward pass (Featherstone 2008,
+//! chapters 5 and 6), in world axes with each body's own centroid as reference. Allocates nothing after `new`.
 
 use super::kinematics::{self, Driven, Kinematics, Wrench};
 use super::model::{Model, Motion};
 use crate::scene::{Mat3, Vec3};
 
-/// Mass, first moment and inertia of a body with all that hangs on it, about that body's centroid.
+/// Mass, first moment and inertia of a body with all its descendants, about that body's centroid.
 #[derive(Clone, Copy)]
 struct Composite {
     mass: f64,
@@ -80,7 +80,7 @@ impl Tree {
         tree
     }
 
-    /// For `model`, of which nothing is asked but how it moves: [`Self::forward`].
+    /// For `model`, if only its motion is needed: [`Self::forward`].
     pub fn without_masses(model: &Model) -> Self {
         let n = model.bodies.len();
         Self {
@@ -159,7 +159,7 @@ impl Tree {
                 torque: load.torque - inertia * m.angular_acceleration - w.cross(&(inertia * w)),
             };
             if body.carries {
-                // Everything that hangs on this body has been added up by now.
+                // All descendants of this body have been added up by now.
                 c.add(&composite[b]);
                 composite[b] = Composite::EMPTY;
             }
@@ -315,7 +315,7 @@ impl Tree {
         }
     }
 
-    /// Keeps quaternions at length 1.
+    /// Normalises quaternions to length 1.
     #[inline]
     pub fn normalise(model: &Model, y: &mut [f64]) {
         for body in &model.bodies {
@@ -354,8 +354,8 @@ fn world_inertia(r: &Mat3, inertia: &Mat3, diagonal: bool) -> Mat3 {
     Mat3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
 }
 
-/// Adds to `sum` the inertia of a composite (inertia about its own reference, mass, first moment) seen from a reference
-/// that lies `d` before its own: I + m (d.d 1 - d d^T) + 2 (d.k) 1 - d k^T - k d^T.
+/// Adds to `sum` the inertia of a composite (inertia about its own reference, mass, first moment) about a reference from
+/// which its own lies at `d`: I + m (d.d 1 - d d^T) + 2 (d.k) 1 - d k^T - k d^T.
 #[inline]
 fn add_shifted_inertia(sum: &mut Mat3, inertia: &Mat3, mass: f64, k: &Vec3, d: &Vec3) {
     // With h = k + m d / 2 the whole shift is 2 (d.h) 1 - d h^T - h d^T.

@@ -5,19 +5,19 @@ use std::sync::Arc;
 use eframe::egui;
 use eframe::egui_wgpu;
 
-use super::{Renderer, Target, wgpu};
+use super::{RenderTarget, Renderer, wgpu};
 use crate::view::DrawList;
 
-/// Lives in egui's callback resources.
+/// Stored in egui's callback resources.
 struct Resources {
     renderer: Renderer,
     blit: wgpu::RenderPipeline,
     layout: wgpu::BindGroupLayout,
     sampler: wgpu::Sampler,
-    shown: Option<(Target, wgpu::BindGroup)>,
+    shown: Option<(RenderTarget, wgpu::BindGroup)>,
 }
 
-/// Makes the renderer and keeps it in egui's callback resources. Call once, when the application starts.
+/// Creates the renderer and stores it in egui's callback resources. Call once, when the application starts.
 pub fn install(state: &egui_wgpu::RenderState) {
     let resources = Resources::new(&state.device, state.target_format);
     state.renderer.write().callback_resources.insert(resources);
@@ -116,7 +116,7 @@ impl Resources {
     }
 
     fn fit_target(&mut self, device: &wgpu::Device, size: [u32; 2]) {
-        // A window can be 0 pixels wide for a moment, or wider than a texture may be.
+        // A window can briefly be 0 pixels wide, or wider than the largest texture.
         let limit = device.limits().max_texture_dimension_2d;
         let size = size.map(|n| n.clamp(1, limit));
         if self
@@ -126,7 +126,7 @@ impl Resources {
         {
             return;
         }
-        let target = Target::new(device, size);
+        let target = RenderTarget::new(device, size);
         let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("blit"),
             layout: &self.layout,
@@ -154,7 +154,7 @@ impl egui_wgpu::CallbackTrait for Viewport {
         encoder: &mut wgpu::CommandEncoder,
         resources: &mut egui_wgpu::CallbackResources,
     ) -> Vec<wgpu::CommandBuffer> {
-        // Without `install` there is nothing to draw with: the rectangle stays empty.
+        // Without `install` there is no renderer: the rectangle stays empty.
         let Some(resources) = resources.get_mut::<Resources>() else {
             return Vec::new();
         };

@@ -8,11 +8,11 @@ pub enum RenderError {
         "picture of {width}x{height} pixels: each side must be 1 to {limit} on this graphics adapter"
     )]
     Size {
-        /// Asked width.
+        /// Requested width.
         width: u32,
-        /// Asked height.
+        /// Requested height.
         height: u32,
-        /// Greatest side.
+        /// Largest side.
         limit: u32,
     },
     /// The device failed while drawing or reading back.
@@ -32,7 +32,7 @@ pub struct Image {
 }
 
 impl Image {
-    /// As the bytes of a PNG file; `texts` are its keyword and text pairs (`Software`, `Description`, …; Latin-1).
+    /// Encodes as PNG; `texts` are its keyword and text pairs (`Software`, `Description`, …; Latin-1).
     ///
     /// # Errors
     /// A text that PNG cannot hold.

@@ -1,4 +1,4 @@
-//! Pictures for a person to look at: `JOINTPLAY_LOOK=folder cargo test --lib render::look -- --ignored`.
+//! Pictures for visual inspection: `JOINTPLAY_LOOK=folder cargo test --lib render::look -- --ignored`.
 
 use super::Offscreen;
 use crate::view::{DrawList, PeakMarks, Preset, SceneView, Shot, Theme, ViewOptions, fixture};
@@ -85,7 +85,7 @@ fn look() {
     }
 }
 
-/// Cost of a picture on this processor: the list, and recording its passes.
+/// CPU cost of a picture: building the list, and recording its passes.
 #[test]
 #[ignore = "prints times for a person to read"]
 fn time() {

@@ -4,9 +4,9 @@ use std::f32::consts::{PI, TAU};
 
 use crate::view::{Mesh, MeshData};
 
-/// Around a bar or a ball.
+/// Around a bar or a sphere.
 const SECTORS: u32 = 64;
-/// From pole to pole of a ball.
+/// From pole to pole of a sphere.
 const STACKS: u32 = 32;
 
 /// The shared meshes, by [`Mesh::index`].
@@ -15,7 +15,7 @@ pub(super) fn shared() -> [MeshData; Mesh::SHARED] {
 }
 
 /// Adds a patch: `point(u, v)` for u, v in 0..=1 gives position and normal; u runs around, v from bottom to top, so that
-/// (u, v, outside) is right-handed.
+/// (u, v, outward) is right-handed.
 fn patch(mesh: &mut MeshData, nu: u32, nv: u32, point: impl Fn(f32, f32) -> ([f32; 4], [f32; 3])) {
     let first = mesh.vertices.len() as u32;
     for j in 0..=nv {
@@ -33,13 +33,13 @@ fn patch(mesh: &mut MeshData, nu: u32, nv: u32, point: impl Fn(f32, f32) -> ([f3
     }
 }
 
-/// Point of the unit circle at turn `u`; exactly closed.
+/// Point of the unit circle at `u` turns; exactly closed.
 fn circle(u: f32) -> (f32, f32) {
     let angle = if u >= 1.0 { 0.0 } else { u * TAU };
     (angle.cos(), angle.sin())
 }
 
-/// Point of the unit ball: turn `u`, height angle from the south pole `theta`.
+/// Point of the unit sphere: `u` turns of azimuth, polar angle `theta` from the south pole.
 fn on_ball(u: f32, theta: f32) -> [f32; 3] {
     let (x, y) = circle(u);
     [theta.sin() * x, theta.sin() * y, -theta.cos()]

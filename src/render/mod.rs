@@ -1,5 +1,5 @@
-//! Draws a [`crate::view::DrawList`] to a texture with wgpu: the same path in a window, in the browser (WebGPU, WebGL2)
-//! and without a screen.
+//! Draws a [`crate::view::DrawList`] to a texture with wgpu: the same path in a window, in the browser (WebGPU, WebGL2) and
+//! headless.
 //!
 //! The picture is gamma-encoded once, at the end of `shaders/scene.wgsl`; everything after that copies bytes.
 
@@ -22,4 +22,4 @@ pub use image::{Image, RenderError};
 #[cfg(not(target_arch = "wasm32"))]
 pub use offscreen::{NoAdapter, Offscreen};
 pub use renderer::Renderer;
-pub use target::Target;
+pub use target::RenderTarget;

@@ -1,6 +1,6 @@
 //! Pictures without a window.
 
-use super::{Image, RenderError, Renderer, Target, wgpu};
+use super::{Image, RenderError, RenderTarget, Renderer, wgpu};
 use crate::view::DrawList;
 
 /// No graphics adapter on this machine.
@@ -10,17 +10,17 @@ use crate::view::DrawList;
 )]
 pub struct NoAdapter;
 
-/// A device without a window, with its renderer.
+/// A device without a window, and its renderer.
 pub struct Offscreen {
     adapter: wgpu::AdapterInfo,
     device: wgpu::Device,
     queue: wgpu::Queue,
     renderer: Renderer,
-    frame: Option<(Target, wgpu::Buffer)>,
+    frame: Option<(RenderTarget, wgpu::Buffer)>,
 }
 
 impl Offscreen {
-    /// Opens the best adapter: a GPU, else software Vulkan, else GL. `WGPU_BACKEND` narrows the choice.
+    /// Opens the best adapter: a GPU, otherwise software Vulkan, otherwise GL. `WGPU_BACKEND` restricts the choice.
     ///
     /// # Errors
     /// No adapter at all.
@@ -34,7 +34,7 @@ impl Offscreen {
             wgpu::Backends::from_env().unwrap_or(wgpu::Backends::PRIMARY | wgpu::Backends::GL);
         let instance = wgpu::Instance::new(descriptor);
         let mut adapters = instance.enumerate_adapters(wgpu::Backends::all()).await;
-        // Stable: among equals the backend's own order stays.
+        // Stable: the backend's own order breaks ties.
         adapters.sort_by_key(|adapter| rank(&adapter.get_info()));
         for adapter in adapters {
             let limits = wgpu::Limits {
@@ -108,7 +108,7 @@ impl Offscreen {
                 usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
                 mapped_at_creation: false,
             });
-            self.frame = Some((Target::new(&self.device, list.size), buffer));
+            self.frame = Some((RenderTarget::new(&self.device, list.size), buffer));
         }
         let Some((target, buffer)) = &self.frame else {
             return Err(RenderError::Device("no target".to_owned()));
@@ -167,9 +167,9 @@ impl Offscreen {
 
 #[cfg(test)]
 impl Offscreen {
-    /// Records a picture and throws it away; the time it took.
+    /// Records a picture without submitting it; returns the time taken.
     pub(super) fn record_only(&mut self, list: &DrawList) -> std::time::Duration {
-        let target = Target::new(&self.device, list.size);
+        let target = RenderTarget::new(&self.device, list.size);
         let start = web_time::Instant::now();
         let mut encoder = self.device.create_command_encoder(&Default::default());
         self.renderer
@@ -181,7 +181,7 @@ impl Offscreen {
     }
 }
 
-/// Order of preference: hardware before software, Vulkan and its kin before GL.
+/// Order of preference: hardware over software, Vulkan and its peers over GL.
 fn rank(info: &wgpu::AdapterInfo) -> u8 {
     let kind = match info.device_type {
         wgpu::DeviceType::DiscreteGpu => 0,

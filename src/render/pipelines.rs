@@ -1,4 +1,4 @@
-//! Every pipeline of the picture, and the layouts they share.
+//! Every pipeline of the picture, and their common layouts.
 
 use std::mem::size_of;
 
@@ -49,7 +49,7 @@ struct Recipe<'a> {
     blend: bool,
     /// Off: depth only.
     colour: bool,
-    /// Drawn a little farther away than it is.
+    /// Depth-biased: drawn a little farther away than it is.
     behind: bool,
 }
 
@@ -171,14 +171,14 @@ impl Pipelines {
                 ..flat("outline", "vs_line", "fs_line", TriangleStrip)
             }),
             faded: make(glass("faded", "fs_solid", Back)),
-            // Its nearest surface alone is seen: what of itself lies behind would show through it in patches.
+            // Only its nearest surface is visible: its own back parts would show through in patches.
             ghost_depth: make(Recipe {
                 colour: false,
                 ..mesh("ghost, depth", "vs_ghost", Some("fs_ghost"))
             }),
             ghost: make(Recipe {
                 vertex: "vs_ghost",
-                // The same corners as just before.
+                // The same vertices as in the depth pass.
                 compare: LessEqual,
                 ..glass("ghost", "fs_ghost", Back)
             }),
@@ -219,7 +219,7 @@ fn pipeline(
     shadow: &wgpu::BindGroupLayout,
     recipe: Recipe<'_>,
 ) -> wgpu::RenderPipeline {
-    // The shadow map cannot be read while it is drawn.
+    // The shadow map cannot be read while being drawn.
     let both = [Some(globals), Some(shadow)];
     let groups = if recipe.fragment.is_some() {
         &both[..]

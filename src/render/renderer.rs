@@ -9,10 +9,10 @@ use wgpu::util::DeviceExt as _;
 
 use super::meshes;
 use super::pipelines::{Pipelines, SHADOW};
-use super::{Target, wgpu};
+use super::{RenderTarget, wgpu};
 use crate::view::{DrawList, Instance, Layer, Line, Mesh, MeshData};
 
-/// Side of the shadow map, pixels: within WebGL2's least limit of 2048.
+/// Side of the shadow map, pixels: within the 2048 that WebGL2 guarantees.
 const SHADOW_SIZE: u32 = 1536;
 
 /// `Globals` of `shaders/scene.wgsl`.
@@ -40,7 +40,7 @@ struct Loaded {
     count: u32,
 }
 
-/// A buffer that grows to what is written to it.
+/// A buffer that grows as needed.
 struct Growing {
     label: &'static str,
     buffer: wgpu::Buffer,
@@ -70,7 +70,7 @@ pub struct Renderer {
 }
 
 impl Renderer {
-    /// Pipelines and shared meshes on `device`.
+    /// Creates pipelines and shared meshes on `device`.
     pub fn new(device: &wgpu::Device) -> Self {
         let pipelines = Pipelines::new(device);
         let globals = device.create_buffer(&wgpu::BufferDescriptor {
@@ -143,13 +143,13 @@ impl Renderer {
         }
     }
 
-    /// Records the passes that draw `list` to `target`. One picture for each submission: the buffers are shared.
+    /// Records the passes that draw `list` to `target`. One picture per submission: the buffers are shared.
     pub fn draw(
         &mut self,
         device: &wgpu::Device,
         queue: &wgpu::Queue,
         encoder: &mut wgpu::CommandEncoder,
-        target: &Target,
+        target: &RenderTarget,
         list: &DrawList,
     ) {
         if !Arc::ptr_eq(&self.plates, &list.plates) {
@@ -395,7 +395,7 @@ fn globals(list: &DrawList, size: [u32; 2]) -> Globals {
     }
 }
 
-/// Orthographic view along the light of the ball that must have shadows.
+/// Orthographic view from the light onto the sphere that needs shadows.
 fn light_from_world(direction: Vec3, centre: Vec3, radius: f32) -> Mat4 {
     let up = direction.any_orthonormal_vector();
     let view =

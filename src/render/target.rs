@@ -1,4 +1,4 @@
-//! Where a picture is drawn.
+//! The target a picture is drawn to.
 
 use super::wgpu;
 
@@ -6,11 +6,11 @@ use super::wgpu;
 pub(super) const COLOUR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 /// Depth of the picture.
 pub(super) const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth24Plus;
-/// Samples per pixel; four is what every backend can do.
+/// Samples per pixel; every backend supports four.
 pub(super) const SAMPLES: u32 = 4;
 
 /// Multisampled colour and depth, and the resolved picture.
-pub struct Target {
+pub struct RenderTarget {
     size: [u32; 2],
     pub(super) samples: wgpu::TextureView,
     pub(super) depth: wgpu::TextureView,
@@ -22,7 +22,7 @@ pub struct Target {
     pub(super) picture_view: wgpu::TextureView,
 }
 
-impl Target {
+impl RenderTarget {
     /// A target of `size` pixels (each at least 1 and at most the device's `max_texture_dimension_2d`).
     pub fn new(device: &wgpu::Device, size: [u32; 2]) -> Self {
         use wgpu::TextureUsages as Usage;

@@ -1,4 +1,4 @@
-//! Pixels, not promises. They need a graphics adapter; software Vulkan will do.
+//! Tests on pixels. They need a graphics adapter; software Vulkan will do.
 
 use glam::Vec3;
 
@@ -19,7 +19,7 @@ fn offscreen() -> Offscreen {
     )
 }
 
-/// Bare options: nothing but the machine and its floor.
+/// Bare options: only the machine and its floor.
 fn bare() -> ViewOptions {
     let mut options = ViewOptions {
         triad: false,
@@ -99,7 +99,7 @@ fn every_shader_is_valid_and_translates_to_what_webgl2_runs() {
         let text = std::fs::read_to_string(&path).expect("a readable shader");
         let module = naga::front::wgsl::parse_str(&text)
             .unwrap_or_else(|error| panic!("{}: {}", path.display(), error.emit_to_string(&text)));
-        // No capability beyond the core: the web has none.
+        // Core capabilities only: the web has no others.
         let flags = naga::valid::ValidationFlags::all();
         let info = naga::valid::Validator::new(flags, naga::valid::Capabilities::empty())
             .validate(&module)
@@ -274,7 +274,7 @@ fn an_arrow_inside_a_ball_can_be_seen() {
         device.render(&plain).expect("a picture"),
         device.render(&marked).expect("a picture"),
     );
-    // The normal force runs from the contact through the centre of the ball.
+    // The normal force points from the contact through the centre of the ball.
     let centre = to_f32(&(frame.joints[0].socket_centre + 20.0 * frame.joints[0].eccentricity));
     let inside = centre - 0.005 * to_f32(&frame.joints[0].normal_force).normalize();
     let [red, _, blue] = at(&marked, &camera, inside);
@@ -300,7 +300,7 @@ fn a_hit_joint_lights_up_and_themes_differ() {
     let [r0, _, b0] = at(&quiet, &camera, beside).map(i32::from);
     let [r1, _, b1] = at(&hit, &camera, beside).map(i32::from);
     assert!((r1 - b1) - (r0 - b0) > 20, "warm light beside the socket");
-    // Nothing of the joint is painted over: neither the contact nor the ball, nor any of the socket.
+    // Nothing of the joint is painted over: neither the contact, nor the ball, nor the socket.
     let centre = to_f32(&frame.joints[0].socket_centre);
     let (right, up, _) = camera.axes();
     for k in 0..400 {
@@ -404,7 +404,7 @@ fn a_ghost_in_the_same_place_is_not_seen_in_patches() {
     let without = device.render(&plain).expect("a picture");
     let back = camera.axes().2.as_dvec3();
     let centre = to_f32(&(frame.joints[0].socket_centre + 20.0 * frame.joints[0].eccentricity));
-    // A little nearer, and a little farther: its ball lies within the other all but for a hair's breadth.
+    // A little nearer, and a little farther: its ball lies almost entirely within the other.
     for move_by in [4.0, -4.0] {
         let metres = move_by * f64::from(camera.metres_per_pixel(SIZE)) / 20.0;
         let mut ghost = frame.clone();
@@ -572,7 +572,7 @@ fn the_background_has_exactly_the_themes_colours() {
         ..Default::default()
     };
     let image = device.render(&list).expect("a picture");
-    // Encoded once, not twice and not never; half a step of noise may round to a neighbour.
+    // Encoded exactly once; half a step of noise may round to a neighbour.
     assert!(
         (0..64).all(|i| difference(image.pixel(i, i), [0x40, 0x60, 0x80]) <= 1),
         "{:?}",
@@ -594,7 +594,7 @@ fn a_size_that_cannot_be_drawn_is_refused_with_the_limit() {
     }
 }
 
-/// An application that is nothing but the viewport.
+/// An application with only the viewport.
 struct OnlyViewport(std::sync::Arc<DrawList>);
 
 impl eframe::App for OnlyViewport {
@@ -613,7 +613,7 @@ fn struck_cells_have_the_colour_of_their_value_and_others_none() {
     let mut simulation = Simulation::new(&scene).expect("starts");
     simulation.keep_wear();
     simulation.advance_to(0.3).expect("steps");
-    simulation.pass_wear();
+    simulation.commit_wear();
     let mut frame = Frame::default();
     simulation.sample(simulation.time(), &mut frame);
     let wear = simulation.wear().expect("kept");
@@ -650,7 +650,7 @@ fn struck_cells_have_the_colour_of_their_value_and_others_none() {
             1,
             "the ball that hides the wall is seen through"
         );
-        // Nothing stands before the wall.
+        // Nothing in front of the wall.
         list.solid.by_mesh.iter_mut().for_each(Vec::clear);
         list.clear_balls.clear();
         let without = device.render(&list).expect("a picture");

@@ -1,4 +1,4 @@
-//! Parameters of a scene by key: reading and changing.
+//! Reading and changing the parameters of a scene by key.
 
 use super::error::{brief, nearest, nearest_parameter};
 use super::field::Access;
@@ -7,7 +7,7 @@ use super::table::{contact_part, contact_rows, find};
 use super::*;
 
 impl BallJoint {
-    /// A contact parameter of this joint by the last part of its key; `None` where there is no such part.
+    /// A contact parameter of this joint by the last part of its key; `None` if there is no such part.
     pub fn value(&self, part: &str) -> Option<Value> {
         let (_, field) = contact_rows().find(|(of, _)| *of == part)?;
         Some((field.get)(&self.contact))
@@ -20,7 +20,7 @@ struct Resolved {
     joint: Option<usize>,
 }
 
-/// Whether a key has its place in a scene file although it is no parameter.
+/// Whether a key belongs in a scene file although it is not a parameter.
 fn file_only(key: &str) -> bool {
     let (section, rest) = key.split_once('.').unwrap_or((key, ""));
     match section {
@@ -34,7 +34,7 @@ fn file_only(key: &str) -> bool {
 }
 
 impl Scene {
-    /// Whether a row's keys exist in this scene.
+    /// Whether this scene has a row's keys.
     fn has(&self, parameter: &Parameter) -> bool {
         match parameter.scope {
             Scope::Every | Scope::Contact => true,
@@ -130,10 +130,10 @@ impl Scene {
         }
     }
 
-    /// Value of `key` (`joint.<name>.<…>` included).
+    /// Value of `key` (including `joint.<name>.<…>`).
     ///
     /// # Errors
-    /// A key this scene has not, with the nearest right one.
+    /// A key this scene does not have; the error suggests the nearest one.
     pub fn get(&self, key: &str) -> Result<Value, SceneError> {
         let Resolved { parameter, joint } = self.resolve(key)?;
         Ok(match parameter.access {
@@ -145,19 +145,19 @@ impl Scene {
         })
     }
 
-    /// Parameter row of `key` (`joint.<name>.<…>` included).
+    /// Parameter row of `key` (including `joint.<name>.<…>`).
     ///
     /// # Errors
-    /// A key this scene has not, with the nearest right one.
+    /// A key this scene does not have; the error suggests the nearest one.
     pub fn parameter(&self, key: &str) -> Result<&'static Parameter, SceneError> {
         self.resolve(key).map(|resolved| resolved.parameter)
     }
 
-    /// Changes a parameter in place and records it in `changes`. Some rebuild the scene from its source with the
+    /// Changes a parameter in place and records it in `changes`. Some parameters rebuild the scene from its source with all
     /// changes so far.
     ///
     /// # Errors
-    /// Unknown key, wrong unit, out of range, or a scene that would no longer hold together; `self` is then unchanged.
+    /// Unknown key, wrong unit, out of range, or an inconsistent scene; `self` is then unchanged.
     pub fn set(&mut self, key: &str, value: &str) -> Result<&'static Parameter, SceneError> {
         let mut next = self.clone();
         let parameter = next.change(key, value)?;
@@ -170,10 +170,10 @@ impl Scene {
         Ok(parameter)
     }
 
-    /// As [`Self::set`] with a value in SI units, for sliders: the text recorded reads back to the same bits.
+    /// As [`Self::set`] with a value in SI units, for sliders: the recorded text reads back to the same bits.
     ///
     /// # Errors
-    /// As [`Self::set`]; [`Value::Unset`] takes the change back, as [`Self::undo_change`].
+    /// As [`Self::set`]; [`Value::Unset`] reverts the change, as [`Self::undo_change`].
     pub fn set_value(
         &mut self,
         key: &str,
@@ -193,10 +193,10 @@ impl Scene {
         self.set(key, &parameter.write(value))
     }
 
-    /// Takes a change back: the parameter is again what the scene's text says.
+    /// Reverts a change: the parameter is again as in the scene's text.
     ///
     /// # Errors
-    /// A key this scene has not, or a scene that would no longer hold together; `self` is then unchanged.
+    /// A key this scene does not have, or an inconsistent scene; `self` is then unchanged.
     pub fn undo_change(&mut self, key: &str) -> Result<&'static Parameter, SceneError> {
         let parameter = self.parameter(key)?;
         let mut next = self.clone();
@@ -205,11 +205,11 @@ impl Scene {
         Ok(parameter)
     }
 
-    /// The scene read again from its text with its changes, less those of joints that are no more.
+    /// The scene read again from its text with its changes, except those of joints that no longer exist.
     fn rebuilt(&self) -> Result<Self, SceneError> {
         let mut changes = self.changes.clone();
         if let Some((_, links)) = changes.iter().find(|(key, _)| key == "chain.links") {
-            // Every ball joint of a chain is J1 to JN.
+            // The ball joints of a chain are J1 to JN.
             let links: u64 = links.parse().unwrap_or(u64::MAX);
             changes.retain(|(key, _)| {
                 match key
@@ -224,7 +224,7 @@ impl Scene {
         Self::parse(&self.source.text, self.source.file.as_deref(), &changes)
     }
 
-    /// Applies and records one change without the checks between parameters.
+    /// Applies and records one change, without the checks across parameters.
     pub(super) fn change(
         &mut self,
         key: &str,
@@ -262,7 +262,8 @@ impl Scene {
         Ok(parameter)
     }
 
-    /// Writes a value that has passed the table; one of a contact for every joint that has none of its own, too.
+    /// Writes a value already checked against the table; a contact value also goes to every joint that does not override
+    /// it.
     pub(super) fn write(&mut self, parameter: &'static Parameter, value: &Value) {
         match parameter.access {
             Access::Contact(field) => {
@@ -277,7 +278,7 @@ impl Scene {
         }
     }
 
-    /// What the scene's text does not give by name follows the preset.
+    /// Whatever the scene's text does not give by name follows the preset.
     pub(super) fn apply_preset(&mut self, preset: Preset) {
         let (method, step, tolerance) = preset.point();
         let free = |key: &str| !self.source.places.contains_key(key);
@@ -299,7 +300,7 @@ impl Scene {
         }
     }
 
-    /// Solver settings that were changed by name win over a preset, whichever came first.
+    /// Solver settings changed by name take precedence over a preset, in either order.
     fn resolve_preset(&mut self) {
         for key in ["solver.method", "solver.step", "solver.tolerance"] {
             let changed = self.changes.iter().rfind(|(changed, _)| changed == key);

@@ -7,12 +7,12 @@ use super::read_bodies::{BODY_KEYS, read_rigid_body};
 use super::read_joints::{contact_parts, read_own_contact, read_rotation};
 use super::*;
 
-/// Adds the bodies, free joints and ball joints of the `[chain]` in `node`: link 1 hangs from a fixed socket at
-/// `hang`, every other from the socket at the lower end of the one before; all start straight, at rest, turned by
-/// `rotation`. A `[[chain.joint]]` gives one of the ball joints contact parameters of its own; where these stand is returned.
+/// Adds the bodies, free joints and ball joints of the `[chain]` in `node`: link 1 hangs from a fixed socket at `hang`,
+/// every other link from the socket at the lower end of the previous one; all start in a straight line, at rest, rotated by
+/// `rotation`. A `[[chain.joint]]` gives a ball joint its own contact parameters; their places are returned.
 ///
 /// # Errors
-/// Anything wrong in the section, a name that the file has already taken, or a joint that the chain has not.
+/// Anything wrong in the section, a name already used in the file, or a joint that the chain does not have.
 pub(super) fn expand<'d>(
     node: &Node<'d>,
     scene: &mut Scene,
@@ -71,10 +71,6 @@ pub(super) fn expand<'d>(
             .ball_joints
             .iter()
             .any(|joint| joint_used(&joint.name))
-        || scene
-            .elements
-            .iter()
-            .any(|element| joint_used(&element.name))
     {
         let message = "the file already uses a name that the chain needs: bodies link1, link2, …, joints free1, free2, … \
                        and J1, J2, …";
@@ -105,7 +101,7 @@ pub(super) fn expand<'d>(
                 body: Some(first + index),
                 point: ball,
             },
-            // The world's socket has world axes, the links' sockets turn with them.
+            // The world's socket has world axes; the links' sockets rotate with the links.
             opening: if index == 0 {
                 rotation * opening
             } else {

@@ -1,4 +1,4 @@
-//! What must hold between the parameters of a scene, and what is allowed but doubtful.
+//! Consistency checks between the parameters of a scene, and warnings about choices that are allowed but doubtful.
 
 use super::error::{line_text, place_of};
 use super::*;
@@ -6,8 +6,8 @@ use crate::contact::{self, FrictionLaw, FrictionVelocity, NormalLaw};
 use crate::integrate::Method;
 use std::collections::BTreeMap;
 
-/// Fewer fixed steps than this lose much of an impact; twice as many resolve it. The implicit Euler method in the contacts
-/// needs more: its own damping takes as much of an impact as a step is of it.
+/// With fewer fixed steps than this much of an impact is lost; twice as many resolve it. Implicit Euler contacts need more:
+/// numerical damping takes about the same share of an impact as a step does of its duration.
 pub fn least_impact_steps(method: Method) -> u64 {
     match method {
         Method::ImexEuler => 40,
@@ -15,14 +15,14 @@ pub fn least_impact_steps(method: Method) -> u64 {
     }
 }
 
-/// Loosest tolerance at which impacts keep their energy to a few per cent.
+/// Loosest tolerance at which impacts conserve energy to a few per cent.
 const LOOSEST: f64 = 1e-3;
 
-/// Sentences about ball joints, after which a last one stands for the rest.
+/// Most sentences about ball joints; a last one stands for the rest.
 const MOST_LISTED: usize = 40;
 
 impl Scene {
-    /// What must hold between the contact parameters of one joint.
+    /// Checks the contact parameters of each joint for consistency.
     pub(super) fn check_contacts(&self) -> Result<(), Fault> {
         check_contact(&self.contact).map_err(|(parts, message)| Fault {
             joint: None,
@@ -39,7 +39,7 @@ impl Scene {
         Ok(())
     }
 
-    /// Choices that are allowed but may not mean what the user expects: [`Self::doubts`], and what makes a run slow.
+    /// Choices that are allowed but may not mean what the user expects: [`Self::doubts`], and whatever slows a run down.
     pub fn warnings(&self) -> Vec<Warning> {
         let doubts = self.doubts().into_iter();
         let mut warnings: Vec<Warning> = doubts.map(Warning::Doubt).collect();
@@ -62,7 +62,7 @@ impl Scene {
         warnings
     }
 
-    /// Why a result of this scene is not to be trusted, whatever the run meets.
+    /// Reasons to doubt any result of this scene, whatever happens in the run.
     pub fn doubts(&self) -> Vec<Doubt> {
         let mut doubts = Vec::new();
         for (joints, contact) in self.contact_groups() {
@@ -101,7 +101,7 @@ impl Scene {
         doubts
     }
 
-    /// That a tolerance is too loose for impacts.
+    /// Warns of a tolerance too loose for impacts.
     fn tolerance_warning(&self) -> Option<Doubt> {
         let rattles = self.ball_joints.iter().any(|j| j.contact.clearance > 0.0);
         let loose = self.solver.method.is_adaptive() && self.solver.tolerance > LOOSEST;
@@ -111,7 +111,7 @@ impl Scene {
         })
     }
 
-    /// That a fixed step is too long for the shortest impact to be expected, with one that is not.
+    /// Warns of a fixed step too long for the shortest expected impact, and recommends one that is not.
     fn step_warning(&self) -> Option<Doubt> {
         if self.solver.method.is_adaptive() {
             return None;
@@ -129,7 +129,7 @@ impl Scene {
         if self.solver.step <= duration / steps {
             return None;
         }
-        // One, two or five of a decade.
+        // Round to 1, 2 or 5 times a power of ten.
         let most = duration / (2.0 * steps);
         let decade = libm::pow(10.0, libm::floor(libm::log10(most)));
         let digit = [5.0, 2.0, 1.0].into_iter().find(|d| d * decade <= most);
@@ -139,7 +139,7 @@ impl Scene {
             step: self.solver.step,
             duration,
             sliding: friction > 1.0,
-            // It takes force elements as explicit steps do.
+            // It integrates force elements explicitly.
             stable: self.solver.method == Method::ImexEuler
                 && friction <= 1.0
                 && self.elements.is_empty(),
@@ -148,11 +148,11 @@ impl Scene {
     }
 
     /// Estimated duration of the first impact of a joint with clearance, s, whose bodies fall freely through the gap; and
-    /// how many times within it friction could reverse a sliding as fast as the approach, at least 1.
+    /// how many times within it friction could reverse sliding at the approach speed, at least 1.
     fn impact_duration(&self, joint: &BallJoint) -> (f64, f64) {
         let c = &joint.contact;
         let coefficients = contact::Coefficients::new(c, c.clearance);
-        // Inverse masses felt at the ball's centre and in sliding: a force there also turns the body.
+        // Inverse effective masses at the ball's centre, normal and in sliding: a force there also rotates the body.
         let (mut normal, mut sliding) = (0.0, 0.0);
         for attachment in [&joint.ball, &joint.socket] {
             let Some(b) = attachment.body else { continue };
@@ -187,8 +187,8 @@ impl Scene {
         )
     }
 
-    /// An error found when the scene starts, about what `title` names (see [`Source::places`]): it points to that
-    /// line of the file, and names the latest change whose key is among `keys` or, where they end in a dot, below one.
+    /// An error found when the scene starts, about `title` (see [`Source::places`]): it points to that line of the file,
+    /// and names the latest change whose key is among `keys` or, for those ending in a dot, begins with one.
     pub fn start_error(&self, title: &str, keys: &[String], message: String) -> SceneError {
         let concerns = |changed: &str| {
             keys.iter()
@@ -202,7 +202,7 @@ impl Scene {
             None => SceneError::about(title, None, message),
         };
         error.file.clone_from(&self.source.file);
-        // Of a built-in scene there is no file to look into: a change that explains the error is enough.
+        // A built-in scene has no file to look at: a change that explains the error is enough.
         if self.source.file.is_some() || change.is_none() {
             error.position = place;
             error.line_text = place.and_then(|(line, _)| line_text(&self.source.text, line));
@@ -210,7 +210,7 @@ impl Scene {
         error
     }
 
-    /// Ball joints with equal contact parameters, named together.
+    /// Groups of ball joints with equal contact parameters, with their names.
     fn contact_groups(&self) -> Vec<(String, contact::Parameters)> {
         let mut groups: Vec<(Vec<&str>, contact::Parameters)> = Vec::new();
         let mut group_of = BTreeMap::new();
@@ -232,7 +232,7 @@ impl Scene {
     }
 }
 
-/// What can be compared and sorted of contact parameters: equal where they are.
+/// Contact parameters in a form that can be compared and sorted: equal if and only if they are.
 fn bits(contact: &contact::Parameters) -> ([u64; 9], [u8; 4]) {
     let contact::Parameters {
         clearance,
@@ -260,7 +260,7 @@ fn bits(contact: &contact::Parameters) -> ([u64; 9], [u8; 4]) {
         slip_speed_high,
         impact_speed_floor,
     ];
-    // -0 is 0.
+    // Map -0 to 0.
     let numbers = numbers.map(|number| (number + 0.0).to_bits());
     let words = [
         friction_velocity as u8,
@@ -271,7 +271,7 @@ fn bits(contact: &contact::Parameters) -> ([u64; 9], [u8; 4]) {
     (numbers, words)
 }
 
-/// Two parameters that do not go together.
+/// Two parameters that are inconsistent.
 pub(super) struct Fault {
     pub joint: Option<usize>,
     /// Last parts of the keys at fault, the likelier first.
@@ -280,7 +280,7 @@ pub(super) struct Fault {
 }
 
 impl Fault {
-    /// Keys that could be to blame in `scene`, the likelier first.
+    /// Keys that could be at fault in `scene`, the likelier first.
     pub fn keys(&self, scene: &Scene) -> Vec<String> {
         let joint = self.joint.map(|index| &scene.ball_joints[index]);
         let key = |part: &&'static str| match joint {
@@ -288,7 +288,7 @@ impl Fault {
             _ => format!("contact.{part}"),
         };
         let mut keys: Vec<String> = self.parts.iter().map(key).collect();
-        // What one joint has of its own departs from what holds for all.
+        // A joint's own setting is likelier at fault than the general one.
         keys.sort_by_key(|key| !key.starts_with("joint."));
         keys
     }
@@ -302,7 +302,7 @@ impl Fault {
         }
     }
 
-    /// The error of the change of `key` that brought the fault in.
+    /// The error for the change of `key` that introduced the fault.
     pub fn blame_change(&self, scene: &Scene, key: &str) -> SceneError {
         let value = scene
             .changes
@@ -312,7 +312,7 @@ impl Fault {
         SceneError::about(key, value, self.text(scene, key))
     }
 
-    /// The error of the latest change that has to do with the fault; `None` if it was in the file.
+    /// The error for the latest change related to the fault; `None` if the fault was in the file.
     pub fn blame_changes(&self, scene: &Scene) -> Option<SceneError> {
         let keys = self.keys(scene);
         let (key, _) = scene

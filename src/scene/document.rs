@@ -1,4 +1,4 @@
-//! TOML with places: every value knows its key and its line and column, so that every error can name them.
+//! TOML with positions: every value knows its key, line and column, so that every error can name them.
 
 use super::error::{brief, line_text, nearest, place_of};
 use super::units::{QuantityError, parse_quantity};
@@ -11,7 +11,7 @@ use toml::de::{DeTable, DeValue};
 /// Largest length, speed, angle, … in SI units that a file may give.
 const MAX_SI: f64 = 1e6;
 
-/// The text being read, and the name that errors give it.
+/// The text being read, and its name in errors.
 #[derive(Clone, Copy)]
 pub(super) struct Document<'d> {
     pub file: Option<&'d str>,
@@ -36,7 +36,7 @@ pub(super) struct Node<'d> {
 }
 
 impl<'d> Document<'d> {
-    /// An error at a place in the text.
+    /// An error at a position in the text.
     pub fn error(
         &self,
         span: Range<usize>,
@@ -55,7 +55,7 @@ impl<'d> Document<'d> {
         error
     }
 
-    /// The text of a value, cut to what fits in a line.
+    /// The text of a value, truncated to fit on a line.
     pub fn excerpt(&self, span: Range<usize>) -> String {
         brief(self.text.get(span).unwrap_or(""))
     }
@@ -90,7 +90,7 @@ impl<'d> Section<'d> {
         }
     }
 
-    /// Full path of a key in here.
+    /// Full path of a key in this table.
     pub fn key(&self, name: &str) -> String {
         if self.path.is_empty() {
             name.to_owned()
@@ -99,7 +99,7 @@ impl<'d> Section<'d> {
         }
     }
 
-    /// A value that may be left out.
+    /// An optional value.
     pub fn get(&self, name: &str) -> Option<Node<'d>> {
         let value = self.table.get(name)?;
         Some(Node {
@@ -109,7 +109,7 @@ impl<'d> Section<'d> {
         })
     }
 
-    /// A value that must be there; `like` shows how one is written.
+    /// A required value; `like` is an example of one.
     pub fn require(&self, name: &str, like: &str) -> Result<Node<'d>, SceneError> {
         self.get(name).ok_or_else(|| {
             self.error(
@@ -119,12 +119,12 @@ impl<'d> Section<'d> {
         })
     }
 
-    /// Where this table begins in the text, bytes.
+    /// Byte offset of this table in the text.
     pub fn place(&self) -> usize {
         self.span.start
     }
 
-    /// An error about this table as a whole, or about a key that it lacks.
+    /// An error about this table as a whole, or about a missing key.
     pub fn error(&self, name: &str, message: impl Into<String>) -> SceneError {
         let key = if name.is_empty() {
             self.path.clone()
@@ -134,7 +134,7 @@ impl<'d> Section<'d> {
         self.document.error(self.span.clone(), &key, None, message)
     }
 
-    /// Refuses a key that makes no sense here.
+    /// Rejects a key that makes no sense here.
     pub fn refuse(&self, name: &str, why: &str) -> Result<(), SceneError> {
         self.get(name).map_or(Ok(()), |node| {
             Err(node.error(format!("not allowed here: {why}")))
@@ -143,7 +143,7 @@ impl<'d> Section<'d> {
 }
 
 impl<'d> Node<'d> {
-    /// Where this value begins in the text, bytes.
+    /// Byte offset of this value in the text.
     pub fn place(&self) -> usize {
         self.value.span().start
     }
@@ -167,7 +167,7 @@ impl<'d> Node<'d> {
         ))
     }
 
-    /// A number or a text, as a person wrote it.
+    /// A number or a text, as written.
     pub fn scalar(&self) -> Result<&'d str, SceneError> {
         match self.value.get_ref() {
             DeValue::String(text) => Ok(text),
@@ -185,7 +185,7 @@ impl<'d> Node<'d> {
             .ok_or_else(|| self.wrong_type("a text in quotes"))
     }
 
-    /// A yes or no.
+    /// A boolean.
     pub fn flag(&self) -> Result<bool, SceneError> {
         self.value
             .get_ref()
@@ -198,7 +198,7 @@ impl<'d> Node<'d> {
         self.limited(parse_quantity(self.scalar()?, dimension), dimension)
     }
 
-    /// Refuses what no mechanism has, before its squares overflow in the equations of motion.
+    /// Rejects values beyond any mechanism, before their squares overflow in the equations of motion.
     fn limited(
         &self,
         read: Result<f64, QuantityError>,
@@ -235,7 +235,7 @@ impl<'d> Node<'d> {
         )))
     }
 
-    /// One of the words of an enum.
+    /// One of an enum's words.
     pub fn word<T: Words>(&self) -> Result<T, SceneError> {
         let text = self.text()?;
         T::of_word(text).ok_or_else(|| {
@@ -247,7 +247,7 @@ impl<'d> Node<'d> {
         })
     }
 
-    /// A name: letters, digits, `_` and `-`, because keys and column names are made from it.
+    /// A name: letters, digits, `_` and `-`, as keys and column names are built from it.
     pub fn name(&self) -> Result<&'d str, SceneError> {
         let name = self.text()?;
         let fine = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-');
@@ -257,7 +257,7 @@ impl<'d> Node<'d> {
         Err(self.error("is not a name; allowed 1 to 40 letters (a to z), digits, `_` and `-`"))
     }
 
-    /// The elements of an array that has at most `most`, which are `what`; as [`Self::elements`].
+    /// The elements of an array of at most `most`; `what` names them in errors. As [`Self::elements`].
     pub fn elements_up_to(&self, most: usize, what: &str) -> Result<Vec<Node<'d>>, SceneError> {
         let elements = self.elements()?;
         match elements.get(most) {
@@ -289,7 +289,7 @@ impl<'d> Node<'d> {
         Ok(array.iter().enumerate().map(node).collect())
     }
 
-    /// Three or so quantities: `["1 mm", 0, "3 mm"]`, or with one unit for all, `"1 0 3 mm"`.
+    /// N quantities: `["1 mm", 0, "3 mm"]`, or with a common unit, `"1 0 3 mm"`.
     pub fn quantities<const N: usize>(&self, dimension: Dimension) -> Result<[f64; N], SceneError> {
         let mut values = [0.0; N];
         if let Some(text) = self.value.get_ref().as_str() {
@@ -345,7 +345,7 @@ impl<'d> Node<'d> {
         self.section_as(self.key.clone(), known)
     }
 
-    /// As [`Self::section`], with another path for its keys.
+    /// As [`Self::section`], with a different path for its keys.
     pub fn section_as(&self, path: String, known: &[&str]) -> Result<Section<'d>, SceneError> {
         let table = self
             .value
@@ -355,8 +355,8 @@ impl<'d> Node<'d> {
         Section::new(self.document, path, table, self.value.span(), known)
     }
 
-    /// Checks the choice that the key `name` of a table makes, if it is there: it decides which other keys there may be, so
-    /// a wrong word is to be named before any of these.
+    /// Checks the word that the key `name` of a table selects, if present: it determines which other keys are allowed, so a
+    /// wrong word must be reported before any of those.
     pub fn check_word<T: Words>(&self, path: &str, name: &str) -> Result<(), SceneError> {
         let table = self.value.get_ref().as_table();
         let Some(value) = table.and_then(|table| table.get(name)) else {
@@ -370,7 +370,7 @@ impl<'d> Node<'d> {
         node.word::<T>().map(|_| ())
     }
 
-    /// Text of the `name` key of a table, for the paths of its keys; the array index where there is none yet.
+    /// Value of the table's `name` key, for the paths of its keys; the array index if there is none yet.
     pub fn title(&self, prefix: &str) -> String {
         let name = self
             .value
@@ -380,10 +380,10 @@ impl<'d> Node<'d> {
         name.map_or_else(|| self.key.clone(), |name| format!("{prefix}.{name}"))
     }
 
-    /// A parameter's value, read and checked by its row of the table.
+    /// A parameter's value, read and checked against its row of the table.
     pub fn parameter(&self, key: &str) -> Result<super::Value, SceneError> {
         let parameter = find(key).expect("only keys of the table are asked for");
-        // A count and a pure number may stand bare; text and bare numbers read alike.
+        // A count or a pure number may be written bare; text and bare numbers read alike.
         parameter
             .read(self.scalar()?)
             .map_err(|error| self.error(error.to_string()))

@@ -1,11 +1,11 @@
-//! What a scene asks for that speaks against any result of it: numbers, and words for them.
+//! Reasons in a scene's settings to doubt any result of it: numbers, and their wording.
 
 use std::fmt;
 
 use super::format_quantity;
 use crate::contact::{self, NormalLaw};
 
-/// Why a result of a scene is not to be trusted, whatever the run meets. Its `Display` is a sentence for a person.
+/// Why a scene's results are not to be trusted, whatever happens in the run. Its `Display` is a sentence for the user.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Doubt {
     /// A restitution for which the normal-force law was not derived.
@@ -14,10 +14,10 @@ pub enum Doubt {
         joints: String,
         /// Their law.
         law: NormalLaw,
-        /// What it is asked for.
+        /// The restitution asked for.
         restitution: f64,
     },
-    /// A clearance so small that the contact patch is not small against the ball.
+    /// A clearance so small that the contact patch is not small compared with the ball.
     Clearance {
         /// Names of the joints.
         joints: String,
@@ -26,34 +26,34 @@ pub enum Doubt {
         /// m.
         ball_radius: f64,
     },
-    /// A fixed step too long for the shortest impact to be expected.
+    /// A fixed step too long for the shortest expected impact.
     Step {
         /// Joint with that impact.
         joint: String,
         /// `solver.step`, s.
         step: f64,
-        /// How long the impact lasts, or the sliding in it until friction reverses it, s.
+        /// Duration of the impact, or of sliding in it until friction reverses it, s.
         duration: f64,
-        /// The latter.
+        /// Whether `duration` is that of the sliding.
         sliding: bool,
-        /// The method stays stable, and loses the impact.
+        /// The method stays stable, but loses the impact.
         stable: bool,
-        /// A step that will do, s.
+        /// A step that is short enough, s.
         recommended: f64,
     },
     /// A tolerance too loose for impacts.
     Tolerance {
         /// `solver.tolerance`.
         tolerance: f64,
-        /// The loosest that will do.
+        /// The loosest adequate one.
         loosest: f64,
     },
-    /// Friction that reads the velocities of (13) as printed.
+    /// Friction with the velocities of (13) as printed.
     PrintedFriction {
         /// Names of the joints.
         joints: String,
     },
-    /// More ball joints differ from one another than are listed.
+    /// More ball joints with distinct settings than are listed.
     MoreJoints,
 }
 
@@ -125,13 +125,13 @@ impl fmt::Display for Doubt {
     }
 }
 
-/// What a person should know before a run: why its result is not to be trusted, or what makes it slow. Its `Display` is a
+/// What the user should know before a run: why its result is not to be trusted, or what makes it slow. Its `Display` is a
 /// sentence.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Warning {
-    /// Speaks against the result.
+    /// A reason to doubt the result.
     Doubt(Doubt),
-    /// A ramp of friction that asks for small steps.
+    /// A friction ramp that needs small steps.
     StiffFriction {
         /// Names of the joints.
         joints: String,
@@ -140,7 +140,7 @@ pub enum Warning {
     },
 }
 
-/// What kind a warning is of: another one of the same kind differs in numbers and names alone.
+/// Kind of a warning: two of the same kind differ only in numbers and names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct WarningKind(Option<std::mem::Discriminant<Doubt>>);
 
@@ -153,7 +153,7 @@ impl Warning {
         })
     }
 
-    /// Whether it goes away with other `[solver]` settings.
+    /// Whether other `[solver]` settings would remove it.
     pub fn is_about_solver(&self) -> bool {
         matches!(
             self,

@@ -1,4 +1,5 @@
-//! Force elements of a scene file: one row for each kind, from which its section is read. What it does is in `mechanism/elements`.
+//! Force elements of a scene file: one row per kind, from which its section is read. Their physics is in
+//! `mechanism/elements`.
 
 use std::collections::BTreeMap;
 
@@ -7,18 +8,18 @@ use super::error::nearest;
 use super::read_joints::{FASTEST_DRIVE, read_attachment};
 use super::*;
 
-/// A number that an element has.
+/// A numeric key of an element.
 #[derive(Debug)]
 pub struct ElementNumber {
     /// Key.
     pub key: &'static str,
-    /// What it is measured in.
+    /// Its dimension.
     pub dimension: Dimension,
     /// Closed range, SI.
     pub range: (f64, f64),
-    /// Value where the file gives none; `None` where it must give one.
+    /// Value if the file gives none; `None` if it is required.
     pub default: Option<f64>,
-    /// How one is written.
+    /// An example.
     pub like: &'static str,
     /// What it is.
     pub help: &'static str,
@@ -35,15 +36,15 @@ pub struct ElementKind {
     pub points: &'static [&'static str],
     /// Its numbers.
     pub numbers: &'static [ElementNumber],
-    /// Its vectors, 0 where the file gives none: key, what they are measured in, what they are.
+    /// Its vectors, 0 if the file gives none: key, dimension, help.
     pub vectors: &'static [(&'static str, Dimension, &'static str)],
-    /// Of its numbers and vectors, those without any of which it does nothing.
+    /// Numbers and vectors of which at least one is needed for it to have any effect.
     pub acts_by: &'static [&'static str],
-    /// Its choices: key, words with the default first, what they decide.
+    /// Its choices: key, words with the default first, help.
     pub choices: &'static [(&'static str, &'static [&'static str], &'static str)],
 }
 
-/// A force element of a scene, as its row says.
+/// A force element of a scene, according to its row.
 #[derive(Clone, Debug)]
 pub struct Element {
     /// Unique name.
@@ -183,7 +184,7 @@ impl Element {
     }
 }
 
-/// One element of `kind`; `bodies` maps names to places in the sorted scene.
+/// One element of `kind`; `bodies` maps names to indices in the sorted scene.
 pub(super) fn read_element<'d>(
     node: &Node<'d>,
     kind: &'static ElementKind,
@@ -291,7 +292,7 @@ pub(super) fn read_element<'d>(
     Ok((element, section))
 }
 
-/// The sections of all kinds as rows of the page on the file format.
+/// The sections of all kinds as table rows for the file-format page.
 pub fn element_table() -> String {
     let mut out = String::new();
     for kind in &ELEMENT_KINDS {

@@ -3,7 +3,7 @@
 use super::visible::{visible, visible_line};
 use std::fmt;
 
-/// What is wrong with a scene or a parameter value, in a form a person can act on.
+/// What is wrong with a scene or a parameter value, in a form the user can act on.
 ///
 /// Its text is complete: place, key, value, reason, and the line of the file with a mark under the fault.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -20,7 +20,7 @@ pub struct SceneError {
     pub message: String,
     /// The line of the file at `position`.
     pub line_text: Option<Box<str>>,
-    /// The file could not be read at all (rather than being wrong).
+    /// The file could not be read at all (as opposed to being invalid).
     pub unreadable: bool,
 }
 
@@ -71,7 +71,7 @@ impl fmt::Display for SceneError {
     }
 }
 
-/// Line and column, from 1, of what follows `before`. A scene's text is short: the counts fit.
+/// Line and column, from 1, of what follows `before`. Scene texts are short: the counts fit.
 pub(super) fn line_and_column(before: &str) -> (u32, u32) {
     let line_start = before.rfind('\n').map_or(0, |at| at + 1);
     let from_one = |count: usize| u32::try_from(count + 1).unwrap_or(u32::MAX);
@@ -81,12 +81,12 @@ pub(super) fn line_and_column(before: &str) -> (u32, u32) {
     )
 }
 
-/// Line and column, from 1, of the byte `at` of `text`.
+/// Line and column, from 1, of byte `at` of `text`.
 pub(super) fn place_of(text: &str, at: usize) -> (u32, u32) {
     line_and_column(&text[..text.floor_char_boundary(at)])
 }
 
-/// The first line of what someone wrote, cut to what an error can quote.
+/// The first line of an input, truncated to what an error can quote.
 pub(super) fn brief(text: &str) -> String {
     let mut short: String = text.lines().next().unwrap_or("").chars().take(60).collect();
     if short.len() < text.len() {
@@ -95,7 +95,7 @@ pub(super) fn brief(text: &str) -> String {
     short
 }
 
-/// Line number `line`, from 1, of a text; `None` for one too long for a terminal, or with control characters in it.
+/// Line number `line`, from 1, of a text; `None` if it is too long for a terminal or contains control characters.
 pub(super) fn line_text(text: &str, line: u32) -> Option<Box<str>> {
     let line = text
         .lines()
@@ -106,10 +106,10 @@ pub(super) fn line_text(text: &str, line: u32) -> Option<Box<str>> {
     fit.then(|| line.into())
 }
 
-/// A text longer than this, bytes, is no slip of a name; comparing it would take its square.
+/// A text longer than this, bytes, is no typing slip; comparing it takes quadratic time.
 const LONGEST_SLIP: usize = 100;
 
-/// The nearest of `names` to `wrong`, in brackets; "" if none is near.
+/// The one of `names` nearest to `wrong`, in brackets; "" if none is near.
 pub(super) fn nearest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> String {
     if wrong.len() > LONGEST_SLIP {
         return String::new();
@@ -130,8 +130,8 @@ pub(super) fn nearest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>)
         })
 }
 
-/// The parameter whose key, or the last part of whose key, is nearest to `wrong`, or one of some other `words`, in brackets;
-/// "" if none is near.
+/// The parameter whose key, or last part of it, is nearest to `wrong`, or one of the other `words`, in brackets; "" if none
+/// is near.
 pub(super) fn nearest_parameter<'a>(
     wrong: &str,
     keys: impl Iterator<Item = &'a str> + Clone,

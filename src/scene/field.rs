@@ -4,14 +4,14 @@ use super::{Scene, Value};
 use crate::contact;
 use crate::words::Words;
 
-/// Reads and writes one field of a `T`. What is written has passed the row's range.
+/// Reads and writes one field of a `T`. Values written have already passed the row's range check.
 #[derive(Debug)]
 pub struct Field<T> {
     pub(super) get: fn(&T) -> Value,
     pub(super) set: fn(&mut T, &Value),
 }
 
-// Derived, these would ask for a `T` that can be copied.
+// Derived, these would require `T: Copy`.
 impl<T> Clone for Field<T> {
     fn clone(&self) -> Self {
         *self
@@ -20,7 +20,7 @@ impl<T> Clone for Field<T> {
 
 impl<T> Copy for Field<T> {}
 
-/// Where the value of a row is kept.
+/// Where the value of a row is stored.
 #[derive(Clone, Copy, Debug)]
 pub enum Access {
     /// In the contact parameters: of the scene, and of each ball joint.
@@ -29,7 +29,7 @@ pub enum Access {
     Scene(Field<Scene>),
 }
 
-/// A type that a field can have.
+/// A type that a field can hold.
 pub(super) trait Held: Sized {
     fn to_value(self) -> Value;
     fn of_value(value: &Value) -> Self;
@@ -84,7 +84,7 @@ macro_rules! field {
     };
 }
 
-/// A field of what not every scene has: `optional_field!(spcmm.frequency)`.
+/// A field of an optional part of a scene: `optional_field!(spcmm.frequency)`.
 macro_rules! optional_field {
     ($part:ident.$name:ident) => {
         Field {

@@ -15,17 +15,17 @@ pub const BUILT_IN: [&str; 5] = [
     "chain",
 ];
 
-/// The scene that opens when none is named.
+/// The scene that opens if none is named.
 pub const DEFAULT_SCENE: &str = BUILT_IN[0];
 
-/// The largest file that is read, bytes: a scene is a few kilobytes.
+/// Largest file that is read, bytes: a scene is a few kilobytes.
 pub const LARGEST_FILE: u64 = 4 << 20;
 
-/// Most bodies of a scene, a chain's links included.
+/// Most bodies of a scene, including a chain's links.
 pub const MOST_BODIES: usize = 10_000;
-/// Most ball joints of a scene, a chain's included.
+/// Most ball joints of a scene, including a chain's.
 pub const MOST_BALL_JOINTS: usize = 10_000;
-/// Most shapes of a scene, those of its bodies and the fixed ones.
+/// Most shapes of a scene, on bodies and fixed.
 pub const MOST_SHAPES: usize = 50_000;
 /// Most force elements of each kind.
 pub const MOST_ELEMENTS: usize = 10_000;
@@ -34,7 +34,7 @@ pub const MOST_CORNERS: usize = 100;
 /// Most changes of a scene.
 pub const MOST_CHANGES: usize = 4096;
 
-/// Why a larger one is not.
+/// The message for a larger one.
 pub fn too_large() -> String {
     format!(
         "too large for a scene file: more than {} MiB",
@@ -55,8 +55,8 @@ pub fn built_in_text(name: &str) -> Option<&'static str> {
 }
 
 impl Scene {
-    /// A built-in scene by name, or a file (contains `/` or ends in `.toml`), with changes applied in order; of two
-    /// changes of one key the last wins.
+    /// A built-in scene by name, or a file (contains `/` or ends in `.toml`), with changes applied in order; the last
+    /// change of a key wins.
     ///
     /// # Errors
     /// Unreadable file, anything wrong in it, or a bad change.
@@ -65,7 +65,7 @@ impl Scene {
         changes: &[(String, String)],
     ) -> Result<Self, SceneError> {
         let path = argument.as_ref();
-        // A file's name need be no text; what is said of it is.
+        // A file name need not be valid UTF-8; messages about it must be.
         let argument = &*path.to_string_lossy();
         if argument.contains('/') || argument.ends_with(".toml") {
             let text = read_file(Path::new(path), argument)?;
@@ -105,7 +105,7 @@ fn read_file(path: &Path, name: &str) -> Result<String, SceneError> {
         return Err(error("this is a directory, not a scene file".to_owned()));
     }
     let mut bytes = Vec::new();
-    // One byte more than allowed: a pipe or a device does not tell its size.
+    // One byte more than allowed: a pipe or a device does not report its size.
     std::fs::File::open(path)
         .and_then(|file| file.take(LARGEST_FILE + 1).read_to_end(&mut bytes))
         .map_err(|cause| error(format!("cannot read this file: {cause}")))?;

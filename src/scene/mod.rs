@@ -1,4 +1,4 @@
-//! Scenes as data: what a mechanism is, its file format, and the one table of its parameters.
+//! Scenes as data: what a mechanism consists of, its file format, and the single table of its parameters.
 //!
 #![doc = include_str!("../../docs/scene-format.md")]
 
@@ -36,8 +36,8 @@ pub use visible::{visible, visible_line};
 
 use table::find;
 
-/// The parameter of any scene, by its key or the last part of it, or the one of some other `words` that is nearest to
-/// `wrong`, as errors say it: in brackets, or nothing.
+/// The parameter of any scene (by its key or the last part of it) or other word from `words` nearest to `wrong`, as errors
+/// quote it: in brackets, or empty.
 pub fn suggest_parameter(wrong: &str, words: &[&'static str]) -> String {
     let keys = table().iter().map(|parameter| parameter.key);
     error::nearest_parameter(wrong, keys, words)

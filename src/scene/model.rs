@@ -1,4 +1,4 @@
-//! What a scene is, typed and in SI units. `read.rs` makes one from a file, `parameters.rs` changes one by key.
+//! The typed scene, in SI units. `read.rs` builds it from a file, `parameters.rs` changes it by key.
 
 use crate::words::words;
 use std::collections::BTreeMap;
@@ -16,15 +16,15 @@ pub type Quat = nalgebra::UnitQuaternion<f64>;
 
 /// A mechanism and everything needed to simulate and draw it.
 ///
-/// Cut every ball joint and what is left is a forest: each body hangs on its parent by exactly one entry of
-/// `joints`, and parents come before children.
+/// Cut every ball joint and a forest remains: each body hangs on its parent by exactly one entry of `joints`, and parents
+/// come before children.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// Short name: that of the built-in scene, or of the file without its ending.
+    /// Short name: that of the built-in scene, or of the file without its extension.
     pub name: String,
-    /// One line for a list.
+    /// A one-line title, for lists.
     pub title: String,
-    /// A paragraph for a person.
+    /// A paragraph for the user.
     pub description: String,
     /// Gravity, world axes, m/s^2.
     pub gravity: Vec3,
@@ -38,11 +38,11 @@ pub struct Scene {
     pub spcmm: Option<Spcmm>,
     /// Set in scenes made of repeated links.
     pub chain: Option<Chain>,
-    /// How to look at it.
+    /// How it is to be viewed.
     pub view: ViewSettings,
     /// What the pose columns report.
     pub output: Output,
-    /// How the file's start values are meant.
+    /// How the file's start values are to be understood.
     pub start: StartRule,
     /// Moving bodies, parents before children.
     pub bodies: Vec<Body>,
@@ -50,24 +50,24 @@ pub struct Scene {
     pub joints: Vec<Joint>,
     /// The cut joints.
     pub ball_joints: Vec<BallJoint>,
-    /// Force elements: springs, outside loads.
+    /// Force elements: springs, external loads.
     pub elements: Vec<Element>,
-    /// Shapes that do not move (rails, frame), world axes.
+    /// Fixed shapes (rails, frame), world axes.
     pub fixed_shapes: Vec<Shape>,
-    /// Text the scene was read from, and where: a reset reads it again with the changes.
+    /// Text the scene was read from, and its origin: a reset reads it again with the changes.
     pub source: Source,
-    /// Parameters changed since the file, in order: key and value as a user would write it.
+    /// Parameters changed since the file was read, in order: key and value as a user would write them.
     pub changes: Vec<(String, String)>,
 }
 
-/// How the start values of the joints are meant.
+/// How the start values of the joints are to be understood.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum StartRule {
     /// Exactly as the file gives them.
     #[default]
     AsGiven,
-    /// Guesses: the mechanism is assembled with every ball concentric with its socket at t = 0, and velocities
-    /// that follow from the drives.
+    /// Initial guesses: the mechanism is assembled with every ball concentric with its socket at t = 0, and velocities that
+    /// follow from the drives.
     Ideal,
 }
 
@@ -83,17 +83,17 @@ pub struct Source {
     pub file: Option<String>,
     /// The TOML text.
     pub text: String,
-    /// Where in the text, bytes, that stands which errors after reading point to: each parameter that the text gives, by
-    /// key; `spcmm`, its section; `joint.<name>`, each ball joint (a chain's: its section).
+    /// Byte offsets in the text of what errors found after reading point to: each parameter given in the text, by key;
+    /// `spcmm`, its section; `joint.<name>`, each ball joint (a chain's: its section).
     pub places: BTreeMap<String, usize>,
 }
 
-/// Form of the equations of motion.
+/// Formulation of the equations of motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Formulation {
-    /// Spanning forest coordinates.
+    /// Generalized coordinates of a spanning forest.
     Tree,
-    /// All bodies, multipliers, Baumgarte stabilisation; paper eqs. (44)-(58).
+    /// All bodies, Lagrange multipliers, Baumgarte stabilisation; paper eqs. (44)-(58).
     Lagrange,
 }
 
@@ -102,7 +102,7 @@ words!(Formulation {
     Lagrange => "lagrange",
 });
 
-/// Named point on the front of speed against accuracy.
+/// A named point on the speed-accuracy front.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Preset {
     /// Fast, rough.
@@ -111,7 +111,7 @@ pub enum Preset {
     RealTime,
     /// For figures.
     Accurate,
-    /// To measure the others against.
+    /// The reference for the others.
     Reference,
 }
 
@@ -122,10 +122,10 @@ words!(Preset {
     Reference => "reference",
 });
 
-/// Stepper settings. An explicit method, step or tolerance beats the preset.
+/// Stepper settings. An explicit method, step or tolerance takes precedence over the preset.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Solver {
-    /// Named point; fills what is not given.
+    /// Named point; fills in what is not given.
     pub preset: Option<Preset>,
     /// Method in force.
     pub method: Method,
@@ -149,7 +149,7 @@ impl Preset {
     }
 }
 
-/// The paper's mechanism: dimensions and trajectory that its slider laws need. SI units.
+/// The paper's mechanism: dimensions and trajectory for its slider laws. SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spcmm {
     /// a1, distance along +X from O_A to the slider plane, m.
@@ -214,14 +214,14 @@ impl SignedAxis {
     }
 }
 
-/// How the scene asks to be looked at.
+/// How the scene is to be viewed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViewSettings {
     /// World axis that points down on the screen.
     pub down: SignedAxis,
-    /// Where the floor grid lies: coordinate along `down`, m; `None` lets the view choose.
+    /// Position of the floor grid: coordinate along `down`, m; `None` lets the view choose.
     pub floor: Option<f64>,
-    /// Turn about the vertical and height angle of the isometric view, rad, where the usual one hides something.
+    /// Azimuth about the vertical and elevation of the isometric view, rad, where the usual one would hide something.
     pub isometric: Option<(f64, f64)>,
 }
 
@@ -234,7 +234,7 @@ pub struct Output {
     pub probe: Option<Vec3>,
 }
 
-/// A rigid body. Its frame is where the file puts it; the centroid may lie elsewhere.
+/// A rigid body. The file places its frame; the centroid may lie elsewhere.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Body {
     /// Unique name.
@@ -249,7 +249,7 @@ pub struct Body {
     pub shapes: Vec<Shape>,
 }
 
-/// What a shape stands for: the view picks its colour and material.
+/// What a shape represents: the view picks its colour and material.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum Role {
@@ -277,13 +277,13 @@ words!(Role {
 /// A drawn shape in its body's frame (or the world's).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shape {
-    /// Form and place.
+    /// Form and position.
     pub geometry: Geometry,
-    /// What it stands for.
+    /// What it represents.
     pub role: Role,
 }
 
-/// Form and place of a shape, m.
+/// Form and position of a shape, m.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Geometry {
     /// Round bar with hemispherical ends.
@@ -327,7 +327,7 @@ pub enum Geometry {
         /// Radius.
         radius: f64,
     },
-    /// Flat plate: a convex polygon pushed to both sides of its plane.
+    /// Flat plate: a convex polygon extruded to both sides of its plane.
     Plate {
         /// Corners in order, in one plane.
         corners: Vec<Vec3>,
@@ -336,11 +336,11 @@ pub enum Geometry {
     },
 }
 
-/// The tree joint by which `child` hangs on `parent`.
+/// The tree joint that connects `child` to `parent`.
 ///
-/// Pose of the child for joint coordinate q, with R the parent's (world: identity) rotation, `rotation` = R0:
-/// revolute `R_child = R Rot(axis, q) R0`, the two points coincide; prismatic `R_child = R R0`, the child's point
-/// is at the parent's point + q axis; fixed as prismatic with q = 0; free (parent is the world): see `start`.
+/// Pose of the child for joint coordinate q, with R the parent's (world: identity) rotation, `rotation` = R0: revolute
+/// `R_child = R Rot(axis, q) R0`, the two points coincide; prismatic `R_child = R R0`, the child's point is at the parent's
+/// point + q axis; fixed as prismatic with q = 0; free (parent is the world): see `start`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
     /// Unique name.
@@ -361,7 +361,7 @@ pub struct Joint {
     pub rotation: Quat,
     /// Prescribes q(t); `None` leaves it to the dynamics.
     pub drive: Option<Drive>,
-    /// Where it starts.
+    /// Its start values.
     pub start: JointStart,
 }
 
@@ -385,7 +385,7 @@ words!(JointKind {
     Free => "free",
 });
 
-/// Start of a joint.
+/// Start values of a joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum JointStart {
     /// Coordinate (m or rad) and rate of a one-degree joint.
@@ -436,7 +436,7 @@ pub enum Drive {
     },
 }
 
-/// A point of a body, or of the world.
+/// A point on a body, or fixed in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Attachment {
     /// Body; `None` is the world.
@@ -445,7 +445,7 @@ pub struct Attachment {
     pub point: Vec3,
 }
 
-/// A ball-and-socket joint: ideal where its clearance is 0, else a contact.
+/// A ball-and-socket joint: ideal if its clearance is 0, otherwise a contact.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BallJoint {
     /// Unique name.
@@ -454,8 +454,8 @@ pub struct BallJoint {
     pub socket: Attachment,
     /// Ball centre Z_j.
     pub ball: Attachment,
-    /// Unit vector in the socket body's frame: the drawn socket is cut open on that side, so that the rod can
-    /// leave and the ball inside is seen. It has no effect on the motion.
+    /// Unit vector in the socket body's frame: the drawn socket is cut open on that side, so that the rod can pass and the
+    /// ball inside is visible. It has no effect on the motion.
     pub opening: Vec3,
     /// This joint's contact parameters, overrides applied.
     pub contact: contact::Parameters,

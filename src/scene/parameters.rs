@@ -1,4 +1,4 @@
-//! The one table of scene parameters: files, `--set`, sliders, tooltips and the reference page are made from it.
+//! The single table of scene parameters: files, `--set`, sliders, tooltips and the reference page are derived from it.
 
 use super::error::nearest;
 use super::field::Access;
@@ -18,7 +18,7 @@ pub enum Value {
     Unset,
 }
 
-/// Physical dimension of a quantity; fixes which units it may be written in.
+/// Physical dimension of a quantity; determines the units it may be written in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Dimension {
     /// A pure number.
@@ -56,7 +56,7 @@ pub enum Dimension {
 /// What kind of value a parameter takes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
-    /// A number with its dimension and closed range in SI units; `display` is the unit shown to people.
+    /// A number with its dimension and closed range in SI units; `display` is the unit shown to the user.
     Number {
         /// Dimension.
         dimension: Dimension,
@@ -78,7 +78,7 @@ pub enum Kind {
         /// Greatest.
         max: u64,
     },
-    /// One of some words.
+    /// One of a list of words.
     Choice(&'static [&'static str]),
 }
 
@@ -96,7 +96,7 @@ pub enum Scope {
 }
 
 impl Scope {
-    /// Where the scope's keys exist, for people.
+    /// Where the scope's keys exist, in words.
     pub fn describe(self) -> &'static str {
         match self {
             Self::Every => "every scene",
@@ -112,27 +112,27 @@ impl Scope {
 pub struct Parameter {
     /// Key, e.g. `contact.clearance`.
     pub key: &'static str,
-    /// Where a scene keeps its value.
+    /// Where its value is stored in a scene.
     pub(super) access: Access,
     /// Sentence-case name for the interface, e.g. "Clearance".
     pub label: &'static str,
-    /// Heading it stands under, e.g. "Contact".
+    /// Heading it is listed under, e.g. "Contact".
     pub group: &'static str,
     /// Values it takes.
     pub kind: Kind,
-    /// Value where neither the file nor a change gives one.
+    /// Value if neither the file nor a change gives one.
     pub default: Value,
     /// Where it exists.
     pub scope: Scope,
-    /// Takes effect only at the next reset (it would move a drive in mid-run, or change the equations).
+    /// Takes effect only at the next reset (it would move a drive mid-run, or change the equations).
     pub at_reset: bool,
-    /// What the quantity is, in a sentence or two, with what to expect of extreme values.
+    /// What the quantity is, in a sentence or two, and the effect of extreme values.
     pub help: &'static str,
     /// Which equation it enters, e.g. "paper eqs. (9), (10)".
     pub equation: &'static str,
 }
 
-/// Why a text or a value is none for a parameter.
+/// Why a text or a value is not valid for a parameter.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{fault}; {allowed}")]
 pub struct ValueError {
@@ -145,22 +145,22 @@ pub struct ValueError {
 /// What is wrong with a value.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ValueFault {
-    /// No quantity of the right dimension.
+    /// Not a quantity of the right dimension.
     #[error("{0}")]
     Quantity(#[from] QuantityError),
     /// Out of range.
     #[error("out of range")]
     OutOfRange,
-    /// No whole number.
+    /// Not a whole number.
     #[error("is not a whole number")]
     NotWhole,
-    /// None of the choices; the nearest, as errors say it.
+    /// Not one of the choices; with the nearest, as errors quote it.
     #[error("is not one of the choices{nearest}")]
     NoChoice {
-        /// In brackets, or nothing.
+        /// In brackets, or empty.
         nearest: String,
     },
-    /// A number for a choice, or the like.
+    /// A number where a choice is expected, or the like.
     #[error("is of the wrong kind")]
     WrongKind,
 }
@@ -174,7 +174,7 @@ impl Parameter {
         }
     }
 
-    /// A value as people read it, with its unit: `0.3 mm`.
+    /// A value for display, with its unit: `0.3 mm`.
     pub fn show(&self, value: &Value) -> String {
         match value {
             Value::Number(si) => format_quantity(*si, self.display_unit()),
@@ -187,7 +187,7 @@ impl Parameter {
     /// The range or the choices, in words: `0 Hz to 50 Hz`.
     pub fn range(&self) -> String {
         match self.kind {
-            // The table's upper end is that of the ball; what counts is this joint's.
+            // The table's upper end is the largest ball radius; what counts is this joint's.
             Kind::Number { min, display, .. } if self.key == "contact.clearance" => {
                 format!("{} to below the ball radius", format_quantity(min, display))
             }
@@ -217,14 +217,14 @@ impl Parameter {
         }
     }
 
-    /// What may be given, in words, with the units it may be written in.
+    /// The allowed values in words, with the units they may be written in.
     pub fn allowed(&self) -> String {
         let units = self.units();
         let separator = if units.is_empty() { "" } else { "; " };
         format!("allowed {}{separator}{units}", self.range())
     }
 
-    /// Reads a value as people write it, and checks its range.
+    /// Reads a value as users write it, and checks its range.
     ///
     /// # Errors
     /// What is wrong and what is allowed, without the key.
@@ -234,7 +234,7 @@ impl Parameter {
             Kind::Number { dimension, .. } => {
                 let number = parse_quantity(text, dimension).map_err(|error| ValueError {
                     fault: error.into(),
-                    // The error has said the units.
+                    // The error already lists the units.
                     allowed: format!("allowed {}", self.range()),
                 })?;
                 Value::Number(number)
@@ -247,7 +247,7 @@ impl Parameter {
                 Err(_) => return Err(self.refuse(ValueFault::NotWhole)),
             },
             Kind::Choice(words) => {
-                // "+x" is also what "x" means.
+                // "x" means "+x".
                 let word = text.to_lowercase();
                 let found = words.iter().find(|choice| {
                     **choice == word || choice.strip_prefix('+') == Some(word.as_str())

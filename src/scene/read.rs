@@ -1,4 +1,4 @@
-//! A scene from its TOML text: settings first, then bodies, joints and ball joints.
+//! Reads a scene from TOML: settings first, then bodies, joints and ball joints.
 
 use super::document::{Document, Node, Section};
 use super::elements::read_element;
@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use toml::de::DeTable;
 
-/// Keys at the top of a file, beside the sections of [`ELEMENT_KINDS`].
+/// Top-level keys of a file, besides the sections of [`ELEMENT_KINDS`].
 const TOP: [&str; 16] = [
     "name",
     "title",
@@ -30,9 +30,9 @@ const TOP: [&str; 16] = [
     "fixed_shape",
 ];
 
-/// Parameters that decide what the bodies are: a change of one reads the file anew.
+/// Parameters that determine the bodies: changing one reads the file again.
 pub(super) const REBUILDS: [&str; 2] = ["chain.links", "spcmm.slider_plane"];
-/// Keys of `[spcmm]` that are no parameters: the file's bodies are built to these dimensions.
+/// Keys of `[spcmm]` that are not parameters: the file's bodies are built to these dimensions.
 pub(super) const SPCMM_DIMENSIONS: [&str; 5] = [
     "mean_x",
     "gamma",
@@ -41,14 +41,14 @@ pub(super) const SPCMM_DIMENSIONS: [&str; 5] = [
     "driven_rod",
 ];
 
-/// Keys of `[view]` that are no parameters.
+/// Keys of `[view]` that are not parameters.
 pub(super) const VIEW_SETTINGS: [&str; 3] = ["floor", "yaw", "pitch"];
 
-/// Where a value of a parameter stands in the file.
+/// Where the file gives each parameter's value.
 type Places<'d> = BTreeMap<String, Node<'d>>;
 
 impl Scene {
-    /// A scene from TOML text; `file` is the name that errors give.
+    /// Parses a scene from TOML text; `file` is its name in errors.
     ///
     /// # Errors
     /// As [`Self::load`].
@@ -119,7 +119,7 @@ impl Scene {
     }
 }
 
-/// Everything that is neither a parameter nor a part of the mechanism; the rest at its defaults.
+/// Everything that is neither a parameter nor part of the mechanism; the rest at its defaults.
 fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
     let document = top.document;
     let text = |name: &str| top.get(name).map(|node| node.text()).transpose();
@@ -218,7 +218,7 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
     })
 }
 
-/// Names of the table's keys in a section, with some more.
+/// The parameter table's keys in a section, plus `more`.
 fn keys_with<'a>(section: &str, more: &[&'a str]) -> Vec<&'a str> {
     let parts = table()
         .iter()
@@ -226,7 +226,7 @@ fn keys_with<'a>(section: &str, more: &[&'a str]) -> Vec<&'a str> {
     parts.chain(more.iter().copied()).collect()
 }
 
-/// Every parameter from the file, or its default; returns where each stands.
+/// Reads every parameter from the file, or takes its default; returns where each is given.
 fn read_parameters<'d>(top: &Section<'d>, scene: &mut Scene) -> Result<Places<'d>, SceneError> {
     let mut places = Places::new();
     let mut sections: BTreeMap<&str, Section<'d>> = BTreeMap::new();
@@ -246,7 +246,7 @@ fn read_parameters<'d>(top: &Section<'d>, scene: &mut Scene) -> Result<Places<'d
         Some((section, name)) => sections.get(section).and_then(|section| section.get(name)),
         None => top.get(key),
     };
-    // The preset first: what the file gives besides wins over it.
+    // The preset first: other settings in the file take precedence over it.
     let preset = table()
         .iter()
         .filter(|parameter| parameter.key == "solver.preset");
@@ -269,7 +269,7 @@ fn read_parameters<'d>(top: &Section<'d>, scene: &mut Scene) -> Result<Places<'d
 }
 
 fn default_of(parameter: &Parameter, sections: &BTreeMap<&str, Section<'_>>) -> Value {
-    // Half a gravity vector would be a surprise: a section that names one component has 0 for the others.
+    // A partly defaulted gravity vector would surprise: if a section gives one component, the others are 0.
     if parameter.key.starts_with("gravity.") && sections.contains_key("gravity") {
         Value::Number(0.0)
     } else {
@@ -322,12 +322,7 @@ fn read_mechanism<'d>(
         joints.push(joint);
     }
     (scene.bodies, scene.joints) = sort_forest(bodies, joints, &body_sections)?;
-    let by_name: BTreeMap<String, usize> = scene
-        .bodies
-        .iter()
-        .enumerate()
-        .map(|(index, body)| (body.name.clone(), index))
-        .collect();
+    let by_name = indices_by_name(&scene.bodies);
     for node in list("ball_joint", MOST_BALL_JOINTS, "ball joints")? {
         let BallJointText {
             joint,
@@ -340,14 +335,6 @@ fn read_mechanism<'d>(
         scene.ball_joints.push(joint);
         places.extend(own);
     }
-    for kind in &ELEMENT_KINDS {
-        for node in list(kind.section, MOST_ELEMENTS, "force elements")? {
-            let (element, section) = read_element(&node, kind, scene, &by_name)?;
-            // Joints and elements name columns of one table.
-            joint_names.add(&section, "joint or force element", &element.name)?;
-            scene.elements.push(element);
-        }
-    }
     for node in list("fixed_shape", MOST_SHAPES, "shapes")? {
         let shape = read_shape(&node, scene.spcmm.as_ref())?;
         scene.fixed_shapes.push(shape);
@@ -357,6 +344,20 @@ fn read_mechanism<'d>(
         for joint in &scene.ball_joints {
             let title = format!("joint.{}", joint.name);
             scene.source.places.entry(title).or_insert(node.place());
+        }
+        let joints = scene.joints.iter().map(|joint| &joint.name);
+        for name in joints.chain(scene.ball_joints.iter().map(|joint| &joint.name)) {
+            joint_names.taken(name, node.place());
+        }
+    }
+    // After the chain: they may be attached to its links.
+    let by_name = indices_by_name(&scene.bodies);
+    for kind in &ELEMENT_KINDS {
+        for node in list(kind.section, MOST_ELEMENTS, "force elements")? {
+            let (element, section) = read_element(&node, kind, scene, &by_name)?;
+            // Joints and elements share one table of column names.
+            joint_names.add(&section, "joint or force element", &element.name)?;
+            scene.elements.push(element);
         }
     }
     let of_bodies = scene.bodies.iter().map(|body| body.shapes.len());
@@ -376,12 +377,18 @@ fn read_mechanism<'d>(
     read_output(top, scene, &file_order)
 }
 
+/// Index of each body, by name.
+fn indices_by_name(bodies: &[Body]) -> BTreeMap<String, usize> {
+    let place = |(index, body): (usize, &Body)| (body.name.clone(), index);
+    bodies.iter().enumerate().map(place).collect()
+}
+
 fn read_output(
     top: &Section<'_>,
     scene: &mut Scene,
     file_order: &[String],
 ) -> Result<(), SceneError> {
-    // Where nothing is said, the last body: the end of a chain, the platform of most files.
+    // Default: the last body (the end of a chain, the platform of most files).
     let last = scene.bodies.last().map_or("", |body| body.name.as_str());
     let last = if scene.chain.is_some() {
         last
@@ -412,13 +419,18 @@ fn read_output(
     Ok(())
 }
 
-/// Names seen so far, with where they stand in the text: no two may be equal.
+/// Names seen so far, with their positions in the text: they must be unique.
 #[derive(Default)]
 struct Names {
     places: BTreeMap<String, usize>,
 }
 
 impl Names {
+    /// Reserves `name` for the item at `place`, unless already taken.
+    fn taken(&mut self, name: &str, place: usize) {
+        self.places.entry(name.to_owned()).or_insert(place);
+    }
+
     fn add(&mut self, section: &Section<'_>, what: &str, name: &str) -> Result<(), SceneError> {
         let node = section.require("name", "\"rod\"")?;
         match self.places.insert(name.to_owned(), node.place()) {

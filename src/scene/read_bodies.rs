@@ -24,11 +24,11 @@ words!(Form {
     Plate => "plate",
 });
 
-/// Largest mass, kg, and inertia, kg m^2, that a file may give: beyond them only typing slips lie.
+/// Largest mass, kg, and inertia, kg m^2, that a file may give: anything beyond is a typing slip.
 const MAX_MASS: f64 = 1e9;
 const MAX_INERTIA: f64 = 1e12;
 
-/// Moments of inertia are printed to three digits: the triangle inequality gets this relative slack.
+/// Moments of inertia are often given to three digits: the triangle inequality gets this relative slack.
 const TRIANGLE_SLACK: f64 = 1e-9;
 
 /// Keys of mass and shape, for bodies and links.
@@ -75,8 +75,8 @@ pub(super) fn read_rigid_body(section: &Section<'_>, name: String) -> Result<Bod
     })
 }
 
-/// The inertia matrix about the centroid in body axes: `inertia` = Ixx, Iyy, Izz and, where the axes are not
-/// principal, `products` = the integrals of xy, xz, yz over the mass.
+/// The inertia matrix about the centroid in body axes: `inertia` = Ixx, Iyy, Izz and, where the axes are not principal,
+/// `products` = the integrals of xy, xz, yz over the mass.
 fn read_inertia(section: &Section<'_>) -> Result<Mat3, SceneError> {
     let node = section.require("inertia", "\"1.58e-5 1.92e-3 1.93e-3 kg m^2\"")?;
     let [xx, yy, zz] = node.quantities::<3>(Dimension::Inertia)?;
@@ -109,7 +109,7 @@ fn read_inertia(section: &Section<'_>) -> Result<Mat3, SceneError> {
     Ok(inertia)
 }
 
-/// One shape. With `spcmm` it is a fixed shape, which may keep with the slider plane.
+/// One shape. With `spcmm` it is a fixed shape, which may follow the slider plane.
 pub(super) fn read_shape(node: &Node<'_>, spcmm: Option<&Spcmm>) -> Result<Shape, SceneError> {
     let mut known = vec![
         "form",

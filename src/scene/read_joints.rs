@@ -25,22 +25,22 @@ words!(Law {
 /// Highest frequency of a harmonic drive, Hz.
 pub(super) const FASTEST_DRIVE: f64 = 1e4;
 
-/// A tree joint whose bodies are still places in the file.
+/// A tree joint whose bodies are still indices in file order.
 pub(super) struct JointText<'d> {
     pub name: String,
     pub section: Section<'d>,
-    /// `parent` and `child` count bodies in file order.
+    /// `parent` and `child` are body indices in file order.
     pub joint: Joint,
 }
 
-/// A ball joint with the places of its contact keys.
+/// A ball joint with the positions of its contact keys.
 pub(super) struct BallJointText<'d> {
     pub joint: BallJoint,
     pub section: Section<'d>,
     pub places: BTreeMap<String, Node<'d>>,
 }
 
-/// One `[[joint]]`; `bodies` are the names in file order, `places` their places in it.
+/// One `[[joint]]`; `bodies` are the names in file order, `places` the index of each.
 pub(super) fn read_joint<'d>(
     node: &Node<'d>,
     scene: &Scene,
@@ -114,7 +114,7 @@ pub(super) fn read_joint<'d>(
     })
 }
 
-/// A free body: where it starts and how it moves.
+/// A free body: its initial pose and velocity.
 fn read_free(section: &Section<'_>, joint: &mut Joint) -> Result<(), SceneError> {
     if joint.parent.is_some() {
         let node = section.require("parent", "\"world\"")?;
@@ -134,7 +134,7 @@ fn read_free(section: &Section<'_>, joint: &mut Joint) -> Result<(), SceneError>
         .get("rotation")
         .map_or(Ok(Quat::identity()), |node| read_rotation(&node))?;
     let angular_velocity = vector("angular_velocity", Dimension::AngularSpeed)?;
-    // The file places and moves the joint point; the model wants the frame's origin.
+    // The file gives pose and velocity of the joint point; the model wants those of the frame's origin.
     let arm = rotation * joint.child_point;
     joint.start = JointStart::Pose {
         position: start
@@ -149,7 +149,7 @@ fn read_free(section: &Section<'_>, joint: &mut Joint) -> Result<(), SceneError>
     Ok(())
 }
 
-/// A slide or a hinge: axis, and a drive or a start.
+/// A slide or a hinge: axis, and either a drive or start values.
 fn read_moving(section: &Section<'_>, scene: &Scene, joint: &mut Joint) -> Result<(), SceneError> {
     let (place, rate) = match joint.kind {
         JointKind::Revolute => (Dimension::Angle, Dimension::AngularSpeed),
@@ -262,7 +262,7 @@ fn read_drive(
     })
 }
 
-/// Where a law starts; the inverse kinematics say it for the spcmm law, which is 0 here.
+/// Start of a drive law; that of the spcmm law, 0 here, comes from the inverse kinematics.
 fn drive_start(drive: Drive) -> JointStart {
     let (position, velocity) = match drive {
         Drive::Spcmm { .. } => (0.0, 0.0),
@@ -383,7 +383,8 @@ pub(super) fn read_rotation(node: &Node<'_>) -> Result<Quat, SceneError> {
     }
 }
 
-/// Bodies parents first, else in file order, and their joints in the same order with `parent` and `child` renamed.
+/// Bodies with parents first, otherwise in file order, and their joints in the same order with `parent` and `child`
+/// renumbered.
 pub(super) fn sort_forest(
     bodies: Vec<Body>,
     joints: Vec<JointText<'_>>,
@@ -456,7 +457,7 @@ pub(super) fn sort_forest(
     ))
 }
 
-/// A point on a body or the world, under `key`; `bodies` maps names to places in the sorted scene.
+/// A point on a body or the world, under `key`; `bodies` maps names to indices in the sorted scene.
 pub(super) fn read_attachment(
     section: &Section<'_>,
     key: &str,
@@ -482,7 +483,7 @@ pub(super) fn read_attachment(
     Ok(Attachment { body, point })
 }
 
-/// One `[[ball_joint]]`; `bodies` maps names to places in the sorted scene.
+/// One `[[ball_joint]]`; `bodies` maps names to indices in the sorted scene.
 pub(super) fn read_ball_joint<'d>(
     node: &Node<'d>,
     scene: &Scene,
@@ -521,15 +522,15 @@ pub(super) fn read_ball_joint<'d>(
     })
 }
 
-/// Keys of `[contact]`, which a joint may have for itself.
+/// Keys of `[contact]`, which a joint may override.
 pub(super) fn contact_parts() -> impl Iterator<Item = &'static str> {
     contact_rows().map(|(part, _)| part)
 }
 
-/// Gives `joint` what `section` says of its contact alone; where that stands, by parameter.
+/// Applies the contact overrides of `section` to `joint`; returns where each is given, by parameter.
 ///
 /// # Errors
-/// A value that is none, or outside of its range.
+/// A value that is invalid or out of range.
 pub(super) fn read_own_contact<'d>(
     section: &Section<'d>,
     joint: &mut BallJoint,

@@ -7,12 +7,12 @@ use crate::integrate::Method;
 use crate::words::Words;
 use Dimension as D;
 
-/// Every parameter there is, in the order the interface shows.
+/// Every parameter, in the order in which the interface lists them.
 pub fn table() -> &'static [Parameter] {
     &TABLE
 }
 
-/// A row that takes effect at once; the functions below change that where it is otherwise.
+/// A row that takes effect at once; the functions below modify that where needed.
 const fn row(
     key: &'static str,
     access: Access,
@@ -469,7 +469,7 @@ pub(super) fn contact_part(parameter: &'static Parameter) -> Option<&'static str
     }
 }
 
-/// Rows of `[contact]`, which a joint may have for itself: last part of the key, and the field.
+/// Rows of `[contact]`, which a joint may override: last part of the key, and the field.
 pub(super) fn contact_rows() -> impl Iterator<Item = (&'static str, Field<contact::Parameters>)> {
     TABLE.iter().filter_map(|parameter| match parameter.access {
         Access::Contact(field) => Some((parameter.key.strip_prefix("contact.")?, field)),

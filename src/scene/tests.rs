@@ -1,8 +1,8 @@
-//! The built-in scenes as a whole: they load, and they close.
+//! The built-in scenes as a whole: they load, and their loops close.
 
 use super::*;
 
-/// World poses of all bodies at the file's start; slider coordinates of the spcmm law as `physics` derives them.
+/// World poses of all bodies at the file's start; slider coordinates of the spcmm law as derived by `physics`.
 fn start_poses(scene: &Scene) -> Vec<(Vec3, Quat)> {
     // Roots of the paper's eq. (39) at t = 0 for a1 = 32 mm.
     let sliders = [0.136_493_548_0, 0.240_922_773_5, 0.186_472_405_6];
@@ -187,7 +187,7 @@ fn the_last_of_two_changes_wins_and_only_the_result_is_checked() {
         scene.changes,
         [("contact.friction".to_owned(), "0.3".to_owned())]
     );
-    // A gap wider than the file's ball is fine with the bigger ball that comes with it.
+    // A gap wider than the file's ball is fine with the larger ball that comes with it.
     let scene = changed(
         "spcmm",
         &[
@@ -214,7 +214,7 @@ fn explicit_solver_settings_beat_a_preset_in_either_order() {
         Scene::parse(&file, None, &[]).unwrap().solver.tolerance,
         1e-5
     );
-    // Nor does one that is asked for later replace what the file says by name.
+    // Nor does a preset requested later replace what the file gives by name.
     let ask = [("solver.preset".to_owned(), "reference".to_owned())];
     let solver = Scene::parse(&file, None, &ask).unwrap().solver;
     assert_eq!(solver.tolerance, 1e-5);
@@ -292,7 +292,7 @@ fn a_chain_is_rebuilt_with_its_links() {
     assert_eq!(scene.ball_joints[1].contact.friction, 0.4);
     assert_eq!(scene.output.body, 2);
     assert_eq!(scene.get("chain.links"), Ok(Value::Count(3)));
-    // The change of a joint that is gone goes with it.
+    // A change of a joint that no longer exists is dropped with it.
     assert!(scene.get("joint.J7.friction").is_err());
     assert_eq!(scene.changes.len(), 2);
     assert_eq!(
@@ -414,7 +414,7 @@ fn the_slider_crank_starts_with_velocities_that_fit_together() {
             .iter()
             .any(|joint| joint.name == "crank" && joint.drive == Some(constant))
     );
-    // Otherwise they are one machine.
+    // Otherwise they are the same mechanism.
     assert_eq!(driven.bodies, scene.bodies);
     assert_eq!(driven.ball_joints, scene.ball_joints);
 }

@@ -1,4 +1,4 @@
-//! Quantities as people write them: "0.3 mm", "206 GPa", "15 deg".
+//! Quantities as users write them: "0.3 mm", "206 GPa", "15 deg".
 //!
 //! Decimal prefixes are applied to the decimal exponent of the text, not by a multiplication, so that
 //! "0.3 mm", "0.3mm" and "3e-4 m" are the same bits.
@@ -6,32 +6,32 @@
 use super::Dimension;
 use std::f64::consts::PI;
 
-/// Why a text is no quantity of the wanted dimension.
+/// Why a text is not a quantity of the required dimension.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum QuantityError {
     /// No number at the start.
     #[error("is not a number{}", example(*.0))]
     NotANumber(Dimension),
-    /// Infinite, not a number, or beyond the range of double precision.
+    /// Infinite, NaN, or beyond the range of double precision.
     #[error("must be a finite number{}", example(*.0))]
     NotFinite(Dimension),
-    /// A bare number other than 0 for a quantity that has a dimension.
+    /// A bare number other than 0 for a dimensional quantity.
     #[error("needs a unit{}", example(*.0))]
     MissingUnit(Dimension),
-    /// A comma where the point belongs.
+    /// A comma instead of a decimal point.
     #[error("has a decimal comma; write a point, as in 0.5")]
     Comma,
-    /// A unit of another dimension, or none known.
+    /// A unit of another dimension, or an unknown one.
     #[error("wrong unit `{unit}`{}{}", foreign(unit), example(*.dimension))]
     WrongUnit {
         /// The unit as written.
         unit: String,
-        /// The dimension that was wanted.
+        /// The dimension required.
         dimension: Dimension,
     },
 }
 
-/// How a unit turns into SI.
+/// How a unit converts to SI.
 #[derive(Clone, Copy)]
 enum Scale {
     /// 10 to this power.
@@ -198,7 +198,7 @@ pub fn unit_names(dimension: Dimension) -> Vec<&'static str> {
     units(dimension).iter().map(|(name, _)| *name).collect()
 }
 
-/// All units as the table of a Markdown page.
+/// All units as a Markdown table.
 pub fn unit_table() -> String {
     let row = |&(_, name, units): &(Dimension, &str, &[Unit])| {
         let names: Vec<String> = units.iter().map(|(name, _)| format!("`{name}`")).collect();
@@ -216,7 +216,7 @@ pub fn si_unit(dimension: Dimension) -> &'static str {
     units(dimension).first().map_or("", |(name, _)| *name)
 }
 
-/// A quantity as a person writes it, in SI units. A bare 0 needs no unit; pure numbers take none.
+/// A quantity as a user writes it, in SI units. A bare 0 needs no unit; pure numbers take none.
 ///
 /// # Errors
 /// Not a number, not finite, no unit, or a unit of another dimension.
@@ -259,11 +259,11 @@ pub fn parse_quantity(text: &str, dimension: Dimension) -> Result<f64, QuantityE
     if !value.is_finite() {
         return Err(QuantityError::NotFinite(dimension));
     }
-    // A negative zero would only make two equal scenes hash differently.
+    // A negative zero would only make equal scenes hash differently.
     Ok(value + 0.0)
 }
 
-/// An SI value in `unit`; unchanged for a unit that is not known or "".
+/// An SI value in `unit`; unchanged if `unit` is unknown or "".
 pub fn to_display(si: f64, unit: &str) -> f64 {
     match scale_of(unit) {
         Some(Decimal(exponent)) => shift(&format!("{si:e}"), -exponent).unwrap_or(f64::NAN),
@@ -272,12 +272,12 @@ pub fn to_display(si: f64, unit: &str) -> f64 {
     }
 }
 
-/// A value in `unit` as SI; unchanged for a unit that is not known or "".
+/// A value in `unit` as SI; unchanged if `unit` is unknown or "".
 pub fn from_display(value: f64, unit: &str) -> f64 {
     scale_of(unit).map_or(value, |scale| apply(&format!("{value:e}"), value, scale))
 }
 
-/// An SI value with its unit, at most `digits` significant digits, no needless zeros: `0.3 mm`.
+/// An SI value with its unit, at most `digits` significant digits, no trailing zeros: `0.3 mm`.
 pub fn format_quantity_digits(si: f64, unit: &str, digits: usize) -> String {
     let number = format_number(to_display(si, unit), digits);
     if unit.is_empty() {
@@ -287,12 +287,12 @@ pub fn format_quantity_digits(si: f64, unit: &str, digits: usize) -> String {
     }
 }
 
-/// An SI value with its unit for people: six significant digits.
+/// An SI value with its unit for display: six significant digits.
 pub fn format_quantity(si: f64, unit: &str) -> String {
     format_quantity_digits(si, unit, 6)
 }
 
-/// A text that [`parse_quantity`] reads back to the same bits, in `unit` where that is possible, else in SI.
+/// A text that [`parse_quantity`] reads back to the same bits, in `unit` if possible, otherwise in SI.
 pub(super) fn exact_quantity(si: f64, unit: &str, dimension: Dimension) -> String {
     let friendly = format_quantity_digits(si, unit, 15);
     if parse_quantity(&friendly, dimension).map(f64::to_bits) == Ok((si + 0.0).to_bits()) {
@@ -306,7 +306,7 @@ pub(super) fn exact_quantity(si: f64, unit: &str, dimension: Dimension) -> Strin
     }
 }
 
-/// At most `digits` significant digits, plain notation where it is short.
+/// At most `digits` significant digits, in plain notation where that is short.
 fn format_number(value: f64, digits: usize) -> String {
     if value == 0.0 || !value.is_finite() {
         return if value == 0.0 {
@@ -359,7 +359,7 @@ fn shift(text: &str, by: i32) -> Option<f64> {
         .ok()
 }
 
-/// Splits "0.3 mm" into "0.3" and "mm"; the number is "" where the text starts with none.
+/// Splits "0.3 mm" into "0.3" and "mm"; the number is "" if the text does not start with one.
 fn split_number(text: &str) -> (&str, &str) {
     let bytes = text.as_bytes();
     let digits = |mut at: usize| {
@@ -379,7 +379,7 @@ fn split_number(text: &str) -> (&str, &str) {
     if count == 0 {
         return ("", text);
     }
-    // An exponent only where digits follow: the `e` of a unit stays with the unit.
+    // An exponent only if digits follow: the `e` of a unit stays with the unit.
     if matches!(bytes.get(end), Some(b'e' | b'E')) {
         let sign = usize::from(matches!(bytes.get(end + 1), Some(b'+' | b'-')));
         let exponent = digits(end + 1 + sign);
@@ -403,7 +403,7 @@ fn normalise(unit: &str) -> String {
         .replace('°', "deg")
 }
 
-/// The units to choose from, as the end of a sentence.
+/// The possible units, as the end of a sentence.
 fn example(dimension: Dimension) -> String {
     let names = unit_names(dimension);
     match names.first() {
@@ -423,7 +423,7 @@ fn dimension_name(dimension: Dimension) -> &'static str {
         .map_or("", |(_, name, _)| name)
 }
 
-/// Says what a unit would measure, if it measures anything.
+/// Says what a unit would measure, if anything.
 fn foreign(unit: &str) -> String {
     let wanted = normalise(unit);
     UNITS
@@ -481,7 +481,7 @@ mod tests {
         ];
         for (text, dimension, si) in cases {
             let read = parse_quantity(text, dimension).unwrap();
-            // One rounding of pi on the way.
+            // pi brings one extra rounding.
             assert!(
                 (read - si).abs() <= f64::EPSILON * si.abs(),
                 "{text}: {read}"

@@ -1,11 +1,11 @@
-//! Texts of others (scene files, links, command lines) made fit to be shown: what would steer a terminal, forge a line or
-//! reorder what stands beside it becomes visible.
+//! Makes foreign text (scene files, links, command lines) safe to show: what would control a terminal, forge a line or
+//! reorder its surroundings becomes visible.
 
 use std::borrow::Cow;
 
-/// Whether a terminal or a page would obey `c` instead of showing it: control characters, line and paragraph separators,
-/// and marks that turn the direction of writing.
-fn steers(c: char) -> bool {
+/// Whether a terminal or a page would act on `c` instead of showing it: control characters, line and paragraph separators,
+/// and bidirectional formatting characters.
+fn is_control_or_bidi(c: char) -> bool {
     c.is_control()
         || matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{206f}')
 }
@@ -18,7 +18,7 @@ fn escaped(text: &str, hide: impl Fn(char) -> bool) -> Cow<'_, str> {
     let mut out = String::with_capacity(text.len() + 16);
     for c in text.chars() {
         if hide(c) {
-            // Also what JSON calls it. Writing to a String cannot fail.
+            // The JSON escape, too. Writing to a String cannot fail.
             let _ = write!(out, "\\u{:04x}", u32::from(c));
         } else {
             out.push(c);
@@ -27,14 +27,14 @@ fn escaped(text: &str, hide: impl Fn(char) -> bool) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// `text` with line breaks and tabs as they are, and every other character that steers as `\u001b`.
+/// `text` with line breaks and tabs kept, and every other control or formatting character escaped as `\u001b`.
 pub fn visible(text: &str) -> Cow<'_, str> {
-    escaped(text, |c| steers(c) && !matches!(c, '\n' | '\t'))
+    escaped(text, |c| is_control_or_bidi(c) && !matches!(c, '\n' | '\t'))
 }
 
-/// As [`visible`], in one line.
+/// As [`visible`], on one line.
 pub fn visible_line(text: &str) -> Cow<'_, str> {
-    escaped(text, steers)
+    escaped(text, is_control_or_bidi)
 }
 
 #[cfg(test)]
@@ -58,7 +58,7 @@ mod tests {
         ] {
             let text = visible(&format!("a{c}b")).into_owned();
             assert_eq!(text, format!("a{shown}b"));
-            // Shown once, it stays as it is.
+            // Escaping again changes nothing.
             assert_eq!(visible_line(&text), text);
         }
     }

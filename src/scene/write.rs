@@ -1,4 +1,4 @@
-//! A scene back to TOML: the text it was read from, with the changed values in their places; comments and order stay.
+//! A scene back to TOML: its source text with the changed values in place; comments and order are kept.
 
 use toml_edit::{
     Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value as Toml, value,
@@ -7,10 +7,10 @@ use toml_edit::{
 use super::{Kind, Scene, SceneError, Value};
 
 impl Scene {
-    /// The text of a scene file that reads to this scene, its changes included.
+    /// The text of a scene file that reads back to this scene, changes included.
     ///
     /// # Errors
-    /// A change that the format has no place for.
+    /// A change that the format cannot express.
     pub fn to_toml(&self) -> Result<String, SceneError> {
         let lost = |key: &str, message: String| SceneError {
             key: Some(key.to_owned()),
@@ -26,7 +26,7 @@ impl Scene {
             self.write_change(&mut document, key)?;
         }
         let text = document.to_string();
-        // What was written is what was meant, or nothing is given out.
+        // Return the text only if it reads back as intended.
         let read = Self::parse(&text, self.source.file.as_deref(), &[])?;
         for (key, _) in &self.changes {
             if read.get(key)? != self.get(key)? {
@@ -58,7 +58,7 @@ impl Scene {
                 let table = document
                     .entry(section)
                     .or_insert_with(|| Item::Table(Table::new()));
-                // A section that names one component of gravity has 0 for the others.
+                // If a section gives one component of gravity, the others are 0.
                 if fresh && section == "gravity" {
                     for part in ["x", "y", "z"] {
                         place(table, part, self.item(&format!("gravity.{part}"))?);
@@ -71,7 +71,7 @@ impl Scene {
         Ok(())
     }
 
-    /// Present value of `key` as it stands in a file: pure numbers and counts bare, all else as a text.
+    /// Current value of `key` as a file gives it: pure numbers and counts bare, everything else as text.
     fn item(&self, key: &str) -> Result<Item, SceneError> {
         let parameter = self.parameter(key)?;
         let now = self.get(key)?;
@@ -85,7 +85,7 @@ impl Scene {
     }
 }
 
-/// Puts `item` into the entry called `name` of a list of joints, if there is one.
+/// Writes `item` to the entry named `name` in a list of joints, if there is one.
 fn put_joint(joints: Option<&mut Item>, name: &str, part: &str, item: &Item) -> bool {
     match joints {
         Some(Item::ArrayOfTables(tables)) => tables
@@ -103,7 +103,7 @@ fn put_joint(joints: Option<&mut Item>, name: &str, part: &str, item: &Item) -> 
     .is_some()
 }
 
-/// Puts `item` into the `[[chain.joint]]` called `name`, a new one if need be; whether there is a chain.
+/// Writes `item` to the `[[chain.joint]]` named `name`, adding it if needed; returns whether there is a chain.
 fn put_chain_joint(chain: Option<&mut Item>, name: &str, part: &str, item: Item) -> bool {
     match chain {
         Some(Item::Table(chain)) => {
@@ -147,19 +147,19 @@ fn put_chain_joint(chain: Option<&mut Item>, name: &str, part: &str, item: Item)
     }
 }
 
-/// Puts `item` into a section, which is a table or an inline one.
+/// Writes `item` to a section, which is a table or an inline table.
 fn place(section: &mut Item, name: &str, item: Item) {
     match (section, item) {
         (Item::Table(table), item) => put(table, name, item),
         (Item::Value(Toml::InlineTable(table)), Item::Value(item)) => {
             table.insert(name, item);
         }
-        // The scene was read from this text: a section is a table.
+        // Unreachable: the scene was read from this text, so a section is a table.
         _ => {}
     }
 }
 
-/// Puts `item` into `table`; comments above and behind the old value stay.
+/// Writes `item` to `table`; comments above and after the old value are kept.
 fn put(table: &mut Table, name: &str, mut item: Item) {
     let Some(old) = table.get_mut(name) else {
         table.insert(name, item);
@@ -168,7 +168,7 @@ fn put(table: &mut Table, name: &str, mut item: Item) {
     if let (Some(old), Some(new)) = (old.as_value(), item.as_value_mut()) {
         *new.decor_mut() = old.decor().clone();
     }
-    // Inserting would format the key anew, and drop what stands above it.
+    // Inserting would reformat the key and drop the comments above it.
     *old = item;
 }
 
@@ -213,7 +213,7 @@ mod tests {
             let plain = scene(name, &[]);
             for parameter in plain.parameters() {
                 let other = match parameter.kind {
-                    // Inside every range, and no round number.
+                    // Inside every range, and not a round number.
                     Kind::Number { slider, .. } => {
                         Value::Number(slider.0 + 0.377_123_456_789 * (slider.1 - slider.0))
                     }
@@ -227,7 +227,7 @@ mod tests {
                 for key in keys {
                     let mut changed = plain.clone();
                     if let Err(error) = changed.set_value(&key, &other) {
-                        // A law may refuse the restitution that the scene has, and the like.
+                        // A law may reject the scene's restitution, for example.
                         assert!(matches!(parameter.scope, Scope::Contact), "{error}");
                         continue;
                     }
@@ -318,7 +318,7 @@ mod tests {
                 written.contains("# the second"),
                 text.contains("# the second")
             );
-            // A second time: the entries are there now.
+            // A second time: the entries exist now.
             let mut again = read;
             again.set("joint.J8.friction", "0.3").expect("in range");
             let written = again.to_toml().expect("has its places");

@@ -4,7 +4,7 @@ use super::Pose;
 use super::frame::BodyMotion;
 use crate::scene::{Mat3, Vec3};
 
-/// Closer than this to beta = +-pi/2 (in cos beta), alpha is 0 and gamma takes the rest.
+/// Closer to beta = +-pi/2 than this (in cos beta), alpha is set to 0 and gamma takes the rest.
 const NEAR_SINGULAR: f64 = 1e-9;
 
 /// (alpha, beta, gamma) of a rotation, rad.
@@ -21,7 +21,7 @@ pub(super) fn pose_of(body: &BodyMotion) -> Pose {
     let angles = angles_of(&body.rotation);
     let (sa, ca) = libm::sincos(angles.x);
     let (sb, cb) = libm::sincos(angles.y);
-    // Axes about which the three angles turn: x, Rx z, Rx Rz y; omega = alpha' e1 + beta' e2 + gamma' e3.
+    // Axes of the three rotations: x, Rx z, Rx Rz y; omega = alpha' e1 + beta' e2 + gamma' e3.
     let (e1, e2, e3) = (
         Vec3::x(),
         Vec3::new(0.0, -sa, ca),
@@ -78,7 +78,7 @@ mod tests {
 
     #[test]
     fn rates_and_accelerations_are_derivatives_of_the_angles() {
-        // A body spinning with omega = w + t w1; angles at t = -h, 0, h by integrating R' = [omega]x R exactly enough.
+        // A body spinning with omega = w + t w1; angles at t = -h, 0, h from integrating R' = [omega]x R accurately enough.
         let (a, w, w1) = (
             Vec3::new(0.3, -0.5, 0.8),
             Vec3::new(1.0, -2.0, 0.5),

@@ -1,4 +1,4 @@
-//! Which values of a frame a scene has recorded: channels of the plots and columns of `run`, laid out from the one table.
+//! Which values of a frame are recorded for a scene: plot channels and columns of `run`, all laid out from one table.
 
 mod table;
 
@@ -8,10 +8,10 @@ use super::Frame;
 use crate::scene::{JointKind, Scene};
 use table::{Each, Signal, TABLE, Take};
 
-/// Ball joints, and drives, that are recorded; in a longer chain the rest would cost more memory than they tell.
+/// Ball joints and drives that are recorded; in a longer chain the rest would cost more memory than it is worth.
 pub const RECORDED_JOINTS: usize = 12;
 
-/// Where in a frame one value stands.
+/// Where a value is found in a frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Reading {
     take: Take,
@@ -20,7 +20,7 @@ pub struct Reading {
 }
 
 impl Reading {
-    /// The value, SI units; `None` where `frame` does not know it.
+    /// The value, SI units; `None` where `frame` does not have it.
     #[inline]
     pub fn read(&self, frame: &Frame) -> Option<f64> {
         self.take.value(frame, self.part, self.component)
@@ -32,21 +32,21 @@ impl Reading {
 pub struct Channel {
     /// What it measures.
     pub quantity: Quantity,
-    /// Which one of them: a joint's name, an axis, a kind of energy.
+    /// Which member: a joint's name, an axis, a kind of energy.
     pub member: String,
     column: String,
     reading: Reading,
 }
 
 impl PartialEq for Channel {
-    /// Quantity and member tell a channel; where it is read follows from them.
+    /// Quantity and member identify a channel; where it is read follows from them.
     fn eq(&self, other: &Self) -> bool {
         (self.quantity, &self.member) == (other.quantity, &other.member)
     }
 }
 
 impl Channel {
-    /// Name of its column in a file, with the SI unit: that of `run` for the same quantity.
+    /// Name of its column in a file, with the SI unit: the same as the `run` column of the quantity.
     pub fn column(&self) -> &str {
         &self.column
     }
@@ -95,13 +95,13 @@ impl Channels {
         self.list.iter().position(own)
     }
 
-    /// Index of the error of the output point, which no frame knows.
+    /// Index of the error of the output point, which frames do not contain.
     pub fn tip_error(&self) -> usize {
         let own = |c: &Channel| c.quantity == Quantity::TipError;
         self.list.iter().position(own).unwrap_or_default()
     }
 
-    /// Reads every channel from `frame` into `out`, SI units; NaN where the frame does not know it.
+    /// Reads every channel from `frame` into `out`, SI units; NaN where the frame has no value.
     pub fn read(&self, frame: &Frame, out: &mut Vec<f64>) {
         out.clear();
         let value = |channel: &Channel| channel.reading.read(frame).unwrap_or(f64::NAN);
@@ -109,8 +109,8 @@ impl Channels {
     }
 }
 
-/// Columns of the rows of `run` in order, each with its name and where it is read; `first` tells whether the scene has a probe
-/// error and a ledger, and what its elements report.
+/// Columns of the rows of `run` in order, each with its name and where it is read; `first` shows whether the scene has a
+/// probe error and a ledger, and what its elements report.
 pub fn run_columns(scene: &Scene, first: &Frame) -> (Vec<String>, Vec<Reading>) {
     let (mut names, mut readings) = (Vec::new(), Vec::new());
     let in_run = |signal: &Signal| signal.run;
@@ -129,8 +129,8 @@ struct Found<'a> {
     reading: Reading,
 }
 
-/// Calls `add` with the values of all signals that have a place, by place; of those that share one and are repeated for the same
-/// parts, part by part, the first `most`.
+/// Calls `add` with the values of all signals that have a place, in order of place; signals that share a place and are
+/// repeated for the same parts go part by part. Only the first `most` parts are used.
 fn lay_out(
     scene: &Scene,
     first: Option<&Frame>,
@@ -168,7 +168,7 @@ fn lay_out(
     }
 }
 
-/// Names of what a signal is repeated for; of a driven joint with its kind.
+/// Names of the parts a signal is repeated for; for a driven joint also its kind.
 fn parts_of(scene: &Scene, each: Each) -> Vec<(&str, Option<JointKind>)> {
     let joints = scene.ball_joints.iter().map(|joint| joint.name.as_str());
     let elements = scene.elements.iter().map(|element| element.name.as_str());
@@ -181,7 +181,7 @@ fn parts_of(scene: &Scene, each: Each) -> Vec<(&str, Option<JointKind>)> {
     }
 }
 
-/// Whether `scene` has `signal` for its `part`; without a `first` frame, whether it may have it.
+/// Whether `scene` has `signal` for part `part`; without a `first` frame, whether it may have it.
 fn has(
     scene: &Scene,
     first: Option<&Frame>,

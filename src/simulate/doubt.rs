@@ -1,15 +1,15 @@
-//! What speaks against a result: numbers, and words for them.
+//! Reasons to doubt a result: numbers, and their wording.
 
 use std::fmt;
 
 use crate::scene;
 
-/// Ball joints that a doubt is about.
+/// Ball joints that a doubt concerns.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joints {
-    /// Name of the one of which it is truest.
+    /// Name of the most affected one.
     pub worst: String,
-    /// How many others it is true of.
+    /// How many others are affected.
     pub others: usize,
 }
 
@@ -23,10 +23,10 @@ impl fmt::Display for Joints {
     }
 }
 
-/// A work that the ledger states.
+/// A work term of the ledger.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
-pub enum Work {
+pub enum LedgerTerm {
     Drives,
     Gravity,
     Restitution,
@@ -37,7 +37,7 @@ pub enum Work {
     External,
 }
 
-impl Work {
+impl LedgerTerm {
     fn words(self) -> &'static str {
         match self {
             Self::Drives => "work of the drives",
@@ -52,16 +52,16 @@ impl Work {
     }
 }
 
-/// Why a result is not to be trusted. Its `Display` is a sentence for a person.
+/// Why a result is not to be trusted. Its `Display` is a sentence for the user.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Doubt {
-    /// What the scene asks for, whatever the run met.
+    /// Follows from the scene's settings, whatever happened in the run.
     Scene(scene::Doubt),
-    /// Contacts that lasted fewer fixed steps than their forces need.
+    /// Contacts that lasted fewer fixed steps than needed to resolve their forces.
     Unresolved {
         /// Where.
         joints: Joints,
-        /// How many, of so many contacts of the worst joint.
+        /// How many of the worst joint's contacts.
         short: u64,
         /// Contacts of the worst joint.
         contacts: u64,
@@ -72,19 +72,19 @@ pub enum Doubt {
     Floored {
         /// Where.
         joints: Joints,
-        /// How many, of so many contacts of the worst joint.
+        /// How many of the worst joint's contacts.
         slow: u64,
         /// Contacts of the worst joint.
         contacts: u64,
     },
-    /// A contact patch that is not small against its ball.
+    /// A contact patch that is not small compared with its ball.
     Patch {
         /// Where.
         joints: Joints,
         /// Radius of the patch over that of the ball.
         radii: f64,
     },
-    /// Damping beyond what the law gives an undisturbed impact.
+    /// More damping than the law gives an undisturbed impact.
     Damping {
         /// Where.
         joints: Joints,
@@ -95,34 +95,34 @@ pub enum Doubt {
         /// The same in an undisturbed impact: chi.
         usual: f64,
     },
-    /// Constraints of the `lagrange` form that did not hold.
+    /// Constraints of the `lagrange` form that drifted.
     Drift {
-        /// How far they were off, m.
+        /// Largest violation, m.
         distance: f64,
     },
-    /// Energy that nothing accounts for, against that exchanged.
+    /// Unaccounted energy, compared with the energy exchanged.
     Energy {
         /// J.
         residual: f64,
-        /// Over the energy exchanged.
+        /// As a fraction of the energy exchanged.
         share: f64,
     },
-    /// Energy that nothing accounts for, against a work of the ledger.
+    /// Unaccounted energy, compared with a work term of the ledger.
     Work {
-        /// The smallest.
-        work: Work,
+        /// The smallest work term.
+        work: LedgerTerm,
         /// Its value, J.
         value: f64,
         /// J.
         residual: f64,
     },
-    /// An explicit method whose steps stability held, not the tolerance.
+    /// An explicit method whose step size was limited by stability, not by the tolerance.
     Held {
-        /// Part of the simulated time.
+        /// Fraction of the simulated time.
         share: f64,
         /// `solver.tolerance`.
         tolerance: f64,
-        /// Loosest with which such steps keep the energy.
+        /// Loosest tolerance at which such steps conserve energy well enough.
         loosest: f64,
     },
 }

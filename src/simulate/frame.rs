@@ -15,7 +15,7 @@ pub struct Frame {
     pub joints: Vec<JointReport>,
     /// Force elements in scene order.
     pub elements: Vec<ElementReport>,
-    /// The hand that pulls, if one does: from it to the point. Of the frame on show alone.
+    /// The hand that pulls, if any: force from the hand on the grasped point. Only set in the displayed frame.
     pub pull: Option<ElementReport>,
     /// Driven joints in scene order: actuator force, N (or torque, N m), positive along the joint axis's positive sense.
     pub actuators: Vec<f64>,
@@ -27,10 +27,10 @@ pub struct Frame {
     pub potential: f64,
     /// The elastic part of `potential`: energy stored in contacts and springs, J.
     pub elastic: f64,
-    /// Probe tip minus the tip of the ideal mechanism at the same time, m; `None` where the scene has no
-    /// probe, or the ideal mechanism does not get here.
+    /// Probe tip minus the tip of the ideal mechanism at the same time, m; `None` if the scene has no probe or the ideal
+    /// mechanism cannot reach this instant.
     pub probe_error: Option<Vec3>,
-    /// Energy moved since the start; `None` where `solver.energy_ledger` is off.
+    /// Energy exchanged since the start; `None` where `solver.energy_ledger` is off.
     pub ledger: Option<Ledger>,
 }
 
@@ -91,7 +91,7 @@ pub struct JointReport {
     pub ball_centre: Vec3,
     /// e = Z_j - Z_i, m (5).
     pub eccentricity: Vec3,
-    /// Clearance in force now (a live change moves it at a bounded rate), m.
+    /// Clearance in force now (a live change ramps it at a bounded rate), m.
     pub clearance: f64,
     /// delta = |e| - c, m (10); 0 for an ideal joint.
     pub penetration: f64,
@@ -103,13 +103,13 @@ pub struct JointReport {
     pub friction_force: Vec3,
     /// Where the forces act on the ball, Z_j + r n, m.
     pub contact_point: Vec3,
-    /// Speed of sliding that friction reads, m/s.
+    /// Sliding speed used by the friction law, m/s.
     pub slip_speed: f64,
     /// What the contact is doing.
     pub state: ContactState,
 }
 
-/// The strongest instant of a ball joint since the peaks were last taken.
+/// The largest force on a ball joint since the peaks were last taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Peak {
     /// Largest |F_N| in continuous time, N.
@@ -120,7 +120,7 @@ pub struct Peak {
     pub normal_force: Vec3,
     /// Friction force on the ball at that instant, N, world axes.
     pub friction_force: Vec3,
-    /// Contacts that began.
+    /// Number of contacts begun.
     pub impacts: u32,
     /// Largest approach speed of those impacts, m/s.
     pub approach_speed: f64,

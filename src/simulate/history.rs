@@ -1,13 +1,13 @@
-//! The recorded past of some channels, thinned so that no extreme is lost: bins of doubling width, each with the
-//! least and the greatest value that fell into it.
+//! The recorded past of some channels, thinned without losing extremes: bins of doubling width, each with the least and the
+//! greatest value that fell into it.
 
 /// Bins kept per level: more than a wide plot has columns of pixels.
 const BINS: usize = 2048;
 /// Levels: the widest bin is `finest * 2^(LEVELS - 1)`.
 const LEVELS: usize = 23;
-/// No bin.
+/// Empty slot.
 const EMPTY: i64 = i64::MIN;
-/// Nothing was recorded of a channel.
+/// Nothing recorded for a channel.
 const NOTHING: (f32, f32) = (f32::INFINITY, f32::NEG_INFINITY);
 
 /// Fixed-size record of `channels` quantities over time. Nothing is allocated after [`History::new`].
@@ -19,9 +19,9 @@ pub struct History {
     indices: Vec<i64>,
     /// Newest index per level.
     newest: [i64; LEVELS],
-    /// Greatest index per level that there ever was: what is older by a round is overwritten.
+    /// Greatest index ever reached per level: anything more than `BINS` older has been overwritten.
     reached: [i64; LEVELS],
-    /// First value per channel. What is kept is the difference from it: a small motion far from zero has all its digits.
+    /// First value per channel. Differences from it are stored, so that a small motion far from zero keeps its digits.
     base: Vec<f64>,
     /// (least, greatest) per channel less its base, slot by slot, level by level.
     ranges: Vec<(f32, f32)>,
@@ -39,7 +39,7 @@ pub struct Bin {
     pub greatest: f64,
 }
 
-/// Where a record stood, to go back to: see [`History::rewind`].
+/// A position in the record that [`History::rewind`] can go back to.
 #[derive(Clone, Debug)]
 pub struct Mark {
     newest: [i64; LEVELS],
@@ -49,7 +49,7 @@ pub struct Mark {
 }
 
 impl Mark {
-    /// Bytes that it takes, about.
+    /// Approximate size in bytes.
     pub fn bytes(&self) -> usize {
         size_of::<Self>() + std::mem::size_of_val(self.ranges.as_slice())
     }
@@ -85,7 +85,7 @@ impl History {
         self.start.map(|start| (start, self.end))
     }
 
-    /// Forgets everything.
+    /// Clears the record.
     pub fn clear(&mut self) {
         self.indices.fill(EMPTY);
         self.newest = [EMPTY; LEVELS];
@@ -94,7 +94,7 @@ impl History {
         self.end = 0.0;
     }
 
-    /// Where the record stands.
+    /// The current position in the record.
     pub fn mark(&self) -> Mark {
         let mut ranges = Vec::with_capacity(LEVELS * self.channels);
         for (level, &index) in self.newest.iter().enumerate() {
@@ -109,7 +109,7 @@ impl History {
         }
     }
 
-    /// Forgets what was recorded after `mark`, which is this record's own since it was last cleared.
+    /// Drops everything recorded after `mark`, which must come from this record since it was last cleared.
     pub fn rewind(&mut self, mark: &Mark) {
         let Some((start, end)) = mark.span else {
             return self.clear();
@@ -132,8 +132,8 @@ impl History {
         }
     }
 
-    /// Records one instant, s; one value per channel, NaN where there is none. An instant before the latest, or not finite, is
-    /// ignored.
+    /// Records one instant, s; one value per channel, NaN where there is none. Instants that are not finite, or earlier
+    /// than the latest, are ignored.
     pub fn push(&mut self, time: f64, values: &[f64]) {
         if !time.is_finite() || (self.start.is_some() && time < self.end) {
             return;
@@ -164,7 +164,7 @@ impl History {
         }
     }
 
-    /// Widens what is recorded at `time` so that `channel` includes `value`: a peak between two steps.
+    /// Widens the bins at `time` so that `channel` includes `value`: a peak between two steps.
     pub fn widen(&mut self, time: f64, channel: usize, value: f64) {
         if channel >= self.channels || !time.is_finite() || !value.is_finite() {
             return;
@@ -179,8 +179,9 @@ impl History {
         }
     }
 
-    /// What was recorded of `channel` from `from` to `to`, s, in order of time, in at most `most_bins` bins and one beyond
-    /// each end; appended to `out`. The latest ends with the record; between two that do not touch nothing was recorded.
+    /// Appends to `out` what was recorded of `channel` from `from` to `to`, s, in order of time, in at most `most_bins`
+    /// bins plus one beyond each end. The last bin ends where the record ends; a gap between bins means that nothing was
+    /// recorded there.
     pub fn bins(&self, channel: usize, from: f64, to: f64, most_bins: usize, out: &mut Vec<Bin>) {
         if channel >= self.channels || to <= from {
             return;
@@ -191,7 +192,7 @@ impl History {
         let (from, to) = (from.max(start), to.min(end));
         let level = self.level(from, to, most_bins);
         let (width, complete) = (self.width(level), self.complete(level));
-        // Where nothing was recorded at the very beginning, what was before it.
+        // If the first bin is empty, go back to the last one before it that is not.
         let (mut first, oldest) = (self.index(level, from), self.index(level, start));
         let gone = self.reached[level].saturating_sub(BINS as i64);
         while first > oldest.max(gone + 1) && self.range(level, first, complete, channel).is_none()
@@ -212,8 +213,8 @@ impl History {
         }
     }
 
-    /// Everything that is kept in at most so many rows: time of each bin's middle in s, then the least and the greatest
-    /// value of each channel in it, channel after channel; least above greatest where there was none.
+    /// The whole record in at most `most_bins` rows: time of each bin's middle in s, then the least and the greatest value
+    /// of each channel; least above greatest where there was none.
     pub fn rows(&self, most_bins: usize) -> Vec<(f64, Vec<(f64, f64)>)> {
         let Some((start, end)) = self.span() else {
             return Vec::new();
@@ -231,9 +232,9 @@ impl History {
             .collect()
     }
 
-    /// The narrowest bins of which `most_bins` cover the time between `from` and `to`, s, and that are still there.
+    /// The finest level at which `most_bins` bins cover `from` to `to`, s, and the bins still exist.
     fn level(&self, from: f64, to: f64, most_bins: usize) -> usize {
-        // Two bins of room: the window seldom starts and ends on a bin's edge.
+        // Two spare bins: the window seldom starts and ends on a bin's edge.
         let most_bins = most_bins.clamp(2, BINS - 2) as f64;
         (0..LEVELS)
             .find(|&level| {
@@ -248,11 +249,11 @@ impl History {
     }
 
     fn index(&self, level: usize, time: f64) -> i64 {
-        // Halving the finest index keeps the levels nested whatever the rounding of the division.
+        // Shifting the finest index keeps the levels nested whatever the rounding of the division.
         ((time / self.finest).floor() as i64) >> level
     }
 
-    /// Where the ranges of a bin lie.
+    /// Index range of a bin's values in `ranges`.
     fn at(&self, level: usize, index: i64) -> std::ops::Range<usize> {
         let at = (level * BINS + slot_of(index)) * self.channels;
         at..at + self.channels
@@ -263,15 +264,15 @@ impl History {
         &mut self.ranges[at]
     }
 
-    /// First bin of `level` that narrower levels have still to hand something up to.
+    /// First bin of `level` into which finer levels have yet to be merged.
     fn complete(&self, level: usize) -> i64 {
         let newest = self.newest[..level].iter().enumerate();
         let above = newest.map(|(below, index)| index >> (level - below));
         above.min().unwrap_or(i64::MAX)
     }
 
-    /// Range of `channel` in one bin, what the narrower levels have not yet handed up included: those before the bin
-    /// `complete` have it all.
+    /// Range of `channel` in one bin, including what finer levels have not yet merged into it; bins before `complete` need
+    /// no such look-up.
     fn range(&self, level: usize, index: i64, complete: i64, channel: usize) -> Option<(f64, f64)> {
         let mut found: Option<(f32, f32)> = None;
         for below in if index < complete { level } else { 0 }..=level {
@@ -292,7 +293,7 @@ impl History {
         let base = self.base[channel];
         let whole = |kept: f32| {
             let value = base + f64::from(kept);
-            // As far from its base as that is from zero, it has no more digits than this: zero stays zero.
+            // The base cancels this value to within f32 precision: report an exact zero.
             if value.abs() <= f64::from(f32::EPSILON) * base.abs() {
                 0.0
             } else {
@@ -302,7 +303,7 @@ impl History {
         found.map(|(least, greatest)| (whole(least), whole(greatest)))
     }
 
-    /// Hands the newest bin of `level` up to the level above.
+    /// Merges the newest bin of `level` into the level above.
     fn close(&mut self, level: usize) {
         let index = self.newest[level];
         if index == EMPTY || level + 1 == LEVELS {
@@ -386,7 +387,7 @@ mod tests {
             let middle = libm::sin((bin.from + bin.to) * 50.0);
             assert!((bin.least - middle).abs() < 0.1 && (bin.greatest - middle).abs() < 0.1);
         }
-        // Records are fewer than the bins of a short window: it begins with the one before it.
+        // The window has fewer entries than bins: it begins with the entry before it.
         let found = bins(&history, 0, 0.499_953, 0.499_973, 300);
         assert!(found[0].from < 0.499_952 && found.len() == 3, "{found:?}");
         let found = bins(&history, 0, 0.0, 1.0, 300);
@@ -457,7 +458,7 @@ mod tests {
         history.rewind(&mark);
         assert_eq!(history.span(), Some((0.0, 3_332.0 * 1e-5)));
         assert!(history.rows(70) == rows);
-        // What the future overwrote is there in wider bins.
+        // What the future overwrote is still available in wider bins.
         let after = bins(&history, 0, 0.0, 1.0, 700);
         let ends = |bins: &[Bin]| (bins[0].from, bins[bins.len() - 1].to);
         assert_eq!(ends(&after), ends(&before));

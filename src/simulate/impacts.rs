@@ -1,13 +1,13 @@
-//! The restitution check: for each impact what was asked for, what its law gives, and what it really gave.
+//! The restitution check: for each impact the restitution asked for, the one its law gives, and the one that resulted.
 
 use super::peaks::Course;
 use crate::contact::{Coefficients, restitution_given};
 
-/// Latest impacts that are kept.
+/// How many of the latest impacts are kept.
 const KEPT: usize = 64;
 
-/// A finished impact of one ball joint: from the instant at which a contact began with an approach to the instant at
-/// which it ended. A contact that existed at the start, or that a live change ended, is none.
+/// A finished impact of one ball joint, from the start of an approaching contact to its end. A contact that existed at the
+/// start, or that a live change ended, does not count.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Impact {
     /// Ball joint, by its index in the scene.
@@ -16,31 +16,32 @@ pub struct Impact {
     pub start: f64,
     /// When it ended, s.
     pub end: f64,
-    /// Rate of the penetration when it began, m/s.
+    /// Penetration rate when it began, m/s.
     pub approach_speed: f64,
-    /// Minus the rate of the penetration when it ended, m/s.
+    /// Minus the penetration rate when it ended, m/s.
     pub separation_speed: f64,
-    /// Restitution that the joint asked for when it began.
+    /// The joint's restitution setting when it began.
     pub asked: f64,
-    /// Restitution that its normal-force law gives an undisturbed impact that is not slower than the floor.
+    /// Restitution that its normal-force law gives for an undisturbed impact not slower than the floor.
     pub law: f64,
     /// Began slower than `impact_speed_floor`: it rebounds higher than asked.
     pub floored: bool,
-    /// Another ball joint touched meanwhile, or a live change altered the contact: its restitution is not the law's alone.
+    /// Another ball joint was in contact meanwhile, or a live change altered the contact: the law alone does not set its
+    /// restitution.
     pub disturbed: bool,
-    /// Accepted steps from its beginning to its end, those at which a fixed step meets them included.
+    /// Accepted steps from its beginning to its end; with fixed steps, including those in which it begins and ends.
     pub steps: u64,
     /// Deepest penetration in continuous time, m.
     pub deepest: f64,
     /// Largest normal force in continuous time, N.
     pub peak: f64,
-    /// Largest ratio of damping to elastic force: the damping factor at its start, unless it is hit again or began slower than
-    /// the floor.
+    /// Largest ratio of damping to elastic force: the damping factor at its start, unless it is hit again or began slower
+    /// than the floor.
     pub damping: f64,
 }
 
 impl Impact {
-    /// Restitution that it really gave: separation speed over approach speed.
+    /// Actual restitution: separation speed over approach speed.
     pub fn given(&self) -> f64 {
         self.separation_speed / self.approach_speed
     }
@@ -51,9 +52,9 @@ impl Impact {
 pub(super) struct Impacts {
     /// By joint.
     under_way: Vec<Option<Impact>>,
-    /// (damping factor, restitution that it gives), by joint: finding it takes an iteration.
+    /// (damping factor, resulting restitution), by joint: cached, because computing it takes an iteration.
     laws: Vec<(f64, f64)>,
-    /// Finished ones; the n-th lies at n modulo its length.
+    /// Finished ones, as a ring buffer: impact n is at index n modulo its length.
     finished: Vec<Impact>,
     /// Number of finished ones, and of those handed out.
     count: u64,
@@ -61,12 +62,13 @@ pub(super) struct Impacts {
 }
 
 impl Impacts {
-    /// What is kept of the finished ones.
+    /// Finished impacts still in the buffer.
     pub(super) fn kept(&self) -> &[Impact] {
         &self.finished
     }
 
-    /// For `joints` ball joints. A step finishes at most one impact of each, so that all can be had between two steps.
+    /// For `joints` ball joints. A step finishes at most one impact per joint, so that all of them can be collected between
+    /// two steps.
     pub(super) fn new(joints: usize) -> Self {
         Self {
             under_way: vec![None; joints],
@@ -109,8 +111,8 @@ impl Impacts {
         });
     }
 
-    /// A step in which the contact of `joint` was on, or came on: the course of its penetration, its largest normal force (N)
-    /// and its largest ratio of damping to elastic force.
+    /// Follows the contact of `joint` over a step in which it was, or became, active: the course of its penetration, its
+    /// largest normal force (N) and its largest ratio of damping to elastic force.
     pub(super) fn follow(&mut self, joint: usize, course: &Course, force: f64, damping: f64) {
         if let Some(impact) = &mut self.under_way[joint] {
             impact.steps += 1;
@@ -137,7 +139,7 @@ impl Impacts {
         }
     }
 
-    /// A live change altered the contact of `joint`, and ended it where `touching` is false.
+    /// A live change altered the contact of `joint`, ending it if `touching` is false.
     pub(super) fn change(&mut self, joint: usize, touching: bool) {
         let impact = &mut self.under_way[joint];
         if touching {
@@ -149,7 +151,7 @@ impl Impacts {
         }
     }
 
-    /// The latest finished ones, at most 64, the oldest first.
+    /// The latest finished ones, at most 64, oldest first.
     pub(super) fn latest(&self) -> impl ExactSizeIterator<Item = &Impact> + DoubleEndedIterator {
         let first = self.count.saturating_sub(KEPT as u64);
         self.since(first)
@@ -161,7 +163,7 @@ impl Impacts {
         (0..most).map(move |n| &self.finished[((first + n as u64) % length) as usize])
     }
 
-    /// Appends those that were not handed out yet.
+    /// Appends those not yet handed out.
     pub(super) fn hand_out(&mut self, out: &mut Vec<Impact>) {
         let oldest = self.count.saturating_sub(self.finished.len() as u64);
         out.extend(self.since(self.handed_out.max(oldest)));

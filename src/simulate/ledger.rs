@@ -1,39 +1,39 @@
-//! Where the energy came from and where it went: works by quadrature of powers, against the change of the energies.
+//! Where the energy came from and where it went: works by quadrature of powers, compared with the change in energy.
 
 use crate::mechanism::Powers;
 
-/// Energy moved since the start, J. Each work comes from the forces that do it, none from the energies, so that what does
-/// not add up is the error of the integration: [`Self::residual`].
+/// Energy exchanged since the start, J. Each work is computed from the forces that do it, never from energies, so that the
+/// imbalance is the integration error: [`Self::residual`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Ledger {
-    /// Given by the drives: actuator force times rate.
+    /// Supplied by the drives: actuator force times rate.
     pub drive_work: f64,
-    /// Given by gravity, minus the change of its potential.
+    /// Supplied by gravity: minus the change of its potential.
     pub gravity_work: f64,
     /// Change of the kinetic energy of all bodies.
     pub kinetic_change: f64,
     /// Change of the elastic energy in contacts and springs.
     pub elastic_change: f64,
-    /// Taken by the damping part of the normal forces, the cut at 0 included.
+    /// Dissipated by the damping part of the normal forces, with their cut-off at 0 included.
     pub restitution_loss: f64,
-    /// Taken by friction, with the velocities of the two points at which it acts. Where friction reads the centres'
-    /// velocity it may be negative: the force then drives the surfaces.
+    /// Dissipated by friction, from the velocities of the two points where it acts. It may be negative where friction uses
+    /// the centres' velocity: the force then drives the surfaces.
     pub friction_loss: f64,
-    /// Given by clearances on their way to a new value.
+    /// Supplied by clearances being ramped to a new value.
     pub clearance_work: f64,
-    /// Taken by the dampers of force elements.
+    /// Dissipated by the dampers of force elements.
     pub damping_loss: f64,
-    /// Given by loads from outside.
+    /// Supplied by external loads.
     pub external_work: f64,
-    /// Put into the contacts by changed parameters: jumps of their elastic energy.
+    /// Added to the contacts by parameter changes: jumps in their elastic energy.
     pub change_work: f64,
-    /// Energy exchanged: half the sum, over all steps, of the sizes of all terms, for each joule leaves one and arrives at
-    /// another.
+    /// Energy exchanged: half the sum of the magnitudes of all terms over all steps, as each joule leaves one term and
+    /// enters another.
     pub exchanged: f64,
 }
 
 impl Ledger {
-    /// Energy that nothing accounts for, J: positive where it came from nowhere.
+    /// Unaccounted energy, J: positive where it came from nowhere.
     pub fn residual(&self) -> f64 {
         let given = self.drive_work
             + self.gravity_work
@@ -62,9 +62,9 @@ pub(super) struct Energies {
     pub elastic: f64,
 }
 
-/// Most instants that a quadrature uses.
+/// Largest number of quadrature nodes.
 const NODES: usize = 6;
-/// Weights of six even instants for the interval between the last two: Adams and Moulton's (Hairer, Nørsett & Wanner,
+/// Weights of six equidistant instants for the interval between the last two: Adams-Moulton (Hairer, Nørsett & Wanner,
 /// *Solving Ordinary Differential Equations I*, III.1).
 const EVEN: [f64; NODES] = [
     27.0 / 1440.0,
@@ -74,7 +74,7 @@ const EVEN: [f64; NODES] = [
     1427.0 / 1440.0,
     475.0 / 1440.0,
 ];
-/// Instants that are even to this part of their interval: the weights are then right to as much.
+/// Relative tolerance for treating instants as equidistant: the weights are then accurate to the same order.
 const EVENLY: f64 = 1e-9;
 
 /// Powers at some instants, and the polynomial through them.
@@ -94,7 +94,7 @@ impl PowerCourse {
         self.count = 0;
     }
 
-    /// Adds an instant; the oldest makes room.
+    /// Adds an instant; drops the oldest if full.
     pub(super) fn push(&mut self, time: f64, powers: Powers) {
         if self.count == NODES {
             self.times.copy_within(1.., 0);
@@ -106,7 +106,7 @@ impl PowerCourse {
         self.count += 1;
     }
 
-    /// Adds an instant; those that lie closer than `apart` before the latest are dropped.
+    /// Adds an instant, after dropping stored ones less than `apart` before the latest stored.
     pub(super) fn push_apart(&mut self, time: f64, powers: Powers, apart: f64) {
         while let [.., before, latest] = self.times[..self.count]
             && latest - before < apart
@@ -119,7 +119,7 @@ impl PowerCourse {
         self.push(time, powers);
     }
 
-    /// The same with its times in steps of size `h` from `from`.
+    /// The same with times measured from `from` in units of `h`.
     pub(super) fn seen_from(&self, from: f64, h: f64) -> Self {
         let mut seen = *self;
         for time in &mut seen.times[..self.count] {
@@ -146,11 +146,11 @@ impl PowerCourse {
     }
 }
 
-/// Weights with which values at `nodes`, six at most, give the integral from 0 to `end` of the polynomial through them.
+/// Weights that turn values at `nodes`, at most six, into the integral from 0 to `end` of the polynomial through them.
 pub(super) fn weights(nodes: &[f64], end: f64) -> [f64; NODES] {
     let mut weights = [0.0; NODES];
     for (i, x) in nodes.iter().enumerate() {
-        // Lagrange's polynomial of this node by its coefficients, lowest first.
+        // Coefficients of this node's Lagrange polynomial, lowest first.
         let mut coefficients = [0.0; NODES + 1];
         coefficients[0] = 1.0;
         let others = nodes.iter().enumerate().filter(|&(j, _)| j != i);
@@ -170,16 +170,16 @@ pub(super) fn weights(nodes: &[f64], end: f64) -> [f64; NODES] {
 /// The ledger of a running simulation, at both ends of the latest step: part of its state.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Account {
-    /// Whether it is kept.
+    /// Whether the ledger is kept.
     pub on: bool,
     /// Start and end of the latest step.
     before: (Ledger, Energies),
     now: (Ledger, Energies),
-    /// Powers over the latest step, which goes from 0 to 1: what its works are integrated from.
+    /// Powers over the latest step, in step time 0 to 1: the works are integrated from it.
     pub course: PowerCourse,
-    /// Powers at the ends of past steps, by time, where the motion is a function of time alone.
+    /// Powers at the ends of past steps, by time, for kinematic scenes.
     pub past: PowerCourse,
-    /// Powers now, where they are known.
+    /// Current powers, if known.
     pub powers: Option<Powers>,
 }
 
@@ -201,7 +201,7 @@ impl Account {
         self.now = (self.within(1.0, h, energies), energies);
     }
 
-    /// Books a change of parameters, not of the motion: the energies that go with the new ones.
+    /// Books a change of parameters that leaves the motion unchanged: `energies` are those with the new ones.
     pub(super) fn book_change(&mut self, energies: Energies) {
         let (ledger, before) = &mut self.now;
         let jump = energies.elastic - before.elastic;
@@ -215,7 +215,7 @@ impl Account {
         self.past.clear();
     }
 
-    /// Sum of the sizes of the energies at the end of the latest step, J.
+    /// Sum of the magnitudes of the energies at the end of the latest step, J.
     pub(super) fn energy(&self) -> f64 {
         let Energies {
             kinetic,
@@ -230,7 +230,7 @@ impl Account {
         &self.now.0
     }
 
-    /// At the part `theta` of the latest step, of size `h`, where the energies are these.
+    /// Ledger at fraction `theta` of the latest step, of size `h`, where the energies are `energies`.
     pub(super) fn within(&self, theta: f64, h: f64, energies: Energies) -> Ledger {
         let (ledger, start) = &self.before;
         let mut works = Powers::default();
@@ -239,7 +239,7 @@ impl Account {
     }
 }
 
-/// `ledger` with what happened since it stood at the energies `start`.
+/// `ledger` plus everything since the energies were `start`.
 fn entered(ledger: &Ledger, start: &Energies, end: Energies, works: &Powers) -> Ledger {
     let gravity = start.gravitational - end.gravitational;
     let kinetic = end.kinetic - start.kinetic;
@@ -281,7 +281,7 @@ mod tests {
 
     #[test]
     fn a_course_integrates_the_polynomial_through_its_instants() {
-        // Of degree 5 through six uneven instants, four of them before the interval.
+        // Of degree 5 through six non-equidistant instants, four of them before the interval.
         let p = |t: f64| 1.0 + t * (2.0 - t * (3.0 - t * (0.5 + t * (0.25 - t))));
         let integral =
             |t: f64| t + t * t - t.powi(3) + 0.125 * t.powi(4) + 0.05 * t.powi(5) - t.powi(6) / 6.0;
@@ -311,7 +311,7 @@ mod tests {
             for j in 0..NODES {
                 let (time, power) = (j as f64 - 4.0, if i == j { 1.0 } else { 0.0 });
                 even.push(time, drive(power));
-                // Not even by more than is taken for it.
+                // Just uneven enough not to count as equidistant.
                 let off = if j == 0 { 1e-8 } else { 0.0 };
                 uneven.push(time + off, drive(power));
             }

@@ -17,7 +17,7 @@ mod wear;
 
 pub use angles::angles_of;
 pub use channels::*;
-pub use doubt::{Doubt, Joints, Work};
+pub use doubt::{Doubt, Joints, LedgerTerm};
 pub use frame::*;
 pub use history::{Bin, History, Mark};
 pub use impacts::Impact;
@@ -34,7 +34,7 @@ pub use crate::mechanism::Pull;
 use crate::mechanism::{CostOf, Counts, MechanismError, Structure};
 use crate::scene::{Scene, SceneError};
 
-/// The longest run, s: at its end a double still tells instants 0.1 ns apart.
+/// The longest run, s: at its end a double still resolves 0.1 ns.
 pub const LONGEST_RUN: f64 = 1e6;
 
 /// Why a simulation could not start.
@@ -43,7 +43,7 @@ pub const LONGEST_RUN: f64 = 1e6;
 pub struct StartError(#[from] pub MechanismError);
 
 impl StartError {
-    /// The same with the line of `scene`'s file and the change that it is about.
+    /// The same error, with the line of `scene`'s file and the change that it concerns.
     pub fn located(&self, scene: &Scene) -> SceneError {
         let one = |joint: &str, parts: &[&str]| {
             let mut keys = vec!["spcmm.".to_owned(), "formulation".to_owned()];
@@ -59,7 +59,7 @@ impl StartError {
             | MechanismError::Singular => ("spcmm".to_owned(), vec!["spcmm.".to_owned()]),
             MechanismError::Open { joint, .. }
             | MechanismError::NoClosure { joint, .. }
-            | MechanismError::Torn { joint, .. } => one(joint, &["clearance"]),
+            | MechanismError::InconsistentDrives { joint, .. } => one(joint, &["clearance"]),
             MechanismError::OutsideSocket { joint, .. } => {
                 one(joint, &["clearance", "ball_radius"])
             }
@@ -92,8 +92,8 @@ pub enum Effect {
     AtReset,
 }
 
-/// Forces that the motion does not fix, because ideal joints hold a direction that others hold already: those reported are
-/// the reactions with the least sum of squares, and what follows from them.
+/// Forces that the motion does not determine, because ideal joints constrain a direction redundantly: the values reported
+/// are the least-squares reactions and what follows from them.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct NotUnique {
     /// Ball joints, by index.
@@ -109,7 +109,7 @@ pub struct Statistics {
     pub steps: u64,
     /// Evaluations of the equations of motion.
     pub evaluations: u64,
-    /// Evaluations of all contacts at an instant; 0 in a scene without clearance.
+    /// Evaluations of all contacts at one instant; 0 in a scene without clearance.
     pub contact_evaluations: u64,
     /// Evaluations of the friction of one contact; 0 in a scene without friction.
     pub friction_evaluations: u64,
@@ -122,7 +122,7 @@ pub struct Statistics {
     /// Contacts that began slower than the scene's `impact_speed_floor` or existed at the start, per ball joint: they
     /// rebound higher than asked.
     pub floored: Vec<u64>,
-    /// Contacts that ended after fewer fixed steps than resolve one, per ball joint; 0 with an adaptive method.
+    /// Contacts that ended after fewer fixed steps than needed to resolve one, per ball joint; 0 with an adaptive method.
     pub coarse: Vec<u64>,
     /// Largest continuous-time normal force (reaction of an ideal joint), per ball joint, N.
     pub peak_normal: Vec<f64>,
@@ -130,7 +130,7 @@ pub struct Statistics {
     pub peak_time: Vec<f64>,
     /// Time of the last separation, per ball joint, s; NaN if none.
     pub last_separation: Vec<f64>,
-    /// Time that an explicit adaptive method spent in steps held by stability, s.
+    /// Simulated time that an explicit adaptive method spent in steps limited by stability, s.
     pub held_time: f64,
     /// Largest ratio of damping to elastic force in any contact, per ball joint.
     pub damping: Vec<f64>,
@@ -163,7 +163,7 @@ impl Statistics {
 }
 
 impl PartialEq for Statistics {
-    /// Bit by bit, so that "no separation yet" equals itself.
+    /// Compares bits, so that "no separation yet" equals itself.
     fn eq(&self, other: &Self) -> bool {
         let bits = |v: &[f64]| v.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
         let counts = |s: &Self| {
@@ -184,7 +184,7 @@ impl PartialEq for Statistics {
     }
 }
 
-/// The whole state of a simulation: restoring it resumes with the same bits.
+/// The whole state of a simulation: resuming from it reproduces the same bits.
 #[derive(Debug, Clone)]
 pub struct Snapshot {
     scene: Arc<Scene>,
@@ -198,7 +198,7 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
-    /// The scene it belongs to, as it ran.
+    /// The scene it belongs to, as it was running.
     pub fn running_scene(&self) -> &Scene {
         &self.running
     }
@@ -208,12 +208,12 @@ impl Snapshot {
         self.state.time()
     }
 
-    /// Accepted steps before it.
+    /// Accepted steps up to it.
     pub fn steps(&self) -> u64 {
         self.state.steps()
     }
 
-    /// Bytes that it takes, about; the scene, which others share, left out.
+    /// Approximate size in bytes, without the shared scene.
     pub fn bytes(&self) -> usize {
         self.state.bytes() + std::mem::size_of_val(self.peaks.as_slice())
     }

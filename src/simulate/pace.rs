@@ -1,19 +1,19 @@
-//! Pacing against the clock: how far the simulation should be after each frame. No clock lives here; the caller
-//! measures and tells.
+//! Pacing against the wall clock: how far the simulation should be after each frame. This module reads no clock; the caller
+//! measures and passes times in.
 
-/// Longest frame that is caught up with, s: after a hitch or a hidden window the simulation goes on, it does not race.
+/// Longest frame to catch up with, s: after a hitch or a hidden window the simulation continues instead of racing.
 pub const LONGEST_FRAME: f64 = 0.25;
 
-/// Most stepping per frame, s: what is left of a 60 Hz frame after drawing.
+/// Largest stepping budget per frame, s: what drawing leaves of a 60 Hz frame.
 pub const LARGEST_BUDGET: f64 = 0.012;
 
-/// Time over which the reached ratio is averaged, s.
+/// Averaging time of the achieved time scale, s.
 const AVERAGE: f64 = 0.5;
 
-/// Least and greatest time scale: 1:10 000 slow motion to real time.
+/// Range of the time scale: from 1:10 000 slow motion to real time.
 pub const SCALE_RANGE: (f64, f64) = (1e-4, 1.0);
 
-/// Keeps shown time in step with the wall clock as far as the machine can follow.
+/// Keeps the displayed time in step with the wall clock as far as the machine can keep up.
 #[derive(Clone, Debug)]
 pub struct Pacer {
     scale: f64,
@@ -38,12 +38,12 @@ impl Default for Pacer {
 }
 
 impl Pacer {
-    /// Simulated seconds per second asked for.
+    /// Requested time scale: simulated seconds per second.
     pub fn scale(&self) -> f64 {
         self.scale
     }
 
-    /// Asks for `scale` simulated seconds per second, kept within [`SCALE_RANGE`].
+    /// Requests `scale` simulated seconds per second, clamped to [`SCALE_RANGE`].
     pub fn set_scale(&mut self, scale: f64) {
         if scale.is_finite() {
             self.scale = scale.clamp(SCALE_RANGE.0, SCALE_RANGE.1);
@@ -51,19 +51,19 @@ impl Pacer {
         }
     }
 
-    /// Simulated time on show, s.
+    /// Displayed simulated time, s.
     pub fn shown(&self) -> f64 {
         self.shown
     }
 
-    /// Puts `time` on show, as after a reset or a single step.
+    /// Displays `time`, as after a reset or a single step.
     pub fn jump(&mut self, time: f64) {
         self.shown = time;
         self.behind = false;
         self.forget_average();
     }
 
-    /// Starts a frame that comes `dt` seconds after the last: the simulated time to reach.
+    /// Starts a frame `dt` seconds after the last; returns the simulated time to reach.
     pub fn begin(&mut self, dt: f64) -> f64 {
         let dt = if dt.is_finite() {
             dt.clamp(0.0, LONGEST_FRAME)
@@ -74,17 +74,17 @@ impl Pacer {
         self.shown + dt * self.scale
     }
 
-    /// Whether another step may start, `spent` seconds of stepping into this frame.
+    /// Whether another step may start after `spent` seconds of stepping in this frame.
     pub fn may_step(&self, spent: f64) -> bool {
         spent < self.budget
     }
 
-    /// Ends the frame begun `dt` seconds after the last: `target` is what [`Self::begin`] gave, `reached` the time
-    /// of the simulation. What is missing is given up, not owed.
+    /// Ends the frame begun `dt` seconds after the last: `target` is what [`Self::begin`] returned, `reached` the time of
+    /// the simulation. Any shortfall is dropped, not carried over.
     pub fn end(&mut self, dt: f64, target: f64, reached: f64) {
         let shown = target.min(reached).max(self.shown);
         self.behind = reached < target;
-        // A pause this long was no frame: it says nothing about the machine.
+        // So long a pause was no frame: it says nothing about the machine.
         if dt.is_finite() && dt < 1.0 {
             let keep = libm::exp(-dt / AVERAGE);
             self.advanced = self.advanced * keep + (shown - self.shown);
@@ -93,7 +93,7 @@ impl Pacer {
         self.shown = shown;
     }
 
-    /// Simulated seconds per second reached lately; `None` before anything was measured.
+    /// Simulated seconds per second achieved lately; `None` before anything was measured.
     pub fn reached_scale(&self) -> Option<f64> {
         (self.elapsed > 0.05).then(|| self.advanced / self.elapsed)
     }

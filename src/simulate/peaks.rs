@@ -14,18 +14,18 @@ pub(super) struct Approach {
 /// A quantity at the latest two instants.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Recent {
-    /// (time, value), the older first; a value of 0 stands for none yet.
+    /// (time, value), the older first; a value of 0 means none yet.
     before: [(f64, f64); 2],
 }
 
 impl Recent {
-    /// Its values at these two instants, if they are the latest.
+    /// Its values at `start` and `end`, if those are the latest two instants.
     pub(super) fn ends(&self, start: f64, end: f64) -> Option<(f64, f64)> {
         let [(t0, f0), (t1, f1)] = self.before;
         (t0 == start && t1 == end && f0 > 0.0).then_some((f0, f1))
     }
 
-    /// Takes the value at a new instant; returns the largest since the one before, by the parabola through three.
+    /// Adds the value at a new instant; returns the largest value since the previous one, by the parabola through three.
     pub(super) fn rise(&mut self, time: f64, value: f64) -> f64 {
         let [(t0, f0), (t1, f1)] = self.before;
         self.before = [(t1, f1), (time, value)];
@@ -105,7 +105,7 @@ impl Course {
         self.at(0.5 * (low + high)).0.max(ends)
     }
 
-    /// Largest penetration rate from `from` to the end of the step and where: (m/s, theta).
+    /// Largest penetration rate from `from` to the end of the step, and where: (m/s, theta).
     pub(super) fn fastest(&self, from: f64) -> (f64, f64) {
         let start = if from > 0.0 {
             self.at(from).1
@@ -130,14 +130,14 @@ impl Course {
         ends
     }
 
-    /// Largest ratio of the damping to the elastic force from `from` to the end of the step, and where. It grows with the rate.
+    /// Largest ratio of damping to elastic force from `from` to the end of the step, and where. It grows with the rate.
     pub(super) fn most_damped(&self, c: &Coefficients, remembered: f64, from: f64) -> (f64, f64) {
         let (rate, theta) = self.fastest(from);
         let approach = c.approach(ApproachPiece::Unsplit, remembered, rate);
         (c.damping * rate / approach, theta)
     }
 
-    /// Larger normal force of both ends and where: (N, theta).
+    /// The larger of the normal forces at both ends, and where: (N, theta).
     pub(super) fn stronger_end(&self, c: &Coefficients, approach_speed: f64) -> (f64, f64) {
         let force = |at: &Approach| {
             let approach = c.approach(ApproachPiece::Unsplit, approach_speed, at.rate);
@@ -147,13 +147,13 @@ impl Course {
         if f1 >= f0 { (f1, 1.0) } else { (f0, 0.0) }
     }
 
-    /// Largest normal force over the step and where: (N, theta). The contact's memory holds `approach_speed`.
+    /// Largest normal force over the step, and where: (N, theta). The contact's memory holds `approach_speed`.
     pub(super) fn strongest(&self, c: &Coefficients, approach_speed: f64) -> (f64, f64) {
         let force = |theta: f64| {
             let (p, v, _) = self.at(theta);
             c.normal_force(p, v, c.approach(ApproachPiece::Unsplit, approach_speed, v))
         };
-        // Sign of dF/dt, F = K p^1.5 (1 + chi v / v0): 1.5 v (1 + chi v / v0) + p chi a / v0; where v0 is v, that of v.
+        // Sign of dF/dt, F = K p^1.5 (1 + chi v / v0): 1.5 v (1 + chi v / v0) + p chi a / v0; where v0 is v, the sign of v.
         let slope = |theta: f64| {
             let (p, v, a) = self.at(theta);
             if p <= 0.0 || c.approach_follows(ApproachPiece::Unsplit, approach_speed, v) {
@@ -218,7 +218,8 @@ mod tests {
         let (start, end) = (0.43e-4, 0.53e-4);
         let (force, theta) = Course::new(at(start), at(end), end - start).strongest(&c, 0.1);
         let exact = c.normal_force(a, 0.0, 0.1);
-        // Hermite's error of the penetration, (pi h / T)^4 / 384 = 2.5e-5, enters the force by its 1.5th power.
+        // The Hermite interpolation error of the penetration, (pi h / T)^4 / 384 = 2.5e-5, enters the force to the power
+        // 1.5.
         assert!((force / exact - 1.0).abs() < 3.8e-5, "{force} {exact}");
         assert!((start + theta * (end - start) - 0.5e-4).abs() < 1e-8);
     }

@@ -1,4 +1,4 @@
-//! From the equations' latest evaluation to a [`Frame`].
+//! From the latest evaluation of the equations to a [`Frame`].
 
 use super::angles::pose_of;
 use super::frame::{BodyMotion, ContactState, Frame, JointReport};
@@ -6,7 +6,8 @@ use crate::contact::Memory;
 use crate::mechanism::Mechanism;
 use crate::scene::{Scene, Vec3};
 
-/// Fills `out` after [`Evaluator::evaluate_fully`](crate::mechanism::Evaluator::evaluate_fully) at `time` with this contact `memory`.
+/// Fills `out` after [`Evaluator::evaluate_fully`](crate::mechanism::Evaluator::evaluate_fully) at `time`, with the contact
+/// memory `memory`.
 pub(super) fn fill(
     mechanism: &mut Mechanism,
     scene: &Scene,

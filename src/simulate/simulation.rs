@@ -32,26 +32,26 @@ use corners::Piece;
 use ideal::{ProbeFault, Reference};
 
 /// Speed at which the clearance closes when a jump would put a ball inside its socket wall, m/s: an impact at this speed
-/// is of the order of the settled forces.
+/// gives a force of the order of the static ones.
 pub const CLEARANCE_SPEED: f64 = 2e-3;
 /// Longest step of an adaptive method, s.
 const LONGEST_STEP: f64 = 10e-3;
-/// Further than this from its closed form, an ideal motion is on another branch of it, m.
+/// An ideal motion farther than this from its closed form has changed to another branch of it, m.
 const OTHER_BRANCH: f64 = 1e-6;
-/// How close a scene that is a function of time alone comes to a pose that it cannot pass, s.
+/// How closely a kinematic scene approaches a pose that it cannot pass, s.
 const SHORTEST_KINEMATIC_STEP: f64 = 1e-5;
-/// First step after a contact begins, before one is known to work, s: a tenth of a usual impact.
+/// First step after a contact begins, before a workable one is known, s: a tenth of a typical impact.
 const FIRST_CONTACT_STEP: f64 = 1e-5;
-/// Loops that are open by more than this after projection have come apart, m.
+/// Loops still open by more than this after projection have come apart, m.
 const OPEN_LOOP: f64 = 1e-7;
 
 /// A scene in motion.
 ///
 /// The same scene and the same calls give the same bits.
 pub struct Simulation {
-    /// With changes that wait for a reset.
+    /// Including changes that wait for a reset.
     scene: Arc<Scene>,
-    /// As it runs.
+    /// As it is running.
     running: Arc<Scene>,
     mechanism: Mechanism,
     stepper: AnyStepper,
@@ -59,9 +59,9 @@ pub struct Simulation {
     /// What the probe is compared with.
     reference: Reference,
     peaks: Vec<Peak>,
-    /// On which side of singular poses a scene that is a function of time alone started.
+    /// On which side of singular poses a kinematic scene started.
     right_handed: bool,
-    /// Largest force that a sample met and when, by joint: no part of the state, which sampling does not change.
+    /// Largest force seen by a sample, and when, by joint: not part of the state, which sampling must not change.
     sampled: Vec<(f64, f64)>,
     attempt: Attempt,
     scratch_y: Vec<f64>,
@@ -69,7 +69,7 @@ pub struct Simulation {
     scratch_memory: Vec<Memory>,
 }
 
-/// The end of a step, and what goes with it.
+/// The end of a step, and the data that belong to it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct StepEnd {
     t: f64,
@@ -93,7 +93,7 @@ impl StepEnd {
         }
     }
 
-    /// Takes over another of the same scene without allocating.
+    /// Copies another of the same scene without allocating.
     fn copy_from(&mut self, other: &Self) {
         self.t = other.t;
         self.y.copy_from_slice(&other.y);
@@ -106,38 +106,38 @@ impl StepEnd {
 /// The step being taken.
 struct Attempt {
     end: StepEnd,
-    /// Joint whose contact starts or ends at its end.
+    /// Joint whose contact starts or ends at the step's end.
     located: Option<usize>,
-    /// Joint that goes onto another piece of a law there.
+    /// Joint that moves to another piece of a law there.
     corner: Option<(usize, Piece)>,
-    /// It was begun again on another piece.
+    /// Restarted on another piece.
     turned: bool,
-    /// A contact was beyond the piece of a law that its memory holds.
+    /// A contact left the piece of a law that its memory holds.
     left_piece: bool,
     /// It may hold the largest force of a contact.
     near_peak: bool,
-    /// Largest normal force of each joint that was in contact over it, N, and at which part of it.
+    /// Largest normal force of each joint that was in contact over it, N, and at which fraction of it.
     strongest: Vec<(f64, f64)>,
-    /// Evaluations that it took so far.
+    /// Evaluations spent so far.
     counts: Counts,
 }
 
 /// What a snapshot copies.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct State {
-    /// The physical state, and the start of the latest step, inside which samples lie.
+    /// The physical state, and the start of the latest step, between which samples lie.
     now: StepEnd,
     before: StepEnd,
-    /// Clearances on their way, and in force.
+    /// Clearance ramps under way, and clearances in force.
     ramps: Vec<Option<Ramp>>,
     clearances: Vec<f64>,
-    /// Where somebody pulls.
+    /// The hand's pull, if any.
     pull: Option<Pull>,
     control: Control,
     record: Record,
 }
 
-/// How the next step is chosen: no part of the physical state.
+/// How the next step is chosen: not part of the physical state.
 #[derive(Clone, Debug, PartialEq)]
 struct Control {
     /// Next step of an adaptive method.
@@ -146,15 +146,15 @@ struct Control {
     h_contact: f64,
     /// A contact began at the latest event.
     contact_began: bool,
-    /// How closely corners of the friction law followed one another, and whether too closely to locate them.
+    /// How densely corners of the friction law follow one another, and whether too densely to locate them.
     chatter: u32,
     chatters: bool,
-    /// Of the automatic pair the implicit method steps.
+    /// Whether the implicit method of the automatic pair is stepping.
     implicit: bool,
-    /// What the automatic pair's choice goes by.
+    /// State behind the automatic pair's choice.
     choice: Choice,
     controller: Controller,
-    /// Fixed steps are counted from here, so that times do not accumulate rounding.
+    /// Fixed steps are counted from here, so that times do not accumulate rounding errors.
     grid_origin: f64,
     grid_count: u64,
 }
@@ -214,8 +214,8 @@ impl State {
         }
     }
 
-    /// Forgets the step before.
-    fn begin_anew(&mut self) {
+    /// Discards the previous step.
+    fn discard_previous_step(&mut self) {
         self.before.copy_from(&self.now);
         self.control.grid_origin = self.now.t;
         self.control.grid_count = 0;
@@ -245,7 +245,7 @@ impl Simulation {
         Ok(simulation)
     }
 
-    /// With the equations of `scene` set up and `state` taken as it is.
+    /// Sets up the equations of `scene` and takes `state` as it is.
     fn assembled(scene: &Arc<Scene>, mechanism: Mechanism, state: State) -> Self {
         let (n, joints) = (state.now.y.len(), state.now.gaps.len());
         Self {
@@ -279,7 +279,7 @@ impl Simulation {
         self.running.solver.method.is_adaptive()
     }
 
-    /// Contacts that exist at the start take the floor as their approach speed: nothing tells how they began.
+    /// Contacts that exist at the start take the floor as their approach speed: how they began is unknown.
     fn begin_contacts_at_start(&mut self) {
         self.mechanism.measure(self.state.now.t, &self.state.now.y);
         for j in 0..self.state.now.memory.len() {
@@ -294,7 +294,7 @@ impl Simulation {
         }
     }
 
-    /// Recomputes derivative and gaps of the current state after anything but a step changed it; forgets the step before.
+    /// Recomputes derivative and gaps after anything but a step changed the state; discards the previous step.
     fn refresh(&mut self) {
         self.hold_pieces(true);
         let located = self.locates();
@@ -308,17 +308,17 @@ impl Simulation {
         mechanism.contacts.finish();
         store_gaps(mechanism, &mut now.gaps);
         self.stepper.invalidate();
-        // Forces jump here: a parabola through both sides would have a peak that never was.
+        // Forces jump here: a parabola across the jump would have a spurious peak.
         state.record.reactions.fill(Recent::default());
-        state.begin_anew();
+        state.discard_previous_step();
     }
 
-    /// The scene with every change, those that wait for a reset included.
+    /// The scene with every change, including those that wait for a reset.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
 
-    /// The scene as it runs now: without the changes that wait for a reset.
+    /// The scene as it is running: without the changes that wait for a reset.
     pub fn running_scene(&self) -> &Scene {
         &self.running
     }
@@ -351,7 +351,7 @@ impl Simulation {
         self.advance(f64::INFINITY)
     }
 
-    /// One step that ends at `end` at the latest, exactly there if it would pass it.
+    /// One step that ends no later than `end`, and exactly there if it would overshoot.
     ///
     /// # Errors
     /// As [`Self::step`].
@@ -362,7 +362,7 @@ impl Simulation {
         self.advance(end)
     }
 
-    /// Steps until [`Self::time`] is at least `time`, never shortening a step.
+    /// Steps until [`Self::time`] is at least `time`, without shortening a step.
     ///
     /// # Errors
     /// As [`Self::step`].
@@ -374,7 +374,7 @@ impl Simulation {
     }
 
     fn advance(&mut self, end: f64) -> Result<(), Stopped> {
-        // Not at the end of the step before: samples inside it still see the clearance on its way.
+        // Not at the end of the previous step: samples inside it still see the clearance moving.
         self.finish_ramps();
         let limit = end.min(self.ramp_end());
         if self.mechanism.is_kinematic() {
@@ -409,7 +409,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Tries a step of size `h` from the present state; returns the error against the scales.
+    /// Tries a step of size `h` from the current state; returns the scaled error estimate.
     fn try_step(&mut self, h: f64) -> f64 {
         let located = self.locates();
         let Self {
@@ -441,7 +441,7 @@ impl Simulation {
         error
     }
 
-    /// Derivative at the end of the step being taken, which ends at `t_end`, and the gaps there.
+    /// Derivative and gaps at the end `t_end` of the step being taken.
     fn evaluate_end(&mut self, t_end: f64) {
         let located = self.locates();
         let Self {
@@ -463,8 +463,8 @@ impl Simulation {
         store_gaps(&self.mechanism, &mut self.attempt.end.gaps);
     }
 
-    /// A step of a scene whose motion is a function of time alone: predict, close the loops, read the reactions. Where
-    /// that fails it comes closer in shorter steps, so that the last good state is next to the bad one.
+    /// A step of a kinematic scene: predict, close the loops, compute the reactions. If that fails it retries with shorter
+    /// steps, so that the last good state is close to the failure.
     fn kinematic_step(&mut self, limit: f64) -> Result<(), Stopped> {
         let t = self.state.now.t;
         let mut step = self.mechanism.kinematic_step().min(LONGEST_STEP);
@@ -488,12 +488,13 @@ impl Simulation {
         }
     }
 
-    /// Makes the attempted step count: projection, guard, contact memory, peaks.
+    /// Accepts the attempted step: projection, guard, contact memory, peaks.
     fn accept(&mut self, t_end: f64, h: f64) -> Result<(), Stopped> {
         let open = self.mechanism.project(t_end, &mut self.attempt.end.y);
         let mean_rates = self.stepper.has_mean_rates();
         if mean_rates {
-            // Forces at its end are those of a contact that may be long over by the next: the step's own mean tells more.
+            // Forces at its end belong to a contact that may be over long before the next step ends: the step's mean tells
+            // more.
             let (mechanism, now) = (&mut self.mechanism, &self.state.now);
             let StepEnd { y, k, .. } = &mut self.attempt.end;
             mechanism.measure(t_end, y);
@@ -506,7 +507,7 @@ impl Simulation {
             self.evaluate_end(t_end);
         }
         self.state.record.statistics.count(self.attempt.counts);
-        // The loops may close again behind the pose, on another branch.
+        // Beyond the pose the loops may close again on another branch.
         let passed = self.mechanism.is_right_handed() != self.right_handed
             || self.mechanism.distance_from_ideal() > OTHER_BRANCH;
         let fault = if passed {
@@ -555,8 +556,8 @@ impl Simulation {
         }
         self.book_step(h, switched.contacts || switched.forces);
         self.pass_corner();
-        // The force now divides by the approach speed just found. Where no step needs the derivative at its end, the reactions of
-        // ideal joints do.
+        // The force now depends on the approach speed just found. Where no step needs the derivative at its end, the
+        // reactions of ideal joints still do.
         if again {
             let Self {
                 mechanism,
@@ -594,13 +595,13 @@ impl Simulation {
         }
     }
 
-    /// Why there is nothing, or nothing any more, that the probe could be compared with: the ideal mechanism does not start,
-    /// or came to where it cannot go on.
+    /// Why there is no ideal motion, or no longer one, to compare the probe with: the ideal mechanism does not start, or
+    /// could not continue.
     pub fn probe_fault(&self) -> Option<ProbeFault> {
         self.reference.fault()
     }
 
-    /// Forces at the latest state that the motion does not fix.
+    /// Forces at the latest state that the motion does not determine.
     pub fn not_unique(&mut self) -> NotUnique {
         self.sample(self.state.now.t, &mut Frame::default());
         let Self {
@@ -616,25 +617,25 @@ impl Simulation {
         }
     }
 
-    /// Peaks per ball joint since the last call, written to `out` in joint order, and forgotten here.
+    /// Writes the peaks per ball joint since the last call to `out`, in joint order, and clears them here.
     pub fn take_peaks(&mut self, out: &mut Vec<Peak>) {
         out.clear();
         out.extend_from_slice(&self.peaks);
         self.peaks.fill(Peak::default());
     }
 
-    /// The latest finished impacts, at most 64, the oldest first.
+    /// The latest finished impacts, at most 64, oldest first.
     pub fn impacts(&self) -> impl ExactSizeIterator<Item = &Impact> + DoubleEndedIterator {
         self.state.record.impacts.latest()
     }
 
     /// Appends to `out` the impacts that finished since the last call. None is lost if it is called after every step;
-    /// otherwise only the latest 64 (more where there are more ball joints) are sure to be there.
+    /// otherwise only the latest 64 (more with more ball joints) are guaranteed.
     pub fn take_impacts(&mut self, out: &mut Vec<Impact>) {
         self.state.record.impacts.hand_out(out);
     }
 
-    /// Back to t = 0 with the parameters as they are now, those that wait for a reset included.
+    /// Back to t = 0 with the current parameters, including those that wait for a reset.
     ///
     /// # Errors
     /// As [`Self::new`]; the simulation is then unchanged.
@@ -648,7 +649,7 @@ impl Simulation {
         &self.state.now.y
     }
 
-    /// Contact memory of ball joint `j`: whether it is in contact, with which approach speed.
+    /// Contact memory of ball joint `j`: whether it is in contact, and its approach speed.
     pub fn contact_memory(&self, j: usize) -> Memory {
         self.state.now.memory[j]
     }

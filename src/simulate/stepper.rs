@@ -1,4 +1,4 @@
-//! The stepping methods behind one name, so that a method can change while the simulation runs.
+//! The stepping methods behind one type, so that the method can change while the simulation runs.
 
 use crate::integrate::{
     ContactSystem, DormandPrince, ImexEuler, Method, Polynomial, Radau, Rosenbrock, RungeKutta4,
@@ -12,7 +12,7 @@ pub(super) enum AnyStepper {
     DormandPrince(DormandPrince),
     Rosenbrock(Box<Rosenbrock>),
     Radau(Box<Radau>),
-    /// The explicit one steps while `implicit` is false.
+    /// The explicit method steps while `implicit` is false.
     Pair {
         explicit: DormandPrince,
         stiff: Box<Radau>,
@@ -37,14 +37,14 @@ impl AnyStepper {
         }
     }
 
-    /// Puts the implicit method of a pair in charge, or the explicit one.
+    /// Selects the implicit or the explicit method of a pair.
     pub(super) fn choose(&mut self, use_implicit: bool) {
         if let Self::Pair { implicit, .. } = self {
             *implicit = use_implicit;
         }
     }
 
-    /// Forgets what was computed at a state that is no longer the current one.
+    /// Discards what was computed at a state that is no longer current.
     pub(super) fn invalidate(&mut self) {
         match self {
             Self::Rosenbrock(stiff) => stiff.invalidate(),
@@ -61,14 +61,14 @@ impl AnyStepper {
         }
     }
 
-    /// Takes it back.
+    /// Restores it.
     pub(super) fn set_polynomial(&mut self, polynomial: &Polynomial) {
         if let Self::Radau(stiff) | Self::Pair { stiff, .. } = self {
             stiff.set_polynomial(polynomial);
         }
     }
 
-    /// Step size times the largest eigenvalue felt in the step just attempted by an explicit adaptive method.
+    /// Step size times the largest eigenvalue seen in the step just attempted by an explicit adaptive method.
     pub(super) fn stiffness(&self, h: f64, y_end: &[f64], k_end: &[f64]) -> f64 {
         match self {
             Self::DormandPrince(explicit)
@@ -109,8 +109,8 @@ impl AnyStepper {
         }
     }
 
-    /// Where within a step an integral over it reads what it integrates: the middle, to go with both ends, or a
-    /// collocation method's own instants, between which its polynomial leaves stiff contacts.
+    /// Interior quadrature nodes for integrals over a step: the midpoint, used with both ends, or a collocation method's
+    /// own nodes, between which its polynomial departs from stiff contacts.
     pub(super) fn interior(&self) -> &'static [f64] {
         match self {
             Self::Radau(_) | Self::Pair { implicit: true, .. } => &Radau::INTERIOR,
@@ -118,7 +118,7 @@ impl AnyStepper {
         }
     }
 
-    /// Those instants with the ends that go with them, in units of the step.
+    /// Those nodes with the ends used with them, in units of the step.
     pub(super) fn quadrature(&self) -> &'static [f64] {
         const RADAU: [f64; 3] = [Radau::INTERIOR[0], Radau::INTERIOR[1], 1.0];
         match self {
@@ -127,7 +127,7 @@ impl AnyStepper {
         }
     }
 
-    /// Lets the latest attempt end at `theta` of its length, where its interpolant is.
+    /// Ends the latest attempt at fraction `theta` of it, on its interpolant.
     pub(super) fn truncate(&mut self, theta: f64) {
         match self {
             Self::DormandPrince(s)
@@ -141,7 +141,7 @@ impl AnyStepper {
         }
     }
 
-    /// Whether `attempt` leaves the derivative at the end.
+    /// Whether `attempt` provides the derivative at the end.
     pub(super) fn ends_with_derivative(&self) -> bool {
         !matches!(
             self,
@@ -149,7 +149,7 @@ impl AnyStepper {
         )
     }
 
-    /// Whether rates are differences of the states at both ends of a step: no step needs a derivative at its end.
+    /// Whether rates are difference quotients over the step: no step needs a derivative at its end.
     pub(super) fn has_mean_rates(&self) -> bool {
         matches!(self, Self::ImexEuler(_))
     }

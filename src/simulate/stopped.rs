@@ -1,6 +1,6 @@
-//! Why a simulation stopped, in numbers; words for people are made where it is displayed.
+//! Why a simulation stopped, in numbers; the wording is formed on display.
 
-/// Why a simulation stopped: the divergence guard. The state is the last good one.
+/// Why the divergence guard stopped a simulation. The state is the last good one.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("stopped at t = {time:.6e} s: {fault}; {advice}")]
 pub struct Stopped {
@@ -15,22 +15,22 @@ pub struct Stopped {
 /// What no accepted step may show.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum StopFault {
-    /// An ideal motion at a pose behind which its loops could close on another branch.
+    /// An ideal motion at a pose beyond which its loops could close on another branch.
     #[error("the loops through the ideal ball joints pass a singular pose")]
     SingularLoops,
-    /// Loops that projection leaves open.
+    /// Loops left open by projection.
     #[error("the loops through the ideal ball joints came apart by {open:.1e} m")]
     OpenLoops {
         /// m.
         open: f64,
     },
-    /// Stabilised constraints that hold nothing together any more.
+    /// Stabilised constraints that no longer hold anything together.
     #[error("the constraints of the lagrange form are off by {drift:.1e} m")]
     Drift {
         /// m, or rad.
         drift: f64,
     },
-    /// Constraint rows of the `lagrange` form that lose their independence.
+    /// Constraint rows of the `lagrange` form that become dependent.
     #[error("the constraints pass a singular pose")]
     SingularConstraints,
     /// A ball that has left its socket through the wall.
@@ -56,7 +56,7 @@ pub enum StopFault {
         /// Energy stored over energy of the approach.
         times: f64,
     },
-    /// An absurd speed, or none at all.
+    /// An absurd or undefined speed.
     #[error("body {body}: speed {speed:.3e} m/s, angular speed {angular_speed:.3e} rad/s")]
     AbsurdSpeed {
         /// Name.
@@ -66,10 +66,10 @@ pub enum StopFault {
         /// rad/s.
         angular_speed: f64,
     },
-    /// Accelerations beyond the range of numbers.
+    /// Accelerations that are not finite.
     #[error("the accelerations are not finite")]
     NotFinite,
-    /// A step size that reaches rounding.
+    /// A step size as small as rounding.
     #[error("the step size that the tolerance asks for fell below 1e-14 s")]
     ShortStep,
 }
@@ -82,7 +82,7 @@ pub enum StopAdvice {
         "the ideal joints are (nearly) dependent here: keep clear of this pose, or give a joint a clearance"
     )]
     Dependent,
-    /// Adaptive steps are as short as they need to be: the motion itself is beyond the model.
+    /// Adaptive steps are already as short as needed: the motion itself is beyond the model.
     #[error(
         "try slower drives, a stiffer contact, or a tighter solver.tolerance (now {tolerance:e})"
     )]
@@ -90,7 +90,7 @@ pub enum StopAdvice {
         /// In force.
         tolerance: f64,
     },
-    /// A fixed step is too long.
+    /// The fixed step is too long.
     #[error(
         "try a smaller solver.step (now {step:e} s) or solver.method = automatic, or else a stiffer contact"
     )]
@@ -98,7 +98,7 @@ pub enum StopAdvice {
         /// In force, s.
         step: f64,
     },
-    /// A tolerance that the scene cannot be held to.
+    /// A tolerance that cannot be met in this scene.
     #[error("try a looser solver.tolerance (now {tolerance:e}) or a softer or heavier scene")]
     LooserTolerance {
         /// In force.

@@ -1,4 +1,4 @@
-//! Wear maps: where balls struck and rubbed the inner faces of their sockets, how hard, and what friction spent there.
+//! Wear maps: where balls struck and rubbed the inner faces of their sockets, how hard, and the friction work done there.
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 use std::ops::Range;
@@ -15,7 +15,7 @@ const CELLS: usize = 200;
 /// zones between are divided evenly in azimuth. Cells are counted from the pole +z, and eastwards from azimuth 0.
 #[derive(Debug, PartialEq)]
 pub struct Grid {
-    /// Number of the first cell of each zone, caps included, and behind them the number of all.
+    /// Number of the first cell of each zone, caps included, followed by the total number.
     first: Vec<usize>,
 }
 
@@ -29,22 +29,23 @@ pub struct Edges {
 }
 
 impl Grid {
-    /// The one of every wear map.
+    /// The grid of every wear map.
     pub fn of_sockets() -> Self {
         Self::new(CELLS)
     }
 
-    /// Of `cells` cells, two at least.
+    /// With `cells` cells, at least two.
     fn new(cells: usize) -> Self {
         let n = cells as f64;
-        // Polar angle within which a share of the sphere lies.
+        // Polar angle that encloses a given share of the sphere.
         let within = |share: f64| 2.0 * libm::asin(share.sqrt());
         let cap = within(1.0 / n);
         let collars = ((PI - 2.0 * cap) / (4.0 * PI / n).sqrt()).round().max(1.0);
         let height = (PI - 2.0 * cap) / collars;
         let mut first = vec![0, 1];
         for collar in 1..collars as usize {
-            // The whole number of cells next to those down to the collar's lower edge: what it is off enters the next collar.
+            // Nearest whole number of cells down to the collar's lower edge: the rounding error carries over to the next
+            // collar.
             let s = libm::sin(0.5 * (cap + height * collar as f64));
             first.push((n * s * s).round() as usize);
         }
@@ -64,7 +65,7 @@ impl Grid {
         self.first.len() - 1
     }
 
-    /// Cells of zone `zone`, from +z on; those of one zone are the same but for a turn about z.
+    /// Cells of zone `zone`, counted from +z; those of one zone are identical up to a rotation about z.
     pub fn zone(&self, zone: usize) -> Option<Range<usize>> {
         (zone < self.zones()).then(|| self.first[zone]..self.first[zone + 1])
     }
@@ -74,7 +75,7 @@ impl Grid {
         self.first.partition_point(|first| *first <= cell) - 1
     }
 
-    /// Where `cell` lies.
+    /// Edges of `cell`.
     pub fn edges(&self, cell: usize) -> Edges {
         let zone = self.zone_of(cell);
         let (from, to) = (self.first[zone], self.first[zone + 1]);
@@ -89,9 +90,9 @@ impl Grid {
         }
     }
 
-    /// Cell in which a unit vector points.
+    /// Cell that a unit vector points into.
     pub fn cell(&self, direction: &Vec3) -> usize {
-        // Of equal height are of equal area (Archimedes): as many cells as this lie above.
+        // Zones of equal height have equal area (Archimedes): this many cells lie above.
         let above = 0.5 * (1.0 - direction.z) * self.cells() as f64;
         let zone = self.zone_of((above as usize).min(self.cells() - 1));
         let sectors = self.first[zone + 1] - self.first[zone];
@@ -102,14 +103,14 @@ impl Grid {
     }
 }
 
-/// What a cell of a socket's inner face took.
+/// What happened to a cell of a socket's inner face.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Cell {
     /// Contacts that began there.
     pub contacts: u64,
     /// Time integral of the normal force, N s.
     pub impulse: f64,
-    /// Time integral of the power that friction took, J. Where friction reads the centres' velocity it may be negative.
+    /// Time integral of the friction power, J. It may be negative where friction uses the centres' velocity.
     pub friction_work: f64,
 }
 
@@ -127,14 +128,14 @@ struct Socket {
     grid_from_body: Mat3,
     /// Radius r + c of the inner face, m.
     radius: f64,
-    /// None in an ideal joint. Copies of the map share those that have not changed since.
+    /// Empty for an ideal joint. Copies of the map share what has not changed since.
     cells: Arc<[Cell]>,
 }
 
-/// A ball that pressed at one of the instants of a step.
+/// A ball in contact at a quadrature node of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Press {
-    /// Index among the instants of the quadrature.
+    /// Index among the quadrature nodes.
     instant: usize,
     joint: usize,
     cell: usize,
@@ -144,22 +145,22 @@ struct Press {
     friction_power: f64,
 }
 
-/// What the contacts of a run did to the inner faces of its sockets, by cells of equal area.
+/// What the contacts of a run did to the inner faces of its sockets, in cells of equal area.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Wear {
     grid: Arc<Grid>,
     sockets: Vec<Socket>,
-    /// Of the step being booked; after it those at its end, which may begin the next.
+    /// Of the step being booked; afterwards those at its end, which may begin the next.
     presses: Vec<Press>,
-    /// What the latest step did, by joint and cell: not in the cells yet.
+    /// What the latest step did, by joint and cell: not yet added to the cells.
     latest: Vec<(usize, usize, Cell)>,
 }
 
-/// Most entries of a joint in one step: its instants, and a contact that begins.
+/// Most entries of a joint in one step: its nodes, and a contact that begins.
 const MOST_ENTRIES: usize = 4;
 
 impl Wear {
-    /// Bytes that it takes, about; the grid, which others share, left out.
+    /// Approximate size in bytes, without the shared grid.
     pub(super) fn bytes(&self) -> usize {
         let cells: usize = self.sockets.iter().map(|socket| socket.cells.len()).sum();
         cells * size_of::<Cell>() + size_of_val(self.presses.as_slice())
@@ -188,30 +189,30 @@ impl Wear {
         }
     }
 
-    /// The cells of every socket.
+    /// The cell division of every socket.
     pub fn grid(&self) -> &Grid {
         &self.grid
     }
 
-    /// What the cells of ball joint `joint` took, the latest step left out before
-    /// [`Simulation::pass_wear`](super::Simulation::pass_wear); none in an ideal joint.
+    /// What happened to the cells of ball joint `joint`, without the latest step until
+    /// [`Simulation::commit_wear`](super::Simulation::commit_wear); empty for an ideal joint.
     pub fn cells(&self, joint: usize) -> &[Cell] {
         &self.sockets[joint].cells
     }
 
-    /// Area of a cell of ball joint `joint`, m^2, with the clearance that it had when the map was begun.
+    /// Area of a cell of ball joint `joint`, m^2, with its clearance when the map was started.
     pub fn area(&self, joint: usize) -> f64 {
         let radius = self.sockets[joint].radius;
         4.0 * PI * radius * radius / self.grid.cells() as f64
     }
 
-    /// Rotation from the axes of the socket's body to those of the grid: z is the socket's opening; x lies in the plane of the
-    /// opening and the body's x axis, or its y axis where x is within 45 degrees of the opening.
+    /// Rotation from the axes of the socket's body to those of the grid: z is the socket's opening; x lies in the plane of
+    /// the opening and the body's x axis, or its y axis where x is within 45 degrees of the opening.
     pub fn grid_from_body(&self, joint: usize) -> &Mat3 {
         &self.sockets[joint].grid_from_body
     }
 
-    /// The latest step is over: what it did enters the cells.
+    /// Adds what the latest step did to the cells.
     pub(super) fn pass(&mut self) {
         for (joint, cell, share) in self.latest.drain(..) {
             let cells = Arc::make_mut(&mut self.sockets[joint].cells);
@@ -219,8 +220,8 @@ impl Wear {
         }
     }
 
-    /// A step is about to be booked; where its forces begin as the one before ended, those are taken over for its first
-    /// instant.
+    /// Before booking a step; if its forces continue those at the end of the previous one, these are reused for its first
+    /// node.
     pub(super) fn begin_step(&mut self, goes_on: bool) {
         self.pass();
         if !goes_on {
@@ -228,7 +229,7 @@ impl Wear {
         }
     }
 
-    /// The forces of the latest evaluation of `mechanism` are those at instant `instant` of the step.
+    /// Takes the forces of the latest evaluation of `mechanism` as those at node `instant` of the step.
     pub(super) fn read(&mut self, instant: usize, mechanism: &Mechanism) {
         for joint in 0..self.sockets.len() {
             if let Some(touch) = mechanism.touch(joint) {
@@ -244,7 +245,7 @@ impl Wear {
         }
     }
 
-    /// A contact of `joint` begins in the direction `direction` of the socket's body.
+    /// A contact of `joint` begins in direction `direction`, in the axes of the socket's body.
     pub(super) fn begin_contact(&mut self, joint: usize, direction: &Vec3) {
         let share = Cell {
             contacts: 1,
@@ -254,7 +255,7 @@ impl Wear {
             .push((joint, self.cell(joint, direction), share));
     }
 
-    /// Books a step of size `h`, the weights of whose instants are `weights`.
+    /// Books a step of size `h` with the quadrature weights `weights`.
     pub(super) fn book(&mut self, h: f64, weights: &[f64]) {
         for press in &self.presses {
             let weight = h * weights[press.instant];
@@ -292,7 +293,7 @@ fn axes(opening: &Vec3) -> Mat3 {
 mod tests {
     use super::*;
 
-    /// Unit vector by polar angle and azimuth.
+    /// Unit vector from polar angle and azimuth.
     fn towards(polar: f64, azimuth: f64) -> Vec3 {
         let ((s, c), (sa, ca)) = (libm::sincos(polar), libm::sincos(azimuth));
         Vec3::new(s * ca, s * sa, c)
@@ -362,7 +363,7 @@ mod tests {
                 assert!(edges.azimuth[0] <= azimuth && azimuth <= edges.azimuth[1]);
             }
         }
-        // Points of equal density: as many in every cell.
+        // Points of uniform density: equally many in every cell.
         for (cell, hits) in hit.into_iter().enumerate() {
             assert!((700..900).contains(&hits), "{cell}: {hits}");
         }

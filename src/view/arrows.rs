@@ -1,4 +1,4 @@
-//! Force arrows, the ruler that they are read by, the hollow marks of peaks that are over, and the arrow of an error.
+//! Force arrows, the ruler that scales them, the hollow marks of past peaks, and the error arrow.
 
 use glam::Vec3;
 
@@ -11,19 +11,19 @@ use super::{
 };
 use crate::scene::format_quantity_digits;
 
-/// Reference length of arrows, in heights of the picture.
+/// Reference length of arrows, as a fraction of the picture height.
 pub(super) const ARROW_LENGTH: f32 = 0.22;
 /// Longest arrow, in reference lengths.
 const LONGEST_ARROW: f32 = 2.5;
-/// Radius of the thickest shaft, in heights of the picture.
+/// Radius of the thickest shaft, as a fraction of the picture height.
 const THICKEST: f32 = 0.0045;
-/// Length of an arrow that is as thick as it may be, in radii of its shaft; a shorter one is thinner in proportion.
+/// Shortest arrow with the full thickness, in shaft radii; a shorter one is proportionally thinner.
 const STOUTEST: f32 = 10.0;
 /// Length and radius of a head, in radii of the shaft.
 const HEAD: [f32; 2] = [5.5, 2.3];
-/// Where the shaft of an arrow that is longer than can be drawn is left out, from tail to neck.
+/// Gaps in the shaft of an arrow too long to be drawn in full: its three parts, from tail to neck.
 const BREAK: [[f32; 2]; 3] = [[0.0, 0.44], [0.48, 0.52], [0.56, 1.0]];
-/// Width of the outline of a mark, points.
+/// Outline width of a mark, points.
 const OUTLINE: f32 = 1.8;
 
 /// A shaft with its head.
@@ -33,12 +33,12 @@ pub(super) struct Arrow {
     pub along: Vec3,
     /// Of the shaft, m.
     pub radius: f32,
-    /// Longer than it is drawn.
+    /// Longer than drawn.
     pub broken: bool,
 }
 
 impl Arrow {
-    /// At most as thick as `radius` says.
+    /// With a radius of at most `radius`.
     pub fn new(tail: Vec3, along: Vec3, radius: f32) -> Self {
         Self {
             tail,
@@ -111,11 +111,11 @@ impl Arrow {
     }
 }
 
-/// Turns pixels into lengths in the scene.
+/// Converts pixels to lengths in the scene.
 struct Ruler {
     eye: Vec3,
     axes: (Vec3, Vec3, Vec3),
-    /// Pixels of a slope of 1.
+    /// Pixels per unit slope.
     slope: f32,
 }
 
@@ -128,14 +128,14 @@ impl Ruler {
         }
     }
 
-    /// Length, m, of a line from `tail` along the unit vector `along` that is `pixels` long on the screen where it lies
-    /// across the line of sight, whether that means parallel to the picture or square to the ray from the eye, and never
+    /// Length, m, of a line from `tail` along the unit vector `along` that would be `pixels` long on the screen if it lay
+    /// across the line of sight (whether parallel to the picture or perpendicular to the ray from the eye), and is never
     /// longer; and the size of a pixel there, m. `None` behind the eye.
     ///
-    /// In slopes (x, y) of the picture and depth z the end of a line of length s lies at (p + s q) / (z + s w), q and w the
-    /// parts of `along` in the picture and away from the eye. Its start is p / z, so it has s |q - p w / z| / (z + s w) of
-    /// slope: solved for s. The size of q - p w / z is 1 in the picture's plane, 0 along the ray, and more than 1 where a
-    /// wide picture stretches what is square to the ray.
+    /// In slopes (x, y) of the picture and depth z, the end of a line of length s lies at (p + s q) / (z + s w), with q and
+    /// w the components of `along` in the picture and away from the eye. Its start is p / z, so its length in slopes is
+    /// s |q - p w / z| / (z + s w), solved for s. |q - p w / z| is 1 in the picture plane, 0 along the ray, and more
+    /// than 1 where a wide picture stretches what is perpendicular to the ray.
     fn measure(&self, tail: Vec3, along: Vec3, pixels: f32) -> Option<(f32, f32)> {
         let (right, up, back) = self.axes;
         let from_eye = tail - self.eye;
@@ -148,7 +148,7 @@ impl Ruler {
     }
 }
 
-/// Length of an arrow in reference lengths, and whether it had to be cut.
+/// Length of an arrow in reference lengths, and whether it had to be clipped.
 fn arrow_length(force: f32, reference: f32, scaling: Scaling) -> (f32, bool) {
     let ratio = force / reference;
     let length = match scaling {
@@ -158,7 +158,7 @@ fn arrow_length(force: f32, reference: f32, scaling: Scaling) -> (f32, bool) {
     (length.min(LONGEST_ARROW), length > LONGEST_ARROW)
 }
 
-/// Arrows of the forces of the instant on show, marks of the peaks before it, and how to read them.
+/// Arrows of the current forces, marks of past peaks, and their legend.
 pub(super) fn push_forces(
     shot: &Shot<'_>,
     joints: &[DrawnJoint],
@@ -179,7 +179,7 @@ pub(super) fn push_forces(
     let height = shot.size[1] as f32;
     let reference = shot.marks.reference(options);
     let mut clipped = false;
-    // `None` of no force.
+    // `None` for a zero force.
     let mut arrow = |force: Vec3, tail: Vec3| {
         let along = force.try_normalize()?;
         let (length, broken) = arrow_length(force.length(), reference, options.scaling);
@@ -193,7 +193,7 @@ pub(super) fn push_forces(
     let reports = joints.iter().zip(&shot.frame.joints);
     for (joint, report) in reports.filter(|_| at_joints) {
         let normal = to_f32(&report.normal_force);
-        // The wall pushes the ball away from the point of contact, so that lies against the normal force.
+        // The wall pushes the ball away from the contact point, which therefore lies opposite to the normal force.
         let contact = joint.ball_centre - normal.normalize_or_zero() * joint.ball_radius;
         let friction = to_f32(&report.friction_force);
         for (shown, force, colour) in [
@@ -234,7 +234,7 @@ pub(super) fn push_forces(
         let Some(joint) = joints.get(mark.joint) else {
             continue;
         };
-        // On the wall that was struck.
+        // On the wall that was hit.
         let contact = joint.socket_centre - mark.force.normalize_or_zero() * joint.inner;
         if let Some(arrow) = arrow(mark.force, contact) {
             let colour = palette.normal.with_opacity(mark.strength.sqrt());
@@ -271,7 +271,7 @@ pub(super) fn push_forces(
     });
 }
 
-/// An arrow that is no force but a length in the scene, with its label at its head.
+/// An arrow for a length in the scene instead of a force, with its label at its head.
 pub(super) fn push_error(
     shot: &Shot<'_>,
     tail: Vec3,
@@ -290,7 +290,7 @@ pub(super) fn push_error(
     push_label(out, words, LabelKind::Error, tail + along, colour);
 }
 
-/// How hard, and how long ago in simulated time.
+/// Force of the peak, and how long ago in simulated time.
 fn words(mark: &Mark) -> String {
     let (ago, unit) = match mark.age {
         age if age < 0.9995e-3 => (age * 1e6, "µs"),
@@ -349,7 +349,7 @@ mod tests {
                             assert!((seen - PIXELS).abs() < 0.01 * PIXELS, "{along}: {seen}");
                             checked += 1;
                         }
-                        // Towards the eye or away from it, it is shorter.
+                        // Pointing towards the eye or away from it, it is shorter.
                         for tilt in [0.7, -0.7] {
                             let seen = length((in_picture + back * tilt).normalize());
                             assert!(seen <= PIXELS * 1.001, "{seen}");

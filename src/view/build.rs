@@ -1,4 +1,4 @@
-//! Scene and frame to draw list.
+//! From scene and frame to draw list.
 
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use parry3d::query::Ray;
 use super::arrows::{ARROW_LENGTH, push_arrow, push_forces};
 use super::cast::{cast, room};
 use super::coil::push_coil;
-use super::drawn::{self, BarKind, DrawnJoint, Part, Solid};
+use super::drawn::{self, BarKind, DrawnJoint, DrawnShape, Solid};
 use super::instances::{bar, placed, push_label};
 use super::theme::Material;
 use super::{
@@ -18,9 +18,9 @@ use super::{
 use crate::scene::{Role, Scene, SignedAxis};
 use crate::simulate::Frame;
 
-/// What the view keeps of a scene: made once for each scene, and again when its bodies or shapes change.
+/// What the view precomputes for a scene: built once per scene, and again when its bodies or shapes change.
 pub struct SceneView {
-    pub(super) parts: Vec<Part>,
+    pub(super) parts: Vec<DrawnShape>,
     plates: Arc<[MeshData]>,
     joint_names: Vec<Arc<str>>,
     axis_names: [Arc<str>; 4],
@@ -29,25 +29,25 @@ pub struct SceneView {
     isometric: Option<(f64, f64)>,
     /// Coordinate of the floor along `down`, m.
     floor: f32,
-    /// Greatest outer radius of each drawn socket, m: where its carrier begins.
+    /// Largest outer radius of each drawn socket, m: where the part carrying it begins.
     pub(super) room: Vec<f32>,
-    /// Points of the moving parts at the start, m: what a fixed part that is in the way hides.
+    /// Points of the moving parts at the start, m: used to test what a fixed part hides.
     watched: Vec<Vec3>,
     /// Ball joints at the start.
     at_start: Vec<DrawnJoint>,
 }
 
-/// Least edge of a picture that has room for the triad, points.
+/// Smallest picture edge that leaves room for the triad, points.
 const SMALLEST_WITH_TRIAD: f32 = 200.0;
-/// Radius of the light about a joint that was hit, in radii of its socket.
+/// Radius of the halo of a joint that was hit, in radii of its socket.
 const HALO: f32 = 1.7;
-/// Opacity of a ball that a wear map is seen through.
+/// Opacity of a ball in front of a wear map.
 const CLEAR_BALL: f32 = 0.25;
 /// Radius of a drawn spring, in radii of the scene.
 const COIL: f32 = 0.025;
 
 impl SceneView {
-    /// Prepares the meshes and bounds of `scene`; `frame` is any frame of it, best the first.
+    /// Prepares the meshes and bounds of `scene`; `frame` is any frame of it, preferably the first.
     pub fn new(scene: &Scene, frame: &Frame) -> Self {
         let (parts, plates) = drawn::parts(scene);
         let joints = drawn::joints(scene, frame, 1.0);
@@ -60,7 +60,7 @@ impl SceneView {
             .fold(f32::NEG_INFINITY, f32::max);
         let floor = match scene.view.floor {
             Some(floor) => floor as f32,
-            // Room for a machine that moves.
+            // Leave room for motion.
             None if lowest.is_finite() => lowest + 0.15 * bounds.radius,
             None => bounds.radius,
         };
@@ -73,7 +73,7 @@ impl SceneView {
                 .extent(|point, _| ends.push(point));
             let middle = ends.iter().sum::<Vec3>() / ends.len().max(1) as f32;
             watched.push(middle);
-            // A bar is long: its ends count, too.
+            // A bar is long: include its ends.
             watched.extend(ends.into_iter().take(2).filter(|_| part.is_bar()));
         }
         watched.retain(|point| point.is_finite());
@@ -96,7 +96,7 @@ impl SceneView {
         }
     }
 
-    /// Ball around everything drawn at the frame given to [`Self::new`].
+    /// Bounding sphere of everything drawn in the frame given to [`Self::new`].
     pub fn bounds(&self) -> Bounds {
         self.bounds
     }
@@ -110,7 +110,7 @@ impl SceneView {
         }
     }
 
-    /// Moves `camera` so that everything drawn in `frame` fills a picture of `size`; the direction stays.
+    /// Moves `camera` so that everything drawn in `frame` fills a picture of `size`; the direction is kept.
     pub fn fit(
         &self,
         camera: &mut Camera,
@@ -122,7 +122,7 @@ impl SceneView {
         camera.fit_balls(&self.extents(scene, frame, options), size, [0.0; 3]);
     }
 
-    /// The same with room for text: beside a `plate`, width and height in pixels, in the upper left corner and above the
+    /// The same with room for text: beside a `plate` (width and height in pixels) in the upper left corner and above the
     /// legend in the lower right, or below the plate; whichever shows the scene larger.
     pub fn fit_around(
         &self,
@@ -143,13 +143,13 @@ impl SceneView {
         }
     }
 
-    /// What is drawn where `options` ask for a magnification.
+    /// Magnification actually drawn for the one in `options`.
     pub(super) fn magnification(&self, scene: &Scene, frame: &Frame, options: &ViewOptions) -> f32 {
         drawn::magnification(scene, frame, &self.room, options.magnification)
     }
 
-    /// Opacity of part `index` from `eye`: a fixed part before much of what moves is seen through. It follows from the
-    /// first frame, so that it changes with the point of view alone.
+    /// Opacity of part `index` from `eye`: a fixed part that hides much of the moving parts becomes translucent. It is
+    /// based on the first frame, so that it changes only with the viewpoint.
     pub(super) fn opacity(&self, index: usize, eye: Vec3) -> f32 {
         const HIDES: [f32; 2] = [0.05, 0.16];
         const LEAST: f32 = 0.22;
@@ -171,8 +171,8 @@ impl SceneView {
         let m = self.magnification(scene, frame, options);
         let joints = drawn::joints(scene, frame, m);
         let mut extents = extents(&self.parts, frame, &joints);
-        // Half a reference length of arrows around each joint: they lean any way, and most are shorter. Drawn or not, so
-        // that pictures with and without them compare.
+        // Half a reference length of arrows around each joint: they point anywhere, and most are shorter. Included even if
+        // not drawn, so that pictures with and without them can be compared.
         let arrow = ARROW_LENGTH * self.bounds.radius;
         extents.extend(joints.iter().map(|joint| (joint.socket_centre, arrow)));
         extents
@@ -193,7 +193,7 @@ impl SceneView {
         }
     }
 
-    /// Rebuilds `out` in its own buffers.
+    /// Rebuilds `out`, reusing its buffers.
     pub fn build(&self, shot: &Shot<'_>, out: &mut DrawList) {
         let Shot {
             scene,
@@ -252,7 +252,7 @@ impl SceneView {
                     }
                 };
                 out.sockets.push(half(joint.opening, palette.socket));
-                // The half that is cut away stays as a breath: a ball that touches there is still in its socket.
+                // The half that is cut away stays faintly visible: a ball in contact there is still in its socket.
                 let colour = palette
                     .socket
                     .colour
@@ -331,7 +331,7 @@ impl SceneView {
         let Bounds { centre, radius } = self.bounds;
         let (up, right) = (shot.camera.up(), shot.camera.front_right());
         let back = right.cross(up);
-        // From above, the left and the front: fixed to the scene, so that shadows stay when the camera turns.
+        // From above, the left and the front: fixed to the scene, so that shadows do not move with the camera.
         out.light = Light {
             direction: (up - 0.45 * right + 0.55 * back).normalize(),
             up,
@@ -353,11 +353,11 @@ impl SceneView {
         });
     }
 
-    /// Axes and gravity in the lower left corner, of constant size on the screen.
+    /// Axes and gravity in the lower left corner, at constant size on the screen.
     fn push_triad(&self, shot: &Shot<'_>, palette: &Palette, out: &mut DrawList) {
         let camera = shot.camera;
         let points = shot.size.map(|n| n as f32 / shot.pixels_per_point);
-        // In a small picture it would lie over the machine.
+        // In a small picture it would cover the machine.
         if points[0].min(points[1]) < SMALLEST_WITH_TRIAD {
             return;
         }
@@ -369,7 +369,7 @@ impl SceneView {
                 .map(|n| n as f32 * camera.metres_per_pixel(shot.size) / 2.0);
             camera.target - right * (width - 62.0 * scale) - up * (height - 62.0 * scale)
         };
-        // Perspective would stretch it out there: sheared so that it looks as it does in the middle.
+        // Perspective would distort it there: sheared so that it looks as it would in the centre.
         let back = camera.axes().2;
         let lean = (corner - camera.target) / camera.distance;
         let sheared = |point: Vec3| point - lean * (point - corner).dot(back);
@@ -411,7 +411,7 @@ impl SceneView {
         }
         for instance in out.overlay.by_mesh.iter_mut().flatten() {
             let rows = instance.world_from_mesh.map(Vec4::from);
-            // Depth over the corner of the mesh's axes and origin.
+            // Depth relative to the corner, of the mesh's axes and origin.
             let depth =
                 rows[0] * back.x + rows[1] * back.y + rows[2] * back.z - Vec4::W * corner.dot(back);
             instance.world_from_mesh = [0, 1, 2].map(|i| (rows[i] - lean[i] * depth).to_array());
@@ -419,8 +419,8 @@ impl SceneView {
     }
 }
 
-/// Balls (centre, radius) whose hull holds everything drawn.
-fn extents(parts: &[Part], frame: &Frame, joints: &[DrawnJoint]) -> Vec<(Vec3, f32)> {
+/// Spheres (centre, radius) whose convex hull contains everything drawn.
+fn extents(parts: &[DrawnShape], frame: &Frame, joints: &[DrawnJoint]) -> Vec<(Vec3, f32)> {
     let mut extents = Vec::new();
     for part in parts {
         part.place(frame, joints)
@@ -458,7 +458,7 @@ fn bounds(extents: &[(Vec3, f32)]) -> Bounds {
     }
 }
 
-/// A magnification in words, without its sign.
+/// A magnification in words, without the multiplication sign.
 pub(super) fn times(x: f32) -> String {
     if (x - x.round()).abs() < 0.05 {
         format!("{x:.0}")

@@ -5,7 +5,7 @@ use glam::{Mat4, Vec2, Vec3, Vec4};
 use super::{Bounds, Eye};
 use crate::scene::SignedAxis;
 
-/// A named point of view.
+/// A named viewpoint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Preset {
     /// Level, from the front.
@@ -33,18 +33,18 @@ impl Preset {
     }
 }
 
-/// A perspective camera that turns about a target.
+/// A perspective camera that orbits a target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// What it turns about, m.
+    /// Orbit centre, m.
     pub target: Vec3,
-    /// Turn about the vertical, rad; 0 looks from the front.
+    /// Azimuth about the vertical, rad; 0 looks from the front.
     pub yaw: f32,
-    /// Height angle, rad; positive looks down.
+    /// Elevation, rad; positive looks down.
     pub pitch: f32,
     /// Eye to target, m.
     pub distance: f32,
-    /// Vertical angle of view, rad.
+    /// Vertical field of view, rad.
     pub field_of_view: f32,
     up: Vec3,
     right: Vec3,
@@ -52,7 +52,7 @@ pub struct Camera {
     followed: Option<Vec3>,
 }
 
-/// Steepest view; a right angle is looking straight down.
+/// Steepest elevation; a right angle looks straight down.
 const STEEPEST: f32 = std::f32::consts::FRAC_PI_2;
 
 impl Camera {
@@ -78,14 +78,14 @@ impl Camera {
         camera
     }
 
-    /// Isometric view at another yaw and pitch, rad, than the usual.
+    /// Sets an isometric view with other than the default yaw and pitch, rad.
     pub fn with_isometric(mut self, yaw: f32, pitch: f32) -> Self {
         self.isometric = (yaw, pitch.clamp(-STEEPEST, STEEPEST));
         self.preset(Preset::Isometric);
         self
     }
 
-    /// Turns to a named point of view; target and distance stay.
+    /// Turns to a named viewpoint; target and distance are kept.
     pub fn preset(&mut self, preset: Preset) {
         (self.yaw, self.pitch) = match preset {
             Preset::Front => (0.0, 0.0),
@@ -95,7 +95,7 @@ impl Camera {
         };
     }
 
-    /// Moves so that all of `bounds` is in a picture of the given aspect (width by height); the direction stays.
+    /// Moves so that all of `bounds` is in a picture of the given aspect ratio (width by height); the direction is kept.
     pub fn fit(&mut self, bounds: Bounds, aspect: f32) {
         let half = (self.field_of_view / 2.0).tan();
         let half_angle = (half * aspect.min(1.0)).atan();
@@ -103,8 +103,8 @@ impl Camera {
         self.distance = (bounds.radius.max(1e-6) / half_angle.sin()) * 1.02;
     }
 
-    /// Moves so that the balls (centre, radius) just fill a picture of `size`, with a small margin; the direction stays.
-    /// `reserved` pixels at the left, the top and the bottom are kept free.
+    /// Moves so that the spheres (centre, radius) just fill a picture of `size`, with a small margin; the direction is
+    /// kept. `reserved` pixels at the left, the top and the bottom are kept free.
     pub(super) fn fit_balls(
         &mut self,
         balls: &[(Vec3, f32)],
@@ -114,7 +114,7 @@ impl Camera {
         const MARGIN: f32 = 1.16;
         let axes = self.axes();
         let [width, height] = size.map(|n| n.max(1) as f32);
-        // Slope of one pixel. No more is kept free than leaves most of the picture.
+        // Slope of one pixel. The reserved space is limited so that most of the picture remains.
         let pixel = 2.0 * (self.field_of_view / 2.0).tan() / height;
         let free_of = |edge: f32, low: f32, high: f32| {
             let keep = (0.6 * edge / (low + high).max(1e-3)).min(1.0);
@@ -124,9 +124,9 @@ impl Camera {
             );
             (pixel * (half - middle), pixel * (half + middle))
         };
-        // Along one screen axis, up to slopes `low` and `high`: a ball at (x, depth z towards the eye) is inside both
-        // edges where x - x0 + r sqrt(1 + high^2) <= (d - z) high, and likewise below. The two tightest edges give d, and
-        // the x0 that lies midway for any greater d.
+        // Along one screen axis, up to slopes `low` and `high`: a sphere at (x, depth z towards the eye) is inside both
+        // edges if x - x0 + r sqrt(1 + high^2) <= (d - z) high, and likewise below. The two tightest edges give d, and the
+        // x0 that stays midway for any greater d.
         let span = |axis: Vec3, (low, high): (f32, f32)| {
             let reach = |sign: f32, slope: f32| {
                 let edge = |&(p, r): &(Vec3, f32)| {
@@ -152,11 +152,11 @@ impl Camera {
         }
     }
 
-    /// Looks at a ball of `radius` about `centre` from the side to which `opening` points, a little from above.
+    /// Looks at a sphere of `radius` about `centre` from the side that `opening` points to, a little from above.
     pub fn close_up(&mut self, centre: Vec3, opening: Vec3, radius: f32) {
         let out = opening.normalize_or(self.back_at(0.0));
         let level = Vec2::new(out.dot(self.right), out.dot(self.back_at(0.0)));
-        // An opening straight up or down says nothing about the turn: that stays as it is.
+        // An opening straight up or down does not determine the yaw: that is kept.
         if level.length() > 1e-3 {
             self.yaw = level.x.atan2(level.y) + 0.25;
         }
@@ -164,21 +164,21 @@ impl Camera {
         self.fit(Bounds { centre, radius }, 1.0);
     }
 
-    /// Turns by a drag of `drag` pixels.
+    /// Orbits by a drag of `drag` pixels.
     pub fn orbit(&mut self, drag: Vec2) {
         const RADIANS_PER_PIXEL: f32 = 0.006;
         self.yaw = (self.yaw - drag.x * RADIANS_PER_PIXEL).rem_euclid(std::f32::consts::TAU);
         self.pitch = (self.pitch + drag.y * RADIANS_PER_PIXEL).clamp(-STEEPEST, STEEPEST);
     }
 
-    /// Shifts by a drag of `drag` pixels: what lies at the target's distance stays under the cursor.
+    /// Pans by a drag of `drag` pixels: what lies at the target's distance stays under the cursor.
     pub fn pan(&mut self, drag: Vec2, size: [u32; 2]) {
         let metres = self.metres_per_pixel(size);
         let (right, up, _) = self.axes();
         self.target += (up * drag.y - right * drag.x) * metres;
     }
 
-    /// Comes nearer by `factor` (above 1 is nearer); what is under `cursor` at the target's distance stays there.
+    /// Zooms by `factor` (above 1 is nearer); what is under `cursor` at the target's distance stays there.
     pub fn zoom(&mut self, factor: f32, cursor: Vec2, size: [u32; 2]) {
         if !(factor.is_finite() && factor > 0.0) {
             return;
@@ -191,8 +191,8 @@ impl Camera {
         self.target += (right * off_centre.x - up * off_centre.y) * shrink;
     }
 
-    /// Comes nearer by `factor` to a point of the scene, which stays where it is on the screen. The target takes its
-    /// depth, so that coming nearer never leads past it.
+    /// Zooms by `factor` about a point of the scene, which stays where it is on the screen. The target takes its depth, so
+    /// that zooming in never passes it.
     pub fn zoom_about(&mut self, factor: f32, point: Vec3, size: [u32; 2]) {
         let (eye, back) = (self.eye(), self.axes().2);
         let depth = (eye - point).dot(back);
@@ -206,7 +206,7 @@ impl Camera {
         }
     }
 
-    /// Moves with a followed point: call each frame with its place, or `None` to stay.
+    /// Moves with a followed point: call each frame with its position, or `None` to stay.
     pub fn follow(&mut self, point: Option<Vec3>) {
         if let (Some(now), Some(before)) = (point, self.followed) {
             self.target += now - before;
@@ -214,7 +214,7 @@ impl Camera {
         self.followed = point;
     }
 
-    /// Part of the way to `goal`: `t` = 0 stays, 1 arrives. For smooth changes of view.
+    /// Interpolates to `goal`: `t` = 0 stays, 1 arrives. For smooth changes of view.
     pub fn towards(&self, goal: &Self, t: f32) -> Self {
         use std::f32::consts::{PI, TAU};
         let turn = (goal.yaw - self.yaw + PI).rem_euclid(TAU) - PI;
@@ -228,12 +228,12 @@ impl Camera {
         }
     }
 
-    /// Unit vector up in the scene.
+    /// The scene's up direction, a unit vector.
     pub fn up(&self) -> Vec3 {
         self.up
     }
 
-    /// Unit vector that runs to the right in the front view.
+    /// Unit vector that points to the right in the front view.
     pub fn front_right(&self) -> Vec3 {
         self.right
     }
@@ -252,7 +252,7 @@ impl Camera {
         (up.cross(back), up, back)
     }
 
-    /// Length at the target's distance that one pixel covers, m.
+    /// Size of one pixel at the target's distance, m.
     pub fn metres_per_pixel(&self, size: [u32; 2]) -> f32 {
         2.0 * self.distance * (self.field_of_view / 2.0).tan() / size[1].max(1) as f32
     }

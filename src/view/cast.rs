@@ -1,11 +1,11 @@
-//! Rays and distances against solids where they stand.
+//! Ray casts and distances against placed solids.
 
 use glam::{Quat, Vec3};
 use parry3d::math::Pose as ParryPose;
 use parry3d::query::{Ray, RayCast};
 use parry3d::shape::{Ball, Capsule, Cone, Cuboid, Cylinder, Shape};
 
-use super::drawn::{BarKind, DrawnJoint, Part, Pose, Solid};
+use super::drawn::{BarKind, DrawnJoint, DrawnShape, Pose, Solid};
 use crate::scene::Scene;
 use crate::simulate::Frame;
 
@@ -16,14 +16,14 @@ pub(super) fn cast(solid: &Solid<'_>, ray: &Ray) -> Option<f32> {
     })?
 }
 
-/// Distance from `point` to the solid, 0 within it.
+/// Distance from `point` to the solid, 0 inside it.
 pub(super) fn distance(solid: &Solid<'_>, point: Vec3) -> Option<f32> {
     with_shape(solid, |shape, pose| {
         shape.distance_to_point(pose, point, true)
     })
 }
 
-/// Asks something of the solid's shape where it stands; `None` where there is none.
+/// Queries the solid's placed shape; `None` if it has none.
 fn with_shape<T>(solid: &Solid<'_>, ask: impl FnOnce(&dyn Shape, &ParryPose) -> T) -> Option<T> {
     // A broken frame must not reach parry's iterations.
     let mut finite = true;
@@ -43,7 +43,7 @@ fn with_shape<T>(solid: &Solid<'_>, ask: impl FnOnce(&dyn Shape, &ParryPose) -> 
             if half == 0.0 {
                 return None;
             }
-            // parry's bars stand along Y.
+            // parry's bars lie along Y.
             let turn = Quat::from_rotation_arc(Vec3::Y, (to - from).normalize_or(Vec3::Y));
             let pose = ParryPose::from_parts((from + to) / 2.0, turn);
             match kind {
@@ -78,11 +78,11 @@ pub(super) fn cast_ball(centre: Vec3, radius: f32, ray: &Ray) -> Option<f32> {
     Ball::new(radius).cast_ray(&ParryPose::from_translation(centre), ray, f32::MAX, true)
 }
 
-/// Outer radius, m, to which the socket of each ball joint may grow before it cuts into what carries it, `joints` drawn
-/// without magnification. What it touches already, or what is cut at its outer face, is no limit.
+/// Outer radius, m, to which the socket of each ball joint may grow before it intersects the part that carries it, with
+/// `joints` drawn without magnification. Parts that it already touches, or that end at its outer face, do not limit it.
 pub(super) fn room(
     scene: &Scene,
-    parts: &[Part],
+    parts: &[DrawnShape],
     frame: &Frame,
     joints: &[DrawnJoint],
 ) -> Vec<f32> {

@@ -1,4 +1,4 @@
-//! Springs as coils, from one of their points to the other just now.
+//! Springs as coils between the current positions of their two points.
 
 use std::f32::consts::TAU;
 
@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::{Colour, Line};
 
-/// Part of the length at each end that is straight.
+/// Fraction of the length that is straight at each end.
 const STRAIGHT: f32 = 0.12;
 const TURNS: f32 = 9.0;
 const SEGMENTS: u16 = 96;
@@ -28,7 +28,7 @@ pub(super) fn push_coil(
     let point = |part: f32| {
         let inside = ((part - STRAIGHT) / (1.0 - 2.0 * STRAIGHT)).clamp(0.0, 1.0);
         let (sin, cos) = (TAU * TURNS * inside).sin_cos();
-        // The wire leaves the middle within a turn.
+        // The wire reaches its full radius within a turn.
         let out = radius * (TURNS * inside.min(1.0 - inside)).min(1.0);
         from + (to - from) * part + (side * cos + other * sin) * out
     };

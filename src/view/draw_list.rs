@@ -1,4 +1,4 @@
-//! The plain list that `render` draws: no handle, no GPU type; equal lists give equal pictures.
+//! The plain list that `render` draws: no handles, no GPU types; equal lists give equal pictures.
 
 use std::sync::Arc;
 
@@ -7,10 +7,10 @@ use glam::{Mat4, Vec2, Vec3};
 
 use super::{Colour, WearMap};
 
-/// A mesh that many instances share.
+/// A mesh shared by many instances.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Mesh {
-    /// Unit ball about the origin.
+    /// Unit sphere about the origin.
     Sphere,
     /// Radius 1, flat ends at z = 0 and z = 1.
     Cylinder,
@@ -20,15 +20,15 @@ pub enum Mesh {
     Cube,
     /// Half of a spherical shell of outer radius 1, open towards +z; [`Instance::inner_radius`] is its inner radius.
     Socket,
-    /// `DrawList::plates[i]`: a cell of a zone of wear maps, then the plates of the scene.
+    /// `DrawList::plates[i]`: one cell per zone of the wear maps, then the plates of the scene.
     Plate(u16),
 }
 
 impl Mesh {
-    /// Number of meshes before the first plate.
+    /// Number of shared meshes, before the first plate.
     pub const SHARED: usize = 5;
 
-    /// Position in [`Layer`]: shared meshes first, then plates.
+    /// Index in [`Layer`]: shared meshes first, then plates.
     pub fn index(self) -> usize {
         match self {
             Self::Sphere => 0,
@@ -44,7 +44,7 @@ impl Mesh {
 /// Triangles of one mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshData {
-    /// Position (x, y, z) and a mark: 0, but on sockets 1 for the inner face, 2 and 3 for the cut face's outer and inner
+    /// Position (x, y, z) and a mark: 0, except on sockets 1 for the inner face, 2 and 3 for the cut face's outer and inner
     /// edge; then the normal.
     pub vertices: Vec<([f32; 4], [f32; 3])>,
     /// Three per triangle, counter-clockwise seen from outside.
@@ -59,9 +59,9 @@ pub struct Instance {
     pub world_from_mesh: [[f32; 4]; 3],
     /// Red, green, blue (sRGB-encoded), opacity.
     pub colour: [f32; 4],
-    /// 0 mirror, 1 chalk; of a ghost's outline its width, pixels.
+    /// From 0 (mirror) to 1 (chalk); for a ghost's outline its width, pixels.
     pub roughness: f32,
-    /// 0 plastic, 1 metal; of a ghost its slice of depth ([`super::GhostLook::slice`]).
+    /// From 0 (plastic) to 1 (metal); for a ghost its depth slice ([`super::GhostLook::slice`]).
     pub metal: f32,
     /// Inner radius of a socket, in units of its outer radius; unused elsewhere.
     pub inner_radius: f32,
@@ -115,7 +115,7 @@ pub struct Line {
     pub to_colour: [f32; 4],
 }
 
-/// Where the picture is taken from.
+/// Viewpoint of the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Eye {
     /// World to clip space (z in 0..1, y up).
@@ -124,20 +124,20 @@ pub struct Eye {
     pub position: Vec3,
 }
 
-/// The one light that casts shadows.
+/// The only light that casts shadows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Light {
     /// Unit vector from the scene towards the light.
     pub direction: Vec3,
-    /// Unit vector up: sky light comes from there.
+    /// Unit vector up: the direction of sky light.
     pub up: Vec3,
-    /// Centre of what must have shadows, m.
+    /// Centre of the region that needs shadows, m.
     pub centre: Vec3,
-    /// Radius of what must have shadows, m.
+    /// Radius of the region that needs shadows, m.
     pub radius: f32,
 }
 
-/// Ground of the picture.
+/// Background of the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Background {
     /// At the top edge.
@@ -149,13 +149,13 @@ pub struct Background {
 /// Floor with its grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Floor {
-    /// Middle of the grid, m: grid lines pass through it.
+    /// Centre of the grid, m: grid lines pass through it.
     pub centre: Vec3,
     /// Unit vector along one set of lines.
     pub along: Vec3,
     /// Distance between thin lines, m; every tenth is thick.
     pub spacing: f32,
-    /// Where it has faded out, m from `centre`.
+    /// Distance from `centre` at which it has faded out, m.
     pub radius: f32,
     /// Colour of the plane.
     pub colour: Colour,
@@ -172,30 +172,30 @@ pub enum LabelKind {
     Gravity,
     /// A ball joint, by index.
     Joint(usize),
-    /// The mark of a peak of a ball joint, by index.
+    /// The mark of a ball joint's peak, by index.
     Peak(usize),
-    /// The arrow of a force from outside.
+    /// The arrow of an external force.
     Outside,
     /// The error of the output point.
     Error,
 }
 
-/// Text that the interface paints over the picture.
+/// Text that the interface draws over the picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Label {
-    /// What it says.
+    /// The text.
     pub text: Arc<str>,
     /// What it names.
     pub kind: LabelKind,
     /// World point, m.
     pub anchor: Vec3,
-    /// Pixel of the anchor, from the top left; labels that cannot be seen are left out.
+    /// Pixel of the anchor, from the top left; labels outside the picture are left out.
     pub pixel: Vec2,
     /// Colour of the text.
     pub colour: Colour,
 }
 
-/// One step of the arrow legend.
+/// One tick of the arrow legend.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tick {
     /// Force, N.
@@ -204,35 +204,35 @@ pub struct Tick {
     pub fraction: f32,
 }
 
-/// How to read the arrows.
+/// The arrow legend.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Legend {
     /// Force whose arrow has the reference length, N.
     pub reference: f32,
-    /// Reference length, pixels: what an arrow across the line of sight has anywhere in the picture.
+    /// Reference length, pixels: the same for an arrow across the line of sight anywhere in the picture.
     pub pixels: f32,
     /// Length against force.
     pub scaling: super::Scaling,
     /// Whether the reference follows the forces.
     pub automatic: bool,
-    /// Whether some arrow would be longer than is drawn (a fixed reference far too small): its shaft is broken.
+    /// Whether some arrow is longer than can be drawn (a fixed reference far too small): its shaft is broken.
     pub clipped: bool,
-    /// Marks on the scale, rising.
+    /// Ticks on the scale, ascending.
     pub ticks: Vec<Tick>,
-    /// Colour of normal forces; `None` where they are not drawn.
+    /// Colour of normal forces; `None` if they are not drawn.
     pub normal: Option<Colour>,
-    /// Whether peaks that are over are marked.
+    /// Whether past peaks are marked.
     pub peaks: bool,
-    /// Colour of friction; `None` where it is not drawn.
+    /// Colour of friction; `None` if it is not drawn.
     pub friction: Option<Colour>,
 }
 
-/// How to read the colours of a wear map.
+/// The colour legend of a wear map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WearScale {
-    /// What they stand for: an impulse in N s/mm^2, or the size of a work in mJ/mm^2.
+    /// Quantity shown: an impulse in N s/mm^2, or the magnitude of a work in mJ/mm^2.
     pub map: WearMap,
-    /// Largest value in the picture; 0 while no ball has touched.
+    /// Largest value in the picture; 0 until a ball has been in contact.
     pub largest: f32,
 }
 
@@ -241,7 +241,7 @@ pub struct WearScale {
 pub struct DrawList {
     /// Size of the picture for which `eye` and label pixels hold.
     pub size: [u32; 2],
-    /// Where from.
+    /// Viewpoint.
     pub eye: Eye,
     /// Light.
     pub light: Light,
@@ -251,46 +251,47 @@ pub struct DrawList {
     pub exposure: f32,
     /// Floor, if any.
     pub floor: Option<Floor>,
-    /// Meshes of this scene's own; shared, so that a renderer can tell by the pointer whether it has them.
+    /// The scene's own meshes; shared, so that a renderer can tell by pointer whether it has loaded them.
     pub plates: Arc<[MeshData]>,
     /// Solid things that cast shadows.
     pub solid: Layer,
-    /// Fixed things before what moves, seen through.
+    /// Fixed things in front of moving ones, drawn translucent.
     pub faded: Layer,
-    /// Solid things seen through all others where these stand before them: force arrows.
+    /// Solid things that show through whatever is in front of them: force arrows.
     pub arrows: Layer,
-    /// Other states of the machine, translucent before all others but arrows.
+    /// Other states of the machine, translucent in front of everything but arrows.
     pub ghost: Layer,
-    /// The same in the colour of their outlines.
+    /// The same in their outline colour.
     pub ghost_edges: Layer,
-    /// Rings of light about joints that were hit.
+    /// Halos of joints that were hit.
     pub halos: Vec<Instance>,
-    /// Sockets, farthest first: for each the half that stands and, fainter, the half that is cut away.
+    /// Sockets, farthest first: for each the half that is kept and, fainter, the half that is cut away.
     pub sockets: Vec<Instance>,
-    /// Cells of wear maps, in their own colours whatever the light; fainter where something stands before them, or the wall.
+    /// Cells of wear maps, in their own colours whatever the light; fainter where something, or the wall, is in front of
+    /// them.
     pub wear: Layer,
-    /// Balls that wear maps are seen through.
+    /// Translucent balls in front of wear maps.
     pub clear_balls: Vec<Instance>,
-    /// Solid things before all others: the triad.
+    /// Solid things in front of everything: the triad.
     pub overlay: Layer,
     /// Lines.
     pub lines: Vec<Line>,
-    /// Lines before all others: outlines of peaks that are over.
+    /// Lines in front of everything: outlines of past peaks.
     pub marks: Vec<Line>,
-    /// Text for the interface to paint.
+    /// Text for the interface to draw.
     pub labels: Vec<Label>,
-    /// How to read the arrows; `None` where none are drawn.
+    /// The arrow legend; `None` if no arrows are drawn.
     pub legend: Option<Legend>,
-    /// How to read the wear map; `None` where none is drawn.
+    /// The wear-map legend; `None` if none is drawn.
     pub wear_scale: Option<WearScale>,
-    /// Magnification of the play that was drawn.
+    /// Magnification of the play as drawn.
     pub magnification: f32,
-    /// What to write about it: "play ×50"; says so where less was drawn than asked.
+    /// Its label: "play ×50"; says so if less was drawn than requested.
     pub magnification_text: String,
 }
 
 impl Default for DrawList {
-    /// An empty picture; its buffers are kept from build to build.
+    /// An empty picture; its buffers are reused from build to build.
     fn default() -> Self {
         let ground = Colour::hex(0xFFFFFF);
         Self {

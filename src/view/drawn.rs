@@ -1,8 +1,8 @@
-//! Where each drawn thing stands at one instant: the one source for drawing, picking and bounds.
+//! Where each thing is drawn at one instant: the single source for drawing, picking and bounds.
 //!
 //! With a magnification m of the play, the ball of a joint is drawn at Z_i + m e in a socket of inner radius r + m c, so
-//! it touches the drawn wall exactly when it touches the real one. Bodies stay where they are; only the end of a bar
-//! that carries a ball goes along with it, so that nothing comes apart.
+//! that it touches the drawn wall exactly when it touches the real one. Bodies are drawn in place; only the end of a bar
+//! that carries a ball moves with it, so that nothing comes apart.
 
 use std::sync::Arc;
 
@@ -13,18 +13,18 @@ use super::{Mesh, MeshData, to_f32, wear};
 use crate::scene::{Geometry, Role, Scene, Shape};
 use crate::simulate::{BodyMotion, Frame};
 
-/// Greatest drawn inner radius of a socket, in ball radii: beyond it the magnification is held back.
+/// Largest drawn inner radius of a socket, in ball radii: it limits the magnification.
 const LARGEST_SOCKET: f32 = 4.2;
 /// Thickness of a drawn socket, in ball radii.
 const WALL: f32 = 0.26;
-/// Gap drawn in an ideal joint, in ball radii: ball and socket must not share a surface.
+/// Gap drawn in an ideal joint, in ball radii: ball and socket must not coincide.
 const IDEAL_GAP: f32 = 0.02;
 
 /// A shape as the scene gives it, in its body's frame.
-pub(super) struct Part {
+pub(super) struct DrawnShape {
     /// Body; `None` is the world.
     pub body: Option<usize>,
-    /// Position among `fixed_shapes`, or among the body's shapes.
+    /// Index among `fixed_shapes`, or among the body's shapes.
     pub index: usize,
     pub role: Role,
     form: Form,
@@ -58,7 +58,7 @@ pub(super) enum BarKind {
     Cone,
 }
 
-/// End of a bar and the ball joint it reaches into.
+/// End of a bar, and the ball joint it reaches into.
 struct End {
     point: Vec3,
     at: Option<Reach>,
@@ -66,9 +66,9 @@ struct End {
 
 #[derive(Clone, Copy)]
 enum Reach {
-    /// The joint's ball sits on this end.
+    /// The joint's ball is on this end.
     Ball(usize),
-    /// The joint's socket stands before this end.
+    /// The joint's socket is in front of this end.
     Socket(usize),
 }
 
@@ -77,7 +77,7 @@ enum Reach {
 pub(super) struct DrawnJoint {
     pub socket_centre: Vec3,
     pub ball_centre: Vec3,
-    /// Drawn less real place of the ball.
+    /// Drawn minus real position of the ball.
     pub shift: Vec3,
     pub ball_radius: f32,
     pub inner: f32,
@@ -86,9 +86,9 @@ pub(super) struct DrawnJoint {
     pub opening: Vec3,
 }
 
-/// A part where it stands, world axes.
+/// A placed part, world axes.
 pub(super) enum Solid<'a> {
-    /// `capped[i]`: whether end i of a capsule shows its round end.
+    /// `capped[i]`: whether end i of a capsule shows its hemisphere.
     Bar {
         from: Vec3,
         to: Vec3,
@@ -145,7 +145,7 @@ impl Pose {
 }
 
 /// Shapes of `scene`, and the meshes that are not shared: the zones of wear maps, then its plates.
-pub(super) fn parts(scene: &Scene) -> (Vec<Part>, Vec<MeshData>) {
+pub(super) fn parts(scene: &Scene) -> (Vec<DrawnShape>, Vec<MeshData>) {
     let mut meshes = wear::meshes();
     let mut parts = Vec::new();
     let fixed = scene
@@ -161,7 +161,7 @@ pub(super) fn parts(scene: &Scene) -> (Vec<Part>, Vec<MeshData>) {
     });
     for (body, index, shape) in fixed.chain(moving) {
         if let Some(form) = form(scene, body, shape, &mut meshes) {
-            parts.push(Part {
+            parts.push(DrawnShape {
                 body,
                 index,
                 role: shape.role,
@@ -179,7 +179,7 @@ pub(super) fn parts(scene: &Scene) -> (Vec<Part>, Vec<MeshData>) {
             centre: to_f32(tip),
             radius: 0.4 * size,
         };
-        parts.push(Part {
+        parts.push(DrawnShape {
             body: Some(scene.output.body),
             index: 0,
             role: Role::Probe,
@@ -263,7 +263,7 @@ fn reach(scene: &Scene, body: Option<usize>, end: Vec3) -> Option<Reach> {
     None
 }
 
-/// Prism over a convex polygon, pushed half the thickness to both sides.
+/// Prism over a convex polygon, extruded by half the thickness to both sides.
 fn plate(corners: &[Vec3], thickness: f32) -> Option<MeshData> {
     let n = corners.len();
     let normal = (1..n.saturating_sub(1))
@@ -295,8 +295,7 @@ fn plate(corners: &[Vec3], thickness: f32) -> Option<MeshData> {
     Some(mesh)
 }
 
-/// Magnification that is drawn where `asked` is wanted: no socket may outgrow [`LARGEST_SOCKET`] ball radii, nor its
-/// [`room`].
+/// Magnification drawn when `asked` is requested: no socket may outgrow [`LARGEST_SOCKET`] ball radii, nor its [`room`].
 pub(super) fn magnification(scene: &Scene, frame: &Frame, room: &[f32], asked: f32) -> f32 {
     let asked = if asked.is_finite() {
         asked.clamp(1.0, 100.0)
@@ -352,7 +351,7 @@ pub(super) fn joints(scene: &Scene, frame: &Frame, m: f32) -> Vec<DrawnJoint> {
     drawn.collect()
 }
 
-impl Part {
+impl DrawnShape {
     /// Whether it is long and thin.
     pub fn is_bar(&self) -> bool {
         matches!(self.form, Form::Bar { .. })
@@ -368,7 +367,7 @@ impl Part {
         }
     }
 
-    /// The part where it stands in `frame`, its ends fitted to the drawn joints.
+    /// The part placed in `frame`, its ends fitted to the drawn joints.
     pub fn place(&self, frame: &Frame, joints: &[DrawnJoint]) -> Solid<'_> {
         let pose = Pose::in_frame(frame, self.body);
         match &self.form {
@@ -426,10 +425,10 @@ fn leave_socket(start: Vec3, end: Vec3, joint: &DrawnJoint) -> Option<Vec3> {
         return None;
     }
     if start.distance(joint.socket_centre) <= radius {
-        // All of it is inside: nothing is left to draw.
+        // Entirely inside: nothing left to draw.
         return Some(start);
     }
-    // |to_end + s along| = radius for the s > 0 that goes back towards the start.
+    // |to_end + s along| = radius for the s > 0 towards the start.
     let along = (start - end).normalize_or_zero();
     let b = to_end.dot(along);
     let s = -b + (b * b + radius * radius - to_end.length_squared()).sqrt();
@@ -437,7 +436,7 @@ fn leave_socket(start: Vec3, end: Vec3, joint: &DrawnJoint) -> Option<Vec3> {
 }
 
 impl Solid<'_> {
-    /// Calls `visit` with balls (centre, radius) whose hull holds the solid: for bounds.
+    /// Calls `visit` with spheres (centre, radius) whose convex hull contains the solid: for bounds.
     pub fn extent(&self, mut visit: impl FnMut(Vec3, f32)) {
         match self {
             Solid::Bar {

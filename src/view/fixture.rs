@@ -66,7 +66,7 @@ fn joint(name: &str, socket: Attachment, ball: Attachment, opening: Vec3) -> Bal
     }
 }
 
-/// Report of a joint whose ball touches the wall in the direction `n` (unit), pressed with `normal` newtons.
+/// Report of a joint whose ball touches the wall in the direction `n` (unit) with `normal` newtons.
 fn touching(socket_centre: Vec3, n: Vec3, normal: f64, friction: Vec3) -> JointReport {
     let eccentricity = n * (CLEARANCE + 1e-6);
     let ball_centre = socket_centre + eccentricity;
@@ -145,7 +145,7 @@ pub(crate) fn pendulum() -> (Scene, Frame) {
     (scene, frame)
 }
 
-/// The paper's mechanism as it stands at t = 0, balls pressed against their sockets.
+/// The paper's mechanism at t = 0, balls pressed against their sockets.
 pub(crate) fn three_legs() -> (Scene, Frame) {
     let x = |x: f64| Vec3::new(x, 0.0, 0.0);
     let f = [0.136_493_548, 0.240_922_773_5, 0.186_472_405_6];
@@ -285,7 +285,7 @@ pub(crate) fn three_legs() -> (Scene, Frame) {
     )
 }
 
-/// Peaks of a frame in which each joint was hit with ten times its present force.
+/// Peaks of a frame in which each joint was hit with ten times its current force.
 pub(crate) fn hits(frame: &Frame) -> Vec<Peak> {
     let peak = |report: &JointReport| Peak {
         normal: 10.0 * report.normal_force.norm(),

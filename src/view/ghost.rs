@@ -1,4 +1,4 @@
-//! Ghosts: other states of the machine, drawn translucent and outlined before it.
+//! Ghosts: other states of the machine, drawn translucent and outlined in front of it.
 
 use glam::{Mat3, Vec3};
 
@@ -10,30 +10,30 @@ use super::{Colour, DrawList, Mesh, Palette, SceneView, Shot, drawn, to_f32};
 use crate::scene::{Output, format_quantity_digits};
 use crate::simulate::Frame;
 
-/// Which other state a ghost is.
+/// Which other state a ghost shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ghost {
     /// The neighbouring motion.
     Twin,
-    /// Every ball joint closed.
+    /// The motion with every ball joint ideal.
     Ideal,
 }
 
 /// How a ghost is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GhostLook {
-    /// Of its surfaces; opacity applies along their edges.
+    /// Colour of its surfaces; full opacity applies along their edges.
     pub fill: Colour,
-    /// Of its outline.
+    /// Colour of its outline.
     pub edge: Colour,
-    /// Of the outline, points. That of the farther slice is wider: it is seen around the nearer.
+    /// Outline width, points. The farther slice has the wider one: it shows around the nearer.
     pub width: f32,
-    /// Slice of depth that it is drawn in: 0 lies before 1, and both before the machine, so that no two take turns.
+    /// Depth slice that it is drawn in: 0 is in front of 1, and both in front of the machine, so that none interpenetrate.
     pub slice: f32,
 }
 
 impl GhostLook {
-    /// Surface and outline, seen so far, 0 to 1; a pixel has so many points.
+    /// Surface and outline at visibility `seen`, 0 to 1.
     fn materials(&self, seen: f32, pixels_per_point: f32) -> [Material; 2] {
         let material = |colour: Colour| Material {
             colour: colour.with_opacity(seen * colour.0[3]),
@@ -55,8 +55,8 @@ pub fn output_point(output: &Output, frame: &Frame) -> Option<crate::scene::Vec3
 }
 
 impl SceneView {
-    /// Adds the moving parts as they stand in `ghost`, another state of the scene of `shot`, to the list that was built of
-    /// it, each the clearer the farther it stands from its place there; whether any differs by a pixel or more.
+    /// Adds the moving parts in the state `ghost` of the scene of `shot` to the list built from that shot, each the more
+    /// visible the farther it is from its place there; returns whether any differs by a pixel or more.
     pub fn add_ghost(
         &self,
         shot: &Shot<'_>,
@@ -69,7 +69,7 @@ impl SceneView {
         let (here, there) = (at(shot.frame), at(ghost));
         let (eye, back) = (shot.camera.eye(), shot.camera.axes().2);
         let target = shot.camera.metres_per_pixel(shot.size) / shot.camera.distance;
-        // From one pixel to three.
+        // Fades in from one pixel to three.
         let materials = |from: Vec3, to: Vec3| {
             let pixel = target * (eye - to).dot(back);
             let seen = (from.distance(to) / pixel / shot.pixels_per_point - 0.5) / 2.5;
@@ -106,8 +106,8 @@ impl SceneView {
         differs
     }
 
-    /// Adds the arrow of the error of the output point, from where `ideal` has it: as much larger than it is as the play is
-    /// drawn, unless that does not fit. Its label gives its length and, where it is drawn larger, by how much.
+    /// Adds the arrow of the output point's error, starting where `ideal` has the point: magnified as much as the play is
+    /// drawn, unless that does not fit. Its label gives the length and, if magnified, the factor.
     pub fn add_output_error(&self, shot: &Shot<'_>, ideal: &Frame, out: &mut DrawList) {
         let output = &shot.scene.output;
         let (Some(from), Some(to)) = (

@@ -1,4 +1,4 @@
-//! Meshes and labels put where they belong.
+//! Placing meshes and labels.
 
 use std::sync::Arc;
 
@@ -33,7 +33,7 @@ pub(super) fn bar(from: Vec3, along: Vec3, radius: f32, material: Material) -> I
     )
 }
 
-/// A label at `anchor` if that is in the picture.
+/// A label at `anchor` if that is inside the picture.
 pub(super) fn push_label(
     out: &mut DrawList,
     text: &Arc<str>,

@@ -42,12 +42,12 @@ pub use pick::{Hit, Picked};
 pub use shot::Shot;
 pub use theme::{Colour, Palette, Theme};
 
-/// A physics vector as the view's.
+/// Converts a physics vector to the view's type.
 pub fn to_f32(v: &crate::scene::Vec3) -> glam::Vec3 {
     glam::Vec3::new(v.x as f32, v.y as f32, v.z as f32)
 }
 
-/// Ball around everything drawn.
+/// Bounding sphere of everything drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
     /// Centre, m, world axes.

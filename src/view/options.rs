@@ -1,14 +1,14 @@
-//! What a person may choose about the picture.
+//! The user's choices about the picture.
 
 use super::Theme;
 
-/// Everything about the picture that is a matter of choice.
+/// All user choices about the picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ViewOptions {
     /// Light or dark.
     pub theme: Theme,
-    /// Factor on eccentricity and clearance together, 1..=100. What is drawn may be less where the socket would
-    /// outgrow the picture ([`super::DrawList::magnification`]).
+    /// Factor on eccentricity and clearance together, 1..=100. It may be reduced where the socket would outgrow the picture
+    /// ([`super::DrawList::magnification`]).
     pub magnification: f32,
     /// Contact-force arrows.
     pub arrows: ArrowOptions,
@@ -20,11 +20,11 @@ pub struct ViewOptions {
     pub triad: bool,
     /// Names of the ball joints beside them.
     pub joint_names: bool,
-    /// Draw sockets; without them the balls stand free.
+    /// Draw sockets; without them only the balls are shown.
     pub sockets: bool,
     /// Draw the caller's trail.
     pub trail: bool,
-    /// What colours the sockets' inner faces; balls are then seen through.
+    /// Quantity shown on the sockets' inner faces; balls then become translucent.
     pub wear: WearMap,
 }
 
@@ -45,7 +45,7 @@ impl Default for ViewOptions {
     }
 }
 
-/// What colours the sockets' inner faces.
+/// Quantity shown on the sockets' inner faces.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum WearMap {
     /// Nothing.
@@ -53,22 +53,22 @@ pub enum WearMap {
     Off,
     /// Time integral of the normal force.
     Impulse,
-    /// Work that friction took.
+    /// Work done by friction.
     FrictionWork,
 }
 
 /// How contact forces are drawn.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ArrowOptions {
-    /// Draw normal forces (the reaction of an ideal joint counts as one).
+    /// Draw normal forces (including the reactions of ideal joints).
     pub normal: bool,
     /// Draw friction forces.
     pub friction: bool,
     /// Length against force.
     pub scaling: Scaling,
-    /// Force of the reference length, N; `None` follows the largest force shown lately.
+    /// Force of the reference length, N; `None` follows the largest recent force.
     pub reference: Option<f32>,
-    /// Mark peaks of the normal force that are over.
+    /// Mark past peaks of the normal force.
     pub peaks: bool,
 }
 

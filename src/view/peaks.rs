@@ -1,14 +1,14 @@
-//! Memory of the hardest blow to each ball joint: an impact lasts a hundredth of a picture, an eye needs longer.
+//! Remembers the hardest blow to each ball joint: an impact lasts a hundredth of a picture, an eye needs longer.
 //!
-//! What is remembered is a mark of its own, never an arrow: arrows are the forces of the instant on show. It fades with
-//! simulated time alone; how fast follows from the time scale, so that it is seen equally long at every one.
+//! A remembered blow gets a mark of its own, never an arrow: arrows are the current forces. It fades with simulated time
+//! alone; the rate follows from the time scale, so that it stays visible equally long at any scale.
 
 use glam::Vec3;
 
 use super::{ArrowOptions, to_f32};
 use crate::simulate::{Frame, Peak};
 
-/// A peak that is over.
+/// A past peak.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mark {
     /// Ball joint.
@@ -21,26 +21,26 @@ pub struct Mark {
     pub strength: f32,
 }
 
-/// The hardest blow to each joint since it was last forgotten. Deterministic: depends on what it was given and nothing else.
+/// The hardest blow to each joint that has not faded. Deterministic: depends only on its inputs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PeakMarks {
     joints: Vec<Joint>,
-    /// Instant on show, s.
+    /// Displayed instant, s.
     now: f64,
-    /// Peaks up to here have been taken, s.
+    /// Peaks have been taken up to here, s.
     seen: f64,
     /// Simulated time in which a mark fades, s.
     fade: f64,
-    /// Largest force shown lately, N: what the automatic scale follows.
+    /// Largest recent force, N: what the automatic scale follows.
     largest: f32,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Joint {
     blow: Option<Blow>,
-    /// Within the latest step, after the instant on show.
+    /// In the latest step, but after the displayed instant.
     coming: Option<Blow>,
-    /// Largest force of a contact that began lately, N, while it still rises.
+    /// Largest force of a recently begun contact, N, while it still rises.
     rising: Option<f32>,
 }
 
@@ -52,13 +52,13 @@ struct Blow {
     flash: f32,
 }
 
-/// How long a mark is seen, s of viewing; a flash half as long.
+/// How long a mark stays visible, s of viewing time; a flash half as long.
 pub const SEEN: f64 = 0.8;
-/// The automatic scale shrinks by half in so many times that: slowly, so that lengths can be compared.
+/// Half-life of the automatic scale, in multiples of the fade time: slow, so that lengths can be compared.
 const SCALE_HALF_LIFE: f64 = 2.5;
-/// A force on show of so much of the peak is the peak: nothing is left to mark.
+/// A current force above this fraction of the peak counts as the peak: nothing to mark.
 const PRESENT: f32 = 0.95;
-/// Least brightness: a touch a hundred times softer than the hardest lately still shows, but does not dazzle.
+/// Least brightness: a touch a hundred times softer than the hardest recent one still shows, but does not dazzle.
 const FAINTEST: f32 = 0.15;
 
 impl Default for PeakMarks {
@@ -88,12 +88,11 @@ impl PeakMarks {
         };
     }
 
-    /// Takes the instant on show and the strongest instants since the one before, `peaks` (one per ball joint, or empty).
-    /// A blow is forgotten `fade` seconds of simulated time after its peak. Where time has run back, nothing is
-    /// remembered.
+    /// Takes the displayed instant and the peaks since the previous one, `peaks` (one per ball joint, or empty). A blow is
+    /// forgotten `fade` seconds of simulated time after its peak. If time has run back, everything is forgotten.
     pub fn update(&mut self, frame: &Frame, peaks: &[Peak], fade: f64) {
         if frame.time < self.now {
-            // The scale stays: the run is the same.
+            // The scale is kept: it is the same run.
             let largest = self.largest;
             self.clear(frame.time);
             self.largest = largest;
@@ -114,7 +113,7 @@ impl PeakMarks {
             .fold(self.largest, f32::max);
         let Self { now, seen, .. } = *self;
         for ((joint, peak), report) in self.joints.iter_mut().zip(peaks).zip(&frame.joints) {
-            // What comes later than the instant on show comes no later than the next.
+            // A peak after the displayed instant is due by the next one.
             if let Some(blow) = joint.coming.take_if(|blow| blow.time <= now) {
                 joint.take(blow, self.fade);
             }
@@ -123,7 +122,7 @@ impl PeakMarks {
             let rises = joint.rising.is_some_and(|before| size > before);
             if !(peak.time > seen && size.is_finite() && (peak.impacts > 0 || rises)) {
                 if peak.impacts > 0 && size == 0.0 {
-                    // It begins where the latest step ends.
+                    // It begins at the end of the latest step.
                     joint.rising = Some(0.0);
                 } else if peak.time > seen {
                     joint.rising = None;
@@ -145,7 +144,7 @@ impl PeakMarks {
             joint.coming = Some(blow(force, peak.time));
             let present = to_f32(&report.normal_force);
             if present.is_finite() && present != Vec3::ZERO {
-                // It has begun: it strikes as hard as it is seen to.
+                // It has begun: show it with its current force.
                 joint.take(blow(present, now), self.fade);
             }
         }
@@ -165,7 +164,7 @@ impl PeakMarks {
             .fold(self.largest * (-half_lives as f32).exp2(), f32::max);
     }
 
-    /// The marks to draw beside the forces of `frame`: none where a joint bears as much now.
+    /// The marks to draw beside the forces of `frame`: none for a joint whose current force is as large.
     pub fn marks<'a>(&'a self, frame: &'a Frame) -> impl Iterator<Item = Mark> + 'a {
         let mark = |(joint, (held, report)): (usize, (&Joint, _))| {
             let blow = held.blow?;
@@ -195,7 +194,7 @@ impl PeakMarks {
         })
     }
 
-    /// Force of the reference length: the option's, or the largest shown lately, rounded up to 1, 2 or 5 times a power of
+    /// Force of the reference length: the option's, or the largest recent one, rounded up to 1, 2 or 5 times a power of
     /// ten.
     pub fn reference(&self, options: &ArrowOptions) -> f32 {
         match options.reference {
@@ -206,7 +205,7 @@ impl PeakMarks {
 }
 
 impl Joint {
-    /// Shows `blow` unless the one on show is still the stronger, faded as it is.
+    /// Shows `blow` unless the displayed one, faded, is still stronger.
     fn take(&mut self, blow: Blow, fade: f64) {
         let faded = self.blow.map_or(0.0, |before| {
             let left = 1.0 - (blow.time - before.time) / fade;
@@ -218,7 +217,7 @@ impl Joint {
     }
 }
 
-/// Least of …, 1, 2, 5, 10, 20, … that is not below `x`; 1 where `x` is not positive.
+/// Smallest of …, 1, 2, 5, 10, 20, … not below `x`; 1 if `x` is not positive.
 fn round_up_125(x: f32) -> f32 {
     if !(x.is_finite() && x > 1e-6) {
         return 1.0;
@@ -297,7 +296,7 @@ mod tests {
         marks.update(&after, &hit, 1.0);
         assert!(mark(&marks, &after).is_some());
         marks.clear(1e-3);
-        // What was struck before then is not news.
+        // Blows before that time are not new.
         marks.update(&after, &hit, 1.0);
         assert_eq!((mark(&marks, &after), marks.flash(0)), (None, 0.0));
     }
@@ -316,7 +315,7 @@ mod tests {
 
     #[test]
     fn a_blow_that_is_watched_as_it_rises_and_falls_is_marked_once_it_falls() {
-        // It begins where a step ends, in a picture of its own: without any force yet.
+        // It begins at the end of a step, in a frame of its own: still without force.
         let mut marks = PeakMarks::new();
         marks.update(&frame(1e-6, 0.0), &peak(0.0, 0.0, 1), 80e-6);
         for k in 2..=60 {

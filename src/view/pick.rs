@@ -1,4 +1,4 @@
-//! What lies under the cursor: a ray against the shapes that are drawn.
+//! Hit test: what lies under the cursor, by a ray against the drawn shapes.
 
 use glam::{Vec2, Vec3};
 use parry3d::query::Ray;
@@ -22,7 +22,7 @@ pub enum Picked {
 /// Where the cursor's ray first meets the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// What was met.
+    /// What was hit.
     pub what: Picked,
     /// Where, m, world axes.
     pub point: Vec3,
@@ -31,7 +31,7 @@ pub struct Hit {
 }
 
 impl SceneView {
-    /// Nearest drawn thing under `pixel` of the picture that `shot` describes, or `None`.
+    /// Nearest drawn thing under `pixel` of the picture described by `shot`, or `None`.
     pub fn pick(&self, shot: &Shot<'_>, pixel: Vec2) -> Option<Hit> {
         let (origin, direction) = shot.camera.ray(pixel, shot.size);
         let ray = Ray::new(origin, direction);
@@ -40,7 +40,7 @@ impl SceneView {
         let parts = self.parts.iter().enumerate().filter_map(|(i, part)| {
             let what = part.body.map_or(Picked::Fixed(part.index), Picked::Body);
             let distance = cast(&part.place(shot.frame, &joints), &ray)?;
-            // What can be seen through can be reached through.
+            // What is translucent does not block picking.
             (self.opacity(i, origin) > 0.6).then_some((distance, what))
         });
         let balls = joints.iter().enumerate().filter_map(|(i, joint)| {
@@ -50,7 +50,7 @@ impl SceneView {
                 .sockets
                 .then(|| cast_ball(joint.socket_centre, joint.outer, &ray))
                 .flatten();
-            // A ray through the missing half of the socket passes on to what is inside.
+            // A ray through the cut-away half of the socket continues to what is inside.
             let socket = socket
                 .filter(|&t| (ray.point_at(t) - joint.socket_centre).dot(joint.opening) <= 0.0);
             let distance = [ball, socket]

@@ -1,4 +1,4 @@
-//! What a picture is made of.
+//! The inputs of a picture.
 
 use glam::Vec3;
 
@@ -9,15 +9,15 @@ use crate::simulate::Frame;
 /// One picture: everything [`SceneView::build`](super::SceneView::build) reads.
 #[derive(Clone, Copy)]
 pub struct Shot<'a> {
-    /// The scene as it runs.
+    /// The running scene.
     pub scene: &'a Scene,
     /// The instant.
     pub frame: &'a Frame,
-    /// Peaks that are over.
+    /// Past peaks.
     pub marks: &'a PeakMarks,
-    /// Choices.
+    /// User choices.
     pub options: &'a ViewOptions,
-    /// Point of view.
+    /// Viewpoint.
     pub camera: &'a Camera,
     /// Trail of the probe tip, oldest point first, m, world axes.
     pub trail: &'a [Vec3],

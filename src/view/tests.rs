@@ -1,4 +1,4 @@
-//! What the draw list promises.
+//! What the draw list guarantees.
 
 use glam::{Vec2, Vec3};
 
@@ -29,7 +29,7 @@ fn shot<'a>(
     }
 }
 
-/// Draw list of a scene with the present forces held.
+/// Draw list of a scene with the current forces held.
 fn list(scene: &Scene, frame: &Frame, options: &ViewOptions) -> DrawList {
     let view = SceneView::new(scene, frame);
     let mut marks = PeakMarks::new();
@@ -189,7 +189,7 @@ fn a_magnified_socket_cuts_into_nothing_that_carries_it() {
                     let Some(distance) = super::cast::distance(&solid, joint.socket_centre) else {
                         continue;
                     };
-                    // What carries a socket as small as it comes touches it, and a bar ends at its outer face.
+                    // What carries a socket at its original size touches it, and a bar ends at its outer face.
                     let touches = distance < plain[i].outer || part.reaches_socket(i);
                     assert!(
                         touches || distance >= joint.outer * 0.999,

@@ -6,10 +6,10 @@ use crate::scene::Role;
 /// Light or dark.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Theme {
-    /// Dark things on a light ground.
+    /// Dark things on a light background.
     #[default]
     Light,
-    /// Light things on a dark ground.
+    /// Light things on a dark background.
     Dark,
 }
 
@@ -33,20 +33,20 @@ impl Colour {
         Self([self.0[0], self.0[1], self.0[2], opacity])
     }
 
-    /// As 8-bit red, green, blue, opacity (not premultiplied): what a 2D painter wants.
+    /// As 8-bit red, green, blue, opacity (not premultiplied): for a 2D painter.
     pub fn to_rgba8(self) -> [u8; 4] {
         self.0.map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8)
     }
 }
 
-/// Colour with its surface.
+/// Colour and surface finish.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
     /// Base colour.
     pub colour: Colour,
-    /// 0 mirror, 1 chalk.
+    /// From 0 (mirror) to 1 (chalk).
     pub roughness: f32,
-    /// 0 plastic, 1 metal.
+    /// From 0 (plastic) to 1 (metal).
     pub metal: f32,
 }
 
@@ -102,9 +102,9 @@ pub struct Palette {
     pub normal: Colour,
     /// Friction arrows.
     pub friction: Colour,
-    /// Arrows of forces from outside.
+    /// Arrows of external forces.
     pub outside: Colour,
-    /// Light of a joint that was hit.
+    /// Halo of a joint that was hit.
     pub flash: Colour,
     /// Gravity arrow.
     pub gravity: Colour,
@@ -116,14 +116,14 @@ pub struct Palette {
     pub ball: Material,
     /// Sockets (opacity applies).
     pub socket: Material,
-    /// The neighbouring motion, and that with ideal joints.
+    /// The neighbouring motion, and the ideal one.
     ghosts: [GhostLook; 2],
     /// Factor on all light.
     pub exposure: f32,
 }
 
 impl Palette {
-    /// Colours of `theme`. Orange and blue stay apart for the colour-blind.
+    /// Colours of `theme`. Orange and blue remain distinct for the colour-blind.
     pub const fn of(theme: Theme) -> Self {
         match theme {
             Theme::Light => Self {
@@ -187,12 +187,12 @@ impl Palette {
         }
     }
 
-    /// How a ghost is drawn: violet the twin, pale the ideal.
+    /// How a ghost is drawn: the twin violet, the ideal pale.
     pub const fn ghost(&self, which: Ghost) -> GhostLook {
         self.ghosts[which as usize]
     }
 
-    /// Surface of a shape by what it stands for; the same in both themes, so that a part keeps its colour.
+    /// Material of a shape by its role; the same in both themes, so that a part keeps its colour.
     pub const fn material(&self, role: Role) -> Material {
         match role {
             Role::Slider => material(0x4C6A88, 0.45, 0.25),

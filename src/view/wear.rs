@@ -1,4 +1,4 @@
-//! The wear map: cells of the sockets' inner faces coloured by what they took.
+//! The wear map: cells of the sockets' inner faces coloured by the impulse or the friction work they received.
 
 use glam::{Mat3, Vec3};
 
@@ -10,13 +10,13 @@ use crate::simulate::{Cell, Edges, Grid, Wear};
 
 /// Decades of the scale below the largest value.
 const DECADES: f32 = 3.0;
-/// Radius of the drawn cells, in inner radii of the socket: before its wall.
+/// Radius of the drawn cells, in inner radii of the socket: just in front of its wall.
 const BEFORE_WALL: f32 = 0.99;
-/// Widest part of a cell that is drawn flat, rad.
+/// Largest part of a cell that is drawn flat, rad.
 const FLAT: f64 = 0.07;
 
 impl WearMap {
-    /// What a cell shows, per square millimetre of its `area` (m^2); the sign left out.
+    /// Value of a cell per square millimetre of its `area` (m^2), without sign.
     fn value(self, cell: &Cell, area: f64) -> f32 {
         let value = match self {
             Self::Off => 0.0,
@@ -30,17 +30,17 @@ impl WearMap {
 }
 
 impl WearScale {
-    /// Least value that has a colour of its own; lesser ones have its.
+    /// Smallest value with a colour of its own; smaller ones share its colour.
     pub fn least(&self) -> f32 {
         self.largest / 10_f32.powf(DECADES)
     }
 
-    /// Place of `value` on the scale, logarithmic: 0 for the least, 1 for the largest.
+    /// Position of `value` on the logarithmic scale: 0 for the smallest, 1 for the largest.
     pub fn place(&self, value: f32) -> f32 {
         (1.0 + (value / self.largest).log10() / DECADES).clamp(0.0, 1.0)
     }
 
-    /// Powers of ten on the scale, rising; none while nothing was touched.
+    /// Powers of ten on the scale, ascending; none before the first contact.
     pub fn ticks(&self) -> impl Iterator<Item = f32> {
         let first = self.least().log10().ceil() as i32;
         let powers = (first..=first + DECADES as i32).map(|power| 10_f32.powi(power));
@@ -48,8 +48,8 @@ impl WearScale {
         powers.take_while(move |tick| *tick <= largest)
     }
 
-    /// Colour at a place of the scale: viridis (S. van der Walt and N. Smith, 2015), which rises evenly in lightness, also to
-    /// the colour-blind and in grey.
+    /// Colour at a position on the scale: viridis (S. van der Walt and N. Smith, 2015), whose lightness rises evenly, also
+    /// for the colour-blind and in grey.
     pub fn colour(place: f32) -> Colour {
         const VIRIDIS: [u32; 9] = [
             0x440154, 0x472D7B, 0x3B528B, 0x2C728E, 0x21918C, 0x28AE80, 0x5EC962, 0xADDC30,
@@ -97,8 +97,8 @@ fn patch(edges: &Edges) -> MeshData {
 }
 
 impl SceneView {
-    /// Adds the map that `shot` asks for, from what `wear` holds, to the list that was built of it: cells that took nothing stay
-    /// clear.
+    /// Adds the map selected in `shot`, with the values in `wear`, to the list built from that shot: cells without contact
+    /// stay clear.
     pub fn add_wear(&self, shot: &Shot<'_>, wear: &Wear, out: &mut DrawList) {
         let map = shot.options.wear;
         if map == WearMap::Off {

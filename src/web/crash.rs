@@ -18,7 +18,7 @@ extern "C" {
     fn crashed(report: &str, link: &str) -> Result<(), JsValue>;
 }
 
-/// From now on a panic is shown on the page.
+/// From now on panics are shown on the page.
 pub fn explain_panics() {
     let previous = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {
@@ -38,7 +38,7 @@ pub fn explain_panics() {
     }));
 }
 
-/// Tells what is running, for a report. `link`: the fragment that leads back to it.
+/// Notes what is running, for a report. `link`: the fragment that leads back to it.
 pub fn note(scene: &Scene, renderer: &str, link: String) {
     let mut text = format!("scene: {}\n", scene.name);
     for (key, value) in &scene.changes {

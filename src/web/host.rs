@@ -26,15 +26,15 @@ extern "C" {
     fn pick();
     #[wasm_bindgen(js_namespace = jointplayHost)]
     fn announce(text: &str, event: bool);
-    /// Tells that the graphics of start number `start` are gone.
+    /// Reports that the graphics of start number `start` are lost.
     #[wasm_bindgen(js_namespace = jointplayHost, js_name = graphicsLost)]
     pub fn graphics_lost(start: u32, why: &str);
-    /// Whether the graphics on show are gone, which an error may tell before the event does.
+    /// Whether the current graphics are lost, which an error may show before the event does.
     #[wasm_bindgen(js_namespace = jointplayHost, js_name = areGraphicsLost)]
     pub fn are_graphics_lost() -> bool;
 }
 
-/// Files on their way in, and the window to wake for them.
+/// Incoming files, and the window to wake for them.
 #[derive(Default)]
 pub struct Inbox {
     files: RefCell<VecDeque<OpenedFile>>,
@@ -77,7 +77,7 @@ impl Inbox {
 
 /// The page around the application.
 pub struct WebHost {
-    /// What comes in.
+    /// Incoming files.
     pub inbox: Rc<Inbox>,
 }
 

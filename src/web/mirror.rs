@@ -3,7 +3,7 @@
 use eframe::egui::{self, accesskit};
 use serde_json::json;
 
-/// Keeps what egui last told about its controls.
+/// Keeps what egui last reported about its controls.
 #[derive(Default)]
 pub struct Mirror {
     /// `[{"role", "label", "value", "on", "disabled", "rect": [x0, y0, x1, y1]}, …]`; places in CSS pixels of the canvas.
@@ -23,7 +23,7 @@ impl egui::Plugin for Mirror {
         let Some(tree) = &output.platform_output.accesskit_update else {
             return;
         };
-        // Places are told in points.
+        // Places are given in points.
         let scale = f64::from(ctx.zoom_factor());
         let widgets = tree.nodes.iter().filter_map(|(_, node)| {
             let bounds = node.bounds()?;

@@ -16,14 +16,14 @@ use super::mirror::Mirror;
 use crate::app::{App, AppOptions};
 use crate::render::wgpu::Backends;
 
-/// Time between two notes of what is running, s: what a crash report and a new start go back to.
+/// Time between two notes of what is running, s; a crash report and a restart go back to the latest.
 const NOTE_INTERVAL: f64 = 2.0;
 
 /// The laboratory on a page.
 #[wasm_bindgen]
 pub struct Page {
     runner: eframe::WebRunner,
-    /// Outlives the canvas: graphics that are lost take nothing else with them.
+    /// Outlives the canvas: losing the graphics loses nothing else.
     laboratory: Rc<RefCell<Option<Laboratory>>>,
     inbox: Rc<Inbox>,
 }
@@ -99,7 +99,7 @@ impl Page {
         self.runner.start(canvas, options, create).await
     }
 
-    /// Lets go of the canvas; the laboratory waits for the next [`Self::start`].
+    /// Releases the canvas; the laboratory waits for the next [`Self::start`].
     pub fn suspend(&self) {
         self.runner.destroy();
     }
@@ -119,7 +119,7 @@ impl Page {
         self.with(|laboratory| laboratory.app.share_state())
     }
 
-    /// Opens the address from its `?` on, as somebody has changed it.
+    /// Opens the address from its `?` on, after the user has changed it.
     #[wasm_bindgen(js_name = openLink)]
     pub fn open_link(&self, link: &str) {
         self.with(|laboratory| {
@@ -143,7 +143,7 @@ impl Page {
         });
     }
 
-    /// The controls on show, as JSON (`src/web/mirror.rs`). Empty the first time: the mirror starts with the next frame.
+    /// The controls shown, as JSON (`src/web/mirror.rs`). Empty the first time: the mirror starts with the next frame.
     pub fn widgets(&self) -> Option<String> {
         self.with(|laboratory| {
             let mirror = laboratory.ctx.plugin_or_default::<Mirror>();
@@ -170,10 +170,10 @@ impl Page {
     }
 }
 
-/// Tells the page when the graphics of start number `start` go.
+/// Tells the page when the graphics of start number `start` are lost.
 fn watch(state: &RenderState, backend: &str, start: u32) {
     if backend == "webgl" {
-        // The canvas has an event for it, before which calls may fail already.
+        // The canvas has an event for it, but calls may fail before that.
         state.device.on_uncaptured_error(Arc::new(|error| {
             if are_graphics_lost() {
                 log::warn!("drawing without graphics: {error}");
@@ -192,7 +192,7 @@ fn describe(cc: &eframe::CreationContext<'_>) -> String {
         || "none".to_owned(),
         |state| {
             let info = state.adapter.get_info();
-            // A browser may keep the name of the adapter to itself.
+            // A browser may withhold the name of the adapter.
             match info.name.as_str() {
                 "" => info.backend.to_string(),
                 name => format!("{} ({name})", info.backend),
@@ -218,7 +218,7 @@ impl Laboratory {
         })
     }
 
-    /// Goes on with other graphics.
+    /// Continues with new graphics.
     fn attach(&mut self, cc: &eframe::CreationContext<'_>) {
         let theme = self.ctx.options(|options| options.theme_preference);
         self.app
@@ -246,7 +246,7 @@ impl Laboratory {
             .iter()
             .map(|(key, value)| (key.clone(), json!(value)))
             .collect();
-        // Where nobody has moved it, it shows everything.
+        // A camera that was not moved shows everything.
         let camera = self
             .app
             .link()
@@ -270,6 +270,7 @@ impl Laboratory {
             "time_s": player.simulation().time(),
             "shown_s": player.pacer.shown(),
             "steps": player.simulation().statistics().steps,
+            "pull_N": player.frame().pull.map(|pull| pull.force.norm()),
             "peak_normal_N": player.simulation().statistics().peak_normal,
             "state_hash": format!("{:016x}", player.simulation().state_hash()),
             "camera": camera,

@@ -29,7 +29,7 @@ fn say(message: &Message) {
     tell(&serde_json::to_string(message).expect("a message is JSON"));
 }
 
-/// In the worker: computes a job, as JSON, and tells each message, as JSON.
+/// In the worker: computes a job, given as JSON, and posts each message as JSON.
 #[wasm_bindgen]
 pub fn perform(job: &str) {
     std::panic::set_hook(Box::new(|info| {
@@ -44,7 +44,7 @@ pub fn perform(job: &str) {
             &mut || start.elapsed().as_secs_f64(),
             &mut |message| {
                 say(&message);
-                // The page ends the worker where it wants no more.
+                // The page ends the worker when it wants no more.
                 ControlFlow::Continue(())
             },
         ),

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use jointplay::analysis::grid::{Axis, FOLLOW_BLOCK, Grid, Start};
+use jointplay::analysis::grid::{FOLLOW_BLOCK, Grid, ParameterRange, Start};
 use jointplay::analysis::point::Plan;
 use jointplay::analysis::sweep::Sweep;
 use jointplay::scene::Scene;
@@ -441,7 +441,7 @@ fn bad_input_is_refused_before_anything_runs() {
 fn small(start: Start, points: usize) -> Sweep {
     let scene = Scene::load("spcmm", &[]).unwrap();
     let text = format!("contact.clearance=0.2mm..0.3mm:{points}");
-    let axis = Axis::parse(&scene, &text).unwrap();
+    let axis = ParameterRange::parse(&scene, &text).unwrap();
     let grid = Grid::new(&scene, vec![axis], start).unwrap();
     let plan = Plan {
         periods: 2,

@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 use std::rc::Rc;
 use std::sync::Arc;
 
-use crate::hands::type_over;
+use crate::hands::{opened, type_over};
 use eframe::egui::{self, Key, accesskit::Role};
 use egui_kittest::{
     Harness, SnapshotResults,
@@ -14,10 +14,7 @@ use egui_kittest::{
 };
 use jointplay::analysis::drive::observed;
 use jointplay::analysis::task::{Job, Message, perform};
-use jointplay::app::{
-    App, AppOptions, DesktopHost, Host, Link, OpenedFile, Player, Replay, Running, Verdict,
-};
-use jointplay::scene::Scene;
+use jointplay::app::{App, DesktopHost, Host, Link, OpenedFile, Player, Replay, Running, Verdict};
 
 /// Computes at once, and is heard of as many points of a sweep as the test allows: it is neither too quick nor too slow.
 struct Held(Rc<Cell<usize>>);
@@ -70,19 +67,7 @@ fn sized(
     size: [f32; 2],
     theme: egui::Theme,
 ) -> Harness<'static, App> {
-    let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
-    let changes: Vec<_> = changes.iter().map(own).collect();
-    let mut options = AppOptions::new(Scene::load(scene, &changes).expect("a built-in scene"));
-    options.playing = false;
-    options.theme = theme.into();
-    options.clock = crate::common::looks::<100>;
-    let mut harness = Harness::builder()
-        .with_size(size)
-        .with_theme(theme)
-        .with_step_dt(1.0 / 60.0)
-        .with_max_steps(60)
-        .wgpu()
-        .build_eframe(move |cc| App::new(cc, options).expect("the scene starts"));
+    let mut harness = opened(scene, changes, size, theme, crate::common::looks::<100>);
     harness
         .state_mut()
         .set_host(Box::new(DesktopHost::default()));
@@ -218,7 +203,7 @@ fn a_sweep_of_something_else_says_so_and_a_click_asks_before_it_changes_what_is_
     harness.get_by_label_contains(
         "clearance 0.2 mm to 0.4 mm, 3 values; 4 periods of which 1 discarded, phase 0°, cold",
     );
-    harness.get_by_label("Of the scene on show, with its values");
+    harness.get_by_label("For the scene shown, with its values");
     let click_point = |harness: &mut Harness<'_, App>| {
         let at = harness.state().bench().place(1, 1).expect("drawn");
         harness.hover_at(at);
@@ -232,15 +217,15 @@ fn a_sweep_of_something_else_says_so_and_a_click_asks_before_it_changes_what_is_
     let player = harness.state_mut().player_mut();
     player.set("contact.clearance", "0.5 mm").expect("in range");
     harness.run_steps(2);
-    harness.get_by_label("Of the scene on show, with its values");
+    harness.get_by_label("For the scene shown, with its values");
     let player = harness.state_mut().player_mut();
     player.set("contact.friction", "0.3").expect("in range");
     harness.run_steps(2);
-    harness.get_by_label_contains("Not of what is on show. Friction coefficient: ");
+    harness.get_by_label_contains("Not for what is shown. Friction coefficient: ");
 
     harness.state_mut().open("pendulum").expect("built in");
     harness.run_steps(3);
-    harness.get_by_label("Not of what is on show. Scene: spcmm instead of pendulum");
+    harness.get_by_label("Not for what is shown. Scene: spcmm instead of pendulum");
     harness.get_by_label_contains("Running: pendulum, ");
     click_point(&mut harness);
     assert_eq!(harness.state().loading(), None);

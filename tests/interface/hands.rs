@@ -1,8 +1,34 @@
-//! Gestures of a user.
+//! The window as a user opens it, and gestures.
 
-use eframe::egui::{Key, Modifiers, accesskit::Role};
+use eframe::egui::{self, Event, Key, Modifiers, PointerButton, Pos2, TouchPhase, accesskit::Role};
 use egui_kittest::{Harness, kittest::Queryable as _};
-use jointplay::app::App;
+use jointplay::app::{App, AppOptions};
+use jointplay::scene::Scene;
+
+/// The window on `scene` with some changes, paused at t = 0, by a `clock` that the test drives.
+pub fn opened(
+    scene: &str,
+    changes: &[(&str, &str)],
+    size: [f32; 2],
+    theme: egui::Theme,
+    clock: fn() -> f64,
+) -> Harness<'static, App> {
+    let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
+    let changes: Vec<_> = changes.iter().map(own).collect();
+    let mut options = AppOptions::new(Scene::load(scene, &changes).expect("a built-in scene"));
+    options.playing = false;
+    options.theme = theme.into();
+    options.clock = clock;
+    let mut harness = Harness::builder()
+        .with_size(size)
+        .with_theme(theme)
+        .with_step_dt(1.0 / 60.0)
+        .with_max_steps(120)
+        .wgpu()
+        .build_eframe(move |cc| App::new(cc, options).expect("the scene starts"));
+    harness.run();
+    harness
+}
 
 /// Replaces what stands in a text field; nothing is entered yet.
 pub fn type_over(harness: &mut Harness<'_, App>, label: &str, text: &str) {
@@ -16,4 +42,48 @@ pub fn type_over(harness: &mut Harness<'_, App>, label: &str, text: &str) {
         .get_by_role_and_label(Role::TextInput, label)
         .type_text(text);
     harness.step();
+}
+
+/// Fingers on the screen, each with its way: they come down one after the other, move together and are lifted. The first is the
+/// pointer, too, as in a real window.
+pub fn fingers(harness: &mut Harness<'_, App>, paths: &[&[Pos2]]) {
+    for (finger, path) in paths.iter().enumerate() {
+        touch(harness, finger, TouchPhase::Start, path[0]);
+        harness.step();
+    }
+    for step in 1..paths[0].len() {
+        for (finger, path) in paths.iter().enumerate() {
+            touch(harness, finger, TouchPhase::Move, path[step]);
+        }
+        harness.step();
+    }
+    for (finger, path) in paths.iter().enumerate() {
+        touch(harness, finger, TouchPhase::End, path[path.len() - 1]);
+    }
+    harness.step();
+}
+
+fn touch(harness: &mut Harness<'_, App>, finger: usize, phase: TouchPhase, pos: Pos2) {
+    harness.event(Event::Touch {
+        device_id: egui::TouchDeviceId(0),
+        id: egui::TouchId::from(finger as u64),
+        phase,
+        pos,
+        force: None,
+    });
+    if finger > 0 {
+        return;
+    }
+    harness.event(Event::PointerMoved(pos));
+    if phase != TouchPhase::Move {
+        harness.event(Event::PointerButton {
+            pos,
+            button: PointerButton::Primary,
+            pressed: phase == TouchPhase::Start,
+            modifiers: Modifiers::NONE,
+        });
+    }
+    if phase == TouchPhase::End {
+        harness.event(Event::PointerGone);
+    }
 }

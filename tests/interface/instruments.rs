@@ -5,10 +5,10 @@ use egui_kittest::{
     Harness, SnapshotResults,
     kittest::{NodeT as _, Queryable as _},
 };
-use jointplay::app::{App, AppOptions, Link};
-use jointplay::scene::Scene;
+use jointplay::app::{App, Link};
 use jointplay::simulate::Quantity;
 
+use crate::hands::opened;
 use crate::window::pixels::Picture;
 
 const WIDE: [f32; 2] = [1280.0, 800.0];
@@ -21,21 +21,7 @@ fn window(
     size: [f32; 2],
     theme: egui::Theme,
 ) -> Harness<'static, App> {
-    let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
-    let changes: Vec<_> = changes.iter().map(own).collect();
-    let mut options = AppOptions::new(Scene::load(scene, &changes).expect("a built-in scene"));
-    options.playing = false;
-    options.theme = theme.into();
-    options.clock = crate::common::looks::<10>;
-    let mut harness = Harness::builder()
-        .with_size(size)
-        .with_theme(theme)
-        .with_step_dt(1.0 / 60.0)
-        .with_max_steps(120)
-        .wgpu()
-        .build_eframe(move |cc| App::new(cc, options).expect("the scene starts"));
-    harness.run();
-    harness
+    opened(scene, changes, size, theme, crate::common::looks::<10>)
 }
 
 fn spcmm() -> Harness<'static, App> {

@@ -8,7 +8,7 @@ mod bench_window;
 mod frames;
 mod hands;
 mod headless_window;
-mod instrument;
 mod instruments;
+mod lecture;
 mod page;
 mod window;

@@ -1,6 +1,6 @@
 //! The window, driven by role and label as a person with a screen reader would.
 
-use crate::hands::type_over;
+use crate::hands::{opened, type_over};
 use eframe::egui::{self, Key, accesskit::Role};
 use egui_kittest::{
     Harness, SnapshotResults,
@@ -20,19 +20,7 @@ pub(crate) fn window(scene: &str) -> Harness<'static, App> {
 }
 
 pub(crate) fn sized(scene: &str, size: [f32; 2], theme: egui::Theme) -> Harness<'static, App> {
-    let mut options = AppOptions::new(Scene::load(scene, &[]).expect("a built-in scene"));
-    options.playing = false;
-    options.theme = theme.into();
-    options.clock = crate::common::looks::<10>;
-    let mut harness = Harness::builder()
-        .with_size(size)
-        .with_theme(theme)
-        .with_step_dt(1.0 / 60.0)
-        .with_max_steps(60)
-        .wgpu()
-        .build_eframe(move |cc| App::new(cc, options).expect("the scene starts"));
-    harness.run();
-    harness
+    opened(scene, &[], size, theme, crate::common::looks::<10>)
 }
 
 fn time(harness: &Harness<'_, App>) -> f64 {

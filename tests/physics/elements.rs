@@ -211,6 +211,39 @@ fn loads_move_a_body_as_newton_and_euler_say() {
 }
 
 #[test]
+fn elements_are_fixed_to_links_of_a_chain() {
+    let text = jointplay::scene::built_in_text("chain").unwrap();
+    let with = |element: &str| Scene::parse(&format!("{text}\n{element}"), None, &[]);
+    // Strong beside gravity: long before a ball has crossed its play the link moves as if it were alone.
+    let scene =
+        with("[[load]]\nname = \"push\"\non = { body = \"link3\" }\nforce = \"0 40 0 N\"\n");
+    let mut simulation = Simulation::new(&scene.unwrap()).unwrap();
+    let before = at(&mut simulation, 0.0).bodies[2].position;
+    let frame = at(&mut simulation, 1e-3);
+    assert!(
+        frame
+            .joints
+            .iter()
+            .all(|joint| joint.normal_force.norm() == 0.0)
+    );
+    let moved = frame.bodies[2].position - before;
+    let expected = Vec3::new(0.0, 40.0 / 0.384, -9.81) * 0.5e-6;
+    assert!((moved - expected).norm() < 1e-12, "{moved} {expected}");
+
+    for (name, body, said) in [
+        ("J2", "link3", "already a joint or force element"),
+        ("free2", "link3", "already a joint or force element"),
+        ("push", "link9", "link8"),
+    ] {
+        let load = format!(
+            "[[load]]\nname = \"{name}\"\non = {{ body = \"{body}\" }}\nforce = \"1 0 0 N\"\n"
+        );
+        let error = with(&load).unwrap_err().to_string();
+        assert!(error.contains(said), "{error}");
+    }
+}
+
+#[test]
 fn a_harmonic_load_drives_as_it_should() {
     let load = "[[load]]\nname = \"f\"\non = { body = \"mass\" }\nforce = \"2 0 0 N\"\nfrequency = \"5 Hz\"\nphase = \"90 deg\"\n";
     let mut simulation = floating(load, &[("solver.tolerance", "1e-10")]);

@@ -3,7 +3,7 @@
 use jointplay::analysis::exponent::Exponent;
 use jointplay::analysis::orbit::Orbit;
 use jointplay::analysis::regime::{Evidence, Regime, classify};
-use jointplay::analysis::section::{Schedule, Watch};
+use jointplay::analysis::section::{Schedule, SectionRun};
 use jointplay::integrate::{Controller, DormandPrince, RungeKutta4, Stepper, System};
 
 /// A map of the line or the circle, x' = f(x).
@@ -171,7 +171,7 @@ where
         sections,
         discard,
     };
-    let mut watch = Watch::new(orbit, schedule, Some(separation));
+    let mut watch = SectionRun::new(orbit, schedule, Some(separation));
     watch.finish().unwrap();
     assert_eq!(watch.sections().len(), (sections - discard) * width);
     let exponent = watch.exponent().and_then(|benettin| benettin.result());
@@ -444,7 +444,7 @@ fn a_motion_that_stops_keeps_its_sections() {
         sections: 10,
         discard: 2,
     };
-    let mut watch = Watch::new(Wall(0.0), schedule, Some(1e-6));
+    let mut watch = SectionRun::new(Wall(0.0), schedule, Some(1e-6));
     assert_eq!(watch.finish(), Err("wall"));
     assert_eq!(watch.sections(), [3.0, 4.0]);
     assert!(watch.exponent().is_none());

@@ -9,7 +9,7 @@ fn after(name: &str, changes: &Changes, duration: f64) -> Simulation {
     let mut simulation = simulation(name, changes);
     simulation.keep_wear();
     run_until(&mut simulation, duration);
-    simulation.pass_wear();
+    simulation.commit_wear();
     simulation
 }
 
@@ -75,7 +75,7 @@ fn friction_work_and_contacts_are_those_of_ledger_and_counters() {
         let end = run.time() + 0.05;
         run_until(&mut run, end);
     }
-    run.pass_wear();
+    run.commit_wear();
     check("live changes", &run);
 }
 
@@ -112,7 +112,7 @@ fn impulses_are_time_integrals_of_the_normal_force() {
                 }
             }
         }
-        simulation.pass_wear();
+        simulation.commit_wear();
         for (j, expected) in expected.into_iter().enumerate() {
             let found = sum(wear(&simulation), j).impulse;
             println!(
@@ -142,13 +142,13 @@ fn the_map_changes_no_bit_and_copies_go_on_alike() {
         assert_eq!(with.state_hash(), without.state_hash(), "{method}");
         assert_eq!(with.statistics(), without.statistics(), "{method}");
         assert_eq!(with.ledger(), without.ledger(), "{method}");
-        with.pass_wear();
+        with.commit_wear();
         let once = wear(&with).clone();
         // From the middle on, again.
         with.restore(&kept).unwrap();
         assert!(*wear(&with) != once, "{method}");
         with.advance_to(0.05).unwrap();
-        with.pass_wear();
+        with.commit_wear();
         assert_eq!(with.state_hash(), without.state_hash(), "{method}");
         assert!(*wear(&with) == once, "{method}");
         // The ledger is not needed for it.
@@ -187,7 +187,7 @@ fn a_cell_lies_where_the_ball_touches() {
                 expected[j][cell] += h * report.normal_force.norm();
             }
         }
-        simulation.pass_wear();
+        simulation.commit_wear();
         let wear = wear(&simulation);
         for (j, expected) in expected.iter().enumerate() {
             if wear.cells(j).is_empty() {

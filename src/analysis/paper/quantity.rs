@@ -1,4 +1,4 @@
-//! What the paper measures of a run, and its numbers beside this program's.
+//! Quantities that the paper reports of a run, and its numbers beside this program's.
 
 use serde::{Deserialize, Deserializer, de::Error as _};
 
@@ -6,10 +6,10 @@ use super::{Coordinate, Coordinate::Beta, Coordinate::X, Published};
 use crate::analysis::response::{Extremes, Response};
 use crate::words::{Words as _, words};
 
-/// What a figure shows of a run, as one number in SI units.
+/// A quantity that a figure shows of a run, as one number in SI units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs, reason = "their words say it")]
-pub enum Quantity {
+pub enum FigureValue {
     DeviationX,
     DeviationBeta,
     RateX,
@@ -23,7 +23,7 @@ pub enum Quantity {
     LastSeparation,
 }
 
-words!(Quantity {
+words!(FigureValue {
     DeviationX => "largest deviation of x",
     DeviationBeta => "largest deviation of beta",
     RateX => "largest velocity in x",
@@ -37,15 +37,15 @@ words!(Quantity {
     LastSeparation => "last separation",
 });
 
-impl<'de> Deserialize<'de> for Quantity {
+impl<'de> Deserialize<'de> for FigureValue {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let word = String::deserialize(deserializer)?;
         Self::of_word(&word).ok_or_else(|| D::Error::unknown_variant(&word, Self::WORDS))
     }
 }
 
-impl Quantity {
-    /// Contact forces joint by joint.
+impl FigureValue {
+    /// Contact forces, joint by joint.
     pub const NORMAL: [Self; 3] = [Self::Normal1, Self::Normal2, Self::Normal3];
 
     /// Its unit.
@@ -80,7 +80,7 @@ impl Quantity {
         }
     }
 
-    /// In continuous time; NaN where there is no such thing.
+    /// Value in continuous time; NaN where undefined.
     pub fn of(self, response: &Response) -> f64 {
         if self == Self::LastSeparation {
             let last = response.last_separation.iter().copied();
@@ -89,13 +89,13 @@ impl Quantity {
         self.of_extremes(&response.full).unwrap_or(f64::NAN)
     }
 
-    /// Sampled as the paper samples; `None` where sampling does not enter.
+    /// Value at the paper's sampling; `None` where sampling does not matter.
     pub fn sampled(self, response: &Response) -> Option<f64> {
         self.of_extremes(&response.sampled)
     }
 }
 
-/// How near two numbers are.
+/// How close two numbers are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Agreement {
     /// Within 10 % of the paper's.
@@ -113,7 +113,7 @@ words!(Agreement {
 });
 
 impl Agreement {
-    /// Of a number over the paper's.
+    /// From the ratio of a number to the paper's.
     pub fn of(ratio: f64) -> Self {
         if (0.9..=1.1).contains(&ratio) {
             Self::Agrees
@@ -125,29 +125,29 @@ impl Agreement {
     }
 }
 
-/// A number of the paper with the same of this program.
+/// A number of the paper with this program's counterpart.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Comparison {
-    /// The paper's.
+    /// The paper's number.
     pub published: &'static Published,
-    /// In continuous time.
+    /// This program's, in continuous time.
     pub full: f64,
-    /// As a solver with the paper's output step would report; `None` where sampling does not enter.
+    /// As a solver with the paper's output step would report it; `None` where sampling does not matter.
     pub sampled: Option<f64>,
 }
 
 impl Comparison {
-    /// Continuous time over the paper's.
+    /// Continuous-time value over the paper's.
     pub fn ratio(&self) -> f64 {
         self.full / self.published.value
     }
 
-    /// Sampled over the paper's.
+    /// Sampled value over the paper's.
     pub fn sampled_ratio(&self) -> Option<f64> {
         self.sampled.map(|value| value / self.published.value)
     }
 
-    /// In continuous time: impacts are so short that samples see their peaks by chance.
+    /// Judged in continuous time: impacts are so short that samples catch their peaks only by chance.
     pub fn agreement(&self) -> Agreement {
         Agreement::of(self.ratio())
     }

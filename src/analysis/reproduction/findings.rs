@@ -1,20 +1,20 @@
-//! Everything that was found.
+//! The results of a report.
 
-use super::record::{Loop, SweepData, Swept, Traced};
+use super::record::{SettledCurve, SweepData, Swept, Traced};
 use super::{Extent, Variant};
 use crate::analysis::paper::{CASES, Case, Comparison, PAPER, Published, Series};
 
-/// Everything that was found.
+/// The results of a report.
 pub struct Report {
-    /// With the model of this program.
+    /// With this program's model.
     pub corrected: Findings,
-    /// With friction that reads (13) as printed.
+    /// With friction that uses (13) as printed.
     pub printed: Findings,
-    /// The latter with a second change each.
+    /// The latter, each with a second change.
     pub combinations: Vec<Combination>,
 }
 
-/// What (13) as printed gives together with a second change.
+/// Results of (13) as printed together with a second change.
 pub struct Combination {
     /// The changes.
     pub variant: Variant,
@@ -24,7 +24,7 @@ pub struct Combination {
     pub sections: SweepData,
 }
 
-/// Everything that was found with one model.
+/// All results with one model.
 pub struct Findings {
     /// How much was computed.
     pub extent: Extent,
@@ -32,15 +32,15 @@ pub struct Findings {
     pub variant: Variant,
     /// The paper's runs, in the order of [`CASES`].
     pub runs: Vec<Traced>,
-    /// The first of them with all bodies and multipliers, and with ideal joints.
+    /// The first of them with all bodies and multipliers.
     pub lagrange: Traced,
-    /// Ideal joints.
+    /// The run with ideal joints.
     pub ideal: Traced,
     /// Settled curves, in the order of [`CASES`].
-    pub curves: Vec<Loop>,
+    pub curves: Vec<SettledCurve>,
     /// Sweeps: [`Findings::sweep`] finds one by name.
     pub sweeps: Vec<SweepData>,
-    /// What two sections must differ by in x (m) and beta (rad) to be different.
+    /// Smallest differences in x (m) and beta (rad) that distinguish two sections.
     pub resolution: [f64; 2],
 }
 
@@ -56,7 +56,7 @@ impl Findings {
     /// If there is none.
     pub fn sweep(&self, name: &str) -> &SweepData {
         let found = self.sweeps.iter().find(|s| s.name == name);
-        found.expect("named as in Work::new")
+        found.expect("named as in Agenda::new")
     }
 
     /// Many sections of each run of a series.
@@ -64,17 +64,17 @@ impl Findings {
         &self.sweep(&format!("runs_by_{series}")).points
     }
 
-    /// The sweep over the parameter of a series from cold starts, with exponents.
+    /// The sweep over a series' parameter from cold starts, with exponents.
     pub fn cold(&self, series: Series) -> &SweepData {
         self.sweep(&format!("{series}_cold"))
     }
 
-    /// Its points.
+    /// Points of that sweep.
     pub fn swept(&self, series: Series) -> &[Swept] {
         &self.cold(series).points
     }
 
-    /// The same, and then with the motion followed upward and downward.
+    /// Points of that sweep, and of those that follow the motion upward and downward.
     pub fn branches(&self, series: Series) -> [&[Swept]; 3] {
         ["cold", "up", "down"].map(|start| &self.sweep(&format!("{series}_{start}")).points[..])
     }
@@ -88,11 +88,11 @@ impl Findings {
     }
 
     /// Settled curves of a series.
-    pub fn loops(&self, series: Series) -> [&Loop; 3] {
+    pub fn loops(&self, series: Series) -> [&SettledCurve; 3] {
         series.cases().map(|case| &self.curves[index(case)])
     }
 
-    /// Every number of the paper whose run is named, beside this program's.
+    /// Every number of the paper from a named run, beside this program's.
     pub fn comparisons(&self) -> Vec<Comparison> {
         let of = |published: &'static Published| {
             let response = &self.run(published.case).response;

@@ -1,4 +1,4 @@
-//! What a run, a settled curve and a sweep of the report leave behind.
+//! Records of the runs, settled curves and sweeps of a report.
 
 use super::Variant;
 use crate::analysis::paper::{Case, Coordinate};
@@ -6,15 +6,15 @@ use crate::analysis::regime::Regime;
 use crate::analysis::response::{Look, Response};
 use crate::analysis::sweep::Sweep;
 
-/// A column of a [`Row`].
+/// A column of a [`TracedRow`].
 pub struct Column {
     /// Name in files.
     pub name: &'static str,
-    /// What it is, in words.
+    /// Label.
     pub label: &'static str,
-    /// Unit in pictures.
+    /// Unit in plots.
     pub unit: &'static str,
-    /// SI units in one of it.
+    /// That unit in SI units.
     pub one: f64,
 }
 
@@ -27,7 +27,7 @@ const fn column(name: &'static str, label: &'static str, unit: &'static str, one
     }
 }
 
-/// Columns of a [`Row`], each coordinate before its derivatives.
+/// Columns of a [`TracedRow`]; each coordinate is followed by its derivatives.
 pub const COLUMNS: [Column; 15] = [
     column("t_s", "time", "s", 1.0),
     column("x_m", "x", "mm", 1e-3),
@@ -61,9 +61,9 @@ pub fn derivative(coordinate: Coordinate, nth: usize) -> usize {
 }
 
 /// One instant of a run, in the order of [`COLUMNS`]; the last is 1 at whole multiples of the paper's output step.
-pub type Row = [f64; COLUMNS.len()];
+pub type TracedRow = [f64; COLUMNS.len()];
 
-pub(super) fn row(look: &Look) -> Row {
+pub(super) fn row(look: &Look) -> TracedRow {
     let [c, r, a] = look.derivatives();
     let deviation = look.deviation();
     let joints = &look.frame.joints;
@@ -98,17 +98,17 @@ pub struct Traced {
     /// Peaks and separations.
     pub response: Response,
     /// All instants, in order of time.
-    pub rows: Vec<Row>,
+    pub rows: Vec<TracedRow>,
 }
 
 impl Traced {
     /// The instants at the paper's output step.
-    pub fn samples(&self) -> Vec<&Row> {
+    pub fn samples(&self) -> Vec<&TracedRow> {
         let last = COLUMNS.len() - 1;
         self.rows.iter().filter(|row| row[last] == 1.0).collect()
     }
 
-    /// A column in its unit of pictures against time.
+    /// A column in its plot unit against time.
     pub fn curve(&self, column: usize) -> impl Iterator<Item = (f64, f64)> {
         let one = COLUMNS[column].one;
         self.rows.iter().map(move |row| (row[0], row[column] / one))
@@ -117,14 +117,15 @@ impl Traced {
 
 /// Settled motion of one of the paper's runs over one period.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Loop {
+pub struct SettledCurve {
     /// The run.
     pub case: Case,
     /// x (m) and beta (rad) at equal drive phases, the same for every run.
     pub coordinates: [Vec<f64>; 2],
     /// Their rates, m/s and rad/s.
     pub rates: [Vec<f64>; 2],
-    /// Largest difference of x and of beta at equal phases of this period and the one before: how wide the closed curve is.
+    /// Largest difference of x and of beta between this period and the previous one at equal phases: the width of the
+    /// closed curve.
     pub width: [f64; 2],
 }
 
@@ -135,11 +136,11 @@ pub struct Swept {
     pub value: f64,
     /// Regime, in a word.
     pub regime: &'static str,
-    /// Drive periods after which it repeats; 0 where it does not.
+    /// Drive periods after which it repeats; 0 if it does not.
     pub period: usize,
     /// Largest Lyapunov exponent and its standard error, 1/s; NaN where none was measured.
     pub exponent: (f64, f64),
-    /// Sections in x (m) and beta (rad), kept ones, in order of time.
+    /// Kept sections in x (m) and beta (rad), in order of time.
     pub sections: [Vec<f64>; 2],
 }
 
@@ -150,7 +151,7 @@ impl Swept {
         last.copied().unwrap_or(f64::NAN)
     }
 
-    /// Distance between the extremes of the latest half of the sections in a coordinate.
+    /// Range of a coordinate over the latter half of the sections.
     pub fn spread(&self, coordinate: Coordinate) -> f64 {
         let all = &self.sections[coordinate as usize];
         extent(all[all.len() / 2..].iter().copied())
@@ -165,20 +166,20 @@ impl Swept {
     }
 }
 
-/// Least and largest.
+/// Minimum and maximum.
 pub fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
     values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
         (a.min(v), b.max(v))
     })
 }
 
-/// Largest less least.
+/// Maximum less minimum.
 pub(super) fn extent(values: impl Iterator<Item = f64>) -> f64 {
     let (least, most) = range(values);
     most - least
 }
 
-/// Least and largest exponent of those that were measured, 1/s.
+/// Smallest and largest measured exponent, 1/s.
 pub fn exponents(points: &[Swept]) -> (f64, f64) {
     let measured = points.iter().map(|p| p.exponent.0);
     range(measured.filter(|e| e.is_finite()))
@@ -189,13 +190,13 @@ pub fn exponents(points: &[Swept]) -> (f64, f64) {
 pub struct SweepData {
     /// The model.
     pub variant: Variant,
-    /// What it is in words of a file's name.
+    /// Name used in file names.
     pub name: &'static str,
-    /// What was swept.
+    /// The sweep.
     pub sweep: Sweep,
-    /// A record a point, one after the other; empty until its blocks are put in.
+    /// One record per point, concatenated; empty until its blocks are added.
     pub records: Vec<f64>,
-    /// The points along its axis; empty for a map, and as long as there are no records.
+    /// Points along its axis; empty for a map, and while there are no records.
     pub points: Vec<Swept>,
 }
 
@@ -205,7 +206,7 @@ impl SweepData {
         format!("{}{}", self.variant.prefix, self.name)
     }
 
-    /// Values of the array called `name`, those of a point together; empty if there is none.
+    /// Values of the array called `name`, grouped by point; empty if there is none.
     pub fn values(&self, name: &str) -> Vec<f64> {
         let layout = self.sweep.layout();
         let Some(at) = layout.columns().iter().position(|c| c.name == name) else {
@@ -247,7 +248,7 @@ impl SweepData {
     }
 }
 
-/// The word of a regime's number in files.
+/// Word for a regime code in files.
 pub fn regime_word(code: i64) -> &'static str {
     let all = [
         Regime::Unclear,

@@ -1,17 +1,17 @@
-//! Whether what the paper says in words holds here: one criterion for each kind of statement in [`paper::PAPER`].
+//! Whether the paper's statements hold here: one criterion for each kind of statement in [`paper::PAPER`].
 
 use std::collections::BTreeMap;
 
 use super::Findings;
-use super::record::{COLUMNS, Row, Swept, Traced, column_of, derivative, exponents, extent};
+use super::record::{COLUMNS, Swept, Traced, TracedRow, column_of, derivative, exponents, extent};
 use crate::analysis::paper::{
-    Case, Claim, Coordinate, Curves, PAPER, Quantity, Sections, Series, Test,
+    Case, Claim, Coordinate, Curves, FigureValue, PAPER, Sections, Series, Test,
 };
 
-/// A change below this share of the amplitude counts as none.
+/// A change below this fraction of the amplitude counts as none.
 const LITTLE: f64 = 0.05;
 
-/// A statement of the paper and what this program finds.
+/// A statement of the paper and this program's verdict.
 #[derive(Clone, Debug)]
 pub struct Statement {
     /// Where the paper makes it, what it says, and its test.
@@ -134,7 +134,7 @@ impl Findings {
                 )
             }
             Test::Steady { after, over } => {
-                let last = self.values(Quantity::LastSeparation, over);
+                let last = self.values(FigureValue::LastSeparation, over);
                 (
                     format!("no ball leaves its socket after {after} s"),
                     last.iter().all(|t| *t <= after),
@@ -160,7 +160,7 @@ impl Findings {
             } => {
                 let ideal = ideal.then_some(&self.ideal);
                 let curves = self.curves_of(curves).into_iter().chain(ideal);
-                let curves: Vec<Vec<&Row>> = curves.map(Traced::samples).collect();
+                let curves: Vec<Vec<&TracedRow>> = curves.map(Traced::samples).collect();
                 let columns: Vec<usize> = columns.iter().map(|name| column_of(name)).collect();
                 let shares: Vec<f64> = columns.iter().map(|&c| apart(&curves, c, from)).collect();
                 let when = if from > 0.0 {
@@ -377,8 +377,8 @@ impl Findings {
         }
     }
 
-    /// A quantity in continuous time, run by run.
-    fn values(&self, quantity: Quantity, series: Series) -> [f64; 3] {
+    /// A quantity in continuous time, per run.
+    fn values(&self, quantity: FigureValue, series: Series) -> [f64; 3] {
         let of = |case: Case| quantity.of(&self.run(case).response);
         series.cases().map(of)
     }
@@ -392,7 +392,7 @@ impl Findings {
         }
     }
 
-    /// Largest distance of the two formulations in a coordinate at the paper's output step, m or rad.
+    /// Largest difference between the two formulations in a coordinate at the paper's output step, m or rad.
     pub fn formulations_apart(&self, coordinate: Coordinate) -> f64 {
         let column = derivative(coordinate, 0);
         let (tree, lagrange) = (self.runs[0].samples(), self.lagrange.samples());
@@ -403,7 +403,7 @@ impl Findings {
     }
 }
 
-/// The statements of section 4.2 that something grows, taken together.
+/// The growth statements of section 4.2 taken together.
 fn all_grow(series: Series, before: &[Statement]) -> Judged {
     let parts = before
         .iter()
@@ -416,8 +416,8 @@ fn all_grow(series: Series, before: &[Statement]) -> Judged {
     )
 }
 
-/// Largest distance of any two of `curves` at an instant from `from` (s) on, over the amplitude.
-fn apart(curves: &[Vec<&Row>], column: usize, from: f64) -> f64 {
+/// Largest distance between any two of `curves` at any instant from `from` (s) on, over the amplitude.
+fn apart(curves: &[Vec<&TracedRow>], column: usize, from: f64) -> f64 {
     let coordinate = Coordinate::ALL[(column - 1) / 3];
     let late = curves.iter().map(|c| {
         let late = c.iter().filter(|row| row[0] >= from);
@@ -427,7 +427,7 @@ fn apart(curves: &[Vec<&Row>], column: usize, from: f64) -> f64 {
     furthest(&late) / coordinate.amplitude((column - 1) % 3)
 }
 
-/// Largest distance of two of `curves` at equal places.
+/// Largest distance between any two of `curves` at equal indices.
 fn furthest<C: AsRef<[f64]>>(curves: &[C]) -> f64 {
     let places = curves.iter().map(|c| c.as_ref().len()).min().unwrap_or(0);
     (0..places)
@@ -435,7 +435,7 @@ fn furthest<C: AsRef<[f64]>>(curves: &[C]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Share of the sections within half of the largest distance from their mean; `None` where they cannot be told apart.
+/// Fraction of the sections within half of the largest distance from their mean; `None` if they cannot be told apart.
 fn crowd(run: &Swept, resolution: [f64; 2]) -> Option<f64> {
     let middle = [0, 1].map(|c| {
         let all = &run.sections[c];
@@ -472,7 +472,7 @@ fn ascending(values: &[f64]) -> bool {
     values.windows(2).all(|pair| pair[0] < pair[1])
 }
 
-/// How many points are of which regime, and their exponents.
+/// Number of points per regime, and their exponents.
 fn regimes(points: &[Swept]) -> String {
     let mut counts: BTreeMap<String, usize> = BTreeMap::new();
     for point in points {
@@ -491,7 +491,7 @@ fn measured(points: &[Swept]) -> String {
     format!("largest Lyapunov exponents from {least:.2} to {most:.2} 1/s")
 }
 
-/// `text` of what belongs to each run of a series.
+/// `text` of the value of each run in a series.
 fn each<T>(series: Series, values: &[T], text: impl Fn(&T) -> String) -> String {
     let runs = series.cases().into_iter().zip(values);
     join(runs.map(|(case, value)| format!("{}: {}", series.name(series.of(case)), text(value))))
@@ -528,13 +528,13 @@ fn digits(value: f64, n: usize) -> String {
 mod tests {
     use super::*;
     use crate::analysis::paper::CASES;
-    use crate::analysis::reproduction::{Extent, Job, Loop, Outcome, Work};
+    use crate::analysis::reproduction::{Agenda, Extent, Outcome, ReportJob, SettledCurve};
     use crate::analysis::response::respond;
     use crate::scene::Scene;
 
-    /// The same short run for every case, settled curves at rest, and sweeps of zeros: what a test needs is put in by hand.
+    /// The same short run for every case, settled curves at rest, and sweeps of zeros: each test fills in what it needs.
     fn nothing_moves() -> Findings {
-        let work = Work::new(Extent {
+        let work = Agenda::new(Extent {
             settle: 1,
             runs: (9, 1),
             values: [2, 2],
@@ -545,15 +545,15 @@ mod tests {
         .expect("an extent");
         let scene = Scene::load("spcmm", &[]).expect("built in");
         let response = respond(&scene, 1e-3, 1e-3, |_| (), |_| true).expect("runs");
-        let outcome = |job: &Job| match *job {
-            Job::Run(_) => Outcome::Run(Box::new((response.clone(), Vec::new()))),
-            Job::Curve(n) => Outcome::Curve(Loop {
+        let outcome = |job: &ReportJob| match *job {
+            ReportJob::Run(_) => Outcome::Run(Box::new((response.clone(), Vec::new()))),
+            ReportJob::Curve(n) => Outcome::Curve(SettledCurve {
                 case: work.curves[n].0,
                 coordinates: [vec![0.0; 4], vec![0.0; 4]],
                 rates: [vec![0.0; 4], vec![0.0; 4]],
                 width: [0.0; 2],
             }),
-            Job::Block(s, b) => {
+            ReportJob::Block(s, b) => {
                 let sweep = &work.sweeps()[s].sweep;
                 let values = sweep.grid().block(b).len() * sweep.layout().record_length();
                 Outcome::Block(vec![0.0; values])
@@ -565,7 +565,7 @@ mod tests {
         found
     }
 
-    /// Verdicts by place and words of the statement.
+    /// Expected verdicts by place and words of the statement.
     #[track_caller]
     fn expect(found: &Findings, verdicts: &[(&str, &str, bool)]) {
         let statements = found.statements();
@@ -606,7 +606,7 @@ mod tests {
             ([3.0, 2.0, 1.0], 0.1, [1.0, 2.0], 1e-3),
             ([3.0, 2.0, 1.0], 0.2, [1.0, 3.0], 2e-3),
             ([1.0, 2.0, 3.0], 0.5, [4.0, 3.0], 3e-3),
-            // Over the frictions x stays and beta goes from 1 to 3; the forces from 3 N to 5 N, more than over the clearances.
+            // Over friction x stays and beta goes from 1 to 3; the forces go from 3 N to 5 N, more than over clearance.
             ([2.0, 1.0, 1.0], 0.1, [1.0, 1.0], 3e-3),
             ([5.0, 1.0, 1.0], 0.1, [1.0, 3.0], 2e-3),
         ];
@@ -686,8 +686,8 @@ mod tests {
 
     #[test]
     fn curves_coincide_from_the_instant_that_is_asked_for() {
-        // A curve that is `early` off until 0.35 s and `late` off afterwards, in every coordinate and derivative.
-        let curve = |early: f64, late: f64| -> Vec<Row> {
+        // A curve that is off by `early` until 0.35 s and by `late` afterwards, in every coordinate and derivative.
+        let curve = |early: f64, late: f64| -> Vec<TracedRow> {
             let instants = (0..=20).map(|k| f64::from(k) * 0.1);
             let row = |t: f64| {
                 let off = if t < 0.35 { early } else { late };
@@ -703,7 +703,7 @@ mod tests {
             instants.map(row).collect()
         };
         let mut found = nothing_moves();
-        // By clearance apart in the beginning only, and until after 0.3 s; by friction by 4 % from there on.
+        // By clearance apart only at the beginning, and until after 0.3 s; by friction 4 % apart from there on.
         let off = [
             (0.0, 0.0),
             (0.25, 0.0),
@@ -771,7 +771,7 @@ mod tests {
                 ("Figure 19b", "areas", true),
             ],
         );
-        // All periodic, at one place whatever the clearance, and at places 10 mm of 25 mm apart by friction.
+        // All periodic: by clearance all at one place, by friction at places 10 mm of 25 mm apart.
         let still = [0.01, 0.5, 1.0].map(|c| point(c, "periodic", 0.2, &wide(0.0)));
         put(&mut found, "clearance_cold", still.to_vec());
         put(&mut found, "runs_by_clearance", still.to_vec());
@@ -796,7 +796,7 @@ mod tests {
                 ("third conclusion", "friction has little", true),
             ],
         );
-        // Chaos at one friction alone, and x that moves from section to section.
+        // Chaos at a single friction value, and an x that moves from section to section.
         put(&mut found, "friction_cold", as_printed.clone());
         let mut moving = as_printed;
         moving[2].sections[0] = wide(1e-3).to_vec();
@@ -829,7 +829,7 @@ mod tests {
     #[test]
     fn portraits_are_compared_at_equal_phases() {
         let mut found = nothing_moves();
-        // By clearance 0.2 mm apart and ever wider; by friction 4 mm of 25 mm.
+        // By clearance 0.2 mm apart and increasingly wide; by friction 4 mm of 25 mm apart.
         let curves = [
             (0.0, 1e-3),
             (1e-4, 2e-3),

@@ -2,11 +2,11 @@
 
 use eframe::egui::{ComboBox, Ui};
 
-use super::plane::Axis;
+use super::plane::AxisLabel;
 use crate::app::watch::Observed;
 use crate::simulate::Quantity;
 
-/// One of x, y, z, alpha, beta, gamma, by its place in a section.
+/// One of x, y, z, alpha, beta, gamma, by its index in a section.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Coordinate(usize);
 
@@ -22,7 +22,7 @@ impl Default for Coordinate {
 }
 
 impl Coordinate {
-    /// Its place in a section.
+    /// Its index in a section.
     pub fn index(self) -> usize {
         self.0
     }
@@ -36,14 +36,14 @@ impl Coordinate {
     }
 
     /// The axis of the coordinate.
-    pub fn axis(self) -> Axis {
-        Axis::new(NAMES[self.0], self.quantities()[0].unit().0)
+    pub fn axis(self) -> AxisLabel {
+        AxisLabel::new(NAMES[self.0], self.quantities()[0].unit().0)
     }
 
     /// The axis of its rate.
-    pub fn rate_axis(self) -> Axis {
+    pub fn rate_axis(self) -> AxisLabel {
         let name = format!("rate of {}", NAMES[self.0]);
-        Axis::new(name, self.quantities()[1].unit().0)
+        AxisLabel::new(name, self.quantities()[1].unit().0)
     }
 
     /// A coordinate, SI, in the unit of [`Self::axis`].
@@ -57,7 +57,7 @@ impl Coordinate {
         [self.shown(state[self.0]), state[6 + self.0] / rate]
     }
 
-    /// The choice of it.
+    /// Lets the user choose it.
     pub fn ui(&mut self, ui: &mut Ui) {
         ComboBox::from_id_salt("coordinate")
             .width(64.0)

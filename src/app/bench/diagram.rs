@@ -1,10 +1,10 @@
-//! The bifurcation diagram of a sweep, and what else it found at each value; a click picks a section.
+//! The bifurcation diagram of a sweep and its other results at each value; a click picks a section.
 
 use eframe::egui::{ComboBox, Grid, Pos2, RichText, Sense, Ui};
 use egui_plot::{HLine, LineStyle, PlotPoint, PlotPoints, PlotTransform, Points, VLine};
 
 use super::coordinate::Coordinate;
-use super::plane::{Axis, plane};
+use super::plane::{AxisLabel, plane};
 use super::portrait::title;
 use super::swept::Swept;
 use crate::analysis::swept::SweptPoint;
@@ -15,7 +15,7 @@ const HEIGHT: f32 = 230.0;
 /// How near a click must come to a point, points.
 const NEAR: f32 = 16.0;
 
-/// What stands over the varied parameter.
+/// What is plotted over the varied parameter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Ordinate {
     #[default]
@@ -37,17 +37,17 @@ impl Ordinate {
         }
     }
 
-    fn axis(self, coordinate: Coordinate) -> Axis {
+    fn axis(self, coordinate: Coordinate) -> AxisLabel {
         match self {
             Self::Sections => coordinate.axis(),
-            Self::Exponent => Axis::new("largest Lyapunov exponent", "1/s"),
-            Self::Peak => Axis::new("peak normal force", "N"),
-            Self::Probe => Axis::new("largest probe error", "µm"),
+            Self::Exponent => AxisLabel::new("largest Lyapunov exponent", "1/s"),
+            Self::Peak => AxisLabel::new("peak normal force", "N"),
+            Self::Probe => AxisLabel::new("largest probe error", "µm"),
         }
     }
 }
 
-/// One kind of motion: number in files, word, place in the row of colours.
+/// The kinds of motion: number in files, word, index in the colour series.
 const REGIMES: [(i64, &str, usize); 5] = [
     (1, "periodic", 0),
     (2, "quasi-periodic", 2),
@@ -56,42 +56,42 @@ const REGIMES: [(i64, &str, usize); 5] = [
     (0, "unclear", 7),
 ];
 
-/// A drawn point: where, and which section of which point of the sweep it is.
+/// A drawn point: its position, and the indices of its sweep point and of its section.
 type Mark = (PlotPoint, usize, usize);
 
 /// The diagram.
 #[derive(Default)]
 pub struct Diagram {
     ordinate: Ordinate,
-    /// What the marks were made for; `None` where they are to be made again.
+    /// What the marks were made for; `None` if they must be rebuilt.
     made: Option<(Ordinate, Coordinate)>,
     marks: [Vec<PlotPoint>; REGIMES.len()],
     all: Vec<Mark>,
     diverged: Vec<f64>,
     transform: Option<PlotTransform>,
-    /// What was picked last.
+    /// The latest pick.
     picked: Option<(usize, usize)>,
 }
 
 impl Diagram {
-    /// For a new sweep.
+    /// Clears it for a new sweep.
     pub fn clear(&mut self) {
         (self.made, self.picked, self.transform) = (None, None, None);
     }
 
-    /// A point came.
+    /// Has the marks rebuilt: a point has arrived.
     pub fn renew(&mut self) {
         self.made = None;
     }
 
-    /// Where a section was drawn last, points of the screen.
+    /// Where a section was last drawn, points of the screen.
     pub fn place(&self, index: usize, section: usize) -> Option<Pos2> {
         let is = |mark: &&Mark| (mark.1, mark.2) == (index, section);
         let (point, ..) = self.all.iter().find(is)?;
         Some(self.transform.as_ref()?.position_from_point(point))
     }
 
-    /// The diagram of `swept`; the point and its kept section that were clicked.
+    /// The diagram of `swept`; returns the point and its kept section that were clicked.
     pub fn ui(
         &mut self,
         ui: &mut Ui,
@@ -106,7 +106,7 @@ impl Diagram {
         if self.made != Some((self.ordinate, coordinate)) {
             self.make(swept, coordinate, &shown);
         }
-        let across = Axis::new(label.to_lowercase(), value::typeset(unit));
+        let across = AxisLabel::new(label.to_lowercase(), value::typeset(unit));
         let up = self.ordinate.axis(coordinate);
         title(
             ui,
@@ -191,7 +191,7 @@ impl Diagram {
         });
     }
 
-    /// What the colours mean, and at how many values each was found.
+    /// What the colours mean, and for how many values each kind was found.
     fn key(&self, ui: &mut Ui, swept: &Swept, dark: bool) {
         let weak = ui.visuals().weak_text_color();
         let mut entries: Vec<_> = REGIMES
@@ -263,7 +263,7 @@ impl Diagram {
 }
 
 impl Ordinate {
-    /// The one value of a point, in the unit of its axis.
+    /// The single value of a point, in the unit of its axis.
     fn of(self, point: &SweptPoint) -> Option<f64> {
         match self {
             Self::Sections => None,

@@ -1,9 +1,9 @@
-//! The twin run: how far it is from the run, on a logarithmic plot, and the slope of that.
+//! The twin run: its distance from the run on a logarithmic plot, and the slope.
 
 use eframe::egui::{Checkbox, RichText, Ui};
 use egui_plot::{GridMark, Line, LineStyle, PlotPoint, PlotPoints};
 
-use super::plane::{Axis, plane};
+use super::plane::{AxisLabel, plane};
 use super::portrait::title;
 use crate::app::curve::Path;
 use crate::app::layout::reserved;
@@ -40,15 +40,15 @@ pub fn ui(ui: &mut Ui, player: &mut Player, problem: &mut Option<String>) {
         return;
     };
     let dark = ui.visuals().dark_mode;
-    // The twin is as far as the latest step, the picture within it.
+    // The twin has reached the end of the latest step; the displayed instant lies within it.
     let shown = player.pacer.shown();
     let distances = twin.distances();
     let distances = &distances[..distances.partition_point(|[time, _]| *time <= shown)];
     let span = distances.last().zip(distances.first());
     let length = span.map_or(0.0, |(last, first)| last[0] - first[0]);
     let (unit, size) = plots::time_axis(length);
-    let across = Axis::new("at", unit);
-    let up = Axis::new("log10 of the distance", "");
+    let across = AxisLabel::new("at", unit);
+    let up = AxisLabel::new("log10 of the distance", "");
     title(
         ui,
         "Distance of the twin, in scales of the state (logarithmic)",
@@ -105,7 +105,7 @@ pub fn ui(ui: &mut Ui, player: &mut Player, problem: &mut Option<String>) {
     });
 }
 
-/// Marks at whole powers of ten, few enough.
+/// Marks at whole powers of ten, spaced so that there are few.
 fn decades((least, greatest): (f64, f64)) -> Vec<GridMark> {
     let step = ((greatest - least) / 5.0).ceil().clamp(1.0, 100.0);
     let (first, last) = (

@@ -8,21 +8,21 @@ use crate::app::value;
 
 /// Name and unit of an axis.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Axis {
+pub struct AxisLabel {
     /// What it shows.
     pub name: String,
     /// Unit; "" for a pure number.
     pub unit: String,
 }
 
-impl Axis {
+impl AxisLabel {
     /// An axis.
     pub fn new(name: impl Into<String>, unit: impl Into<String>) -> Self {
         let (name, unit) = (name.into(), unit.into());
         Self { name, unit }
     }
 
-    /// Name and unit, as a title says it.
+    /// Name and unit, as in a title.
     pub fn title(&self) -> String {
         with_unit(&self.name, &self.unit, ", ")
     }
@@ -43,7 +43,13 @@ fn word(mark: GridMark, range: &std::ops::RangeInclusive<f64>) -> String {
 }
 
 /// A plot of `up` over `across`, `height` points high and as wide as there is room.
-pub fn plane<'a>(ui: &Ui, id: &'static str, across: &Axis, up: &Axis, height: f32) -> Plot<'a> {
+pub fn plane<'a>(
+    ui: &Ui,
+    id: &'static str,
+    across: &AxisLabel,
+    up: &AxisLabel,
+    height: f32,
+) -> Plot<'a> {
     let faint = ui.visuals().weak_text_color();
     let font = egui::TextStyle::Small.resolve(ui.style());
     let hints = |hints: AxisHints<'a>| hints.tick_label_color(faint).tick_label_font(font.clone());
@@ -81,7 +87,7 @@ pub fn plane<'a>(ui: &Ui, id: &'static str, across: &Axis, up: &Axis, height: f3
                 position,
                 ..
             } => {
-                let line = |axis: &Axis, value| {
+                let line = |axis: &AxisLabel, value| {
                     let number = value::number(value, 6);
                     format!("{} {}", axis.name, with_unit(&number, &axis.unit, " "))
                 };

@@ -4,7 +4,7 @@ use eframe::egui::{RichText, Slider, SliderClamping, Ui};
 use egui_plot::{PlotPoint, PlotPoints, Points};
 
 use super::coordinate::Coordinate;
-use super::plane::{Axis, plane};
+use super::plane::{AxisLabel, plane};
 use crate::analysis::drive::observed;
 use crate::app::curve::Path;
 use crate::app::layout::reserved;
@@ -15,7 +15,7 @@ use crate::app::{keys, theme, value};
 /// Height of each plot, points.
 const HEIGHT: f32 = 190.0;
 
-/// What is kept between two frames: lists that are filled anew in each.
+/// Buffers kept between frames and refilled in each.
 #[derive(Default)]
 pub struct Portrait {
     orbit: Vec<PlotPoint>,
@@ -61,7 +61,14 @@ impl Portrait {
         }
     }
 
-    fn section(&self, ui: &mut Ui, player: &mut Player, period: f64, across: &Axis, up: &Axis) {
+    fn section(
+        &self,
+        ui: &mut Ui,
+        player: &mut Player,
+        period: f64,
+        across: &AxisLabel,
+        up: &AxisLabel,
+    ) {
         let mark = theme::series(1, ui.visuals().dark_mode);
         title(
             ui,
@@ -112,7 +119,7 @@ impl Portrait {
         };
         self.orbit.clear();
         self.orbit.extend(watch.orbit().map(point));
-        // The orbit leaves out instants close to one another; the one on show is its end.
+        // The orbit skips instants close to one another; the displayed one is its end.
         let frame = player.frame();
         self.orbit.push(point(&(frame.time, observed(&frame.pose))));
         self.sections.clear();

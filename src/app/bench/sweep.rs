@@ -1,4 +1,4 @@
-//! A sweep in the background: what is asked for, how far it is, and the points that came.
+//! A background sweep: its settings, its progress, and the points so far.
 
 use eframe::egui::{Button, ComboBox, DragValue, ProgressBar, RichText, TextEdit, Ui, vec2};
 
@@ -17,13 +17,13 @@ use crate::app::player::Player;
 use crate::app::value;
 use crate::scene::{Kind, Parameter, Value};
 
-/// Parameter that is varied at first, and its range.
+/// Parameter varied by default, and its range.
 const FIRST: (&str, &str, &str) = ("contact.clearance", "0.01 mm", "1 mm");
 
-/// Width of the button that starts and ends a sweep, points: it stays where it is.
+/// Width of the button that starts and ends a sweep, points; fixed, so that it does not move.
 const GO: f32 = 120.0;
 
-/// What the next sweep is to be.
+/// Settings of the next sweep.
 struct Settings {
     /// Scene that they were made for.
     scene: String,
@@ -39,7 +39,7 @@ struct Settings {
 
 /// The panel.
 #[derive(Default)]
-pub struct Sweep {
+pub struct SweepPanel {
     settings: Option<Settings>,
     asked: Option<SweepTask>,
     running: Option<(Box<dyn Running>, SweepTask)>,
@@ -49,8 +49,8 @@ pub struct Sweep {
     diagram: Diagram,
 }
 
-impl Sweep {
-    /// Starts what was asked for, and takes in what came; whether a sweep is under way.
+impl SweepPanel {
+    /// Starts a requested sweep and takes messages from a running one; returns whether one is running.
     pub fn update(&mut self, host: &mut dyn Host) -> bool {
         if let Some(task) = self.asked.take() {
             self.problem = None;
@@ -92,7 +92,7 @@ impl Sweep {
         false
     }
 
-    /// Whether a sweep is under way.
+    /// Whether a sweep is running.
     pub fn is_running(&self) -> bool {
         self.running.is_some() || self.asked.is_some()
     }
@@ -107,7 +107,7 @@ impl Sweep {
         &self.diagram
     }
 
-    /// Settings, progress and diagram; the section that was clicked.
+    /// Settings, progress and diagram; returns the run to a section that was clicked.
     pub fn ui(&mut self, ui: &mut Ui, player: &Player, coordinate: Coordinate) -> Option<Load> {
         match player.watch().period() {
             Err(why) => {
@@ -137,7 +137,7 @@ impl Sweep {
         )
     }
 
-    /// What went wrong, or whether the diagram is of what is on show.
+    /// What went wrong, or whether the diagram belongs to the displayed scene.
     fn state_ui(&self, ui: &mut Ui, player: &Player) {
         let small = |words: &str| RichText::new(words).small();
         if let Some(problem) = &self.problem {
@@ -158,9 +158,9 @@ impl Sweep {
         };
         let differences = swept.differences(player);
         if differences.is_empty() {
-            ui.label(small("Of the scene on show, with its values").weak());
+            ui.label(small("For the scene shown, with its values").weak());
         } else {
-            let words = format!("Not of what is on show. {}", differences.join("; "));
+            let words = format!("Not for what is shown. {}", differences.join("; "));
             ui.label(small(&words).color(ui.visuals().warn_fg_color))
                 .on_hover_text("A click on a point asks before it changes this");
         }
@@ -337,7 +337,7 @@ impl Settings {
         Some(settings)
     }
 
-    /// Another parameter, over the range of its slider.
+    /// Selects another parameter, over the range of its slider.
     fn vary(&mut self, parameter: &'static Parameter) {
         self.key = parameter.key;
         (self.from, self.to) = match parameter.kind {
@@ -352,7 +352,7 @@ impl Settings {
     }
 }
 
-/// Whether the scene has `parameter`, as a number that its motion depends on.
+/// Whether the scene has `parameter` as a number that affects its motion.
 fn varies(player: &Player, parameter: &Parameter) -> bool {
     let value = player.wanted().get(parameter.key);
     matches!(value, Ok(Value::Number(_) | Value::Count(_)))
@@ -360,7 +360,7 @@ fn varies(player: &Player, parameter: &Parameter) -> bool {
         && !parameter.key.starts_with("solver.")
 }
 
-/// A whole number with its name.
+/// An integer field with its label.
 fn number(
     ui: &mut Ui,
     name: &str,
@@ -374,7 +374,7 @@ fn number(
         .accessible_name(name);
 }
 
-/// What is wrong, without the words of the command line.
+/// The error message without its command-line prefix.
 fn in_words(why: &str, task: &SweepTask) -> String {
     let option = task.vary.first().map(|text| format!("--vary {text}: "));
     let words = option.and_then(|option| why.strip_prefix(option.as_str()));

@@ -1,4 +1,4 @@
-//! A sweep of the bench and what came of it.
+//! A sweep of the bench and its results.
 
 use crate::analysis::grid::Start;
 use crate::analysis::swept::{Range, SweepTask, SweptPoint};
@@ -6,20 +6,20 @@ use crate::app::player::Player;
 use crate::app::value;
 use crate::scene::{Kind, Scene, Value, table};
 
-/// A sweep that was started, and what came of it.
+/// A sweep that was started, and its results so far.
 pub struct Swept {
-    /// What was asked for.
+    /// The requested task.
     pub task: SweepTask,
     /// The varied parameter.
     pub range: Range,
-    /// Points by their number; `None` where one is still to come.
+    /// Points by number; `None` for those still to come.
     pub points: Vec<Option<SweptPoint>>,
-    /// The scene that it was made of, without what varies.
+    /// The swept scene, without the varied parameter.
     pub(super) scene: Option<Scene>,
 }
 
 impl Swept {
-    /// What it was made of: scene, changed parameters, range, periods.
+    /// What was swept: scene, changed parameters, range, periods.
     pub(super) fn caption(&self) -> String {
         let Self { task, range, .. } = self;
         let varied = [range.key.clone()];
@@ -43,7 +43,7 @@ impl Swept {
         )
     }
 
-    /// What stands against its being of the scene on show, a phrase each.
+    /// How it differs from the displayed scene, one phrase each.
     pub(super) fn differences(&self, player: &Player) -> Vec<String> {
         let varied = [self.range.key.clone()];
         let scene = self.scene.as_ref();

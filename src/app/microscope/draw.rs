@@ -12,13 +12,13 @@ use crate::app::value;
 use crate::scene::SignedAxis;
 use crate::view::{Palette, Theme, to_f32};
 
-/// Radius of the clearance circle, in sides of the picture.
+/// Radius of the clearance circle, as a fraction of the picture's side.
 const CIRCLE: f32 = 0.39;
-/// Radius of the mark of the ball's centre, points.
+/// Radius of the ball-centre mark, points.
 const CENTRE: f32 = 4.5;
-/// Length of the arrow of the reference speed, points.
+/// Length of the arrow at the reference speed, points.
 const ARROW: f32 = 40.0;
-/// Points of the path that lie closer on the screen are one, points.
+/// Path points closer than this on the screen are merged, points.
 const APART: f32 = 0.8;
 /// Least scale of the section, m: penetrations of some micrometres are usual.
 const SHALLOWEST: f64 = 0.5e-6;
@@ -49,8 +49,8 @@ impl Plane {
         }
     }
 
-    /// World vectors that run to the right and up in the picture; `view`: those of the 3D view. What is down in the scene is
-    /// down in the picture where that is possible.
+    /// World vectors to the right and up in the picture; `view`: those of the 3D view. Down in the scene is down in the picture
+    /// where that is possible.
     pub fn axes(self, down: SignedAxis, view: [Vec3; 2]) -> [Vec3; 2] {
         let [first, second] = match self {
             Self::View => return view,
@@ -88,7 +88,7 @@ pub fn round_up(value: f64) -> f64 {
     }
 }
 
-/// A length for a person.
+/// A length as shown to the user.
 pub fn length(si: f64, digits: usize) -> String {
     let unit = if si.abs() < 9.9995e-6 { "um" } else { "mm" };
     value::quantity(si, unit, digits)
@@ -145,12 +145,12 @@ impl<'a> Sheet<'a> {
 pub struct Circle {
     /// Where the socket's centre is.
     pub centre: Pos2,
-    /// Of the clearance.
+    /// Radius of the clearance.
     pub radius: f32,
 }
 
-/// The clearance sphere along the line of sight of a plane: path and centre of the ball, contact, velocity, scale. `axes` run
-/// to the right and up; `speed` is what the arrow of the ruler stands for, m/s.
+/// The clearance sphere along the line of sight of a plane: path and centre of the ball, contact, velocity, scale. `axes` point
+/// to the right and up; `speed` is the reference speed of the velocity arrow, m/s.
 pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, speed: f64) -> Circle {
     let Sheet {
         painter,
@@ -207,7 +207,7 @@ pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, spee
     let touches = sight.sliding.is_some();
     let contact = colour(palette.normal);
     if let (true, Some(normal)) = (touches, sight.normal) {
-        // The wall of the ball's centre is the clearance sphere: it touches there, and the normal leaves it there.
+        // For the ball's centre the wall is the clearance sphere: contact is there, and the normal starts there.
         let normal = to_f32(&normal);
         let foot = place(normal * clearance);
         let out = flat(normal);
@@ -241,7 +241,7 @@ pub fn sphere(sheet: &Sheet<'_>, axes: [Vec3; 2], path: &[Point], now: f64, spee
     circle
 }
 
-/// The world axes as they lie in the picture, in its lower left corner.
+/// The world axes as seen in the picture, in its lower left corner.
 fn triad(sheet: &Sheet<'_>, axes: [Vec3; 2]) {
     const LENGTH: f32 = 22.0;
     let origin = pos2(sheet.rect.left() + 34.0, sheet.rect.bottom() - 34.0);
@@ -257,8 +257,8 @@ fn triad(sheet: &Sheet<'_>, axes: [Vec3; 2]) {
     }
 }
 
-/// Ball and wall about the point of contact in section, as they would be without each other: what lies below the wall's line is
-/// pressed in, elastically, over the patch. Depths are drawn larger than widths, and it says how much.
+/// Section of ball and wall around the contact point, both undeformed: what lies below the wall line is the elastic penetration
+/// over the contact patch. Depths are exaggerated relative to widths, by the factor shown.
 pub fn section(sheet: &Sheet<'_>, patch: &Patch) {
     let Sheet {
         painter,
@@ -311,7 +311,7 @@ pub fn section(sheet: &Sheet<'_>, patch: &Patch) {
     let bar = round_down(0.5 * half);
     let end = pos2(rect.right() - 10.0, rect.bottom() - 8.0);
     sheet.bar(end, (bar * wide) as f32, &length(bar, 3));
-    // Upright, at the left edge, from the wall's line down.
+    // Vertical, at the left edge, from the wall line down.
     let down = round_down(depth);
     let stroke = Stroke::new(1.5, sheet.ink);
     let top = pos2(rect.left() + 48.0, wall);
@@ -337,7 +337,7 @@ pub fn empty(ui: &Ui, rect: Rect, words: &str) {
     ui.painter().galley(at.min, galley, ink);
 }
 
-/// Sides of the picture in a place so large: as large as it can be with `below` points left for what stands under it.
+/// Side of the picture in a given space: as large as possible with `below` points left for what is under it.
 pub fn side(space: Vec2, below: f32) -> f32 {
     space.x.min((space.y - below).max(0.55 * space.y)).max(96.0)
 }

@@ -1,5 +1,5 @@
-//! What the microscope shows of one ball joint: read from the instant on show and from what the run recorded, none of it a
-//! force of its own.
+//! What the microscope shows of one ball joint: read from the displayed instant and the record, without computing any force
+//! itself.
 
 use crate::app::paths::axes_of;
 use crate::app::player::Player;
@@ -7,10 +7,10 @@ use crate::contact::Coefficients;
 use crate::scene::{Attachment, Mat3, Vec3};
 use crate::simulate::{ContactState, Frame, Impact, JointReport};
 
-/// Impacts over which the path reaches back.
+/// Number of impacts that the path reaches back.
 pub const IMPACTS: usize = 6;
 
-/// One ball joint at the instant on show. SI units, world axes.
+/// One ball joint at the displayed instant. SI units, world axes.
 pub struct Sight {
     /// What the step reported.
     pub report: JointReport,
@@ -18,15 +18,15 @@ pub struct Sight {
     pub carrier: Mat3,
     /// n = e/|e| (8); `None` where the centres coincide.
     pub normal: Option<Vec3>,
-    /// Velocity of the ball's centre from the socket's, de/dt, m/s.
+    /// Velocity of the ball's centre relative to the socket's, de/dt, m/s.
     pub velocity: Vec3,
-    /// Sliding velocity of the ball that friction reads, m/s; `None` out of contact.
+    /// Sliding velocity of the ball as used by the friction law, m/s; `None` out of contact.
     pub sliding: Option<Vec3>,
-    /// What presses; `None` in an ideal joint.
+    /// Geometry of the contact; `None` in an ideal joint.
     pub patch: Option<Patch>,
-    /// The latest impact that is over.
+    /// The latest impact that has ended.
     pub impact: Option<Impact>,
-    /// From when on the path is shown, s.
+    /// Start of the path shown, s.
     pub since: f64,
 }
 
@@ -48,7 +48,7 @@ impl Patch {
     }
 }
 
-/// Velocity of an attachment's point, m/s; the world's rest.
+/// Velocity of an attachment point, m/s, and angular velocity of its body, rad/s; zero for the world.
 fn velocity_of(frame: &Frame, at: &Attachment) -> (Vec3, Vec3) {
     let motion = at.body.and_then(|body| frame.bodies.get(body));
     motion.map_or((Vec3::zeros(), Vec3::zeros()), |motion| {
@@ -59,7 +59,7 @@ fn velocity_of(frame: &Frame, at: &Attachment) -> (Vec3, Vec3) {
 }
 
 impl Sight {
-    /// Of ball joint `joint`; `None` where the scene has no such joint.
+    /// Of ball joint `joint`; `None` if the scene has no such joint.
     pub fn of(player: &Player, joint: usize) -> Option<Self> {
         let (frame, shown) = (player.frame(), player.pacer.shown());
         let spec = player.scene().ball_joints.get(joint)?;
@@ -77,7 +77,7 @@ impl Sight {
             let read = law.friction_reads(&normal, &velocity, &ball_spin, &socket_spin);
             law.sliding(&gap, &read)
         });
-        // What the run has computed beyond the instant on show is not told.
+        // What the run has computed beyond the displayed instant is not shown.
         let mut over = player
             .simulation()
             .impacts()
@@ -140,7 +140,7 @@ mod tests {
                     .map_or(0.0, |normal| normal.dot(&sight.velocity));
                 let reported = sight.report.penetration_rate;
                 assert!((rate - reported).abs() < 1e-12 + 1e-9 * sight.velocity.norm());
-                // The law reads none where its normal force is cut at zero.
+                // The friction law reads none where the normal force is cut off at zero.
                 let presses = sight.report.normal_force.norm() > 0.0;
                 let Some(sliding) = sight.sliding.filter(|_| presses) else {
                     continue;

@@ -1,21 +1,21 @@
-//! States of a run that it can be taken back to: close together where it is young, thinned where it is old.
+//! States to which a run can be taken back: closely spaced in the recent past, thinned out in the older.
 
 use crate::simulate::{Mark, Snapshot};
 
-/// Steps from one state that is kept to the next.
+/// Steps from one kept state to the next.
 const STRIDE: u64 = 256;
-/// Steps from one to the next on the way to an instant of the past: the one before it is near then, too.
+/// Steps from one to the next while retracing the past, so that stepping back once more is quick, too.
 const FINE_STRIDE: u64 = 16;
-/// Most bytes that the states kept take, and those on the way.
+/// Most bytes for the kept states, and for those of the retraced stretch.
 const BUDGET: usize = 32 << 20;
 const FINE_BUDGET: usize = 4 << 20;
 
-/// A state and what else a player is taken back to with it.
+/// A state, and what else a player restores with it.
 pub(super) struct Keyframe {
     pub state: Snapshot,
-    /// Events of the log that came before.
+    /// Number of log entries before it.
     pub events: usize,
-    /// Where the record stood; only the states that are kept know.
+    /// Position in the record; only the kept states have it.
     pub record: Option<Mark>,
 }
 
@@ -25,12 +25,12 @@ impl Keyframe {
     }
 }
 
-/// The states of one run, from its start on.
+/// The states of one run since its start.
 #[derive(Default)]
 pub(super) struct Keyframes {
     kept: Vec<Keyframe>,
     bytes: usize,
-    /// Of the stretch that was last gone through again.
+    /// States of the stretch last retraced.
     fine: Vec<Keyframe>,
     fine_bytes: usize,
 }
@@ -41,7 +41,7 @@ impl Keyframes {
         *self = Self::default();
     }
 
-    /// Whether the state after `steps` steps, the latest so far, is one to keep.
+    /// Whether to keep the state after `steps` steps, the latest so far.
     pub fn is_due(&self, steps: u64) -> bool {
         let last = self.kept.last();
         last.is_none_or(|last| steps >= last.state.steps() + STRIDE)
@@ -67,12 +67,12 @@ impl Keyframes {
         self.bytes = self.kept.iter().map(Keyframe::bytes).sum();
     }
 
-    /// Whether the state after `steps` steps, on the way to an instant of the past, is worth keeping for the way back.
+    /// Whether the state after `steps` steps, reached while retracing, is worth keeping for going further back.
     pub fn is_fine(&self, steps: u64) -> bool {
         steps.is_multiple_of(FINE_STRIDE) && self.fine_bytes < FINE_BUDGET
     }
 
-    /// Keeps a state on the way.
+    /// Keeps a state reached while retracing.
     pub fn keep_fine(&mut self, keyframe: Keyframe) {
         let after = self.fine.last();
         if after.is_none_or(|last| last.state.steps() < keyframe.state.steps()) {
@@ -81,13 +81,13 @@ impl Keyframes {
         }
     }
 
-    /// Another stretch is gone through.
+    /// Forgets them: another stretch is being retraced.
     pub fn forget_fine(&mut self) {
         self.fine.clear();
         self.fine_bytes = 0;
     }
 
-    /// The latest state of which `is_before` is true, as it is for every earlier one.
+    /// The latest state for which `is_before` is true; it must be true for every earlier one.
     pub fn latest(&self, is_before: impl Fn(&Keyframe) -> bool) -> Option<&Keyframe> {
         let last = |list: &'_ [Keyframe]| list.partition_point(&is_before).checked_sub(1);
         let kept = last(&self.kept).map(|at| &self.kept[at]);
@@ -98,20 +98,20 @@ impl Keyframes {
         }
     }
 
-    /// As [`Self::latest`], among those that know where the record stood.
+    /// As [`Self::latest`], among those with a position in the record.
     pub fn latest_kept(&self, is_before: impl Fn(&Keyframe) -> bool) -> Option<&Keyframe> {
         let at = self.kept.partition_point(is_before).checked_sub(1)?;
         Some(&self.kept[at])
     }
 
-    /// Another future begins after `steps` steps.
+    /// Drops what follows `steps` steps: another future begins.
     pub fn cut(&mut self, steps: u64) {
         self.kept.retain(|kept| kept.state.steps() <= steps);
         self.bytes = self.kept.iter().map(Keyframe::bytes).sum();
         self.forget_fine();
     }
 
-    /// Bytes that all of it takes, about.
+    /// Approximate memory of all states, bytes.
     #[cfg(test)]
     pub fn bytes(&self) -> usize {
         self.bytes + self.fine_bytes

@@ -46,7 +46,7 @@ fn a_long_step_is_recorded_as_a_curve() {
     }
 }
 
-/// The instant on show is that of frame, record, peaks and sections, whatever the run itself has computed beyond it.
+/// Frame, record, peaks and sections are all at the displayed instant, whatever the run has computed beyond it.
 fn one_clock(player: &Player) {
     let shown = player.pacer.shown();
     assert_eq!(player.frame().time, shown);
@@ -79,7 +79,7 @@ fn nothing_tells_of_what_is_still_to_come() {
         }
     }
     assert!(within > 20, "in the midst of long steps: {within}");
-    // Strictly after the peak of the second impact: the record has its top, and the last value is that on show.
+    // Strictly after the peak of the second impact: the record has its top, and its last value is the displayed one.
     let forces = recorded(&player, Quantity::NormalForce, 1.0);
     let peak = player.simulation().statistics().peak_normal[0];
     let top = forces.iter().map(|p| p[1]).fold(0.0, f64::max);
@@ -114,20 +114,20 @@ fn after_steps_back_the_record_is_as_before_and_another_future_follows_it() {
     for _ in 0..40 {
         player.step_back();
     }
-    // What is to come is still known, and a value that is refused leaves it so.
+    // The future is still known, and a refused value leaves it so.
     assert!(player.history().rows(200) == all);
     assert!(player.set("contact.friction", "-1").is_err());
-    assert!(player.has_future() && player.left().is_none());
-    // A change takes nothing of the past away, and what was to come is kept apart.
+    assert!(player.has_future() && player.abandoned_future().is_none());
+    // A change takes nothing of the past away, and the former future is kept apart.
     player.set("contact.friction", "0.3").expect("in range");
-    let left = player.left().expect("left");
+    let left = player.abandoned_future().expect("left");
     assert_eq!((left.from, left.to), (player.pacer.shown(), there));
     assert!(left.history.rows(200) == all);
     let again = player.history().rows(200);
     assert_eq!(again.last().map(|row| row.0), rows.last().map(|row| row.0));
     one_clock(&player);
     player.run_to(12e-3);
-    assert!(player.left().is_none(), "replaced");
+    assert!(player.abandoned_future().is_none(), "replaced");
     one_clock(&player);
     let forces = recorded(&player, Quantity::NormalForce, 8.6e-3);
     assert!(forces.iter().any(|point| point[1] > 300.0));
@@ -240,7 +240,7 @@ fn single_steps_are_taken_back_bit_by_bit() {
         player.single_step();
     }
     assert_eq!(player.simulation().state_hash(), end);
-    // A change is no step: the step before it is taken back, and the change waits for its time.
+    // A change is not a step: the step before it is taken back, and the change waits for its time.
     let before = *hashes.last().expect("steps");
     player.set("contact.friction", "0.3").expect("in range");
     player.step_back();
@@ -302,7 +302,7 @@ fn any_instant_of_the_past_has_the_bits_of_the_first_time() {
             player.go_to(time);
             assert_eq!(player.simulation().state_hash(), hash, "{scene} at {time}");
             one_clock(&player);
-            // Between two steps, too, nothing else is on show.
+            // Nothing else is displayed between two steps, either.
             player.go_to(time + 1e-7);
             one_clock(&player);
         }
@@ -314,11 +314,44 @@ fn any_instant_of_the_past_has_the_bits_of_the_first_time() {
 }
 
 #[test]
+fn a_thousand_jumps_over_a_thousand_impacts_have_the_bits_of_the_run() {
+    // Balls that lose next to nothing rattle on.
+    let changes = [("contact.restitution", "1"), ("contact.friction", "0")];
+    let own = |(key, value): (&str, &str)| (key.to_owned(), value.to_owned());
+    let scene = Scene::load("spcmm", &changes.map(own)).expect("in range");
+    let mut player = Player::new(&scene).expect("starts");
+    let mut hashes = Vec::new();
+    let impacts = |player: &Player| {
+        let of = |joint| {
+            player
+                .contact_history()
+                .touches(joint, 0.0, f64::INFINITY)
+                .count()
+        };
+        (0..3).map(of).sum::<usize>()
+    };
+    while impacts(&player) < 1000 {
+        let to = player.pacer.shown() + 0.05;
+        hashes.extend(run_with(&mut player, &[], to));
+        assert!(to < 10.0, "{} impacts", impacts(&player));
+    }
+    let end = player.simulation().state_hash();
+    let mut random = Uniform(11);
+    for _ in 0..1000 {
+        let (time, hash) = hashes[(random.next() * hashes.len() as f64) as usize];
+        player.go_to(time);
+        assert_eq!(player.simulation().state_hash(), hash, "at {time}");
+    }
+    player.go_to(player.reached());
+    assert_eq!(player.simulation().state_hash(), end);
+}
+
+#[test]
 #[ignore = "half a minute: `cargo test --release --lib -- --ignored ten_minutes`"]
 fn ten_minutes_stay_within_reach() {
     let mut player = player("spcmm");
     player.run_to(600.0);
-    let bytes = player.bytes_of_travels();
+    let bytes = player.rewind_bytes();
     let (mut random, mut longest, clock) = (Uniform(3), 0.0_f64, player.clock);
     for _ in 0..300 {
         let start = clock();
@@ -330,6 +363,30 @@ fn ten_minutes_stay_within_reach() {
         player.steps()
     );
     assert!(bytes < 64 << 20);
+}
+
+/// Memory that this process holds, bytes.
+#[cfg(target_os = "linux")]
+fn resident() -> usize {
+    let status = std::fs::read_to_string("/proc/self/status").expect("Linux has it");
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
+    let size = line.and_then(|line| line.trim().strip_suffix(" kB"));
+    1024 * size.expect("in kB").parse::<usize>().expect("a number")
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+#[ignore = "minutes: `cargo test --lib -- --ignored an_hour --nocapture`"]
+fn an_hour_takes_no_more_memory_than_ten_minutes() {
+    let mut player = player("spcmm");
+    player.set_ideal(true);
+    let mut held = Vec::new();
+    for part in 1..=6 {
+        player.run_to(600.0 * f64::from(part));
+        held.push((resident(), player.rewind_bytes()));
+        println!("{} s: {:?} bytes", 600 * part, held[held.len() - 1]);
+    }
+    assert!(held[5].0 < held[0].0 + (32 << 20), "{held:?}");
 }
 
 #[test]
@@ -401,7 +458,7 @@ fn going_on_from_the_past_leaves_what_was_done_later() {
         "the link knows what was done until here"
     );
     player.set_playing(true);
-    let left = player.left().expect("left");
+    let left = player.abandoned_future().expect("left");
     assert_eq!((left.from, left.to), (0.08, 0.15_f64.max(left.to)));
     assert_eq!(left.flags.len(), 1);
     assert_eq!(player.flags().count(), 1);
@@ -422,7 +479,7 @@ fn impacts_are_found_one_after_another() {
     player.go_to(0.0);
     let mut times = Vec::new();
     loop {
-        player.go_to_touch(None, true);
+        player.go_to_contact(None, true);
         if player.is_seeking() {
             break;
         }
@@ -433,21 +490,21 @@ fn impacts_are_found_one_after_another() {
     assert!(times.len() >= 6 && times.is_sorted(), "{times:?}");
     // The first impact of the paper's mechanism.
     assert!((times[0] - 7.8e-3).abs() < 0.1e-3, "{times:?}");
-    // One that has not been yet is run to, without a look at what lies between.
+    // One that has not happened yet is run to, without looking at what lies between.
     while player.is_seeking() {
         player.advance(1.0 / 60.0);
     }
     let next = player.pacer.shown();
     assert!(next > 60e-3 && !player.is_playing());
-    let course = player.course();
-    assert_eq!(course.next_touch(None, 60e-3, true), Some(next));
+    let history = player.contact_history();
+    assert_eq!(history.next_contact(None, 60e-3, true), Some(next));
     one_clock(&player);
     for time in times.iter().rev() {
-        player.go_to_touch(None, false);
+        player.go_to_contact(None, false);
         assert_eq!(player.pacer.shown(), *time);
     }
-    player.go_to_touch(Some(1), true);
-    let of_one: Vec<f64> = player.course().touches(1, 0.0, 1.0).collect();
+    player.go_to_contact(Some(1), true);
+    let of_one: Vec<f64> = player.contact_history().touches(1, 0.0, 1.0).collect();
     assert_eq!(player.pacer.shown(), of_one[0]);
 }
 
@@ -504,7 +561,7 @@ fn a_preset_chosen_here_replaces_what_was_set_by_name() {
     assert_eq!(player.scene().solver.tolerance, tolerance);
     player.set("solver.tolerance", "1e-9").expect("in range");
     assert_eq!(player.scene().solver.tolerance, 1e-9);
-    assert!(player.beats_preset().is_empty());
+    assert!(player.keys_overriding_preset().is_empty());
 }
 
 #[test]

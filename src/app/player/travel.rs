@@ -1,7 +1,7 @@
-//! Going back in time and on from there: any instant of the run is put on show by restoring the nearest state before it and
-//! taking the same steps again, with what the log says was done on the way. The bits are those of the first time.
+//! Going back in time and on from there: any instant of the run is displayed by restoring the nearest state before it and
+//! taking the same steps again, with the logged events on the way. The result is the same to the bit.
 
-use super::course::Course;
+use super::contact_history::ContactHistory;
 use super::keyframes::Keyframe;
 use super::{FINEST_BIN, Player, sentences};
 use crate::app::log::{Entry, Event};
@@ -10,18 +10,18 @@ use crate::app::settled::Settling;
 use crate::scene::SceneError;
 use crate::simulate::{Bin, Effect, History, Pull};
 
-/// Most steps taken again before an instant of the past, so that the plots have what led to it in detail.
+/// Most steps retaken before a past instant, so that the plots show in detail what led to it.
 const LEAD: u64 = 512;
 
-/// How far the next touch is looked for, s.
+/// How far ahead the next contact is sought, s.
 const FARTHEST: f64 = 5.0;
 
-/// A touch that the run is on its way to.
+/// A contact that the run is heading for.
 #[derive(Clone, Copy)]
-pub(super) struct Sought {
-    /// Of this ball joint, or of any.
+pub(super) struct ContactSearch {
+    /// In this ball joint, or in any.
     joint: Option<usize>,
-    /// Given up there, s.
+    /// Time at which the search is given up, s.
     until: f64,
 }
 
@@ -34,22 +34,22 @@ pub struct Flag {
     pub words: String,
 }
 
-/// A future that was left: the run went on otherwise from an instant before it.
+/// An abandoned future: the run branched at an instant before it.
 #[derive(Clone, Debug)]
-pub struct Left {
-    /// What was recorded, the time before it included.
+pub struct AbandonedFuture {
+    /// Its record, including the time before it.
     pub history: History,
     /// The contact states.
-    pub course: Course,
+    pub contact_history: ContactHistory,
     /// What was done in it.
     pub flags: Vec<Flag>,
-    /// When it was left, and how far it had been on show, s.
+    /// Where the run branched off, and how far this future had been displayed, s.
     pub from: f64,
     #[allow(missing_docs)]
     pub to: f64,
 }
 
-/// Of the bins from `first` on those that have something of the time before `start`, s, go.
+/// Drops the bins from `first` on that reach into the time before `start`, s.
 fn drop_before(bins: &mut Vec<Bin>, first: usize, start: f64) {
     let early = bins[first..].iter().take_while(|bin| bin.from < start);
     let count = early.count();
@@ -57,27 +57,32 @@ fn drop_before(bins: &mut Vec<Bin>, first: usize, start: f64) {
 }
 
 impl Player {
-    /// Latest instant of the run that was on show, s.
+    /// Latest instant of the run ever displayed, s.
     pub fn reached(&self) -> f64 {
         self.reached
     }
 
-    /// Whether the instant on show has a future that was already on show, or something to be done that already was.
+    /// Whether anything after the displayed instant was displayed before, or any logged event is yet to be reapplied.
     pub fn has_future(&self) -> bool {
         self.pacer.shown() < self.reached || self.applied < self.log.entries.len()
     }
 
-    /// The future that was left, as far as it is still ahead.
-    pub fn left(&self) -> Option<&Left> {
+    /// The abandoned future, as far as it is still ahead.
+    pub fn abandoned_future(&self) -> Option<&AbandonedFuture> {
         self.left.as_deref().filter(|left| left.to > self.reached)
     }
 
-    /// When the ball joints were free, slid or stuck.
-    pub fn course(&self) -> &Course {
-        &self.course
+    /// Time up to which the run, or its abandoned future, is known, s.
+    pub fn known_to(&self) -> f64 {
+        self.abandoned_future().map_or(self.reached, |left| left.to)
     }
 
-    /// What was done to the run, that of its future included; of a pull its beginning and its end.
+    /// When the ball joints were free, slid or stuck.
+    pub fn contact_history(&self) -> &ContactHistory {
+        &self.contact_history
+    }
+
+    /// What was done to the run, its future included; of a pull only the beginning and the end.
     pub fn flags(&self) -> impl Iterator<Item = Flag> {
         let entries = &self.log.entries;
         let pulls = |at: usize| matches!(entries[at].event, Event::Pull(Some(_)));
@@ -91,13 +96,13 @@ impl Player {
             })
     }
 
-    /// What was recorded of `channel` from `from` to `to`, s, appended to `out` as by [`History::bins`]: from the stretch that was
-    /// last gone through again where there is one, since it is still known in detail. What comes after all that was on show is of
-    /// the future that was left.
+    /// Appends what was recorded of `channel` from `from` to `to`, s, to `out`, as by [`History::bins`]: where possible from
+    /// the stretch last retraced, which is known in full detail, and beyond the latest displayed instant from the abandoned
+    /// future.
     pub fn bins(&self, channel: usize, from: f64, to: f64, most_bins: usize, out: &mut Vec<Bin>) {
         self.own_bins(channel, from, to, most_bins, out);
         let reached = self.reached;
-        if let Some(left) = self.left().filter(|_| to > reached) {
+        if let Some(left) = self.abandoned_future().filter(|_| to > reached) {
             let first = out.len();
             let from = from.max(reached);
             left.history.bins(channel, from, to, most_bins, out);
@@ -113,7 +118,7 @@ impl Player {
         if from < start {
             let first = out.len();
             self.history.bins(channel, from, start, most_bins, out);
-            // A wider one has something of what follows.
+            // A wider bin extends into what follows.
             let whole = out[first..].iter().filter(|bin| bin.to <= start).count();
             out.truncate(first + whole);
         }
@@ -127,40 +132,40 @@ impl Player {
         }
     }
 
-    /// Pauses and puts `time`, s, on show: any instant that already was.
+    /// Pauses and displays `time`, s: any instant displayed before.
     pub fn go_to(&mut self, time: f64) {
         self.set_paused();
         self.travel(time);
     }
 
-    /// The instant after the one on show, or before it, at which the ball of joint `joint` (of any joint) came to touch; goes
-    /// there, or to the start. One that has not been yet is run to, frame by frame.
-    pub fn go_to_touch(&mut self, joint: Option<usize>, forward: bool) {
+    /// Goes to the next or previous instant at which the ball of joint `joint` (of any joint) came into contact, or to the
+    /// start. If the next one has not happened yet, the run continues to it, frame by frame.
+    pub fn go_to_contact(&mut self, joint: Option<usize>, forward: bool) {
         let shown = self.pacer.shown();
-        let found = self.course.next_touch(joint, shown, forward);
+        let found = self.contact_history.next_contact(joint, shown, forward);
         match found.filter(|time| *time <= self.reached) {
             Some(time) => self.go_to(time),
             None if !forward => self.go_to(0.0),
             None => {
                 self.go_to(self.reached);
                 let until = self.reached + FARTHEST;
-                self.sought = Some(Sought { joint, until });
+                self.sought = Some(ContactSearch { joint, until });
             }
         }
     }
 
-    /// Whether the run is on its way to the next touch.
+    /// Whether the run is heading for the next contact.
     pub fn is_seeking(&self) -> bool {
         self.sought.is_some()
     }
 
-    /// Goes on towards the touch that is sought, within the budget of a frame.
-    pub(super) fn seek(&mut self, sought: Sought) {
+    /// Continues towards the sought contact within the budget of a frame.
+    pub(super) fn seek(&mut self, sought: ContactSearch) {
         self.go_on();
         let from = self.pacer.shown();
         let start = (self.clock)();
         let found = loop {
-            let found = self.course.next_touch(sought.joint, from, true);
+            let found = self.contact_history.next_contact(sought.joint, from, true);
             let over = self.simulation.time() > sought.until || self.stopped.is_some();
             if found.is_some() || over || !self.pacer.may_step((self.clock)() - start) {
                 break found.map_or(over.then_some(f64::INFINITY), Some);
@@ -175,7 +180,7 @@ impl Player {
         }
     }
 
-    /// Takes the latest step back: to where it began, or the one before where that is on show.
+    /// Steps back: to the start of the latest step, or of the one before if that start is displayed already.
     pub fn step_back(&mut self) {
         self.set_paused();
         let Some(steps) = self.steps().checked_sub(1) else {
@@ -195,7 +200,7 @@ impl Player {
         self.sought = None;
     }
 
-    /// Puts `time`, s, on show.
+    /// Displays `time`, s.
     pub(super) fn travel(&mut self, time: f64) {
         if !time.is_finite() {
             return;
@@ -203,7 +208,7 @@ impl Player {
         let time = time.clamp(0.0, self.reached);
         let here = self.simulation.time();
         let run = self.unchanged.as_deref().unwrap_or(&self.simulation);
-        // The latest step holds every instant of it, but for one from which more was done.
+        // Any instant of the latest step can be sampled; if a change was made within it, from the run as it was before.
         if !(run.step_start() < time && time <= here) {
             let best = self.keyframes.latest(|k| k.state.time() <= time);
             let best = best.map_or(0.0, |k| k.state.time());
@@ -215,7 +220,7 @@ impl Player {
         self.arrive(time);
     }
 
-    /// Puts `time`, s, of the latest step on show, with what was done then.
+    /// Displays `time`, s, of the latest step, and reapplies what was done then.
     fn arrive(&mut self, time: f64) {
         self.pacer.jump(time.min(self.simulation.time()));
         if time >= self.simulation.time().min(self.reached) {
@@ -225,8 +230,8 @@ impl Player {
         self.present();
     }
 
-    /// Goes back to a state before `time`, s. Where what led to that instant is not known in detail, to one that lies earlier, and
-    /// keeps the detail from there on.
+    /// Restores a state before `time`, s. If what led to that instant is not known in detail, restores an earlier one and
+    /// records in detail from there.
     fn restore_at(&mut self, time: f64) {
         let best = self.keyframes.latest(|k| k.state.time() <= time);
         let Some((start, steps)) = best.map(|k| (k.state.time(), k.state.steps())) else {
@@ -243,12 +248,12 @@ impl Player {
         self.restore(start, true);
     }
 
-    /// Goes back to the state kept of `time`, s; with `anew` another stretch is recorded in detail from there on.
+    /// Restores the latest state kept up to `time`, s; with `anew` another stretch is recorded in detail from there on.
     fn restore(&mut self, time: f64, anew: bool) {
         let Some(keyframe) = self.keyframes.latest(|k| k.state.time() <= time) else {
             return;
         };
-        // A scene that runs once is restored again.
+        // A state of a running scene can be restored.
         if self.simulation.restore(&keyframe.state).is_err() {
             return;
         }
@@ -257,7 +262,7 @@ impl Player {
         self.stopped = None;
         self.unchanged = None;
         if now > self.recorded_to {
-            // Nobody saw the way there.
+            // The way there was not recorded.
             self.paths = Paths::new(self.simulation.running_scene());
         }
         self.recorded_to = now;
@@ -279,7 +284,7 @@ impl Player {
         }
     }
 
-    /// Takes steps again until `is_there`, the way led by the log; no further than what was on show before `time`, s.
+    /// Retakes steps until `is_there`, with the logged events on the way; displays nothing beyond `time`, s.
     fn retrace(&mut self, is_there: impl Fn(&Self) -> bool, time: f64) {
         while !is_there(self) {
             self.pacer.jump(self.simulation.time().min(time));
@@ -290,20 +295,20 @@ impl Player {
         }
     }
 
-    /// Does again what was done after so many steps.
+    /// Reapplies the events logged after this number of steps.
     fn apply_due(&mut self) {
         while let Some(entry) = self.log.entries.get(self.applied) {
             if entry.steps > self.steps() {
                 break;
             }
             if entry.event == Event::Stop {
-                // The step that is refused again says so.
+                // The step is refused again and says so.
                 self.step();
                 break;
             }
             let entry = entry.clone();
             self.applied += 1;
-            // It was accepted once, of the same scene in the same state.
+            // It was accepted before, for the same scene in the same state.
             let _ = self.apply(&entry);
         }
     }
@@ -322,15 +327,15 @@ impl Player {
         done.map(|_| ())
     }
 
-    /// The run goes on from the instant on show. Steps that were taken before are taken again; where something was done on the way,
-    /// that future is left.
+    /// Continues from the displayed instant by retaking the known steps; if more events were logged after it, that future is
+    /// abandoned.
     pub(super) fn go_on(&mut self) {
         if self.applied < self.log.entries.len() {
             self.branch();
         }
     }
 
-    /// The instant on show becomes the end of the run; what was after it is left.
+    /// The displayed instant becomes the end of the run; what was after it is abandoned.
     pub(super) fn branch(&mut self) {
         if !self.has_future() {
             return;
@@ -338,9 +343,9 @@ impl Player {
         let (steps, shown, applied) = (self.steps(), self.pacer.shown(), self.applied);
         if shown < self.reached {
             let after = |flag: &Flag| flag.time > shown;
-            self.left = Some(Box::new(Left {
+            self.left = Some(Box::new(AbandonedFuture {
                 history: self.history.clone(),
-                course: self.course.clone(),
+                contact_history: self.contact_history.clone(),
                 flags: self.flags().filter(after).collect(),
                 from: shown,
                 to: self.reached,
@@ -356,7 +361,7 @@ impl Player {
         if let Some(mark) = &keyframe.record {
             self.history.rewind(mark);
         }
-        self.course.cut(start);
+        self.contact_history.cut(start);
         self.watch.cut(start);
         self.keyframes.cut(start_steps);
         self.near = None;
@@ -366,7 +371,7 @@ impl Player {
         self.arrive(shown);
     }
 
-    /// Keeps the latest state, which is recorded, where one is due: of the run as it goes on, or on the way through its past.
+    /// Keeps the latest state, which is recorded, if one is due: while the run advances, or while it retraces its past.
     pub(super) fn keep(&mut self) {
         let steps = self.steps();
         let new = steps >= self.most_steps;
@@ -388,21 +393,21 @@ impl Player {
         }
     }
 
-    /// A run begins: nothing of the one before is known any more.
-    pub(super) fn forget_travels(&mut self) {
+    /// A new run begins: forgets everything about the one before.
+    pub(super) fn clear_rewind(&mut self) {
         self.keyframes.clear();
         self.near = None;
         self.left = None;
         self.sought = None;
-        self.course.begin(0.0);
+        self.contact_history.begin(0.0);
         self.event_times.clear();
         (self.applied, self.most_steps) = (0, 0);
         (self.reached, self.recorded_to) = (0.0, 0.0);
     }
 
-    /// Bytes that the ways back take, about.
+    /// Approximate memory for going back, bytes.
     #[cfg(test)]
-    pub(super) fn bytes_of_travels(&self) -> usize {
+    pub(super) fn rewind_bytes(&self) -> usize {
         self.keyframes.bytes()
     }
 }

@@ -1,4 +1,4 @@
-//! What of the choices about plots and view travels in a link, as words.
+//! The plot and view settings that a link carries, as words.
 
 use crate::app::plots::{Plots, Window};
 use crate::scene::{Dimension, Scene, parse_quantity};
@@ -71,7 +71,7 @@ pub fn write_window(window: Window) -> String {
 /// The part of `scene` that `text`, `joint.NAME` or `body.NAME`, names.
 ///
 /// # Errors
-/// What there is to name.
+/// There is no such part; lists those there are.
 pub fn find_followed(scene: &Scene, text: &str) -> Result<Picked, String> {
     let joints = || scene.ball_joints.iter().map(|joint| joint.name.as_str());
     let bodies = || scene.bodies.iter().map(|body| body.name.as_str());
@@ -101,7 +101,7 @@ pub fn name_followed(scene: &Scene, picked: Picked) -> Option<String> {
     }
 }
 
-/// The chosen quantities and the window of `plots`, where they are others than at first.
+/// The chosen quantities and the window of `plots`, where they differ from the defaults.
 pub fn changed(plots: &Plots) -> (Option<Vec<Quantity>>, Option<Window>) {
     let first = Plots::default();
     let chosen = (plots.chosen != first.chosen).then(|| plots.chosen.clone());

@@ -1,4 +1,4 @@
-//! Rows as text: the header first, then nothing but data, so that every reader takes it unmodified.
+//! Rows as text: a header line, then nothing but data, so that every reader takes it unmodified.
 
 use std::io::{self, Write};
 
@@ -21,14 +21,14 @@ pub(super) fn write(out: &mut impl Write, table: &Table) -> io::Result<()> {
     })
 }
 
-/// Passes bytes on and reckons their CRC-32, by which a reader tells whether rows and the account of them belong together.
-pub(super) struct Checked<W> {
+/// Passes bytes on and computes their CRC-32, which tells a reader whether rows and metadata belong together.
+pub(super) struct ChecksumWriter<W> {
     inner: W,
     checksum: crc32fast::Hasher,
 }
 
-impl<W: Write> Checked<W> {
-    /// Nothing passed yet.
+impl<W: Write> ChecksumWriter<W> {
+    /// A writer that has passed nothing yet.
     pub fn new(inner: W) -> Self {
         let checksum = crc32fast::Hasher::new();
         Self { inner, checksum }
@@ -40,7 +40,7 @@ impl<W: Write> Checked<W> {
     }
 }
 
-impl<W: Write> Write for Checked<W> {
+impl<W: Write> Write for ChecksumWriter<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let written = self.inner.write(bytes)?;
         self.checksum.update(&bytes[..written]);

@@ -1,4 +1,4 @@
-//! Output files: what they are called, that they appear whole, and what is in them.
+//! Output files: their names, their formats, and that they appear whole.
 
 mod csv;
 mod json;
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Map, Value as Json};
 
 use super::failure::Failure;
-use crate::files::{Filled, Target, same_file};
+use crate::files::{OutputFile, PendingFile, same_file};
 
 /// Largest number of values in a file of rows: 4 GiB.
 const MOST_VALUES: u64 = 1 << 29;
@@ -22,19 +22,19 @@ const MOST_VALUES: u64 = 1 << 29;
 /// File format of a run's rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
-    /// Text, one row a line; what made it stands in a second file beside it.
+    /// Text, one row per line; a second file beside it holds the metadata.
     Csv,
     /// One object: `meta` and `columns`.
     Json,
-    /// NumPy archive: one array a column, and `meta`.
+    /// NumPy archive: one array per column, and `meta`.
     Npz,
 }
 
 impl Format {
-    /// The format that a file's ending asks for.
+    /// The format of a file by its ending.
     ///
     /// # Errors
-    /// An ending that is none of the three.
+    /// Any other ending than the three.
     pub fn of(path: &Path) -> Result<Self, Failure> {
         let ending = path
             .extension()
@@ -52,12 +52,12 @@ impl Format {
     }
 }
 
-/// Where a run's rows will go: claimed, and known to be writable, before the run starts.
+/// Where the rows of a run go: claimed, and known to be writable, before the run starts.
 pub struct RowsFile {
     format: Format,
-    rows: Target,
-    /// CSV has no place for what made it: a plain reader takes the first line for the header and every other for data.
-    beside: Option<Target>,
+    rows: OutputFile,
+    /// Metadata of a CSV file, which has no place for it: a plain reader takes every line after the header for data.
+    beside: Option<OutputFile>,
 }
 
 impl RowsFile {
@@ -67,14 +67,14 @@ impl RowsFile {
     /// Unknown ending (usage), existing file without `force`, unwritable folder (input/output).
     pub fn claim(path: &Path, force: bool) -> Result<Self, Failure> {
         let format = Format::of(path)?;
-        // The name that the user gave first: an error is to name that one.
-        let rows = Target::claim(path, force)?;
+        // The user's own name is claimed first, so that an error names it.
+        let rows = OutputFile::claim(path, force)?;
         let beside = match format {
             Format::Csv => {
                 let meta = Self::meta_path(path);
-                // What is left of a pair whose run was killed between its two names says nothing and stands in no way.
+                // Metadata left by a run that was killed between its two renames is worthless and may be replaced.
                 let alone = !path.exists() && is_account(&meta);
-                Some(Target::claim(&meta, force || alone)?)
+                Some(OutputFile::claim(&meta, force || alone)?)
             }
             Format::Json | Format::Npz => None,
         };
@@ -85,14 +85,14 @@ impl RowsFile {
         })
     }
 
-    /// The file beside a CSV file that says what made it: `run.csv` has `run.csv.meta.json`.
+    /// The metadata file beside a CSV file: `run.csv` has `run.csv.meta.json`.
     fn meta_path(path: &Path) -> PathBuf {
         let mut name = path.as_os_str().to_owned();
         name.push(".meta.json");
         PathBuf::from(name)
     }
 
-    /// What `option` with `path` writes, for [`check_distinct`].
+    /// The files that `option` with `path` writes, for [`check_distinct`].
     pub fn names(option: &str, path: &Path) -> Vec<(String, PathBuf)> {
         let mut names = vec![(option.to_owned(), path.to_owned())];
         if Format::of(path) == Ok(Format::Csv) {
@@ -101,20 +101,24 @@ impl RowsFile {
         names
     }
 
-    /// The rows' file.
-    pub fn target(&self) -> &Target {
+    /// The file of the rows.
+    pub fn target(&self) -> &OutputFile {
         &self.rows
     }
 
     /// Writes everything; nothing has its final name yet.
     ///
     /// # Errors
-    /// Whatever the file system says.
-    pub fn fill(self, table: &Table, mut meta: Map<String, Json>) -> Result<Vec<Filled>, Failure> {
+    /// Whatever the file system reports.
+    pub fn fill(
+        self,
+        table: &Table,
+        mut meta: Map<String, Json>,
+    ) -> Result<Vec<PendingFile>, Failure> {
         let mut checksum = String::new();
         let rows = self.rows.fill(|file| match self.format {
             Format::Csv => {
-                let mut file = csv::Checked::new(file);
+                let mut file = csv::ChecksumWriter::new(file);
                 csv::write(&mut file, table)?;
                 checksum = file.checksum();
                 Ok(())
@@ -127,22 +131,22 @@ impl RowsFile {
         };
         meta.insert(ROWS_CHECKSUM.into(), checksum.into());
         let account = beside.fill(|file| json::write_meta(file, &meta))?;
-        // In this order a kill between the two leaves no rows without their account.
+        // In this order a kill between the two leaves no rows without their metadata.
         Ok(vec![account, rows])
     }
 }
 
-/// Key of a CSV file's CRC-32 in what stands beside it.
+/// Key of a CSV file's CRC-32 in its metadata.
 const ROWS_CHECKSUM: &str = "rows_crc32";
 
-/// Whether the file is one that [`RowsFile`] writes beside rows.
+/// Whether the file is metadata that [`RowsFile`] wrote beside rows.
 fn is_account(path: &Path) -> bool {
     let meta = std::fs::read(path).unwrap_or_default();
     let meta: Json = serde_json::from_slice(&meta).unwrap_or_default();
     meta["program"] == crate::files::PROGRAM && meta[ROWS_CHECKSUM].is_string()
 }
 
-/// Refuses outputs of one command that would be one file, or the command's own input; each with what it is.
+/// Refuses a command if two of its outputs, or an output and its input, are one file; each comes with its description.
 ///
 /// # Errors
 /// Usage, with the two.

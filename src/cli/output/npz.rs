@@ -1,4 +1,4 @@
-//! Rows as a NumPy archive: one float64 array a column, and `meta` as the bytes of a JSON text.
+//! Rows as a NumPy archive: one float64 array per column, and `meta` as the bytes of a JSON text.
 
 use std::io;
 
@@ -39,7 +39,7 @@ fn as_io(error: WriteNpzError) -> io::Error {
 mod tests {
     use super::*;
     use crate::files::Call;
-    use crate::files::Target;
+    use crate::files::OutputFile;
     use crate::files::faults::{Fault, Kind, with};
 
     #[test]
@@ -50,16 +50,16 @@ mod tests {
         for n in 1.. {
             let mut failed = false;
             let work = || {
-                Target::claim(&path, true)?.write(|file| {
+                OutputFile::claim(&path, true)?.write(|file| {
                     let mut archive = NpzWriter::new(file);
                     let added = archive
                         .add_array("a", &values)
                         .and_then(|()| archive.add_array("b", &values));
                     failed = added.is_err();
-                    // As the archive does when it is dropped, and complains of what goes wrong then.
+                    // As the archive does when dropped, complaining about any error.
                     let ended = archive.finish().map(|_| ());
                     assert!(ended.is_ok() || !failed, "{ended:?}");
-                    // Whatever is said here, the disk comes first.
+                    // Whatever is returned here, the disk error takes precedence.
                     Ok(())
                 })
             };

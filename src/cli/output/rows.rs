@@ -1,27 +1,27 @@
-//! Rows of equal width, as many as the disk holds: what exceeds one block in memory goes to a nameless file.
+//! Rows of equal width, as many as fit on the disk: full blocks in memory are moved to a nameless file.
 
 use std::io;
 
 use crate::files::Spool;
 
-/// Values of a block, 8 MiB.
+/// Values per block, 8 MiB.
 const BLOCK: usize = 1 << 20;
 
 /// Rows in order.
 #[derive(Debug)]
 pub struct Rows {
     width: usize,
-    /// Rows of a full block.
+    /// Rows per full block.
     rows_per_block: usize,
-    /// The latest, row after row.
+    /// The latest rows, row-major.
     block: Vec<f64>,
-    /// Full blocks, each column after column.
+    /// Full blocks, each column-major.
     spool: Option<Spool>,
     spooled: usize,
 }
 
 impl Rows {
-    /// No rows of `width` values yet.
+    /// No rows yet, of `width` values each.
     pub fn new(width: usize) -> Self {
         Self {
             width,
@@ -32,7 +32,7 @@ impl Rows {
         }
     }
 
-    /// From now on full blocks go to `spool`; without one all rows stay in memory.
+    /// From now on full blocks go to `spool`; without it all rows stay in memory.
     pub fn spool_to(&mut self, spool: Spool) {
         self.spool = Some(spool);
     }
@@ -69,7 +69,7 @@ impl Rows {
     /// Calls `each` with every row, in order.
     ///
     /// # Errors
-    /// The disk; that of `each`.
+    /// A disk error, or that of `each`.
     pub fn each(&self, mut each: impl FnMut(&[f64]) -> io::Result<()>) -> io::Result<()> {
         let n = self.rows_per_block;
         let mut row = vec![0.0; self.width];
@@ -89,7 +89,7 @@ impl Rows {
     /// Calls `each` with every value of a column, in order.
     ///
     /// # Errors
-    /// The disk; that of `each`.
+    /// A disk error, or that of `each`.
     pub fn column(
         &self,
         column: usize,
@@ -104,7 +104,7 @@ impl Rows {
         rows.map(|row| row[column]).try_for_each(each)
     }
 
-    /// `count` values of a spooled block, from its value `from` on.
+    /// Reads `count` values of a spooled block, starting at its value `from`.
     fn read(&self, block: usize, from: usize, count: usize) -> io::Result<Vec<f64>> {
         let mut bytes = vec![0; 8 * count];
         let at = 8 * (block * self.rows_per_block * self.width + from) as u64;
@@ -119,12 +119,12 @@ impl Rows {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::files::Target;
+    use crate::files::OutputFile;
 
     #[test]
     fn spooled_rows_are_the_rows() {
         let folder = tempfile::tempdir().unwrap();
-        let target = Target::claim(&folder.path().join("a.csv"), false).unwrap();
+        let target = OutputFile::claim(&folder.path().join("a.csv"), false).unwrap();
         let mut rows = Rows::new(3);
         rows.rows_per_block = 4;
         rows.spool_to(target.spool().unwrap());

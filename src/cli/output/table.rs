@@ -1,9 +1,9 @@
-//! The rows of a run: which columns a scene has, and one row for each sampled instant. SI units, world axes.
+//! The rows of a run: the columns that a scene has, and one row per sampled instant. SI units, world axes.
 
 use std::io;
 
 use super::rows::Rows;
-use crate::files::Target;
+use crate::files::OutputFile;
 use crate::scene::Scene;
 use crate::simulate::{Frame, Reading, run_columns};
 
@@ -11,10 +11,10 @@ use crate::simulate::{Frame, Reading, run_columns};
 #[derive(Debug)]
 pub struct Table {
     names: Vec<String>,
-    /// Where a frame has the value of each column; empty where the rows are no frames.
+    /// Where in a frame to read the value of each column; empty if the rows are not frames.
     readings: Vec<Reading>,
     rows: Rows,
-    /// The row that is being made.
+    /// The row being assembled.
     values: Vec<f64>,
 }
 
@@ -31,13 +31,13 @@ pub enum NoRow {
         /// Time of the row, s.
         time: f64,
     },
-    /// The disk.
+    /// A disk error.
     #[error(transparent)]
     Disk(#[from] io::Error),
 }
 
 impl Table {
-    /// An empty table with the columns of `scene`; `first` tells whether it has a probe error and a ledger.
+    /// An empty table with the columns of `scene`; `first` shows whether it has a probe error and a ledger.
     pub fn new(scene: &Scene, first: &Frame) -> Self {
         let (names, readings) = run_columns(scene, first);
         Self {
@@ -48,7 +48,7 @@ impl Table {
         }
     }
 
-    /// A table of other rows than those of a run.
+    /// A table of rows other than those of a run.
     pub fn of_rows<const N: usize>(names: [&str; N], rows: impl Iterator<Item = [f64; N]>) -> Self {
         let mut table = Self {
             names: names.map(str::to_owned).to_vec(),
@@ -57,17 +57,17 @@ impl Table {
             values: Vec::new(),
         };
         for row in rows {
-            // In memory nothing can fail.
+            // Cannot fail in memory.
             let _ = table.rows.push(&row);
         }
         table
     }
 
-    /// Keeps in memory but the latest rows, and the others beside `target`.
+    /// Keeps only the latest rows in memory, and the others beside `target`.
     ///
     /// # Errors
     /// Input/output.
-    pub fn spool_beside(&mut self, target: &Target) -> Result<(), crate::files::FileError> {
+    pub fn spool_beside(&mut self, target: &OutputFile) -> Result<(), crate::files::FileError> {
         self.rows.spool_to(target.spool()?);
         Ok(())
     }
@@ -90,7 +90,7 @@ impl Table {
     /// Calls `each` with every row in order, each as long as [`Self::names`].
     ///
     /// # Errors
-    /// The disk; that of `each`.
+    /// A disk error, or that of `each`.
     pub fn rows(&self, each: impl FnMut(&[f64]) -> io::Result<()>) -> io::Result<()> {
         self.rows.each(each)
     }
@@ -98,7 +98,7 @@ impl Table {
     /// Calls `each` with every value of one column, in order of time.
     ///
     /// # Errors
-    /// The disk; that of `each`.
+    /// A disk error, or that of `each`.
     pub fn column(&self, column: usize, each: impl FnMut(f64) -> io::Result<()>) -> io::Result<()> {
         self.rows.column(column, each)
     }
@@ -106,7 +106,7 @@ impl Table {
     /// Appends the row of `frame`.
     ///
     /// # Errors
-    /// A value that is not finite, but for one that the frame does not know; a full disk. The table is then unchanged.
+    /// A value that is not finite, except one that is unknown in the frame; a full disk. The table is then unchanged.
     pub fn push(&mut self, frame: &Frame) -> Result<(), NoRow> {
         self.values.clear();
         for (reading, column) in self.readings.iter().zip(&self.names) {
@@ -118,7 +118,7 @@ impl Table {
                     time: frame.time,
                 });
             }
-            // Where the ideal mechanism came to its end there is no probe error.
+            // After the ideal mechanism has come to its end there is no probe error.
             self.values.push(value.unwrap_or(f64::NAN));
         }
         Ok(self.rows.push(&self.values)?)

@@ -23,7 +23,7 @@ const MOST_FRAMES: f64 = 100_000.0;
 pub(super) struct Times {
     /// Instants, s, in the order of the frame numbers.
     instants: Vec<f64>,
-    /// Simulated seconds in a second of a film; `None` for single pictures.
+    /// Simulated seconds per second of film; `None` for single pictures.
     time_scale: Option<f64>,
 }
 
@@ -44,7 +44,7 @@ impl Times {
         options::positive("--fps", fps, 10_000.0)?;
         options::positive("--slow", arguments.slow, 1e9)?;
         let rate = fps * arguments.slow;
-        // Both ends count; a whole number of frames is one however the product rounds.
+        // Both ends count; a whole number of frames stays whole however the product rounds.
         let last = (duration * rate * (1.0 + 1e-9)).floor();
         if last >= MOST_FRAMES {
             return Err(Failure::usage(format!(
@@ -69,7 +69,7 @@ impl Times {
     }
 }
 
-/// Does what `render` asks.
+/// Runs `render`.
 ///
 /// # Errors
 /// Bad input, no adapter, the divergence guard, Ctrl-C, the file system.
@@ -82,7 +82,7 @@ pub fn render(arguments: &RenderArguments) -> Result<(), Failure> {
     } else {
         Box::new(SceneStudio::new(&scene, view.clone(), arguments)?)
     };
-    // From here on there is a scratch folder, which a run that is told to end takes away.
+    // From here on there is a scratch folder, which an interrupted run removes.
     interrupt::listen();
     let folder = Folder::claim(&arguments.out, arguments.force)?;
     if !arguments.quiet {
@@ -96,7 +96,7 @@ pub fn render(arguments: &RenderArguments) -> Result<(), Failure> {
     fill(folder, &mut *studio, &scene, &times, arguments)
 }
 
-/// Draws all frames and gives the folder its name.
+/// Draws all frames and gives the folder its final name.
 pub(super) fn fill(
     folder: Folder,
     studio: &mut dyn Studio,
@@ -158,8 +158,8 @@ pub(super) fn fill(
     failure.map_or(Ok(()), Err)
 }
 
-/// The automatic force of the reference arrow, N, from all frames together, so that their arrows compare; `None` where
-/// there is nothing to agree on. It runs the simulation once before.
+/// Automatic force of the reference arrow, N, from all frames together, so that their arrows compare; `None` if no common
+/// force is needed. Runs the simulation once beforehand.
 fn common_reference(
     scene: &Scene,
     times: &Times,
@@ -176,7 +176,7 @@ fn common_reference(
     for number in times.in_order() {
         let instant = times.instants[number];
         while simulation.time() < instant {
-            // The frames themselves say why they end early.
+            // The frames themselves report why they end early.
             if interrupt::asked() || simulation.step().is_err() {
                 return Ok(Some(marks.reference(arrows)));
             }
@@ -188,13 +188,13 @@ fn common_reference(
         } else {
             &[]
         };
-        // Nothing fades: what was large stays.
+        // Nothing fades: the largest forces stay.
         marks.update(&frame, since, f64::INFINITY);
     }
     Ok(Some(marks.reference(arrows)))
 }
 
-/// What made a picture, as texts inside it: a frame that has lost its manifest still tells.
+/// Provenance of a picture, as texts inside it: a frame that has lost its manifest still carries it.
 fn labels(meta: &Map<String, Json>) -> Vec<(&'static str, String)> {
     // PNG texts are Latin-1.
     let latin = |text: String| {

@@ -9,7 +9,7 @@ use crate::scene::Scene;
 use crate::simulate::Frame;
 use crate::view::{ArrowOptions, Camera, Preset, Scaling, SceneView, Theme, ViewOptions, WearMap};
 
-/// Point of view that `arguments` ask for, at the frame of t = 0.
+/// Point of view requested by `arguments`, at the frame of t = 0.
 ///
 /// # Errors
 /// Usage.
@@ -56,7 +56,7 @@ pub fn camera(
         None => {
             let size = [arguments.size.0, arguments.size.1];
             if arguments.overlay {
-                // A line for each joint, and one for the wear map.
+                // A line per joint, and one for the wear map.
                 let lines = scene.ball_joints.len() + usize::from(arguments.wear.is_some());
                 let plate = plate(lines);
                 view.fit_around(&mut camera, scene, frame, options, size, plate);
@@ -69,7 +69,7 @@ pub fn camera(
     Ok(camera)
 }
 
-/// Choices about the picture that `arguments` ask for.
+/// View options requested by `arguments`.
 ///
 /// # Errors
 /// Usage.
@@ -114,7 +114,7 @@ pub fn view_options(arguments: &RenderArguments) -> Result<ViewOptions, Failure>
     })
 }
 
-/// Refuses what is not in 0 < `value` <= `most`.
+/// Refuses a value outside 0 < `value` <= `most`.
 ///
 /// # Errors
 /// Usage.

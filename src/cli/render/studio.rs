@@ -1,4 +1,4 @@
-//! What takes the pictures: the scene alone, or the whole application.
+//! What draws the pictures: the scene alone, or the whole application.
 
 use std::sync::Arc;
 
@@ -21,14 +21,14 @@ pub trait Studio {
     /// The divergence guard, Ctrl-C.
     fn go_to(&mut self, instant: f64) -> Result<(), Failure>;
 
-    /// Draws `instant`, which lies in the latest step; in a film, which shows `time_scale` simulated seconds in a second,
-    /// with what happened since the frame before.
+    /// Draws `instant`, which lies in the latest step; in a film, which shows `time_scale` simulated seconds per second,
+    /// with the events since the previous frame.
     ///
     /// # Errors
     /// A failing graphics adapter.
     fn draw(&mut self, instant: f64, time_scale: Option<f64>) -> Result<Image, Failure>;
 
-    /// Gives the reference arrow a force, N, that all frames share.
+    /// Fixes the force of the reference arrow, N, for all frames.
     fn fix_arrow_scale(&mut self, reference: f32);
 
     /// The simulation.
@@ -40,13 +40,13 @@ pub trait Studio {
 
 /// What the picture is drawn on.
 enum Screen {
-    /// The scene and nothing else.
+    /// The scene alone.
     Plain(Box<Offscreen>),
     /// The scene with text over it.
     Written(Box<Headless>),
 }
 
-/// The scene alone, with text over it where asked.
+/// The scene alone, with text over it if requested.
 pub struct SceneStudio {
     simulation: Simulation,
     frame: Frame,
@@ -84,7 +84,7 @@ impl SceneStudio {
         if wear {
             simulation.keep_wear();
         }
-        // Neither magnified play nor a colour is ever shown without saying so.
+        // Magnified play and wear colours are never shown unlabelled.
         let screen = if arguments.overlay || options.magnification != 1.0 || wear {
             Screen::Written(Box::new(
                 Headless::new().map_err(|error| no_adapter(&error))?,
@@ -139,7 +139,7 @@ impl Studio for SceneStudio {
                 }
             }
             None => {
-                // A single picture shows its own instant and nothing before it.
+                // A single picture shows only its own instant.
                 self.marks.clear(instant);
                 self.marks.update(&self.frame, &[], f64::INFINITY);
             }
@@ -200,7 +200,7 @@ pub struct ApplicationStudio {
     size: [u32; 2],
 }
 
-/// Longest time that the application runs between two looks for Ctrl-C, s.
+/// Longest time that the application runs between two checks for Ctrl-C, s.
 const SLICE: f64 = 0.01;
 
 impl ApplicationStudio {
@@ -264,7 +264,7 @@ impl Studio for ApplicationStudio {
             .map_err(|error| failed(&error))
     }
 
-    // The window's scale follows its own forces.
+    // The window scales its arrows by its own forces.
     fn fix_arrow_scale(&mut self, _reference: f32) {}
 
     fn simulation(&self) -> &Simulation {

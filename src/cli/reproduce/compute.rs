@@ -1,4 +1,4 @@
-//! All jobs of a report, on some threads.
+//! Runs all jobs of a report on several threads.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -8,17 +8,17 @@ use indicatif::ProgressBar;
 
 use super::interrupted;
 use super::kept::Kept;
-use crate::analysis::reproduction::{Outcome, Report, ReproductionError, Work};
+use crate::analysis::reproduction::{Agenda, Outcome, Report, ReproductionError};
 use crate::analysis::response::ResponseError;
 use crate::cli::{Failure, interrupt};
 
-/// Does what `kept` lacks of `work`, and keeps it there; what comes out depends neither on the number of threads nor on
-/// interruptions.
+/// Runs the jobs of `work` that `kept` lacks, and keeps their outcomes there; these depend neither on the number of
+/// threads nor on interruptions.
 ///
 /// # Errors
-/// Ctrl-C; the file system; a run that cannot be done, the first in order of the jobs that was begun.
+/// Ctrl-C; the file system; a run that fails: of those begun, the first in job order.
 pub(super) fn compute(
-    work: Work,
+    work: Agenda,
     kept: &mut Kept,
     threads: usize,
     bar: &ProgressBar,
@@ -50,7 +50,7 @@ pub(super) fn compute(
                 !(stop.load(Ordering::Relaxed) || interrupt::asked())
             });
             bar.inc((work.length(job) - told).max(0.0).round() as u64);
-            // A thread that panicked has been told of already.
+            // A thread's panic has already been reported.
             let mut shared = shared.lock().unwrap_or_else(PoisonError::into_inner);
             let (kept, done) = &mut *shared;
             let outcome = match outcome {

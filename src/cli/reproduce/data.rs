@@ -94,7 +94,7 @@ fn statements(found: &Findings) -> String {
     )
 }
 
-/// A run at the paper's output step, which the last column tells.
+/// A run at the paper's output step, which the last column marks.
 fn samples(run: &Traced) -> String {
     let columns = COLUMNS.len() - 1;
     let names = COLUMNS.map(|c| c.name);
@@ -105,7 +105,7 @@ fn samples(run: &Traced) -> String {
     )
 }
 
-/// A run at every instant that was looked at.
+/// A run at every examined instant.
 fn rows(run: &Traced, report: &Report) -> Result<Vec<u8>, Failure> {
     let mut meta = super::meta(report);
     meta.insert("run".into(), json!(run.name));
@@ -146,7 +146,7 @@ fn curves(found: &Findings) -> String {
     )
 }
 
-/// One row a point of a sweep, without its sections.
+/// One row per point of a sweep, without its sections.
 fn points(data: &SweepData) -> String {
     let (layout, grid) = (data.sweep.layout(), data.sweep.grid());
     let single = layout.columns().iter().filter(|c| !c.per_section);
@@ -178,7 +178,7 @@ impl Source for Records<'_> {
     }
 }
 
-/// A sweep in the form that `sweep` writes.
+/// A sweep in the format that `sweep` writes.
 fn archive(folder: &Folder, data: &SweepData) -> Result<(), Failure> {
     let meta: Map<String, Json> = meta(&data.sweep);
     let mut source = Records {

@@ -1,4 +1,4 @@
-//! The figures of the paper, and those beyond it, as sheets.
+//! The figures of the paper and the additional ones, as sheets.
 
 use super::text::{capital, typeset};
 use crate::analysis::paper::{Case, Coordinate, PAPER, Series, Shows};
@@ -10,10 +10,10 @@ use crate::chart::{
 };
 use crate::cli::output::significant;
 
-/// Width of a sheet, height of a row of charts, pixels.
+/// Width of a sheet and height of a row of charts, pixels.
 const WIDTH: u32 = 1120;
 const ROW: u32 = 290;
-/// The first part of a run, in which the balls bounce, s; and of the comparison of formulations.
+/// First part of a run, in which the balls bounce, s; and that of the comparison of formulations.
 const EARLY: f64 = 0.15;
 const EARLIEST: f64 = 0.1;
 
@@ -45,12 +45,12 @@ pub(super) fn all(found: &Findings) -> Vec<(String, Sheet)> {
         .collect()
 }
 
-/// Name of the picture of a figure in files and on the page.
+/// Name of a figure's picture in files and on the page.
 pub(super) fn picture_name(variant: Variant, name: &str) -> String {
     format!("{}{name}", variant.prefix.replace('_', "-"))
 }
 
-/// Two charts in a row.
+/// Charts in rows of two.
 fn sheet(charts: Vec<Chart>) -> Sheet {
     let rows = charts.len().div_ceil(2) as u32;
     Sheet {
@@ -62,7 +62,7 @@ fn sheet(charts: Vec<Chart>) -> Sheet {
     }
 }
 
-/// What tells a run of a series from the others.
+/// What distinguishes a run from the others of its series.
 fn case_name(series: Series, case: Case) -> String {
     series.name(series.of(case))
 }
@@ -176,7 +176,7 @@ fn verification(found: &Findings, names: &[String]) -> Vec<Chart> {
             ("lagrange formulation", &found.lagrange),
         ];
         let runs = runs.map(|(label, run)| (label.to_owned(), run, column_of(name)));
-        // The ideal motion is what all others are compared with: in the first colour.
+        // The ideal motion, with which the others are compared, has the first colour.
         columns(&runs, EARLIEST, "", 0)
     };
     names.iter().map(chart).collect()
@@ -210,7 +210,7 @@ fn drift(found: &Findings) -> Vec<Chart> {
     ]
 }
 
-/// Rate against value of a coordinate, a series a run.
+/// Rate against value of a coordinate, one curve per run.
 fn phases(coordinate: Coordinate, title: &str, series: Vec<Curve>) -> Chart {
     let [x, y] = [0, 1].map(|nth| of_column(derivative(coordinate, nth)));
     chart(title, x, y, series)
@@ -277,7 +277,7 @@ fn sections(found: &Findings, series: Series) -> Vec<Chart> {
     charts.to_vec()
 }
 
-/// Points that a picture can tell apart, once each.
+/// Points that a picture can resolve, once each.
 fn seen(points: Points) -> Points {
     let mut cells = std::collections::HashSet::new();
     let cell = |v: f64| format!("{v:.6}");
@@ -289,7 +289,7 @@ fn seen(points: Points) -> Points {
 
 fn bifurcation(found: &Findings, series: Series) -> Vec<Chart> {
     let all = found.branches(series);
-    // Each start on top of the one before, and smaller: all of them show.
+    // Each start is drawn over the previous one, and smaller, so that all of them show.
     let looks = [
         ("cold start", PALETTE[0], Marker::Disc),
         ("followed upward", PALETTE[5], Marker::Point),
@@ -340,7 +340,7 @@ fn bifurcation(found: &Findings, series: Series) -> Vec<Chart> {
     diagrams.chain(Coordinate::ALL.map(differences)).collect()
 }
 
-/// Lower exponents are left out of the picture: the smallest clearances would press all others against 0, 1/s.
+/// Lower exponents are left out of the picture, 1/s: the smallest clearances would squeeze all others against 0.
 const LEAST_EXPONENT: f64 = -10.0;
 
 fn exponents(found: &Findings, series: Series) -> Vec<Chart> {
@@ -417,7 +417,7 @@ fn map(found: &Findings) -> Vec<Chart> {
     let peaks: Vec<Vec<f64>> = peaks.collect();
     let hardest = (0..regimes.len()).map(|k| peaks.iter().map(|p| p[k]).fold(f64::NAN, f64::max));
     let exponents = data.values("exponent_per_s").into_iter();
-    // Grey where a disturbance grows.
+    // Grey where disturbances grow.
     let memory = exponents.map(|e| if e < 0.0 { -1.0 / e } else { f64::NAN });
     let size = |title: &str, values: Vec<f64>, scale: Axis| heat(title, values, scale, Vec::new());
     vec![

@@ -1,27 +1,27 @@
-//! Finished blocks of the sweeps, kept beside the report until that is written, so that an interrupted one goes on where it
-//! stopped. Everything else takes seconds and is computed again.
+//! Finished blocks of the sweeps, kept beside the report until it is written, so that an interrupted report resumes where
+//! it stopped. Everything else takes seconds and is recomputed.
 
 use std::path::{Path, PathBuf};
 
-use crate::analysis::reproduction::{Outcome, Work};
+use crate::analysis::reproduction::{Agenda, Outcome};
 use crate::cli::Failure;
 use crate::cli::sweep::{Partial, meta};
 use crate::cli::warn;
 use crate::files::{create_folders, remove_empty_folder};
 
-/// One file a sweep, in a folder of their own.
+/// One file per sweep, in a folder of their own.
 pub(super) struct Kept {
     folder: PathBuf,
     parts: Vec<Partial>,
 }
 
 impl Kept {
-    /// Opens the folder beside `out`, or makes it.
+    /// Opens or creates the folder beside `out`.
     ///
     /// # Errors
     /// As [`Partial::open`].
-    pub(super) fn open(out: &Path, work: &Work) -> Result<Self, Failure> {
-        // Through its parts, so that a slash at the end is none.
+    pub(super) fn open(out: &Path, work: &Agenda) -> Result<Self, Failure> {
+        // By components, which drops a trailing slash.
         let mut name = out.components().as_path().as_os_str().to_owned();
         name.push(".partial");
         let folder = PathBuf::from(name);
@@ -47,16 +47,16 @@ impl Kept {
         &self.folder
     }
 
-    /// Whether an earlier run left something.
+    /// Whether an earlier run left anything.
     pub(super) fn is_begun(&self) -> bool {
         self.parts.iter().any(Partial::is_begun)
     }
 
-    /// What earlier runs finished, by job.
+    /// Outcomes of earlier runs, by job.
     ///
     /// # Errors
     /// The file system.
-    pub(super) fn found(&self, work: &Work) -> Result<Vec<(usize, Outcome)>, Failure> {
+    pub(super) fn found(&self, work: &Agenda) -> Result<Vec<(usize, Outcome)>, Failure> {
         let mut parts = Vec::new();
         for part in &self.parts {
             parts.push(part.blocks()?);
@@ -74,7 +74,7 @@ impl Kept {
     /// The file system.
     pub(super) fn keep(
         &mut self,
-        work: &Work,
+        work: &Agenda,
         job: usize,
         outcome: &Outcome,
     ) -> Result<(), Failure> {
@@ -84,7 +84,7 @@ impl Kept {
         }
     }
 
-    /// Takes it away: its content is in the report.
+    /// Removes the folder: its content is in the report.
     pub(super) fn remove(self) {
         self.parts.into_iter().for_each(Partial::remove);
         if let Err(error) = remove_empty_folder(&self.folder) {

@@ -1,4 +1,4 @@
-//! `reproduce`: everything of the paper's section 4 in one go, as data, plots and one page that sets it beside the paper.
+//! `reproduce`: the paper's whole section 4 in one go, as data, plots and one page that compares it with the paper.
 
 mod compute;
 mod data;
@@ -18,15 +18,15 @@ use self::kept::Kept;
 use super::args::ReproduceArguments;
 use super::{Failure, interrupt, print, progress, warn};
 use crate::analysis::paper::{Agreement, Series};
-use crate::analysis::reproduction::{Extent, Findings, Report, Statement, Work};
+use crate::analysis::reproduction::{Agenda, Extent, Findings, Report, Statement};
 use crate::files::Folder;
 
-/// Does what `reproduce` asks.
+/// Runs `reproduce`.
 ///
 /// # Errors
 /// A folder that cannot be written, before anything is computed; Ctrl-C, the file system.
 pub fn reproduce(arguments: &ReproduceArguments) -> Result<(), Failure> {
-    // From here on there is a scratch folder, which a run that is told to end takes away.
+    // From here on there is a scratch folder, which an interrupted run removes.
     interrupt::listen();
     let extent = if arguments.quick {
         Extent::QUICK
@@ -42,7 +42,7 @@ pub fn reproduce(arguments: &ReproduceArguments) -> Result<(), Failure> {
     print(&summary(&report, &arguments.out, wall))
 }
 
-/// Computes a report of any extent and writes it to `out`, which must not exist or be empty.
+/// Computes a report of any extent and writes it to `out`, which must be missing or empty.
 ///
 /// # Errors
 /// As [`reproduce`].
@@ -50,7 +50,7 @@ pub fn into_folder(out: &Path, extent: Extent, threads: usize) -> Result<(), Fai
     make(Folder::claim(out, false)?, out, extent, threads, true).map(|_| ())
 }
 
-/// Computes a report into the `folder` that will be `out`.
+/// Computes a report into `folder`, which becomes `out`.
 fn make(
     folder: Folder,
     out: &Path,
@@ -58,7 +58,7 @@ fn make(
     threads: usize,
     quiet: bool,
 ) -> Result<Report, Failure> {
-    let work = Work::new(extent).map_err(|error| Failure::usage(error.to_string()))?;
+    let work = Agenda::new(extent).map_err(|error| Failure::usage(error.to_string()))?;
     let mut kept = Kept::open(out, &work)?;
     if kept.is_begun() && !quiet {
         warn(&format!(
@@ -77,7 +77,7 @@ fn make(
     Ok(report)
 }
 
-/// Writes all files into `folder`; what made them.
+/// Writes all files into `folder`; returns their provenance.
 fn fill(
     folder: &Folder,
     report: &Report,
@@ -104,7 +104,7 @@ fn fill(
     Ok(meta(report))
 }
 
-/// What made the report.
+/// Provenance of the report.
 fn meta(report: &Report) -> serde_json::Map<String, Json> {
     let scene = report.corrected.cold(Series::Clearance).sweep.scene();
     let mut meta = super::provenance::meta(scene);
@@ -160,7 +160,7 @@ impl Score {
     }
 }
 
-/// What was found, in a few lines.
+/// The results in a few lines.
 fn summary(report: &Report, out: &Path, wall: f64) -> String {
     let statements = report.corrected.statements();
     let corrected = Score::of(&report.corrected, &statements);

@@ -1,4 +1,4 @@
-//! The page: each figure of the paper beside what this program gets. One file, nothing from the network.
+//! The page: each figure of the paper beside this program's. One file, nothing from the network.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -7,7 +7,7 @@ use super::figures::picture_name;
 use super::text::{self, NONE, capital, escape, shown, typeset};
 use super::{Score, command, meta, scatter};
 use crate::analysis::paper::{
-    Agreement, Comparison, Coordinate, DURATION, Figure, PAPER, Quantity, Series, Shows,
+    Agreement, Comparison, Coordinate, DURATION, Figure, FigureValue, PAPER, Series, Shows,
 };
 use crate::analysis::reproduction::{
     CORRECTED, Extent, Findings, PERIOD, Report, Statement, Swept, Variant,
@@ -16,7 +16,7 @@ use crate::analysis::response::Response;
 use crate::cli::output::significant;
 use crate::cli::tables::{fill, html};
 
-/// Stands above a report that is not the whole one.
+/// Shown above a shortened report.
 const SHORTENED: &str = "<p class=\"notice\">This is a quick report: few values and few periods, which shows that everything works. \
     Transients have not ended everywhere, so regimes, sections and diagrams may differ from those of the whole report, which \
     <code>jointplay reproduce --out report/</code> computes.</p>\n";
@@ -134,7 +134,7 @@ fn badge(agreement: Agreement) -> String {
     format!("<span class=\"{class}\">{agreement}</span>")
 }
 
-/// Two decimals, and two digits of what is small.
+/// Two decimals, or two digits of a small number.
 fn ratio(value: f64) -> String {
     if value < 0.1 {
         typeset(&significant(value, 2))
@@ -149,7 +149,7 @@ fn run_of(comparison: &Comparison) -> String {
     format!("{} mm, {}", case.clearance, case.friction)
 }
 
-fn what(quantity: Quantity) -> String {
+fn what(quantity: FigureValue) -> String {
     typeset(&format!("{quantity} ({})", quantity.unit()))
 }
 
@@ -176,7 +176,7 @@ fn numbers(rows: &[&Comparison]) -> String {
 fn strongest(comparisons: &[Comparison], figures: &[String]) -> String {
     let row = |figure: &String| {
         let own = |c: &&Comparison| {
-            c.published.figure == *figure && Quantity::NORMAL.contains(&c.published.quantity)
+            c.published.figure == *figure && FigureValue::NORMAL.contains(&c.published.quantity)
         };
         let own: Vec<&Comparison> = comparisons.iter().filter(own).collect();
         let most = |of: fn(&Comparison) -> f64| own.iter().map(|c| of(c)).fold(0.0, f64::max);
@@ -200,7 +200,7 @@ fn strongest(comparisons: &[Comparison], figures: &[String]) -> String {
 }
 
 fn verification(found: &Findings) -> String {
-    let row = |figure: &str, quantity: Quantity, paper: [Option<f64>; 2]| {
+    let row = |figure: &str, quantity: FigureValue, paper: [Option<f64>; 2]| {
         let of = |run: &Response| [shown(quantity.of(run)), shown(quantity.sampled(run))];
         let mut row = vec![figure.to_owned(), what(quantity)];
         row.extend(paper.map(shown));
@@ -215,7 +215,7 @@ fn verification(found: &Findings) -> String {
         .verification
         .iter()
         .map(|v| row(&v.figure, v.quantity, [Some(v.own), Some(v.commercial)]));
-    let forces = Quantity::NORMAL.map(|quantity| row("", quantity, [None, None]));
+    let forces = FigureValue::NORMAL.map(|quantity| row("", quantity, [None, None]));
     format!(
         "<p>The paper does not name the run of this figure. Its peaks, beside those of both formulations at 0.3 mm and friction 0.2:</p>\n{}",
         html(

@@ -1,19 +1,19 @@
-//! The page's section on the paper's scatter: whether friction that reads equation (13) as printed explains it.
+//! The page's section on the scatter in the paper: whether friction that uses equation (13) as printed explains it.
 
 use super::Score;
 use super::text::{self, escape, shown, typeset};
-use crate::analysis::paper::{Case, Coordinate, PAPER, Quantity, Series};
+use crate::analysis::paper::{Case, Coordinate, FigureValue, PAPER, Series};
 use crate::analysis::reproduction::{Report, Statement, Swept, Traced, exponents};
 use crate::cli::output::significant;
 use crate::cli::tables::html;
 
 /// Mean of x in trajectory (59), m.
 const MEAN_X: f64 = 0.203;
-/// Largest factor from the paper's settling and rates that counts as near.
+/// Largest ratio to the paper's settling and rates that counts as near.
 const NEAR: f64 = 1.25;
 
-/// What the paper prints for `quantity` at `case`; where it prints two values, the first.
-fn printed(case: Case, quantity: Quantity) -> Option<f64> {
+/// The value that the paper prints for `quantity` at `case`; the first if it prints two.
+fn printed(case: Case, quantity: FigureValue) -> Option<f64> {
     let mut numbers = PAPER.numbers.iter();
     let found = numbers.find(|p| p.case == case && p.quantity == quantity);
     found.map(|p| p.value)
@@ -45,12 +45,16 @@ fn models(report: &Report) -> Vec<Model<'_>> {
         .collect()
 }
 
-/// What is compared: a heading, the value of a run and its sections, and the paper's where it prints one.
-type Measure = (&'static str, fn(&Traced, &Swept) -> f64, Option<Quantity>);
+/// What is compared: a heading, the value for a run and its sections, and the paper's quantity if it prints one.
+type Measure = (
+    &'static str,
+    fn(&Traced, &Swept) -> f64,
+    Option<FigureValue>,
+);
 
 const MEASURES: [Measure; 6] = {
     use Coordinate::{Beta, X};
-    use Quantity::{LastSeparation, RateBeta};
+    use FigureValue::{LastSeparation, RateBeta};
     [
         (
             "Section in x, from 203 mm (µm)",
@@ -106,7 +110,7 @@ fn clearances(models: &[Model]) -> String {
     )
 }
 
-/// How many points are of which regime, the first found first.
+/// Number of points per regime, in order of first occurrence.
 fn regimes(points: &[Swept]) -> String {
     let mut regimes: Vec<(String, usize)> = Vec::new();
     for point in points {
@@ -149,10 +153,10 @@ fn sweeps(report: &Report) -> String {
     )
 }
 
-/// A statement with both models.
+/// A statement under both models.
 type Both<'a> = (&'a Statement, &'a Statement);
 
-/// Statements that come out otherwise with (13) as printed.
+/// Statements whose verdict changes with (13) as printed.
 fn turned_table(turned: &[Both]) -> String {
     if turned.is_empty() {
         return "<p>No statement of the paper comes out otherwise with (13) as printed.</p>\n"
@@ -179,7 +183,7 @@ fn turned_table(turned: &[Both]) -> String {
     )
 }
 
-/// How far the values of a measure are from the paper's: the largest ratio, either way.
+/// Distance of a measure's values from the paper's: the largest ratio, either way.
 fn off(model: &Model, (_, of, quantity): Measure) -> Option<f64> {
     let quantity = quantity?;
     let ratios = model.runs.iter().filter_map(|(run, sections)| {
@@ -189,7 +193,7 @@ fn off(model: &Model, (_, of, quantity): Measure) -> Option<f64> {
     Some(ratios.fold(1.0, f64::max))
 }
 
-/// What stands in the gaps of the section.
+/// Texts for the gaps of the section.
 pub(super) fn gaps(report: &Report, statements: &[Statement]) -> Vec<(&'static str, String)> {
     let with_printed = report.printed.statements();
     let printed = Score::of(&report.printed, &with_printed);

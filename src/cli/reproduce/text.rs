@@ -1,4 +1,4 @@
-//! Words of page, pictures and data files.
+//! Texts of page, pictures and data files.
 
 use crate::analysis::paper::DURATION;
 use crate::analysis::reproduction::{Findings, PERIOD, Report, SweepData};
@@ -10,16 +10,16 @@ pub(super) fn escape(text: &str) -> String {
         .replace('>', "&gt;")
 }
 
-/// Stands where there is no number.
+/// Shown where there is no number.
 pub(super) const NONE: &str = "\u{2013}";
 
-/// Four digits: what a reader takes in.
+/// Four digits, as many as a reader takes in.
 pub(super) fn shown(value: impl Into<Option<f64>>) -> String {
     let text = |value| typeset(&significant(value, 4));
     value.into().map_or_else(|| NONE.to_owned(), text)
 }
 
-/// As the page shows it: beta by its letter, powers of ten raised, minus signs.
+/// Typeset for the page: beta as its letter, powers of ten raised, minus signs.
 pub(super) fn typeset(text: &str) -> String {
     let all: Vec<char> = text.chars().collect();
     let is = |at: usize, test: fn(char) -> bool| all.get(at).is_some_and(|&c| test(c));
@@ -69,7 +69,7 @@ pub(super) fn typeset(text: &str) -> String {
     out
 }
 
-/// With a capital letter, but for names of coordinates.
+/// Capitalised, except for names of coordinates.
 pub(super) fn capital(text: &str) -> String {
     let mut letters = text.chars();
     match (letters.next(), text.split(' ').next()) {
@@ -88,7 +88,7 @@ pub(super) fn verdict(confirmed: bool) -> &'static str {
     }
 }
 
-/// Simulated time of all runs together, without twins, s.
+/// Total simulated time of all runs, without twins, s.
 pub(super) fn simulated(report: &Report) -> f64 {
     let of_runs = |count: usize| count as f64 * DURATION;
     let of_sweep =

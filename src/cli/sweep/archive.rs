@@ -1,4 +1,4 @@
-//! A sweep's result as a NumPy archive: one array a quantity, the varied values, and `meta`.
+//! A sweep's result as a NumPy archive: one array per quantity, the varied values, and `meta`.
 
 use std::io;
 use std::path::Path;
@@ -11,18 +11,18 @@ use super::options::Shard;
 use crate::analysis::layout::Column;
 use crate::analysis::sweep::Sweep;
 use crate::cli::Failure;
-use crate::files::Target;
+use crate::files::OutputFile;
 
-/// Where the numbers of an archive come from.
+/// Source of an archive's numbers.
 pub trait Source {
-    /// Writes `length` values from `offset` of each point's record to `out`, points in the archive's order.
+    /// Writes `length` values of each point's record, starting at `offset`, to `out`, points in the archive's order.
     ///
     /// # Errors
     /// Input/output.
     fn gather(&mut self, offset: usize, length: usize, out: &mut [f64]) -> Result<(), Failure>;
 }
 
-/// An archive to be written: what is in it, without the numbers.
+/// An archive to be written: its description, without the numbers.
 pub struct Archive {
     meta: Map<String, Json>,
     /// Key and values of each varied parameter.
@@ -36,7 +36,7 @@ pub struct Archive {
 /// Key in `meta` that only shards have.
 pub const SHARD: &str = "shard";
 
-/// Refuses a name that readers would not take for a NumPy archive.
+/// Refuses a name that readers would not recognise as a NumPy archive.
 ///
 /// # Errors
 /// Usage.
@@ -79,7 +79,7 @@ impl Archive {
         }
     }
 
-    /// The archive of a whole sweep as its shards describe it; `None` where `meta` is none of a sweep.
+    /// The archive of a whole sweep as its shards describe it; `None` if `meta` is not that of a sweep.
     pub fn of_meta(meta: Map<String, Json>, axes: Vec<(String, Vec<f64>)>) -> Option<Self> {
         let kept = usize::try_from(meta.get("kept")?.as_u64()?).ok()?;
         let column = |array: &Json| {
@@ -99,7 +99,7 @@ impl Archive {
         })
     }
 
-    /// What made it.
+    /// Provenance.
     pub fn meta(&self) -> &Map<String, Json> {
         &self.meta
     }
@@ -112,7 +112,7 @@ impl Archive {
         }
     }
 
-    /// Name of each array, whether it holds whole numbers, and how many values a point has in it.
+    /// Name of each array, whether it holds integers, and its number of values per point.
     pub fn names(&self) -> Vec<(String, bool, usize)> {
         let columns = self.columns.iter();
         columns
@@ -135,7 +135,7 @@ impl Archive {
         Ok(values)
     }
 
-    /// Values that a point has in a column.
+    /// Number of values per point in a column.
     fn length(&self, column: &Column) -> usize {
         if column.per_section { self.kept } else { 1 }
     }
@@ -143,8 +143,8 @@ impl Archive {
     /// Writes the file, one array in memory at a time.
     ///
     /// # Errors
-    /// Whatever the file system says; the final name is then as it was.
-    pub fn write(&self, target: Target, source: &mut impl Source) -> Result<(), Failure> {
+    /// Whatever the file system reports; the final name is then as it was.
+    pub fn write(&self, target: OutputFile, source: &mut impl Source) -> Result<(), Failure> {
         let mut failure = None;
         let written = target.write(|file| {
             let mut archive = NpzWriter::new(file);

@@ -1,4 +1,4 @@
-//! `merge`: the shards of a sweep put together to the file that one run of the whole sweep writes, byte for byte.
+//! `merge`: combines the shards of a sweep into the file that one run of the whole sweep writes, byte for byte.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -12,10 +12,10 @@ use super::archive::{self, Archive, SHARD, Source};
 use super::options;
 use crate::cli::Failure;
 use crate::cli::args::MergeArguments;
-use crate::files::{Target, same_file};
+use crate::files::{OutputFile, same_file};
 
 /// An open shard.
-struct Part {
+struct OpenShard {
     path: PathBuf,
     reader: NpzReader<BufReader<File>>,
     meta: Map<String, Json>,
@@ -24,10 +24,10 @@ struct Part {
     points: Vec<usize>,
 }
 
-/// Does what `merge` asks.
+/// Runs `merge`.
 ///
 /// # Errors
-/// Files that are no shards, or not all shards of one sweep; the file system.
+/// Files that are not shards, or not all shards of one sweep; the file system.
 pub fn merge(arguments: &MergeArguments) -> Result<(), Failure> {
     archive::check_ending(&arguments.out)?;
     let shards: Vec<&Path> = arguments.shards.iter().map(PathBuf::as_path).collect();
@@ -37,10 +37,10 @@ pub fn merge(arguments: &MergeArguments) -> Result<(), Failure> {
             arguments.out.display()
         )));
     }
-    let target = Target::claim(&arguments.out, arguments.force)?;
+    let target = OutputFile::claim(&arguments.out, arguments.force)?;
     let mut parts = Vec::new();
     for path in &arguments.shards {
-        parts.push(Part::open(path)?);
+        parts.push(OpenShard::open(path)?);
     }
     let Some(first) = parts.first_mut() else {
         return Err(Failure::usage("merge: no shard given"));
@@ -71,8 +71,8 @@ pub fn merge(arguments: &MergeArguments) -> Result<(), Failure> {
     super::report(&archive, &summary, &arguments.out, arguments.summary)
 }
 
-/// Every point once.
-fn check_points(parts: &[Part], count: usize) -> Result<(), Failure> {
+/// Requires every point exactly once.
+fn check_points(parts: &[OpenShard], count: usize) -> Result<(), Failure> {
     let mut owner: Vec<Option<usize>> = vec![None; count];
     for (i, part) in parts.iter().enumerate() {
         for &point in &part.points {
@@ -95,7 +95,7 @@ fn check_points(parts: &[Part], count: usize) -> Result<(), Failure> {
     if missing == 0 {
         return Ok(());
     }
-    // Which they are can be said where all shards are parts of the same number.
+    // They can be named if all shards are parts of the same number.
     let numbers: Vec<_> = parts
         .iter()
         .filter_map(|p| options::shard(&p.shard).ok())
@@ -125,7 +125,7 @@ fn no_shard(path: &Path) -> Failure {
     ))
 }
 
-impl Part {
+impl OpenShard {
     fn open(path: &Path) -> Result<Self, Failure> {
         let file = File::open(path)
             .map_err(|error| Failure::io(format!("cannot read {}: {error}", path.display())))?;
@@ -183,9 +183,9 @@ fn unreadable(path: &Path, error: &ReadNpzError) -> Failure {
 
 /// All shards of a sweep as one source.
 struct Shards {
-    /// Name, whether whole numbers, and length of each array, in the order of a record.
+    /// Name, whether it holds integers, and length of each array, in record order.
     names: Vec<(String, bool, usize)>,
-    parts: Vec<Part>,
+    parts: Vec<OpenShard>,
 }
 
 impl Source for Shards {

@@ -1,4 +1,4 @@
-//! `sweep`: one scene at many parameter values, on all cores; `merge`: the shards of a sweep put together.
+//! `sweep`: one scene at many parameter values, on all cores; `merge`: combines the shards of a sweep.
 
 mod archive;
 mod merge;
@@ -24,24 +24,24 @@ use super::check::{NearSingular, near_singular};
 use super::summary::count;
 use super::{Failure, interrupt, load, print, progress, warn};
 use crate::analysis::drive::drive_period;
-use crate::analysis::grid::{Axis, FOLLOW_BLOCK, Grid};
+use crate::analysis::grid::{FOLLOW_BLOCK, Grid, ParameterRange};
 use crate::analysis::layout::Status;
 use crate::analysis::point::{LOOSEST_FOR_EXPONENT, Plan};
 use crate::analysis::regime::{FEWEST, Regime};
 use crate::analysis::sweep::Sweep;
-use crate::files::Target;
+use crate::files::OutputFile;
 use crate::scene::WarningKind;
 
-/// Steps between two looks for Ctrl-C.
+/// Steps between two checks for Ctrl-C.
 const STEPS_BETWEEN_LOOKS: u32 = 4096;
 
-/// Does what `sweep` asks.
+/// Runs `sweep`.
 ///
 /// # Errors
 /// Any: bad input before it starts; Ctrl-C and the file system afterwards.
 pub fn sweep(arguments: &SweepArguments) -> Result<(), Failure> {
     archive::check_ending(&arguments.out)?;
-    let target = Target::claim(&arguments.out, arguments.force)?;
+    let target = OutputFile::claim(&arguments.out, arguments.force)?;
     let sweep = read(arguments)?;
     let shard = match &arguments.shard {
         Some(text) => Some(options::shard(text)?),
@@ -106,11 +106,14 @@ pub fn sweep(arguments: &SweepArguments) -> Result<(), Failure> {
     report(&archive, &summary, &arguments.out, arguments.summary)
 }
 
-/// The sweep that the arguments ask for.
+/// The sweep requested by the arguments.
 fn read(arguments: &SweepArguments) -> Result<Sweep, Failure> {
     let scene = load(&arguments.scene)?;
     let usage = |error: &dyn std::fmt::Display| Failure::usage(error.to_string());
-    let axes = arguments.vary.iter().map(|text| Axis::parse(&scene, text));
+    let axes = arguments
+        .vary
+        .iter()
+        .map(|text| ParameterRange::parse(&scene, text));
     let axes = axes.collect::<Result<Vec<_>, _>>().map_err(|e| usage(&e))?;
     let grid = Grid::new(&scene, axes, arguments.start.into()).map_err(|e| usage(&e))?;
     let plan = Plan {
@@ -122,7 +125,7 @@ fn read(arguments: &SweepArguments) -> Result<Sweep, Failure> {
     Sweep::new(scene, grid, plan).map_err(|e| usage(&e))
 }
 
-/// What made the result: the same for the whole sweep and every shard of it.
+/// Provenance of the result: the same for the whole sweep and every shard of it.
 pub(super) fn meta(sweep: &Sweep) -> Map<String, Json> {
     let scene = sweep.scene();
     let (grid, plan) = (sweep.grid(), sweep.plan());
@@ -176,17 +179,17 @@ pub(super) fn meta(sweep: &Sweep) -> Map<String, Json> {
     meta
 }
 
-/// Most points whose warnings are asked for, spread over the ranges: it must not take long.
+/// Largest number of points examined for warnings, spread over the ranges: it must not take long.
 const MOST_WARNED: usize = 64;
 
-/// What kind a warning is of: another one of the same kind says nothing new.
+/// Kind of a warning: a second one of the same kind says nothing new.
 #[derive(PartialEq, Eq, Hash)]
 enum Kind {
     Scene(WarningKind),
     Singular(std::mem::Discriminant<NearSingular>),
 }
 
-/// Warnings of the scene along the ranges, each kind with the first point that has it, and of the sweep itself.
+/// Warnings about the scene along the ranges, each kind with the first point that has it, and about the sweep itself.
 fn warnings(sweep: &Sweep) -> Vec<String> {
     let mut all = Vec::new();
     let mut kinds = HashSet::new();
@@ -230,7 +233,7 @@ fn warnings(sweep: &Sweep) -> Vec<String> {
     all
 }
 
-/// Computes the blocks `todo` and puts each into `partial` as it is done; stops early after Ctrl-C.
+/// Computes the blocks `todo` and appends each to `partial` when it is done; stops early after Ctrl-C.
 fn compute(
     sweep: &Sweep,
     todo: &[usize],
@@ -276,7 +279,7 @@ fn compute(
     })
 }
 
-/// How many points ended how.
+/// Number of points by outcome.
 fn summarise(archive: &Archive, source: &mut impl Source) -> Result<Map<String, Json>, Failure> {
     let statuses = archive.values("status", source)?;
     let regimes = archive.values("regime", source)?;
@@ -304,7 +307,7 @@ fn summarise(archive: &Archive, source: &mut impl Source) -> Result<Map<String, 
     Ok(summary)
 }
 
-/// Says on standard output what was written.
+/// Prints what was written.
 fn report(
     archive: &Archive,
     summary: &Map<String, Json>,
@@ -332,7 +335,7 @@ fn report(
         .map(|(word, number)| format!("{number} {word}"))
         .collect();
     if regimes.is_empty() {
-        // A shard of a sweep with fewer points than shards.
+        // Happens in a shard of a sweep with fewer points than shards.
         regimes.push("none".to_owned());
     }
     let wall = summary.get("wall_s").and_then(Json::as_f64);
@@ -350,7 +353,7 @@ fn report(
 }
 
 impl Shard {
-    /// Whether block `b` belongs to it: every so-manieth, so that all shards have about the same to do.
+    /// Whether block `b` belongs to it: blocks are dealt out in turn, so that all shards have about the same work.
     fn has(&self, b: usize) -> bool {
         b % self.of == self.number - 1
     }

@@ -3,7 +3,7 @@
 use crate::cli::Failure;
 use crate::scene::{Dimension, parse_quantity};
 
-/// Part `number` of `of`, from 1.
+/// Part `number` of `of`, counted from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
     /// Which part.

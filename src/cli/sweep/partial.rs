@@ -1,10 +1,10 @@
-//! The file beside a sweep's output that holds the blocks done so far, so that an interrupted sweep goes on where it
+//! The file beside a sweep's output that holds the finished blocks, so that an interrupted sweep resumes where it
 //! stopped. Removed once the output is written.
 //!
-//! Magic number with the format's version; the settings as JSON behind their length, and their CRC-32; then for each block
-//! its number, the number of its values, the values (float64, little-endian), and the CRC-32 of all these. A block is
-//! appended by one write: where that was cut short, the block is lost and nothing else. Anything else that does not check is
-//! refused as a whole: a half-read result would look like a whole one.
+//! Magic number with the format version; the settings as JSON, preceded by their length and followed by their CRC-32;
+//! then for each block its number, the number of its values, the values (float64, little-endian), and the CRC-32 of all
+//! these. A block is appended by one write: if that is cut short, only this block is lost. Any other inconsistency
+//! rejects the whole file: a half-read result would look like a whole one.
 
 use std::collections::BTreeMap;
 use std::fs::TryLockError;
@@ -18,23 +18,23 @@ use crate::analysis::sweep::Sweep;
 use crate::cli::{Failure, warn};
 use crate::files::{File, open_or_create, remove_file};
 
-/// Magic number, the last character being the format's version.
+/// Magic number; its last character is the format version.
 const MAGIC: &[u8; 8] = b"JPSWEEP1";
-/// Settings longer than this are none.
+/// Longer settings are rejected as damaged.
 const LONGEST_SETTINGS: u64 = 1 << 20;
 
-/// The blocks of a sweep done so far.
+/// The finished blocks of a sweep.
 pub struct Partial {
     path: PathBuf,
     file: File,
-    /// Where the blocks begin and end, bytes.
+    /// Start and end of the blocks, bytes.
     start: u64,
     end: u64,
     /// Points of each block, and whether it is done.
     points: Vec<std::ops::Range<usize>>,
     done: Vec<bool>,
     record: usize,
-    /// Place of each point among those of the output.
+    /// Position of each point among those of the output.
     place: Vec<usize>,
 }
 
@@ -46,10 +46,10 @@ impl Partial {
         PathBuf::from(name)
     }
 
-    /// Opens the file beside `out`, or makes it; `blocks` are those of the output.
+    /// Opens or creates the file beside `out`; `blocks` are those of the output.
     ///
     /// # Errors
-    /// Input/output: unreadable, damaged, in use; usage: of other settings.
+    /// Input/output: unreadable, damaged, in use; usage: begun with other settings.
     pub fn open(
         out: &Path,
         settings: &Map<String, Json>,
@@ -69,7 +69,7 @@ impl Partial {
                     path.display()
                 )));
             }
-            // A file system without locks: two runs of one output are then the user's to avoid.
+            // A file system without locks: avoiding two runs of one output is then up to the user.
             Err(TryLockError::Error(error)) => log::warn!("no lock: {error}"),
         }
         let grid = sweep.grid();
@@ -110,7 +110,7 @@ impl Partial {
         self.done.contains(&true)
     }
 
-    /// Records of every block that is done, by its number.
+    /// Records of every finished block, by block number.
     ///
     /// # Errors
     /// Input/output.
@@ -125,7 +125,7 @@ impl Partial {
         Ok(all)
     }
 
-    /// From the first block on.
+    /// Reader positioned at the first block.
     fn reader(&self) -> Result<impl Read, Failure> {
         let mut file = &self.file;
         file.seek(SeekFrom::Start(self.start))
@@ -133,10 +133,10 @@ impl Partial {
         Ok(BufReader::new(file.take(self.end - self.start)))
     }
 
-    /// Puts in the records of block `b`.
+    /// Appends the records of block `b`.
     ///
     /// # Errors
-    /// Whatever the file system says; the file is then as it was.
+    /// Whatever the file system reports; the file is then as it was.
     pub fn append(&mut self, b: usize, records: &[f64]) -> Result<(), Failure> {
         let mut bytes = Vec::with_capacity(20 + 8 * records.len());
         bytes.extend((b as u64).to_le_bytes());
@@ -150,7 +150,7 @@ impl Partial {
             .map_err(self.failed())?;
         let written = file.write_all(&bytes).and_then(|()| file.sync());
         if let Err(error) = written {
-            // Best effort: half a block is told from a whole one.
+            // Best effort: a torn block is recognised as such.
             let _ = self.file.set_length(self.end);
             return Err(self.failed()(error));
         }
@@ -159,7 +159,7 @@ impl Partial {
         Ok(())
     }
 
-    /// Takes the file away: its content is in the output.
+    /// Removes the file: its content is in the output.
     pub fn remove(self) {
         if let Err(error) = remove_file(&self.path) {
             warn(&format!(
@@ -185,7 +185,7 @@ impl Partial {
         self.file.length().map_err(self.failed())
     }
 
-    /// Checks the whole file.
+    /// Reads and checks the whole file.
     fn read(&mut self, settings: &Json) -> Result<(), Failure> {
         let length = self.length()?;
         let mut file = &self.file;
@@ -235,27 +235,27 @@ impl Partial {
             }
         }
         if cut {
-            // What is left of it would stand before the next one.
+            // The remains would stand before the next block.
             self.file.set_length(end).map_err(self.failed())?;
         }
         (self.start, self.end, self.done) = (start, end, done);
         Ok(())
     }
 
-    /// Number and records of the next block, which is whole.
+    /// Number and records of the next block, which must be whole.
     fn read_block(&self, reader: &mut impl Read, records: &mut Vec<f64>) -> Result<usize, Failure> {
         let b = self.next_block(reader, records)?;
         b.ok_or_else(|| self.damaged("it is cut short"))
     }
 
-    /// Number and records of the next block; `None` where the file ends before it does.
+    /// Number and records of the next block; `None` if the file ends first.
     fn next_block(
         &self,
         reader: &mut impl Read,
         records: &mut Vec<f64>,
     ) -> Result<Option<usize>, Failure> {
         let foreign = || self.damaged("a block does not belong to this sweep");
-        // As much as is there of each number must be right: what is no block is not taken for half a one.
+        // Each number must be valid as far as it is there: foreign data is not taken for a torn block.
         let Some(b) = self.number(reader)? else {
             return Ok(None);
         };
@@ -291,7 +291,7 @@ impl Partial {
         Ok(Some(block))
     }
 
-    /// The next whole number; `None` where the file ends before it does.
+    /// The next integer; `None` if the file ends first.
     fn number(&self, reader: &mut impl Read) -> Result<Option<u64>, Failure> {
         match read_u64(reader) {
             Ok(number) => Ok(Some(number)),
@@ -301,7 +301,7 @@ impl Partial {
     }
 }
 
-/// What a file without blocks holds.
+/// Content of a file without blocks.
 fn beginning(settings: &Json) -> Vec<u8> {
     let text = settings.to_string();
     let mut bytes = MAGIC.to_vec();
@@ -327,7 +327,7 @@ impl Source for Partial {
     }
 }
 
-/// The first setting in which two differ.
+/// The first setting that differs.
 pub fn difference(own: &Json, wanted: &Json) -> String {
     let (Some(own), Some(wanted)) = (own.as_object(), wanted.as_object()) else {
         return "unreadable".to_owned();
@@ -359,7 +359,7 @@ fn read_u32(reader: &mut impl Read) -> std::io::Result<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::grid::{Axis, Grid, Start};
+    use crate::analysis::grid::{Grid, ParameterRange, Start};
     use crate::analysis::point::Plan;
     use crate::scene::Scene;
 
@@ -369,7 +369,7 @@ mod tests {
         let out = folder.path().join("a.npz");
         let path = Partial::path_of(&out);
         let scene = Scene::load("spcmm", &[]).unwrap();
-        let axis = Axis::parse(&scene, "contact.clearance=0.2mm..0.3mm:3").unwrap();
+        let axis = ParameterRange::parse(&scene, "contact.clearance=0.2mm..0.3mm:3").unwrap();
         let grid = Grid::new(&scene, vec![axis], Start::Cold).unwrap();
         let plan = Plan {
             periods: 1,
@@ -391,7 +391,7 @@ mod tests {
         let whole = std::fs::read(&path).unwrap();
         let block = 20 + 8 * length;
         assert_eq!(whole.len(), begin + 3 * block);
-        // With a step that meets every place of the eight-byte numbers, and whole blocks.
+        // The step meets every position within the eight-byte numbers; the ends are those of whole blocks.
         let ends = (0..=3).map(|blocks| begin + blocks * block);
         for cut in (begin..whole.len()).step_by(29).chain(ends) {
             std::fs::write(&path, &whole[..cut]).unwrap();
@@ -402,7 +402,7 @@ mod tests {
                 (0..3).all(|b| partial.has(b) == left.contains(&b)),
                 "cut at {cut}"
             );
-            // It goes on behind the last whole block.
+            // It continues after the last whole block.
             for b in [2, 0, 1].into_iter().skip(blocks) {
                 partial.append(b, &vec![b as f64; length]).unwrap();
             }

@@ -1,4 +1,4 @@
-//! Results of one scene as a folder: points as CSV and JSON, diagrams as SVG and PNG, and what made them.
+//! Results of one scene as a folder: points as CSV and JSON, diagrams as SVG and PNG, and their provenance.
 
 use serde_json::{Map, Value as Json, json};
 
@@ -9,7 +9,7 @@ use crate::cli::{Failure, machine, provenance};
 use crate::files::Folder;
 use crate::scene::Scene;
 
-/// Pixels of the PNG for one of the diagram.
+/// PNG pixels per diagram pixel.
 const PNG_SCALE: f32 = 2.0;
 
 /// Columns of the CSV file of one phase, each after its name.
@@ -24,7 +24,7 @@ const OF_PHASE: [&str; 8] = [
     "front",
 ];
 
-/// Writes all files into `folder`; what made them.
+/// Writes all files into `folder`; returns their provenance.
 pub(super) fn fill(
     folder: &Folder,
     found: &WorkPrecision,
@@ -33,7 +33,7 @@ pub(super) fn fill(
     let sheet = picture(found, false, &machine::name());
     let drawing = |error: crate::chart::SheetError| Failure::io(error.to_string());
     let mut meta = provenance::meta(scene);
-    // Every method had its turn, whatever the scene asks for.
+    // All methods were run, whatever the scene asks for.
     for key in ["method", "step_s", "tolerance"] {
         meta.shift_remove(key);
     }
@@ -56,7 +56,7 @@ pub(super) fn fill(
     Ok(meta)
 }
 
-/// What the points are measured against.
+/// The reference.
 fn reference(found: &WorkPrecision) -> Result<Json, Failure> {
     let reference = &found.reference;
     let names: Vec<&str> = reference

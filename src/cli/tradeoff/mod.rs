@@ -1,4 +1,4 @@
-//! `tradeoff`: what every method costs on a scene and how wrong it is, as a table, files and the page of the documents.
+//! `tradeoff`: cost and error of every method on a scene, as a table, files and the documentation page.
 
 mod files;
 mod page;
@@ -18,7 +18,7 @@ use crate::cli::args::SceneArguments;
 use crate::files::Folder;
 use crate::scene::{BUILT_IN, Scene};
 
-/// Does what `tradeoff` asks.
+/// Runs `tradeoff`.
 ///
 /// # Errors
 /// Bad input before it starts; a scene without a reference, Ctrl-C and the file system afterwards.
@@ -42,14 +42,14 @@ fn one(name: &OsStr, arguments: &TradeoffArguments, effort: &Effort) -> Result<(
         scene: name.to_owned(),
         changes: arguments.changes.clone(),
     })?;
-    // From here on there is a scratch folder, which a run that is told to end takes away.
+    // From here on there is a scratch folder, which an interrupted run removes.
     interrupt::listen();
     let folder = match &arguments.out {
         Some(path) => Some((path, Folder::claim(path, arguments.force)?)),
         None => None,
     };
     if !arguments.quiet {
-        // What it says of the solver does not matter here: every method has its turn.
+        // Warnings about the solver do not matter here: all methods are run.
         for warning in scene.warnings().iter().filter(|w| !w.is_about_solver()) {
             warn(&warning.to_string());
         }
@@ -70,7 +70,7 @@ fn measure(scene: &Scene, effort: &Effort, quiet: bool) -> Result<WorkPrecision,
     })
 }
 
-/// Measures everything that the documents say, and writes it in one go at the end.
+/// Measures everything that the documentation states, and writes it in one go at the end.
 fn all(root: &Path, quiet: bool, effort: &Effort) -> Result<(), Failure> {
     let targets = page::Targets::claim(root)?;
     let mut found = Vec::with_capacity(BUILT_IN.len());

@@ -1,4 +1,4 @@
-//! The page of the documents, its diagrams and the record of the presets, measured on the built-in scenes.
+//! The documentation page, its diagrams and the record of the presets, measured on the built-in scenes.
 
 use std::collections::BTreeMap;
 use std::io::Write as _;
@@ -7,28 +7,28 @@ use std::path::Path;
 use super::picture::{is_yardstick, picture};
 use super::words::{cost_rows, end, error, reference, times, value};
 use crate::analysis::presets::{Measured, Record, choose, limit};
-use crate::analysis::{PartCost, Phase, Point, Setting, WorkPrecision};
+use crate::analysis::{CaseCost, Phase, Point, Setting, WorkPrecision};
 use crate::cli::tables::{fill, markdown};
 use crate::cli::{Failure, machine};
-use crate::files::{Target, appear};
+use crate::files::{OutputFile, publish};
 use crate::scene::{BUILT_IN, Preset};
 
-/// Where its parts lie under the source folder.
+/// Paths under the source folder.
 const PAGE: &str = "docs/tradeoff.md";
 const RECORD: &str = "assets/presets.json";
 
 /// All files, claimed before the measuring begins.
 pub(super) struct Targets {
-    page: Target,
-    record: Target,
-    diagrams: Vec<Target>,
+    page: OutputFile,
+    record: OutputFile,
+    diagrams: Vec<OutputFile>,
 }
 
 impl Targets {
     /// # Errors
     /// A folder that is not the program's source, or cannot be written.
     pub(super) fn claim(root: &Path) -> Result<Self, Failure> {
-        let claim = |name: &str| Ok::<_, Failure>(Target::claim(&root.join(name), true)?);
+        let claim = |name: &str| Ok::<_, Failure>(OutputFile::claim(&root.join(name), true)?);
         let diagrams = BUILT_IN
             .iter()
             .map(|name| claim(&format!("docs/{}", diagram(name))));
@@ -40,7 +40,7 @@ impl Targets {
     }
 
     /// Writes everything; all texts are made before the first file changes.
-    pub(super) fn write(self, found: &[WorkPrecision], costs: &[PartCost]) -> Result<(), Failure> {
+    pub(super) fn write(self, found: &[WorkPrecision], costs: &[CaseCost]) -> Result<(), Failure> {
         let machine = machine::name();
         let scenes: String = found.iter().map(measured_scene).collect();
         let page = page(&machine, found, &scenes, costs);
@@ -51,14 +51,15 @@ impl Targets {
             let svg = picture(found, true, &machine).svg();
             drawn.push(svg.map_err(|error| Failure::io(error.to_string()))?);
         }
-        let put = |target: Target, text: &str| target.fill(|file| file.write_all(text.as_bytes()));
+        let put =
+            |target: OutputFile, text: &str| target.fill(|file| file.write_all(text.as_bytes()));
         let diagrams = self.diagrams.into_iter().zip(&drawn);
         let mut files = diagrams
             .map(|(target, svg)| put(target, svg))
             .collect::<Result<Vec<_>, _>>()?;
         files.push(put(self.page, &page)?);
         files.push(put(self.record, &format!("{record}\n"))?);
-        Ok(appear(files)?)
+        Ok(publish(files)?)
     }
 }
 
@@ -91,7 +92,7 @@ fn record(found: &[WorkPrecision], machine: &str) -> Record {
     record
 }
 
-/// The page with its headings, its diagrams and the heads of its tables, and nothing measured.
+/// The page with its headings, diagrams and table heads, but nothing measured.
 pub fn skeleton() -> String {
     let scenes: String = BUILT_IN
         .iter()
@@ -100,7 +101,7 @@ pub fn skeleton() -> String {
     page("", &[], &scenes, &[])
 }
 
-fn page(machine: &str, found: &[WorkPrecision], scenes: &str, costs: &[PartCost]) -> String {
+fn page(machine: &str, found: &[WorkPrecision], scenes: &str, costs: &[CaseCost]) -> String {
     let rows = found.iter().flat_map(|found| {
         let presets = Preset::ALL.into_iter();
         presets.filter_map(|preset| Some(preset_row(found, found.preset(preset)?, preset)))
@@ -135,7 +136,7 @@ fn page(machine: &str, found: &[WorkPrecision], scenes: &str, costs: &[PartCost]
     )
 }
 
-/// The part of a scene: what it is measured against, its diagram, what that says, and the points that the page names.
+/// Section of a scene: its reference, its diagram, what that shows, and the points that the page names.
 fn scene(name: &str, against: &[String], reading: &[String], rows: Vec<Vec<String>>) -> String {
     let list = |lines: &[String]| -> String { lines.iter().map(|l| format!("- {l}\n")).collect() };
     format!(
@@ -165,7 +166,7 @@ fn measured_scene(found: &WorkPrecision) -> String {
     )
 }
 
-/// What a preset is, what it is to hold, and what this run would choose.
+/// What a preset is, the limit it must keep, and what this run would choose.
 fn choice_row(found: &[WorkPrecision], preset: Preset) -> Vec<String> {
     let words = |setting: &Setting| format!("{} {}", setting.method, value(setting));
     let own = found.first().and_then(|found| found.preset(preset));
@@ -188,7 +189,7 @@ fn preset_row(found: &WorkPrecision, point: &Point, preset: Preset) -> Vec<Strin
     row([name, preset.word().to_owned()], found, point, held)
 }
 
-/// Ratios and errors of a point between its names and a last word.
+/// Ratios and errors of a point, between its names and a last cell.
 fn row(names: [String; 2], found: &WorkPrecision, point: &Point, last: &str) -> Vec<String> {
     let floor = &found.reference.floor;
     let ratio = |phase: &Phase| match end(phase) {
@@ -209,7 +210,7 @@ fn row(names: [String; 2], found: &WorkPrecision, point: &Point, last: &str) -> 
     row
 }
 
-/// Points that the page names: on a front, a preset, or what the others are divided by.
+/// Points that the page names: on a front, a preset, or the yardstick.
 fn is_told(point: &Point) -> bool {
     let front = point.impacts.front || point.settled.as_ref().is_some_and(|phase| phase.front);
     front || point.preset.is_some() || is_yardstick(point)
@@ -231,7 +232,7 @@ fn point_row(found: &WorkPrecision, point: &Point) -> Vec<String> {
     row([method, setting], found, point, front)
 }
 
-/// What the numbers say, in words.
+/// What the numbers show, in words.
 fn reading(found: &WorkPrecision) -> Vec<String> {
     let mut told = Vec::new();
     let setting =

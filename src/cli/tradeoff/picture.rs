@@ -8,7 +8,7 @@ use crate::integrate::Method;
 /// Width of one diagram and height of the page, pixels.
 const WIDTH: u32 = 560;
 const HEIGHT: u32 = 500;
-/// Markers of the methods, in their order; a long list begins again.
+/// Markers of the methods, in order; a longer list starts again.
 const MARKERS: [Marker; 8] = [
     Marker::Square,
     Marker::Disc,
@@ -19,12 +19,12 @@ const MARKERS: [Marker; 8] = [
     Marker::Plus,
     Marker::Disc,
 ];
-/// Errors above this are wrong altogether: how wrong says nothing.
+/// Larger errors are wrong altogether: their size means nothing.
 const WORST: f64 = 1.0;
 const FRONT: &str = "On the front: nothing is both faster and more accurate";
 
-/// Error against time, both phases side by side. `relative`: times over that of Runge-Kutta 4 at 10 microseconds, which mean
-/// something on other machines, too.
+/// Error against time, both phases side by side. `relative`: times relative to Runge-Kutta 4 at 10 microseconds, which
+/// also mean something on other machines.
 pub(super) fn picture(found: &WorkPrecision, relative: bool, machine: &str) -> Sheet {
     let floor = &found.reference.floor;
     let mut charts = vec![diagram(
@@ -75,7 +75,7 @@ fn diagram(
         } else {
             phase.cost()?
         };
-        // Below the floor nothing can be told: the point lies on it.
+        // Errors below the floor cannot be resolved: the point lies on it.
         let error = error.max(floor.unwrap_or(0.0));
         (error <= WORST).then_some((cost, error))
     };

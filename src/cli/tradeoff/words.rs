@@ -1,13 +1,13 @@
-//! Numbers and tables of the trade for a person.
+//! Numbers and tables of the trade-off for people.
 
 use std::fmt::Write as _;
 
-use crate::analysis::{End, PartCost, Phase, Point, ReferenceSolution, Setting, WorkPrecision};
+use crate::analysis::{CaseCost, End, Phase, Point, ReferenceSolution, Setting, WorkPrecision};
 use crate::cli::machine;
 use crate::cli::output::significant;
 use crate::scene::format_quantity;
 
-/// A number of times with three digits, `-` where there is none.
+/// A factor with three digits, `-` if there is none.
 pub fn times(value: Option<f64>) -> String {
     value.map_or_else(|| "-".to_owned(), |value| significant(value, 3))
 }
@@ -29,7 +29,7 @@ pub fn value(setting: &Setting) -> String {
     }
 }
 
-/// An error with two digits; one below `floor` is as good as that.
+/// An error with two digits; one below `floor` is shown as less than `floor`.
 pub(super) fn error(value: Option<f64>, floor: Option<f64>) -> String {
     match (value, floor) {
         (None, _) => "-".to_owned(),
@@ -49,7 +49,7 @@ fn exponent(value: f64) -> String {
     }
 }
 
-/// How a phase ended where it did not come to its end.
+/// How a phase ended if it did not reach its end.
 pub(super) fn end(phase: &Phase) -> &'static str {
     match phase.end {
         End::Reached => "",
@@ -58,7 +58,7 @@ pub(super) fn end(phase: &Phase) -> &'static str {
     }
 }
 
-/// What the errors are measured against, a line each.
+/// Description of the reference, a line each.
 pub(super) fn reference(reference: &ReferenceSolution) -> Vec<(&'static str, String)> {
     let ms = |time: f64| format!("{} ms", significant(1e3 * time, 5));
     let floor = &reference.floor;
@@ -175,7 +175,7 @@ pub(super) fn text(found: &WorkPrecision) -> String {
     out
 }
 
-/// A table of the points in one phase: their settings, speeds and work, the errors under `errors`, and how the phase ended.
+/// A table of the points in one phase: settings, speeds and work, the errors under the head `errors`, and how the phase ended.
 fn phase_table(
     found: &WorkPrecision,
     phase: impl Fn(&Point) -> Option<&Phase>,
@@ -211,7 +211,7 @@ fn phase_table(
 }
 
 /// Costs of the parts of the model as text.
-pub(super) fn costs(costs: &[PartCost]) -> String {
+pub(super) fn costs(costs: &[CaseCost]) -> String {
     let head = ["scene", "with", "an evaluation", "a simulated second"];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     rows.extend(cost_rows(costs));
@@ -221,9 +221,9 @@ pub(super) fn costs(costs: &[PartCost]) -> String {
     )
 }
 
-/// Scene and name of each part, cost of an evaluation and of a simulated second over those of the first.
-pub(super) fn cost_rows(costs: &[PartCost]) -> Vec<Vec<String>> {
-    let row = |cost: &PartCost| {
+/// Scene and name of each part, with its costs per evaluation and per simulated second relative to those of the first.
+pub(super) fn cost_rows(costs: &[CaseCost]) -> Vec<Vec<String>> {
+    let row = |cost: &CaseCost| {
         let first = &costs[0];
         vec![
             cost.part.scene.to_owned(),
@@ -235,7 +235,7 @@ pub(super) fn cost_rows(costs: &[PartCost]) -> Vec<Vec<String>> {
     costs.iter().map(row).collect()
 }
 
-/// Rows of cells in columns, the first row being the head: numbers to the right, words to the left.
+/// Aligns rows of cells in columns, the first row being the head: numbers to the right, words to the left.
 pub fn grid(rows: &[Vec<String>]) -> String {
     let is_number = |text: &str| {
         let first = text.chars().next();

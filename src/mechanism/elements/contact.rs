@@ -1,4 +1,4 @@
-//! Loose ball joint: contact between a ball and the wall of its socket, by the laws in `contact`.
+//! Ball joint with clearance: contact between a ball and the wall of its socket, by the laws in `contact`.
 
 use super::{At, Coupling, ForceElement, Loads};
 use crate::contact::{Coefficients, Force, Separation, Slope};
@@ -15,7 +15,7 @@ pub struct Gap {
     pub eccentricity: Vec3,
     /// de/dt, m/s.
     pub eccentricity_rate: Vec3,
-    /// n = e / |e| (8); zero where e is.
+    /// n = e / |e| (8); zero if e is.
     pub normal: Vec3,
     /// delta, m (10).
     pub penetration: f64,
@@ -25,13 +25,13 @@ pub struct Gap {
     pub normal_force: f64,
     /// F_T on the ball, N (20).
     pub friction: Vec3,
-    /// |v_t| that friction reads, m/s.
+    /// |v_t| used by friction, m/s.
     pub slip_speed: f64,
 }
 
-/// A ball joint; a force element where it is loose.
+/// A ball joint; a force element if it has clearance.
 pub struct Contact {
-    /// Its place among the ball joints, and so that of its memory.
+    /// Its index among the ball joints, and so that of its memory.
     index: usize,
     pub joint: BallJoint,
     pub law: Coefficients,
@@ -54,7 +54,7 @@ impl Contact {
         self.joint.ideal.is_none()
     }
 
-    /// Where the ball, off the centre, was at the latest evaluation.
+    /// Separation at the latest evaluation, for a ball that is off centre.
     #[inline]
     pub fn separation(&self) -> Separation {
         let gap = &self.gap;
@@ -62,7 +62,7 @@ impl Contact {
             .separation(&gap.eccentricity, &gap.eccentricity_rate)
     }
 
-    /// Power that friction takes where the contact has the normal `n`, W.
+    /// Power dissipated by friction for the contact normal `n`, W.
     fn friction_power(&self, n: &Vec3, motion: &[Kinematics]) -> f64 {
         let (gap, law) = (&self.gap, &self.law);
         if gap.friction == Vec3::zeros() {
@@ -73,7 +73,7 @@ impl Contact {
         -gap.friction.dot(&surfaces)
     }
 
-    /// What the ball does to the wall of its socket at the latest evaluation; `None` where it does not press.
+    /// Contact of the ball with its socket wall at the latest evaluation; `None` if it does not press on it.
     pub fn touch(&self, motion: &[Kinematics]) -> Option<Touch> {
         if !self.is_loose() || self.gap.normal_force <= 0.0 {
             return None;
@@ -85,8 +85,8 @@ impl Contact {
         })
     }
 
-    /// Unit vector from the socket's centre to the ball's, off the centre, at the latest evaluation, in the axes of the socket's
-    /// body: towards the point of the wall that the ball is next to.
+    /// Unit vector from the socket centre to the ball centre, which must differ from it, at the latest evaluation, in the axes
+    /// of the socket's body: towards the point of the wall nearest to the ball.
     pub fn wall_direction(&self, motion: &[Kinematics]) -> Vec3 {
         let socket = &motion[self.joint.socket.body];
         socket.rotation.tr_mul(&self.separation().normal)
@@ -98,7 +98,7 @@ impl Contact {
         [self.joint.ball.body, self.joint.socket.body].map(|body| &motion[body].angular_velocity)
     }
 
-    /// Relative velocity that friction reads where the normal is `n`, m/s.
+    /// Relative velocity used by friction for the normal `n`, m/s.
     #[inline]
     pub fn friction_reads(&self, n: &Vec3, motion: &[Kinematics]) -> Vec3 {
         let [ball, socket] = self.spins(motion);
@@ -121,7 +121,7 @@ impl Contact {
             return;
         }
         gap.penetration = distance - law.clearance;
-        // A ball at rest at the centre leaves it in the direction in which it moves.
+        // A ball exactly at the centre leaves it in its direction of motion.
         let opening = if distance > 0.0 {
             gap.normal.dot(&gap.eccentricity_rate)
         } else {
@@ -207,7 +207,7 @@ impl ForceElement for Contact {
             normal: n,
             force: n * -gap.normal_force + gap.friction,
             stiffness,
-            reads_surfaces: self.law.reads_surfaces(),
+            uses_surface_velocity: self.law.uses_surface_velocity(),
         })
     }
 

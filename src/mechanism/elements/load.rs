@@ -1,4 +1,4 @@
-//! Force and torque from outside on a body, constant or harmonic, in world or body axes.
+//! External force and torque on a body, constant or harmonic, in world or body axes.
 
 use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, point_of, push};
 use crate::mechanism::Powers;
@@ -11,7 +11,7 @@ struct Load {
     force: Vec3,
     torque: Vec3,
     turns: bool,
-    /// rad/s; 0 where constant.
+    /// rad/s; 0 if constant.
     omega: f64,
     phase: f64,
 }

@@ -1,5 +1,5 @@
-//! Force elements: what pushes bodies without a constraint. Each kind is one file. Loose ball joints are among them; the others
-//! are those of a scene's own list, each kind with a row below.
+//! Force elements: whatever loads bodies without a constraint. One file per kind. Ball joints with clearance are among them;
+//! the others come from the scene's own list, each kind with an entry below.
 
 mod contact;
 mod load;
@@ -25,87 +25,87 @@ pub(super) struct At<'a> {
     pub touching: Touching<'a>,
 }
 
-/// What elements add to at an evaluation.
+/// What elements add to in an evaluation.
 pub(super) struct Loads<'a> {
     /// On the bodies, about their centroids; the last is the world's.
     pub wrench: &'a mut [Wrench],
     pub counts: &'a mut Counts,
-    /// A sliding speed or a penetration rate was beyond the piece of its law that the memory holds.
+    /// A sliding speed or penetration rate was beyond the piece of its law held in the memory.
     pub left_piece: bool,
 }
 
-/// How the force between two points answers to their relative motion.
+/// How the force between two points depends on their relative motion.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Coupling {
-    /// The points, first the one that `force` acts on, each with how far beyond it along `normal` its body is pushed, m.
+    /// The points, first the one `force` acts on, each with the distance along `normal` from it to where the force acts, m.
     pub sides: [(Anchor, f64); 2],
-    /// Zero where the bodies are pushed at the points.
+    /// Zero if the force acts at the points themselves.
     pub normal: Vec3,
-    /// Force on the first, N, where it acts along a normal that turns with the points; zero elsewhere.
+    /// Force on the first, N, if it acts along a normal that turns with the points; otherwise zero.
     pub force: Vec3,
     /// Derivatives of the force.
     pub stiffness: Stiffness,
-    /// Whether the part of it by slip follows the surfaces and not the points.
-    pub reads_surfaces: bool,
+    /// Whether its slip-dependent part follows the surfaces rather than the points.
+    pub uses_surface_velocity: bool,
 }
 
 impl Coupling {
-    /// Of a force on the second of two points that acts there: by their distance, N/m, and by its rate, N s/m.
+    /// For a force on the second of two points that acts there: derivatives by their distance, N/m, and by its rate, N s/m.
     fn between_points([from, to]: [Anchor; 2], by_displacement: Mat3, by_rate: Mat3) -> Self {
         Self {
             sides: [(to, 0.0), (from, 0.0)],
             normal: Vec3::zeros(),
             force: Vec3::zeros(),
             stiffness: Stiffness::between_points(by_displacement, by_rate),
-            reads_surfaces: false,
+            uses_surface_velocity: false,
         }
     }
 }
 
-/// What an element reports of an instant. SI units.
+/// Report of an element at one instant. SI units.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ElementReport {
-    /// Where it acts: both points of an element between two, the same point twice of another, m.
+    /// Where it acts: both points of an element between two, otherwise the same point twice, m.
     pub points: [Vec3; 2],
     /// Force on the second, N.
     pub force: Vec3,
-    /// Torque on the body, N m, of a kind that has one.
+    /// Torque on the body, N m, if the kind has one.
     pub torque: Option<Vec3>,
 }
 
-/// Something that loads bodies by their motion and by time. Allocates nothing.
+/// Something that loads bodies depending on their motion and on time. Allocates nothing.
 pub(super) trait ForceElement: Send {
     /// Adds its loads.
     fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>);
 
-    /// The two points to whose relative motion it answers; `None` where nothing of it is stiff.
+    /// The two points on whose relative motion it depends; `None` if nothing about it is stiff.
     fn ends(&self) -> Option<[Anchor; 2]>;
 
-    /// How it answers there, after an evaluation; `None` where it does not.
+    /// Its linearisation there, after an evaluation; `None` if it has none.
     fn coupling(&self, at: &At<'_>) -> Option<Coupling>;
 
-    /// Energy stored, J; of a contact that at the gap last measured.
+    /// Energy stored, J; for a contact, at the gap last measured.
     fn stored(&self, motion: &[Kinematics]) -> f64;
 
     /// Adds its powers at `t`, after an evaluation.
     fn add_powers(&self, t: f64, motion: &[Kinematics], powers: &mut Powers);
 }
 
-/// One of a scene's own list. A ball joint is reported as one, loose or not.
+/// An element of the scene's own list. Ball joints, with clearance or without, are reported as joints.
 pub(super) trait SceneElement: ForceElement {
-    /// Period of what it does by time alone, s; infinite where that does not change.
+    /// Period of its explicit time dependence, s; infinite if it has none.
     fn period(&self) -> f64 {
         f64::INFINITY
     }
 
-    /// What it does at `t`.
+    /// Its report at `t`.
     fn report(&self, t: f64, motion: &[Kinematics]) -> ElementReport;
 }
 
-/// Makes the element of one kind; its points as anchors.
+/// Makes an element of one kind, with its points as anchors.
 type Make = fn(&Element, &[Anchor]) -> Box<dyn SceneElement>;
 
-/// Every kind by its section.
+/// All kinds by section.
 const KINDS: [(&str, Make); 2] = [("spring", spring::make), ("load", load::make)];
 
 /// The force elements of `scene`, in its order.
@@ -125,7 +125,7 @@ pub(super) fn elements_of(scene: &Scene, model: &Model) -> Vec<Box<dyn SceneElem
     scene.elements.iter().map(make).collect()
 }
 
-/// The element of a hand that pulls.
+/// The element for a pulling hand.
 pub(super) fn hand(scene: &Scene, model: &Model, pull: Pull) -> Box<dyn SceneElement> {
     let point = Attachment {
         body: Some(pull.body),

@@ -1,5 +1,5 @@
-//! A hand that pulls on a body: a spring and a damper from a point of it to a place that the hand holds. To the scene it is
-//! something outside, so all that it does is work from outside.
+//! A hand that pulls on a body: a spring and a damper between a point of the body and the hand. It is external to the
+//! scene, so all its work is external.
 
 use super::{
     At, Coupling, ElementReport, ForceElement, Loads, Powers, SceneElement, point_of, push,
@@ -8,13 +8,13 @@ use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::model::Anchor;
 use crate::scene::{Scene, Vec3};
 
-/// Frequency at which all that moves would swing on the spring, Hz: soft enough for every method, and in the length of a hand's
-/// move a few times the weight.
+/// Natural frequency of all moving bodies together on the spring, Hz: soft enough for every method, and a few times the
+/// weight over the length of a hand movement.
 const FREQUENCY: f64 = 3.0;
-/// Damping of that swinging, in parts of the critical one.
+/// Damping ratio of that oscillation.
 const DAMPING: f64 = 0.3;
 
-/// Where somebody pulls, and how.
+/// Where the hand pulls, and how.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pull {
     /// Body, by its index in the scene.
@@ -35,7 +35,7 @@ pub(super) struct Hand {
 }
 
 impl Pull {
-    /// On `point` of body `body` of `scene`, m in its scene frame, as softly as suits its masses; the hand is at `hand`, m.
+    /// On `point` (m, scene frame) of body `body` of `scene`, as softly as suits the scene's masses; the hand is at `hand`, m.
     pub fn softly(scene: &Scene, body: usize, point: Vec3, hand: Vec3) -> Self {
         let mass: f64 = scene.bodies.iter().map(|body| body.mass).sum();
         let rate = std::f64::consts::TAU * FREQUENCY;
@@ -48,7 +48,7 @@ impl Pull {
         }
     }
 
-    /// What it does with the point at a place, m, with a velocity, m/s: from the hand to the point.
+    /// Its report for a given position, m, and velocity, m/s, of the point: from the hand to the point.
     pub fn report(&self, point: Vec3, velocity: Vec3) -> ElementReport {
         ElementReport {
             points: [self.hand, point],
@@ -59,7 +59,7 @@ impl Pull {
 }
 
 impl Hand {
-    /// What it does, the velocity of the point and its arm from the centroid.
+    /// Its report, the velocity of the point and its arm from the centroid.
     fn at(&self, motion: &[Kinematics]) -> (ElementReport, Vec3, Vec3) {
         let (point, velocity, arm) = point_of(&self.on, motion);
         (self.pull.report(point, velocity), velocity, arm)
@@ -72,7 +72,7 @@ impl ForceElement for Hand {
         push(&mut loads.wrench[self.on.body], &arm, &report.force);
     }
 
-    // Soft by choice: nothing that an implicit method would have to know.
+    // Soft by design: nothing that an implicit method has to linearise.
     fn ends(&self) -> Option<[Anchor; 2]> {
         None
     }

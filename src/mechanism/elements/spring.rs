@@ -15,11 +15,11 @@ struct Spring {
     preload: f64,
 }
 
-/// One instant.
+/// State at one instant.
 struct State {
     arms: [Vec3; 2],
     points: [Vec3; 2],
-    /// Velocity of `to` against `from`, m/s.
+    /// Velocity of `to` relative to `from`, m/s.
     velocity: Vec3,
     /// Distance of the points, m, and unit vector from `from` to `to`; zero where they coincide.
     length: f64,
@@ -81,7 +81,7 @@ impl ForceElement for Spring {
     fn coupling(&self, at: &At<'_>) -> Option<Coupling> {
         let (s, ends) = (self.state(at.motion), [self.from, self.to]);
         if s.length == 0.0 {
-            // A bush pulls back however its points part; else the direction, and with it the force, jumps here.
+            // A bushing resists separation in any direction; otherwise the direction, and with it the force, jumps here.
             let bush = self.length == 0.0 && self.preload == 0.0;
             let by_displacement = Mat3::identity() * -self.stiffness;
             return bush.then(|| Coupling::between_points(ends, by_displacement, Mat3::zeros()));

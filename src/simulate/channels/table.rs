@@ -1,5 +1,5 @@
-//! The one table of what is read from a frame: what it is called in plots and in files, and how it is read. Plots, their
-//! tooltips, saved records and the rows of `run` follow from it.
+//! The single table of what is read from a frame: names in plots and in files, and how each value is read. Plots, their
+//! tooltips, saved records and the rows of `run` are all derived from it.
 
 use Quantity as Q;
 use Take::{
@@ -31,16 +31,16 @@ pub enum Quantity {
     TipError,
 }
 
-/// What a plot says of its quantity.
+/// How a plot presents its quantity.
 struct Plot {
     quantity: Quantity,
     label: &'static str,
-    /// Unit on the axis, and SI units in one of it.
+    /// Axis unit, and its value in SI units.
     unit: (&'static str, f64),
     help: &'static str,
 }
 
-/// Every plot, in the order in which a list shows them.
+/// Every plot, in list order.
 const PLOTS: &[Plot] = &[
     Plot {
         quantity: Q::NormalForce,
@@ -144,7 +144,7 @@ const PLOTS: &[Plot] = &[
 ];
 
 impl Quantity {
-    /// All of them, in the order in which a list shows them.
+    /// All of them, in list order.
     pub const ALL: [Self; PLOTS.len()] = {
         let mut all = [Self::NormalForce; PLOTS.len()];
         let mut i = 0;
@@ -165,17 +165,18 @@ impl Quantity {
         self.plot().label
     }
 
-    /// Unit on the axis, and SI units in one of it.
+    /// Axis unit, and its value in SI units.
     pub fn unit(self) -> (&'static str, f64) {
         self.plot().unit
     }
 
-    /// What it is, in a sentence.
+    /// A one-sentence description.
     pub fn help(self) -> &'static str {
         self.plot().help
     }
 
-    /// Whether this member of [`Self::EnergyBalance`] takes energy, or holds it; the others give. All together cancel.
+    /// Whether this member of [`Self::EnergyBalance`] takes or stores energy; the others supply it. All of them sum to
+    /// zero.
     pub fn takes(member: &str) -> bool {
         TABLE
             .iter()
@@ -183,10 +184,10 @@ impl Quantity {
     }
 }
 
-/// How a signal is read from a frame, SI units and world axes, and how many there are of it.
+/// How a signal is read from a frame (SI units, world axes), and what it is repeated for.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Take {
-    /// Of the whole; name among the members of its plot.
+    /// A single value; with its member name in the plot.
     Whole(&'static str, fn(&Frame) -> f64),
     /// Of the output body, along x, y, z.
     Axes(fn(&Pose) -> Vec3),
@@ -200,13 +201,13 @@ pub(super) enum Take {
     Slide,
     /// Actuator of each driven hinge.
     Hinge,
-    /// A term of the energy balance that gives energy, with its name there.
+    /// A term of the energy balance that supplies energy, with its member name.
     Given(&'static str, fn(&Ledger) -> f64),
-    /// One that takes energy, or holds it.
+    /// A term that takes or stores energy.
     Taken(&'static str, fn(&Ledger) -> f64),
     /// Along x, y, z.
     ProbeError,
-    /// Of each force element that has it, along x, y, z.
+    /// Of each force element that reports it, along x, y, z.
     Element(fn(&ElementReport) -> Option<Vec3>),
 }
 
@@ -223,7 +224,7 @@ pub(super) enum Each {
     Element,
 }
 
-/// Names of the values of a signal: in plots, and in columns.
+/// Names of a signal's components: in plots, and in columns.
 pub(super) type Components = &'static [(&'static str, &'static str)];
 
 impl Take {
@@ -246,7 +247,7 @@ impl Take {
         }
     }
 
-    /// Name among the members of its plot, where the signal has one of its own.
+    /// Member name in its plot, where the signal has its own.
     pub(super) fn member(&self) -> &'static str {
         match *self {
             Whole(member, _) | Given(member, _) | Taken(member, _) => member,
@@ -254,7 +255,7 @@ impl Take {
         }
     }
 
-    /// Value of one component for the `part`-th of what it is repeated for; `None` where the frame does not know it.
+    /// Value of one component for part `part`; `None` where the frame does not have it.
     #[inline]
     pub(super) fn value(&self, frame: &Frame, part: usize, component: usize) -> Option<f64> {
         match self {
@@ -273,20 +274,20 @@ impl Take {
 /// One recorded quantity.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Signal {
-    /// Its column in files, with the SI unit: `@` stands for the name of what it is repeated for, `#` for that of the component.
+    /// Column name in files, with the SI unit: `@` stands for the name of the part, `#` for that of the component.
     pub column: &'static str,
     /// Plot that shows it.
     pub plot: Option<Quantity>,
-    /// Place in the rows of `run`, the lower first. Those of one place stand in the order of the table, part by part where
-    /// they are repeated. Readers know columns by their place, too: a new one goes behind all others.
+    /// Place in the rows of `run`, lowest first. Signals of the same place keep the order of the table, part by part where
+    /// they are repeated. Readers also rely on column positions: append new columns at the end.
     pub run: Option<u8>,
     /// How it is read.
     pub take: Take,
-    /// Whether a scene without force elements has it not.
+    /// Whether it is absent in a scene without force elements.
     pub of_elements: bool,
 }
 
-/// A signal of a plot and of `run`.
+/// A signal in both a plot and `run`.
 const fn both(column: &'static str, plot: Quantity, run: u8, take: Take) -> Signal {
     Signal {
         column,
@@ -297,7 +298,7 @@ const fn both(column: &'static str, plot: Quantity, run: u8, take: Take) -> Sign
     }
 }
 
-/// One of a plot alone.
+/// A signal in a plot only.
 const fn plotted(column: &'static str, plot: Quantity, take: Take) -> Signal {
     Signal {
         run: None,
@@ -305,7 +306,7 @@ const fn plotted(column: &'static str, plot: Quantity, take: Take) -> Signal {
     }
 }
 
-/// One of `run` alone.
+/// A signal in `run` only.
 const fn listed(column: &'static str, run: u8, take: Take) -> Signal {
     Signal {
         plot: None,
@@ -352,7 +353,7 @@ pub(super) const TABLE: &[Signal] = &[
     both("gravity_work_J", Q::EnergyBalance, 10, Given("gravity", |ledger| ledger.gravity_work)),
     both("clearance_work_J", Q::EnergyBalance, 11, Given("clearance", |ledger| ledger.clearance_work)),
     plotted("change_work_J", Q::EnergyBalance, Given("changes", |ledger| ledger.change_work)),
-    // A hand can pull on any scene.
+    // Any scene can be pulled by hand.
     plotted("external_work_J", Q::EnergyBalance, Given("external", |ledger| ledger.external_work)),
     of_elements(listed("external_work_J", 14, Given("external", |ledger| ledger.external_work))),
     both("restitution_loss_J", Q::EnergyBalance, 10, Taken("restitution", |ledger| ledger.restitution_loss)),
@@ -362,7 +363,7 @@ pub(super) const TABLE: &[Signal] = &[
     plotted("elastic_change_J", Q::EnergyBalance, Taken("elastic", |ledger| ledger.elastic_change)),
     both("energy_residual_J", Q::EnergyBalance, 11, Given("residual", Ledger::residual)),
 
-    // Given by who computes the ideal motion beside the run.
+    // Supplied by whoever computes the ideal motion alongside the run.
     plotted("tip_error_m", Q::TipError, Whole("distance", |_| f64::NAN)),
     both("probe_error_#_m", Q::ProbeError, 9, ProbeError),
 
@@ -370,7 +371,7 @@ pub(super) const TABLE: &[Signal] = &[
     listed("@_torque_#_Nm", 12, Element(|element| element.torque)),
 ];
 
-/// Number that stands for a contact state in files.
+/// Code of a contact state in files.
 fn state_code(state: ContactState) -> f64 {
     match state {
         ContactState::Free => 0.0,

@@ -55,7 +55,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// One try of a step with its event; `None` where it has to be repeated with the smaller `h_next` that it left.
+    /// One attempt at a step with its event; `None` if it must be repeated with the smaller `h_next` it has set.
     fn attempt_adaptive(&mut self, limit: f64) -> Option<(f64, f64)> {
         let t = self.state.now.t;
         let tolerance = self.running.solver.tolerance;
@@ -74,7 +74,7 @@ impl Simulation {
             return None;
         }
         let next = h * state.control.controller.after_accept(error);
-        // A step cut short says nothing against the longer one.
+        // A step cut short is no evidence against the longer one.
         state.control.h_next = if cut {
             state.control.h_next.max(next)
         } else {
@@ -90,7 +90,7 @@ impl Simulation {
             && corner.is_at_start()
             && !self.attempt.turned
         {
-            // One more try on the other piece; it may well lead back here, and then this one is as good.
+            // Retry once on the other piece; if that leads back here, this piece is as good.
             self.attempt.turned = true;
             corner.next.put(&mut self.state.now.memory[corner.joint]);
             self.stepper.invalidate();
@@ -100,7 +100,7 @@ impl Simulation {
         }
         let corner = corner.filter(|corner| !corner.is_at_start());
         if let Some(corner) = corner {
-            // The whole step worked; where the rate stops rising, soon after a beginning contact, says nothing against it.
+            // The whole step worked; a rate that stops rising soon after the contact began is no evidence against it.
             if contact_began && matches!(corner.next, Piece::Approach(_)) {
                 self.state.control.h_contact = h.max(1e-9);
             }
@@ -110,7 +110,7 @@ impl Simulation {
             self.end_at(corner.theta, t_end, h);
             h *= corner.theta;
         } else if let Some(theta) = event {
-            // The step is taken again, shorter, so that its end carries the method's error and not the interpolant's.
+            // The step is repeated, shortened, so that its end carries the method's error and not the interpolant's.
             t_end = t + theta * h;
             h *= theta;
             if !self.try_step(h).is_finite() {
@@ -125,8 +125,8 @@ impl Simulation {
         Some((t_end, h))
     }
 
-    /// Fraction of the step just attempted at which the first contact starts or ends, if one does; that joint is put
-    /// down in `located`.
+    /// Fraction of the step just attempted at which the first contact starts or ends, if any; its joint is stored in
+    /// `located`.
     fn first_event(&mut self, h: f64) -> Option<f64> {
         let mut first: Option<f64> = None;
         self.attempt.located = None;
@@ -145,7 +145,7 @@ impl Simulation {
         first
     }
 
-    /// Where joint `j` leaves the state that its memory says, as a fraction of the step just attempted.
+    /// Where joint `j` leaves the contact state in its memory, as a fraction of the step just attempted.
     fn event_of(&mut self, j: usize, h: f64) -> Option<f64> {
         let (start, end) = (self.state.now.gaps[j], self.attempt.end.gaps[j]);
         // Positive where the gap contradicts the recorded contact state.
@@ -154,7 +154,8 @@ impl Simulation {
         } else {
             1.0
         };
-        // A ball may cross its play several times in one long step: look at pieces that are short against the play.
+        // A ball may cross its play several times in one long step: search intervals in which it moves little compared with
+        // the play.
         let travel = h * start.speed.max(end.speed);
         let clearance = self.mechanism.contacts.clearance(j);
         let pieces = (4.0 * travel / clearance).ceil().clamp(1.0, 64.0);
@@ -177,11 +178,11 @@ impl Simulation {
             }
             left = right;
         }
-        // In the wrong state all along: it switches at the end of the step.
+        // In the wrong state throughout: it switches at the end of the step.
         None
     }
 
-    /// Two points of a piece of the step between which the signed gap turns positive.
+    /// Two points within an interval of the step that bracket the signed gap turning positive.
     fn crossing_within(
         &mut self,
         j: usize,
@@ -193,7 +194,7 @@ impl Simulation {
         if left.gap < 0.0 && right.gap > 0.0 {
             return Some((left, right));
         }
-        // An extremum inside: a touch that both ends miss, or a way out and back.
+        // An extremum inside: a brief contact that both ends miss, or a brief separation.
         let (mut a, mut b) = (left, right);
         let turns = if right.gap > 0.0 {
             a.rate < 0.0 && b.rate > 0.0
@@ -204,7 +205,7 @@ impl Simulation {
             return None;
         }
         for _ in 0..40 {
-            // Neither tangent reaches zero: nothing to find.
+            // Neither tangent reaches zero: no root here.
             let reach = (a.gap + a.rate * (b.theta - a.theta) * h)
                 .min(b.gap - b.rate * (b.theta - a.theta) * h);
             if right.gap <= 0.0 && reach < 0.0 {

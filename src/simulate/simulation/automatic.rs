@@ -1,51 +1,51 @@
-//! Which method of the automatic pair steps: the explicit one through impacts, the implicit one once contacts settled.
+//! Which method of the automatic pair steps: the explicit one through impacts, the implicit one once contacts have settled.
 
 use super::Simulation;
 use crate::integrate::{Controller, Method};
 use crate::mechanism::{Mechanism, MechanismError};
 
-/// h |lambda| beyond which an explicit step is held by stability.
+/// h |lambda| beyond which an explicit step is limited by stability.
 pub(super) const HELD_BY_STABILITY: f64 = 3.0;
-/// Steps that must be held by stability, or taken since the latest contact began, before the implicit method is tried.
+/// Steps that must be limited by stability, or taken since the latest contact began, before the implicit method is tried.
 const HELD_STEPS: u32 = 8;
 const SETTLED_STEPS: u32 = 60;
-/// Over so many implicit steps the progress per cost must be this many times the explicit method's; else the explicit one
-/// has its turn for so many steps, and twice as many after each trial in a row that fails.
+/// Over this many implicit steps the progress per cost must be this many times the explicit method's; otherwise the
+/// explicit one gets this many steps, and twice as many after each consecutive failed trial.
 const TRIAL_STEPS: u32 = 12;
 const WORTH_IT: f64 = 2.0;
 const EXPLICIT_TURN: u32 = 200;
 const LONGEST_TURN: u32 = 6400;
 /// Evaluations of one explicit step.
 const EXPLICIT_EVALUATIONS: f64 = 6.0;
-/// Dense algebra of an implicit step, in evaluations: the square of the velocity coordinates over this. (An evaluation is linear
-/// in them and a factorisation cubic; measured on chains of 4 to 16 links.)
+/// Cost of an implicit step's dense algebra, in evaluations: the square of the number of velocity coordinates over this.
+/// (An evaluation is linear in them and a factorisation cubic; measured on chains of 4 to 16 links.)
 const SQUARE_OF_AN_EVALUATION: f64 = 36.0;
-/// More velocity coordinates than this are refused by the implicit methods, whose matrices are dense.
+/// The implicit methods, whose matrices are dense, refuse more velocity coordinates than this.
 pub const LARGEST_DENSE: usize = 1024;
-/// More velocity coordinates than this make a dense factorisation dearer than many explicit steps: the automatic pair stays
-/// with those.
+/// With more velocity coordinates than this a dense factorisation costs more than many explicit steps: the automatic pair
+/// stays explicit.
 pub const LARGEST_IMPLICIT: usize = 96;
 
-/// Memory of the automatic pair.
+/// State of the automatic pair.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Choice {
-    /// Explicit steps since the latest contact began, and how many of them were held by stability.
+    /// Explicit steps since the latest contact began, and how many of them were limited by stability.
     pub(super) since_contact: u32,
     pub(super) held: u32,
     /// Explicit steps before the implicit method may be tried again.
     pub(super) wait: u32,
-    /// Explicit step at the latest change to the implicit method, s.
+    /// Explicit step size at the latest switch to the implicit method, s.
     pub(super) h_explicit: f64,
     /// Time and cost, in evaluations, of the implicit steps on trial.
     pub(super) progress: f64,
     pub(super) cost: f64,
     pub(super) steps: u32,
-    /// Trials in a row that failed.
+    /// Consecutive failed trials.
     pub(super) failures: u32,
 }
 
 impl Simulation {
-    /// Which method of the automatic pair takes the next step, after one of size `h` that took so many evaluations.
+    /// Chooses the method of the automatic pair for the next step, after one of size `h` that took `evaluations`.
     pub(super) fn vote(&mut self, h: f64, stiffness: f64, evaluations: u64) {
         let velocities = self.state.now.y.len() - self.mechanism.positions();
         let state = &mut self.state;
@@ -53,7 +53,7 @@ impl Simulation {
         if state.control.contact_began {
             choice.since_contact = 0;
             choice.held = 0;
-            // An impact is short and not stiff: the explicit method resolves it at less cost.
+            // An impact is short and not stiff: the explicit method resolves it more cheaply.
             if state.control.implicit && state.now.memory.iter().any(|m| m.active && !m.floored) {
                 state.control.implicit = false;
                 state.control.controller = controller_of(Method::Automatic, false);

@@ -7,18 +7,18 @@ use crate::contact::{ApproachPiece, Coefficients};
 use crate::scene::least_impact_steps;
 use crate::simulate::peaks::Course;
 
-/// What the end of a step changed in the contacts' memory.
+/// What the end of a step changed in the contact memory.
 #[derive(Clone, Copy)]
 pub(super) struct Switched {
     /// A contact began or ended.
     pub contacts: bool,
-    /// The force at the step's end is another with the approach speed just found.
+    /// The force at the step's end changes with the approach speed just found.
     pub forces: bool,
 }
 
 impl State {
-    /// Puts down a step of contact `j`, from its part `from` on, with the largest normal force `force` (N), while its memory held
-    /// `remembered` (m/s).
+    /// Records a step of contact `j`, from fraction `from` on, with the largest normal force `force` (N) and the remembered
+    /// approach speed `remembered` (m/s).
     fn follow(
         &mut self,
         j: usize,
@@ -69,8 +69,8 @@ impl Simulation {
                 let remembered = state.now.memory[j].approach_speed;
                 state.follow(j, &course, coefficients, strongest[j].0, remembered, 0.0);
             }
-            // A located switch ends within rounding of the wall, on either side; but the step taken again may show that a
-            // ball that was about to separate turned around before.
+            // A located switch ends within rounding of the wall, on either side; but the repeated step may show that a ball
+            // about to separate turned around before.
             let turned = state.now.memory[j].active && end.penetration > 0.0 && end.rate > 0.0;
             let touching = if located == Some(j) {
                 !state.now.memory[j].active || turned
@@ -112,7 +112,7 @@ impl Simulation {
                     .impacts
                     .begin(j, time, rate, asked, coefficients, among_others);
                 let mut memory = Memory::begun(coefficients, rate);
-                // A located one begins where the step ends.
+                // A located contact begins where the step ends.
                 if immediate {
                     if coefficients.largest {
                         memory.approach_speed = memory.approach_speed.max(course.fastest(theta).0);
@@ -173,7 +173,7 @@ impl Simulation {
             } else if state.now.memory[j].active {
                 course.strongest(&coefficients, state.now.memory[j].approach_speed)
             } else {
-                // It came and went within the step, without a memory: its approach speed was the rate at each instant.
+                // It began and ended within the step, with no memory: its approach speed was the rate at each instant.
                 coefficients.largest = true;
                 course.strongest(&coefficients, coefficients.speed_floor)
             };
@@ -193,7 +193,7 @@ impl Simulation {
                 peaks[j].normal = force;
                 peaks[j].time = time;
                 peaks[j].normal_force = n * -force;
-                // Friction follows the normal force within a step: its ratio at the step's end serves for the peak.
+                // Friction follows the normal force within a step: the ratio at the step's end is used for the peak.
                 peaks[j].friction_force = if gap.normal_force > 0.0 {
                     gap.friction * (force / gap.normal_force)
                 } else {

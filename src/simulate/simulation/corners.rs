@@ -1,23 +1,23 @@
-//! Corners of the contact laws as events: each touching joint holds one piece of the friction law over a whole step, and one
-//! of the rule for its approach speed, and the step ends where its sliding speed or its penetration rate leaves that piece.
+//! Corners of the contact laws as events: over a whole step each touching joint stays on one piece of the friction law and
+//! one piece of the approach-speed rule, and the step ends where its sliding speed or penetration rate leaves that piece.
 
 use super::Simulation;
 use crate::contact::{ApproachPiece, FrictionPiece, Memory};
 use crate::integrate::{Method, find_root};
 
-/// Parts of a step at whose ends the sliding speed is looked at.
+/// Parts of a step at whose ends the sliding speed is checked.
 const PARTS: u32 = 4;
-/// A corner earlier than this fraction of the step was passed at its start: the step is taken again on the next piece.
+/// A corner earlier than this fraction of the step was passed at its start: the step is repeated on the next piece.
 const AT_START: f64 = 1e-9;
-/// The same where a rate stops rising: it is level there, and the force to second order the same on both pieces.
+/// The same where a rate stops rising: it is stationary there, and the force agrees to second order on both pieces.
 const LEVEL_AT_START: f64 = 1e-3;
-/// A rate beyond the largest so far by less than this part of it is that.
+/// A rate that exceeds the largest so far by less than this fraction of it counts as equal.
 const NO_FASTER: f64 = 1e-6;
-/// Golden sections of two quarters of a step in which a rate is largest: to 2e-4 of the step.
+/// Golden-section iterations over the two quarters of a step in which a rate is largest: to 2e-4 of the step.
 const SECTIONS: u32 = 16;
-/// What a step that ends at a corner adds to the chatter; any other takes one off.
+/// Chatter added by a step that ends at a corner; any other step subtracts one.
 const CORNER: u32 = 3;
-/// Chatter from which corners are no longer located, until it has died down.
+/// Chatter above which corners are no longer located, until it has died down.
 const MOST_CHATTER: u32 = 60;
 
 /// A corner inside the step just attempted.
@@ -33,12 +33,12 @@ pub(super) struct Corner {
 pub(super) enum Piece {
     /// Of the friction law.
     Friction(FrictionPiece),
-    /// Of the rule for the approach speed.
+    /// Of the approach-speed rule.
     Approach(ApproachPiece),
 }
 
 impl Piece {
-    /// Puts a contact onto it.
+    /// Puts a contact on it.
     pub(super) fn put(self, memory: &mut Memory) {
         match self {
             Self::Friction(piece) => memory.friction_piece = piece,
@@ -55,15 +55,15 @@ impl Corner {
 }
 
 impl Simulation {
-    /// Whether the method locates corners. It needs an interpolant of its own: a cubic through both ends of a step longer
-    /// than a contact rings overshoots inside, and a step that ends on it gains energy.
+    /// Whether the method locates corners. It needs its own interpolant: over a step longer than the contact's oscillation
+    /// a cubic through both ends overshoots, and a step that ends on it gains energy.
     fn locates_corners(&self) -> bool {
         let method = self.running.solver.method;
         method.is_adaptive() && method != Method::Rosenbrock
     }
 
-    /// Puts every touching joint on the pieces of the laws on which it is now; those that hold some already keep
-    /// them unless `anew`. Where corners are not located, all follow the whole laws.
+    /// Puts every touching joint on its current pieces of the laws; those that already hold some keep them unless `anew`.
+    /// Where corners are not located, all follow the whole laws.
     pub(super) fn hold_pieces(&mut self, anew: bool) {
         let holds = self.locates_corners() && !self.state.control.chatters;
         let keeps = |slip: FrictionPiece| slip != FrictionPiece::Unsplit && !anew;
@@ -77,7 +77,7 @@ impl Simulation {
         let Self {
             mechanism, state, ..
         } = self;
-        // A rate that was held below the largest so far has passed it only at a corner; one that rose may have stopped.
+        // A rate below the largest so far exceeds it only at a corner; a rising one may have stopped rising.
         for (j, memory) in state.now.memory.iter_mut().enumerate() {
             let c = mechanism.contacts.coefficients(j);
             if memory.approach_piece == ApproachPiece::Rising
@@ -89,7 +89,8 @@ impl Simulation {
                 && memory.approach_piece == ApproachPiece::Unsplit
                 && !anew
             {
-                memory.approach_piece = c.pace_at(memory.approach_speed, state.now.gaps[j].rate);
+                memory.approach_piece =
+                    c.approach_piece_at(memory.approach_speed, state.now.gaps[j].rate);
             }
         }
         if state
@@ -107,10 +108,10 @@ impl Simulation {
                 memory.friction_piece = FrictionPiece::Unsplit;
             } else if !keeps(memory.friction_piece) {
                 let speed = mechanism.slip_speed(j);
-                memory.friction_piece = c.slip_at(speed);
+                memory.friction_piece = c.friction_piece_at(speed);
                 if anew {
                     let rate = mechanism.contacts.gap(j).rate;
-                    memory.approach_piece = c.pace_at(memory.approach_speed, rate);
+                    memory.approach_piece = c.approach_piece_at(memory.approach_speed, rate);
                 }
             }
         }
@@ -146,7 +147,7 @@ impl Simulation {
         first
     }
 
-    /// Where the penetration rate of joint `j` passes the largest so far.
+    /// Where the penetration rate of joint `j` exceeds the largest so far.
     fn overtaking(&mut self, j: usize, h: f64) -> Option<(f64, Piece)> {
         let most = self.state.now.memory[j].approach_speed * (1.0 + NO_FASTER);
         let mut left = (0.0, self.state.now.gaps[j].rate - most);
@@ -213,7 +214,7 @@ impl Simulation {
         self.mechanism.measure(time, &self.scratch_y);
     }
 
-    /// State at the part `theta` of the attempted step, of size `h`, into the scratch state.
+    /// State at fraction `theta` of the attempted step, of size `h`, written to the scratch state.
     fn interpolate_attempt(&mut self, theta: f64, h: f64) {
         let (now, end) = (&self.state.now, &self.attempt.end);
         let scratch = &mut self.scratch_y;
@@ -221,7 +222,8 @@ impl Simulation {
             .interpolate(theta, h, &now.y, &now.k, &end.y, &end.k, scratch);
     }
 
-    /// Where the sliding speed of joint `j` leaves its piece, as a fraction of the step just attempted, and for which piece.
+    /// Where the sliding speed of joint `j` leaves its piece, as a fraction of the step just attempted, and for which
+    /// piece.
     fn corner_of(&mut self, j: usize, h: f64) -> Option<(f64, Piece)> {
         let mut left = (0.0, self.beyond(j, 0.0, h).0);
         for n in 1..=PARTS {
@@ -252,8 +254,8 @@ impl Simulation {
         None
     }
 
-    /// Lets the step just attempted end at a corner. Unlike a beginning contact it is not taken again: its end would be
-    /// off the corner by the tolerance, which is not small against the ramp, and slide back at once.
+    /// Ends the step just attempted at a corner. Unlike at the start of a contact the step is not repeated: its end would
+    /// miss the corner by the tolerance, which is not small compared with the ramp, and slide back at once.
     pub(super) fn end_at(&mut self, theta: f64, t_end: f64, h: f64) {
         self.interpolate_attempt(theta, h);
         self.attempt.end.y.copy_from_slice(&self.scratch_y);
@@ -270,8 +272,8 @@ impl Simulation {
         (c.beyond(slip, speed), speed)
     }
 
-    /// After an accepted step: goes on to the piece behind the corner that it ended at, and stops locating for a while
-    /// where corners follow one another with hardly a step between.
+    /// After an accepted step: moves to the piece beyond the corner at its end, and stops locating for a while if corners
+    /// follow one another almost step by step.
     pub(super) fn pass_corner(&mut self) {
         let state = &mut self.state;
         if let Some((j, next)) = self.attempt.corner.take() {

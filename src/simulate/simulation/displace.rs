@@ -1,12 +1,12 @@
-//! A state moved by hand: what a twin run and its renormalisation need.
+//! Perturbing the state: for a twin run and its renormalisation.
 
 use super::Simulation;
 use crate::contact::{ApproachPiece, FrictionPiece, Memory};
 
 impl Simulation {
-    /// Adds `offset` to coordinates and velocities (as [`Self::state`] orders them) and goes on from there: quaternions
-    /// back to unit length, ideal joints closed again. A joint whose ball the offset puts into its wall is in contact
-    /// from now on, one whose ball it lifts is not; every other contact keeps its memory. Counters stay as they are, and no wear map is kept any more.
+    /// Adds `offset` to coordinates and velocities (ordered as in [`Self::state`]) and continues from there: quaternions
+    /// are renormalised, ideal joints closed again. A joint whose ball the offset puts into its wall is now in contact, one
+    /// whose ball it lifts is not; every other contact keeps its memory. Counters are unchanged; a wear map is dropped.
     ///
     /// Components of `offset` beyond the state's are ignored, missing ones are 0.
     pub fn displace(&mut self, offset: &[f64]) {
@@ -45,7 +45,7 @@ impl Simulation {
         self.book_change();
     }
 
-    /// What a difference of 1 means for each component of [`Self::state`]: the scales of the tolerance.
+    /// Scale of each component of [`Self::state`]: the error scales of the tolerance.
     pub fn scales(&self) -> &[f64] {
         self.mechanism.scale()
     }

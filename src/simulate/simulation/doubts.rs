@@ -1,40 +1,41 @@
-//! What speaks against a result: what the scene asks for, and what the run met.
+//! Reasons to doubt a result: from the scene's settings, and from what happened in the run.
 
 use super::Simulation;
 use crate::contact::settled_penetration;
 use crate::integrate::Method;
 use crate::scene::least_impact_steps;
-use crate::simulate::{Doubt, Joints, Ledger, Work};
+use crate::simulate::{Doubt, Joints, Ledger, LedgerTerm};
 
-/// Part of a joint's contacts that may be slower than the floor.
+/// Fraction of a joint's contacts that may be slower than the floor.
 const MOST_FLOORED: f64 = 0.5;
-/// Contact patch over ball radius beyond which Hertz's theory, which takes the ball for a half-space, is far off.
+/// Contact patch over ball radius beyond which Hertz theory, which treats the ball as a half-space, is far off.
 const LARGEST_PATCH: f64 = 1.0 / 3.0;
-/// Constraints that are off by more than this part of the least clearance move what the clearance does.
+/// Constraint violations above this fraction of the smallest clearance blur the effect of the clearance.
 const DRIFT_OF_CLEARANCE: f64 = 0.1;
 /// The same where every ball joint is ideal, m.
 const DRIFT: f64 = 1e-4;
-/// Damping over elastic force, less what an undisturbed impact has of it, beyond which a force is an artefact of the law.
+/// Damping over elastic force, less that of an undisturbed impact, beyond which a force is an artefact of the law.
 const MOST_DAMPING: f64 = 1.0;
-/// Part of the energy exchanged that may be unaccounted for.
+/// Fraction of the energy exchanged that may be unaccounted for.
 const RESIDUAL: f64 = 5e-3;
-/// Part of each work that may be, where it is at least so much of the energy exchanged: a loss by restitution may be tiny
-/// against what else goes on, and right although the residual is as large.
+/// Fraction of each work that may be unaccounted for, and the smallest residual, as a fraction of the energy exchanged, for
+/// which this is checked: a restitution loss may be tiny compared with everything else, and correct although the residual
+/// is as large.
 const RESIDUAL_OF_WORK: f64 = 0.1;
 const NOTEWORTHY: f64 = 1e-3;
-/// Part of the energies there are below which a residual is rounding.
+/// Fraction of the energies present below which a residual is rounding.
 const ROUNDING: f64 = 1e-9;
-/// What stands still has next to no energy: all bodies at the speed that crosses the least clearance in this time, s, have as
-/// much as counts.
+/// A mechanism at rest has almost no energy: energies smaller than with all bodies at the speed that crosses the smallest
+/// clearance in this time, s, do not count.
 const CREEP: f64 = 0.1;
-/// Part of the time in which stability may hold an explicit method's steps, and the loosest tolerance with which they keep the
-/// energy.
+/// Fraction of the time in which stability may limit an explicit method's steps, and the loosest tolerance at which such
+/// steps still conserve energy.
 const MOST_HELD: f64 = 0.1;
 const LOOSEST_HELD: f64 = 3e-5;
 
 impl Simulation {
-    /// Why what was computed since the last reset is not to be trusted; empty where nothing speaks
-    /// against it. Begins with [`crate::scene::Scene::doubts`] of the scene as it runs.
+    /// Reasons not to trust the results since the last reset; empty if there are none. Begins with
+    /// [`crate::scene::Scene::doubts`] of the running scene.
     pub fn doubts(&self) -> Vec<Doubt> {
         let scene = self.running.doubts().into_iter().map(Doubt::Scene);
         let mut doubts: Vec<Doubt> = scene.collect();
@@ -79,7 +80,7 @@ impl Simulation {
         doubts
     }
 
-    /// Energy that nothing accounts for: against all that was exchanged or, where that is large, each work.
+    /// Unaccounted energy, compared with the energy exchanged or, where that is large, with each work.
     fn energy_doubt(&self, ledger: &Ledger) -> Option<Doubt> {
         let residual = ledger.residual();
         let clearances = self.running.ball_joints.iter().map(|j| j.contact.clearance);
@@ -94,14 +95,14 @@ impl Simulation {
             return Some(Doubt::Energy { residual, share });
         }
         let works = [
-            (Work::Drives, ledger.drive_work),
-            (Work::Gravity, ledger.gravity_work),
-            (Work::Restitution, ledger.restitution_loss),
-            (Work::Friction, ledger.friction_loss),
-            (Work::Clearance, ledger.clearance_work),
-            (Work::Damping, ledger.damping_loss),
-            (Work::External, ledger.external_work),
-            (Work::Changes, ledger.change_work),
+            (LedgerTerm::Drives, ledger.drive_work),
+            (LedgerTerm::Gravity, ledger.gravity_work),
+            (LedgerTerm::Restitution, ledger.restitution_loss),
+            (LedgerTerm::Friction, ledger.friction_loss),
+            (LedgerTerm::Clearance, ledger.clearance_work),
+            (LedgerTerm::Damping, ledger.damping_loss),
+            (LedgerTerm::External, ledger.external_work),
+            (LedgerTerm::Changes, ledger.change_work),
         ];
         let least = works
             .into_iter()
@@ -118,8 +119,8 @@ impl Simulation {
             })
     }
 
-    /// An explicit method at a loose tolerance that stability held and not its error: the estimate then says little of how much
-    /// energy settled contacts lose.
+    /// An explicit method at a loose tolerance, limited by stability and not by its error: the estimate then says little
+    /// about how much energy settled contacts lose.
     fn stability_doubt(&self) -> Option<Doubt> {
         let solver = &self.running.solver;
         let share = self.statistics().held_time / self.state.now.t;
@@ -131,7 +132,7 @@ impl Simulation {
         })
     }
 
-    /// The joint of which `measure` is largest and beyond `limit`, and how many others are beyond it.
+    /// The joint for which `measure` is largest and above `limit`, and how many others are above it.
     fn worst(&self, limit: f64, measure: impl Fn(usize) -> f64) -> Option<(Joints, usize)> {
         let joints = &self.running.ball_joints;
         let beyond = || (0..joints.len()).filter(|&j| measure(j) > limit);

@@ -5,12 +5,12 @@ use crate::mechanism::{Mechanism, Powers, Touching};
 use crate::simulate::ledger::{Account, Energies, weights};
 use crate::simulate::{Frame, Ledger};
 
-/// Instants at the ends of past steps from which the works of a scene that is a function of time alone are integrated:
-/// its powers are smooth, and its steps short against their periods.
+/// Ends of past steps from which the works of a kinematic scene are integrated: its powers are smooth, and its steps short
+/// compared with their periods.
 const PAST_ENDS: usize = 5;
-/// A past step shorter than this part of the one to integrate says nothing about its powers.
+/// A past step shorter than this fraction of the one being integrated is ignored.
 const SHORTEST_PAST: f64 = 0.1;
-/// Where else than at its ends the powers of such a step are read as long as there are too few of them.
+/// Where besides its ends the powers of such a step are evaluated while there are too few past ends.
 const MIDDLE: [f64; 1] = [0.5];
 
 impl Simulation {
@@ -20,7 +20,7 @@ impl Simulation {
         account.on.then(|| account.ledger())
     }
 
-    /// A new account at the present state, of which everything was just evaluated.
+    /// Opens a new account at the current state, just fully evaluated.
     pub(super) fn open_account(&mut self) {
         let Self {
             mechanism, state, ..
@@ -29,7 +29,7 @@ impl Simulation {
         state.record.account = Account::start(self.running.solver.energy_ledger, energies);
     }
 
-    /// Books what a live change did to the energies; everything was just evaluated.
+    /// Books what a live change did to the energies; the state was just fully evaluated.
     pub(super) fn book_change(&mut self) {
         let Self {
             mechanism, state, ..
@@ -38,12 +38,12 @@ impl Simulation {
             let energies = energies(mechanism, state);
             state.record.account.book_change(energies);
         }
-        // A wear map has them without a ledger, too.
+        // A wear map keeps them even without a ledger.
         state.record.account.powers = None;
     }
 
-    /// Books the step just accepted, of size `h`, in the ledger and the wear map. The contact memory in force is still that of the
-    /// step; `switched` where another has been found for its end.
+    /// Books the step just accepted, of size `h`, in the ledger and the wear map. The contact memory is still that of the
+    /// step; `switched` if it has changed at its end.
     pub(super) fn book_step(&mut self, h: f64, switched: bool) {
         let Record { account, wear, .. } = &self.state.record;
         let keeps_ledger = account.on;
@@ -80,8 +80,8 @@ impl Simulation {
         }
     }
 
-    /// Begins to book the step just accepted in the wear map: with the contacts that began at its end, and the forces there, those
-    /// of the latest evaluation.
+    /// Starts booking the step just accepted in the wear map: the contacts that began at its end, and the forces there,
+    /// from the latest evaluation.
     fn begin_wear_of_step(&mut self) {
         let State {
             before,
@@ -102,7 +102,7 @@ impl Simulation {
         wear.read(instants.len() - 1, &self.mechanism);
     }
 
-    /// Finds the instants from which the works of the step just accepted are integrated; at its end the powers are `end`.
+    /// Chooses the quadrature nodes for the works of the step just accepted; `end` are the powers at its end.
     fn lay_out_course(&mut self, h: f64, end: Powers) {
         let (from, to) = (self.state.before.t, self.state.now.t);
         let kinematic = self.mechanism.is_kinematic();
@@ -120,7 +120,7 @@ impl Simulation {
             self.stepper.interior()
         };
         self.state.record.account.course.clear();
-        // A collocation method has its own quadrature, which leaves the start out.
+        // A collocation method has its own quadrature, which excludes the start.
         if interior.len() == 1 {
             let start = self.state.record.account.powers;
             let start = start.unwrap_or_else(|| self.powers_within(0.0, h));
@@ -133,7 +133,7 @@ impl Simulation {
         self.state.record.account.course.push(1.0, end);
     }
 
-    /// Powers at the part `theta` of the step just accepted.
+    /// Powers at fraction `theta` of the step just accepted.
     fn powers_within(&mut self, theta: f64, h: f64) -> Powers {
         self.interpolate(theta, h);
         let located = self.locates();
@@ -149,7 +149,7 @@ impl Simulation {
         let mut evaluator = mechanism.evaluator(Touching::by(located, &state.before.memory));
         let powers = evaluator.powers(state.before.t + theta * h, scratch_y, scratch_k);
         if let Some(wear) = &mut state.record.wear {
-            // None of them where the motion is a function of time alone: there no ball touches.
+            // No quadrature node in a kinematic scene: no ball is in contact there.
             let instant = stepper.quadrature().iter().position(|at| *at == theta);
             wear.read(instant.unwrap_or(0), mechanism);
         }
@@ -175,7 +175,7 @@ impl Simulation {
     }
 }
 
-/// Energies at the latest evaluation, that of the present state.
+/// Energies at the latest evaluation, that of the current state.
 fn energies(mechanism: &Mechanism, state: &State) -> Energies {
     let (kinetic, gravitational) = mechanism.energies();
     let contacts = &mechanism.contacts;

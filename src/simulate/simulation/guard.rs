@@ -6,13 +6,14 @@ use crate::simulate::StopFault;
 
 /// Speed beyond which a state is absurd, m/s and rad/s.
 const ABSURD_SPEED: f64 = 1e6;
-/// Deeper in its wall than this many radii a ball has left its socket, and a contact patch is not small any more.
+/// With a penetration above this many radii a ball has left its socket, and its contact patch is no longer small.
 const LEFT_SOCKET: f64 = 0.1;
-/// Energy of an impact's first step over that of the approach beyond which the step, not the motion, made it.
+/// Energy stored by an impact's first step, over that of the approach, beyond which the step and not the motion created it.
 const MOST_OVERSHOOT: f64 = 4.0;
-/// Constraints that are only stabilised and off by more than this hold nothing together, m.
+/// Stabilised constraints that are off by more than this no longer hold anything together, m.
 const MOST_DRIFT: f64 = 1e-3;
-/// Smallest pivot ratio of the constraints of the `lagrange` form: below, they fix the motion to less than four digits.
+/// Smallest pivot ratio of the constraints of the `lagrange` form: below it they determine the motion to fewer than four
+/// digits.
 const LEAST_PIVOT: f64 = 1e-12;
 
 impl Simulation {
@@ -70,8 +71,8 @@ impl Simulation {
         None
     }
 
-    /// Where a fixed step carried a free ball so far into the wall that it stores more energy there than any approach
-    /// could bring: how many times more.
+    /// If a fixed step carried a free ball so far into the wall that it stores more energy there than any approach could
+    /// bring: the ratio.
     fn energy_of_overshoot(&self, j: usize, h: f64) -> Option<f64> {
         let (start, end) = (self.state.now.gaps[j], self.attempt.end.gaps[j]);
         if start.penetration > 0.0 || end.penetration <= 0.0 {

@@ -1,32 +1,32 @@
-//! The ideal motion that a probe is compared with: where the scene has no closed form of it, a simulation of the same scene
-//! with every ball joint closed, alongside.
+//! The ideal motion that a probe is compared with: where it has no closed form, a simulation of the same scene with every
+//! ball joint ideal, run alongside.
 
 use super::Simulation;
 use crate::integrate::Method;
 use crate::scene::{Formulation, Scene, StartRule, Vec3};
 use crate::simulate::{Frame, Snapshot, StartError, Stopped};
 
-/// Tolerance of the ideal motion: it has no impacts, so that accuracy is cheap.
+/// Tolerance of the ideal motion: without impacts, accuracy is cheap.
 const TOLERANCE: f64 = 1e-10;
 /// First step, s.
 const FIRST_STEP: f64 = 1e-4;
-/// Latest step ends that are kept. Both motions step 10 ms at most, so that samples within a step lie among them.
+/// Latest step ends that are kept. Both motions step at most 10 ms, so that samples within a step lie among them.
 const MARKS: usize = 64;
 
-/// Why there is nothing, or nothing any more, that a probe could be compared with.
+/// Why there is no ideal motion, or no longer one, to compare a probe with.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ProbeFault {
     /// The ideal mechanism does not start.
     #[error("cannot start: {0}")]
     NoStart(StartError),
-    /// It came to where it cannot go on.
+    /// It could not continue.
     #[error("{0}")]
     Stopped(Stopped),
 }
 
-/// Where the ideal tip is known from.
+/// Source of the ideal tip.
 pub(super) enum Reference {
-    /// There is no probe, or the drives' closed form tells.
+    /// There is no probe, or the drives' closed form gives it.
     Elsewhere,
     /// Every ball joint is ideal: the motion is its own reference.
     Itself,
@@ -43,7 +43,7 @@ struct Mark {
     tip: [Vec3; 3],
 }
 
-/// The ideal scene in motion, and where its tip was.
+/// The ideal scene in motion, and past positions of its tip.
 pub(super) struct IdealMotion {
     simulation: Simulation,
     body: usize,
@@ -52,7 +52,7 @@ pub(super) struct IdealMotion {
     marks: Marks,
 }
 
-/// The latest step ends, and whether there will be more.
+/// The latest step ends, and whether more will follow.
 #[derive(Clone, Debug)]
 struct Marks {
     ring: [Mark; MARKS],
@@ -61,7 +61,7 @@ struct Marks {
     stopped: Option<Stopped>,
 }
 
-/// What a snapshot keeps of it.
+/// The part of it that a snapshot keeps.
 #[derive(Clone, Debug)]
 pub(in crate::simulate) struct Kept {
     snapshot: Snapshot,
@@ -83,7 +83,7 @@ impl Reference {
         }
     }
 
-    /// Tip in `frame` less the ideal tip at its time.
+    /// Tip in `frame` minus the ideal tip at its time.
     pub(super) fn error(&mut self, frame: &Frame) -> Option<Vec3> {
         match self {
             Self::Elsewhere | Self::None(_) => None,
@@ -96,7 +96,7 @@ impl Reference {
         }
     }
 
-    /// Why there is no ideal motion, or none any more.
+    /// Why there is no ideal motion, or no longer one.
     pub(super) fn fault(&self) -> Option<ProbeFault> {
         match self {
             Self::Elsewhere | Self::Itself => None,
@@ -133,8 +133,8 @@ impl Reference {
     }
 }
 
-/// `scene` with every ball joint closed, at the same drives and gravity, solved so closely that it can be a reference. It has no
-/// probe of its own.
+/// `scene` with every ball joint ideal, with the same drives and gravity, solved accurately enough to serve as a reference.
+/// It has no probe of its own.
 pub fn closed(scene: &Scene) -> Scene {
     let mut ideal = scene.clone();
     for joint in &mut ideal.ball_joints {
@@ -169,7 +169,7 @@ impl IdealMotion {
         Ok(motion)
     }
 
-    /// Puts down where the tip is now.
+    /// Records the current tip.
     fn mark(&mut self) {
         self.simulation
             .sample(self.simulation.time(), &mut self.frame);
@@ -200,7 +200,7 @@ impl IdealMotion {
         self.tip(time);
         self.simulation.go_back_to(time);
         self.simulation.set_gravity(gravity);
-        // What lay ahead of `time` is not so any more.
+        // What lay after `time` no longer holds.
         self.marks.forget_after(time);
         self.mark();
     }
@@ -225,13 +225,13 @@ impl Marks {
     }
 }
 
-/// The polynomial of order 5 through positions, velocities and accelerations at both ends.
+/// The quintic through positions, velocities and accelerations at both ends.
 fn quintic(a: &Mark, b: &Mark, time: f64) -> Vec3 {
     let h = b.time - a.time;
     let s = (time - a.time) / h;
     let ([x0, v0, a0], [x1, v1, a1]) = (a.tip, b.tip);
     let (v0, v1, a0, a1) = (v0 * h, v1 * h, a0 * (h * h), a1 * (h * h));
-    // What the end has more than a parabola from the start.
+    // What remains at the end after the parabola from the start.
     let (x, v, c) = (x1 - x0 - v0 - a0 * 0.5, v1 - v0 - a0, a1 - a0);
     let (c3, c4, c5) = (
         x * 10.0 - v * 4.0 + c * 0.5,
@@ -284,7 +284,7 @@ mod tests {
         simulation.set("gravity.x", "0").expect("sets");
         simulation.sample(change, &mut frame);
         assert!(frame.probe_error.expect("goes on").norm() < 2e-3);
-        // Without gravity a rod in an ideal joint turns evenly: its tip stays on its circle, at the speed that it has.
+        // Without gravity a rod in an ideal joint rotates uniformly: its tip stays on its circle, at its speed.
         let Reference::Alongside(motion) = &mut simulation.reference else {
             panic!("nothing alongside");
         };

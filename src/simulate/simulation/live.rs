@@ -10,7 +10,7 @@ use crate::scene::{Scene, SceneError};
 use crate::simulate::stepper::AnyStepper;
 use crate::simulate::{Effect, Frame};
 
-/// Farthest that a hand, or the point that it holds, may be, m: beyond it a force is no pull any more.
+/// Largest distance of a hand, or of the point it holds, m: beyond it a pull makes no sense.
 const FARTHEST_HAND: f64 = 1e6;
 
 impl Simulation {
@@ -42,7 +42,7 @@ impl Simulation {
         )
     }
 
-    /// Somebody pulls on a body from now on, elsewhere or otherwise than before, or lets go.
+    /// Starts, changes or (with `None`) ends the pull of a hand on a body.
     ///
     /// # Errors
     /// As [`Self::check_pull`]: the running simulation is unchanged.
@@ -55,10 +55,10 @@ impl Simulation {
         Ok(())
     }
 
-    /// Whether somebody can pull like this.
+    /// Whether such a pull is possible.
     ///
     /// # Errors
-    /// A body that the scene has not, a place out of reach.
+    /// An unknown body, or a position out of reach.
     pub fn check_pull(&self, pull: &Pull) -> Result<(), SceneError> {
         let bodies = self.running.bodies.len();
         let far = pull.hand.amax().max(pull.point.amax());
@@ -77,7 +77,7 @@ impl Simulation {
         })
     }
 
-    /// What the hand that pulls, if one does, does where the bodies are as in `frame`.
+    /// Force of the hand that pulls, if any, with the bodies as in `frame`.
     pub fn pull_in(&self, frame: &Frame) -> Option<ElementReport> {
         let pull = self.state.pull?;
         let motion = frame.bodies.get(pull.body)?;
@@ -86,7 +86,7 @@ impl Simulation {
         Some(pull.report(motion.position + arm, velocity))
     }
 
-    /// Where somebody pulls.
+    /// The current pull, if any.
     pub fn pulled(&self) -> Option<Pull> {
         self.state.pull
     }
@@ -98,9 +98,9 @@ impl Simulation {
         waits: bool,
     ) -> Result<Effect, SceneError> {
         let mut running = Scene::clone(&self.running);
-        // What the running scene cannot take may suit the one that waits, say a joint of a longer chain.
+        // What the running scene cannot accept may suit the waiting one, say a joint of a longer chain.
         let waits = waits || change(&mut running).is_err();
-        // A joint that turns ideal, or stops being so, changes the equations.
+        // A joint that becomes ideal, or stops being so, changes the equations.
         let turns = |running: &Scene| {
             let pairs = self.running.ball_joints.iter().zip(&running.ball_joints);
             pairs
@@ -148,7 +148,7 @@ impl Simulation {
         Ok(Effect::Now)
     }
 
-    /// Gravity from now on, m/s^2, of a simulation that no change of a scene goes through.
+    /// Sets gravity from now on, m/s^2, for a simulation whose scene is not changed otherwise.
     pub fn set_gravity(&mut self, gravity: crate::scene::Vec3) {
         Arc::make_mut(&mut self.running).gravity = gravity;
         Arc::make_mut(&mut self.scene).gravity = gravity;
@@ -156,7 +156,7 @@ impl Simulation {
         self.refresh();
     }
 
-    /// Back to `time` within the latest step, on its interpolant; of a simulation without contacts.
+    /// Back to `time` within the latest step, on its interpolant; only for a simulation without contacts.
     pub(in crate::simulate) fn go_back_to(&mut self, time: f64) {
         let h = self.state.now.t - self.state.before.t;
         if !(time < self.state.now.t && time >= self.state.before.t) {
@@ -169,7 +169,7 @@ impl Simulation {
         self.refresh();
     }
 
-    /// New contact parameters at this instant; a clearance that would put the ball inside the wall starts to move.
+    /// New contact parameters from this instant; a clearance that would put the ball inside the wall is ramped.
     fn change_contact(&mut self, j: usize, contact: &crate::contact::Parameters) {
         if contact.clearance == 0.0 {
             return;
@@ -203,7 +203,7 @@ impl Simulation {
         state.record.impacts.change(j, state.now.memory[j].active);
     }
 
-    /// When the first clearance under way arrives, s.
+    /// When the first clearance ramp under way ends, s.
     pub(super) fn ramp_end(&self) -> f64 {
         let end = |r: &Ramp| r.start + (r.to - r.from) / r.rate;
         self.state

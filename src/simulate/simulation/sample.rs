@@ -7,8 +7,8 @@ use crate::mechanism::Touching;
 use crate::simulate::{Frame, report};
 
 impl Simulation {
-    /// Largest normal force of ball joint `j` (reaction, where it is ideal) since the last reset and when, (N, s): that of
-    /// [`Statistics`](crate::simulate::Statistics), which is found from the ends of steps, or a larger one that a sample met.
+    /// Largest normal force of ball joint `j` (reaction, if ideal) since the last reset and when, (N, s): that of
+    /// [`Statistics`](crate::simulate::Statistics), found from the ends of steps, or a larger one seen by a sample.
     pub fn peak(&self, j: usize) -> (f64, f64) {
         let statistics = self.statistics();
         let found = (statistics.peak_normal[j], statistics.peak_time[j]);
@@ -38,7 +38,8 @@ impl Simulation {
         }
     }
 
-    /// Evaluates everything at `time` within the latest step, for the mechanism to be read; counts as no evaluation.
+    /// Evaluates everything at `time` within the latest step, so that the mechanism can be read; not counted as an
+    /// evaluation.
     pub(super) fn look(&mut self, time: f64) {
         let h = self.state.now.t - self.state.before.t;
         let inside = h > 0.0 && time < self.state.now.t;
@@ -62,7 +63,7 @@ impl Simulation {
         }
         let (before, now) = (&state.before.memory, &state.now.memory);
         for (j, memory) in scratch_memory.iter_mut().enumerate() {
-            // A contact that began within a fixed step has its approach speed from there on.
+            // A contact that began within a fixed step has its approach speed from then on.
             let known = !inside || (!located && !before[j].active);
             *memory = if known { now[j] } else { before[j] };
         }
@@ -70,7 +71,8 @@ impl Simulation {
         evaluator.evaluate_fully(time, scratch_y, scratch_k);
     }
 
-    /// State at the part `theta` of the latest step, of size `h`, into the scratch state, as the method interpolates it.
+    /// State at fraction `theta` of the latest step, of size `h`, by the method's interpolant, written to the scratch
+    /// state.
     pub(super) fn interpolate(&mut self, theta: f64, h: f64) {
         let Self {
             mechanism,

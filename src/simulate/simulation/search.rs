@@ -1,16 +1,16 @@
-//! Peaks that the ends of a step do not tell: its inside is looked into, as a row would.
+//! Peaks that the ends of a step do not show: its inside is sampled, as an output row would.
 
 use super::Simulation;
 use crate::simulate::peaks::Course;
 
-/// A step whose forces stay below this part of their peaks so far is not looked into.
+/// A step whose forces stay below this fraction of their peaks so far is not searched.
 pub(super) const NEAR_PEAK: f64 = 0.5;
-/// Where a fixed step is looked into.
+/// Where a fixed step is sampled.
 const PARTS: [f64; 3] = [0.25, 0.5, 0.75];
 
 impl Simulation {
-    /// Takes the reactions at the end of the step just accepted, of which everything was just evaluated. Without a
-    /// contact they are smooth, and have their peaks on the parabola through three ends.
+    /// Takes the reactions at the end of the step just accepted, just fully evaluated. Without contacts they are smooth and
+    /// peak on the parabola through three step ends.
     pub(super) fn track_reactions(&mut self) {
         let joints = self.state.now.gaps.len();
         let smooth = !(0..joints).any(|j| self.mechanism.contacts.has_clearance(j));
@@ -24,9 +24,9 @@ impl Simulation {
         }
     }
 
-    /// Finds the largest normal force of every joint that was in contact over the step just accepted, and where, from the cubic through
-    /// the penetration. Where that has a peak inside a located step it is looked up: the cubic's rate, by which damping
-    /// goes, is not that of the motion.
+    /// Finds the largest normal force of every joint in contact over the step just accepted, and where, from the cubic
+    /// through the penetration. A peak inside a located step is re-evaluated there: the cubic's rate, which sets the
+    /// damping, is not that of the motion.
     pub(super) fn find_strongest(&mut self, h: f64) {
         let located = self.locates();
         for j in 0..self.state.now.gaps.len() {
@@ -55,13 +55,14 @@ impl Simulation {
         }
     }
 
-    /// Looks into the step just accepted for peaks.
+    /// Searches the step just accepted for peaks.
     pub(super) fn search_peaks(&mut self) {
         self.search_contacts();
         self.search_reactions();
     }
 
-    /// Where a fixed step is long against an impact, a row reads other rates inside it than the cubic through the penetration.
+    /// Where a fixed step is long compared with an impact, an output row inside it sees other rates than the cubic through
+    /// the penetration.
     fn search_contacts(&mut self) {
         let near = std::mem::take(&mut self.attempt.near_peak);
         if !near || self.locates() {
@@ -86,8 +87,8 @@ impl Simulation {
         }
     }
 
-    /// Looks for peaks of reactions inside the step just accepted, where impacts at other joints make them. Steps around an
-    /// impact are too uneven for a parabola through their ends: it would have peaks that never were.
+    /// Searches the step just accepted for peaks of reactions caused by impacts at other joints. Steps around an impact are
+    /// too uneven for a parabola through their ends: it would have spurious peaks.
     fn search_reactions(&mut self) {
         let joints = self.state.now.gaps.len();
         if !self.mechanism.has_reactions()
@@ -113,7 +114,7 @@ impl Simulation {
         }
     }
 
-    /// Size of the reaction of joint `j` at `time` within the latest step, N; it may be a peak.
+    /// Magnitude of the reaction of joint `j` at `time` within the latest step, N; recorded if it is a peak.
     fn reaction_at(&mut self, j: usize, time: f64) -> f64 {
         self.look(time);
         let size = self.mechanism.reaction(j).map_or(0.0, |force| force.norm());
@@ -129,7 +130,7 @@ impl Simulation {
         }
     }
 
-    /// Puts down a force if it is the largest so far; whether it is the largest since the peaks were last taken.
+    /// Records a force if it is the largest so far; returns whether it is the largest since the peaks were last taken.
     fn is_peak(&mut self, j: usize, size: f64, time: f64) -> bool {
         let statistics = &mut self.state.record.statistics;
         if size > statistics.peak_normal[j] {

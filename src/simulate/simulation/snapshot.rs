@@ -1,4 +1,4 @@
-//! The whole state: copied, put back, hashed.
+//! The whole state: copied, restored, hashed.
 
 use super::automatic::prepare_implicit;
 use super::{Simulation, State};
@@ -16,7 +16,7 @@ impl State {
         self.record.statistics.steps
     }
 
-    /// About; upwards.
+    /// Approximate, rounded up.
     pub(in crate::simulate) fn bytes(&self) -> usize {
         // Both ends of the step, the ledger's and the stepper's copies.
         const COPIES: usize = 12;
@@ -44,9 +44,9 @@ impl Simulation {
         }
     }
 
-    /// Goes back to a state that this simulation, or another of the same scene, was in, with the peaks and counters that it had.
-    /// Nothing is assembled: a live change may have led where no start would be accepted. Where the equations are still those
-    /// of the snapshot they are kept, and this costs about as much as a step. Resuming gives the same bits.
+    /// Restores a state of this simulation, or of another of the same scene, with its peaks and counters. Nothing is
+    /// assembled: a live change may have led to where no start would be accepted. If the equations are still those of the
+    /// snapshot they are kept, and this costs about as much as a step. Resuming gives the same bits.
     ///
     /// # Errors
     /// A snapshot of a scene whose equations cannot be set up.
@@ -93,9 +93,9 @@ impl Simulation {
                 contacts.set_parameters(j, &joint.contact, state.clearances[j]);
             }
         }
-        // The interpolant of the step before is not part of a state.
+        // The interpolant of the previous step is not part of the state.
         state.before.copy_from(&state.now);
-        // What is read off the mechanism between steps: motion, reactions, clearances on their way.
+        // What is read from the mechanism between steps: motion, reactions, clearance ramps.
         let now = &state.now;
         let mut evaluator = mechanism.evaluator(Touching::by(located, &now.memory));
         evaluator.derivative(now.t, &now.y, scratch_k);
@@ -103,9 +103,9 @@ impl Simulation {
         Ok(())
     }
 
-    /// FNV-1a, 64 bit, over the whole state: little-endian bits of time, coordinates, velocities, then for each ball
-    /// joint whether it is in contact, its approach speed, and its clearance in force. The piece of
-    /// the friction law in force is not in it: like the step size it belongs to the stepper.
+    /// FNV-1a, 64 bit, over the whole state: little-endian bits of time, coordinates, velocities, then for each ball joint
+    /// whether it is in contact, its approach speed, and its clearance in force. The current piece of the friction law is
+    /// left out: like the step size it belongs to the stepper.
     pub fn state_hash(&self) -> u64 {
         let mut hash = 0xcbf2_9ce4_8422_2325_u64;
         let mut add = |bits: u64| {

@@ -4,8 +4,8 @@ use super::Simulation;
 use crate::simulate::Wear;
 
 impl Simulation {
-    /// From now on keeps a wear map, empty but for the contacts under way, which count as begun. It belongs to the state: a
-    /// snapshot holds it, and a reset ends it. It changes no step.
+    /// Keeps a wear map from now on, empty except for the contacts under way, which count as begun. It belongs to the
+    /// state: a snapshot holds it, and a reset ends it. It does not affect the steps.
     pub fn keep_wear(&mut self) {
         let mut wear = Wear::new(&self.running);
         self.look(self.state.now.t);
@@ -19,13 +19,13 @@ impl Simulation {
         self.state.record.wear = Some(wear);
     }
 
-    /// The wear map that is kept.
+    /// The wear map, if kept.
     pub fn wear(&self) -> Option<&Wear> {
         self.state.record.wear.as_ref()
     }
 
-    /// The latest step is over: what it did enters the wear map. The next step would see to that, too.
-    pub fn pass_wear(&mut self) {
+    /// Adds what the latest step did to the wear map. The next step would do so, too.
+    pub fn commit_wear(&mut self) {
         if let Some(wear) = &mut self.state.record.wear {
             wear.pass();
         }

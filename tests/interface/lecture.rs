@@ -2,9 +2,10 @@
 
 use eframe::egui::{self, Key, PointerButton, Pos2, accesskit::Role, vec2};
 use egui_kittest::{Harness, SnapshotResults, kittest::Queryable as _};
-use jointplay::app::{App, Event, Link, Log, Replay, SceneText, Verdict};
+use jointplay::app::{App, Event, Link, Log, Player, Replay, SceneText, Verdict};
 use jointplay::simulate::{ContactState, Quantity};
 
+use crate::hands::fingers;
 use crate::window::{CURVES, WHITE, click, picture, shown, sized, window};
 
 /// Where the timeline's strip stands.
@@ -77,12 +78,12 @@ fn the_lanes_have_the_colours_of_the_states_that_were() {
     run_to(&mut harness, 20e-3);
     let player = harness.state().player();
     let touch = player
-        .course()
+        .contact_history()
         .touches(0, 0.0, 1.0)
         .next()
         .expect("strikes");
     let until = player
-        .course()
+        .contact_history()
         .states(0, touch, 1.0)
         .find(|state| state.2 == ContactState::Free);
     let until = until.expect("leaves again").0;
@@ -153,42 +154,43 @@ fn going_on_from_the_past_with_another_clearance_leaves_a_pale_future_that_a_lin
     let player = harness.state_mut().player_mut();
     assert_eq!(player.wanted().contact.friction, 0.15, "as it was then");
     player.set("contact.clearance", "0.6 mm").expect("in range");
-    let left = player.left().expect("left");
+    let left = player.abandoned_future().expect("left");
     assert!((left.from - 5e-3).abs() < 1e-4 && left.to == 30e-3);
     assert_eq!(left.flags.len(), 1);
     player.run_to(12e-3);
     harness.run();
-    // A link takes the branch again, to the same bits.
+    // The branch is in the link.
     let player = harness.state().player();
+    follows(player);
+    run_to(&mut harness, 31e-3);
+    assert!(
+        harness.state().player().abandoned_future().is_none(),
+        "replaced"
+    );
+}
+
+/// A link to the instant on show leads there again, to the same bits.
+fn follows(player: &Player) {
     let link = Link {
         scene: SceneText::of(player.scene()),
         log: player.log(),
         steps: Some(player.steps()),
-        time: Some(shown(&harness)),
+        time: Some(player.pacer.shown()),
         hash: Some(player.simulation().state_hash()),
         ..Link::default()
     };
-    assert_eq!(
-        follow(&link),
-        Verdict::Agrees(player.simulation().state_hash())
-    );
-    run_to(&mut harness, 31e-3);
-    assert!(harness.state().player().left().is_none(), "replaced");
-}
-
-fn follow(link: &Link) -> Verdict {
     let link = Link::parse(&link.format()).expect("a link");
-    let mut copy = jointplay::app::Player::new(&link.load().expect("loads")).expect("starts");
+    let mut copy = Player::new(&link.load().expect("loads")).expect("starts");
     let mut replay = Replay::new(link).expect("an instant");
-    replay.advance(&mut copy, || true).expect("there")
+    let verdict = replay.advance(&mut copy, || true).expect("there");
+    assert_eq!(verdict, Verdict::Agrees(player.simulation().state_hash()));
 }
 
 #[test]
 fn a_body_that_is_pressed_and_dragged_is_pulled_until_it_is_let_go() {
     let mut harness = window("spcmm");
     let image = harness.get_by_role_and_label(Role::Image, "3D view").rect();
-    // The middle of the platform, in the isometric view that the window starts with.
-    let platform = image.lerp_inside(vec2(0.571, 0.722));
+    let platform = platform(&harness);
     let camera = camera(&harness);
     harness.drag_at(platform);
     harness.step();
@@ -218,23 +220,13 @@ fn a_body_that_is_pressed_and_dragged_is_pulled_until_it_is_let_go() {
         pulls.count()
     };
     assert!(pulls(&player.log()) >= 2);
-    let link = Link {
-        scene: SceneText::of(player.scene()),
-        log: player.log(),
-        steps: Some(player.steps()),
-        time: Some(shown(&harness)),
-        hash: Some(player.simulation().state_hash()),
-        ..Link::default()
-    };
-    assert_eq!(
-        follow(&link),
-        Verdict::Agrees(player.simulation().state_hash())
-    );
+    follows(player);
+    let log = player.log();
     // Beside the machine a drag turns the view.
     let beside = image.left_center() + vec2(30.0, 0.0);
     drag(&mut harness, &[beside, beside + vec2(40.0, 0.0)]);
     assert_ne!(self::camera(&harness), camera);
-    assert_eq!(pulls(&harness.state().player().log()), pulls(&link.log));
+    assert_eq!(pulls(&harness.state().player().log()), pulls(&log));
 }
 
 fn camera(harness: &Harness<'_, App>) -> String {
@@ -342,6 +334,66 @@ fn pictures_of_the_past() {
     }
 }
 
+#[test]
+fn pictures_of_wear_and_of_a_pull() {
+    let mut results = SnapshotResults::new();
+    for (name, size, theme) in [
+        ("wear_light", [1280.0, 800.0], egui::Theme::Light),
+        ("wear_dark", [1280.0, 800.0], egui::Theme::Dark),
+        ("wear_phone", [390.0, 844.0], egui::Theme::Light),
+        ("wear_phone_dark", [390.0, 844.0], egui::Theme::Dark),
+    ] {
+        let mut harness = sized("spcmm", size, theme);
+        click(&mut harness, "View options");
+        let choice = |harness: &Harness<'_, App>, scroll: bool| {
+            let choice = harness.get_by_role_and_label(Role::RadioButton, "Wear map: Impulse");
+            if scroll {
+                choice.scroll_to_me();
+            } else {
+                choice.click();
+            }
+        };
+        choice(&harness, true);
+        harness.run();
+        choice(&harness, false);
+        harness.run();
+        harness.key_press(Key::Escape);
+        run_to(&mut harness, 60e-3);
+        // A colour of the scale that nothing else in the view has.
+        let area = [0, 0, size[0] as usize, (0.6 * size[1]) as usize];
+        let purple = picture(&mut harness).coloured(area, [0x47, 0x2D, 0x7B], 12);
+        assert!(purple.len() > 30, "{name}: nothing is mapped");
+        harness.snapshot(name);
+        results.extend_harness(&mut harness);
+    }
+    for (name, size, theme) in [
+        ("pull_light", [1280.0, 800.0], egui::Theme::Light),
+        ("pull_dark", [1280.0, 800.0], egui::Theme::Dark),
+        ("pull_phone", [390.0, 844.0], egui::Theme::Light),
+        ("pull_phone_dark", [390.0, 844.0], egui::Theme::Dark),
+    ] {
+        let mut harness = sized("spcmm", size, theme);
+        let platform = platform(&harness);
+        harness.drag_at(platform);
+        harness.step();
+        for step in 1..=4 {
+            harness.hover_at(platform + vec2(20.0 * step as f32, 0.0));
+            harness.step();
+        }
+        harness.snapshot(name);
+        results.extend_harness(&mut harness);
+    }
+}
+
+/// A point of the picture on the platform at t = 0.
+fn platform(harness: &Harness<'_, App>) -> Pos2 {
+    let app = harness.state();
+    let scene = app.player().scene();
+    let platform = scene.bodies.iter().position(|body| body.name == "platform");
+    let body = &app.player().frame().bodies[platform.expect("there")];
+    app.place_in_view(&body.position).expect("in sight")
+}
+
 /// A class watches: what was done so far for the task at hand.
 struct Lecture {
     harness: Harness<'static, App>,
@@ -350,8 +402,12 @@ struct Lecture {
 
 impl Lecture {
     fn new() -> Self {
+        Self::on([1280.0, 800.0])
+    }
+
+    fn on(size: [f32; 2]) -> Self {
         Self {
-            harness: window("spcmm"),
+            harness: sized("spcmm", size, egui::Theme::Light),
             gestures: 0,
         }
     }
@@ -383,6 +439,34 @@ impl Lecture {
         self.harness.run_steps(2);
     }
 
+    /// One gesture of so many fingers.
+    fn fingers(&mut self, paths: &[&[Pos2]]) {
+        self.gestures += 1;
+        fingers(&mut self.harness, paths);
+        self.harness.run_steps(3);
+    }
+
+    fn tap(&mut self, role: Role, label: &str) {
+        let at = self.harness.get_by_role_and_label(role, label).rect();
+        self.fingers(&[&[at.center()]]);
+    }
+
+    /// A finger that draws a slider's handle to a part of its track.
+    fn swipe(&mut self, label: &str, part: f32) {
+        let track = self.harness.get_by_role_and_label(Role::Slider, label);
+        let track = track.rect();
+        let to = track.left_center() + vec2(part * track.width(), 0.0);
+        self.fingers(&[&[track.center(), to, to]]);
+    }
+
+    /// A tap on the ball of the first joint, in the view that the window starts with.
+    fn tap_ball(&mut self) {
+        let player = self.app().player();
+        let ball = player.frame().joints[0].ball_centre;
+        let at = self.app().place_in_view(&ball).expect("in sight");
+        self.fingers(&[&[at]]);
+    }
+
     fn frames(&mut self, count: usize) {
         self.harness.run_steps(count);
     }
@@ -390,7 +474,8 @@ impl Lecture {
     /// The task is done; the next one.
     fn done(&mut self, task: &str) {
         assert!(self.gestures <= 3, "{task}: {} gestures", self.gestures);
-        *self = Self::new();
+        let size = self.harness.ctx.content_rect().size();
+        *self = Self::on(size.into());
     }
 }
 
@@ -505,5 +590,113 @@ fn tasks_of_a_lecture_take_at_most_three_gestures() {
             .twin()
             .is_some_and(|twin| twin.distances().len() > 5)
     );
+    class.done("a billionth apart");
+}
+
+#[test]
+fn fingers_take_at_most_three_gestures_for_them_on_a_phone() {
+    let mut class = Lecture::on([390.0, 844.0]);
+    // 1
+    class.tap_ball();
+    class.tap(Role::Button, "Play");
+    class.frames(60);
+    let microscope = class.app().microscope();
+    assert!(microscope.is_open() && microscope.joint() == 0);
+    assert!(class.app().player().paths().between(0, 0.0, 1.0).len() > 10);
+    class.done("the ball in its gap");
+
+    // 2
+    class.tap(Role::Button, "Next impact");
+    while class.app().player().is_seeking() {
+        class.frames(1);
+    }
+    assert!((shown(&class.harness) - 7.8e-3).abs() < 0.1e-3);
+    class.tap_ball();
+    assert!(class.app().microscope().is_open());
+    class.done("the first impact");
+
+    // 3
+    class.tap(Role::Button, "Play");
+    class.swipe("Clearance", 0.62);
+    let clearance = class.app().player().scene().contact.clearance;
+    assert!((0.5e-3..0.8e-3).contains(&clearance), "{clearance}");
+    assert!(class.app().player().is_playing());
+    class.done("clearance live");
+
+    // 4
+    class.swipe("Friction coefficient", -0.1);
+    assert_eq!(class.app().player().scene().contact.friction, 0.0);
+    class.tap(Role::Button, "Reset Friction coefficient");
+    assert_eq!(class.app().player().scene().contact.friction, 0.15);
+    class.done("friction off and on");
+
+    // 5
+    class.tap(Role::Button, "Next impact");
+    while class.app().player().is_seeking() {
+        class.frames(1);
+    }
+    let list = class
+        .harness
+        .get_by_role_and_label(Role::ComboBox, "Time scale preset");
+    let at = list.rect().center();
+    class.fingers(&[&[at, at - vec2(20.0, 0.0), at - vec2(45.0, 0.0)]]);
+    assert_eq!(class.app().player().pacer.scale(), 1e-3);
+    class.tap(Role::Button, "Play");
+    let first = shown(&class.harness);
+    class.frames(30);
+    let passed = shown(&class.harness) - first;
+    assert!(
+        (passed / (30.0 * 1e-3 / 60.0) - 1.0).abs() < 0.2,
+        "{passed}"
+    );
+    class.done("an impact slowly");
+    class.harness.state_mut().player_mut().run_to(30e-3);
+    class.tap(Role::Button, "Previous impact");
+    let last = shown(&class.harness);
+    class.tap(Role::Button, "Previous impact");
+    assert!(shown(&class.harness) < last && last < 30e-3);
+    class.tap(Role::Button, "Next impact");
+    assert_eq!(shown(&class.harness), last);
+    class.done("impact before, impact after");
+
+    // 6
+    class.tap(Role::Button, "View options");
+    class.tap(Role::CheckBox, "Ideal ghost");
+    class.tap(Role::Button, "Play");
+    class.frames(90);
+    let player = class.app().player();
+    assert!(player.is_playing());
+    let error = player
+        .ideal()
+        .and_then(|ideal| ideal.output_error(player.frame()));
+    assert!(error.expect("came there").norm() > 1e-6);
+    class.done("ideal beside real");
+
+    // 7
+    class.harness.state_mut().player_mut().run_to(30e-3);
+    class.tap(Role::Button, "Plots");
+    let width = |class: &mut Lecture| {
+        let plots = class.harness.state_mut().plots_mut();
+        let [a, b] = [7.8e-3, 7.9e-3].map(|time| plots.place(Quantity::NormalForce, time, 100.0));
+        (b.expect("shown").x - a.expect("shown").x, a.expect("shown"))
+    };
+    let (before, at) = width(&mut class);
+    let apart = |by: f32| [at - vec2(by, 0.0), at + vec2(by, 0.0)];
+    let [one, two] = [0, 1].map(|finger| [7.0, 15.0, 30.0, 60.0].map(|by| apart(by)[finger]));
+    class.fingers(&[&one, &two]);
+    let (after, there) = width(&mut class);
+    assert!(after > 5.0 * before, "{before} {after}");
+    assert!((there.x - at.x).abs() < 10.0, "{at} {there}");
+    class.fingers(&[&[there]]);
+    assert!((shown(&class.harness) - 7.8e-3).abs() < 0.1e-3);
+    class.done("an impact enlarged");
+
+    // 8
+    class.tap(Role::Button, "Bench");
+    class.tap(Role::CheckBox, "Twin run");
+    class.tap(Role::Button, "Play");
+    class.frames(30);
+    let twin = class.app().player().twin();
+    assert!(twin.is_some_and(|twin| twin.distances().len() > 5));
     class.done("a billionth apart");
 }

@@ -2,28 +2,28 @@
 
 use crate::simulate::{ContactState, Frame};
 
-/// Changes of state that are kept of all joints together; the oldest half goes then.
+/// Most state changes kept for all joints together; beyond that the older half is dropped.
 const KEPT: usize = 200_000;
 
-/// The contact states of a run over time. What was recorded twice, since the run was taken back, is kept once.
+/// The contact states of a run over time. A stretch recorded again after going back is kept once.
 #[derive(Clone, Debug, Default)]
-pub struct Course {
-    /// By ball joint: from when on, s, which state.
+pub struct ContactHistory {
+    /// By ball joint: start time, s, and state.
     joints: Vec<Vec<(f64, ContactState)>>,
     changes: usize,
     from: f64,
     to: f64,
 }
 
-impl Course {
-    /// Of a run that begins at `time`, s.
+impl ContactHistory {
+    /// Begins a new run at `time`, s.
     pub(super) fn begin(&mut self, time: f64) {
         self.joints.clear();
         self.changes = 0;
         (self.from, self.to) = (time, f64::NEG_INFINITY);
     }
 
-    /// Takes the next instant of the run.
+    /// Records the next instant of the run.
     pub(super) fn record(&mut self, frame: &Frame) {
         if frame.time <= self.to {
             return;
@@ -63,17 +63,17 @@ impl Course {
         self.to = self.to.min(time);
     }
 
-    /// Ball joints.
+    /// Number of ball joints.
     pub fn joints(&self) -> usize {
         self.joints.len()
     }
 
-    /// From when on the states are known, s.
+    /// Time from which the states are known, s.
     pub fn known_from(&self) -> f64 {
         self.from
     }
 
-    /// The states of ball joint `joint` that were between two times, s: from when, to when, which.
+    /// The states of ball joint `joint` between two times, s: start, end, state.
     pub fn states(
         &self,
         joint: usize,
@@ -91,7 +91,7 @@ impl Course {
             })
     }
 
-    /// When ball joint `joint` came to touch between two times, s.
+    /// Times between two given ones, s, at which ball joint `joint` came into contact.
     pub fn touches(&self, joint: usize, from: f64, to: f64) -> impl Iterator<Item = f64> {
         let states = self.joints.get(joint).map_or(&[][..], Vec::as_slice);
         let first = states.partition_point(|(time, _)| *time < from);
@@ -107,8 +107,8 @@ impl Course {
             .take_while(move |time| *time <= to)
     }
 
-    /// The instant nearest to `time`, s, at which a ball came to touch after it, or before it; of one joint or of any.
-    pub fn next_touch(&self, joint: Option<usize>, time: f64, forward: bool) -> Option<f64> {
+    /// The instant nearest to `time`, s, after or before it, at which a ball came into contact; of one joint or of any.
+    pub fn next_contact(&self, joint: Option<usize>, time: f64, forward: bool) -> Option<f64> {
         let chosen = |index: &usize| joint.is_none_or(|joint| joint == *index);
         let joints = (0..self.joints.len()).filter(chosen);
         let found = joints.filter_map(|index| {
@@ -149,22 +149,22 @@ mod tests {
         }
     }
 
-    fn course() -> Course {
+    fn history() -> ContactHistory {
         use ContactState::{Free, Slip, Stick};
-        let mut course = Course::default();
-        course.begin(0.0);
+        let mut history = ContactHistory::default();
+        history.begin(0.0);
         let states = [Free, Free, Slip, Stick, Free, Slip, Slip];
         for (index, state) in states.into_iter().enumerate() {
-            course.record(&frame(index as f64, state));
+            history.record(&frame(index as f64, state));
         }
-        course
+        history
     }
 
     #[test]
     fn states_follow_one_another_without_gaps() {
         use ContactState::{Free, Slip, Stick};
-        let course = course();
-        let all: Vec<_> = course.states(0, 0.0, 9.0).collect();
+        let history = history();
+        let all: Vec<_> = history.states(0, 0.0, 9.0).collect();
         let expected = [
             (0.0, 2.0, Free),
             (2.0, 3.0, Slip),
@@ -173,48 +173,48 @@ mod tests {
             (5.0, 6.0, Slip),
         ];
         assert_eq!(all, expected);
-        let part: Vec<_> = course.states(0, 2.5, 3.5).collect();
+        let part: Vec<_> = history.states(0, 2.5, 3.5).collect();
         assert_eq!(part, expected[1..3]);
-        assert_eq!(course.states(1, 0.0, 9.0).count(), 0);
+        assert_eq!(history.states(1, 0.0, 9.0).count(), 0);
     }
 
     #[test]
     fn touches_are_found_both_ways_and_a_second_time_changes_nothing() {
-        let mut course = course();
+        let mut history = history();
         for _ in 0..2 {
-            let touches: Vec<f64> = course.touches(0, 0.0, 9.0).collect();
+            let touches: Vec<f64> = history.touches(0, 0.0, 9.0).collect();
             assert_eq!(touches, [2.0, 5.0]);
-            assert_eq!(course.next_touch(Some(0), 2.0, true), Some(5.0));
-            assert_eq!(course.next_touch(None, 0.5, true), Some(2.0));
-            assert_eq!(course.next_touch(None, 5.0, true), None);
-            assert_eq!(course.next_touch(None, 5.0, false), Some(2.0));
-            assert_eq!(course.next_touch(None, 5.1, false), Some(5.0));
-            assert_eq!(course.next_touch(None, 2.0, false), None);
-            course.record(&frame(1.0, ContactState::Stick));
+            assert_eq!(history.next_contact(Some(0), 2.0, true), Some(5.0));
+            assert_eq!(history.next_contact(None, 0.5, true), Some(2.0));
+            assert_eq!(history.next_contact(None, 5.0, true), None);
+            assert_eq!(history.next_contact(None, 5.0, false), Some(2.0));
+            assert_eq!(history.next_contact(None, 5.1, false), Some(5.0));
+            assert_eq!(history.next_contact(None, 2.0, false), None);
+            history.record(&frame(1.0, ContactState::Stick));
         }
-        course.cut(2.5);
-        assert_eq!(course.next_touch(None, 2.0, true), None);
-        course.record(&frame(3.0, ContactState::Free));
-        course.record(&frame(4.0, ContactState::Stick));
-        assert_eq!(course.next_touch(None, 2.0, true), Some(4.0));
+        history.cut(2.5);
+        assert_eq!(history.next_contact(None, 2.0, true), None);
+        history.record(&frame(3.0, ContactState::Free));
+        history.record(&frame(4.0, ContactState::Stick));
+        assert_eq!(history.next_contact(None, 2.0, true), Some(4.0));
     }
 
     #[test]
     fn a_long_run_forgets_its_oldest_states_and_says_from_when_it_knows() {
-        let mut course = Course::default();
-        course.begin(0.0);
+        let mut history = ContactHistory::default();
+        history.begin(0.0);
         for index in 0..=KEPT + 10 {
             let state = if index % 2 == 0 {
                 ContactState::Free
             } else {
                 ContactState::Slip
             };
-            course.record(&frame(index as f64, state));
+            history.record(&frame(index as f64, state));
         }
-        let from = course.known_from();
+        let from = history.known_from();
         assert!(from > 0.4 * KEPT as f64);
-        let (start, ..) = course.states(0, 0.0, 1e9).next().expect("kept");
+        let (start, ..) = history.states(0, 0.0, 1e9).next().expect("kept");
         assert_eq!(start, from);
-        assert!(course.changes <= KEPT / 2 + 12);
+        assert!(history.changes <= KEPT / 2 + 12);
     }
 }
