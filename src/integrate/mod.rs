@@ -36,7 +36,7 @@ pub enum Method {
     Rosenbrock,
     /// Radau IIA(5), implicit, order 5, adaptive.
     Radau5,
-    /// Dormand-Prince while accuracy sets the step, Radau IIA(5) once stability does.
+    /// Dormand-Prince while accuracy limits the step, ROS34PW2 while friction does, Radau IIA(5) in settled contact.
     Automatic,
 }
 
@@ -96,7 +96,17 @@ pub trait StiffSystem: System {
     fn time_derivative(&self) -> &[f64];
 }
 
-/// A system in which the contacts alone can be stepped implicitly.
+/// A system whose friction can be linearised by itself.
+pub trait FrictionSystem: System {
+    /// The system with a Jacobian of which friction alone is known.
+    type Part<'a>: StiffSystem
+    where
+        Self: 'a;
+    /// Takes that view of it.
+    fn friction_alone(&mut self) -> Self::Part<'_>;
+}
+
+/// A system whose contacts can be stepped implicitly by themselves.
 pub trait ContactSystem: System {
     /// f(t, y) into `dy` as if no contact carried a force.
     fn derivative_without_contacts(&mut self, t: f64, y: &[f64], dy: &mut [f64]);

@@ -96,6 +96,11 @@ pub struct Rosenbrock {
 }
 
 impl Rosenbrock {
+    /// Size of the step that solves with `shift`.
+    pub fn step_of(shift: f64) -> f64 {
+        1.0 / (GAMMA * shift)
+    }
+
     /// For `dimension` components.
     pub fn new(dimension: usize) -> Self {
         Self {
@@ -281,5 +286,67 @@ mod tests {
         // L h = 5e8: an explicit method would need half a billion steps.
         let error = end_error(1e10, true, 20);
         assert!(error < 1e-4, "{error:e}");
+    }
+
+    /// y' = (1 + off) rate y, of which the Jacobian knows `rate`.
+    struct Off {
+        rate: f64,
+        off: f64,
+        shift: f64,
+    }
+
+    impl System for Off {
+        fn dimension(&self) -> usize {
+            1
+        }
+        fn positions(&self) -> usize {
+            0
+        }
+        fn derivative(&mut self, _t: f64, y: &[f64], dy: &mut [f64]) {
+            dy[0] = (1.0 + self.off) * self.rate * y[0];
+        }
+        fn position_rate(&mut self, _t: f64, _y: &[f64], _dy: &mut [f64]) {}
+        fn scale(&self) -> &[f64] {
+            &[1.0]
+        }
+    }
+
+    impl StiffSystem for Off {
+        fn linearise(&mut self, _t: f64, _y: &[f64]) {}
+        fn factor_shifted(&mut self, shift: f64) {
+            self.shift = shift;
+        }
+        fn solve_shifted(&mut self, b: &mut [f64]) {
+            b[0] /= self.shift - self.rate;
+        }
+        fn factor_shifted_pair(&mut self, _: f64, _: f64) {}
+        fn solve_shifted_pair(&mut self, _: &mut [f64], _: &mut [f64]) {}
+        fn time_derivative(&self) -> &[f64] {
+            &[0.0]
+        }
+    }
+
+    #[test]
+    fn a_jacobian_that_is_far_too_large_or_by_a_third_too_small_leaves_it_stable() {
+        let amplification = |rate: f64, off: f64| {
+            let mut system = Off {
+                rate,
+                off,
+                shift: 0.0,
+            };
+            let (y, mut k, mut end, mut rate_end) = ([1.0], [0.0], [0.0], [0.0]);
+            system.derivative(0.0, &y, &mut k);
+            Rosenbrock::new(1).attempt(&mut system, 0.0, 1.0, &y, &k, &mut end, &mut rate_end);
+            end[0].abs()
+        };
+        for rate in [-0.1, -1.0, -3.0, -10.0, -100.0, -1e4, -1e8] {
+            for tenths in -9..=5 {
+                let off = f64::from(tenths) / 10.0;
+                let found = amplification(rate, off);
+                assert!(found < 1.0, "{rate} {off}: {found}");
+            }
+        }
+        // Further off it is not.
+        assert!(amplification(-1e4, 1.0) > 1.0);
     }
 }

@@ -11,6 +11,7 @@ mod elements;
 mod equations;
 mod factor;
 mod forest;
+mod friction;
 mod implicit;
 mod jet;
 mod kinematics;
@@ -213,6 +214,8 @@ pub struct Mechanism {
     joint_names: Vec<String>,
     /// Linearisation; allocated if an implicit method is chosen.
     stiff: Option<Box<stiff::Stiff>>,
+    /// The same of friction alone.
+    friction: Option<Box<friction::Friction>>,
     sources: power::Sources,
     /// Time of the latest evaluation, s, while motion and forces still belong to it; `None` once they have been overwritten.
     evaluated: Option<f64>,
@@ -250,6 +253,7 @@ impl Mechanism {
             gravity: scene.gravity,
             joint_names: scene.ball_joints.iter().map(|j| j.name.clone()).collect(),
             stiff: None,
+            friction: None,
             implicit: None,
             assembly: Assembly::default(),
         })
@@ -492,7 +496,33 @@ impl Mechanism {
         }
     }
 
-    /// Allocates what [`ContactSystem`](crate::integrate::ContactSystem) needs, so that no step has to.
+    /// Allocates what the linearisation of friction alone needs.
+    ///
+    /// # Errors
+    /// Contacts that couple too widely for it.
+    pub fn prepare_friction(&mut self) -> Result<(), MechanismError> {
+        if self.friction.is_none() {
+            let (dimension, positions) = (self.dimension(), self.positions());
+            let (contacts, within) = (&self.contacts, self.equations.is_block_diagonal());
+            let velocities = dimension - positions;
+            let friction =
+                friction::Friction::new(&self.model, contacts, velocities, dimension, within)?;
+            self.friction = Some(Box::new(friction));
+        }
+        Ok(())
+    }
+
+    /// Whether friction can be linearised alone.
+    pub fn has_friction_alone(&self) -> bool {
+        self.friction.is_some()
+    }
+
+    /// Largest rate at which friction damps the sliding of a contact, 1/s, by its latest linearisation.
+    pub fn friction_rate(&self) -> f64 {
+        self.friction.as_ref().map_or(0.0, |f| f.fastest())
+    }
+
+    /// Allocates what [`ContactSystem`](crate::integrate::ContactSystem) needs, so that no step does.
     ///
     /// # Errors
     /// Contacts that are coupled too widely.

@@ -5,7 +5,7 @@ use super::elements::{At, Loads};
 use super::implicit::TURNS;
 use super::kinematics::Wrench;
 use super::{Mechanism, Powers};
-use crate::integrate::{ContactSystem, StiffSystem, System};
+use crate::integrate::{ContactSystem, FrictionSystem, Rosenbrock, StiffSystem, System};
 
 /// The equations of motion, with what decides over a step which contacts carry a force.
 pub struct Evaluator<'a> {
@@ -208,6 +208,93 @@ impl StiffSystem for Evaluator<'_> {
             .stiff
             .as_ref()
             .map_or(&[], |stiff| &stiff.time_derivative)
+    }
+}
+
+/// The equations of motion of which friction alone is linearised.
+pub struct FrictionAlone<'e, 'a>(&'e mut Evaluator<'a>);
+
+impl<'a> FrictionSystem for Evaluator<'a> {
+    type Part<'e>
+        = FrictionAlone<'e, 'a>
+    where
+        Self: 'e;
+
+    fn friction_alone(&mut self) -> FrictionAlone<'_, 'a> {
+        FrictionAlone(self)
+    }
+}
+
+impl System for FrictionAlone<'_, '_> {
+    fn dimension(&self) -> usize {
+        self.0.dimension()
+    }
+
+    fn positions(&self) -> usize {
+        self.0.positions()
+    }
+
+    fn derivative(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
+        self.0.derivative(t, y, dy);
+    }
+
+    fn position_rate(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
+        System::position_rate(self.0, t, y, dy);
+    }
+
+    fn scale(&self) -> &[f64] {
+        self.0.scale()
+    }
+}
+
+impl StiffSystem for FrictionAlone<'_, '_> {
+    fn linearise(&mut self, t: f64, y: &[f64]) {
+        let Some(mut friction) = self.0.mechanism.friction.take() else {
+            return;
+        };
+        let mut scratch = std::mem::take(&mut friction.derivative);
+        self.0.derivative(t, y, &mut scratch);
+        friction.derivative = scratch;
+        let touching = self.0.touching;
+        let Mechanism {
+            model,
+            equations,
+            contacts,
+            ..
+        } = &mut *self.0.mechanism;
+        friction.gather(model, contacts, touching, &mut **equations, y);
+        self.0.mechanism.friction = Some(friction);
+    }
+
+    fn factor_shifted(&mut self, shift: f64) {
+        if let Some(friction) = &mut self.0.mechanism.friction {
+            friction.factor(shift, Rosenbrock::step_of(shift));
+        }
+    }
+
+    fn solve_shifted(&mut self, b: &mut [f64]) {
+        let Mechanism {
+            model,
+            equations,
+            friction,
+            ..
+        } = &mut *self.0.mechanism;
+        if let Some(friction) = friction {
+            friction.solve(b, &**equations, model);
+        }
+    }
+
+    fn factor_shifted_pair(&mut self, _: f64, _: f64) {
+        unreachable!("no method with complex shifts steps friction alone");
+    }
+
+    fn solve_shifted_pair(&mut self, _: &mut [f64], _: &mut [f64]) {
+        unreachable!("no method with complex shifts steps friction alone");
+    }
+
+    fn time_derivative(&self) -> &[f64] {
+        let friction = self.0.mechanism.friction.as_ref();
+        friction.map_or(&[], |friction| &friction.time_derivative)
     }
 }
 

@@ -389,7 +389,7 @@ static TABLE: [Parameter; 28] = [
          order 5) chooses its steps by the tolerance and finds the instants at which contacts begin and end; \
          rosenbrock (ROS34PW2, linearly implicit, order 3) does so too and takes longer steps where contacts \
          have settled; radau5 (Radau IIA, implicit, order 5) takes the longest there; automatic changes between \
-         dopri5 and radau5.",
+         dopri5, radau5 and, while friction limits the step, a rosenbrock that knows friction alone.",
         "Solves paper eqs. (55), (58) in time",
     ),
     row(

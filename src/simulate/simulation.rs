@@ -20,7 +20,7 @@ use std::sync::Arc;
 use super::impacts::{Impact, Impacts};
 use super::ledger::Account;
 use super::peaks::{Approach, Recent};
-use super::stepper::AnyStepper;
+use super::stepper::{AnyStepper, Member};
 use super::{Frame, NotUnique, Peak, StartError, Statistics, StopAdvice, StopFault, Stopped, Wear};
 use crate::contact::Memory;
 use crate::integrate::{Controller, System as _};
@@ -149,9 +149,9 @@ struct Control {
     /// How densely corners of the friction law follow one another, and whether too densely to locate them.
     chatter: u32,
     chatters: bool,
-    /// Whether the implicit method of the automatic pair is stepping.
-    implicit: bool,
-    /// State behind the automatic pair's choice.
+    /// Which member of the automatic choice steps.
+    member: Member,
+    /// What the automatic choice goes by.
     choice: Choice,
     controller: Controller,
     /// Fixed steps are counted from here, so that times do not accumulate rounding errors.
@@ -180,9 +180,9 @@ impl Control {
             contact_began: false,
             chatter: 0,
             chatters: false,
-            implicit: false,
+            member: Member::Explicit,
             choice: Choice::default(),
-            controller: controller_of(scene.solver.method, false),
+            controller: controller_of(scene.solver.method, Member::Explicit),
             grid_origin: 0.0,
             grid_count: 0,
         }

@@ -1,8 +1,8 @@
 //! The stepping methods behind one type, so that the method can change while the simulation runs.
 
 use crate::integrate::{
-    ContactSystem, DormandPrince, ImexEuler, Method, Polynomial, Radau, Rosenbrock, RungeKutta4,
-    SemiImplicitEuler, Stepper, StiffSystem, hermite,
+    ContactSystem, DormandPrince, FrictionSystem, ImexEuler, Method, Polynomial, Radau, Rosenbrock,
+    RungeKutta4, SemiImplicitEuler, Stepper, StiffSystem, hermite,
 };
 
 pub(super) enum AnyStepper {
@@ -12,12 +12,25 @@ pub(super) enum AnyStepper {
     DormandPrince(DormandPrince),
     Rosenbrock(Box<Rosenbrock>),
     Radau(Box<Radau>),
-    /// The explicit method steps while `implicit` is false.
-    Pair {
+    /// One of them at a time.
+    Automatic {
         explicit: DormandPrince,
+        friction: Box<Rosenbrock>,
         stiff: Box<Radau>,
-        implicit: bool,
+        member: Member,
     },
+}
+
+/// Which method steps where the choice is automatic.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Member {
+    /// Dormand-Prince.
+    #[default]
+    Explicit,
+    /// ROS34PW2 with friction alone in its Jacobian.
+    Friction,
+    /// Radau IIA.
+    Implicit,
 }
 
 impl AnyStepper {
@@ -29,18 +42,19 @@ impl AnyStepper {
             Method::DormandPrince5 => Self::DormandPrince(DormandPrince::new(dimension)),
             Method::Rosenbrock => Self::Rosenbrock(Box::new(Rosenbrock::new(dimension))),
             Method::Radau5 => Self::Radau(Box::new(Radau::new(dimension))),
-            Method::Automatic => Self::Pair {
+            Method::Automatic => Self::Automatic {
                 explicit: DormandPrince::new(dimension),
+                friction: Box::new(Rosenbrock::new(dimension)),
                 stiff: Box::new(Radau::new(dimension)),
-                implicit: false,
+                member: Member::Explicit,
             },
         }
     }
 
-    /// Selects the implicit or the explicit method of a pair.
-    pub(super) fn choose(&mut self, use_implicit: bool) {
-        if let Self::Pair { implicit, .. } = self {
-            *implicit = use_implicit;
+    /// Puts a member of the automatic choice in charge.
+    pub(super) fn choose(&mut self, chosen: Member) {
+        if let Self::Automatic { member, .. } = self {
+            *member = chosen;
         }
     }
 
@@ -48,7 +62,13 @@ impl AnyStepper {
     pub(super) fn invalidate(&mut self) {
         match self {
             Self::Rosenbrock(stiff) => stiff.invalidate(),
-            Self::Radau(stiff) | Self::Pair { stiff, .. } => stiff.invalidate(),
+            Self::Radau(stiff) => stiff.invalidate(),
+            Self::Automatic {
+                friction, stiff, ..
+            } => {
+                friction.invalidate();
+                stiff.invalidate();
+            }
             _ => {}
         }
     }
@@ -56,14 +76,14 @@ impl AnyStepper {
     /// The implicit method's latest polynomial, for a snapshot.
     pub(super) fn polynomial(&self) -> Option<&Polynomial> {
         match self {
-            Self::Radau(stiff) | Self::Pair { stiff, .. } => Some(stiff.polynomial()),
+            Self::Radau(stiff) | Self::Automatic { stiff, .. } => Some(stiff.polynomial()),
             _ => None,
         }
     }
 
     /// Restores it.
     pub(super) fn set_polynomial(&mut self, polynomial: &Polynomial) {
-        if let Self::Radau(stiff) | Self::Pair { stiff, .. } = self {
+        if let Self::Radau(stiff) | Self::Automatic { stiff, .. } = self {
             stiff.set_polynomial(polynomial);
         }
     }
@@ -72,16 +92,16 @@ impl AnyStepper {
     pub(super) fn stiffness(&self, h: f64, y_end: &[f64], k_end: &[f64]) -> f64 {
         match self {
             Self::DormandPrince(explicit)
-            | Self::Pair {
+            | Self::Automatic {
                 explicit,
-                implicit: false,
+                member: Member::Explicit,
                 ..
             } => explicit.stiffness(h, y_end, k_end),
             _ => 0.0,
         }
     }
 
-    pub(super) fn attempt<S: StiffSystem + ContactSystem>(
+    pub(super) fn attempt<S: StiffSystem + ContactSystem + FrictionSystem>(
         &mut self,
         system: &mut S,
         t: f64,
@@ -97,13 +117,18 @@ impl AnyStepper {
             Self::ImexEuler(s) => s.attempt(system, t, h, y, y_end),
             Self::RungeKutta4(s) => s.attempt(system, t, h, y, k, y_end, k_end),
             Self::DormandPrince(s)
-            | Self::Pair {
+            | Self::Automatic {
                 explicit: s,
-                implicit: false,
+                member: Member::Explicit,
                 ..
             } => s.attempt(system, t, h, y, k, y_end, k_end),
             Self::Rosenbrock(s) => s.attempt(system, t, h, y, k, y_end, k_end),
-            Self::Radau(s) | Self::Pair { stiff: s, .. } => {
+            Self::Automatic {
+                friction: s,
+                member: Member::Friction,
+                ..
+            } => s.attempt(&mut system.friction_alone(), t, h, y, k, y_end, k_end),
+            Self::Radau(s) | Self::Automatic { stiff: s, .. } => {
                 s.attempt(system, t, h, y, k, y_end, k_end, tolerance)
             }
         }
@@ -113,7 +138,11 @@ impl AnyStepper {
     /// own nodes, between which its polynomial departs from stiff contacts.
     pub(super) fn interior(&self) -> &'static [f64] {
         match self {
-            Self::Radau(_) | Self::Pair { implicit: true, .. } => &Radau::INTERIOR,
+            Self::Radau(_)
+            | Self::Automatic {
+                member: Member::Implicit,
+                ..
+            } => &Radau::INTERIOR,
             _ => &[0.5],
         }
     }
@@ -122,7 +151,11 @@ impl AnyStepper {
     pub(super) fn quadrature(&self) -> &'static [f64] {
         const RADAU: [f64; 3] = [Radau::INTERIOR[0], Radau::INTERIOR[1], 1.0];
         match self {
-            Self::Radau(_) | Self::Pair { implicit: true, .. } => &RADAU,
+            Self::Radau(_)
+            | Self::Automatic {
+                member: Member::Implicit,
+                ..
+            } => &RADAU,
             _ => &[0.0, 0.5, 1.0],
         }
     }
@@ -131,12 +164,17 @@ impl AnyStepper {
     pub(super) fn truncate(&mut self, theta: f64) {
         match self {
             Self::DormandPrince(s)
-            | Self::Pair {
+            | Self::Automatic {
                 explicit: s,
-                implicit: false,
+                member: Member::Explicit,
                 ..
             } => s.truncate(theta),
-            Self::Radau(s) | Self::Pair { stiff: s, .. } => s.truncate(theta),
+            Self::Radau(s)
+            | Self::Automatic {
+                stiff: s,
+                member: Member::Implicit,
+                ..
+            } => s.truncate(theta),
             _ => {}
         }
     }
@@ -168,16 +206,20 @@ impl AnyStepper {
             Self::SemiImplicitEuler(_)
             | Self::ImexEuler(_)
             | Self::RungeKutta4(_)
-            | Self::Rosenbrock(_) => {
+            | Self::Rosenbrock(_)
+            | Self::Automatic {
+                member: Member::Friction,
+                ..
+            } => {
                 hermite(theta, h, y, k, y_end, k_end, out);
             }
             Self::DormandPrince(s)
-            | Self::Pair {
+            | Self::Automatic {
                 explicit: s,
-                implicit: false,
+                member: Member::Explicit,
                 ..
             } => s.interpolate(theta, h, y, k, out),
-            Self::Radau(s) | Self::Pair { stiff: s, .. } => s.interpolate(theta, y, out),
+            Self::Radau(s) | Self::Automatic { stiff: s, .. } => s.interpolate(theta, y, out),
         }
     }
 }

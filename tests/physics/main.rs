@@ -18,6 +18,7 @@ mod independent;
 mod known_systems;
 mod ledger;
 mod live_changes;
+mod many_joints;
 mod order;
 mod pays_only;
 mod planar_loops;

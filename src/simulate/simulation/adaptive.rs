@@ -25,7 +25,7 @@ struct SignedGap {
 impl Simulation {
     /// A step whose size follows the error estimate, cut at the first contact start or end inside it.
     pub(super) fn adaptive_step(&mut self, limit: f64) -> Result<(), Stopped> {
-        self.stepper.choose(self.state.control.implicit);
+        self.stepper.choose(self.state.control.member);
         self.attempt.turned = false;
         self.attempt.counts = Counts::default();
         let (t_end, h) = loop {

@@ -1,18 +1,25 @@
-//! Which method of the automatic pair steps: the explicit one through impacts, the implicit one once contacts have settled.
+//! Which member of the automatic choice steps: the explicit one through impacts, the implicit one once contacts have settled.
 
 use super::Simulation;
 use crate::integrate::{Controller, Method};
 use crate::mechanism::{Mechanism, MechanismError};
+use crate::simulate::stepper::Member;
 
 /// h |lambda| beyond which an explicit step is limited by stability.
 pub(super) const HELD_BY_STABILITY: f64 = 3.0;
 /// Steps that must be limited by stability, or taken since the latest contact began, before the implicit method is tried.
 const HELD_STEPS: u32 = 8;
+/// Steps that must be held by stability before friction is tried as what holds them, and h times its rate below which it does
+/// no longer.
+const HELD_BY_FRICTION: u32 = 2;
+const NO_LONGER_STIFF: f64 = 3.0;
 const SETTLED_STEPS: u32 = 60;
 /// Over this many implicit steps the progress per cost must be this many times the explicit method's; otherwise the
 /// explicit one gets this many steps, and twice as many after each consecutive failed trial.
 const TRIAL_STEPS: u32 = 12;
-const WORTH_IT: f64 = 2.0;
+/// The first of them, in which the step still grows, do not count.
+const GROWING_STEPS: u32 = 8;
+const WORTH_IT: f64 = 1.3;
 const EXPLICIT_TURN: u32 = 200;
 const LONGEST_TURN: u32 = 6400;
 /// Evaluations of one explicit step.
@@ -45,72 +52,104 @@ pub(super) struct Choice {
 }
 
 impl Simulation {
-    /// Chooses the method of the automatic pair for the next step, after one of size `h` that took `evaluations`.
+    /// Which method of the automatic choice takes the next step, after one of size `h` that took so many evaluations.
     pub(super) fn vote(&mut self, h: f64, stiffness: f64, evaluations: u64) {
+        let before = self.state.control.member;
+        let member = self.voted(h, stiffness, evaluations);
+        if member != before {
+            self.state.control.member = member;
+            self.state.control.controller = controller_of(Method::Automatic, member);
+            // Corners are located by those that have an interpolant of their own.
+            self.hold_pieces(false);
+            self.stepper.invalidate();
+        }
+    }
+
+    fn voted(&mut self, h: f64, stiffness: f64, evaluations: u64) -> Member {
         let velocities = self.state.now.y.len() - self.mechanism.positions();
         let state = &mut self.state;
+        let member = state.control.member;
         let choice = &mut state.control.choice;
         if state.control.contact_began {
             choice.since_contact = 0;
             choice.held = 0;
-            // An impact is short and not stiff: the explicit method resolves it more cheaply.
-            if state.control.implicit && state.now.memory.iter().any(|m| m.active && !m.floored) {
-                state.control.implicit = false;
-                state.control.controller = controller_of(Method::Automatic, false);
-            }
-            return;
+            // An impact is short and not stiff: the explicit method resolves it at less cost.
+            let strikes = state.now.memory.iter().any(|m| m.active && !m.floored);
+            return match member {
+                Member::Implicit if strikes => Member::Explicit,
+                _ => member,
+            };
         }
-        if state.control.implicit {
+        if member == Member::Implicit {
             choice.progress += h;
             let algebra = (velocities * velocities) as f64 / SQUARE_OF_AN_EVALUATION;
             choice.cost += evaluations as f64 + algebra;
             choice.steps += 1;
+            if choice.steps == GROWING_STEPS {
+                (choice.progress, choice.cost) = (0.0, 0.0);
+            }
             if choice.steps >= TRIAL_STEPS {
                 let explicit = choice.h_explicit / EXPLICIT_EVALUATIONS;
-                if choice.progress < WORTH_IT * explicit * choice.cost {
-                    state.control.implicit = false;
-                    state.control.controller = controller_of(Method::Automatic, false);
+                let fails = choice.progress < WORTH_IT * explicit * choice.cost;
+                (choice.progress, choice.cost, choice.steps) = (0.0, 0.0, 0);
+                if fails {
                     state.control.h_next = choice.h_explicit;
                     let turn = EXPLICIT_TURN << choice.failures.min(8);
                     choice.wait = turn.min(LONGEST_TURN);
                     choice.failures += 1;
-                } else {
-                    choice.failures = 0;
+                    return Member::Explicit;
                 }
-                (choice.progress, choice.cost, choice.steps) = (0.0, 0.0, 0);
+                choice.failures = 0;
             }
-            return;
+            return member;
         }
         choice.since_contact += 1;
-        choice.held = if stiffness > HELD_BY_STABILITY {
-            choice.held + 1
+        let touches = state.now.memory.iter().any(|m| m.active);
+        let mut next = member;
+        if member == Member::Friction {
+            if self.mechanism.friction_rate() * h < NO_LONGER_STIFF {
+                choice.held = 0;
+                next = Member::Explicit;
+            } else {
+                choice.held += 1;
+            }
         } else {
-            choice.held.saturating_sub(1)
-        };
+            choice.held = if stiffness > HELD_BY_STABILITY {
+                choice.held + 1
+            } else {
+                choice.held.saturating_sub(1)
+            };
+            if touches
+                && self.mechanism.has_friction_alone()
+                && choice.held >= HELD_BY_FRICTION
+                && choice.held < HELD_STEPS
+            {
+                next = Member::Friction;
+            }
+        }
         if choice.wait > 0 {
             choice.wait -= 1;
-            return;
+            return next;
         }
-        let touches = state.now.memory.iter().any(|m| m.active);
         let held = choice.held >= HELD_STEPS && (touches || self.mechanism.has_couplings());
         let settled = held || (touches && choice.since_contact >= SETTLED_STEPS);
         if settled && velocities <= LARGEST_IMPLICIT {
-            state.control.implicit = true;
-            state.control.controller = controller_of(Method::Automatic, true);
             *choice = Choice {
                 h_explicit: h,
                 failures: choice.failures,
                 ..Choice::default()
             };
+            return Member::Implicit;
         }
+        next
     }
 }
 
 /// Step-size control for the order of the method's error estimate.
-pub(super) fn controller_of(method: Method, implicit: bool) -> Controller {
-    Controller::new(match (method, implicit) {
-        (Method::Rosenbrock, _) => 2,
-        (Method::Radau5, _) | (Method::Automatic, true) => 3,
+pub(super) fn controller_of(method: Method, member: Member) -> Controller {
+    Controller::new(match (method, member) {
+        (Method::Rosenbrock, _) | (Method::Automatic, Member::Friction) => 2,
+        (Method::Radau5, _) | (Method::Automatic, Member::Implicit) => 3,
         _ => 4,
     })
 }
@@ -135,6 +174,10 @@ pub(super) fn prepare_implicit(
     }
     if method.is_implicit() || (method == Method::Automatic && velocities <= LARGEST_IMPLICIT) {
         mechanism.prepare_linearisation();
+    }
+    if method == Method::Automatic {
+        // Where they couple too widely, without it.
+        let _ = mechanism.prepare_friction();
     }
     Ok(())
 }

@@ -4,6 +4,7 @@
 use super::Simulation;
 use crate::contact::{ApproachPiece, FrictionPiece, Memory};
 use crate::integrate::{Method, find_root};
+use crate::simulate::stepper::Member;
 
 /// Parts of a step at whose ends the sliding speed is checked.
 const PARTS: u32 = 4;
@@ -59,7 +60,8 @@ impl Simulation {
     /// a cubic through both ends overshoots, and a step that ends on it gains energy.
     fn locates_corners(&self) -> bool {
         let method = self.running.solver.method;
-        method.is_adaptive() && method != Method::Rosenbrock
+        let whole = self.state.control.member == Member::Friction;
+        method.is_adaptive() && method != Method::Rosenbrock && !whole
     }
 
     /// Puts every touching joint on its current pieces of the laws; those that already hold some keep them unless `anew`.

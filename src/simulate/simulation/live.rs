@@ -7,7 +7,7 @@ use super::{CLEARANCE_SPEED, Simulation};
 use crate::contact::Memory;
 use crate::mechanism::{ElementReport, Pull, Ramp};
 use crate::scene::{Scene, SceneError};
-use crate::simulate::stepper::AnyStepper;
+use crate::simulate::stepper::{AnyStepper, Member};
 use crate::simulate::{Effect, Frame};
 
 /// Largest distance of a hand, or of the point it holds, m: beyond it a pull makes no sense.
@@ -137,8 +137,8 @@ impl Simulation {
             let solver = &self.running.solver;
             if solver.method != before.solver.method {
                 self.stepper = AnyStepper::new(solver.method, self.state.now.y.len());
-                self.state.control.implicit = false;
-                self.state.control.controller = controller_of(solver.method, false);
+                self.state.control.member = Member::Explicit;
+                self.state.control.controller = controller_of(solver.method, Member::Explicit);
                 self.state.control.choice = Choice::default();
             }
             self.state.control.h_next = self.state.control.h_next.min(solver.step);

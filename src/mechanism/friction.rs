@@ -1,0 +1,486 @@
+//! Friction of touching balls alone, linearised: what holds an explicit step back while a ball sticks under load.
+//!
+//! On the ramp of its friction law a joint under the load F_N answers to sliding like a damper of mu F_N / v_theta. With S the
+//! velocity of a contact point per velocity coordinate and W that of what friction reads, dQ/dv = sum S_c^T B_c W_c, three rows
+//! a contact. So (s I - M^-1 dQ/dv) x = b takes no matrix of the size of the mechanism: the velocities w_c = W_c x solve
+//! s w_c - sum_d H_cd B_d w_d = W_c b with H_cd = W_c M^-1 S_d^T, and x = (b + M^-1 sum S_c^T B_c w_c) / s.
+//!
+//! The force that a contact carries may rise many times over within a step. A W-method takes any B; one that is too large only
+//! damps, one that is too small by half is unstable. So B is that of the larger load of both ends of the step, as far as the
+//! approach tells.
+
+use super::MechanismError;
+use super::bounds::{Cost, CostOf};
+use super::columns::{Column, collect_columns, contact_sides};
+use super::contacts::{Contacts, Touching};
+use super::equations::Equations;
+use super::model::{BallJoint, Model};
+use crate::contact::{Coefficients, Memory, Slope};
+use crate::scene::{Mat3, Vec3};
+
+/// A ball with play.
+struct Touch {
+    joint: usize,
+    law: Coefficients,
+    memory: Memory,
+    /// m, m/s, and the velocity that friction reads, m/s.
+    eccentricity: Vec3,
+    rate: Vec3,
+    read: Vec3,
+    /// Coordinates of the trees that it acts on, and M^-1 S^T there, one after the other.
+    ranges: Vec<(usize, usize)>,
+    weighted: Vec<Vec3>,
+    columns: Vec<Column>,
+    /// B, N s/m.
+    resistance: Mat3,
+}
+
+impl Touch {
+    /// dF/dw for the larger load of now and `h` later, s.
+    fn resist(&mut self, h: f64) {
+        let later = self.law.separation(&self.eccentricity, &self.rate).rate > 0.0;
+        let ahead = if later { h } else { 0.0 };
+        let eccentricity = self.eccentricity + self.rate * ahead;
+        let at = self.law.separation(&eccentricity, &self.rate);
+        self.resistance = Mat3::zeros();
+        if at.penetration <= 0.0 {
+            return;
+        }
+        let force = self.law.force(&self.memory, &at, || self.read);
+        if force.normal > 0.0 {
+            let slope = Slope::Secant;
+            let of = self
+                .law
+                .linearise(&self.memory, &at, &self.rate, &self.read, &force, slope);
+            self.resistance = of.by_slip;
+        }
+    }
+
+    /// Velocity that friction reads for the velocities `x`.
+    fn reading(&self, x: &[f64]) -> Vec3 {
+        let surfaces = self.law.uses_surface_velocity();
+        let part = |c: &Column| if surfaces { c.surface } else { c.centre } * x[c.coordinate];
+        self.columns.iter().map(part).sum()
+    }
+
+    /// W M^-1 S^T of another's forces.
+    fn mobility(&self, other: &Self) -> Mat3 {
+        let surfaces = self.law.uses_surface_velocity();
+        let mut sum = Mat3::zeros();
+        for c in &self.columns {
+            let mut offset = 0;
+            for &(first, end) in &other.ranges {
+                if (first..end).contains(&c.coordinate) {
+                    let read = if surfaces { c.surface } else { c.centre };
+                    sum += read * other.weighted[offset + c.coordinate - first].transpose();
+                }
+                offset += end - first;
+            }
+        }
+        sum
+    }
+}
+
+/// The linearisation and its factors.
+pub struct Friction {
+    n: usize,
+    /// A force accelerates only the trees that it acts on.
+    within: bool,
+    /// Every ball with play, and which of them touch.
+    touches: Vec<Touch>,
+    active: Vec<usize>,
+    /// Those further apart than this in their order do not feel each other.
+    reach: usize,
+    /// s I - H B, a band of blocks, factored; H in the same places.
+    band: Vec<Mat3>,
+    mobility: Vec<Mat3>,
+    right: Vec<Vec3>,
+    shift: f64,
+    y: Vec<f64>,
+    rate: Vec<f64>,
+    scratch: Vec<f64>,
+    /// First touch on every tree.
+    first_on: Vec<usize>,
+    /// df/dt: friction follows the state alone.
+    pub time_derivative: Vec<f64>,
+    /// Scratch for the derivative at the point of linearisation.
+    pub derivative: Vec<f64>,
+}
+
+impl Friction {
+    /// For `velocities` velocity coordinates in a state of `dimension`. With `within`, a force accelerates only the trees that
+    /// it acts on; else all.
+    ///
+    /// # Errors
+    /// Contacts that couple too widely.
+    pub fn new(
+        model: &Model,
+        contacts: &Contacts,
+        velocities: usize,
+        dimension: usize,
+        within: bool,
+    ) -> Result<Self, MechanismError> {
+        let ranges = |joint: &BallJoint| {
+            if !within {
+                return vec![(0, velocities)];
+            }
+            let mut ranges = Vec::with_capacity(2);
+            for body in [joint.ball.body, joint.socket.body] {
+                if body < model.bodies.len() && !model.bodies[body].driven_only {
+                    let block = &model.blocks[model.block_of[body]];
+                    let range = (block.v, block.v + block.n);
+                    if !ranges.contains(&range) {
+                        ranges.push(range);
+                    }
+                }
+            }
+            ranges
+        };
+        let width = |ranges: &[(usize, usize)]| ranges.iter().map(|(first, end)| end - first).sum();
+        let loose = (0..contacts.len()).filter(|&j| contacts.has_clearance(j));
+        let of: Vec<_> = loose.map(|j| (j, ranges(&model.joints[j]))).collect();
+        let mut friction = Self {
+            n: velocities,
+            within,
+            touches: Vec::new(),
+            active: (0..of.len()).collect(),
+            reach: 0,
+            band: Vec::new(),
+            mobility: Vec::new(),
+            right: Vec::with_capacity(of.len()),
+            shift: 1.0,
+            y: vec![0.0; dimension],
+            rate: vec![0.0; dimension - velocities],
+            scratch: vec![0.0; velocities],
+            first_on: vec![usize::MAX; velocities + 1],
+            time_derivative: vec![0.0; dimension],
+            derivative: vec![0.0; dimension],
+        };
+        let reach = reach_of(
+            of.iter().map(|(_, ranges)| &ranges[..]),
+            &mut friction.first_on,
+        );
+        let widths = of.iter().map(|(_, ranges)| width(ranges)).sum();
+        Cost::of_implicit_contacts(of.len(), reach, widths)
+            .check(CostOf::ImplicitContacts, "choose solver.method = dopri5")?;
+        let touch = |(joint, ranges): (usize, Vec<(usize, usize)>)| Touch {
+            joint,
+            law: *contacts.coefficients(joint),
+            memory: Memory::default(),
+            eccentricity: Vec3::zeros(),
+            rate: Vec3::zeros(),
+            read: Vec3::zeros(),
+            columns: Vec::with_capacity(width(&ranges)),
+            weighted: vec![Vec3::zeros(); width(&ranges)],
+            ranges,
+            resistance: Mat3::zeros(),
+        };
+        let size = of.len() * (2 * reach + 1);
+        friction.touches = of.into_iter().map(touch).collect();
+        friction.active.clear();
+        friction.band.reserve_exact(size);
+        friction.mobility.reserve_exact(size);
+        Ok(friction)
+    }
+
+    /// Takes the balls that touch, from the gaps of the evaluation just made at `y`.
+    pub fn gather(
+        &mut self,
+        model: &Model,
+        contacts: &Contacts,
+        touching: Touching<'_>,
+        equations: &mut dyn Equations,
+        y: &[f64],
+    ) {
+        self.y.copy_from_slice(y);
+        self.active.clear();
+        for (slot, touch) in self.touches.iter_mut().enumerate() {
+            let contact = contacts.joint(touch.joint);
+            let memory = touching.memory(touch.joint);
+            let Some(memory) = memory.filter(|_| contact.law.friction > 0.0) else {
+                continue;
+            };
+            if contact.gap.eccentricity == Vec3::zeros() {
+                continue;
+            }
+            self.active.push(slot);
+            let n = contact.separation().normal;
+            touch.law = contact.law;
+            touch.memory = *memory;
+            touch.eccentricity = contact.gap.eccentricity;
+            touch.rate = contact.gap.eccentricity_rate;
+            touch.read = contact.friction_reads(&n, equations.motion());
+            let sides = contact_sides(&contact.joint, &contact.law);
+            collect_columns(&mut touch.columns, model, equations, &sides, &n);
+            for i in 0..3 {
+                for &(first, end) in &touch.ranges {
+                    self.scratch[first..end].fill(0.0);
+                }
+                for column in &touch.columns {
+                    self.scratch[column.coordinate] = column.surface[i];
+                }
+                let mut offset = 0;
+                for &(first, end) in &touch.ranges {
+                    if self.within {
+                        equations.apply_inverse_mass_within(model, (first, end), &mut self.scratch);
+                    } else {
+                        equations.apply_inverse_mass(model, &mut self.scratch);
+                    }
+                    for k in first..end {
+                        touch.weighted[offset + k - first][i] = self.scratch[k];
+                    }
+                    offset += end - first;
+                }
+            }
+        }
+        let ranges = self
+            .active
+            .iter()
+            .map(|&slot| &self.touches[slot].ranges[..]);
+        self.reach = reach_of(ranges, &mut self.first_on);
+        self.couple();
+    }
+
+    fn couple(&mut self) {
+        let (m, reach) = (self.active.len(), self.reach);
+        let size = m * (2 * reach + 1);
+        self.mobility.clear();
+        self.mobility.resize(size, Mat3::zeros());
+        self.band.clear();
+        self.band.resize(size, Mat3::zeros());
+        self.right.clear();
+        self.right.resize(m, Vec3::zeros());
+        for i in 0..m {
+            for j in i.saturating_sub(reach)..=(i + reach).min(m - 1) {
+                let at = self.at(i, j);
+                let [one, other] = [i, j].map(|i| &self.touches[self.active[i]]);
+                self.mobility[at] = one.mobility(other);
+            }
+        }
+    }
+
+    /// Place of block (i, j) in the band.
+    fn at(&self, i: usize, j: usize) -> usize {
+        i * (2 * self.reach + 1) + j + self.reach - i
+    }
+
+    /// Prepares to solve with the shift s for a step of size `h`.
+    pub fn factor(&mut self, shift: f64, h: f64) {
+        self.shift = shift;
+        let (m, reach) = (self.active.len(), self.reach);
+        for &slot in &self.active {
+            self.touches[slot].resist(h);
+        }
+        let at = |i: usize, j: usize| i * (2 * reach + 1) + j + reach - i;
+        for i in 0..m {
+            for j in i.saturating_sub(reach)..=(i + reach).min(m - 1) {
+                let mut block = self.mobility[at(i, j)] * -self.touches[self.active[j]].resistance;
+                if i == j {
+                    block += Mat3::identity() * shift;
+                }
+                self.band[at(i, j)] = block;
+            }
+        }
+        for k in 0..m {
+            let last = (k + reach).min(m - 1);
+            let inverse = self.band[at(k, k)]
+                .try_inverse()
+                .unwrap_or_else(|| Mat3::from_element(f64::NAN));
+            self.band[at(k, k)] = inverse;
+            for i in k + 1..=last {
+                let factor = self.band[at(i, k)] * inverse;
+                self.band[at(i, k)] = factor;
+                for j in k + 1..=last {
+                    let upper = self.band[at(k, j)];
+                    self.band[at(i, j)] -= factor * upper;
+                }
+            }
+        }
+    }
+
+    /// Largest rate at which friction damps a contact's own sliding, 1/s, as factored last.
+    pub fn fastest(&self) -> f64 {
+        let own = |i: usize| {
+            let h = &self.mobility[self.at(i, i)];
+            -(h * self.touches[self.active[i]].resistance).trace()
+        };
+        (0..self.active.len()).map(own).fold(0.0, f64::max)
+    }
+
+    /// Solves (s I - J) x = b in place.
+    pub fn solve(&mut self, b: &mut [f64], equations: &dyn Equations, model: &Model) {
+        let positions = b.len() - self.n;
+        let (b_q, b_v) = b.split_at_mut(positions);
+        let (m, reach, s) = (self.active.len(), self.reach, self.shift);
+        for (&slot, right) in self.active.iter().zip(&mut self.right) {
+            *right = self.touches[slot].reading(b_v);
+        }
+        for k in 0..m {
+            for i in k + 1..=(k + reach).min(m - 1) {
+                let above = self.right[k];
+                let at = self.at(i, k);
+                self.right[i] -= self.band[at] * above;
+            }
+        }
+        for k in (0..m).rev() {
+            let mut sum = self.right[k];
+            for j in k + 1..=(k + reach).min(m - 1) {
+                sum -= self.band[self.at(k, j)] * self.right[j];
+            }
+            self.right[k] = self.band[self.at(k, k)] * sum;
+        }
+        for (&slot, w) in self.active.iter().zip(&self.right) {
+            let touch = &self.touches[slot];
+            let force = touch.resistance * w;
+            let mut offset = 0;
+            for &(first, end) in &touch.ranges {
+                for (x, by) in b_v[first..end].iter_mut().zip(&touch.weighted[offset..]) {
+                    *x += by.dot(&force);
+                }
+                offset += end - first;
+            }
+        }
+        for x in b_v.iter_mut() {
+            *x /= s;
+        }
+        self.y[positions..].copy_from_slice(b_v);
+        equations.position_rate(model, &self.y, &mut self.rate);
+        for (x, r) in b_q.iter_mut().zip(&self.rate) {
+            *x = (*x + r) / s;
+        }
+    }
+}
+
+/// How far apart in their order touches with these coordinates feel each other: through a tree that both act on. `first_on` is
+/// scratch, one entry a coordinate.
+fn reach_of<'a>(
+    touches: impl Iterator<Item = &'a [(usize, usize)]> + Clone,
+    first_on: &mut [usize],
+) -> usize {
+    for &(first, _) in touches.clone().flatten() {
+        first_on[first] = usize::MAX;
+    }
+    let mut reach = 0;
+    for (i, ranges) in touches.enumerate() {
+        for &(first, _) in ranges {
+            first_on[first] = first_on[first].min(i);
+            reach = reach.max(i - first_on[first]);
+        }
+    }
+    reach
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::contact::Memory;
+    use crate::integrate::{FrictionSystem, StiffSystem, System};
+    use crate::mechanism::{Mechanism, Touching};
+    use crate::scene::Scene;
+
+    /// Without damping, so that the load, and with it friction, does not follow the penetration rate: that is left out.
+    fn scene(name: &str, changes: &[(&str, &str)]) -> Scene {
+        let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
+        let elastic = [("contact.restitution", "1")];
+        let changes: Vec<(String, String)> = elastic.iter().chain(changes).map(own).collect();
+        Scene::load(name, &changes).unwrap()
+    }
+
+    /// Balls that rest 0.2 um deep in their walls and creep along them: two neighbours in a chain, one tree between driven
+    /// slides, and the same with an ideal joint.
+    fn resting() -> Vec<(Scene, Vec<f64>)> {
+        let deep = 0.3e-3 + 2e-7;
+        let chain = scene("chain", &[("chain.links", "3")]);
+        let mut hanging = Mechanism::new(&chain).unwrap().start().unwrap();
+        let positions = hanging.len() - 18;
+        for link in 0..3 {
+            let times = f64::from(link as u8 + 1);
+            hanging[7 * link + 2] -= times * deep;
+            hanging[positions + 6 * link] += times * 2e-5;
+            hanging[positions + 6 * link + 1] -= times * 1e-5;
+        }
+        let mut all = vec![(chain, hanging)];
+        for closed in [&[][..], &[("joint.S2.clearance", "0")]] {
+            let spcmm = scene("spcmm", closed);
+            let mechanism = &mut Mechanism::new(&spcmm).unwrap();
+            let mut y = mechanism.start().unwrap();
+            y[0] += deep;
+            mechanism.project(0.0, &mut y);
+            y[mechanism.positions() + 1] += 2e-5;
+            all.push((spcmm, y));
+        }
+        all
+    }
+
+    /// dv/dt along `x` by central differences of the velocities.
+    fn along(scene: &Scene, memory: &[Memory], y: &[f64], x: &[f64]) -> Vec<f64> {
+        let mut mechanism = Mechanism::new(scene).unwrap();
+        let positions = mechanism.positions();
+        let width = 1e-9 / x.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+        let mut at = |sign: f64| {
+            let (mut moved, mut out) = (y.to_vec(), vec![0.0; y.len()]);
+            for (v, x) in moved[positions..].iter_mut().zip(x) {
+                *v += sign * width * x;
+            }
+            mechanism
+                .evaluator(Touching::Located(memory))
+                .derivative(0.0, &moved, &mut out);
+            out.split_off(positions)
+        };
+        let (plus, minus) = (at(1.0), at(-1.0));
+        let of = |(plus, minus): (&f64, &f64)| (plus - minus) / (2.0 * width);
+        plus.iter().zip(&minus).map(of).collect()
+    }
+
+    #[test]
+    fn it_solves_with_what_friction_alone_adds_to_the_derivative() {
+        for (scene, y) in resting() {
+            let name = &scene.name;
+            let memory = Memory {
+                active: true,
+                approach_speed: 1e-3,
+                floored: true,
+                ..Memory::default()
+            };
+            let memory = vec![memory; scene.ball_joints.len()];
+            let mut mechanism = Mechanism::new(&scene).unwrap();
+            let positions = mechanism.positions();
+            mechanism.prepare_friction().unwrap();
+            let mut evaluator = mechanism.evaluator(Touching::Located(&memory));
+            let mut system = evaluator.friction_alone();
+            system.linearise(0.0, &y);
+            let shift = 1e4;
+            system.factor_shifted(shift);
+            let b: Vec<f64> = (0..y.len()).map(|i| libm::sin(1.0 + i as f64)).collect();
+            let mut x = b.clone();
+            system.solve_shifted(&mut x);
+            assert!(mechanism.friction_rate() > 3.0 * shift, "{name}: not stiff");
+
+            let x_v = &x[positions..];
+            let mut smooth = scene.clone();
+            for joint in &mut smooth.ball_joints {
+                joint.contact.friction = 0.0;
+            }
+            let with = along(&scene, &memory, &y, x_v);
+            let without = along(&smooth, &memory, &y, x_v);
+            let largest = b.iter().fold(0.0_f64, |most, b| most.max(b.abs()));
+            for k in 0..x_v.len() {
+                let left = shift * x_v[k] - (with[k] - without[k]);
+                let off = (left - b[positions + k]).abs();
+                let scale = largest + (shift * x_v[k]).abs() + with[k].abs();
+                // The load is that of the end of the step that the shift belongs to.
+                assert!(
+                    off < 2e-2 * scale,
+                    "{name} {k}: {left:e} {:e}",
+                    b[positions + k]
+                );
+            }
+            let mut rate = vec![0.0; y.len()];
+            let mut moving = y.clone();
+            moving[positions..].copy_from_slice(x_v);
+            mechanism.position_rate(&moving, &mut rate);
+            for k in 0..positions {
+                assert!((shift * x[k] - b[k] - rate[k]).abs() < 1e-9, "{name} q{k}");
+            }
+        }
+    }
+}
