@@ -380,10 +380,16 @@ mod tests {
     /// Without damping, so that the load, and with it friction, does not follow the penetration rate: that is left out.
     fn scene(name: &str, changes: &[(&str, &str)]) -> Scene {
         let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
-        let elastic = [("contact.restitution", "1")];
+        let elastic = [
+            ("contact.restitution", "1"),
+            ("contact.slip_speed_low", "0"),
+        ];
         let changes: Vec<(String, String)> = elastic.iter().chain(changes).map(own).collect();
         Scene::load(name, &changes).unwrap()
     }
+
+    /// m/s: so slow that no load is expected to rise within a step.
+    const SLIP: f64 = 2e-8;
 
     /// Balls that rest 0.2 um deep in their walls and creep along them: two neighbours in a chain, one tree between driven
     /// slides, and the same with an ideal joint.
@@ -395,17 +401,18 @@ mod tests {
         for link in 0..3 {
             let times = f64::from(link as u8 + 1);
             hanging[7 * link + 2] -= times * deep;
-            hanging[positions + 6 * link] += times * 2e-5;
-            hanging[positions + 6 * link + 1] -= times * 1e-5;
+            hanging[positions + 6 * link] += times * SLIP;
+            hanging[positions + 6 * link + 1] -= times * SLIP;
         }
         let mut all = vec![(chain, hanging)];
+        let still = [("spcmm.amplitude_x", "0"), ("spcmm.amplitude_beta", "0")];
         for closed in [&[][..], &[("joint.S2.clearance", "0")]] {
-            let spcmm = scene("spcmm", closed);
+            let spcmm = scene("spcmm", &[&still, closed].concat());
             let mechanism = &mut Mechanism::new(&spcmm).unwrap();
             let mut y = mechanism.start().unwrap();
             y[0] += deep;
             mechanism.project(0.0, &mut y);
-            y[mechanism.positions() + 1] += 2e-5;
+            y[mechanism.positions() + 1] += SLIP;
             all.push((spcmm, y));
         }
         all
@@ -448,12 +455,12 @@ mod tests {
             let mut evaluator = mechanism.evaluator(Touching::Located(&memory));
             let mut system = evaluator.friction_alone();
             system.linearise(0.0, &y);
-            let shift = 1e4;
+            let shift = 4e4;
             system.factor_shifted(shift);
             let b: Vec<f64> = (0..y.len()).map(|i| libm::sin(1.0 + i as f64)).collect();
             let mut x = b.clone();
             system.solve_shifted(&mut x);
-            assert!(mechanism.friction_rate() > 3.0 * shift, "{name}: not stiff");
+            assert!(mechanism.friction_rate() > shift, "{name}: not stiff");
 
             let x_v = &x[positions..];
             let mut smooth = scene.clone();
@@ -467,9 +474,8 @@ mod tests {
                 let left = shift * x_v[k] - (with[k] - without[k]);
                 let off = (left - b[positions + k]).abs();
                 let scale = largest + (shift * x_v[k]).abs() + with[k].abs();
-                // The load is that of the end of the step that the shift belongs to.
                 assert!(
-                    off < 2e-2 * scale,
+                    off < 1e-3 * scale,
                     "{name} {k}: {left:e} {:e}",
                     b[positions + k]
                 );
