@@ -26,6 +26,10 @@ const TRAIL: usize = 1500;
 /// Farthest camera distance by the wheel, in radii of the machine.
 const FARTHEST: f32 = 30.0;
 
+/// A finger that stays for so long, s, within so many points takes hold of what is under it.
+const HOLD: f64 = 0.5;
+const STILL: f32 = 6.0;
+
 /// A shot of what the player shows. A macro, since the draw list is borrowed at the same time.
 macro_rules! shot {
     ($self:ident, $player:ident, $camera:expr, $screen:expr) => {
@@ -64,6 +68,8 @@ pub struct Viewport {
     moved: bool,
     /// What the pointer holds, and whether that changed.
     grip: Option<Grip>,
+    /// When the finger on the picture came down, s of viewing; infinite once it has gone on or taken hold.
+    finger_since: Option<f64>,
     grip_changed: bool,
     /// More than one finger has been down since none was.
     pinched: bool,
@@ -90,6 +96,7 @@ impl Viewport {
             time: player.pacer.shown(),
             moved: false,
             grip: None,
+            finger_since: None,
             grip_changed: false,
             pinched: false,
             clicked: None,
@@ -452,7 +459,7 @@ impl Viewport {
         let (finger, shift, origin) =
             ui.input(|i| (i.any_touches(), i.modifiers.shift, i.pointer.press_origin()));
         let taken = if finger {
-            response.long_touched()
+            self.finger_stays(ui, response)
         } else {
             response.drag_started_by(PointerButton::Primary)
         };
@@ -480,6 +487,36 @@ impl Viewport {
                 }
             }
         }
+        true
+    }
+
+    /// Whether a finger has just stayed for long enough on the place where it came down. (What egui calls a long touch does not
+    /// come to what can be dragged.)
+    fn finger_stays(&mut self, ui: &Ui, response: &egui::Response) -> bool {
+        if !response.is_pointer_button_down_on() {
+            self.finger_since = None;
+            return false;
+        }
+        let (now, way) = ui.input(|i| {
+            let way = i.pointer.latest_pos().zip(i.pointer.press_origin());
+            (
+                i.time,
+                way.map_or(0.0, |(pos, origin)| pos.distance(origin)),
+            )
+        });
+        let since = self.finger_since.get_or_insert(now);
+        if way > STILL {
+            *since = f64::INFINITY;
+        }
+        let left = *since + HOLD - now;
+        if left > 0.0 {
+            if left.is_finite() {
+                ui.ctx()
+                    .request_repaint_after(std::time::Duration::from_secs_f64(left));
+            }
+            return false;
+        }
+        *since = f64::INFINITY;
         true
     }
 

@@ -700,3 +700,23 @@ fn fingers_take_at_most_three_gestures_for_them_on_a_phone() {
     assert!(twin.is_some_and(|twin| twin.distances().len() > 5));
     class.done("a billionth apart");
 }
+
+#[test]
+fn a_finger_that_stays_on_a_body_pulls_on_it() {
+    for size in [[1280.0, 800.0], [390.0, 844.0]] {
+        let mut harness = sized("spcmm", size, egui::Theme::Light);
+        let (at, camera) = (platform(&harness), camera(&harness));
+        // No finger is quite still.
+        let stays = (0..60).map(|k| at + vec2((k % 2) as f32, 0.0));
+        let goes = (1..5).map(|k| at + vec2(10.0 * k as f32, 0.0));
+        let path: Vec<Pos2> = stays.chain(goes).collect();
+        fingers(&mut harness, &[&path]);
+        let log = harness.state().player().log();
+        let pulls = log.entries.iter().filter_map(|entry| match &entry.event {
+            Event::Pull(pull) => Some(pull.is_some()),
+            _ => None,
+        });
+        assert_eq!(pulls.last(), Some(false), "{size:?}: pulls, and lets go");
+        assert_eq!(self::camera(&harness), camera, "{size:?}: the view stays");
+    }
+}
