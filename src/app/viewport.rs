@@ -472,8 +472,9 @@ impl Viewport {
         let Some(grip) = &mut self.grip else {
             return false;
         };
-        let held = response.is_pointer_button_down_on();
-        match response.interact_pointer_pos().filter(|_| held) {
+        // Not the response's: egui takes the pointer from it after a long touch.
+        let held = ui.input(|i| i.pointer.latest_pos().filter(|_| i.pointer.primary_down()));
+        match held {
             None => {
                 self.grip = None;
                 self.grip_changed = true;
@@ -490,8 +491,8 @@ impl Viewport {
         true
     }
 
-    /// Whether a finger has just stayed for long enough on the place where it came down. (What egui calls a long touch does not
-    /// come to what can be dragged.)
+    /// Whether a finger has just stayed for long enough where it came down. (What egui calls a long touch does not come to what
+    /// can be dragged.)
     fn finger_stays(&mut self, ui: &Ui, response: &egui::Response) -> bool {
         if !response.is_pointer_button_down_on() {
             self.finger_since = None;

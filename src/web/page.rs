@@ -270,6 +270,7 @@ impl Laboratory {
             "time_s": player.simulation().time(),
             "shown_s": player.pacer.shown(),
             "steps": player.simulation().statistics().steps,
+            "pull_N": player.frame().pull.map(|pull| pull.force.norm()),
             "peak_normal_N": player.simulation().statistics().peak_normal,
             "state_hash": format!("{:016x}", player.simulation().state_hash()),
             "camera": camera,

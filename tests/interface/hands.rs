@@ -23,7 +23,7 @@ pub fn opened(
         .with_size(size)
         .with_theme(theme)
         .with_step_dt(1.0 / 60.0)
-        .with_max_steps(120)
+        .with_max_steps(60)
         .wgpu()
         .build_eframe(move |cc| App::new(cc, options).expect("the scene starts"));
     harness.run();
@@ -47,6 +47,12 @@ pub fn type_over(harness: &mut Harness<'_, App>, label: &str, text: &str) {
 /// Fingers on the screen, each with its way: they come down one after the other, move together and are lifted. The first is the
 /// pointer, too, as in a real window.
 pub fn fingers(harness: &mut Harness<'_, App>, paths: &[&[Pos2]]) {
+    fingers_down(harness, paths);
+    lift(harness, paths);
+}
+
+/// As [`fingers`], but they stay down.
+pub fn fingers_down(harness: &mut Harness<'_, App>, paths: &[&[Pos2]]) {
     for (finger, path) in paths.iter().enumerate() {
         touch(harness, finger, TouchPhase::Start, path[0]);
         harness.step();
@@ -57,6 +63,10 @@ pub fn fingers(harness: &mut Harness<'_, App>, paths: &[&[Pos2]]) {
         }
         harness.step();
     }
+}
+
+/// Lifts the fingers at the ends of their ways.
+pub fn lift(harness: &mut Harness<'_, App>, paths: &[&[Pos2]]) {
     for (finger, path) in paths.iter().enumerate() {
         touch(harness, finger, TouchPhase::End, path[path.len() - 1]);
     }

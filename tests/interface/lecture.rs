@@ -5,7 +5,7 @@ use egui_kittest::{Harness, SnapshotResults, kittest::Queryable as _};
 use jointplay::app::{App, Event, Link, Log, Player, Replay, SceneText, Verdict};
 use jointplay::simulate::{ContactState, Quantity};
 
-use crate::hands::fingers;
+use crate::hands::{fingers, fingers_down, lift};
 use crate::window::{CURVES, WHITE, click, picture, shown, sized, window};
 
 /// Where the timeline's strip stands.
@@ -710,17 +710,11 @@ fn a_finger_that_stays_on_a_body_pulls_on_it() {
         let stays = (0..60).map(|k| at + vec2((k % 2) as f32, 0.0));
         let goes = (1..5).map(|k| at + vec2(10.0 * k as f32, 0.0));
         let path: Vec<Pos2> = stays.chain(goes).collect();
-        fingers(&mut harness, &[&path]);
-        let log = harness.state().player().log();
-        let mut pulls = log.entries.iter().filter_map(|entry| match &entry.event {
-            Event::Pull(pull) => Some(pull.is_some()),
-            _ => None,
-        });
-        assert_eq!(
-            pulls.next_back(),
-            Some(false),
-            "{size:?}: pulls, and lets go"
-        );
+        fingers_down(&mut harness, &[&path]);
+        let pull = harness.state().player().frame().pull.expect("pulls");
+        assert!(pull.force.norm() > 1.0, "{size:?}: {pull:?}");
+        lift(&mut harness, &[&path]);
+        assert!(harness.state().player().frame().pull.is_none(), "{size:?}");
         assert_eq!(self::camera(&harness), camera, "{size:?}: the view stays");
     }
 }

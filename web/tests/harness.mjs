@@ -226,9 +226,10 @@ export class Lab {
 
     /**
      * Fingers on the screen: each of `paths` is one's way [[x, y], …], all of one length. They come down one after the other,
-     * move together, and are lifted.
+     * move together, and are lifted; a function behind them is called before that.
      */
     async fingers(...paths) {
+        const look = typeof paths.at(-1) === 'function' ? paths.pop() : () => {};
         const cdp = await this.context.newCDPSession(this.page);
         const send = async (type, touchPoints) => {
             await cdp.send('Input.dispatchTouchEvent', { type, touchPoints });
@@ -241,6 +242,7 @@ export class Lab {
         for (let step = 1; step < paths[0].length; step += 1) {
             await send('touchMove', at(step));
         }
+        await look();
         await send('touchEnd', []);
         await cdp.detach();
         await this.frame();

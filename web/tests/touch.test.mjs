@@ -45,6 +45,29 @@ test('one finger orbits, two pan and pinch', async () => {
     await lab.close();
 });
 
+test('a finger that stays on a body pulls on it, and one that goes on at once turns the view', async () => {
+    const lab = await open('play=0', { backend, size: PHONE, context: { hasTouch: true } });
+    const { rect: [x0, y0, x1, y1] } = await lab.find('Image', '3D view');
+    // The middle of the platform, in the view that the page starts with.
+    const at = [x0 + 0.54 * (x1 - x0), y0 + 0.675 * (y1 - y0)];
+    // No finger is quite still, and a page without news draws nothing.
+    const stays = Array.from({ length: 24 }, (_, k) => [at[0] + (k % 2), at[1]]);
+    const away = [10, 20, 30, 40].map((way) => [at[0] + way, at[1]]);
+    let pull = null;
+    await lab.fingers([...stays, ...away], async () => {
+        pull = (await lab.state()).pull_N;
+    });
+    assert.ok(pull > 0.1, `${pull} N`);
+    assert.equal((await lab.state()).camera, null, 'the view stays');
+    assert.equal((await lab.state()).pull_N, null, 'lets go');
+    await lab.fingers([at, ...away], async () => {
+        pull = (await lab.state()).pull_N;
+    });
+    assert.equal(pull, null);
+    assert.notEqual((await lab.state()).camera, null);
+    await lab.close();
+});
+
 test('on a screen with finer pixels the canvas has them all, and a finger hits what it shows', async () => {
     const size = { width: 390, height: 600 };
     const lab = await open('play=0&theme=light', { backend, size, context: { hasTouch: true, isMobile: true, deviceScaleFactor: 2 } });
