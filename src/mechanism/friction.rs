@@ -10,6 +10,7 @@
 //! approach tells.
 
 use super::MechanismError;
+use super::band::Band;
 use super::bounds::{Cost, CostOf};
 use super::columns::{Column, collect_columns, contact_sides};
 use super::contacts::{Contacts, Touching};
@@ -89,10 +90,10 @@ pub struct Friction {
     /// Every ball with play, and which of them touch.
     touches: Vec<Touch>,
     active: Vec<usize>,
-    /// Those further apart than this in their order do not feel each other.
-    reach: usize,
-    /// s I - H B, a band of blocks, factored; H in the same places.
-    band: Vec<Mat3>,
+    /// Touches further apart in their order do not feel each other.
+    band: Band,
+    /// s I - H B, factored; H in the same places.
+    blocks: Vec<Mat3>,
     mobility: Vec<Mat3>,
     right: Vec<Vec3>,
     shift: f64,
@@ -144,8 +145,8 @@ impl Friction {
             within,
             touches: Vec::new(),
             active: (0..of.len()).collect(),
-            reach: 0,
-            band: Vec::new(),
+            band: Band::default(),
+            blocks: Vec::new(),
             mobility: Vec::new(),
             right: Vec::with_capacity(of.len()),
             shift: 1.0,
@@ -175,10 +176,14 @@ impl Friction {
             ranges,
             resistance: Mat3::zeros(),
         };
-        let size = of.len() * (2 * reach + 1);
+        let size = Band {
+            size: of.len(),
+            reach,
+        }
+        .len();
         friction.touches = of.into_iter().map(touch).collect();
         friction.active.clear();
-        friction.band.reserve_exact(size);
+        friction.blocks.reserve_exact(size);
         friction.mobility.reserve_exact(size);
         Ok(friction)
     }
@@ -237,71 +242,53 @@ impl Friction {
             .active
             .iter()
             .map(|&slot| &self.touches[slot].ranges[..]);
-        self.reach = reach_of(ranges, &mut self.first_on);
+        self.band = Band {
+            size: self.active.len(),
+            reach: reach_of(ranges, &mut self.first_on),
+        };
         self.couple();
     }
 
     fn couple(&mut self) {
-        let (m, reach) = (self.active.len(), self.reach);
-        let size = m * (2 * reach + 1);
+        let band = self.band;
         self.mobility.clear();
-        self.mobility.resize(size, Mat3::zeros());
-        self.band.clear();
-        self.band.resize(size, Mat3::zeros());
+        self.mobility.resize(band.len(), Mat3::zeros());
+        self.blocks.clear();
+        self.blocks.resize(band.len(), Mat3::zeros());
         self.right.clear();
-        self.right.resize(m, Vec3::zeros());
-        for i in 0..m {
-            for j in i.saturating_sub(reach)..=(i + reach).min(m - 1) {
-                let at = self.at(i, j);
+        self.right.resize(band.size, Vec3::zeros());
+        for i in 0..band.size {
+            for j in band.row(i) {
                 let [one, other] = [i, j].map(|i| &self.touches[self.active[i]]);
-                self.mobility[at] = one.mobility(other);
+                self.mobility[band.at(i, j)] = one.mobility(other);
             }
         }
-    }
-
-    /// Place of block (i, j) in the band.
-    fn at(&self, i: usize, j: usize) -> usize {
-        i * (2 * self.reach + 1) + j + self.reach - i
     }
 
     /// Prepares to solve with the shift s for a step of size `h`.
     pub fn factor(&mut self, shift: f64, h: f64) {
         self.shift = shift;
-        let (m, reach) = (self.active.len(), self.reach);
+        let band = self.band;
         for &slot in &self.active {
             self.touches[slot].resist(h);
         }
-        let at = |i: usize, j: usize| i * (2 * reach + 1) + j + reach - i;
-        for i in 0..m {
-            for j in i.saturating_sub(reach)..=(i + reach).min(m - 1) {
-                let mut block = self.mobility[at(i, j)] * -self.touches[self.active[j]].resistance;
+        for i in 0..band.size {
+            for j in band.row(i) {
+                let mut block =
+                    self.mobility[band.at(i, j)] * -self.touches[self.active[j]].resistance;
                 if i == j {
                     block += Mat3::identity() * shift;
                 }
-                self.band[at(i, j)] = block;
+                self.blocks[band.at(i, j)] = block;
             }
         }
-        for k in 0..m {
-            let last = (k + reach).min(m - 1);
-            let inverse = self.band[at(k, k)]
-                .try_inverse()
-                .unwrap_or_else(|| Mat3::from_element(f64::NAN));
-            self.band[at(k, k)] = inverse;
-            for i in k + 1..=last {
-                let factor = self.band[at(i, k)] * inverse;
-                self.band[at(i, k)] = factor;
-                for j in k + 1..=last {
-                    let upper = self.band[at(k, j)];
-                    self.band[at(i, j)] -= factor * upper;
-                }
-            }
-        }
+        band.factor(&mut self.blocks);
     }
 
     /// Largest rate at which friction damps a contact's own sliding, 1/s, as factored last.
     pub fn fastest(&self) -> f64 {
         let own = |i: usize| {
-            let h = &self.mobility[self.at(i, i)];
+            let h = &self.mobility[self.band.at(i, i)];
             -(h * self.touches[self.active[i]].resistance).trace()
         };
         (0..self.active.len()).map(own).fold(0.0, f64::max)
@@ -311,24 +298,10 @@ impl Friction {
     pub fn solve(&mut self, b: &mut [f64], equations: &dyn Equations, model: &Model) {
         let positions = b.len() - self.n;
         let (b_q, b_v) = b.split_at_mut(positions);
-        let (m, reach, s) = (self.active.len(), self.reach, self.shift);
         for (&slot, right) in self.active.iter().zip(&mut self.right) {
             *right = self.touches[slot].reading(b_v);
         }
-        for k in 0..m {
-            for i in k + 1..=(k + reach).min(m - 1) {
-                let above = self.right[k];
-                let at = self.at(i, k);
-                self.right[i] -= self.band[at] * above;
-            }
-        }
-        for k in (0..m).rev() {
-            let mut sum = self.right[k];
-            for j in k + 1..=(k + reach).min(m - 1) {
-                sum -= self.band[self.at(k, j)] * self.right[j];
-            }
-            self.right[k] = self.band[self.at(k, k)] * sum;
-        }
+        self.band.solve(&self.blocks, &mut self.right);
         for (&slot, w) in self.active.iter().zip(&self.right) {
             let touch = &self.touches[slot];
             let force = touch.resistance * w;
@@ -341,12 +314,12 @@ impl Friction {
             }
         }
         for x in b_v.iter_mut() {
-            *x /= s;
+            *x /= self.shift;
         }
         self.y[positions..].copy_from_slice(b_v);
         equations.position_rate(model, &self.y, &mut self.rate);
         for (x, r) in b_q.iter_mut().zip(&self.rate) {
-            *x = (*x + r) / s;
+            *x = (*x + r) / self.shift;
         }
     }
 }

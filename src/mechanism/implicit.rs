@@ -7,6 +7,7 @@
 //! once. The lever arms of the contact points belong to a fixed normal, which is updated if it turns too far.
 
 use super::MechanismError;
+use super::band::Band;
 use super::bounds::{Cost, CostOf};
 use super::columns::{Column, collect_columns, contact_sides};
 use super::contacts::{Contacts, Counts, Touching};
@@ -294,12 +295,12 @@ impl ImplicitContacts {
 
     /// Computes how the contacts move each other.
     fn couple(&mut self) {
-        let m = self.touches.len();
-        for i in 0..m {
+        let band = self.band();
+        for i in 0..band.size {
             let touch = &self.touches[i];
             let columns = &self.columns[touch.joint];
             let surface = touch.law.uses_surface_velocity() && touch.law.friction > 0.0;
-            for j in i.saturating_sub(self.reach)..=(i + self.reach).min(m - 1) {
+            for j in band.row(i) {
                 let other = self.touches[j].joint;
                 let (first, end) = self.ranges[other];
                 let mut mobility = [Mat3::zeros(); 2];
@@ -316,23 +317,24 @@ impl ImplicitContacts {
                 if !surface {
                     mobility[1] = mobility[0];
                 }
-                let at = self.at(i, j);
-                self.mobility[at] = mobility;
+                self.mobility[band.at(i, j)] = mobility;
             }
         }
     }
 
-    /// Place of block (i, j) in the band.
-    fn at(&self, i: usize, j: usize) -> usize {
-        i * (2 * self.reach + 1) + j + self.reach - i
+    fn band(&self) -> Band {
+        Band {
+            size: self.touches.len(),
+            reach: self.reach,
+        }
     }
 
     /// Velocities added at touch `i` by the forces in `right`.
     fn driven_by(&self, i: usize, h: f64) -> [Vec3; 2] {
-        let last = (i + self.reach).min(self.touches.len() - 1);
+        let band = self.band();
         let mut sum = [Vec3::zeros(); 2];
-        for j in i.saturating_sub(self.reach)..=last {
-            let mobility = &self.mobility[self.at(i, j)];
+        for j in band.row(i) {
+            let mobility = &self.mobility[band.at(i, j)];
             let impulse = self.right[j] * h;
             sum[0] += mobility[0] * impulse;
             sum[1] += mobility[1] * impulse;
@@ -342,44 +344,22 @@ impl ImplicitContacts {
 
     /// Contact forces of the next Newton iteration into `right`, by block elimination within the band.
     fn eliminate(&mut self, h: f64) {
-        let (m, reach) = (self.touches.len(), self.reach);
-        let at = |i: usize, j: usize| i * (2 * reach + 1) + j + reach - i;
+        let band = self.band();
         for (i, touch) in self.touches.iter().enumerate() {
-            for j in i.saturating_sub(reach)..=(i + reach).min(m - 1) {
+            for j in band.row(i) {
                 let unit = if i == j {
                     Mat3::identity()
                 } else {
                     Mat3::zeros()
                 };
-                let [centre, felt] = &self.mobility[at(i, j)];
-                self.blocks[at(i, j)] =
+                let [centre, felt] = &self.mobility[band.at(i, j)];
+                self.blocks[band.at(i, j)] =
                     unit - (touch.impedance * centre + touch.resistance * felt) * h;
             }
             self.right[i] =
                 touch.force - touch.impedance * touch.added - touch.resistance * touch.slipping;
         }
-        for k in 0..m {
-            let last = (k + reach).min(m - 1);
-            let inverse = self.blocks[at(k, k)]
-                .try_inverse()
-                .unwrap_or_else(|| Mat3::from_element(f64::NAN));
-            self.blocks[at(k, k)] = inverse;
-            for i in k + 1..=last {
-                let factor = self.blocks[at(i, k)] * inverse;
-                for j in k + 1..=last {
-                    let upper = self.blocks[at(k, j)];
-                    self.blocks[at(i, j)] -= factor * upper;
-                }
-                let above = self.right[k];
-                self.right[i] -= factor * above;
-            }
-        }
-        for k in (0..m).rev() {
-            let mut sum = self.right[k];
-            for j in k + 1..=(k + reach).min(m - 1) {
-                sum -= self.blocks[at(k, j)] * self.right[j];
-            }
-            self.right[k] = self.blocks[at(k, k)] * sum;
-        }
+        band.factor(&mut self.blocks);
+        band.solve(&self.blocks, &mut self.right);
     }
 }

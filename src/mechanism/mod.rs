@@ -3,6 +3,7 @@
 //! Ball joints are always the cut joints: without them every scene is a forest of trees. Each ball joint then adds either
 //! three constraint rows (ideal) or one contact force (clearance). A scene pays only for what it contains.
 
+mod band;
 mod bounds;
 mod columns;
 mod constraints;
