@@ -45,6 +45,23 @@ pub fn has_room(rect: Rect) -> bool {
     rect.size().min_elem() >= SMALL
 }
 
+/// Plates in a picture beyond which further ones are left out, and how far one gives way to others, points: further away it
+/// would seem to belong to something else.
+const MOST_PLATES: usize = 256;
+const FURTHEST: f32 = 72.0;
+
+/// `place` moved down until it lies over none of `plates`; none where that is too far.
+fn clear_of(plates: &[Rect], mut place: Rect) -> Option<Rect> {
+    let furthest = place.min.y + FURTHEST;
+    while let Some(plate) = plates.iter().find(|plate| plate.intersects(place)) {
+        place = place.translate(vec2(0.0, plate.max.y + 1.0 - place.min.y));
+        if place.min.y > furthest {
+            return None;
+        }
+    }
+    Some(place)
+}
+
 /// Names of joints and axes at their places.
 pub fn labels(painter: &Painter, rect: Rect, scale: f32, list: &DrawList) {
     if !has_room(rect) {
@@ -66,6 +83,9 @@ pub fn labels(painter: &Painter, rect: Rect, scale: f32, list: &DrawList) {
             LabelKind::Axis | LabelKind::Gravity => None,
         };
         if let Some((size, anchor, beside)) = plate {
+            if names.len() == MOST_PLATES {
+                continue;
+            }
             // On a plate of its own: it often lies over a dark part.
             let font = FontId::proportional(size);
             let words = painter.layout_no_wrap(label.text.to_string(), font, colour(label.colour));
@@ -74,9 +94,10 @@ pub fn labels(painter: &Painter, rect: Rect, scale: f32, list: &DrawList) {
                 let over = place.max.x + 6.0 - rect.max.x;
                 place = place.translate(vec2(-over.max(0.0), 0.0));
             }
-            while let Some(name) = names.iter().find(|name: &&Rect| name.intersects(place)) {
-                place = place.translate(vec2(0.0, name.max.y + 1.0 - place.min.y));
-            }
+            let Some(place) = clear_of(&names, place).filter(|place| rect.intersects(*place))
+            else {
+                continue;
+            };
             names.push(place.expand2(vec2(4.0, 1.0)));
             let opacity = 0.8 * label.colour.0[3];
             painter.rect_filled(
@@ -339,4 +360,58 @@ pub fn wear_scale(painter: &Painter, rect: Rect, scale: &WearScale, theme: Theme
 /// Lower right corner, `margin` points away from both edges.
 pub(super) fn lower_right(rect: Rect, margin: f32) -> Pos2 {
     pos2(rect.max.x - margin, rect.max.y - margin)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use eframe::egui::{Context, LayerId, RawInput};
+    use glam::{Vec2, Vec3};
+
+    /// Names of a column of `count` joints, `apart` points from each other, as they are painted.
+    fn painted(count: usize, apart: f32) -> Vec<(String, Pos2)> {
+        let label = |joint: usize| Label {
+            text: format!("J{joint}").into(),
+            kind: LabelKind::Joint(joint),
+            anchor: Vec3::ZERO,
+            pixel: Vec2::new(300.0, 100.0 + apart * joint as f32),
+            colour: Palette::of(Theme::Light).text,
+        };
+        let list = DrawList {
+            labels: (0..count).map(label).collect(),
+            ..DrawList::default()
+        };
+        let rect = Rect::from_min_size(Pos2::ZERO, vec2(800.0, 600.0));
+        let mut output = Context::default().run_ui(RawInput::default(), |ui| {
+            let painter = Painter::new(ui.ctx().clone(), LayerId::background(), rect);
+            labels(&painter, rect, 1.0, &list);
+        });
+        // No texture is made of them.
+        output.textures_delta.clear();
+        let words = output.shapes.into_iter().filter_map(|shape| {
+            let Shape::Text(text) = shape.shape else {
+                return None;
+            };
+            Some((text.galley.text().to_owned(), text.pos))
+        });
+        words.collect()
+    }
+
+    #[test]
+    fn a_name_stands_by_its_joint_or_not_at_all() {
+        let names = painted(8, 40.0);
+        assert_eq!(names.len(), 8, "each has room");
+        // 4096 joints on 400 points.
+        let names = painted(4096, 400.0 / 4096.0);
+        assert!((20..=MOST_PLATES).contains(&names.len()), "{}", names.len());
+        for (name, at) in names {
+            let joint: f32 = name[1..].parse().expect("a number");
+            let wanted = 100.0 + joint * 400.0 / 4096.0;
+            let off = (at.y - wanted).abs();
+            assert!(
+                off <= FURTHEST + 30.0,
+                "{name}: {off} points from its joint"
+            );
+        }
+    }
 }
