@@ -8,6 +8,7 @@ pub mod exponent;
 mod front;
 pub mod grid;
 pub mod layout;
+mod many_joints;
 pub mod orbit;
 pub mod paper;
 pub mod point;
@@ -29,6 +30,7 @@ mod work_precision;
 
 pub use cost::{CaseCost, CostCase, model_costs};
 pub use front::front;
+pub use many_joints::{GROWTH, SPEED_GOALS, Speed, SpeedGoal, growth, speed};
 pub use reach::{Goal, Reach, reach};
 pub use reference_solution::{Errors, ReferenceSolution, SettledSpan, Slot};
 pub use run_context::{AnalysisError, RunContext};

@@ -134,9 +134,30 @@ impl ReferenceSolution {
     /// A scene that does not start, or whose reference does not reach the end of the first impacts; cancellation by
     /// [`RunContext`].
     pub fn new(scene: &Scene, context: &mut RunContext) -> Result<Self, AnalysisError> {
-        let setting = Setting::reference(REFERENCE);
-        let (contacts, impacts) = first_contacts(&setting, scene, &mut context.part(0, 5))?;
-        let joints = scene.ball_joints.len();
+        let mut reference = Self::of_impacts(scene, REFERENCE, &mut context.part(0, 2))?;
+        let setting = reference.setting;
+        let tighter = Setting {
+            tolerance: 0.5 * REFERENCE,
+            ..setting
+        };
+        let (peaks, position) = reference.reference_impacts(&tighter, &mut context.part(2, 4))?;
+        reference.floor.peak = reference.peak_error(&peaks);
+        reference.floor.position_m = Some((position - reference.position).norm());
+        reference.settle(&setting, &tighter, &mut context.part(3, 4))?;
+        Ok(reference)
+    }
+
+    /// The first impacts alone, with the explicit pair at `tolerance`: nothing of settled motion, and no floor.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub(super) fn of_impacts(
+        scene: &Scene,
+        tolerance: f64,
+        context: &mut RunContext,
+    ) -> Result<Self, AnalysisError> {
+        let setting = Setting::reference(tolerance);
+        let (contacts, impacts) = first_contacts(&setting, scene, &mut context.part(0, 2))?;
         let mut reference = Self {
             scene: scene.clone(),
             slots: Vec::new(),
@@ -149,21 +170,12 @@ impl ReferenceSolution {
             setting,
             floor: Errors::default(),
         };
-        reference.lay_slots(&contacts, joints);
-        let tighter = Setting {
-            tolerance: 0.5 * REFERENCE,
-            ..setting
-        };
-        // First the peaks, then the change at half the tolerance.
-        let (peaks, position) = reference.reference_impacts(&setting, &mut context.part(1, 5))?;
+        reference.lay_slots(&contacts, scene.ball_joints.len());
+        let (peaks, position) = reference.reference_impacts(&setting, &mut context.part(1, 2))?;
         for (slot, peak) in reference.slots.iter_mut().zip(&peaks) {
             slot.peak_n = *peak;
         }
         reference.position = position;
-        let (peaks, position) = reference.reference_impacts(&tighter, &mut context.part(2, 5))?;
-        reference.floor.peak = reference.peak_error(&peaks);
-        reference.floor.position_m = Some((position - reference.position).norm());
-        reference.settle(&setting, &tighter, &mut context.part(3, 5))?;
         Ok(reference)
     }
 

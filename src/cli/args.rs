@@ -31,7 +31,7 @@ pub enum Command {
     Render(RenderArguments),
     /// Measure the cost and error of every method on a scene.
     Tradeoff(TradeoffArguments),
-    /// Measure how fast the default scene runs, against its speed goals.
+    /// Measure how fast the default scene and machines with many loose joints run, against their speed goals.
     Bench(BenchArguments),
     /// Run a driven scene at many parameter values: sections, forces, regimes, exponents.
     Sweep(SweepArguments),

@@ -1,12 +1,12 @@
-//! `bench`: how fast the default scene runs, against its speed goals.
+//! `bench`: how fast the default scene and machines with many loose joints run, against their speed goals.
 
 use std::fmt::Write as _;
 
 use super::args::BenchArguments;
 use super::tradeoff::{grid, percent, times, value};
 use super::{DEFAULT_SCENE, Failure, machine, measuring, print};
-use crate::analysis::{Reach, reach};
-use crate::scene::Scene;
+use crate::analysis::{GROWTH, Reach, SPEED_GOALS, Speed, growth, reach, speed};
+use crate::scene::{Scene, format_quantity};
 
 /// Runs `bench`.
 ///
@@ -14,13 +14,26 @@ use crate::scene::Scene;
 /// Bad changes, Ctrl-C.
 pub fn bench(arguments: &BenchArguments) -> Result<(), Failure> {
     let scene = Scene::load(DEFAULT_SCENE, &arguments.changes)?;
-    let rows = measuring::measure(arguments.quiet, Some(&scene), |context| {
-        reach(&scene, context)
+    let (rows, machines, growth) = measuring::measure(arguments.quiet, Some(&scene), |context| {
+        let parts = SPEED_GOALS.len() + 2;
+        let rows = reach(&scene, &mut context.part(0, parts))?;
+        let mut machines = Vec::new();
+        for (n, goal) in SPEED_GOALS.into_iter().enumerate() {
+            machines.push(speed(goal, &mut context.part(n + 1, parts))?);
+        }
+        // At the tolerance of the shorter of its two chains.
+        let tolerance = machines[1].tolerance;
+        let growth = growth(tolerance, &mut context.part(parts - 1, parts))?;
+        Ok((rows, machines, growth))
     })?;
-    print(&text(&rows))
+    print(&text(&rows, &machines, growth))
 }
 
-fn text(rows: &[Reach]) -> String {
+fn yes(met: bool) -> String {
+    if met { "yes" } else { "no" }.to_owned()
+}
+
+fn text(rows: &[Reach], machines: &[Speed], growth: f64) -> String {
     let head = [
         "span",
         "method",
@@ -43,7 +56,7 @@ fn text(rows: &[Reach]) -> String {
             times(row.yardstick.map(|other| row.speed / other)),
             percent(row.error),
             row.goal.error_of().to_owned(),
-            if row.met() { "yes" } else { "no" }.to_owned(),
+            yes(row.met()),
         ]);
     }
     let mut out = String::new();
@@ -54,5 +67,39 @@ fn text(rows: &[Reach]) -> String {
          All joints ideal  no differential equation is solved, so that a stepper has no part in it\n\n",
     );
     out.push_str(&grid(&lines));
+    let _ = writeln!(
+        out,
+        "\nMany loose joints, automatic at the loosest tolerance with good peaks\n"
+    );
+    let head = [
+        "machine",
+        "span",
+        "tolerance",
+        "error",
+        "speed",
+        "asked",
+        "reached",
+    ];
+    let mut lines = vec![head.map(str::to_owned).to_vec()];
+    for row in machines {
+        lines.push(vec![
+            row.goal.label.to_owned(),
+            format_quantity(row.goal.span, "s"),
+            format!("{:e}", row.tolerance),
+            percent(row.error),
+            times(Some(row.speed)),
+            format!("{:.0}", row.goal.asked),
+            yes(row.met()),
+        ]);
+    }
+    out.push_str(&grid(&lines));
+    let ([short, long], span, most) = GROWTH;
+    let _ = writeln!(
+        out,
+        "\nA link of a chain of {long} costs {} times one of {short} over {}; asked: at most {most}; reached: {}",
+        times(Some(growth)),
+        format_quantity(span, "ms"),
+        yes(growth <= most)
+    );
     out
 }

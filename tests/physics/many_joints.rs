@@ -26,7 +26,7 @@ fn run(scene: &str, method: &str, tolerance: &str, end: f64) -> (Vec<(f64, f64)>
 
 #[test]
 fn friction_is_stepped_implicitly_where_it_holds_explicit_steps_back() {
-    let path = |name: &str| format!("{}/tests/scenes/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+    let path = |name: &str| format!("{}/assets/machines/{name}.toml", env!("CARGO_MANIFEST_DIR"));
     for (scene, end, part) in [
         ("chain".to_owned(), 25e-3, 0.25),
         (path("hexapod"), 30e-3, 0.75),
