@@ -9,6 +9,7 @@ use super::dialogs::Dialog;
 use super::host::{Host, SaveFile};
 use super::player::Player;
 use super::replay::Verdict;
+use super::share::shown::Instruments;
 use super::share::{Link, SceneText, is_link, shown};
 use super::{App, Notice};
 use crate::scene::Scene;
@@ -29,6 +30,15 @@ impl App {
         let player = &self.player;
         let (plots, window) = shown::changed(&self.plots);
         let followed = self.viewport.followed();
+        let joints = &player.scene().ball_joints;
+        let under_microscope = joints.get(self.microscope.joint());
+        let instruments = Instruments {
+            microscope: under_microscope
+                .filter(|_| self.microscope.is_open())
+                .map(|joint| joint.name.clone()),
+            ideal: player.ideal().is_some(),
+            wear: self.viewport.options.wear,
+        };
         Link {
             scene: SceneText::of(player.wanted()),
             log: player.log(),
@@ -41,6 +51,7 @@ impl App {
             follow: followed.and_then(|part| shown::name_followed(player.scene(), part)),
             plots,
             window,
+            instruments: (instruments != Instruments::default()).then_some(instruments),
             playing: Some(player.is_playing()),
             theme: None,
             version: Some(crate::VERSION.to_owned()),

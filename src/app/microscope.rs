@@ -35,6 +35,10 @@ pub struct Microscope {
     joint: usize,
     plane: Plane,
     circle: Option<Circle>,
+    /// Room in the latest frame.
+    area: Option<Rect>,
+    /// It has had a place.
+    placed: bool,
 }
 
 impl Microscope {
@@ -74,7 +78,9 @@ impl Microscope {
         enabled: bool,
     ) -> Option<usize> {
         self.circle = None;
-        if !self.open {
+        // It stays where it first opens: there the layout has to have settled, which takes a window some frames.
+        self.placed |= self.area.replace(area) == Some(area) && self.open;
+        if !self.open || !self.placed {
             return None;
         }
         let size = vec2(

@@ -141,6 +141,8 @@ impl AppOptions {
         let scene = link.load().map_err(|error| format!("link: {error}"))?;
         Simulation::new(&scene).map_err(|error| format!("link: {}", error.located(&scene)))?;
         link.followed(&scene).map_err(|error| error.to_string())?;
+        link.under_microscope(&scene)
+            .map_err(|error| error.to_string())?;
         let mut options = Self::new(scene);
         options.playing = link.playing.unwrap_or(!link.has_instant());
         if let Some(scale) = link.time_scale {
@@ -165,21 +167,6 @@ impl AppOptions {
                 ..Self::new(scene)
             }
         })
-    }
-}
-
-/// Applies camera, followed part and plots of `link`; what it does not mention stays.
-fn show_link(link: &Link, player: &Player, viewport: &mut Viewport, plots: &mut Plots) {
-    if let Some(pose) = link.camera {
-        viewport.set_pose(pose);
-    }
-    // Reading the link has already checked that the part exists.
-    viewport.follow(link.followed(player.scene()).ok().flatten());
-    if let Some(chosen) = &link.plots {
-        plots.chosen.clone_from(chosen);
-    }
-    if let Some(window) = link.window {
-        plots.window = window;
     }
 }
 
@@ -264,20 +251,11 @@ impl App {
         player.clock = options.clock;
         player.pacer.set_scale(options.time_scale);
         player.set_playing(options.playing);
-        let mut viewport = Viewport::new(&player, options.view);
-        let mut plots = Plots::default();
-        if let Some(link) = &options.link {
-            show_link(link, &player, &mut viewport, &mut plots);
-        }
-        let replay = options.link.and_then(Replay::new);
-        if replay.is_some() {
-            player.set_playing(false);
-        }
         let mut app = Self {
-            viewport,
+            viewport: Viewport::new(&player, options.view),
             controls: Controls::default(),
             accuracy: Accuracy::default(),
-            plots,
+            plots: Plots::default(),
             timeline: Timeline::default(),
             bench: Bench::default(),
             dialog: None,
@@ -290,7 +268,7 @@ impl App {
             touched: false,
             fingers: None,
             host: Box::new(NoHost),
-            replay,
+            replay: None,
             load: None,
             verdict: None,
             notice: None,
@@ -302,8 +280,41 @@ impl App {
             graphics: None,
             player,
         };
+        if let Some(link) = options.link {
+            app.show_link(link);
+        }
         app.attach(ctx, state, options.theme);
         Ok(app)
+    }
+
+    /// Applies camera, followed part, plots and instruments of `link`, and goes to its instant; what it does not mention
+    /// stays.
+    fn show_link(&mut self, link: Link) {
+        if let Some(pose) = link.camera {
+            self.viewport.set_pose(pose);
+        }
+        // Reading the link has already checked that the parts exist.
+        let scene = self.player.scene();
+        self.viewport.follow(link.followed(scene).ok().flatten());
+        if let Some(chosen) = &link.plots {
+            self.plots.chosen.clone_from(chosen);
+        }
+        if let Some(window) = link.window {
+            self.plots.window = window;
+        }
+        if let Some(shown) = &link.instruments {
+            let joint = link.under_microscope(scene).ok().flatten();
+            self.microscope.set_open(joint.is_some());
+            if let Some(joint) = joint {
+                self.microscope.focus(joint);
+            }
+            self.viewport.options.wear = shown.wear;
+            self.show_ideal(shown.ideal);
+        }
+        self.replay = Replay::new(link);
+        if self.replay.is_some() {
+            self.player.set_playing(false);
+        }
     }
 
     /// Continues in another window, or with new graphics after the old were lost; nothing else changes.
@@ -502,11 +513,7 @@ impl App {
                 if let Some(theme) = link.theme {
                     ctx.set_theme(theme);
                 }
-                show_link(&link, &self.player, &mut self.viewport, &mut self.plots);
-                self.replay = Replay::new(link);
-            }
-            if self.replay.is_some() {
-                self.player.set_playing(false);
+                self.show_link(link);
             }
             Ok(())
         });

@@ -19,6 +19,7 @@ use crate::scene::{
 };
 use crate::simulate::{Quantity, SCALE_RANGE};
 use crate::view::Picked;
+use shown::Instruments;
 
 /// Longest link written and read, characters: what mail, chats and every browser still pass on.
 pub const LONGEST_LINK: usize = 32_000;
@@ -34,7 +35,7 @@ pub const ALIASES: [(&str, &str); 4] = [
 ];
 
 /// Words of a link that are not parameters.
-const WORDS: [&str; 17] = [
+const WORDS: [&str; 18] = [
     "scene",
     "file",
     "text",
@@ -48,6 +49,7 @@ const WORDS: [&str; 17] = [
     "follow",
     "plots",
     "window",
+    "show",
     "play",
     "version",
     "renderer",
@@ -138,6 +140,8 @@ pub struct Link {
     pub plots: Option<Vec<Quantity>>,
     /// Time that they show.
     pub window: Option<Window>,
+    /// Instruments that are on.
+    pub instruments: Option<Instruments>,
     /// Whether the run plays once the state is reached; by default, only if the link names no instant.
     pub playing: Option<bool>,
     /// Light, dark, or as the system asks.
@@ -160,6 +164,7 @@ impl Default for Link {
             follow: None,
             plots: None,
             window: None,
+            instruments: None,
             playing: None,
             theme: None,
             version: None,
@@ -261,6 +266,9 @@ impl Link {
                 "follow" => link.follow = Some(value.to_owned()),
                 "plots" => link.plots = Some(shown::read_plots(value).map_err(|m| wrong(&m))?),
                 "window" => link.window = Some(shown::read_window(value).map_err(|m| wrong(&m))?),
+                "show" => {
+                    link.instruments = Some(Instruments::read(value).map_err(|m| wrong(&m))?);
+                }
                 "play" => {
                     link.playing = Some(match value {
                         "1" => true,
@@ -350,6 +358,7 @@ impl Link {
         add("follow", self.follow.clone());
         add("plots", self.plots.as_deref().map(shown::write_plots));
         add("window", self.window.map(shown::write_window));
+        add("show", self.instruments.as_ref().map(Instruments::write));
         add(
             "play",
             self.playing.map(|playing| u8::from(playing).to_string()),
@@ -420,6 +429,29 @@ impl Link {
             .as_ref()
             .map(|name| shown::find_followed(scene, name).map_err(|why| fault("follow", name, why)))
             .transpose()
+    }
+
+    /// Index of the ball joint under the microscope in `scene`, if any.
+    ///
+    /// # Errors
+    /// There is no such joint.
+    pub fn under_microscope(&self, scene: &Scene) -> Result<Option<usize>, LinkError> {
+        let Some(name) = self
+            .instruments
+            .as_ref()
+            .and_then(|i| i.microscope.as_ref())
+        else {
+            return Ok(None);
+        };
+        let mut joints = scene.ball_joints.iter();
+        match joints.position(|joint| joint.name == *name) {
+            Some(joint) => Ok(Some(joint)),
+            None => {
+                let known: Vec<_> = scene.ball_joints.iter().map(|j| j.name.as_str()).collect();
+                let message = format!("no such ball joint; allowed: {}", known.join(", "));
+                Err(fault("show", &format!("microscope.{name}"), message))
+            }
+        }
     }
 
     /// Whether the link names an instant to go to.

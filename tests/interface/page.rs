@@ -250,6 +250,7 @@ fn a_bad_link_is_explained_and_the_default_scene_runs() {
         ("#scene=pendulum&log=AAAA", "cut short or damaged"),
         ("?speed=3", "unknown word"),
         ("?follow=joint.S9", "no such part; allowed: joint.S1,"),
+        ("?show=microscope.S9", "no such ball joint; allowed: S1,"),
     ] {
         assert!(AppOptions::from_link(link).is_err(), "{link}");
         let (mut harness, _) = open(AppOptions::from_link_or_default(link), LARGE);
@@ -407,6 +408,9 @@ fn a_double_tap_follows_what_it_hits() {
         .chosen
         .push(Quantity::Energy);
     harness.state_mut().plots_mut().window = Window::Last(0.01);
+    harness.state_mut().microscope_mut().set_open(true);
+    harness.state_mut().microscope_mut().focus(1);
+    harness.state_mut().player_mut().set_ideal(true);
     harness.state_mut().player_mut().run_to(5e-3);
     harness.run_steps(3);
     let link = harness.state().share_state();
@@ -421,7 +425,8 @@ fn a_double_tap_follows_what_it_hits() {
     }
     assert!(
         link.contains("&follow=body.platform&")
-            && link.contains("&plots=normal-force+eccentricity+energy&window=0.01s&"),
+            && link.contains("&plots=normal-force+eccentricity+energy&window=0.01s&")
+            && link.contains("&show=microscope.S2+ideal&"),
         "{link}"
     );
 }

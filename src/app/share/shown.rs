@@ -1,14 +1,74 @@
-//! The plot and view settings that a link carries, as words.
+//! The settings of plots, view and instruments that a link carries, as words.
 
 use crate::app::plots::{Plots, Window};
 use crate::scene::{Dimension, Scene, parse_quantity};
 use crate::simulate::Quantity;
-use crate::view::Picked;
+use crate::view::{Picked, WearMap};
 
 /// Longest window of the plots that a link asks for, s.
 const LONGEST_WINDOW: f64 = 1e4;
 /// Shortest one, s.
 const SHORTEST_WINDOW: f64 = 1e-6;
+
+const IDEAL: &str = "ideal";
+const MICROSCOPE: &str = "microscope.";
+const WEAR: [(&str, WearMap); 2] = [
+    ("wear-impulse", WearMap::Impulse),
+    ("wear-friction-work", WearMap::FrictionWork),
+];
+
+/// Instruments that are on.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Instruments {
+    /// Name of the ball joint under the microscope.
+    pub microscope: Option<String>,
+    /// The ideal motion beside the run.
+    pub ideal: bool,
+    /// What colours the sockets.
+    pub wear: WearMap,
+}
+
+impl Instruments {
+    /// Reads words separated by commas or spaces; `none` stands for none.
+    ///
+    /// # Errors
+    /// Another word; lists those there are.
+    pub fn read(text: &str) -> Result<Self, String> {
+        let mut on = Self::default();
+        for part in text.split([',', ' ']).filter(|part| !part.is_empty()) {
+            if let Some(joint) = part.strip_prefix(MICROSCOPE) {
+                on.microscope = Some(joint.to_owned());
+            } else if let Some((_, map)) = WEAR.iter().find(|(word, _)| *word == part) {
+                on.wear = *map;
+            } else if part == IDEAL {
+                on.ideal = true;
+            } else if part != "none" {
+                return Err(format!(
+                    "no instrument `{part}`; allowed, separated by commas: {MICROSCOPE}JOINT, {IDEAL}, {}, none",
+                    WEAR.map(|(word, _)| word).join(", ")
+                ));
+            }
+        }
+        Ok(on)
+    }
+
+    /// The reverse of [`Self::read`].
+    pub fn write(&self) -> String {
+        let mut words: Vec<String> = Vec::new();
+        words.extend(
+            self.microscope
+                .iter()
+                .map(|joint| format!("{MICROSCOPE}{joint}")),
+        );
+        words.extend(self.ideal.then(|| IDEAL.to_owned()));
+        let wear = WEAR.iter().filter(|(_, map)| *map == self.wear);
+        words.extend(wear.map(|(word, _)| (*word).to_owned()));
+        if words.is_empty() {
+            return "none".to_owned();
+        }
+        words.join(" ")
+    }
+}
 
 /// A quantity's word: `normal-force`.
 fn word(quantity: Quantity) -> String {

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::app::log::Event;
+use crate::view::WearMap;
 
 /// Numbers that look random and are the same each time (splitmix64).
 struct Chance(u64);
@@ -87,6 +88,11 @@ impl Chance {
                 0 => Window::Automatic,
                 1 => Window::Everything,
                 _ => Window::Last(1e-6 + c.unit()),
+            }),
+            instruments: self.maybe(|c| Instruments {
+                microscope: c.maybe(|c| format!("S{}", c.below(9))),
+                ideal: c.below(2) == 0,
+                wear: [WearMap::Off, WearMap::Impulse, WearMap::FrictionWork][c.below(3) as usize],
             }),
             playing: self.maybe(|c| c.below(2) == 0),
             theme: self.maybe(|c| THEMES[c.below(3) as usize].1),
@@ -199,6 +205,10 @@ fn what_is_wrong_in_a_link_is_said() {
         (
             "plots=speed",
             "no plot `speed`; allowed, separated by commas: normal-force,",
+        ),
+        (
+            "show=telescope",
+            "no instrument `telescope`; allowed, separated by commas: microscope.JOINT, ideal, wear-impulse,",
         ),
         ("window=5", "link: window = 5: needs a unit"),
         (
