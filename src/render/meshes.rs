@@ -4,14 +4,43 @@ use std::f32::consts::{PI, TAU};
 
 use crate::view::{Mesh, MeshData};
 
-/// Around a bar or a sphere.
-const SECTORS: u32 = 64;
-/// From pole to pole of a sphere.
-const STACKS: u32 = 32;
+/// How finely the shared meshes are divided.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Detail {
+    /// No corner shows at any size.
+    Fine,
+    /// For radii of at most [`COARSE_PIXELS`].
+    Coarse,
+}
+
+/// Radius up to which [`Detail::Coarse`] serves, pixels: its sides lie within 0.08 pixels of the circle.
+pub(super) const COARSE_PIXELS: f32 = 4.0;
+
+impl Detail {
+    /// Around a bar or a sphere.
+    fn sectors(self) -> u32 {
+        match self {
+            Self::Fine => 64,
+            Self::Coarse => 16,
+        }
+    }
+
+    /// From pole to pole of a sphere.
+    fn stacks(self) -> u32 {
+        self.sectors() / 2
+    }
+}
 
 /// The shared meshes, by [`Mesh::index`].
-pub(super) fn shared() -> [MeshData; Mesh::SHARED] {
-    [sphere(), cylinder(), cone(), cube(), socket()]
+pub(super) fn shared(detail: Detail) -> [MeshData; Mesh::SHARED] {
+    let (nu, nv) = (detail.sectors(), detail.stacks());
+    [
+        sphere(nu, nv),
+        cylinder(nu),
+        cone(nu),
+        cube(),
+        socket(nu, nv / 2),
+    ]
 }
 
 /// Adds a patch: `point(u, v)` for u, v in 0..=1 gives position and normal; u runs around, v from bottom to top, so that
@@ -45,9 +74,9 @@ fn on_ball(u: f32, theta: f32) -> [f32; 3] {
     [theta.sin() * x, theta.sin() * y, -theta.cos()]
 }
 
-fn sphere() -> MeshData {
+fn sphere(nu: u32, nv: u32) -> MeshData {
     let mut mesh = MeshData::default();
-    patch(&mut mesh, SECTORS, STACKS, |u, v| {
+    patch(&mut mesh, nu, nv, |u, v| {
         let n = on_ball(u, v * PI);
         ([n[0], n[1], n[2], 0.0], n)
     });
@@ -55,8 +84,8 @@ fn sphere() -> MeshData {
 }
 
 /// Disc of radius 1 at height `z`, facing up or down.
-fn disc(mesh: &mut MeshData, z: f32, up: bool) {
-    patch(mesh, SECTORS, 1, |u, v| {
+fn disc(mesh: &mut MeshData, nu: u32, z: f32, up: bool) {
+    patch(mesh, nu, 1, |u, v| {
         let (x, y) = circle(u);
         let r = if up { 1.0 - v } else { v };
         (
@@ -66,28 +95,28 @@ fn disc(mesh: &mut MeshData, z: f32, up: bool) {
     });
 }
 
-fn cylinder() -> MeshData {
+fn cylinder(nu: u32) -> MeshData {
     let mut mesh = MeshData::default();
-    patch(&mut mesh, SECTORS, 1, |u, v| {
+    patch(&mut mesh, nu, 1, |u, v| {
         let (x, y) = circle(u);
         ([x, y, v, 0.0], [x, y, 0.0])
     });
-    disc(&mut mesh, 0.0, false);
-    disc(&mut mesh, 1.0, true);
+    disc(&mut mesh, nu, 0.0, false);
+    disc(&mut mesh, nu, 1.0, true);
     mesh
 }
 
-fn cone() -> MeshData {
+fn cone(nu: u32) -> MeshData {
     let mut mesh = MeshData::default();
     let slope = std::f32::consts::FRAC_1_SQRT_2;
-    patch(&mut mesh, SECTORS, 1, |u, v| {
+    patch(&mut mesh, nu, 1, |u, v| {
         let (x, y) = circle(u);
         (
             [x * (1.0 - v), y * (1.0 - v), v, 0.0],
             [x * slope, y * slope, slope],
         )
     });
-    disc(&mut mesh, 0.0, false);
+    disc(&mut mesh, nu, 0.0, false);
     mesh
 }
 
@@ -110,18 +139,17 @@ fn cube() -> MeshData {
 }
 
 /// Half shell, open towards +z: outer face, inner face (fourth coordinate 1), cut face (2 outside, 3 inside).
-fn socket() -> MeshData {
+fn socket(nu: u32, half: u32) -> MeshData {
     let mut mesh = MeshData::default();
-    let half = STACKS / 2;
-    patch(&mut mesh, SECTORS, half, |u, v| {
+    patch(&mut mesh, nu, half, |u, v| {
         let n = on_ball(u, v * PI / 2.0);
         ([n[0], n[1], n[2], 0.0], n)
     });
-    patch(&mut mesh, SECTORS, half, |u, v| {
+    patch(&mut mesh, nu, half, |u, v| {
         let n = on_ball(u, (1.0 - v) * PI / 2.0);
         ([n[0], n[1], n[2], 1.0], n.map(|x| -x))
     });
-    patch(&mut mesh, SECTORS, 1, |u, v| {
+    patch(&mut mesh, nu, 1, |u, v| {
         let (x, y) = circle(u);
         ([x, y, 0.0, 2.0 + v], [0.0, 0.0, 1.0])
     });
@@ -134,8 +162,15 @@ mod tests {
     use glam::Vec3;
 
     #[test]
+    fn a_coarse_circle_keeps_within_a_tenth_of_a_pixel() {
+        let half_side = PI / Detail::Coarse.sectors() as f32;
+        assert!(COARSE_PIXELS * (1.0 - half_side.cos()) < 0.08);
+    }
+
+    #[test]
     fn triangles_wind_counter_clockwise_seen_from_outside() {
-        for (i, mesh) in shared().iter().enumerate() {
+        let all = [Detail::Fine, Detail::Coarse].map(shared);
+        for (i, mesh) in all.iter().flatten().enumerate() {
             for triangle in mesh.indices.chunks(3) {
                 let corner = |k: usize| {
                     let (p, n) = mesh.vertices[triangle[k] as usize];

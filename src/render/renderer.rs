@@ -4,13 +4,13 @@ use std::mem::size_of;
 use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
-use glam::{Mat4, Vec3};
+use glam::{Mat4, Vec3, Vec4};
 use wgpu::util::DeviceExt as _;
 
-use super::meshes;
+use super::meshes::{self, COARSE_PIXELS, Detail};
 use super::pipelines::{Pipelines, SHADOW};
 use super::{RenderTarget, wgpu};
-use crate::view::{DrawList, Instance, Layer, Line, Mesh, MeshData};
+use crate::view::{DrawList, Eye, Instance, Layer, Line, Mesh, MeshData};
 
 /// Side of the shadow map, pixels: within the 2048 that WebGL2 guarantees.
 const SHADOW_SIZE: u32 = 1536;
@@ -48,6 +48,7 @@ struct Growing {
 
 /// Instances of one mesh within the instance buffer.
 struct Batch {
+    detail: Detail,
     mesh: usize,
     first: u64,
     count: u32,
@@ -61,6 +62,8 @@ pub struct Renderer {
     shadow_map: wgpu::TextureView,
     shadow_group: wgpu::BindGroup,
     meshes: Vec<Loaded>,
+    /// The shared meshes for instances of a few pixels, by [`Mesh::index`].
+    coarse: Vec<Loaded>,
     plates: Arc<[MeshData]>,
     instances: Growing,
     lines: Growing,
@@ -130,7 +133,11 @@ impl Renderer {
             globals_group,
             shadow_map,
             shadow_group,
-            meshes: meshes::shared()
+            meshes: meshes::shared(Detail::Fine)
+                .iter()
+                .map(|mesh| load(device, mesh))
+                .collect(),
+            coarse: meshes::shared(Detail::Coarse)
                 .iter()
                 .map(|mesh| load(device, mesh))
                 .collect(),
@@ -159,16 +166,18 @@ impl Renderer {
                 .extend(list.plates.iter().map(|mesh| load(device, mesh)));
         }
         self.packed.clear();
-        let solid = self.pack(&list.solid);
-        let faded = self.pack(&list.faded);
-        let ghost = self.pack(&list.ghost);
-        let ghost_edges = self.pack(&list.ghost_edges);
-        let arrows = self.pack(&list.arrows);
-        let overlay = self.pack(&list.overlay);
-        let halos = [self.pack_one(Mesh::Sphere.index(), &list.halos)];
-        let sockets = [self.pack_one(Mesh::Socket.index(), &list.sockets)];
-        let wear = self.pack(&list.wear);
-        let clear_balls = [self.pack_one(Mesh::Sphere.index(), &list.clear_balls)];
+        let height = target.size()[1];
+        let pixels = |instance: &Instance| radius_on_screen(&list.eye, height, instance);
+        let solid = self.pack(&list.solid, pixels);
+        let faded = self.pack(&list.faded, pixels);
+        let ghost = self.pack(&list.ghost, pixels);
+        let ghost_edges = self.pack(&list.ghost_edges, pixels);
+        let arrows = self.pack(&list.arrows, pixels);
+        let overlay = self.pack(&list.overlay, pixels);
+        let halos = self.pack_mesh(Mesh::Sphere.index(), &list.halos, pixels);
+        let sockets = self.pack_mesh(Mesh::Socket.index(), &list.sockets, pixels);
+        let wear = self.pack(&list.wear, pixels);
+        let clear_balls = self.pack_mesh(Mesh::Sphere.index(), &list.clear_balls, pixels);
         self.instances
             .write(device, queue, bytemuck::cast_slice(&self.packed));
         self.lines
@@ -240,25 +249,36 @@ impl Renderer {
         self.draw_meshes(&mut pass, &pipelines.overlay, &overlay);
     }
 
-    fn pack(&mut self, layer: &Layer) -> Vec<Batch> {
-        let filled = layer
-            .by_mesh
-            .iter()
-            .enumerate()
-            .filter(|(_, instances)| !instances.is_empty());
-        filled
-            .map(|(mesh, instances)| self.pack_one(mesh, instances))
+    /// Packs all instances of `layer`; `pixels` gives an instance's radius on the screen.
+    fn pack(&mut self, layer: &Layer, pixels: impl Fn(&Instance) -> f32 + Copy) -> Vec<Batch> {
+        let meshes = layer.by_mesh.iter().enumerate();
+        meshes
+            .flat_map(|(mesh, instances)| self.pack_mesh(mesh, instances, pixels))
             .collect()
     }
 
-    fn pack_one(&mut self, mesh: usize, instances: &[Instance]) -> Batch {
-        let first = (self.packed.len() * size_of::<Instance>()) as u64;
-        self.packed.extend_from_slice(instances);
-        Batch {
-            mesh,
-            first,
-            count: instances.len() as u32,
-        }
+    /// Fine instances, then coarse ones; either may be none.
+    fn pack_mesh(
+        &mut self,
+        mesh: usize,
+        instances: &[Instance],
+        pixels: impl Fn(&Instance) -> f32,
+    ) -> [Batch; 2] {
+        [Detail::Fine, Detail::Coarse].map(|detail| {
+            let first = self.packed.len();
+            let small =
+                |instance: &&Instance| mesh < Mesh::SHARED && pixels(instance) <= COARSE_PIXELS;
+            let of_detail = instances
+                .iter()
+                .filter(|instance| small(instance) == (detail == Detail::Coarse));
+            self.packed.extend(of_detail);
+            Batch {
+                detail,
+                mesh,
+                first: (first * size_of::<Instance>()) as u64,
+                count: (self.packed.len() - first) as u32,
+            }
+        })
     }
 
     fn draw_meshes(
@@ -269,7 +289,11 @@ impl Renderer {
     ) {
         pass.set_pipeline(pipeline);
         for batch in batches.iter().filter(|batch| batch.count > 0) {
-            let Some(mesh) = self.meshes.get(batch.mesh) else {
+            let meshes = match batch.detail {
+                Detail::Fine => &self.meshes,
+                Detail::Coarse => &self.coarse,
+            };
+            let Some(mesh) = meshes.get(batch.mesh) else {
                 continue;
             };
             pass.set_vertex_buffer(0, mesh.vertices.slice(..));
@@ -395,6 +419,21 @@ fn globals(list: &DrawList, size: [u32; 2]) -> Globals {
     }
 }
 
+/// Radius across an instance's axis, pixels, at the nearer of its origin and its tip (0, 0, 1): what its roundness is seen
+/// by. Infinite where either is not in front of the eye.
+fn radius_on_screen(eye: &Eye, height: u32, instance: &Instance) -> f32 {
+    let rows = instance.world_from_mesh.map(Vec4::from);
+    let column = |j: usize| Vec3::new(rows[0][j], rows[1][j], rows[2][j]);
+    let depth = |at: Vec3| eye.clip_from_world.row(3).dot(at.extend(1.0));
+    let nearest = depth(column(3)).min(depth(column(3) + column(2)));
+    if nearest <= 0.0 {
+        return f32::INFINITY;
+    }
+    let radius = column(0).length().max(column(1).length());
+    let scale = eye.clip_from_world.row(1).truncate().length();
+    radius * scale / nearest * 0.5 * height as f32
+}
+
 /// Orthographic view from the light onto the sphere that needs shadows.
 fn light_from_world(direction: Vec3, centre: Vec3, radius: f32) -> Mat4 {
     let up = direction.any_orthonormal_vector();
@@ -408,4 +447,40 @@ fn light_from_world(direction: Vec3, centre: Vec3, radius: f32) -> Mat4 {
         0.5 * radius,
         4.0 * radius,
     ) * view
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{Mat3, Quat};
+
+    use super::*;
+    use crate::view::{SceneView, fixture};
+
+    #[test]
+    fn the_radius_on_the_screen_is_the_one_that_points_span() {
+        const SIZE: [u32; 2] = [480, 360];
+        let (scene, frame) = fixture::pendulum();
+        let camera = SceneView::new(&scene, &frame).camera();
+        let eye = camera.view(SIZE);
+        let turn = Mat3::from_quat(Quat::from_rotation_x(0.7));
+        let at = |origin: Vec3, radius: f32| {
+            let linear = turn * Mat3::from_diagonal(Vec3::new(radius, radius, 1e-6));
+            let rows = [0, 1, 2].map(|i| linear.row(i).extend(origin[i]).to_array());
+            let instance = Instance {
+                world_from_mesh: rows,
+                ..Instance::zeroed()
+            };
+            radius_on_screen(&eye, SIZE[1], &instance)
+        };
+        let (right, _, back) = camera.axes();
+        for radius in [1e-4_f32, 1e-3, 1e-2] {
+            let ends = [-radius, radius].map(|r| eye.project(camera.target + r * right, SIZE));
+            let [Some(from), Some(to)] = ends else {
+                panic!("the target is behind the eye");
+            };
+            let (found, spanned) = (at(camera.target, radius), from.distance(to) / 2.0);
+            assert!((found / spanned - 1.0).abs() < 1e-2, "{found} {spanned}");
+        }
+        assert!(at(camera.eye() + back, 1e-3).is_infinite());
+    }
 }
