@@ -285,11 +285,13 @@ impl Player {
         Ok(())
     }
 
-    /// The state changed other than by a step.
+    /// The twin begins anew from the present state.
     fn restart_twin(&mut self) {
-        if self.twin.is_some() {
-            // A running scene can be started again.
-            self.twin = Twin::new(&self.simulation).ok().map(Box::new);
+        // A running scene can be started again.
+        if let Some(twin) = &mut self.twin
+            && twin.restart(&self.simulation).is_err()
+        {
+            self.twin = None;
         }
     }
 
@@ -569,7 +571,11 @@ impl Player {
         self.watch
             .begin(self.simulation.running_scene(), self.simulation.time());
         self.settling = Settling::new(self.simulation.running_scene());
-        self.restart_twin();
+        // Where the run is taken again, it has begun only later.
+        let now = self.simulation.time();
+        if self.twin.as_ref().is_some_and(|twin| twin.begins() <= now) {
+            self.restart_twin();
+        }
         self.present();
     }
 

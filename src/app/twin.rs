@@ -2,7 +2,7 @@
 //! distance. The twin does not affect the run.
 
 use crate::analysis::exponent::{offset, scaled_distance};
-use crate::simulate::{Frame, Simulation, StartError};
+use crate::simulate::{Frame, Simulation, Snapshot, StartError};
 
 /// The displacement, in units of the scales of the state.
 pub const DISPLACEMENT: f64 = 1e-9;
@@ -26,9 +26,27 @@ pub struct Fit {
     pub to: f64,
 }
 
+/// Where a twin was, to take it back there.
+pub struct TwinMark {
+    /// When that twin began, s: no other can be taken there.
+    begins: f64,
+    state: Snapshot,
+    steps: u64,
+}
+
+impl TwinMark {
+    /// Approximate memory, bytes.
+    pub fn bytes(&self) -> usize {
+        self.state.bytes()
+    }
+}
+
 /// The twin and its distances so far.
 pub struct Twin {
     simulation: Simulation,
+    /// When it began, s, and its displaced state then. While the run is taken again from before that, the twin waits.
+    begins: f64,
+    origin: Snapshot,
     frame: Frame,
     /// Time in s, distance in units of the scales.
     distances: Vec<[f64; 2]>,
@@ -52,6 +70,8 @@ impl Twin {
         let away: Vec<f64> = offset(run.scales(), DISPLACEMENT).collect();
         simulation.displace(&away);
         let mut twin = Self {
+            begins: run.time(),
+            origin: simulation.snapshot(),
             simulation,
             frame: Frame::default(),
             distances: Vec::with_capacity(KEPT),
@@ -66,8 +86,66 @@ impl Twin {
         Ok(twin)
     }
 
+    /// Begins anew from the present state of `run`. What a twin that began at the same instant knew of its distances stays.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn restart(&mut self, run: &Simulation) -> Result<(), StartError> {
+        let before = std::mem::replace(self, Self::new(run)?);
+        if before.begins == self.begins {
+            (self.distances, self.stride) = (before.distances, before.stride);
+        }
+        Ok(())
+    }
+
+    /// When it began, s.
+    pub fn begins(&self) -> f64 {
+        self.begins
+    }
+
+    /// Where it is now.
+    pub fn mark(&self) -> TwinMark {
+        TwinMark {
+            begins: self.begins,
+            state: self.simulation.snapshot(),
+            steps: self.steps,
+        }
+    }
+
+    /// Goes back with `run`, which has just been taken to where it was when `mark` was set. Without a mark of this twin it
+    /// waits for its beginning, or begins anew where that has passed.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn go_back(&mut self, mark: Option<&TwinMark>, run: &Simulation) -> Result<(), StartError> {
+        let mark = mark.filter(|mark| mark.begins == self.begins);
+        if mark.is_none() && self.begins < run.time() {
+            return self.restart(run);
+        }
+        let (state, steps) = mark.map_or((&self.origin, 0), |mark| (&mark.state, mark.steps));
+        self.simulation.restore(state)?;
+        (self.steps, self.ended) = (steps, None);
+        self.goal = self.begins.max(run.time());
+        self.goal_state.copy_from_slice(run.state());
+        Ok(())
+    }
+
+    /// Forgets the distances after `time`, s: another future begins.
+    pub fn cut(&mut self, time: f64) {
+        let time = time.max(self.begins);
+        self.distances.retain(|[at, _]| *at <= time);
+    }
+
+    /// Whether [`Self::place`] can show it at `time`, s, without being taken back.
+    pub fn reaches(&self, time: f64) -> bool {
+        time <= self.begins || self.simulation.step_start() < time
+    }
+
     /// To be called after a step of `run`: the twin advances to where the run was before that step.
     pub fn follow(&mut self, run: &Simulation) {
+        if run.time() <= self.begins {
+            return;
+        }
         self.come_to(self.goal);
         self.goal = run.time();
         self.goal_state.copy_from_slice(run.state());
@@ -89,8 +167,15 @@ impl Twin {
         }
     }
 
-    /// Records its distance from the run.
+    /// Records its distance from the run, where that is not known from before.
     fn measure(&mut self) {
+        if self
+            .distances
+            .last()
+            .is_some_and(|[at, _]| *at >= self.goal)
+        {
+            return;
+        }
         let scales = self.simulation.scales();
         let distance = scaled_distance(&self.goal_state, self.simulation.state(), scales);
         if self.distances.len() == KEPT {

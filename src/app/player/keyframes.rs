@@ -1,5 +1,6 @@
 //! States to which a run can be taken back: closely spaced in the recent past, thinned out in the older.
 
+use crate::app::twin::TwinMark;
 use crate::simulate::{Mark, Snapshot};
 
 /// Steps from one kept state to the next.
@@ -17,11 +18,14 @@ pub(super) struct Keyframe {
     pub events: usize,
     /// Position in the record; only the kept states have it.
     pub record: Option<Mark>,
+    /// The twin run beside it.
+    pub twin: Option<TwinMark>,
 }
 
 impl Keyframe {
     fn bytes(&self) -> usize {
-        self.state.bytes() + self.record.as_ref().map_or(0, Mark::bytes)
+        let twin = self.twin.as_ref().map_or(0, TwinMark::bytes);
+        self.state.bytes() + twin + self.record.as_ref().map_or(0, Mark::bytes)
     }
 }
 

@@ -347,6 +347,42 @@ fn a_thousand_jumps_over_a_thousand_impacts_have_the_bits_of_the_run() {
 }
 
 #[test]
+fn the_twin_goes_back_and_on_with_the_run() {
+    let mut player = player("spcmm");
+    player.run_to(10e-3);
+    player.set_twin(true).expect("starts");
+    let mut seen = Vec::new();
+    for frame in 0..60 {
+        if frame == 30 {
+            player.set("contact.friction", "0").expect("in range");
+        }
+        player.run_to(10e-3 + 2e-3 * f64::from(frame));
+        let twin = player.twin().expect("on");
+        seen.push((player.pacer.shown(), twin.frame().clone()));
+    }
+    let distances = player.twin().expect("on").distances().to_vec();
+    let began = player.twin().expect("on").begins();
+    let mut random = Uniform(5);
+    for _ in 0..100 {
+        let (time, frame) = &seen[(random.next() * seen.len() as f64) as usize];
+        player.go_to(*time);
+        let twin = player.twin().expect("stays on");
+        if *time < began {
+            assert!(twin.frame().time > *time, "it began after the change");
+        } else if *time > began {
+            assert_eq!(twin.frame().bodies, frame.bodies, "at {time}");
+        }
+        assert_eq!(twin.distances(), distances, "what was known stays so");
+    }
+    // Another future: the twin of the one left is forgotten.
+    player.go_to(seen[10].0);
+    player.set("contact.friction", "0.3").expect("in range");
+    let twin = player.twin().expect("stays on");
+    assert_eq!(twin.begins(), player.simulation().time());
+    assert_eq!(twin.distances().len(), 1);
+}
+
+#[test]
 #[ignore = "half a minute: `cargo test --release --lib -- --ignored ten_minutes`"]
 fn ten_minutes_stay_within_reach() {
     let mut player = player("spcmm");

@@ -209,7 +209,8 @@ impl Player {
         let here = self.simulation.time();
         let run = self.unchanged.as_deref().unwrap_or(&self.simulation);
         // Any instant of the latest step can be sampled; if a change was made within it, from the run as it was before.
-        if !(run.step_start() < time && time <= here) {
+        let twin_reaches = self.twin.as_ref().is_none_or(|twin| twin.reaches(time));
+        if !(run.step_start() < time && time <= here && twin_reaches) {
             let best = self.keyframes.latest(|k| k.state.time() <= time);
             let best = best.map_or(0.0, |k| k.state.time());
             if here > time || here < best {
@@ -226,7 +227,6 @@ impl Player {
         if time >= self.simulation.time().min(self.reached) {
             self.apply_due();
         }
-        self.restart_twin();
         self.present();
     }
 
@@ -258,6 +258,13 @@ impl Player {
             return;
         }
         self.applied = keyframe.events;
+        if let Some(twin) = &mut self.twin
+            && twin
+                .go_back(keyframe.twin.as_ref(), &self.simulation)
+                .is_err()
+        {
+            self.twin = None;
+        }
         let now = self.simulation.time();
         self.stopped = None;
         self.unchanged = None;
@@ -365,9 +372,19 @@ impl Player {
         self.watch.cut(start);
         self.keyframes.cut(start_steps);
         self.near = None;
+        if let Some(twin) = &mut self.twin {
+            twin.cut(start);
+        }
         (self.reached, self.most_steps) = (start, start_steps);
         self.restore(start, false);
         self.retrace(|player| player.steps() >= steps, shown);
+        if self
+            .twin
+            .as_ref()
+            .is_some_and(|twin| twin.begins() > self.simulation.time())
+        {
+            self.restart_twin();
+        }
         self.arrive(shown);
     }
 
@@ -390,6 +407,7 @@ impl Player {
             state: self.simulation.snapshot(),
             events: self.applied,
             record,
+            twin: self.twin.as_ref().map(|twin| twin.mark()),
         }
     }
 
