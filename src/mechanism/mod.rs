@@ -223,6 +223,8 @@ pub struct Mechanism {
     /// Allocated if only the contacts are stepped implicitly.
     implicit: Option<Box<implicit::ImplicitContacts>>,
     assembly: Assembly,
+    /// ns, as by [`bounds::evaluation_time`].
+    evaluation_time: f64,
 }
 
 impl Mechanism {
@@ -242,6 +244,7 @@ impl Mechanism {
             Formulation::Lagrange => Box::new(Lagrange::new(scene, &model)),
         };
         Ok(Self {
+            evaluation_time: bounds::evaluation_time(scene, &model),
             sources: power::Sources::new(&model, &*equations, scene.elements.len()),
             elements: elements_of(scene, &model),
             of_scene: scene.elements.len(),
@@ -519,8 +522,20 @@ impl Mechanism {
     }
 
     /// Largest rate at which friction damps the sliding of a contact, 1/s, by its latest linearisation.
-    pub fn friction_rate(&self) -> f64 {
-        self.friction.as_ref().map_or(0.0, |f| f.fastest())
+    pub fn friction_rate(&mut self) -> f64 {
+        self.friction.as_mut().map_or(0.0, |f| f.fastest())
+    }
+
+    /// Approximate cost of a friction step's algebra, in evaluations.
+    pub fn friction_algebra(&self) -> f64 {
+        let time = self.friction.as_ref().map_or(0.0, |f| f.algebra_time());
+        time / self.evaluation_time
+    }
+
+    /// Approximate cost of an implicit step's dense algebra, in evaluations.
+    pub fn dense_algebra(&self) -> f64 {
+        let velocities = self.dimension() - self.positions();
+        bounds::dense_algebra_time(velocities) / self.evaluation_time
     }
 
     /// Allocates what [`ContactSystem`](crate::integrate::ContactSystem) needs, so that no step does.

@@ -9,24 +9,21 @@ use crate::simulate::stepper::Member;
 pub(super) const HELD_BY_STABILITY: f64 = 3.0;
 /// Steps that must be limited by stability, or taken since the latest contact began, before the implicit method is tried.
 const HELD_STEPS: u32 = 8;
-/// Steps that must be held by stability before friction is tried as what holds them, and h times its rate below which it does
-/// no longer.
+/// Steps that must be held by stability before friction is tried as what holds them.
 const HELD_BY_FRICTION: u32 = 2;
-const NO_LONGER_STIFF: f64 = 3.0;
 const SETTLED_STEPS: u32 = 60;
 /// Over this many implicit steps the progress per cost must be this many times the explicit method's; otherwise the
-/// explicit one gets this many steps, and twice as many after each consecutive failed trial.
+/// explicit one gets steps for this many times the cost of the trial, twice as many after each consecutive failed trial, at
+/// most so many times.
 const TRIAL_STEPS: u32 = 12;
 /// The first of them, in which the step still grows, do not count.
 const GROWING_STEPS: u32 = 8;
 const WORTH_IT: f64 = 1.3;
-const EXPLICIT_TURN: u32 = 200;
-const LONGEST_TURN: u32 = 6400;
-/// Evaluations of one explicit step.
+const EXPLICIT_TURN: f64 = 2.0;
+const MOST_DOUBLINGS: u32 = 3;
+/// Evaluations of one explicit step, and of one with friction implicit.
 const EXPLICIT_EVALUATIONS: f64 = 6.0;
-/// Cost of an implicit step's dense algebra, in evaluations: the square of the number of velocity coordinates over this.
-/// (An evaluation is linear in them and a factorisation cubic; measured on chains of 4 to 16 links.)
-const SQUARE_OF_AN_EVALUATION: f64 = 36.0;
+const FRICTION_EVALUATIONS: f64 = 5.0;
 /// The implicit methods, whose matrices are dense, refuse more velocity coordinates than this.
 pub const LARGEST_DENSE: usize = 1024;
 /// With more velocity coordinates than this a dense factorisation costs more than many explicit steps: the automatic pair
@@ -67,6 +64,7 @@ impl Simulation {
 
     fn voted(&mut self, h: f64, stiffness: f64, evaluations: u64) -> Member {
         let velocities = self.state.now.y.len() - self.mechanism.positions();
+        let algebra = self.mechanism.dense_algebra();
         let state = &mut self.state;
         let member = state.control.member;
         let choice = &mut state.control.choice;
@@ -82,7 +80,6 @@ impl Simulation {
         }
         if member == Member::Implicit {
             choice.progress += h;
-            let algebra = (velocities * velocities) as f64 / SQUARE_OF_AN_EVALUATION;
             choice.cost += evaluations as f64 + algebra;
             choice.steps += 1;
             if choice.steps == GROWING_STEPS {
@@ -91,11 +88,13 @@ impl Simulation {
             if choice.steps >= TRIAL_STEPS {
                 let explicit = choice.h_explicit / EXPLICIT_EVALUATIONS;
                 let fails = choice.progress < WORTH_IT * explicit * choice.cost;
+                let per_step = choice.cost / f64::from(TRIAL_STEPS - GROWING_STEPS);
                 (choice.progress, choice.cost, choice.steps) = (0.0, 0.0, 0);
                 if fails {
                     state.control.h_next = choice.h_explicit;
-                    let turn = EXPLICIT_TURN << choice.failures.min(8);
-                    choice.wait = turn.min(LONGEST_TURN);
+                    let trial = per_step * f64::from(TRIAL_STEPS) / EXPLICIT_EVALUATIONS;
+                    choice.wait =
+                        ((EXPLICIT_TURN * trial) as u32) << choice.failures.min(MOST_DOUBLINGS);
                     choice.failures += 1;
                     return Member::Explicit;
                 }
@@ -107,7 +106,10 @@ impl Simulation {
         let touches = state.now.memory.iter().any(|m| m.active);
         let mut next = member;
         if member == Member::Friction {
-            if self.mechanism.friction_rate() * h < NO_LONGER_STIFF {
+            // An explicit step at the limit of stability, for its cost.
+            let cost = FRICTION_EVALUATIONS + self.mechanism.friction_algebra();
+            let worth = HELD_BY_STABILITY * cost / EXPLICIT_EVALUATIONS;
+            if self.mechanism.friction_rate() * h < worth {
                 choice.held = 0;
                 next = Member::Explicit;
             } else {
