@@ -522,14 +522,8 @@ impl Mechanism {
     }
 
     /// Largest rate at which friction damps the sliding of a contact, 1/s, by its latest linearisation.
-    pub fn friction_rate(&mut self) -> f64 {
-        self.friction.as_mut().map_or(0.0, |f| f.fastest())
-    }
-
-    /// Approximate cost of a friction step's algebra, in evaluations.
-    pub fn friction_algebra(&self) -> f64 {
-        let time = self.friction.as_ref().map_or(0.0, |f| f.algebra_time());
-        time / self.evaluation_time
+    pub fn friction_rate(&self) -> f64 {
+        self.friction.as_ref().map_or(0.0, |f| f.fastest())
     }
 
     /// Approximate cost of an implicit step's dense algebra, in evaluations.

@@ -21,9 +21,8 @@ const GROWING_STEPS: u32 = 8;
 const WORTH_IT: f64 = 1.3;
 const EXPLICIT_TURN: f64 = 2.0;
 const MOST_DOUBLINGS: u32 = 3;
-/// Evaluations of one explicit step, and of one with friction implicit.
+/// Evaluations of one explicit step.
 const EXPLICIT_EVALUATIONS: f64 = 6.0;
-const FRICTION_EVALUATIONS: f64 = 5.0;
 /// The implicit methods, whose matrices are dense, refuse more velocity coordinates than this.
 pub const LARGEST_DENSE: usize = 1024;
 /// With more velocity coordinates than this a dense factorisation costs more than many explicit steps: the automatic pair
@@ -106,10 +105,7 @@ impl Simulation {
         let touches = state.now.memory.iter().any(|m| m.active);
         let mut next = member;
         if member == Member::Friction {
-            // An explicit step at the limit of stability, for its cost.
-            let cost = FRICTION_EVALUATIONS + self.mechanism.friction_algebra();
-            let worth = HELD_BY_STABILITY * cost / EXPLICIT_EVALUATIONS;
-            if self.mechanism.friction_rate() * h < worth {
+            if self.mechanism.friction_rate() * h < HELD_BY_STABILITY {
                 choice.held = 0;
                 next = Member::Explicit;
             } else {
