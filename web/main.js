@@ -11,8 +11,8 @@ const LOSS_SPAN = 60_000;
 /** Pauses before the attempts to start them again, ms: after a crash the browser needs a moment. */
 const PAUSES = [0, 500, 3000];
 
-/** What the tests and the rest of the page hold on to: `page` (src/web/page.rs), the compiled code, and how the starts went. */
-const laboratory = { page: null, code: null, backend: null, ready: false, trouble: null, starts: 0, losses: [] };
+/** What the tests and the rest of the page hold on to: `page` (src/web/page.rs), its mirror, the compiled code, how the starts went. */
+const laboratory = { page: null, mirror: null, code: null, backend: null, ready: false, trouble: null, starts: 0, losses: [] };
 globalThis.jointplay = laboratory;
 
 const LEFT_OUT = {
@@ -226,12 +226,14 @@ async function main() {
         return;
     }
     let bindings;
+    let Mirror;
     try {
         const code = download(`jointplay_bg.wasm${build}`, Number(script.dataset.wasmBytes));
         // Should it fail while the script is still on its way: it is reported where it is waited for.
         code.catch(() => {});
         const { makeHost } = await import(`./host.js${build}`);
         const { CanvasObserver } = await import(`./canvas.js${build}`);
+        ({ Mirror } = await import(`./mirror.js${build}`));
         globalThis.ResizeObserver = CanvasObserver;
         globalThis.jointplayHost = makeHost(laboratory, lost);
         bindings = await import(`./jointplay.js${build}`);
@@ -242,6 +244,7 @@ async function main() {
     }
     stage('Starting');
     laboratory.page = new bindings.Page();
+    laboratory.mirror = new Mirror(laboratory.page, $('mirror'));
     const failure = await begin(found);
     if (failure) return showTrouble('The laboratory could not start', failure);
     // Another link pasted into the address bar of the open page.

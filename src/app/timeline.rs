@@ -3,7 +3,9 @@
 
 use eframe::egui::{
     self, Color32, EventFilter, Key, Mesh, Pos2, Rect, Response, Sense, Shape, Stroke, Ui,
-    WidgetInfo, pos2, vec2,
+    WidgetInfo,
+    accesskit::{Action, ActionData},
+    pos2, vec2,
 };
 
 use super::icons::{Icon, icon_button};
@@ -108,6 +110,13 @@ impl Timeline {
         let shown = player.pacer.shown();
         let enabled = ui.is_enabled();
         response.widget_info(|| WidgetInfo::slider(enabled, shown, "Timeline, s"));
+        ui.ctx().accesskit_node_builder(response.id, |node| {
+            node.set_min_numeric_value(0.0);
+            node.set_max_numeric_value(player.reached());
+            for action in [Action::SetValue, Action::Increment, Action::Decrement] {
+                node.add_action(action);
+            }
+        });
         let range = self.range(player);
         if self.zoomed.is_some() {
             self.zoomed = Some(range);
@@ -142,6 +151,10 @@ impl Timeline {
     ) -> Option<f64> {
         let (from, to) = scale.range;
         let length = to - from;
+        let asked = |action| {
+            ui.input(|input| input.num_accesskit_action_requests(response.id, action)) as f64
+        };
+        let mut by = asked(Action::Increment) - asked(Action::Decrement);
         if response.has_focus() {
             let arrows = EventFilter {
                 horizontal_arrows: true,
@@ -149,10 +162,20 @@ impl Timeline {
             };
             ui.memory_mut(|memory| memory.set_focus_lock_filter(response.id, arrows));
             let pressed = |key| ui.input(|input| input.num_presses(key)) as f64;
-            let by = pressed(Key::ArrowRight) - pressed(Key::ArrowLeft);
-            if by != 0.0 {
-                return Some(player.pacer.shown() + by * NUDGE * length);
-            }
+            by += pressed(Key::ArrowRight) - pressed(Key::ArrowLeft);
+        }
+        if by != 0.0 {
+            return Some(player.pacer.shown() + by * NUDGE * length);
+        }
+        let wanted = ui.input(|input| {
+            let mut requests = input.accesskit_action_requests(response.id, Action::SetValue);
+            requests.find_map(|request| match request.data {
+                Some(ActionData::NumericValue(time)) => Some(time),
+                _ => None,
+            })
+        });
+        if let Some(time) = wanted {
+            return Some(time.clamp(0.0, player.reached()));
         }
         if let Some(zoom) = Zoom::over(ui, response) {
             let (end, width) = (player.known_to(), scale.rect.width());

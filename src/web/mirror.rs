@@ -1,13 +1,16 @@
-//! The accessibility tree of the interface as JSON: eframe's browser side drops it. Tests find controls in it.
+//! The accessibility tree of the interface, which eframe drops in a browser: for the elements that `web/mirror.js` lays over the
+//! canvas, and for tests, which find controls in it. What these elements are asked to do goes back to egui.
+
+use std::collections::HashMap;
 
 use eframe::egui::{self, accesskit};
-use serde_json::json;
+use serde_json::{Value, json};
 
-/// Keeps what egui last reported about its controls.
+/// Keeps what egui last reported about its controls, and what it is to be told next.
 #[derive(Default)]
 pub struct Mirror {
-    /// `[{"role", "label", "value", "on", "disabled", "rect": [x0, y0, x1, y1]}, …]`; places in CSS pixels of the canvas.
-    pub widgets: String,
+    tree: Option<accesskit::TreeUpdate>,
+    requests: Vec<accesskit::ActionRequest>,
 }
 
 impl egui::Plugin for Mirror {
@@ -19,38 +22,96 @@ impl egui::Plugin for Mirror {
         ctx.enable_accesskit();
     }
 
-    fn output_hook(&mut self, ctx: &egui::Context, output: &mut egui::FullOutput) {
-        let Some(tree) = &output.platform_output.accesskit_update else {
-            return;
-        };
-        // Places are given in points.
-        let scale = f64::from(ctx.zoom_factor());
-        let widgets = tree.nodes.iter().filter_map(|(_, node)| {
-            let bounds = node.bounds()?;
-            let rect = [bounds.x0, bounds.y0, bounds.x1, bounds.y1];
-            let label = label(node, &tree.nodes)?;
-            Some(json!({
-                "role": format!("{:?}", node.role()),
-                "label": label,
-                "text": node.value(),
-                "value": node.numeric_value(),
-                "on": node.toggled().map(|on| on == accesskit::Toggled::True),
-                "disabled": node.is_disabled(),
-                "rect": rect.map(|x| x * scale),
-            }))
-        });
-        self.widgets = serde_json::Value::Array(widgets.collect()).to_string();
+    fn input_hook(&mut self, _ctx: &egui::Context, input: &mut egui::RawInput) {
+        let requests = self.requests.drain(..);
+        let events = requests.map(egui::Event::AccessKitActionRequest);
+        input.events.extend(events);
     }
+
+    fn output_hook(&mut self, _ctx: &egui::Context, output: &mut egui::FullOutput) {
+        let tree = output.platform_output.accesskit_update.take();
+        self.tree = tree.or(self.tree.take());
+    }
+}
+
+impl Mirror {
+    /// Controls and texts in reading order, as JSON: `[{"id", "role", "label", "text", "value", "min", "max", "step", "on",
+    /// "expanded", "disabled", "focused", "rect": [x0, y0, x1, y1]}, …]`; places are in CSS pixels of the canvas, `zoom` of
+    /// them to a point. Empty before the first frame.
+    pub fn widgets(&self, zoom: f32) -> String {
+        let Some(tree) = &self.tree else {
+            return String::new();
+        };
+        let nodes: HashMap<_, _> = tree.nodes.iter().map(|(id, node)| (*id, node)).collect();
+        let mut widgets = Vec::new();
+        let mut open: Vec<_> = tree.tree.iter().map(|tree| tree.root).collect();
+        while let Some(id) = open.pop() {
+            let Some(node) = nodes.get(&id) else { continue };
+            open.extend(node.children().iter().rev());
+            widgets.extend(describe(id, node, &nodes, tree.focus, f64::from(zoom)));
+        }
+        Value::Array(widgets).to_string()
+    }
+
+    /// Asks a control for `action` in the next frame: `Click`, `Focus`, `Increment`, `Decrement`, or `SetValue` with `data`.
+    /// False: there is no such action.
+    pub fn ask(&mut self, id: u64, action: &str, data: Option<accesskit::ActionData>) -> bool {
+        use accesskit::Action;
+        let action = match action {
+            "Click" => Action::Click,
+            "Focus" => Action::Focus,
+            "Increment" => Action::Increment,
+            "Decrement" => Action::Decrement,
+            "SetValue" => Action::SetValue,
+            _ => return false,
+        };
+        self.requests.push(accesskit::ActionRequest {
+            action,
+            target_tree: accesskit::TreeId::ROOT,
+            target_node: accesskit::NodeId(id),
+            data,
+        });
+        true
+    }
+}
+
+/// A node that stands for something to read or to use.
+fn describe(
+    id: accesskit::NodeId,
+    node: &accesskit::Node,
+    nodes: &HashMap<accesskit::NodeId, &accesskit::Node>,
+    focus: accesskit::NodeId,
+    zoom: f64,
+) -> Option<Value> {
+    let bounds = node.bounds()?;
+    let rect = [bounds.x0, bounds.y0, bounds.x1, bounds.y1];
+    let label = label(node, nodes)?;
+    Some(json!({
+        // More digits than a number of JavaScript holds.
+        "id": id.0.to_string(),
+        "role": format!("{:?}", node.role()),
+        "label": label,
+        "text": node.value(),
+        "value": node.numeric_value(),
+        "min": node.min_numeric_value(),
+        "max": node.max_numeric_value(),
+        "step": node.numeric_value_step(),
+        "on": node.toggled().map(|on| on == accesskit::Toggled::True),
+        "expanded": node.is_expanded(),
+        "disabled": node.is_disabled(),
+        "focused": id == focus,
+        "rect": rect.map(|x| x * zoom),
+    }))
 }
 
 /// A control's own name, else that of what labels it (sliders, text fields), else its text.
 fn label<'a>(
     node: &'a accesskit::Node,
-    all: &'a [(accesskit::NodeId, accesskit::Node)],
+    nodes: &HashMap<accesskit::NodeId, &'a accesskit::Node>,
 ) -> Option<&'a str> {
     let labelling = || {
         node.labelled_by().iter().find_map(|id| {
-            let (_, label) = all.iter().find(|(other, _)| other == id)?;
+            let label = nodes.get(id)?;
             label.label().or(label.value())
         })
     };

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::sync::Arc;
 
-use eframe::egui;
+use eframe::egui::{self, accesskit::ActionData};
 use eframe::egui_wgpu::{RenderState, WgpuConfiguration, WgpuSetupCreateNew};
 use eframe::web_sys::{File, HtmlCanvasElement};
 use serde_json::json;
@@ -143,16 +143,34 @@ impl Page {
         });
     }
 
-    /// The controls shown, as JSON (`src/web/mirror.rs`). Empty the first time: the mirror starts with the next frame.
+    /// The controls shown, as JSON ([`Mirror::widgets`]). Empty the first time: the mirror starts with the next frame.
     pub fn widgets(&self) -> Option<String> {
         self.with(|laboratory| {
-            let mirror = laboratory.ctx.plugin_or_default::<Mirror>();
-            let widgets = mirror.lock().widgets.clone();
+            let ctx = &laboratory.ctx;
+            let widgets = ctx
+                .plugin_or_default::<Mirror>()
+                .lock()
+                .widgets(ctx.zoom_factor());
             if widgets.is_empty() {
-                laboratory.ctx.request_repaint();
+                ctx.request_repaint();
             }
             widgets
         })
+    }
+
+    /// Does to the control `id` what an assistive program asks for ([`Mirror::ask`]); `value`: a number or a text.
+    pub fn ask(&self, id: &str, action: &str, value: &JsValue) {
+        let number = value.as_f64().map(ActionData::NumericValue);
+        let text = || Some(ActionData::Value(value.as_string()?.into()));
+        let data = number.or_else(text);
+        self.with(|laboratory| {
+            let ctx = &laboratory.ctx;
+            let mirror = ctx.plugin_or_default::<Mirror>();
+            if let Ok(id) = id.parse() {
+                mirror.lock().ask(id, action, data);
+                ctx.request_repaint();
+            }
+        });
     }
 
     /// Pauses and runs on until simulated `time`, s.

@@ -1,5 +1,6 @@
 // All tests in one process, so that they share the browser and the server.
 
+import './assist.test.mjs';
 import './bits.test.mjs';
 import './page.test.mjs';
 import './session.test.mjs';

@@ -11,11 +11,12 @@ const NAME: &str = "jointplay";
 /// The page's own files, from the root of the project.
 const PAGE: &str = "index.html";
 /// Scripts, style and icon beside it, copied as they are.
-const PARTS: [&str; 7] = [
+const PARTS: [&str; 8] = [
     "web/stuck.js",
     "web/main.js",
     "web/host.js",
     "web/canvas.js",
+    "web/mirror.js",
     "web/worker.js",
     "web/page.css",
     "web/icon.svg",
