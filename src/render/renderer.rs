@@ -257,14 +257,14 @@ impl Renderer {
             .collect()
     }
 
-    /// Fine instances, then coarse ones; either may be none.
+    /// Coarse instances, then fine ones; either may be none. Translucent lists run from far to near, and what is coarse is far.
     fn pack_mesh(
         &mut self,
         mesh: usize,
         instances: &[Instance],
         pixels: impl Fn(&Instance) -> f32,
     ) -> [Batch; 2] {
-        [Detail::Fine, Detail::Coarse].map(|detail| {
+        [Detail::Coarse, Detail::Fine].map(|detail| {
             let first = self.packed.len();
             let small =
                 |instance: &&Instance| mesh < Mesh::SHARED && pixels(instance) <= COARSE_PIXELS;

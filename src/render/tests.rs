@@ -222,6 +222,49 @@ fn the_ball_shows_through_its_socket() {
 }
 
 #[test]
+fn a_socket_seen_through_another_looks_the_same_from_either_mesh() {
+    let options = ViewOptions {
+        floor: false,
+        ..bare()
+    };
+    let (scene, frame, mut camera) = close_up(&options);
+    camera.yaw += std::f32::consts::PI;
+    let mut list = picture(&scene, &frame, &options, &camera, false);
+    list.solid = Default::default();
+    let near = list.sockets[0];
+    let centre = Vec3::from(near.world_from_mesh.map(|row| row[3]));
+    let (right, _, back) = camera.axes();
+    let behind = centre - camera.distance * back;
+    let pixels = |length: f32| {
+        let [a, b] = [behind, behind + length * right].map(|p| camera.project(p, SIZE));
+        a.expect("in view").distance(b.expect("in view"))
+    };
+    let size = Vec3::from(near.world_from_mesh.map(|row| row[0])).length();
+    // Coarse meshes are drawn up to a radius of 4 pixels.
+    let far = [3.8, 4.2].map(|radius| {
+        let scale = radius / pixels(size);
+        let mut far = near;
+        for (row, at) in far.world_from_mesh.iter_mut().zip(behind.to_array()) {
+            *row = [row[0] * scale, row[1] * scale, row[2] * scale, at];
+        }
+        far.colour = [1.0, 0.0, 0.0, 0.9];
+        far
+    });
+    let mut device = offscreen();
+    let mut colour = |sockets: &[crate::view::Instance]| {
+        list.sockets = sockets.to_vec();
+        at(&device.render(&list).expect("a picture"), &camera, behind)
+    };
+    let [coarse, fine] = far.map(|far| colour(&[far, near]));
+    let bare = colour(&[far[1]]);
+    assert!(
+        difference(fine, bare) > 10,
+        "{fine:?} {bare:?}: glass before it"
+    );
+    assert!(difference(coarse, fine) < 6, "{coarse:?} {fine:?}");
+}
+
+#[test]
 fn the_machine_casts_a_shadow_on_the_floor() {
     let (scene, frame) = fixture::three_legs();
     let view = SceneView::new(&scene, &frame);
