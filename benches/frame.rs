@@ -33,7 +33,7 @@ fn frames(c: &mut Criterion) {
         let player = app.player_mut();
         player.set_ideal(true);
         player.run_to(1.0);
-        player.set_twin(true).expect("starts");
+        player.set_twin(true);
         player.go_to(0.5);
         player.set("contact.friction", "0.2").expect("in range");
         player.run_to(0.6);

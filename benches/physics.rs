@@ -87,7 +87,7 @@ fn real_time(c: &mut Criterion) {
             b.iter_batched(
                 || start.clone(),
                 |start| {
-                    simulation.restore(&start).expect("its own snapshot");
+                    simulation.restore(&start);
                     simulation.advance_to(17e-3).expect("a built-in scene runs");
                 },
                 criterion::BatchSize::LargeInput,
@@ -109,7 +109,7 @@ fn snapshots(c: &mut Criterion) {
             b.iter(|| black_box(simulation.snapshot()));
         });
         group.bench_function(format!("{name}: restore"), |b| {
-            b.iter(|| simulation.restore(black_box(&snapshot)).expect("its own"));
+            b.iter(|| simulation.restore(black_box(&snapshot)));
         });
     }
     group.finish();
@@ -144,7 +144,7 @@ fn spans(c: &mut Criterion) {
                         || {
                             let mut simulation =
                                 Simulation::new(&scene).expect("a built-in scene starts");
-                            simulation.restore(&start).expect("its own snapshot");
+                            simulation.restore(&start);
                             simulation
                         },
                         |mut simulation| simulation.advance_to(end).expect("a built-in scene runs"),

@@ -170,10 +170,8 @@ impl Orbit for Machine {
         self.simulation.scales()
     }
 
-    fn twin(&self) -> Result<Self, MachineError> {
-        let mut twin = Simulation::new(self.simulation.running_scene())?;
-        twin.restore(&self.simulation.snapshot())?;
-        Ok(Self::resume(twin))
+    fn twin(&self) -> Self {
+        Self::resume(Simulation::of(&self.simulation.snapshot()))
     }
 
     fn displace(&mut self, offset: &[f64]) {

@@ -24,10 +24,7 @@ pub trait Orbit: Sized {
     fn scales(&self) -> &[f64];
 
     /// A second run in the same state and with the same future.
-    ///
-    /// # Errors
-    /// As [`Self::step_until`].
-    fn twin(&self) -> Result<Self, Self::Stop>;
+    fn twin(&self) -> Self;
 
     /// Adds `offset` to the state.
     fn displace(&mut self, offset: &[f64]);

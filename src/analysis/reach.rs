@@ -117,11 +117,7 @@ fn one(scene: &Scene, goal: Goal, context: &mut RunContext) -> Result<Reach, Ana
     let (from, to) = goal.span();
     let speed = |setting: &Setting, context: &mut RunContext| {
         let start = run_to(setting, scene, from, context, |_| {})?.snapshot();
-        let seconds = time_to(to, &effort, context, |_| {
-            let mut simulation = setting.start(scene)?;
-            simulation.restore(&start)?;
-            Ok(simulation)
-        })?;
+        let seconds = time_to(to, &effort, context, |_| Ok(Simulation::of(&start)))?;
         Ok::<_, AnalysisError>((to - from) / seconds)
     };
     // Timed before and after the yardstick, so that a load that sets in between slows both.

@@ -324,7 +324,7 @@ impl ReferenceSolution {
         effort: &Effort,
         context: &mut RunContext,
     ) -> Result<(End, Simulation), AnalysisError> {
-        let mut simulation = setting.resume(&self.scene, &span.start)?;
+        let mut simulation = setting.resume(&span.start)?;
         let end = stretch(&mut simulation, span.from, effort, context, |_| false)?;
         Ok((end, simulation))
     }

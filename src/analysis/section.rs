@@ -148,9 +148,8 @@ impl<O: Orbit> SectionRun<O> {
             return;
         };
         let start = self.schedule.discard.saturating_sub(ALIGNMENT);
-        if self.taken == start
-            && let Ok(mut twin) = self.orbit.twin()
-        {
+        if self.taken == start {
+            let mut twin = self.orbit.twin();
             let mut benettin = Benettin::new(
                 separation,
                 self.schedule.interval,

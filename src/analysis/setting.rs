@@ -81,13 +81,8 @@ impl Setting {
     }
 
     /// Continues from `snapshot` with this setting, whichever setting that has.
-    pub(super) fn resume(
-        &self,
-        scene: &Scene,
-        snapshot: &Snapshot,
-    ) -> Result<Simulation, AnalysisError> {
-        let mut simulation = Simulation::new(scene)?;
-        simulation.restore(snapshot)?;
+    pub(super) fn resume(&self, snapshot: &Snapshot) -> Result<Simulation, AnalysisError> {
+        let mut simulation = Simulation::of(snapshot);
         for (key, value) in self.changes() {
             simulation.set_value(key, &value)?;
         }

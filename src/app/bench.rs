@@ -24,7 +24,6 @@ pub struct Bench {
     coordinate: Coordinate,
     portrait: Portrait,
     sweep: SweepPanel,
-    problem: Option<String>,
 }
 
 impl Bench {
@@ -59,15 +58,10 @@ impl Bench {
             coordinate,
             portrait,
             sweep,
-            problem,
         } = self;
         let help = "How fast neighbouring motions of the running scene part";
         part(ui, "Neighbouring motion", help, |ui| {
-            divergence::ui(ui, player, problem);
-            if let Some(problem) = problem {
-                let words = RichText::new(problem.as_str()).small();
-                ui.label(words.color(ui.visuals().error_fg_color));
-            }
+            divergence::ui(ui, player);
         });
         let help = "The running scene in its phase space";
         part(ui, "Portrait and section", help, |ui| {

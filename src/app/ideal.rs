@@ -204,10 +204,8 @@ impl Motion {
         let Some((_, snapshot)) = self.kept.get(known.max(1) - 1) else {
             return;
         };
-        // A state of this same motion can always be restored.
-        if self.simulation.restore(snapshot).is_ok() {
-            self.stopped = None;
-        }
+        self.simulation.restore(snapshot);
+        self.stopped = None;
     }
 }
 

@@ -422,13 +422,11 @@ impl App {
         let Some(arrival) = load.advance(&mut self.player, may_step) else {
             return;
         };
-        let arrival = arrival.and_then(|()| {
-            self.player
-                .set_twin(*twin)
-                .map_err(|error| error.to_string())
-        });
         match arrival {
-            Ok(()) => self.player.set_playing(true),
+            Ok(()) => {
+                self.player.set_twin(*twin);
+                self.player.set_playing(true);
+            }
             Err(why) => self.problem = Some(why),
         }
         self.load = None;

@@ -274,24 +274,14 @@ impl Player {
     }
 
     /// Starts a twin run from the present state, or ends it. This never affects the run itself.
-    ///
-    /// # Errors
-    /// The twin cannot start.
-    pub fn set_twin(&mut self, on: bool) -> Result<(), StartError> {
-        self.twin = None;
-        if on {
-            self.twin = Some(Box::new(Twin::new(&self.simulation)?));
-        }
-        Ok(())
+    pub fn set_twin(&mut self, on: bool) {
+        self.twin = on.then(|| Box::new(Twin::new(&self.simulation)));
     }
 
     /// The twin begins anew from the present state.
     fn restart_twin(&mut self) {
-        // A running scene can be started again.
-        if let Some(twin) = &mut self.twin
-            && twin.restart(&self.simulation).is_err()
-        {
-            self.twin = None;
+        if let Some(twin) = &mut self.twin {
+            twin.restart(&self.simulation);
         }
     }
 
@@ -553,14 +543,7 @@ impl Player {
         if self.pacer.shown() >= run.time() || run.step_start() >= run.time() {
             return change(run);
         }
-        let mut copy = match Simulation::new(run.running_scene()) {
-            Ok(copy) => copy,
-            // A running scene can be started again; should that fail, the rest of the step is skipped.
-            Err(_) => return change(run),
-        };
-        if copy.restore(&run.snapshot()).is_err() {
-            return change(run);
-        }
+        let mut copy = Simulation::of(&run.snapshot());
         let done = change(&mut copy)?;
         self.unchanged = Some(Box::new(std::mem::replace(run, copy)));
         Ok(done)

@@ -2,7 +2,7 @@
 //! distance. The twin does not affect the run.
 
 use crate::analysis::exponent::{offset, scaled_distance};
-use crate::simulate::{Frame, Simulation, Snapshot, StartError};
+use crate::simulate::{Frame, Simulation, Snapshot};
 
 /// The displacement, in units of the scales of the state.
 pub const DISPLACEMENT: f64 = 1e-9;
@@ -61,12 +61,8 @@ pub struct Twin {
 
 impl Twin {
     /// Displaces a copy of `run` as it is now.
-    ///
-    /// # Errors
-    /// The copy cannot start; a running scene can.
-    pub fn new(run: &Simulation) -> Result<Self, StartError> {
-        let mut simulation = Simulation::new(run.running_scene())?;
-        simulation.restore(&run.snapshot())?;
+    pub fn new(run: &Simulation) -> Self {
+        let mut simulation = Simulation::of(&run.snapshot());
         let away: Vec<f64> = offset(run.scales(), DISPLACEMENT).collect();
         simulation.displace(&away);
         let mut twin = Self {
@@ -83,19 +79,15 @@ impl Twin {
         };
         twin.measure();
         twin.place(run.time());
-        Ok(twin)
+        twin
     }
 
     /// Begins anew from the present state of `run`. What a twin that began at the same instant knew of its distances stays.
-    ///
-    /// # Errors
-    /// As [`Self::new`].
-    pub fn restart(&mut self, run: &Simulation) -> Result<(), StartError> {
-        let before = std::mem::replace(self, Self::new(run)?);
+    pub fn restart(&mut self, run: &Simulation) {
+        let before = std::mem::replace(self, Self::new(run));
         if before.begins == self.begins {
             (self.distances, self.stride) = (before.distances, before.stride);
         }
-        Ok(())
     }
 
     /// When it began, s.
@@ -114,20 +106,16 @@ impl Twin {
 
     /// Goes back with `run`, which has just been taken to where it was when `mark` was set. Without a mark of this twin it
     /// waits for its beginning, or begins anew where that has passed.
-    ///
-    /// # Errors
-    /// As [`Self::new`].
-    pub fn go_back(&mut self, mark: Option<&TwinMark>, run: &Simulation) -> Result<(), StartError> {
+    pub fn go_back(&mut self, mark: Option<&TwinMark>, run: &Simulation) {
         let mark = mark.filter(|mark| mark.begins == self.begins);
         if mark.is_none() && self.begins < run.time() {
             return self.restart(run);
         }
         let (state, steps) = mark.map_or((&self.origin, 0), |mark| (&mark.state, mark.steps));
-        self.simulation.restore(state)?;
+        self.simulation.restore(state);
         (self.steps, self.ended) = (steps, None);
         self.goal = self.begins.max(run.time());
         self.goal_state.copy_from_slice(run.state());
-        Ok(())
     }
 
     /// Forgets the distances after `time`, s: another future begins.
@@ -270,7 +258,7 @@ mod tests {
         let changes = [("contact.friction".to_owned(), "0".to_owned())];
         let scene = Scene::load("spcmm", &changes).expect("built in");
         let mut run = Simulation::new(&scene).expect("starts");
-        let mut twin = Twin::new(&run).expect("starts");
+        let mut twin = Twin::new(&run);
         let start = twin.distances()[0];
         assert!((start[1] / DISPLACEMENT - 1.0).abs() < 1e-6, "{start:?}");
         for _ in 0..3 * KEPT {

@@ -238,12 +238,16 @@ impl Mechanism {
             trajectory.check()?;
         }
         bounds::check(scene, &model)?;
+        Ok(Self::with_model(scene, model))
+    }
+
+    fn with_model(scene: &Scene, model: Arc<Model>) -> Self {
         let contacts = Contacts::new(scene, &model);
         let equations: Box<dyn Equations> = match scene.formulation {
             Formulation::Tree => Box::new(Forest::new(&model)),
             Formulation::Lagrange => Box::new(Lagrange::new(scene, &model)),
         };
-        Ok(Self {
+        Self {
             evaluation_time: bounds::evaluation_time(scene, &model),
             sources: power::Sources::new(&model, &*equations, scene.elements.len()),
             elements: elements_of(scene, &model),
@@ -260,20 +264,18 @@ impl Mechanism {
             friction: None,
             implicit: None,
             assembly: Assembly::default(),
-        })
+        }
     }
 
-    /// For resuming from a state that belongs to `structure`, without computing a start state.
-    ///
-    /// # Errors
-    /// As [`Self::new`].
-    pub fn resumed(scene: &Scene, structure: &Structure) -> Result<Self, MechanismError> {
-        let mut mechanism = Self::new(scene)?;
+    /// For resuming from a state that belongs to `structure`, without computing a start state. What live changes do not
+    /// reach is shared: the scales of the tolerance are those of the start.
+    pub fn resumed(scene: &Scene, structure: &Structure) -> Self {
+        let mut mechanism = Self::with_model(scene, structure.model.clone());
         mechanism.rank = structure.rank;
         if let Some(rank) = structure.rank {
             mechanism.equations.treat_as_dependent(rank);
         }
-        Ok(mechanism)
+        mechanism
     }
 
     /// What a snapshot stores about the equations.

@@ -192,9 +192,7 @@ pub struct Snapshot {
     structure: Structure,
     state: simulation::State,
     polynomial: Option<crate::integrate::Polynomial>,
-    ideal: Option<Box<simulation::ideal::Kept>>,
-    peaks: Vec<Peak>,
-    right_handed: bool,
+    reference: simulation::ideal::Reference<simulation::ideal::Kept>,
 }
 
 impl Snapshot {
@@ -215,7 +213,7 @@ impl Snapshot {
 
     /// Approximate size in bytes, without the shared scene.
     pub fn bytes(&self) -> usize {
-        self.state.bytes() + std::mem::size_of_val(self.peaks.as_slice())
+        self.state.bytes()
     }
 }
 

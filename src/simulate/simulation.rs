@@ -58,9 +58,6 @@ pub struct Simulation {
     state: State,
     /// What the probe is compared with.
     reference: Reference,
-    peaks: Vec<Peak>,
-    /// On which side of singular poses a kinematic scene started.
-    right_handed: bool,
     /// Largest force seen by a sample, and when, by joint: not part of the state, which sampling must not change.
     sampled: Vec<(f64, f64)>,
     attempt: Attempt,
@@ -170,6 +167,10 @@ struct Record {
     reactions: Vec<Recent>,
     /// Steps since the contact under way began.
     contact_steps: Vec<u64>,
+    /// Of each ball joint since they were last taken.
+    peaks: Vec<Peak>,
+    /// On which side of singular poses a kinematic scene started.
+    right_handed: bool,
 }
 
 impl Control {
@@ -210,6 +211,8 @@ impl State {
                 statistics: Statistics::new(joints),
                 reactions: vec![Recent::default(); joints],
                 contact_steps: vec![0; joints],
+                peaks: vec![Peak::default(); joints],
+                right_handed: true,
             },
         }
     }
@@ -232,10 +235,12 @@ impl Simulation {
         let y = mechanism.start()?;
         prepare_implicit(&mut mechanism, scene.solver.method)?;
         let state = State::new(scene, &mechanism, y);
-        let mut simulation = Self::assembled(&Arc::new(scene.clone()), mechanism, state);
+        let scene = Arc::new(scene.clone());
+        let reference = Reference::of(&scene);
+        let mut simulation = Self::assembled(&scene, mechanism, state, reference);
         simulation.begin_contacts_at_start();
         simulation.refresh();
-        simulation.right_handed = simulation.mechanism.is_right_handed();
+        simulation.state.record.right_handed = simulation.mechanism.is_right_handed();
         if simulation.mechanism.distance_from_ideal() > OTHER_BRANCH {
             return Err(MechanismError::OtherBranch.into());
         }
@@ -245,16 +250,19 @@ impl Simulation {
         Ok(simulation)
     }
 
-    /// Sets up the equations of `scene` and takes `state` as it is.
-    fn assembled(scene: &Arc<Scene>, mechanism: Mechanism, state: State) -> Self {
+    /// Takes `state` as it is.
+    fn assembled(
+        scene: &Arc<Scene>,
+        mechanism: Mechanism,
+        state: State,
+        reference: Reference,
+    ) -> Self {
         let (n, joints) = (state.now.y.len(), state.now.gaps.len());
         Self {
             scene: scene.clone(),
             running: scene.clone(),
             stepper: AnyStepper::new(scene.solver.method, n),
-            reference: Reference::of(scene),
-            peaks: vec![Peak::default(); joints],
-            right_handed: true,
+            reference,
             sampled: vec![(0.0, 0.0); joints],
             attempt: Attempt {
                 end: StepEnd::new(vec![0.0; n], joints),
@@ -508,7 +516,7 @@ impl Simulation {
         }
         self.state.record.statistics.count(self.attempt.counts);
         // Beyond the pose the loops may close again on another branch.
-        let passed = self.mechanism.is_right_handed() != self.right_handed
+        let passed = self.mechanism.is_right_handed() != self.state.record.right_handed
             || self.mechanism.distance_from_ideal() > OTHER_BRANCH;
         let fault = if passed {
             Some(StopFault::SingularLoops)
@@ -620,8 +628,9 @@ impl Simulation {
     /// Writes the peaks per ball joint since the last call to `out`, in joint order, and clears them here.
     pub fn take_peaks(&mut self, out: &mut Vec<Peak>) {
         out.clear();
-        out.extend_from_slice(&self.peaks);
-        self.peaks.fill(Peak::default());
+        let peaks = &mut self.state.record.peaks;
+        out.extend_from_slice(peaks);
+        peaks.fill(Peak::default());
     }
 
     /// The latest finished impacts, at most 64, oldest first.

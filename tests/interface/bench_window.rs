@@ -363,11 +363,7 @@ fn an_ideal_mechanism_has_no_twin() {
 /// After some periods, with a sweep and a twin.
 fn used(size: [f32; 2], theme: egui::Theme) -> Harness<'static, App> {
     let mut harness = sized("spcmm", &[FAST, ("contact.friction", "0.05")], size, theme);
-    harness
-        .state_mut()
-        .player_mut()
-        .set_twin(true)
-        .expect("starts");
+    harness.state_mut().player_mut().set_twin(true);
     harness.state_mut().player_mut().run_to(1.0);
     harness.run();
     harness

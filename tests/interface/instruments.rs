@@ -190,11 +190,7 @@ fn instruments_cost_the_run_no_bit() {
                 harness.run();
             }
             harness.state_mut().plots_mut().chosen = vec![Quantity::TipError];
-            harness
-                .state_mut()
-                .player_mut()
-                .set_twin(true)
-                .expect("starts");
+            harness.state_mut().player_mut().set_twin(true);
         }
         for time in [0.01, 0.02, 0.05, 0.08] {
             harness.state_mut().player_mut().run_to(time);
@@ -297,7 +293,7 @@ fn pictures() {
         harness.key_press(Key::G);
         harness.run();
         let player = harness.state_mut().player_mut();
-        player.set_twin(true).expect("starts");
+        player.set_twin(true);
         player.run_to(0.6);
         harness.run();
         harness.snapshot(name);

@@ -1147,7 +1147,7 @@ fn nothing_moves_while_a_scene_plays() {
         let player = harness.state_mut().player_mut();
         player.set("solver.method", "rk4").expect("a method");
         player.set("solver.step", "40 us").expect("in range");
-        player.set_twin(true).expect("starts");
+        player.set_twin(true);
         nothing_moves(&mut harness, &format!("doubts in {size:?}"));
         let doubts = harness.state().player().simulation().doubts();
         assert!(!doubts.is_empty());

@@ -308,7 +308,7 @@ fn it_is_part_of_snapshots_and_starts_anew_at_a_reset() {
         simulation.advance_to(0.1).unwrap();
         let there = ledger(&simulation);
         assert_ne!(here, there);
-        simulation.restore(&snapshot).unwrap();
+        simulation.restore(&snapshot);
         assert_eq!(ledger(&simulation), here);
         simulation.advance_to(0.1).unwrap();
         assert_eq!(ledger(&simulation), there, "{name}");

@@ -327,7 +327,7 @@ fn every_method_takes_a_planar_loop_ideal_driven_and_with_play() {
                 // Another simulation of the scene goes on from here: it knows the rank without a start.
                 let snapshot = simulation.snapshot();
                 let mut other = Simulation::new(&scene).unwrap();
-                other.restore(&snapshot).unwrap();
+                other.restore(&snapshot);
                 let mut plain = Simulation::new(&scene).unwrap();
                 run_until(&mut plain, 0.02);
                 for run in [&mut plain, &mut other] {

@@ -13,7 +13,7 @@ use crate::app::{plots, theme, value};
 const HEIGHT: f32 = 170.0;
 
 /// Switch, plot and slope.
-pub fn ui(ui: &mut Ui, player: &mut Player, problem: &mut Option<String>) {
+pub fn ui(ui: &mut Ui, player: &mut Player) {
     let moves = !player.simulation().mechanism().is_kinematic();
     let mut on = player.twin().is_some();
     ui.horizontal_wrapped(|ui| {
@@ -33,7 +33,7 @@ pub fn ui(ui: &mut Ui, player: &mut Player, problem: &mut Option<String>) {
                 .on_hover_text("A new twin from the present state, say once the transient is over")
                 .clicked();
         if switch.changed() || anew {
-            *problem = player.set_twin(on).err().map(|error| error.to_string());
+            player.set_twin(on);
         }
     });
     let Some(twin) = player.twin() else {

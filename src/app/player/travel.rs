@@ -253,17 +253,10 @@ impl Player {
         let Some(keyframe) = self.keyframes.latest(|k| k.state.time() <= time) else {
             return;
         };
-        // A state of a running scene can be restored.
-        if self.simulation.restore(&keyframe.state).is_err() {
-            return;
-        }
+        self.simulation.restore(&keyframe.state);
         self.applied = keyframe.events;
-        if let Some(twin) = &mut self.twin
-            && twin
-                .go_back(keyframe.twin.as_ref(), &self.simulation)
-                .is_err()
-        {
-            self.twin = None;
+        if let Some(twin) = &mut self.twin {
+            twin.go_back(keyframe.twin.as_ref(), &self.simulation);
         }
         let now = self.simulation.time();
         self.stopped = None;

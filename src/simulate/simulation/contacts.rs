@@ -42,13 +42,11 @@ impl Simulation {
     /// Starts and ends contacts whose penetration changed sign over the step just accepted.
     pub(super) fn switch_contacts(&mut self, h: f64) -> Switched {
         let located = self.attempt.located.take();
-        let immediate = !self.locates();
-        let fixed = !self.running.solver.method.is_adaptive();
+        let fixed = !self.locates();
         let Self {
             mechanism,
             running,
             state,
-            peaks,
             attempt,
             ..
         } = self;
@@ -93,7 +91,7 @@ impl Simulation {
                 continue;
             }
             switched.contacts = true;
-            switched.forces |= immediate;
+            switched.forces |= fixed;
             let steps = std::mem::replace(&mut state.record.contact_steps[j], 0);
             if touching {
                 let course = Course::new(start, end, h);
@@ -113,7 +111,7 @@ impl Simulation {
                     .begin(j, time, rate, asked, coefficients, among_others);
                 let mut memory = Memory::begun(coefficients, rate);
                 // A located contact begins where the step ends.
-                if immediate {
+                if fixed {
                     if coefficients.largest {
                         memory.approach_speed = memory.approach_speed.max(course.fastest(theta).0);
                     }
@@ -124,8 +122,9 @@ impl Simulation {
                 state.now.memory[j] = memory;
                 state.record.statistics.impacts[j] += 1;
                 state.record.statistics.floored[j] += u64::from(memory.floored);
-                peaks[j].impacts += 1;
-                peaks[j].approach_speed = peaks[j].approach_speed.max(rate);
+                state.record.peaks[j].impacts += 1;
+                state.record.peaks[j].approach_speed =
+                    state.record.peaks[j].approach_speed.max(rate);
                 state.control.contact_began = true;
                 state.control.h_next = state.control.h_next.min(state.control.h_contact);
             } else {
@@ -153,7 +152,6 @@ impl Simulation {
         let Self {
             mechanism,
             state,
-            peaks,
             attempt,
             ..
         } = self;
@@ -183,18 +181,18 @@ impl Simulation {
                 state.record.statistics.peak_normal[j] = force;
                 state.record.statistics.peak_time[j] = time;
             }
-            if force > peaks[j].normal {
+            if force > state.record.peaks[j].normal {
                 let gap = mechanism.contacts.gap(j);
                 let n = if gap.eccentricity.norm() > 0.0 {
                     gap.eccentricity.normalize()
                 } else {
                     gap.eccentricity
                 };
-                peaks[j].normal = force;
-                peaks[j].time = time;
-                peaks[j].normal_force = n * -force;
+                state.record.peaks[j].normal = force;
+                state.record.peaks[j].time = time;
+                state.record.peaks[j].normal_force = n * -force;
                 // Friction follows the normal force within a step: the ratio at the step's end is used for the peak.
-                peaks[j].friction_force = if gap.normal_force > 0.0 {
+                state.record.peaks[j].friction_force = if gap.normal_force > 0.0 {
                     gap.friction * (force / gap.normal_force)
                 } else {
                     gap.friction

@@ -24,14 +24,15 @@ pub enum ProbeFault {
     Stopped(Stopped),
 }
 
-/// Source of the ideal tip.
-pub(super) enum Reference {
+/// Source of the ideal tip; in a snapshot, with what it keeps of a second simulation.
+#[derive(Clone, Debug)]
+pub(in crate::simulate) enum Reference<M = IdealMotion> {
     /// There is no probe, or the drives' closed form gives it.
     Elsewhere,
     /// Every ball joint is ideal: the motion is its own reference.
     Itself,
     /// A second simulation.
-    Alongside(Box<IdealMotion>),
+    Alongside(Box<M>),
     /// The ideal mechanism cannot start.
     None(StartError),
 }
@@ -44,7 +45,7 @@ struct Mark {
 }
 
 /// The ideal scene in motion, and past positions of its tip.
-pub(super) struct IdealMotion {
+pub(in crate::simulate) struct IdealMotion {
     simulation: Simulation,
     body: usize,
     probe: Vec3,
@@ -112,24 +113,43 @@ impl Reference {
         }
     }
 
-    pub(super) fn kept(&self) -> Option<Box<Kept>> {
-        match self {
-            Self::Alongside(motion) => Some(Box::new(Kept {
-                snapshot: motion.simulation.snapshot(),
-                marks: motion.marks.clone(),
-            })),
-            _ => None,
-        }
+    pub(super) fn kept(&self) -> Reference<Kept> {
+        self.map(|motion| Kept {
+            snapshot: motion.simulation.snapshot(),
+            marks: motion.marks.clone(),
+        })
     }
 
-    /// # Errors
-    /// As [`Simulation::restore`].
-    pub(super) fn restore(&mut self, kept: &Kept) -> Result<(), StartError> {
-        if let Self::Alongside(motion) = self {
-            motion.simulation.restore(&kept.snapshot)?;
+    /// To the state of a reference of the same equations.
+    pub(super) fn restore(&mut self, kept: &Reference<Kept>) {
+        if let (Self::Alongside(motion), Reference::Alongside(kept)) = (self, kept) {
+            motion.simulation.restore(&kept.snapshot);
             motion.marks = kept.marks.clone();
         }
-        Ok(())
+    }
+}
+
+impl Reference<Kept> {
+    /// What it was kept of, for `scene`.
+    pub(super) fn resume(&self, scene: &Scene) -> Reference {
+        self.map(|kept| IdealMotion {
+            simulation: Simulation::of(&kept.snapshot),
+            body: scene.output.body,
+            probe: scene.output.probe.unwrap_or_default(),
+            frame: Frame::default(),
+            marks: kept.marks.clone(),
+        })
+    }
+}
+
+impl<M> Reference<M> {
+    fn map<N>(&self, turn: impl FnOnce(&M) -> N) -> Reference<N> {
+        match self {
+            Self::Elsewhere => Reference::Elsewhere,
+            Self::Itself => Reference::Itself,
+            Self::Alongside(motion) => Reference::Alongside(Box::new(turn(motion))),
+            Self::None(error) => Reference::None(error.clone()),
+        }
     }
 }
 

@@ -49,7 +49,7 @@ impl Simulation {
     pub fn pull(&mut self, pull: Option<Pull>) -> Result<(), SceneError> {
         pull.map_or(Ok(()), |pull| self.check_pull(&pull))?;
         self.state.pull = pull;
-        self.mechanism.set_pull(&self.running, pull);
+        self.put_conditions();
         self.refresh();
         self.book_change();
         Ok(())
@@ -122,7 +122,6 @@ impl Simulation {
         }
         self.scene = Arc::new(next);
         let before = std::mem::replace(&mut self.running, Arc::new(running));
-        self.mechanism.gravity = self.running.gravity;
         if self.running.gravity != before.gravity {
             let gravity = self.running.gravity;
             self.reference.set_gravity(self.state.now.t, gravity);
@@ -143,6 +142,7 @@ impl Simulation {
             }
             self.state.control.h_next = self.state.control.h_next.min(solver.step);
         }
+        self.put_conditions();
         self.refresh();
         self.book_change();
         Ok(Effect::Now)
@@ -152,8 +152,29 @@ impl Simulation {
     pub fn set_gravity(&mut self, gravity: crate::scene::Vec3) {
         Arc::make_mut(&mut self.running).gravity = gravity;
         Arc::make_mut(&mut self.scene).gravity = gravity;
-        self.mechanism.gravity = gravity;
+        self.put_conditions();
         self.refresh();
+    }
+
+    /// Gives the equations what live changes reach: the running scene and the state have it.
+    pub(super) fn put_conditions(&mut self) {
+        let Self {
+            mechanism,
+            state,
+            running,
+            ..
+        } = self;
+        mechanism.gravity = running.gravity;
+        if mechanism.pull() != state.pull {
+            mechanism.set_pull(running, state.pull);
+        }
+        for (j, joint) in running.ball_joints.iter().enumerate() {
+            if joint.contact.clearance > 0.0 {
+                let contacts = &mut mechanism.contacts;
+                contacts.set_ramp(j, state.ramps[j]);
+                contacts.set_parameters(j, &joint.contact, state.clearances[j]);
+            }
+        }
     }
 
     /// Back to `time` within the latest step, on its interpolant; only for a simulation without contacts.
@@ -194,8 +215,6 @@ impl Simulation {
             state.ramps[j] = None;
             contact.clearance
         };
-        mechanism.contacts.set_ramp(j, state.ramps[j]);
-        mechanism.contacts.set_parameters(j, contact, clearance);
         state.clearances[j] = clearance;
         if state.now.memory[j].active && distance <= clearance {
             state.now.memory[j] = Memory::default();
@@ -224,13 +243,11 @@ impl Simulation {
             if t >= ramp.start + (ramp.to - ramp.from) / ramp.rate {
                 self.state.ramps[j] = None;
                 self.state.clearances[j] = ramp.to;
-                self.mechanism.contacts.set_ramp(j, None);
-                let contact = self.running.ball_joints[j].contact;
-                self.mechanism.contacts.set_parameters(j, &contact, ramp.to);
                 finished = true;
             }
         }
         if finished {
+            self.put_conditions();
             self.refresh();
             self.book_change();
         }

@@ -39,7 +39,7 @@ impl Simulation {
             let (force, theta) = course.strongest(&c, memory.approach_speed);
             self.attempt.strongest[j] = (force, theta);
             let least = self.state.record.statistics.peak_normal[j]
-                .min(self.peaks[j].normal)
+                .min(self.state.record.peaks[j].normal)
                 .min(self.state.record.impacts.peak_under_way(j));
             if !located || theta <= 0.0 || theta >= 1.0 || force <= least {
                 continue;
@@ -80,8 +80,8 @@ impl Simulation {
                 let gap = self.mechanism.contacts.gap(j);
                 let (normal, size, friction) = (gap.normal, gap.normal_force, gap.friction);
                 if self.is_peak(j, size, time) {
-                    self.peaks[j].normal_force = normal * -size;
-                    self.peaks[j].friction_force = friction;
+                    self.state.record.peaks[j].normal_force = normal * -size;
+                    self.state.record.peaks[j].friction_force = friction;
                 }
             }
         }
@@ -126,7 +126,7 @@ impl Simulation {
         if self.is_peak(j, size, time)
             && let Some(reaction) = self.mechanism.reaction(j)
         {
-            self.peaks[j].normal_force = reaction;
+            self.state.record.peaks[j].normal_force = reaction;
         }
     }
 
@@ -137,7 +137,7 @@ impl Simulation {
             statistics.peak_normal[j] = size;
             statistics.peak_time[j] = time;
         }
-        let peak = &mut self.peaks[j];
+        let peak = &mut self.state.record.peaks[j];
         let largest = size > peak.normal;
         if largest {
             (peak.normal, peak.time) = (size, time);

@@ -2,10 +2,10 @@
 
 use super::automatic::prepare_implicit;
 use super::{Simulation, State};
-use crate::integrate::System as _;
+use crate::integrate::{Method, System as _};
 use crate::mechanism::{Mechanism, Touching};
 use crate::simulate::stepper::AnyStepper;
-use crate::simulate::{Snapshot, StartError, Wear};
+use crate::simulate::{Snapshot, Wear};
 
 impl State {
     pub(in crate::simulate) fn time(&self) -> f64 {
@@ -29,6 +29,11 @@ impl State {
     }
 }
 
+/// Allocates what `method` needs, which was in use with these equations when the snapshot was taken.
+fn prepare(mechanism: &mut Mechanism, method: Method) {
+    prepare_implicit(mechanism, method).expect("it was not too costly then");
+}
+
 impl Simulation {
     /// The whole state.
     pub fn snapshot(&self) -> Snapshot {
@@ -38,46 +43,44 @@ impl Simulation {
             structure: self.mechanism.structure(),
             state: self.state.clone(),
             polynomial: self.stepper.polynomial().cloned(),
-            ideal: self.reference.kept(),
-            peaks: self.peaks.clone(),
-            right_handed: self.right_handed,
+            reference: self.reference.kept(),
         }
     }
 
-    /// Restores a state of this simulation, or of another of the same scene, with its peaks and counters. Nothing is
-    /// assembled: a live change may have led to where no start would be accepted. If the equations are still those of the
-    /// snapshot they are kept, and this costs about as much as a step. Resuming gives the same bits.
-    ///
-    /// # Errors
-    /// A snapshot of a scene whose equations cannot be set up.
-    pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), StartError> {
-        let (running, method) = (&snapshot.running, snapshot.running.solver.method);
+    /// A simulation in the state of `snapshot`. Nothing is assembled: a live change may have led to where no start would
+    /// be accepted. Continuing gives the same bits as where the snapshot was taken.
+    pub fn of(snapshot: &Snapshot) -> Self {
+        let running = &snapshot.running;
+        let mut mechanism = Mechanism::resumed(running, &snapshot.structure);
+        prepare(&mut mechanism, running.solver.method);
+        let reference = snapshot.reference.resume(running);
+        let mut simulation = Self::assembled(running, mechanism, snapshot.state.clone(), reference);
+        simulation.restore(snapshot);
+        simulation
+    }
+
+    /// Restores a state of this simulation, or of any other, with its peaks and counters. If the equations are still those
+    /// of the snapshot they are kept, and this costs about as much as a step; else as [`Self::of`].
+    pub fn restore(&mut self, snapshot: &Snapshot) {
         if !self.mechanism.has_structure(&snapshot.structure) {
-            let mut mechanism = Mechanism::resumed(running, &snapshot.structure)?;
-            prepare_implicit(&mut mechanism, method)?;
-            *self = Self::assembled(running, mechanism, snapshot.state.clone());
-        } else {
-            if method != self.running.solver.method {
-                prepare_implicit(&mut self.mechanism, method)?;
-                self.stepper = AnyStepper::new(method, self.state.now.y.len());
-            }
-            self.stepper.invalidate();
-            self.state.clone_from(&snapshot.state);
-            self.running = running.clone();
-            self.sampled.fill((0.0, 0.0));
+            *self = Self::of(snapshot);
+            return;
         }
-        if self.mechanism.pull() != self.state.pull {
-            self.mechanism.set_pull(&self.running, self.state.pull);
+        let method = snapshot.running.solver.method;
+        if method != self.running.solver.method {
+            prepare(&mut self.mechanism, method);
+            self.stepper = AnyStepper::new(method, self.state.now.y.len());
         }
+        self.stepper.invalidate();
+        self.state.clone_from(&snapshot.state);
+        self.running = snapshot.running.clone();
+        self.sampled.fill((0.0, 0.0));
         self.scene = snapshot.scene.clone();
-        self.peaks.clone_from(&snapshot.peaks);
-        self.right_handed = snapshot.right_handed;
         if let Some(polynomial) = &snapshot.polynomial {
             self.stepper.set_polynomial(polynomial);
         }
-        if let Some(ideal) = &snapshot.ideal {
-            self.reference.restore(ideal)?;
-        }
+        self.reference.restore(&snapshot.reference);
+        self.put_conditions();
         let located = self.locates();
         let Self {
             mechanism,
@@ -85,14 +88,6 @@ impl Simulation {
             scratch_k,
             ..
         } = self;
-        mechanism.gravity = self.running.gravity;
-        for (j, joint) in self.running.ball_joints.iter().enumerate() {
-            if joint.contact.clearance > 0.0 {
-                let contacts = &mut mechanism.contacts;
-                contacts.set_ramp(j, state.ramps[j]);
-                contacts.set_parameters(j, &joint.contact, state.clearances[j]);
-            }
-        }
         // The interpolant of the previous step is not part of the state.
         state.before.copy_from(&state.now);
         // What is read from the mechanism between steps: motion, reactions, clearance ramps.
@@ -100,7 +95,6 @@ impl Simulation {
         let mut evaluator = mechanism.evaluator(Touching::by(located, &now.memory));
         evaluator.derivative(now.t, &now.y, scratch_k);
         mechanism.forget_evaluation();
-        Ok(())
     }
 
     /// FNV-1a, 64 bit, over the whole state: little-endian bits of time, coordinates, velocities, then for each ball joint
