@@ -103,14 +103,14 @@ impl Extent {
         map: [16, 16],
         map_periods: (40, 16),
     };
-    /// A shortened report that shows the layout within seconds.
+    /// A shortened report that shows the layout within a minute.
     pub const QUICK: Self = Self {
-        settle: 3,
-        runs: (9, 3),
-        values: [4, 3],
-        sweep: (8, 3),
+        settle: 1,
+        runs: (4, 1),
+        values: [2, 2],
+        sweep: (3, 1),
         map: [2, 2],
-        map_periods: (8, 3),
+        map_periods: (2, 1),
     };
 }
 
