@@ -6,10 +6,7 @@ mod keyframes;
 mod tests;
 mod travel;
 
-use std::sync::OnceLock;
-
-use web_time::Instant;
-
+use super::host::{Clock, wall};
 use super::ideal::{Gravity, Ideal};
 use super::log::{Entry, Event, Log, Number};
 use super::paths::Paths;
@@ -29,15 +26,6 @@ pub use travel::{AbandonedFuture, Flag};
 
 /// Narrowest bin of the record, s: shorter than any step that resolves an impact.
 const FINEST_BIN: f64 = 2e-6;
-
-/// Seconds since an arbitrary origin, to measure the stepping time of a frame.
-pub type Clock = fn() -> f64;
-
-/// Wall-clock time.
-pub fn wall() -> f64 {
-    static START: OnceLock<Instant> = OnceLock::new();
-    START.get_or_init(Instant::now).elapsed().as_secs_f64()
-}
 
 /// A simulation and everything needed to play and plot it.
 ///

@@ -29,11 +29,10 @@ mod systems;
 mod tree;
 
 pub use bounds::CostOf;
-pub use contacts::{Contacts, Counts, Ramp, Touching};
-pub use elements::{ElementReport, Gap, Pull};
+pub use contacts::{Contacts, Ramp};
+pub use elements::{Counts, ElementReport, Gap, Powers, Pull, Touch, Touching};
 pub use jet::Jet;
 pub use kinematics::{Kinematics, Wrench};
-pub use power::{Powers, Touch};
 pub use spcmm::{Ideal, Trajectory, Unreachable};
 pub use start::{Assembly, Placement};
 pub use summary::Summary;

@@ -1,4 +1,4 @@
-//! The rows of the parameter table.
+//! The single table of scene parameters: files, `--set`, sliders, tooltips and the reference page are derived from it.
 
 use super::field::{Access, Field, Held, SWITCH, field, optional_field};
 use super::{Dimension, Formulation, Kind, Parameter, Preset, Scene, Scope, SignedAxis, Value};
@@ -455,6 +455,35 @@ static TABLE: [Parameter; 28] = [
         "No equation: display only",
     ),
 ];
+
+/// The parameter table as a Markdown page.
+pub fn reference_page() -> String {
+    let mut page = String::from(
+        "# Scene parameters\n\nEvery key works in a scene file (a section and a name), as `--set key=value`, and in the window. \
+         A quantity is written with its unit, `0.3 mm` or `0.3mm`; a bare 0 needs none.\n\n\
+         | Key | Name | Default | Range | Unit | Where | Takes effect | What it is | Equation |\n|---|---|---|---|---|---|---|---|---|\n",
+    );
+    for parameter in table() {
+        let effect = if parameter.at_reset {
+            "at reset"
+        } else {
+            "at once"
+        };
+        let cells = [
+            format!("`{}`", parameter.key),
+            parameter.label.to_owned(),
+            parameter.show(&parameter.default),
+            parameter.range(),
+            parameter.units(),
+            parameter.scope.describe().to_owned(),
+            effect.to_owned(),
+            parameter.help.to_owned(),
+            parameter.equation.to_owned(),
+        ];
+        page.push_str(&format!("| {} |\n", cells.join(" | ")));
+    }
+    page
+}
 
 /// The row of a key (without a joint's name).
 pub(super) fn find(key: &str) -> Option<&'static Parameter> {
