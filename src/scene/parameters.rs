@@ -1,6 +1,6 @@
 //! What a row of the parameter table says, and the values it takes.
 
-use super::error::nearest;
+use super::error::{did_you_mean, nearest_name};
 use super::field::Access;
 use super::units::{
     Dimension, QuantityError, exact_quantity, format_quantity, parse_quantity, unit_names,
@@ -108,11 +108,11 @@ pub enum ValueFault {
     /// Not a whole number.
     #[error("is not a whole number")]
     NotWhole,
-    /// Not one of the choices; with the nearest, as errors quote it.
-    #[error("is not one of the choices{nearest}")]
+    /// Not one of the choices.
+    #[error("is not one of the choices{}", did_you_mean(*.nearest))]
     NoChoice {
-        /// In brackets, or empty.
-        nearest: String,
+        /// The nearest of them, if one is near.
+        nearest: Option<&'static str>,
     },
     /// A number where a choice is expected, or the like.
     #[error("is of the wrong kind")]
@@ -207,7 +207,7 @@ impl Parameter {
                     **choice == word || choice.strip_prefix('+') == Some(word.as_str())
                 });
                 let Some(choice) = found else {
-                    let nearest = nearest(text, words.iter().copied());
+                    let nearest = nearest_name(text, words.iter().copied());
                     return Err(self.refuse(ValueFault::NoChoice { nearest }));
                 };
                 Value::Choice(choice)

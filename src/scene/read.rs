@@ -103,11 +103,11 @@ impl Scene {
                     .keys(&scene)
                     .iter()
                     .find_map(|key| places.get(key))
-                    .map(|node| node.error(&*fault.message))
+                    .map(|node| node.error(fault.fault.to_string()))
             };
             let message = || SceneError {
                 file: file.map(str::to_owned),
-                message: fault.message.clone(),
+                message: fault.fault.to_string(),
                 ..Default::default()
             };
             fault
