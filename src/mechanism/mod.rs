@@ -28,7 +28,7 @@ mod summary;
 mod systems;
 mod tree;
 
-pub use bounds::CostOf;
+pub use bounds::{Advice, CostOf, Counted};
 pub use contacts::{Contacts, Ramp};
 pub use elements::{Counts, ElementReport, Gap, Powers, Pull, Touch, Touching};
 pub use jet::Jet;
@@ -134,13 +134,13 @@ pub enum MechanismError {
         /// What is too costly.
         of: CostOf,
         /// What was counted.
-        what: &'static str,
+        what: Counted,
         /// Amount needed.
         needed: u64,
         /// Most that is allowed.
         most: u64,
         /// What to do instead.
-        advice: &'static str,
+        advice: Advice,
     },
     /// A start pose in which constraints become dependent that are independent in every neighbouring pose.
     #[error(
