@@ -14,7 +14,7 @@ use super::settled::Settling;
 use super::twin::Twin;
 use super::watch::RunWatch;
 use crate::analysis::section::Schedule;
-use crate::scene::{Scene, SceneError, Value};
+use crate::scene::{SOLVER_KEYS, Scene, SceneError, Value};
 use crate::simulate::{
     Channels, Effect, Frame, History, Pacer, Peak, Pull, RECORDED_JOINTS, Simulation, StartError,
     Stopped, Wear,
@@ -89,9 +89,6 @@ pub struct Player {
     stepped: f64,
     stepping: f64,
 }
-
-/// Solver keys that override its preset.
-const SOLVER_KEYS: [&str; 3] = ["solver.method", "solver.step", "solver.tolerance"];
 
 /// Seconds of viewing that the automatic window of the plots shows.
 const VIEWING: f64 = 5.0;

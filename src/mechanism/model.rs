@@ -3,7 +3,6 @@
 use super::factor::{NONE, Pattern};
 use super::jet::Jet;
 use super::spcmm::Trajectory;
-use crate::contact;
 use crate::scene::{Attachment, Drive, JointKind, JointStart, Mat3, Quat, Scene, StartRule, Vec3};
 
 /// Index of a body; one past the last stands for the world.
@@ -434,7 +433,7 @@ impl Scales {
             .iter()
             .map(|j| j.contact.ball_radius)
             .fold(f64::INFINITY, f64::min)
-            .min(contact::Parameters::default().ball_radius * 100.0);
+            .min(1.0);
         Self {
             length,
             speed: length / 0.1,

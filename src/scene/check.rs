@@ -1,10 +1,11 @@
 //! Consistency checks between the parameters of a scene, and warnings about choices that are allowed but doubtful.
 
 use super::error::{line_text, place_of};
+use super::table::contact_rows;
 use super::*;
 use crate::contact::{self, FrictionLaw, FrictionVelocity, NormalLaw};
 use crate::integrate::Method;
-use std::collections::BTreeMap;
+use std::cmp::Ordering;
 
 /// With fewer fixed steps than this much of an impact is lost; twice as many resolve it. Implicit Euler contacts need more:
 /// numerical damping takes about the same share of an impact as a step does of its duration.
@@ -205,63 +206,26 @@ impl Scene {
 
     /// Groups of ball joints with equal contact parameters, with their names.
     fn contact_groups(&self) -> Vec<(String, contact::Parameters)> {
-        let mut groups: Vec<(Vec<&str>, contact::Parameters)> = Vec::new();
-        let mut group_of = BTreeMap::new();
-        for joint in &self.ball_joints {
-            let group = *group_of.entry(bits(&joint.contact)).or_insert(groups.len());
-            if group == groups.len() {
-                groups.push((Vec::new(), joint.contact));
-            }
-            groups[group].0.push(&joint.name);
-        }
-        let title = |names: &[&str]| match names {
-            [first, .., last] if names.len() > 6 => format!("{first} to {last}"),
-            _ => names.join(", "),
+        let values = |joint: &BallJoint| -> Vec<Value> {
+            let rows = contact_rows();
+            rows.map(|(_, field)| (field.get)(&joint.contact)).collect()
+        };
+        let joints = self.ball_joints.iter().enumerate();
+        let mut joints: Vec<_> = joints.map(|(j, joint)| (values(joint), j)).collect();
+        // No value is NaN: ranges have no place for it.
+        joints.sort_by(|a, b| a.partial_cmp(b).unwrap_or(Ordering::Equal));
+        let mut groups: Vec<_> = joints.chunk_by(|a, b| a.0 == b.0).collect();
+        groups.sort_by_key(|group| group[0].1);
+        let name = |&(_, j): &(Vec<Value>, usize)| self.ball_joints[j].name.as_str();
+        let title = |group: &[_]| match group {
+            [first, .., last] if group.len() > 6 => format!("{} to {}", name(first), name(last)),
+            _ => group.iter().map(name).collect::<Vec<_>>().join(", "),
         };
         groups
             .into_iter()
-            .map(|(names, contact)| (title(&names), contact))
+            .map(|group| (title(group), self.ball_joints[group[0].1].contact))
             .collect()
     }
-}
-
-/// Contact parameters in a form that can be compared and sorted: equal if and only if they are.
-fn bits(contact: &contact::Parameters) -> ([u64; 9], [u8; 4]) {
-    let contact::Parameters {
-        clearance,
-        friction,
-        restitution,
-        youngs_modulus,
-        poisson_ratio,
-        ball_radius,
-        friction_velocity,
-        slip_speed_low,
-        slip_speed_high,
-        impact_speed_floor,
-        approach_speed,
-        normal_law,
-        friction_law,
-    } = *contact;
-    let numbers = [
-        clearance,
-        friction,
-        restitution,
-        youngs_modulus,
-        poisson_ratio,
-        ball_radius,
-        slip_speed_low,
-        slip_speed_high,
-        impact_speed_floor,
-    ];
-    // Map -0 to 0.
-    let numbers = numbers.map(|number| (number + 0.0).to_bits());
-    let words = [
-        friction_velocity as u8,
-        approach_speed as u8,
-        normal_law as u8,
-        friction_law as u8,
-    ];
-    (numbers, words)
 }
 
 /// Two contact parameters that are inconsistent.

@@ -137,6 +137,9 @@ pub struct Solver {
     pub energy_ledger: bool,
 }
 
+/// Keys of what a preset stands for, in the order of [`Preset::point`].
+pub const SOLVER_KEYS: [&str; 3] = ["solver.method", "solver.step", "solver.tolerance"];
+
 impl Preset {
     /// Method, step (s) and tolerance of the preset, chosen by measurement (`docs/tradeoff.md`).
     pub fn point(self) -> (Method, f64, f64) {
@@ -150,7 +153,7 @@ impl Preset {
 }
 
 /// The paper's mechanism: dimensions and trajectory for its slider laws. SI units.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Spcmm {
     /// a1, distance along +X from O_A to the slider plane, m.
     pub slider_plane: f64,

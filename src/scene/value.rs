@@ -1,7 +1,7 @@
 //! Values of parameters.
 
 /// A parameter's value in SI units.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, PartialOrd)]
 pub enum Value {
     /// A quantity in SI units, or a pure number.
     Number(f64),
