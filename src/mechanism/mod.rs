@@ -42,7 +42,7 @@ use std::sync::Arc;
 
 use crate::scene::{Formulation, Scene, Vec3, format_quantity_digits};
 use elements::{ForceElement, SceneElement, elements_of};
-use equations::Equations;
+use equations::{Equations, LEAST_PIVOT};
 use forest::Forest;
 use lagrange::Lagrange;
 use model::Model;
@@ -404,10 +404,14 @@ impl Mechanism {
         self.equations.drift()
     }
 
-    /// Smallest pivot ratio of the constraint matrix at the latest evaluation: near rounding level if rows are dependent.
-    /// Infinite without constraints.
-    pub fn least_pivot(&self) -> f64 {
-        self.equations.least_pivot()
+    /// Whether rows of the constraint matrix were dependent at the latest evaluation, up to rounding.
+    pub fn has_dependent_rows(&self) -> bool {
+        self.equations.least_pivot() < LEAST_PIVOT
+    }
+
+    /// Whether the constraints no longer determine the motion at the latest evaluation.
+    pub fn is_undetermined(&self) -> bool {
+        self.equations.is_undetermined()
     }
 
     /// Number of driven coordinates.
