@@ -301,7 +301,7 @@ impl Mechanism {
     /// Longest step where the motion is a function of time alone, s: a fiftieth of the shortest period of drives and loads.
     pub fn kinematic_step(&self) -> f64 {
         let loads = self.elements.iter().map(|element| element.period());
-        loads.fold(self.model.shortest_period(), f64::min) / 50.0
+        loads.fold(self.model.shortest_period, f64::min) / 50.0
     }
 
     /// Where the motion is a function of time alone: which side of a singular pose the loops are on. True elsewhere.

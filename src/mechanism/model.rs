@@ -126,7 +126,8 @@ pub struct Model {
     pub output_body: BodyIndex,
     /// Probe tip from the output body's centroid, body axes.
     pub probe: Option<Vec3>,
-    pub revolute_drives: Vec<bool>,
+    /// Shortest period of a drive, s; infinite where nothing is driven periodically.
+    pub shortest_period: f64,
 }
 
 impl Model {
@@ -208,6 +209,7 @@ impl Model {
             }
         }
 
+        let periods = scene.joints.iter().map(|joint| scene.period_of(joint));
         let mut model = Self {
             bodies,
             nq: 0,
@@ -216,7 +218,6 @@ impl Model {
             block_of: vec![0; world],
             joints: Vec::new(),
             ideal_joints: Vec::new(),
-            revolute_drives: Vec::new(),
             drives,
             trajectory,
             start: scene.start,
@@ -228,13 +229,8 @@ impl Model {
                 .output
                 .probe
                 .map(|p| p - scene.bodies[scene.output.body].centre),
+            shortest_period: periods.fold(f64::INFINITY, f64::min),
         };
-        for drive in &model.drives {
-            model.revolute_drives.push(matches!(
-                model.bodies[drive.body].motion,
-                Motion::Driven { revolute: true, .. }
-            ));
-        }
         model.number_coordinates(scene, &root);
         for (index, joint) in scene.ball_joints.iter().enumerate() {
             let ideal = (joint.contact.clearance == 0.0).then(|| {
@@ -355,25 +351,6 @@ impl Model {
     /// The world's index among bodies.
     pub fn world(&self) -> BodyIndex {
         self.bodies.len()
-    }
-
-    /// Shortest period of a drive, s; infinite where nothing is driven periodically.
-    pub fn shortest_period(&self) -> f64 {
-        self.drives
-            .iter()
-            .zip(&self.revolute_drives)
-            .map(|(drive, &revolute)| match drive.law {
-                Drive::Spcmm { .. } => self
-                    .trajectory
-                    .as_ref()
-                    .map_or(f64::INFINITY, Trajectory::period),
-                Drive::Harmonic { frequency, .. } => 1.0 / frequency,
-                Drive::Constant { velocity, .. } if revolute => {
-                    std::f64::consts::TAU / velocity.abs()
-                }
-                Drive::Constant { .. } => f64::INFINITY,
-            })
-            .fold(f64::INFINITY, f64::min)
     }
 
     /// Driven coordinate `drive` at `t`.

@@ -7,6 +7,7 @@ use super::document::{Node, Section};
 use super::error::nearest;
 use super::read_joints::{FASTEST_DRIVE, read_attachment};
 use super::*;
+use crate::words::Words;
 
 const LARGEST_FORCE: f64 = 1e12;
 
@@ -83,7 +84,7 @@ pub static ELEMENT_KINDS: [ElementKind; 2] = [
         acts_by: &["force", "torque"],
         choices: &[(
             "axes",
-            &["world", "body"],
+            LoadAxes::WORDS,
             "whether force and torque keep to the world's axes or turn with the body",
         )],
     },

@@ -1,6 +1,6 @@
 //! The typed scene, in SI units. `read.rs` builds it from a file, `parameters.rs` changes it by key.
 
-use crate::words::words;
+use crate::words::{Words, words};
 use std::collections::BTreeMap;
 
 use super::units::Dimension;
@@ -448,6 +448,34 @@ pub struct Attachment {
     pub point: Vec3,
 }
 
+impl Scene {
+    /// Period of the motion that the drive of `joint` prescribes, s; infinite where it does not repeat or nothing moves.
+    pub fn period_of(&self, joint: &Joint) -> f64 {
+        let swings = |amplitudes: &[f64], frequency: f64| {
+            let moves = amplitudes.iter().any(|amplitude| *amplitude != 0.0);
+            if moves {
+                1.0 / frequency
+            } else {
+                f64::INFINITY
+            }
+        };
+        match joint.drive {
+            Some(Drive::Spcmm { .. }) => self.spcmm.map_or(f64::INFINITY, |spcmm| {
+                swings(&[spcmm.amplitude_x, spcmm.amplitude_beta], spcmm.frequency)
+            }),
+            Some(Drive::Harmonic {
+                frequency,
+                amplitude,
+                ..
+            }) => swings(&[amplitude], frequency),
+            Some(Drive::Constant { velocity, .. }) if joint.kind == JointKind::Revolute => {
+                std::f64::consts::TAU / velocity.abs()
+            }
+            Some(Drive::Constant { .. }) | None => f64::INFINITY,
+        }
+    }
+}
+
 /// A ball-and-socket joint: ideal if its clearance is 0, otherwise a contact.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BallJoint {
@@ -465,6 +493,20 @@ pub struct BallJoint {
     /// Keys (without prefix) in which it differs from the scene's `contact.*`.
     pub overrides: Vec<&'static str>,
 }
+
+/// Axes to which a load keeps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LoadAxes {
+    /// Those of the world.
+    World,
+    /// Those of the body, with which it turns.
+    Body,
+}
+
+words!(LoadAxes {
+    World => "world",
+    Body => "body",
+});
 
 /// A numeric key of an element.
 #[derive(Debug)]
@@ -535,12 +577,12 @@ impl Element {
         self.vectors[at.expect("a vector of the row")]
     }
 
-    /// Word of a choice of its row.
+    /// A choice of its row.
     ///
     /// # Panics
-    /// If the row has no such key.
-    pub fn choice(&self, key: &str) -> &'static str {
+    /// If the row has no such key, or other words for it.
+    pub fn choice<T: Words>(&self, key: &str) -> T {
         let at = self.kind.choices.iter().position(|of| of.0 == key);
-        self.choices[at.expect("a choice of the row")]
+        T::of_word(self.choices[at.expect("a choice of the row")]).expect("a word of the row")
     }
 }
