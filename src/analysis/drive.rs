@@ -1,7 +1,7 @@
 //! The period of a scene's drives, and a running scene as an [`Orbit`].
 
 use super::orbit::Orbit;
-use crate::scene::{Drive, JointKind, Scene};
+use crate::scene::Scene;
 use crate::simulate::{Frame, Pose, Simulation, StartError, Stopped};
 
 /// Why a scene has no sections at a fixed drive phase.
@@ -36,28 +36,7 @@ pub enum NoPeriod {
 pub fn drive_period(scene: &Scene) -> Result<f64, NoPeriod> {
     let mut period: Option<f64> = None;
     for joint in &scene.joints {
-        let own = match joint.drive {
-            Some(Drive::Spcmm { .. }) => {
-                let of = |spcmm: &crate::scene::Spcmm| {
-                    let moves = spcmm.amplitude_x != 0.0 || spcmm.amplitude_beta != 0.0;
-                    if moves {
-                        1.0 / spcmm.frequency
-                    } else {
-                        f64::INFINITY
-                    }
-                };
-                scene.spcmm.as_ref().map_or(f64::INFINITY, of)
-            }
-            Some(Drive::Harmonic {
-                frequency,
-                amplitude,
-                ..
-            }) if amplitude != 0.0 => 1.0 / frequency,
-            Some(Drive::Constant { velocity, .. }) if joint.kind == JointKind::Revolute => {
-                std::f64::consts::TAU / velocity.abs()
-            }
-            _ => f64::INFINITY,
-        };
+        let own = scene.period_of(joint);
         if !own.is_finite() {
             continue;
         }

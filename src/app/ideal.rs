@@ -1,7 +1,7 @@
 //! The ideal motion beside the run: the same scene with every ball joint closed, under the same drives and gravity. It is
 //! computed only while shown, up to the displayed instant, and does not affect the run.
 
-use super::player::Clock;
+use super::host::Clock;
 use crate::scene::{Output, Scene, Vec3};
 use crate::simulate::{Frame, Simulation, Snapshot, StartError, Stopped, closed};
 use crate::view::output_point;

@@ -64,7 +64,7 @@ pub use desktop::DesktopHost;
 use dialogs::{Answer, Dialog};
 #[cfg(not(target_arch = "wasm32"))]
 pub use headless::{Headless, HeadlessError, Overlay, UiFrame};
-pub use host::{Host, NoHost, OpenedFile, Running, SaveFile};
+pub use host::{Clock, Host, NoHost, OpenedFile, Running, SaveFile};
 use keys::Action;
 use layout::Sheet;
 use load::Load;
@@ -72,7 +72,7 @@ pub use log::{Entry, Event, Log};
 pub use microscope::{Circle, Microscope};
 pub use overlay::{force_notes, plate};
 use picture::Picture;
-pub use player::{Clock, Player};
+pub use player::Player;
 pub use plots::{Plots, Window};
 pub use replay::{Replay, Verdict};
 pub use share::{CameraPose, LONGEST_LINK, Link, LinkError, SceneText};
@@ -128,7 +128,7 @@ impl AppOptions {
             },
             link: None,
             problem: None,
-            clock: player::wall,
+            clock: host::wall,
         }
     }
 

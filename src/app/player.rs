@@ -6,10 +6,7 @@ mod keyframes;
 mod tests;
 mod travel;
 
-use std::sync::OnceLock;
-
-use web_time::Instant;
-
+use super::host::{Clock, wall};
 use super::ideal::{Gravity, Ideal};
 use super::log::{Entry, Event, Log, Number};
 use super::paths::Paths;
@@ -17,7 +14,7 @@ use super::settled::Settling;
 use super::twin::Twin;
 use super::watch::RunWatch;
 use crate::analysis::section::Schedule;
-use crate::scene::{Scene, SceneError, Value};
+use crate::scene::{SOLVER_KEYS, Scene, SceneError, Value};
 use crate::simulate::{
     Channels, Effect, Frame, History, Pacer, Peak, Pull, RECORDED_JOINTS, Simulation, StartError,
     Stopped, Wear,
@@ -29,15 +26,6 @@ pub use travel::{AbandonedFuture, Flag};
 
 /// Narrowest bin of the record, s: shorter than any step that resolves an impact.
 const FINEST_BIN: f64 = 2e-6;
-
-/// Seconds since an arbitrary origin, to measure the stepping time of a frame.
-pub type Clock = fn() -> f64;
-
-/// Wall-clock time.
-pub fn wall() -> f64 {
-    static START: OnceLock<Instant> = OnceLock::new();
-    START.get_or_init(Instant::now).elapsed().as_secs_f64()
-}
 
 /// A simulation and everything needed to play and plot it.
 ///
@@ -101,9 +89,6 @@ pub struct Player {
     stepped: f64,
     stepping: f64,
 }
-
-/// Solver keys that override its preset.
-const SOLVER_KEYS: [&str; 3] = ["solver.method", "solver.step", "solver.tolerance"];
 
 /// Seconds of viewing that the automatic window of the plots shows.
 const VIEWING: f64 = 5.0;

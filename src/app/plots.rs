@@ -11,7 +11,7 @@ use super::player::Player;
 use super::stack::stack;
 use super::zoom::{self, Zoom};
 use super::{theme, value};
-use crate::simulate::{Bin, Quantity, RECORDED_JOINTS};
+use crate::simulate::{Bin, PlotKind, Quantity, RECORDED_JOINTS};
 
 /// Windows to choose from, s.
 const WINDOWS: [f64; 6] = [1e-3, 1e-2, 0.05, 0.1, 1.0, 10.0];
@@ -276,7 +276,8 @@ impl Plots {
             }
         }
         self.levels.clear();
-        if quantity == Quantity::Eccentricity {
+        let kind = quantity.kind();
+        if kind == PlotKind::FromZeroWithClearances {
             // As recorded: the present value says nothing about the past.
             for index in player.clearances() {
                 let mut trace = Trace {
@@ -290,18 +291,12 @@ impl Plots {
                 }
             }
         }
-        let bands = if quantity == Quantity::EnergyBalance {
+        let bands = if kind == PlotKind::Bands {
             self.bands(&members, units)
         } else {
             Vec::new()
         };
-        let from_zero = matches!(
-            quantity,
-            Quantity::NormalForce
-                | Quantity::FrictionForce
-                | Quantity::Eccentricity
-                | Quantity::TipError
-        );
+        let from_zero = matches!(kind, PlotKind::FromZero | PlotKind::FromZeroWithClearances);
         let values = if bands.is_empty() {
             extremes(self.traces.iter().chain(&self.levels), size)
         } else {
@@ -417,7 +412,7 @@ impl Plots {
             let shown = plot.show(ui, |plot| {
                 plot.set_plot_bounds_x(from / time_size..=to / time_size);
                 plot.set_plot_bounds_y(least..=greatest);
-                if quantity == Quantity::EnergyBalance {
+                if kind == PlotKind::Bands {
                     for band in &bands {
                         plot.add(
                             FilledArea::new(band.member, &band.times, &band.low, &band.high)

@@ -120,23 +120,27 @@ pub struct Parameters {
     pub friction_law: FrictionLaw,
 }
 
-impl Default for Parameters {
+impl Parameters {
     /// The paper's values (Table 2) with the default scene's clearance and friction.
+    pub const DEFAULT: Self = Self {
+        clearance: 0.3e-3,
+        friction: 0.15,
+        restitution: 0.9,
+        youngs_modulus: 206e9,
+        poisson_ratio: 0.3,
+        ball_radius: 0.010,
+        friction_velocity: FrictionVelocity::Surface,
+        slip_speed_low: 1e-6,
+        slip_speed_high: 1e-4,
+        impact_speed_floor: 1e-3,
+        approach_speed: ApproachSpeed::Start,
+        normal_law: NormalLaw::LankaraniNikravesh,
+        friction_law: FrictionLaw::ModifiedCoulomb,
+    };
+}
+
+impl Default for Parameters {
     fn default() -> Self {
-        Self {
-            clearance: 0.3e-3,
-            friction: 0.15,
-            restitution: 0.9,
-            youngs_modulus: 206e9,
-            poisson_ratio: 0.3,
-            ball_radius: 0.010,
-            friction_velocity: FrictionVelocity::Surface,
-            slip_speed_low: 1e-6,
-            slip_speed_high: 1e-4,
-            impact_speed_floor: 1e-3,
-            approach_speed: ApproachSpeed::Start,
-            normal_law: NormalLaw::LankaraniNikravesh,
-            friction_law: FrictionLaw::ModifiedCoulomb,
-        }
+        Self::DEFAULT
     }
 }

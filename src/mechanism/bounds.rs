@@ -8,6 +8,7 @@ use super::MechanismError;
 use super::factor::NONE;
 use super::lagrange::Layout;
 use super::model::{BodyIndex, Model, Motion};
+use crate::integrate::Method;
 use crate::scene::{Formulation, Scene, StartRule};
 
 /// Maximum number of matrix entries of one scene: 32 MiB.
@@ -22,18 +23,40 @@ const OF_A_PAIR: u64 = 25;
 /// What exceeded a limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CostOf {
-    /// The `tree` formulation.
-    #[error("formulation tree")]
-    Tree,
-    /// The `lagrange` formulation.
-    #[error("formulation lagrange")]
-    Lagrange,
+    /// Evaluating the equations.
+    #[error("formulation {0}")]
+    Formulation(Formulation),
     /// Closing the joints at the start.
     #[error("assembling the start")]
     Assembly,
     /// The method that is implicit in the contacts.
     #[error("solver.method imex-euler")]
     ImplicitContacts,
+}
+
+/// What a limit counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Counted {
+    /// [`Cost::entries`].
+    #[error("numbers in its matrices")]
+    Entries,
+    /// [`Cost::products`].
+    #[error("multiplications in one evaluation")]
+    Products,
+}
+
+/// What to do about a scene that is too costly.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Advice {
+    /// Another formulation.
+    #[error("choose formulation = {0}")]
+    Formulation(Formulation),
+    /// Another method.
+    #[error("choose solver.method = {0}")]
+    Method(Method),
+    /// A smaller scene.
+    #[error("choose fewer bodies and joints, or clearances for ideal ball joints on one body")]
+    Smaller,
 }
 
 /// Upper bounds on the cost of one formulation.
@@ -69,8 +92,16 @@ impl Cost {
         self.entries <= MOST_ENTRIES && self.products <= MOST_PRODUCTS
     }
 
+    /// Cost of the equations in one `form`; as a tree, with the joints `closed` as constraints.
+    pub fn of(form: Formulation, scene: &Scene, model: &Model, closed: &[usize]) -> Self {
+        match form {
+            Formulation::Tree => Self::of_tree(model, closed),
+            Formulation::Lagrange => Self::of_lagrange(&Layout::new(scene, model), model),
+        }
+    }
+
     /// Cost of the `tree` formulation with these joints closed.
-    pub fn of_tree(model: &Model, joints: &[usize]) -> Self {
+    fn of_tree(model: &Model, joints: &[usize]) -> Self {
         let mut cost = Self::default();
         // Coordinates visited when solving with each block's mass matrix.
         let mut solution = Vec::with_capacity(model.blocks.len());
@@ -136,7 +167,7 @@ impl Cost {
     }
 
     /// Cost of the `lagrange` formulation.
-    pub fn of_lagrange(layout: &Layout, model: &Model) -> Self {
+    fn of_lagrange(layout: &Layout, model: &Model) -> Self {
         let mut cost = Self::default();
         let world = model.world();
         let mut rows_on = vec![0_u64; world];
@@ -178,15 +209,11 @@ impl Cost {
     ///
     /// # Errors
     /// The amount needed, and the limit.
-    pub fn check(&self, of: CostOf, advice: &'static str) -> Result<(), MechanismError> {
+    pub fn check(&self, of: CostOf, advice: Advice) -> Result<(), MechanismError> {
         let (what, needed, most) = if self.entries > MOST_ENTRIES {
-            ("numbers in its matrices", self.entries, MOST_ENTRIES)
+            (Counted::Entries, self.entries, MOST_ENTRIES)
         } else if self.products > MOST_PRODUCTS {
-            (
-                "multiplications in one evaluation",
-                self.products,
-                MOST_PRODUCTS,
-            )
+            (Counted::Products, self.products, MOST_PRODUCTS)
         } else {
             return Ok(());
         };
@@ -204,10 +231,7 @@ impl Cost {
 /// with ideal joints: fixed, per velocity coordinate, per loose joint, and per multiplication in mass matrices and constraint
 /// rows. Only its ratio to the time of algebra counts.
 pub fn evaluation_time(scene: &Scene, model: &Model) -> f64 {
-    let cost = match scene.formulation {
-        Formulation::Tree => Cost::of_tree(model, &model.ideal_joints),
-        Formulation::Lagrange => Cost::of_lagrange(&Layout::new(scene, model), model),
-    };
+    let cost = Cost::of(scene.formulation, scene, model, &model.ideal_joints);
     let loose = model.joints.len() - model.ideal_joints.len();
     400.0 + 12.0 * model.nv as f64 + 120.0 * loose as f64 + 1.6 * cost.products as f64
 }
@@ -223,31 +247,27 @@ pub fn dense_algebra_time(velocities: usize) -> f64 {
 /// # Errors
 /// As [`Cost::check`]; the advice is the other formulation if that one is within the limits.
 pub fn check(scene: &Scene, model: &Model) -> Result<(), MechanismError> {
-    let closed = |start| match start {
+    let closed = match model.start {
         StartRule::AsGiven => model.ideal_joints.clone(),
         StartRule::Ideal => (0..model.joints.len()).collect(),
     };
-    let assembly = closed(model.start);
-    let tree = Cost::of_tree(model, &assembly);
-    let assembles = !assembly.is_empty();
-    let lagrange = Cost::of_lagrange(&Layout::new(scene, model), model);
-    let advice = "choose fewer bodies and joints, or clearances for ideal ball joints on one body";
-    match scene.formulation {
-        Formulation::Tree if !tree.fits() && !assembles && lagrange.fits() => {
-            tree.check(CostOf::Tree, "choose formulation = lagrange")
-        }
-        Formulation::Lagrange if !lagrange.fits() && tree.fits() => {
-            lagrange.check(CostOf::Lagrange, "choose formulation = tree")
-        }
-        Formulation::Tree => tree.check(CostOf::Tree, advice),
-        Formulation::Lagrange => {
-            lagrange.check(CostOf::Lagrange, advice)?;
-            if assembles {
-                tree.check(CostOf::Assembly, advice)?;
-            }
-            Ok(())
-        }
+    let cost = |form| Cost::of(form, scene, model, &closed);
+    let own = cost(scene.formulation);
+    // Joints are closed in the coordinates of the tree, whatever the formulation.
+    let assembly = match closed.is_empty() {
+        true => Cost::default(),
+        false => cost(Formulation::Tree),
+    };
+    if own.fits() && assembly.fits() {
+        return Ok(());
     }
+    let helps = |form: &Formulation| *form != scene.formulation && cost(*form).fits();
+    let other = Formulation::ALL.into_iter().find(helps);
+    let advice = other
+        .filter(|_| assembly.fits())
+        .map_or(Advice::Smaller, Advice::Formulation);
+    own.check(CostOf::Formulation(scene.formulation), advice)?;
+    assembly.check(CostOf::Assembly, advice)
 }
 
 #[cfg(test)]
@@ -263,10 +283,7 @@ mod tests {
     fn costs(kind: &str, n: usize) -> [Cost; 2] {
         let scene = Scene::parse(&scene_text(kind, n, "0 m"), None, &[]).expect("a scene");
         let model = Model::new(&scene);
-        [
-            Cost::of_tree(&model, &model.ideal_joints),
-            Cost::of_lagrange(&Layout::new(&scene, &model), &model),
-        ]
+        Formulation::ALL.map(|form| Cost::of(form, &scene, &model, &model.ideal_joints))
     }
 
     #[test]

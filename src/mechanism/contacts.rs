@@ -1,10 +1,10 @@
 //! The ball joints of a scene: which of them carry a force, their clearance ramps, their gaps. Allocates nothing. The force
 //! of a single joint is in `elements/contact.rs`.
 
-use super::elements::{At, Contact, ForceElement, Gap, Loads};
+use super::elements::{At, Contact, ForceElement, Gap, Loads, Touching};
 use super::kinematics::Kinematics;
 use super::model::Model;
-use crate::contact::{Coefficients, Memory, Parameters};
+use crate::contact::{Coefficients, Parameters};
 use crate::scene::{Scene, Vec3};
 
 /// A clearance that ramps to a new value.
@@ -29,57 +29,6 @@ impl Ramp {
         } else {
             (value, self.rate)
         }
-    }
-}
-
-/// What decides which contacts carry a force.
-#[derive(Clone, Copy, Debug)]
-pub enum Touching<'a> {
-    /// The contact memory: the stepper locates the events at which it changes.
-    Located(&'a [Memory]),
-    /// Penetration, at every evaluation: for steppers without event location.
-    Immediate(&'a [Memory]),
-    /// No contact carries a force.
-    Nothing,
-}
-
-impl<'a> Touching<'a> {
-    /// By the memory if events are `located`, else by penetration.
-    pub fn by(located: bool, memory: &'a [Memory]) -> Self {
-        if located {
-            Self::Located(memory)
-        } else {
-            Self::Immediate(memory)
-        }
-    }
-
-    /// Memory of joint `j` if it may carry a force.
-    #[inline]
-    pub(super) fn memory(self, j: usize) -> Option<&'a Memory> {
-        match self {
-            Self::Located(memory) => Some(&memory[j]).filter(|memory| memory.active),
-            Self::Immediate(memory) => Some(&memory[j]),
-            Self::Nothing => None,
-        }
-    }
-}
-
-/// Evaluation counts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counts {
-    /// Of the equations of motion.
-    pub equations: u64,
-    /// Of all contacts at an instant: a scene without clearance makes none.
-    pub contacts: u64,
-    /// Of the friction of one contact: a scene without friction makes none.
-    pub friction: u64,
-}
-
-impl std::ops::AddAssign for Counts {
-    fn add_assign(&mut self, other: Self) {
-        self.equations += other.equations;
-        self.contacts += other.contacts;
-        self.friction += other.friction;
     }
 }
 

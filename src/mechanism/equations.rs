@@ -4,6 +4,9 @@ use super::kinematics::{Driven, Kinematics, Wrench};
 use super::model::Model;
 use crate::scene::Vec3;
 
+/// Smallest pivot ratio of the constraints: below it they determine the motion to fewer than four digits.
+pub(super) const LEAST_PIVOT: f64 = 1e-12;
+
 /// Equations of motion in some coordinates. The `model` passed in is always the one they were made for.
 pub(super) trait Equations: Send {
     /// Position coordinates.
@@ -82,6 +85,10 @@ pub(super) trait Equations: Send {
 
     /// Smallest pivot ratio of the constraints at the latest evaluation; infinite without any.
     fn least_pivot(&self) -> f64;
+
+    /// Whether the constraints no longer determine the motion at the latest evaluation. A form that closes its loops after
+    /// every step passes such poses.
+    fn is_undetermined(&self) -> bool;
 
     /// Largest violation of a stabilised constraint at the latest evaluation, m or rad.
     fn drift(&self) -> f64;

@@ -178,6 +178,10 @@ impl Equations for Forest {
         constraints.map_or(f64::INFINITY, |c| c.least_pivot)
     }
 
+    fn is_undetermined(&self) -> bool {
+        false
+    }
+
     fn drift(&self) -> f64 {
         0.0
     }

@@ -11,12 +11,14 @@
 
 use super::MechanismError;
 use super::band::Band;
-use super::bounds::{Cost, CostOf};
+use super::bounds::{Advice, Cost, CostOf};
 use super::columns::{Column, collect_columns, contact_sides};
-use super::contacts::{Contacts, Touching};
+use super::contacts::Contacts;
+use super::elements::Touching;
 use super::equations::Equations;
 use super::model::{BallJoint, Model};
 use crate::contact::{Coefficients, Memory, Slope};
+use crate::integrate::Method;
 use crate::scene::{Mat3, Vec3};
 
 /// A ball with play.
@@ -162,8 +164,10 @@ impl Friction {
             &mut friction.first_on,
         );
         let widths = of.iter().map(|(_, ranges)| width(ranges)).sum();
-        Cost::of_implicit_contacts(of.len(), reach, widths)
-            .check(CostOf::ImplicitContacts, "choose solver.method = dopri5")?;
+        Cost::of_implicit_contacts(of.len(), reach, widths).check(
+            CostOf::ImplicitContacts,
+            Advice::Method(Method::DormandPrince5),
+        )?;
         let touch = |(joint, ranges): (usize, Vec<(usize, usize)>)| Touch {
             joint,
             law: *contacts.coefficients(joint),

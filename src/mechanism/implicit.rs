@@ -8,12 +8,14 @@
 
 use super::MechanismError;
 use super::band::Band;
-use super::bounds::{Cost, CostOf};
+use super::bounds::{Advice, Cost, CostOf};
 use super::columns::{Column, collect_columns, contact_sides};
-use super::contacts::{Contacts, Counts, Touching};
+use super::contacts::Contacts;
+use super::elements::{Counts, Touching};
 use super::equations::Equations;
 use super::model::Model;
 use crate::contact::{ApproachPiece, Coefficients, Memory, Slope};
+use crate::integrate::Method;
 use crate::scene::{Mat3, Vec3};
 
 /// Maximum number of Newton iterations, and the change of a force relative to the largest at which they stop.
@@ -138,7 +140,7 @@ impl ImplicitContacts {
         let ranges: Vec<_> = (0..joints).map(range).collect();
         let width = |&(first, end): &(usize, usize)| end - first;
         let cost = Cost::of_implicit_contacts(joints, reach, ranges.iter().map(width).sum());
-        cost.check(CostOf::ImplicitContacts, "choose solver.method = automatic")?;
+        cost.check(CostOf::ImplicitContacts, Advice::Method(Method::Automatic))?;
         Ok(Self {
             n,
             reach,

@@ -3,7 +3,7 @@
 //!
 //! The KKT system (55) is solved by its Schur complement J M^-1 J^T. Allocates nothing after `new`.
 
-use super::equations::Equations;
+use super::equations::{Equations, LEAST_PIVOT};
 use super::kinematics::{self, Driven, Kinematics, Wrench};
 use super::model::{BodyIndex, Model, Motion};
 use super::rows::RowSystem;
@@ -588,6 +588,10 @@ impl Equations for Lagrange {
 
     fn least_pivot(&self) -> f64 {
         self.least_pivot
+    }
+
+    fn is_undetermined(&self) -> bool {
+        !(self.least_pivot >= LEAST_PIVOT)
     }
 
     fn drift(&self) -> f64 {

@@ -28,12 +28,11 @@ mod summary;
 mod systems;
 mod tree;
 
-pub use bounds::CostOf;
-pub use contacts::{Contacts, Counts, Ramp, Touching};
-pub use elements::{ElementReport, Gap, Pull};
+pub use bounds::{Advice, CostOf, Counted};
+pub use contacts::{Contacts, Ramp};
+pub use elements::{Counts, ElementReport, Gap, Powers, Pull, Touch, Touching};
 pub use jet::Jet;
 pub use kinematics::{Kinematics, Wrench};
-pub use power::{Powers, Touch};
 pub use spcmm::{Ideal, Trajectory, Unreachable};
 pub use start::{Assembly, Placement};
 pub use summary::Summary;
@@ -43,7 +42,7 @@ use std::sync::Arc;
 
 use crate::scene::{Formulation, Scene, Vec3, format_quantity_digits};
 use elements::{ForceElement, SceneElement, elements_of};
-use equations::Equations;
+use equations::{Equations, LEAST_PIVOT};
 use forest::Forest;
 use lagrange::Lagrange;
 use model::Model;
@@ -135,13 +134,13 @@ pub enum MechanismError {
         /// What is too costly.
         of: CostOf,
         /// What was counted.
-        what: &'static str,
+        what: Counted,
         /// Amount needed.
         needed: u64,
         /// Most that is allowed.
         most: u64,
         /// What to do instead.
-        advice: &'static str,
+        advice: Advice,
     },
     /// A start pose in which constraints become dependent that are independent in every neighbouring pose.
     #[error(
@@ -304,7 +303,7 @@ impl Mechanism {
     /// Longest step where the motion is a function of time alone, s: a fiftieth of the shortest period of drives and loads.
     pub fn kinematic_step(&self) -> f64 {
         let loads = self.elements.iter().map(|element| element.period());
-        loads.fold(self.model.shortest_period(), f64::min) / 50.0
+        loads.fold(self.model.shortest_period, f64::min) / 50.0
     }
 
     /// Where the motion is a function of time alone: which side of a singular pose the loops are on. True elsewhere.
@@ -407,10 +406,14 @@ impl Mechanism {
         self.equations.drift()
     }
 
-    /// Smallest pivot ratio of the constraint matrix at the latest evaluation: near rounding level if rows are dependent.
-    /// Infinite without constraints.
-    pub fn least_pivot(&self) -> f64 {
-        self.equations.least_pivot()
+    /// Whether rows of the constraint matrix were dependent at the latest evaluation, up to rounding.
+    pub fn has_dependent_rows(&self) -> bool {
+        self.equations.least_pivot() < LEAST_PIVOT
+    }
+
+    /// Whether the constraints no longer determine the motion at the latest evaluation.
+    pub fn is_undetermined(&self) -> bool {
+        self.equations.is_undetermined()
     }
 
     /// Number of driven coordinates.

@@ -3,7 +3,6 @@
 use super::factor::{NONE, Pattern};
 use super::jet::Jet;
 use super::spcmm::Trajectory;
-use crate::contact;
 use crate::scene::{Attachment, Drive, JointKind, JointStart, Mat3, Quat, Scene, StartRule, Vec3};
 
 /// Index of a body; one past the last stands for the world.
@@ -127,7 +126,8 @@ pub struct Model {
     pub output_body: BodyIndex,
     /// Probe tip from the output body's centroid, body axes.
     pub probe: Option<Vec3>,
-    pub revolute_drives: Vec<bool>,
+    /// Shortest period of a drive, s; infinite where nothing is driven periodically.
+    pub shortest_period: f64,
 }
 
 impl Model {
@@ -209,6 +209,7 @@ impl Model {
             }
         }
 
+        let periods = scene.joints.iter().map(|joint| scene.period_of(joint));
         let mut model = Self {
             bodies,
             nq: 0,
@@ -217,7 +218,6 @@ impl Model {
             block_of: vec![0; world],
             joints: Vec::new(),
             ideal_joints: Vec::new(),
-            revolute_drives: Vec::new(),
             drives,
             trajectory,
             start: scene.start,
@@ -229,13 +229,8 @@ impl Model {
                 .output
                 .probe
                 .map(|p| p - scene.bodies[scene.output.body].centre),
+            shortest_period: periods.fold(f64::INFINITY, f64::min),
         };
-        for drive in &model.drives {
-            model.revolute_drives.push(matches!(
-                model.bodies[drive.body].motion,
-                Motion::Driven { revolute: true, .. }
-            ));
-        }
         model.number_coordinates(scene, &root);
         for (index, joint) in scene.ball_joints.iter().enumerate() {
             let ideal = (joint.contact.clearance == 0.0).then(|| {
@@ -358,25 +353,6 @@ impl Model {
         self.bodies.len()
     }
 
-    /// Shortest period of a drive, s; infinite where nothing is driven periodically.
-    pub fn shortest_period(&self) -> f64 {
-        self.drives
-            .iter()
-            .zip(&self.revolute_drives)
-            .map(|(drive, &revolute)| match drive.law {
-                Drive::Spcmm { .. } => self
-                    .trajectory
-                    .as_ref()
-                    .map_or(f64::INFINITY, Trajectory::period),
-                Drive::Harmonic { frequency, .. } => 1.0 / frequency,
-                Drive::Constant { velocity, .. } if revolute => {
-                    std::f64::consts::TAU / velocity.abs()
-                }
-                Drive::Constant { .. } => f64::INFINITY,
-            })
-            .fold(f64::INFINITY, f64::min)
-    }
-
     /// Driven coordinate `drive` at `t`.
     pub fn drive(&self, drive: usize, t: f64, ideal: Option<&super::spcmm::Ideal>) -> Jet {
         match self.drives[drive].law {
@@ -434,7 +410,7 @@ impl Scales {
             .iter()
             .map(|j| j.contact.ball_radius)
             .fold(f64::INFINITY, f64::min)
-            .min(contact::Parameters::default().ball_radius * 100.0);
+            .min(1.0);
         Self {
             length,
             speed: length / 0.1,

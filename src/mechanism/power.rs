@@ -2,51 +2,11 @@
 //! nothing.
 
 use super::Mechanism;
-use super::elements::ForceElement;
+use super::elements::{ForceElement, Powers, Touch};
 use super::equations::Equations;
 use super::kinematics::{Kinematics, Wrench};
 use super::model::{Model, Motion};
 use crate::scene::Vec3;
-
-/// Powers at one instant, or their integrals over time (then in J).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Powers {
-    /// Supplied by the drives: actuator force times rate, W.
-    pub drive: f64,
-    /// Dissipated by the damping of the normal forces, W: (F_N - K delta^1.5) d(delta)/dt.
-    pub restitution: f64,
-    /// Dissipated by friction, W: -F_T . (velocity of the ball's point - velocity of the socket's point) (24).
-    pub friction: f64,
-    /// Supplied by ramping clearances, W: -F_N dc/dt + 2/5 dK/dt delta^2.5.
-    pub clearance: f64,
-    /// Dissipated by the dampers of force elements, W.
-    pub damping: f64,
-    /// Supplied by external loads, W.
-    pub external: f64,
-}
-
-/// A ball that presses against the wall of its socket.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Touch {
-    /// Unit vector from the socket's centre to the point of contact, in the axes of the socket's body.
-    pub direction: Vec3,
-    /// F_N, N.
-    pub normal_force: f64,
-    /// Power dissipated by friction, W.
-    pub friction_power: f64,
-}
-
-impl Powers {
-    /// Adds `weight` times `other`.
-    pub fn add(&mut self, weight: f64, other: &Self) {
-        self.drive += weight * other.drive;
-        self.restitution += weight * other.restitution;
-        self.friction += weight * other.friction;
-        self.clearance += weight * other.clearance;
-        self.damping += weight * other.damping;
-        self.external += weight * other.external;
-    }
-}
 
 /// Which parts of a scene can have power.
 pub(super) struct Sources {

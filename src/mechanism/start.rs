@@ -266,7 +266,7 @@ fn rank_around(
     if rank == constraints.rows() {
         return None;
     }
-    let period = (0.002 * model.shortest_period()).min(1e-3);
+    let period = (0.002 * model.shortest_period).min(1e-3);
     let mut beside = Vec::new();
     for sign in [1.0, -1.0] {
         if !model.drives.is_empty() {

@@ -7,7 +7,8 @@
 //! x_q = (b_q + T x_v) / s, where T maps velocities to position rates.
 
 use super::columns::{Column, collect_columns};
-use super::contacts::{Contacts, Touching};
+use super::contacts::Contacts;
+use super::elements::Touching;
 use super::elements::{At, Coupling, ForceElement, SceneElement};
 use super::equations::Equations;
 use super::kinematics::Kinematics;

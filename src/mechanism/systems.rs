@@ -1,7 +1,7 @@
 //! The equations of motion in the form required by the steppers.
 
-use super::contacts::{Counts, Touching};
 use super::elements::{At, Loads};
+use super::elements::{Counts, Touching};
 use super::implicit::TURNS;
 use super::kinematics::Wrench;
 use super::{Mechanism, Powers};

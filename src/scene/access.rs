@@ -281,12 +281,8 @@ impl Scene {
     /// Whatever the scene's text does not give by name follows the preset.
     pub(super) fn apply_preset(&mut self, preset: Preset) {
         let (method, step, tolerance) = preset.point();
-        let free = |key: &str| !self.source.places.contains_key(key);
-        let (method_free, step_free, tolerance_free) = (
-            free("solver.method"),
-            free("solver.step"),
-            free("solver.tolerance"),
-        );
+        let [method_free, step_free, tolerance_free] =
+            SOLVER_KEYS.map(|key| !self.source.places.contains_key(key));
         let solver = &mut self.solver;
         solver.preset = Some(preset);
         if method_free {
@@ -302,7 +298,7 @@ impl Scene {
 
     /// Solver settings changed by name take precedence over a preset, in either order.
     fn resolve_preset(&mut self) {
-        for key in ["solver.method", "solver.step", "solver.tolerance"] {
+        for key in SOLVER_KEYS {
             let changed = self.changes.iter().rfind(|(changed, _)| changed == key);
             if let (Some((_, text)), Some(parameter)) = (changed, find(key))
                 && let Ok(value) = parameter.read(text)

@@ -1,10 +1,11 @@
 //! Consistency checks between the parameters of a scene, and warnings about choices that are allowed but doubtful.
 
 use super::error::{line_text, place_of};
+use super::table::contact_rows;
 use super::*;
 use crate::contact::{self, FrictionLaw, FrictionVelocity, NormalLaw};
 use crate::integrate::Method;
-use std::collections::BTreeMap;
+use std::cmp::Ordering;
 
 /// With fewer fixed steps than this much of an impact is lost; twice as many resolve it. Implicit Euler contacts need more:
 /// numerical damping takes about the same share of an impact as a step does of its duration.
@@ -24,17 +25,10 @@ const MOST_LISTED: usize = 40;
 impl Scene {
     /// Checks the contact parameters of each joint for consistency.
     pub(super) fn check_contacts(&self) -> Result<(), Fault> {
-        check_contact(&self.contact).map_err(|(parts, message)| Fault {
-            joint: None,
-            parts,
-            message,
-        })?;
-        for (index, joint) in self.ball_joints.iter().enumerate() {
-            check_contact(&joint.contact).map_err(|(parts, message)| Fault {
-                joint: Some(index),
-                parts,
-                message,
-            })?;
+        let joints = self.ball_joints.iter().enumerate();
+        let own = joints.map(|(index, joint)| (Some(index), &joint.contact));
+        for (joint, contact) in std::iter::once((None, &self.contact)).chain(own) {
+            check_contact(contact).map_err(|fault| Fault { joint, fault })?;
         }
         Ok(())
     }
@@ -212,82 +206,79 @@ impl Scene {
 
     /// Groups of ball joints with equal contact parameters, with their names.
     fn contact_groups(&self) -> Vec<(String, contact::Parameters)> {
-        let mut groups: Vec<(Vec<&str>, contact::Parameters)> = Vec::new();
-        let mut group_of = BTreeMap::new();
-        for joint in &self.ball_joints {
-            let group = *group_of.entry(bits(&joint.contact)).or_insert(groups.len());
-            if group == groups.len() {
-                groups.push((Vec::new(), joint.contact));
-            }
-            groups[group].0.push(&joint.name);
-        }
-        let title = |names: &[&str]| match names {
-            [first, .., last] if names.len() > 6 => format!("{first} to {last}"),
-            _ => names.join(", "),
+        let values = |joint: &BallJoint| -> Vec<Value> {
+            let rows = contact_rows();
+            rows.map(|(_, field)| (field.get)(&joint.contact)).collect()
+        };
+        let joints = self.ball_joints.iter().enumerate();
+        let mut joints: Vec<_> = joints.map(|(j, joint)| (values(joint), j)).collect();
+        // No value is NaN: ranges have no place for it.
+        joints.sort_by(|a, b| a.partial_cmp(b).unwrap_or(Ordering::Equal));
+        let mut groups: Vec<_> = joints.chunk_by(|a, b| a.0 == b.0).collect();
+        groups.sort_by_key(|group| group[0].1);
+        let name = |&(_, j): &(Vec<Value>, usize)| self.ball_joints[j].name.as_str();
+        let title = |group: &[_]| match group {
+            [first, .., last] if group.len() > 6 => format!("{} to {}", name(first), name(last)),
+            _ => group.iter().map(name).collect::<Vec<_>>().join(", "),
         };
         groups
             .into_iter()
-            .map(|(names, contact)| (title(&names), contact))
+            .map(|group| (title(group), self.ball_joints[group[0].1].contact))
             .collect()
     }
 }
 
-/// Contact parameters in a form that can be compared and sorted: equal if and only if they are.
-fn bits(contact: &contact::Parameters) -> ([u64; 9], [u8; 4]) {
-    let contact::Parameters {
-        clearance,
-        friction,
-        restitution,
-        youngs_modulus,
-        poisson_ratio,
-        ball_radius,
-        friction_velocity,
-        slip_speed_low,
-        slip_speed_high,
-        impact_speed_floor,
-        approach_speed,
-        normal_law,
-        friction_law,
-    } = *contact;
-    let numbers = [
-        clearance,
-        friction,
-        restitution,
-        youngs_modulus,
-        poisson_ratio,
-        ball_radius,
-        slip_speed_low,
-        slip_speed_high,
-        impact_speed_floor,
-    ];
-    // Map -0 to 0.
-    let numbers = numbers.map(|number| (number + 0.0).to_bits());
-    let words = [
-        friction_velocity as u8,
-        approach_speed as u8,
-        normal_law as u8,
-        friction_law as u8,
-    ];
-    (numbers, words)
+/// Two contact parameters that are inconsistent.
+#[derive(Clone, Copy, Debug, thiserror::Error)]
+pub(super) enum ContactFault {
+    #[error(
+        "clearance {} must be below the ball radius, {}; allowed 0 mm to below {1}; units {}",
+        format_quantity(*.clearance, "mm"),
+        format_quantity(*.ball_radius, "mm"),
+        unit_names(Dimension::Length).join(", ")
+    )]
+    Clearance { clearance: f64, ball_radius: f64 },
+    #[error(
+        "slip_speed_low {} must be below slip_speed_high {}; units {}",
+        format_quantity(*.low, "mm/s"),
+        format_quantity(*.high, "mm/s"),
+        unit_names(Dimension::Speed).join(", ")
+    )]
+    SlipSpeeds { low: f64, high: f64 },
+    #[error(
+        "the law {0} divides by the restitution: with it, allowed above 0 to 1; a pure number, no unit"
+    )]
+    DividesByRestitution(NormalLaw),
 }
 
-/// Two parameters that are inconsistent.
+impl ContactFault {
+    /// Last parts of the keys at fault, the likelier first.
+    fn parts(&self) -> [&'static str; 2] {
+        match self {
+            Self::Clearance { .. } => ["clearance", "ball_radius"],
+            Self::SlipSpeeds { .. } => ["slip_speed_low", "slip_speed_high"],
+            Self::DividesByRestitution(_) => ["restitution", "normal_law"],
+        }
+    }
+}
+
+/// An inconsistency of the scene's contact parameters, or of those of one of its joints.
 pub(super) struct Fault {
     pub joint: Option<usize>,
-    /// Last parts of the keys at fault, the likelier first.
-    pub parts: [&'static str; 2],
-    pub message: String,
+    pub fault: ContactFault,
 }
 
 impl Fault {
     /// Keys that could be at fault in `scene`, the likelier first.
     pub fn keys(&self, scene: &Scene) -> Vec<String> {
         let joint = self.joint.map(|index| &scene.ball_joints[index]);
-        let key = |part: &&'static str| match joint {
-            Some(joint) if joint.overrides.contains(part) => format!("joint.{}.{part}", joint.name),
+        let key = |part| match joint {
+            Some(joint) if joint.overrides.contains(&part) => {
+                format!("joint.{}.{part}", joint.name)
+            }
             _ => format!("contact.{part}"),
         };
-        let mut keys: Vec<String> = self.parts.iter().map(key).collect();
+        let mut keys: Vec<String> = self.fault.parts().into_iter().map(key).collect();
         // A joint's own setting is likelier at fault than the general one.
         keys.sort_by_key(|key| !key.starts_with("joint."));
         keys
@@ -296,9 +287,9 @@ impl Fault {
     fn text(&self, scene: &Scene, key: &str) -> String {
         match self.joint.map(|index| &scene.ball_joints[index].name) {
             Some(name) if !key.starts_with("joint.") => {
-                format!("{} (in ball joint {name})", self.message)
+                format!("{} (in ball joint {name})", self.fault)
             }
-            _ => self.message.clone(),
+            _ => self.fault.to_string(),
         }
     }
 
@@ -323,38 +314,22 @@ impl Fault {
     }
 }
 
-fn check_contact(contact: &contact::Parameters) -> Result<(), ([&'static str; 2], String)> {
+fn check_contact(contact: &contact::Parameters) -> Result<(), ContactFault> {
     if contact.clearance >= contact.ball_radius {
-        return Err((
-            ["clearance", "ball_radius"],
-            format!(
-                "clearance {} must be below the ball radius, {}; allowed 0 mm to below {1}; units {}",
-                format_quantity(contact.clearance, "mm"),
-                format_quantity(contact.ball_radius, "mm"),
-                unit_names(Dimension::Length).join(", ")
-            ),
-        ));
+        return Err(ContactFault::Clearance {
+            clearance: contact.clearance,
+            ball_radius: contact.ball_radius,
+        });
     }
     if contact.slip_speed_low >= contact.slip_speed_high {
-        return Err((
-            ["slip_speed_low", "slip_speed_high"],
-            format!(
-                "slip_speed_low {} must be below slip_speed_high {}; units {}",
-                format_quantity(contact.slip_speed_low, "mm/s"),
-                format_quantity(contact.slip_speed_high, "mm/s"),
-                unit_names(Dimension::Speed).join(", ")
-            ),
-        ));
+        return Err(ContactFault::SlipSpeeds {
+            low: contact.slip_speed_low,
+            high: contact.slip_speed_high,
+        });
     }
     let divides = matches!(contact.normal_law, NormalLaw::Flores | NormalLaw::Gonthier);
     if divides && contact.restitution == 0.0 {
-        let law = contact.normal_law;
-        return Err((
-            ["restitution", "normal_law"],
-            format!(
-                "the law {law} divides by the restitution: with it, allowed above 0 to 1; a pure number, no unit"
-            ),
-        ));
+        return Err(ContactFault::DividesByRestitution(contact.normal_law));
     }
     Ok(())
 }

@@ -7,56 +7,7 @@ use super::document::{Node, Section};
 use super::error::nearest;
 use super::read_joints::{FASTEST_DRIVE, read_attachment};
 use super::*;
-
-/// A numeric key of an element.
-#[derive(Debug)]
-pub struct ElementNumber {
-    /// Key.
-    pub key: &'static str,
-    /// Its dimension.
-    pub dimension: Dimension,
-    /// Closed range, SI.
-    pub range: (f64, f64),
-    /// Value if the file gives none; `None` if it is required.
-    pub default: Option<f64>,
-    /// An example.
-    pub like: &'static str,
-    /// What it is.
-    pub help: &'static str,
-}
-
-/// A kind of force element. Adding one takes a row here, and a file in `mechanism/elements` with its row there.
-#[derive(Debug)]
-pub struct ElementKind {
-    /// Section of the file, `[[spring]]`.
-    pub section: &'static str,
-    /// What it is.
-    pub help: &'static str,
-    /// Points on bodies or the world, each `{ body, at }`.
-    pub points: &'static [&'static str],
-    /// Its numbers.
-    pub numbers: &'static [ElementNumber],
-    /// Its vectors, 0 if the file gives none: key, dimension, help.
-    pub vectors: &'static [(&'static str, Dimension, &'static str)],
-    /// Numbers and vectors of which at least one is needed for it to have any effect.
-    pub acts_by: &'static [&'static str],
-    /// Its choices: key, words with the default first, help.
-    pub choices: &'static [(&'static str, &'static [&'static str], &'static str)],
-}
-
-/// A force element of a scene, according to its row.
-#[derive(Clone, Debug)]
-pub struct Element {
-    /// Unique name.
-    pub name: String,
-    /// Row.
-    pub kind: &'static ElementKind,
-    /// In the order of the row.
-    pub points: Vec<Attachment>,
-    numbers: Vec<f64>,
-    vectors: Vec<Vec3>,
-    choices: Vec<&'static str>,
-}
+use crate::words::Words;
 
 const LARGEST_FORCE: f64 = 1e12;
 
@@ -133,7 +84,7 @@ pub static ELEMENT_KINDS: [ElementKind; 2] = [
         acts_by: &["force", "torque"],
         choices: &[(
             "axes",
-            &["world", "body"],
+            LoadAxes::WORDS,
             "whether force and torque keep to the world's axes or turn with the body",
         )],
     },
@@ -152,35 +103,6 @@ impl ElementKind {
             .chain(vectors)
             .chain(choices)
             .collect()
-    }
-}
-
-impl Element {
-    /// A number of its row, SI.
-    ///
-    /// # Panics
-    /// If the row has no such key.
-    pub fn number(&self, key: &str) -> f64 {
-        let at = self.kind.numbers.iter().position(|of| of.key == key);
-        self.numbers[at.expect("a number of the row")]
-    }
-
-    /// A vector of its row, SI.
-    ///
-    /// # Panics
-    /// If the row has no such key.
-    pub fn vector(&self, key: &str) -> Vec3 {
-        let at = self.kind.vectors.iter().position(|of| of.0 == key);
-        self.vectors[at.expect("a vector of the row")]
-    }
-
-    /// Word of a choice of its row.
-    ///
-    /// # Panics
-    /// If the row has no such key.
-    pub fn choice(&self, key: &str) -> &'static str {
-        let at = self.kind.choices.iter().position(|of| of.0 == key);
-        self.choices[at.expect("a choice of the row")]
     }
 }
 

@@ -109,10 +109,13 @@ pub(super) fn line_text(text: &str, line: u32) -> Option<Box<str>> {
 /// A text longer than this, bytes, is no typing slip; comparing it takes quadratic time.
 const LONGEST_SLIP: usize = 100;
 
-/// The one of `names` nearest to `wrong`, in brackets; "" if none is near.
-pub(super) fn nearest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> String {
+/// The one of `names` nearest to `wrong`; `None` if none is near.
+pub(super) fn nearest_name<'a>(
+    wrong: &str,
+    names: impl IntoIterator<Item = &'a str>,
+) -> Option<&'a str> {
     if wrong.len() > LONGEST_SLIP {
-        return String::new();
+        return None;
     }
     let wrong_lower = wrong.to_lowercase();
     names
@@ -125,28 +128,33 @@ pub(super) fn nearest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>)
         })
         .filter(|(score, _)| *score > 0.7)
         .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map_or_else(String::new, |(_, name)| {
-            format!(" (did you mean `{name}`?)")
-        })
+        .map(|(_, name)| name)
 }
 
-/// The parameter whose key, or last part of it, is nearest to `wrong`, or one of the other `words`, in brackets; "" if none
-/// is near.
+/// A near name as errors quote it: in brackets, or empty.
+pub(super) fn did_you_mean(near: Option<&str>) -> String {
+    near.map_or_else(String::new, |name| format!(" (did you mean `{name}`?)"))
+}
+
+/// The one of `names` nearest to `wrong`, as errors quote it.
+pub(super) fn nearest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> String {
+    did_you_mean(nearest_name(wrong, names))
+}
+
+/// The parameter whose key, or last part of it, is nearest to `wrong`, or one of the other `words`, as errors quote it.
 pub(super) fn nearest_parameter<'a>(
     wrong: &str,
-    keys: impl Iterator<Item = &'a str> + Clone,
+    mut keys: impl Iterator<Item = &'a str> + Clone,
     words: &[&'a str],
 ) -> String {
     let last = |key: &'a str| key.rsplit('.').next().unwrap_or(key);
     // Keys without their section are a common slip: compare both forms.
     let forms = keys.clone().map(last).chain(keys.clone());
-    let near = nearest(wrong, words.iter().copied().chain(forms));
-    let name = near.split('`').nth(1).unwrap_or("");
-    let full = keys.clone().find(|key| *key == name || last(key) == name);
-    match full.filter(|_| !words.contains(&name)) {
-        Some(key) => format!(" (did you mean `{key}`?)"),
-        None => near,
-    }
+    let near = nearest_name(wrong, words.iter().copied().chain(forms));
+    let full = near
+        .filter(|name| !words.contains(name))
+        .and_then(|name| keys.find(|key| *key == name || last(key) == name));
+    did_you_mean(full.or(near))
 }
 
 /// "No such body", with the nearest name and all names.

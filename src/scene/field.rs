@@ -1,6 +1,7 @@
 //! How a row of the parameter table is read from a scene and written to it.
 
-use super::{Scene, Value};
+use super::Scene;
+use super::value::Value;
 use crate::contact;
 use crate::words::Words;
 

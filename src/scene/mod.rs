@@ -20,18 +20,20 @@ mod table;
 #[cfg(test)]
 mod tests;
 mod units;
+mod value;
 mod visible;
 mod write;
 
 pub use check::least_impact_steps;
 pub use doubt::{Doubt, Warning, WarningKind};
-pub use elements::{ELEMENT_KINDS, Element, ElementKind, ElementNumber, element_table};
+pub use elements::{ELEMENT_KINDS, element_table};
 pub use error::SceneError;
 pub use load::*;
 pub use model::*;
 pub use parameters::*;
-pub use table::table;
+pub use table::{reference_page, table};
 pub use units::*;
+pub use value::Value;
 pub use visible::{visible, visible_line};
 
 use table::find;

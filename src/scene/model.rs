@@ -1,9 +1,9 @@
 //! The typed scene, in SI units. `read.rs` builds it from a file, `parameters.rs` changes it by key.
 
-use crate::words::words;
+use crate::words::{Words, words};
 use std::collections::BTreeMap;
 
-use super::Element;
+use super::units::Dimension;
 use crate::contact;
 use crate::integrate::Method;
 
@@ -137,6 +137,9 @@ pub struct Solver {
     pub energy_ledger: bool,
 }
 
+/// Keys of what a preset stands for, in the order of [`Preset::point`].
+pub const SOLVER_KEYS: [&str; 3] = ["solver.method", "solver.step", "solver.tolerance"];
+
 impl Preset {
     /// Method, step (s) and tolerance of the preset, chosen by measurement (`docs/tradeoff.md`).
     pub fn point(self) -> (Method, f64, f64) {
@@ -150,7 +153,7 @@ impl Preset {
 }
 
 /// The paper's mechanism: dimensions and trajectory for its slider laws. SI units.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Spcmm {
     /// a1, distance along +X from O_A to the slider plane, m.
     pub slider_plane: f64,
@@ -445,6 +448,34 @@ pub struct Attachment {
     pub point: Vec3,
 }
 
+impl Scene {
+    /// Period of the motion that the drive of `joint` prescribes, s; infinite where it does not repeat or nothing moves.
+    pub fn period_of(&self, joint: &Joint) -> f64 {
+        let swings = |amplitudes: &[f64], frequency: f64| {
+            let moves = amplitudes.iter().any(|amplitude| *amplitude != 0.0);
+            if moves {
+                1.0 / frequency
+            } else {
+                f64::INFINITY
+            }
+        };
+        match joint.drive {
+            Some(Drive::Spcmm { .. }) => self.spcmm.map_or(f64::INFINITY, |spcmm| {
+                swings(&[spcmm.amplitude_x, spcmm.amplitude_beta], spcmm.frequency)
+            }),
+            Some(Drive::Harmonic {
+                frequency,
+                amplitude,
+                ..
+            }) => swings(&[amplitude], frequency),
+            Some(Drive::Constant { velocity, .. }) if joint.kind == JointKind::Revolute => {
+                std::f64::consts::TAU / velocity.abs()
+            }
+            Some(Drive::Constant { .. }) | None => f64::INFINITY,
+        }
+    }
+}
+
 /// A ball-and-socket joint: ideal if its clearance is 0, otherwise a contact.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BallJoint {
@@ -461,4 +492,97 @@ pub struct BallJoint {
     pub contact: contact::Parameters,
     /// Keys (without prefix) in which it differs from the scene's `contact.*`.
     pub overrides: Vec<&'static str>,
+}
+
+/// Axes to which a load keeps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LoadAxes {
+    /// Those of the world.
+    World,
+    /// Those of the body, with which it turns.
+    Body,
+}
+
+words!(LoadAxes {
+    World => "world",
+    Body => "body",
+});
+
+/// A numeric key of an element.
+#[derive(Debug)]
+pub struct ElementNumber {
+    /// Key.
+    pub key: &'static str,
+    /// Its dimension.
+    pub dimension: Dimension,
+    /// Closed range, SI.
+    pub range: (f64, f64),
+    /// Value if the file gives none; `None` if it is required.
+    pub default: Option<f64>,
+    /// An example.
+    pub like: &'static str,
+    /// What it is.
+    pub help: &'static str,
+}
+
+/// A kind of force element. Adding one takes a row here, and a file in `mechanism/elements` with its row there.
+#[derive(Debug)]
+pub struct ElementKind {
+    /// Section of the file, `[[spring]]`.
+    pub section: &'static str,
+    /// What it is.
+    pub help: &'static str,
+    /// Points on bodies or the world, each `{ body, at }`.
+    pub points: &'static [&'static str],
+    /// Its numbers.
+    pub numbers: &'static [ElementNumber],
+    /// Its vectors, 0 if the file gives none: key, dimension, help.
+    pub vectors: &'static [(&'static str, Dimension, &'static str)],
+    /// Numbers and vectors of which at least one is needed for it to have any effect.
+    pub acts_by: &'static [&'static str],
+    /// Its choices: key, words with the default first, help.
+    pub choices: &'static [(&'static str, &'static [&'static str], &'static str)],
+}
+
+/// A force element of a scene, according to its row.
+#[derive(Clone, Debug)]
+pub struct Element {
+    /// Unique name.
+    pub name: String,
+    /// Row.
+    pub kind: &'static ElementKind,
+    /// In the order of the row.
+    pub points: Vec<Attachment>,
+    pub(super) numbers: Vec<f64>,
+    pub(super) vectors: Vec<Vec3>,
+    pub(super) choices: Vec<&'static str>,
+}
+
+impl Element {
+    /// A number of its row, SI.
+    ///
+    /// # Panics
+    /// If the row has no such key.
+    pub fn number(&self, key: &str) -> f64 {
+        let at = self.kind.numbers.iter().position(|of| of.key == key);
+        self.numbers[at.expect("a number of the row")]
+    }
+
+    /// A vector of its row, SI.
+    ///
+    /// # Panics
+    /// If the row has no such key.
+    pub fn vector(&self, key: &str) -> Vec3 {
+        let at = self.kind.vectors.iter().position(|of| of.0 == key);
+        self.vectors[at.expect("a vector of the row")]
+    }
+
+    /// A choice of its row.
+    ///
+    /// # Panics
+    /// If the row has no such key, or other words for it.
+    pub fn choice<T: Words>(&self, key: &str) -> T {
+        let at = self.kind.choices.iter().position(|of| of.0 == key);
+        T::of_word(self.choices[at.expect("a choice of the row")]).expect("a word of the row")
+    }
 }

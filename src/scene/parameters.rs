@@ -1,57 +1,11 @@
-//! The single table of scene parameters: files, `--set`, sliders, tooltips and the reference page are derived from it.
+//! What a row of the parameter table says, and the values it takes.
 
-use super::error::nearest;
+use super::error::{did_you_mean, nearest_name};
 use super::field::Access;
-use super::table::table;
-use super::units::{QuantityError, exact_quantity, format_quantity, parse_quantity, unit_names};
-
-/// A parameter's value in SI units.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Value {
-    /// A quantity in SI units, or a pure number.
-    Number(f64),
-    /// A count.
-    Count(u64),
-    /// One of the parameter's choices.
-    Choice(&'static str),
-    /// Not given (`solver.preset` only).
-    Unset,
-}
-
-/// Physical dimension of a quantity; determines the units it may be written in.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Dimension {
-    /// A pure number.
-    None,
-    /// m
-    Length,
-    /// s
-    Time,
-    /// kg
-    Mass,
-    /// kg m^2
-    Inertia,
-    /// Pa
-    Stress,
-    /// rad
-    Angle,
-    /// m/s
-    Speed,
-    /// rad/s
-    AngularSpeed,
-    /// m/s^2
-    Acceleration,
-    /// Hz
-    Frequency,
-    /// N
-    Force,
-    /// N m
-    Torque,
-    /// N/m
-    Stiffness,
-    /// N s/m
-    Damping,
-}
+use super::units::{
+    Dimension, QuantityError, exact_quantity, format_quantity, parse_quantity, unit_names,
+};
+use super::value::Value;
 
 /// What kind of value a parameter takes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -154,11 +108,11 @@ pub enum ValueFault {
     /// Not a whole number.
     #[error("is not a whole number")]
     NotWhole,
-    /// Not one of the choices; with the nearest, as errors quote it.
-    #[error("is not one of the choices{nearest}")]
+    /// Not one of the choices.
+    #[error("is not one of the choices{}", did_you_mean(*.nearest))]
     NoChoice {
-        /// In brackets, or empty.
-        nearest: String,
+        /// The nearest of them, if one is near.
+        nearest: Option<&'static str>,
     },
     /// A number where a choice is expected, or the like.
     #[error("is of the wrong kind")]
@@ -253,7 +207,7 @@ impl Parameter {
                     **choice == word || choice.strip_prefix('+') == Some(word.as_str())
                 });
                 let Some(choice) = found else {
-                    let nearest = nearest(text, words.iter().copied());
+                    let nearest = nearest_name(text, words.iter().copied());
                     return Err(self.refuse(ValueFault::NoChoice { nearest }));
                 };
                 Value::Choice(choice)
@@ -300,33 +254,4 @@ impl Parameter {
             _ => self.show(value),
         }
     }
-}
-
-/// The parameter table as a Markdown page.
-pub fn reference_page() -> String {
-    let mut page = String::from(
-        "# Scene parameters\n\nEvery key works in a scene file (a section and a name), as `--set key=value`, and in the window. \
-         A quantity is written with its unit, `0.3 mm` or `0.3mm`; a bare 0 needs none.\n\n\
-         | Key | Name | Default | Range | Unit | Where | Takes effect | What it is | Equation |\n|---|---|---|---|---|---|---|---|---|\n",
-    );
-    for parameter in table() {
-        let effect = if parameter.at_reset {
-            "at reset"
-        } else {
-            "at once"
-        };
-        let cells = [
-            format!("`{}`", parameter.key),
-            parameter.label.to_owned(),
-            parameter.show(&parameter.default),
-            parameter.range(),
-            parameter.units(),
-            parameter.scope.describe().to_owned(),
-            effect.to_owned(),
-            parameter.help.to_owned(),
-            parameter.equation.to_owned(),
-        ];
-        page.push_str(&format!("| {} |\n", cells.join(" | ")));
-    }
-    page
 }

@@ -103,11 +103,11 @@ impl Scene {
                     .keys(&scene)
                     .iter()
                     .find_map(|key| places.get(key))
-                    .map(|node| node.error(&*fault.message))
+                    .map(|node| node.error(fault.fault.to_string()))
             };
             let message = || SceneError {
                 file: file.map(str::to_owned),
-                message: fault.message.clone(),
+                message: fault.fault.to_string(),
                 ..Default::default()
             };
             fault
@@ -143,10 +143,6 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
                     .positive(Dimension::Length, 100.0, "m")
             };
             Some(Spcmm {
-                slider_plane: 0.0,
-                amplitude_x: 0.0,
-                amplitude_beta: 0.0,
-                frequency: 0.0,
                 mean_x: section
                     .require("mean_x", "\"203 mm\"")?
                     .quantity(Dimension::Length)?,
@@ -156,6 +152,7 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
                 hinge_radius: length("hinge_radius")?,
                 driving_rod: length("driving_rod")?,
                 driven_rod: length("driven_rod")?,
+                ..Spcmm::default()
             })
         }
     };

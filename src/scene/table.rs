@@ -1,4 +1,4 @@
-//! The rows of the parameter table.
+//! The single table of scene parameters: files, `--set`, sliders, tooltips and the reference page are derived from it.
 
 use super::field::{Access, Field, Held, SWITCH, field, optional_field};
 use super::{Dimension, Formulation, Kind, Parameter, Preset, Scene, Scope, SignedAxis, Value};
@@ -6,6 +6,8 @@ use crate::contact::{self, ApproachSpeed, FrictionLaw, FrictionVelocity, NormalL
 use crate::integrate::Method;
 use crate::words::Words;
 use Dimension as D;
+
+const DEFAULT: contact::Parameters = contact::Parameters::DEFAULT;
 
 /// Every parameter, in the order in which the interface lists them.
 pub fn table() -> &'static [Parameter] {
@@ -148,7 +150,7 @@ static TABLE: [Parameter; 28] = [
         field!(clearance),
         "Clearance",
         number(D::Length, 0.0, 1.0, "mm", (0.0, 1e-3)),
-        Value::Number(0.3e-3),
+        Value::Number(DEFAULT.clearance),
         "Radial gap c = R - r between socket and ball. With 0 the joint is ideal: a constraint instead of a contact. \
          It must stay below the ball radius. Larger gaps give longer free flights and harder impacts; at 0.01 mm and \
          below, the contact patch is no longer small against the ball, which Hertz's theory assumes.",
@@ -159,7 +161,7 @@ static TABLE: [Parameter; 28] = [
         field!(friction),
         "Friction coefficient",
         number(D::None, 0.0, 10.0, "", (0.0, 1.0)),
-        Value::Number(0.15),
+        Value::Number(DEFAULT.friction),
         "Coulomb coefficient cf of ball on socket. Steel on steel lies between 0.1 (oiled) and 0.8 (dry). With 0 \
          the rattling lasts much longer.",
         "Paper eq. (20)",
@@ -169,7 +171,7 @@ static TABLE: [Parameter; 28] = [
         field!(restitution),
         "Restitution",
         number(D::None, 0.0, 1.0, "", (0.0, 1.0)),
-        Value::Number(0.9),
+        Value::Number(DEFAULT.restitution),
         "Rebound speed over approach speed that the normal law is asked for: 1 loses no energy. The law of Lankarani \
          and Nikravesh is right only near 1 (asked for 0, it gives about 0.66); for low values choose flores or \
          gonthier, which divide by this number and refuse 0.",
@@ -180,7 +182,7 @@ static TABLE: [Parameter; 28] = [
         field!(youngs_modulus),
         "Young's modulus",
         logarithmic(D::Stress, 1e6, 1e12, "GPa", (1e9, 1e12)),
-        Value::Number(206e9),
+        Value::Number(DEFAULT.youngs_modulus),
         "Stiffness E of the material of ball and socket. Steel has 206 GPa. A softer material gives longer, gentler \
          impacts and deeper penetration, and lets the solver take larger steps.",
         "Paper eq. (19), stiffness K",
@@ -190,7 +192,7 @@ static TABLE: [Parameter; 28] = [
         field!(poisson_ratio),
         "Poisson's ratio",
         number(D::None, 0.0, 0.499, "", (0.0, 0.499)),
-        Value::Number(0.3),
+        Value::Number(DEFAULT.poisson_ratio),
         "Sideways shrinking of the material when stretched, nu. Metals have about 0.3. It changes the contact \
          stiffness by at most a third.",
         "Paper eq. (19), stiffness K",
@@ -200,7 +202,7 @@ static TABLE: [Parameter; 28] = [
         field!(ball_radius),
         "Ball radius",
         logarithmic(D::Length, 1e-4, 1.0, "mm", (1e-3, 0.1)),
-        Value::Number(0.010),
+        Value::Number(DEFAULT.ball_radius),
         "Radius r of the ball; the socket has R = r + c. A larger ball in the same gap fits more closely, so the \
          contact is stiffer.",
         "Paper eqs. (9), (12), (19)",
@@ -210,7 +212,7 @@ static TABLE: [Parameter; 28] = [
         field!(friction_velocity),
         "Friction velocity",
         Kind::Choice(FrictionVelocity::WORDS),
-        Value::Choice("surface"),
+        Value::Choice(DEFAULT.friction_velocity.word()),
         "Which sliding velocity friction reads. centres is the paper's: the relative velocity of the two centres, \
          which leaves out the turning of the ball. surface is what the contact feels: the relative velocity of the \
          two touching points. printed takes the points of (13) as printed, which do not turn with their bodies: \
@@ -223,7 +225,7 @@ static TABLE: [Parameter; 28] = [
         field!(slip_speed_low),
         "Low slip speed",
         logarithmic(D::Speed, 0.0, 1.0, "mm/s", (1e-7, 1e-3)),
-        Value::Number(1e-6),
+        Value::Number(DEFAULT.slip_speed_low),
         "v_a: below this sliding speed there is no friction, so that its direction never jumps at rest. It must stay \
          below the high slip speed.",
         "Paper eq. (21)",
@@ -233,7 +235,7 @@ static TABLE: [Parameter; 28] = [
         field!(slip_speed_high),
         "High slip speed",
         logarithmic(D::Speed, 1e-9, 10.0, "mm/s", (1e-5, 1e-1)),
-        Value::Number(1e-4),
+        Value::Number(DEFAULT.slip_speed_high),
         "v_theta: above this sliding speed friction is full; below it the joint counts as sticking. A smaller value \
          is closer to true sticking and stiffer to compute.",
         "Paper eq. (21)",
@@ -243,7 +245,7 @@ static TABLE: [Parameter; 28] = [
         field!(impact_speed_floor),
         "Impact speed floor",
         logarithmic(D::Speed, 1e-9, 10.0, "mm/s", (1e-5, 0.1)),
-        Value::Number(1e-3),
+        Value::Number(DEFAULT.impact_speed_floor),
         "Least approach speed that the damping term divides by. Without a floor the last, softest touches would be \
          infinitely stiff. A contact that begins more slowly than this rebounds higher than asked.",
         "Paper eq. (19), the speed at the start of contact",
@@ -253,7 +255,7 @@ static TABLE: [Parameter; 28] = [
         field!(approach_speed),
         "Approach speed",
         Kind::Choice(ApproachSpeed::WORDS),
-        Value::Choice("start"),
+        Value::Choice(DEFAULT.approach_speed.word()),
         "Which speed the damping term divides by. start is the paper's: the penetration rate at which the contact began. A \
          joint that touches softly and is then hit by its neighbour is damped many times too strongly by it. largest is \
          the largest rate of the contact so far, which keeps damping within what the law gives an undisturbed impact; \
@@ -265,7 +267,7 @@ static TABLE: [Parameter; 28] = [
         field!(normal_law),
         "Normal law",
         Kind::Choice(NormalLaw::WORDS),
-        Value::Choice("lankarani-nikravesh"),
+        Value::Choice(DEFAULT.normal_law.word()),
         "Normal force as a function of penetration and its rate. lankarani-nikravesh is the paper's; hertz is \
          elastic; hunt-crossley, flores and gonthier differ in their damping, and flores and gonthier suit low \
          restitution.",
@@ -276,7 +278,7 @@ static TABLE: [Parameter; 28] = [
         field!(friction_law),
         "Friction law",
         Kind::Choice(FrictionLaw::WORDS),
-        Value::Choice("modified-coulomb"),
+        Value::Choice(DEFAULT.friction_law.word()),
         "Friction force as a function of normal force and sliding velocity. modified-coulomb rises linearly between \
          the two slip speeds; none leaves friction out.",
         "Paper eqs. (20), (21)",
@@ -455,6 +457,35 @@ static TABLE: [Parameter; 28] = [
         "No equation: display only",
     ),
 ];
+
+/// The parameter table as a Markdown page.
+pub fn reference_page() -> String {
+    let mut page = String::from(
+        "# Scene parameters\n\nEvery key works in a scene file (a section and a name), as `--set key=value`, and in the window. \
+         A quantity is written with its unit, `0.3 mm` or `0.3mm`; a bare 0 needs none.\n\n\
+         | Key | Name | Default | Range | Unit | Where | Takes effect | What it is | Equation |\n|---|---|---|---|---|---|---|---|---|\n",
+    );
+    for parameter in table() {
+        let effect = if parameter.at_reset {
+            "at reset"
+        } else {
+            "at once"
+        };
+        let cells = [
+            format!("`{}`", parameter.key),
+            parameter.label.to_owned(),
+            parameter.show(&parameter.default),
+            parameter.range(),
+            parameter.units(),
+            parameter.scope.describe().to_owned(),
+            effect.to_owned(),
+            parameter.help.to_owned(),
+            parameter.equation.to_owned(),
+        ];
+        page.push_str(&format!("| {} |\n", cells.join(" | ")));
+    }
+    page
+}
 
 /// The row of a key (without a joint's name).
 pub(super) fn find(key: &str) -> Option<&'static Parameter> {

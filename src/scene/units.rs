@@ -3,8 +3,42 @@
 //! Decimal prefixes are applied to the decimal exponent of the text, not by a multiplication, so that
 //! "0.3 mm", "0.3mm" and "3e-4 m" are the same bits.
 
-use super::Dimension;
 use std::f64::consts::PI;
+
+/// Physical dimension of a quantity; determines the units it may be written in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Dimension {
+    /// A pure number.
+    None,
+    /// m
+    Length,
+    /// s
+    Time,
+    /// kg
+    Mass,
+    /// kg m^2
+    Inertia,
+    /// Pa
+    Stress,
+    /// rad
+    Angle,
+    /// m/s
+    Speed,
+    /// rad/s
+    AngularSpeed,
+    /// m/s^2
+    Acceleration,
+    /// Hz
+    Frequency,
+    /// N
+    Force,
+    /// N m
+    Torque,
+    /// N/m
+    Stiffness,
+    /// N s/m
+    Damping,
+}
 
 /// Why a text is not a quantity of the required dimension.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

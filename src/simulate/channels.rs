@@ -2,7 +2,7 @@
 
 mod table;
 
-pub use table::Quantity;
+pub use table::{PlotKind, Quantity};
 
 use super::Frame;
 use crate::scene::{JointKind, Scene};

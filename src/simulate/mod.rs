@@ -68,7 +68,7 @@ impl StartError {
                 let of_form = matches!(
                     self.0,
                     MechanismError::TooCostly {
-                        of: CostOf::Tree | CostOf::Lagrange,
+                        of: CostOf::Formulation(_),
                         ..
                     }
                 );

@@ -591,7 +591,7 @@ impl Simulation {
     }
 
     fn stopped(&self, fault: StopFault, advice: StopAdvice) -> Stopped {
-        let dependent = self.mechanism.least_pivot() < 1e-12;
+        let dependent = self.mechanism.has_dependent_rows();
         Stopped {
             time: self.state.now.t,
             fault,

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use glam::{Mat3, Vec3};
 use parry3d::shape::ConvexPolyhedron;
 
-use super::{Mesh, MeshData, to_f32, wear};
+use super::{Mesh, MeshData, to_f32, zones};
 use crate::scene::{Geometry, Role, Scene, Shape};
 use crate::simulate::{BodyMotion, Frame};
 
@@ -146,7 +146,7 @@ impl Pose {
 
 /// Shapes of `scene`, and the meshes that are not shared: the zones of wear maps, then its plates.
 pub(super) fn parts(scene: &Scene) -> (Vec<DrawnShape>, Vec<MeshData>) {
-    let mut meshes = wear::meshes();
+    let mut meshes = zones::meshes();
     let mut parts = Vec::new();
     let fixed = scene
         .fixed_shapes

@@ -5,32 +5,10 @@ use glam::{Mat3, Vec3};
 use super::arrows::push_error;
 use super::build::{self, push_solid};
 use super::instances::placed;
-use super::theme::Material;
+use super::theme::{Ghost, GhostLook, Material};
 use super::{Colour, DrawList, Mesh, Palette, SceneView, Shot, drawn, to_f32};
 use crate::scene::{Output, format_quantity_digits};
 use crate::simulate::Frame;
-
-/// Which other state a ghost shows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Ghost {
-    /// The neighbouring motion.
-    Twin,
-    /// The motion with every ball joint ideal.
-    Ideal,
-}
-
-/// How a ghost is drawn.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GhostLook {
-    /// Colour of its surfaces; full opacity applies along their edges.
-    pub fill: Colour,
-    /// Colour of its outline.
-    pub edge: Colour,
-    /// Outline width, points. The farther slice has the wider one: it shows around the nearer.
-    pub width: f32,
-    /// Depth slice that it is drawn in: 0 is in front of 1, and both in front of the machine, so that none interpenetrate.
-    pub slice: f32,
-}
 
 impl GhostLook {
     /// Surface and outline at visibility `seen`, 0 to 1.

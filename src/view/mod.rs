@@ -28,6 +28,7 @@ mod shot;
 mod tests;
 mod theme;
 mod wear;
+mod zones;
 
 pub use build::SceneView;
 pub use camera::{Camera, Preset};
@@ -35,12 +36,12 @@ pub use draw_list::{
     Background, DrawList, Eye, Floor, Instance, Label, LabelKind, Layer, Legend, Light, Line, Mesh,
     MeshData, Tick, WearScale,
 };
-pub use ghost::{Ghost, GhostLook, output_point};
+pub use ghost::output_point;
 pub use options::{ArrowOptions, Scaling, ViewOptions, WearMap};
 pub use peaks::{Mark, PeakMarks, SEEN};
 pub use pick::{Hit, Picked};
 pub use shot::Shot;
-pub use theme::{Colour, Palette, Theme};
+pub use theme::{Colour, Ghost, GhostLook, Palette, Theme};
 
 /// Converts a physics vector to the view's type.
 pub fn to_f32(v: &crate::scene::Vec3) -> glam::Vec3 {

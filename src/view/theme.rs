@@ -1,6 +1,5 @@
 //! Colours of the picture, light and dark. Colours are sRGB-encoded here; the shader linearises them.
 
-use super::{Ghost, GhostLook};
 use crate::scene::Role;
 
 /// Light or dark.
@@ -66,6 +65,28 @@ const fn material(rgb: u32, roughness: f32, metal: f32) -> Material {
         roughness,
         metal,
     }
+}
+
+/// Which other state a ghost shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ghost {
+    /// The neighbouring motion.
+    Twin,
+    /// The motion with every ball joint ideal.
+    Ideal,
+}
+
+/// How a ghost is drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GhostLook {
+    /// Colour of its surfaces; full opacity applies along their edges.
+    pub fill: Colour,
+    /// Colour of its outline.
+    pub edge: Colour,
+    /// Outline width, points. The farther slice has the wider one: it shows around the nearer.
+    pub width: f32,
+    /// Depth slice that it is drawn in: 0 is in front of 1, and both in front of the machine, so that none interpenetrate.
+    pub slice: f32,
 }
 
 const fn twin(fill: u32, opacity: f32, edge: u32) -> GhostLook {

@@ -1,5 +1,6 @@
 //! The arrows of the house point down: a module uses only what stands on lower floors.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Floors from the ground up; modules of one floor know nothing of each other.
@@ -141,34 +142,58 @@ fn line_of(code: &str, at: usize) -> usize {
     code[..at].matches('\n').count() + 1
 }
 
-/// Modules that stand first after `crate::` (or `jointplay::` in the entries), `{…}` lists included.
-fn uses(code: &str) -> Vec<(usize, &str)> {
-    let mut found = Vec::new();
-    for start in ["crate::", "jointplay::"] {
-        for (at, _) in code.match_indices(start) {
-            let after = &code[at + start.len()..];
-            if let Some(list) = after.strip_prefix('{') {
-                // Top-level items of the list.
-                let (mut depth, mut fresh) = (0, true);
-                for (offset, c) in list.char_indices() {
-                    match c {
-                        '{' => depth += 1,
-                        '}' if depth == 0 => break,
-                        '}' => depth -= 1,
-                        ',' if depth == 0 => fresh = true,
-                        c if fresh && depth == 0 && !c.is_whitespace() => {
-                            fresh = false;
-                            found.extend(words(&list[offset..]).next().map(|(_, word)| (at, word)));
-                        }
-                        _ => {}
-                    }
+/// The paths of the tree that `code` begins with, `{…}` lists and `*` included, and what follows it.
+fn tree<'c>(mut code: &'c str, start: &[&'c str], found: &mut Vec<Vec<&'c str>>) -> &'c str {
+    let mut path = start.to_vec();
+    loop {
+        code = code.trim_start();
+        if let Some(mut list) = code.strip_prefix('{') {
+            loop {
+                list = list.trim_start();
+                if let Some(rest) = list.strip_prefix('}') {
+                    return rest;
                 }
-            } else {
-                found.extend(words(after).next().map(|(_, word)| (at, word)));
+                let rest = tree(list, &path, found);
+                // Skips `as name`.
+                let rest = rest.trim_start_matches(|c| !matches!(c, ',' | '}'));
+                list = rest.strip_prefix(',').unwrap_or(rest);
+            }
+        }
+        let end = code
+            .find(|c: char| !(c.is_alphanumeric() || c == '_'))
+            .unwrap_or(code.len());
+        let end = if code.starts_with('*') { 1 } else { end };
+        path.extend((end > 0).then(|| &code[..end]));
+        match code[end..].strip_prefix("::") {
+            Some(rest) if end > 0 => code = rest,
+            _ => {
+                found.push(path);
+                return &code[end..];
             }
         }
     }
-    found
+}
+
+/// Every path that begins with one of the words `starts`, with its place.
+fn paths<'c>(code: &'c str, starts: &[&str]) -> Vec<(usize, Vec<&'c str>)> {
+    let mut all = Vec::new();
+    for (at, word) in words(code) {
+        let begins = !code[..at].ends_with("::") && code[at + word.len()..].starts_with("::");
+        if begins && starts.contains(&word) {
+            let mut found = Vec::new();
+            tree(&code[at..], &[], &mut found);
+            all.extend(found.into_iter().map(|path| (at, path)));
+        }
+    }
+    all
+}
+
+/// Modules that stand first after `crate::` (or `jointplay::` in the entries).
+fn uses(code: &str) -> Vec<(usize, &str)> {
+    let paths = paths(code, &["crate", "jointplay"]).into_iter();
+    paths
+        .filter_map(|(at, path)| Some((at, *path.get(1)?)))
+        .collect()
 }
 
 #[test]
@@ -201,6 +226,158 @@ fn modules_use_only_lower_floors() {
         arrows > 20,
         "only {arrows} arrows found: does the search still work?"
     );
+}
+
+/// What a module's code says, without its tests at the end.
+struct Module<'c> {
+    file: &'c str,
+    code: &'c str,
+    /// Names of its items.
+    items: BTreeSet<&'c str>,
+    /// Paths that it imports, as written.
+    imports: Vec<Vec<&'c str>>,
+}
+
+impl<'c> Module<'c> {
+    fn of(file: &'c str, code: &'c str) -> Self {
+        const KINDS: [&str; 8] = [
+            "fn",
+            "struct",
+            "enum",
+            "trait",
+            "type",
+            "const",
+            "static",
+            "macro_rules",
+        ];
+        let all: Vec<&str> = words(code).map(|(_, word)| word).collect();
+        let pairs = all.windows(2).filter(|pair| KINDS.contains(&pair[0]));
+        let mut imports = Vec::new();
+        for (at, word) in words(code).filter(|(_, word)| *word == "use") {
+            tree(&code[at + word.len()..], &[], &mut imports);
+        }
+        Self {
+            file,
+            code,
+            items: pairs.map(|pair| pair[1]).collect(),
+            imports,
+        }
+    }
+}
+
+/// Modules by their path from the root.
+struct Modules<'c>(BTreeMap<Vec<&'c str>, Module<'c>>);
+
+impl<'c> Modules<'c> {
+    /// A path written in `module` from the root; `None` if it leads to another crate.
+    fn absolute(&self, module: &[&'c str], path: &[&'c str]) -> Option<Vec<&'c str>> {
+        let climbs = path.iter().take_while(|word| **word == "super").count();
+        let above = &module[..module.len().checked_sub(climbs)?];
+        match *path.first()? {
+            "crate" => Some(path[1..].to_vec()),
+            "self" => Some([module, &path[1..]].concat()),
+            "super" => Some([above, &path[climbs..]].concat()),
+            child => {
+                let known = self.0.contains_key(&[module, &[child]].concat());
+                known.then(|| [module, path].concat())
+            }
+        }
+    }
+
+    /// The longest part of a path from the root that is a module.
+    fn module<'p>(&self, path: &'p [&'c str]) -> &'p [&'c str] {
+        let known = |end: &usize| self.0.contains_key(&path[..*end]);
+        &path[..(1..=path.len()).rev().find(known).unwrap_or(0)]
+    }
+
+    /// The module in which the item at a path from the root stands, through re-exports.
+    fn home(&self, path: &[&'c str], depth: usize) -> Option<Vec<&'c str>> {
+        let at = self.module(path);
+        let (module, Some(name)) = (self.0.get(at)?, path.get(at.len())) else {
+            return Some(at.to_vec());
+        };
+        if module.items.contains(name) {
+            return Some(at.to_vec());
+        }
+        module.imports.iter().find_map(|import| {
+            let mut target = self.absolute(at, import)?;
+            if target.pop_if(|last| *last == "*").is_some() {
+                target.push(name);
+            }
+            let named = depth > 0 && target.last() == Some(name);
+            named.then(|| self.home(&target, depth - 1)).flatten()
+        })
+    }
+
+    /// Modules whose items `module` names, each with the place where it does.
+    fn uses(&self, module: &[&'c str]) -> Vec<(usize, Vec<&'c str>)> {
+        let code = self.0[module].code;
+        let mut used = Vec::new();
+        for (at, path) in paths(code, &["crate", "super"]) {
+            let Some(mut target) = self.absolute(module, &path) else {
+                continue;
+            };
+            if target.pop_if(|last| *last == "*").is_none() {
+                let home = self.home(&target, 4);
+                used.push((at, home.unwrap_or_else(|| self.module(&target).to_vec())));
+                continue;
+            }
+            for (at, word) in words(code) {
+                let after = &code[at + word.len()..];
+                let name = word.starts_with(char::is_uppercase) || after.starts_with(['(', ':']);
+                let free = !code[..at].ends_with(['.', ':']) && !after.starts_with(": ");
+                if name && free {
+                    let item = [&target[..], &[word]].concat();
+                    used.extend(self.home(&item, 4).map(|home| (at, home)));
+                }
+            }
+        }
+        used
+    }
+}
+
+#[test]
+fn siblings_use_each_other_in_one_direction() {
+    let files = files();
+    let mut modules = Modules(BTreeMap::new());
+    for (_, file, code) in &files {
+        let (plain, _) = code
+            .split_once("#[cfg(test)]\nmod tests {")
+            .unwrap_or((code, ""));
+        let path = file.trim_end_matches(".rs").trim_end_matches("/mod");
+        modules
+            .0
+            .insert(path.split('/').collect(), Module::of(file, plain));
+    }
+    // (folder, user, used) with a place; what a folder shares with its parent does not count.
+    let mut arrows = BTreeMap::new();
+    for (user, module) in &modules.0 {
+        for (at, used) in modules.uses(user) {
+            let shared = user.iter().zip(&used).take_while(|(a, b)| a == b).count();
+            if let (Some(a), Some(b)) = (user.get(shared), used.get(shared)) {
+                let line = line_of(module.code, at);
+                let place = format!("src/{}:{line}: {a} uses {b}", module.file);
+                arrows.insert((&user[..shared], *a, *b), place);
+            }
+        }
+    }
+    assert!(
+        arrows.len() > 300,
+        "only {} arrows found: does the search still work?",
+        arrows.len()
+    );
+    // What nothing follows or nothing precedes is in no circle.
+    loop {
+        let before = arrows.len();
+        let users: BTreeSet<_> = arrows.keys().map(|&(of, a, _)| (of, a)).collect();
+        let used: BTreeSet<_> = arrows.keys().map(|&(of, _, b)| (of, b)).collect();
+        arrows.retain(|&(of, a, b), _| users.contains(&(of, b)) && used.contains(&(of, a)));
+        if arrows.len() == before {
+            break;
+        }
+    }
+    let places: Vec<String> = arrows.into_values().collect();
+    assert!(places.is_empty(), "in circles:\n{}", places.join("\n"));
 }
 
 #[test]
@@ -299,7 +476,7 @@ fn the_search_sees_through_comments_and_texts() {
     let text = "use crate::{scene::{A, app}, contact}; // crate::app\nlet s = \"crate::render\"; 'a' r#\"crate::cli\"# x.sin()";
     let code = code(text);
     let found: Vec<&str> = uses(&code).into_iter().map(|(_, word)| word).collect();
-    assert_eq!(found, ["scene", "contact"]);
+    assert_eq!(found, ["scene", "scene", "contact"]);
     assert!(code.contains("x.sin()") && !code.contains("render"));
     assert_eq!(line_of(&code, code.find("x.sin").unwrap()), 2);
 }

@@ -138,11 +138,12 @@ pub(super) fn meta(sweep: &Sweep) -> Map<String, Json> {
             "count": axis.count(),
         })
     });
-    let varies_period = grid
-        .axes()
-        .iter()
-        .any(|axis| axis.key() == "spcmm.frequency");
-    let period = drive_period(scene).ok().filter(|_| !varies_period);
+    // Any parameter that changes it does so from one end of its range to the other.
+    let [period, other] = [0, grid.points() - 1].map(|point| {
+        let scene = grid.scene(scene, point).ok()?;
+        drive_period(&scene).ok()
+    });
+    let period = period.filter(|_| period == other);
     let regimes = [
         Regime::Unclear,
         Regime::Periodic(1),

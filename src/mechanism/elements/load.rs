@@ -4,7 +4,7 @@ use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, poin
 use crate::mechanism::Powers;
 use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::model::Anchor;
-use crate::scene::{Element, Vec3};
+use crate::scene::{Element, LoadAxes, Vec3};
 
 struct Load {
     on: Anchor,
@@ -21,7 +21,7 @@ pub(super) fn make(element: &Element, anchors: &[Anchor]) -> Box<dyn SceneElemen
         on: anchors[0],
         force: element.vector("force"),
         torque: element.vector("torque"),
-        turns: element.choice("axes") == "body",
+        turns: element.choice::<LoadAxes>("axes") == LoadAxes::Body,
         omega: std::f64::consts::TAU * element.number("frequency"),
         phase: element.number("phase"),
     })

@@ -9,13 +9,62 @@ mod spring;
 pub(super) use contact::Contact;
 pub use contact::Gap;
 
-use super::Powers;
-use super::contacts::{Counts, Touching};
 use super::kinematics::{Kinematics, Wrench};
 use super::model::{Anchor, Model};
-use crate::contact::Stiffness;
+use crate::contact::{Memory, Stiffness};
 use crate::scene::{Attachment, Element, Mat3, Scene, Vec3};
 pub use pull::Pull;
+
+/// What decides which contacts carry a force.
+#[derive(Clone, Copy, Debug)]
+pub enum Touching<'a> {
+    /// The contact memory: the stepper locates the events at which it changes.
+    Located(&'a [Memory]),
+    /// Penetration, at every evaluation: for steppers without event location.
+    Immediate(&'a [Memory]),
+    /// No contact carries a force.
+    Nothing,
+}
+
+impl<'a> Touching<'a> {
+    /// By the memory if events are `located`, else by penetration.
+    pub fn by(located: bool, memory: &'a [Memory]) -> Self {
+        if located {
+            Self::Located(memory)
+        } else {
+            Self::Immediate(memory)
+        }
+    }
+
+    /// Memory of joint `j` if it may carry a force.
+    #[inline]
+    pub(in crate::mechanism) fn memory(self, j: usize) -> Option<&'a Memory> {
+        match self {
+            Self::Located(memory) => Some(&memory[j]).filter(|memory| memory.active),
+            Self::Immediate(memory) => Some(&memory[j]),
+            Self::Nothing => None,
+        }
+    }
+}
+
+/// Evaluation counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Of the equations of motion.
+    pub equations: u64,
+    /// Of all contacts at an instant: a scene without clearance makes none.
+    pub contacts: u64,
+    /// Of the friction of one contact: a scene without friction makes none.
+    pub friction: u64,
+}
+
+impl std::ops::AddAssign for Counts {
+    fn add_assign(&mut self, other: Self) {
+        self.equations += other.equations;
+        self.contacts += other.contacts;
+        self.friction += other.friction;
+    }
+}
 
 /// Motion of the bodies at `t`, s, and what decides which contacts carry a force.
 #[derive(Clone, Copy)]
@@ -71,6 +120,46 @@ pub struct ElementReport {
     pub force: Vec3,
     /// Torque on the body, N m, if the kind has one.
     pub torque: Option<Vec3>,
+}
+
+/// Powers at one instant, or their integrals over time (then in J).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Powers {
+    /// Supplied by the drives: actuator force times rate, W.
+    pub drive: f64,
+    /// Dissipated by the damping of the normal forces, W: (F_N - K delta^1.5) d(delta)/dt.
+    pub restitution: f64,
+    /// Dissipated by friction, W: -F_T . (velocity of the ball's point - velocity of the socket's point) (24).
+    pub friction: f64,
+    /// Supplied by ramping clearances, W: -F_N dc/dt + 2/5 dK/dt delta^2.5.
+    pub clearance: f64,
+    /// Dissipated by the dampers of force elements, W.
+    pub damping: f64,
+    /// Supplied by external loads, W.
+    pub external: f64,
+}
+
+/// A ball that presses against the wall of its socket.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Touch {
+    /// Unit vector from the socket's centre to the point of contact, in the axes of the socket's body.
+    pub direction: Vec3,
+    /// F_N, N.
+    pub normal_force: f64,
+    /// Power dissipated by friction, W.
+    pub friction_power: f64,
+}
+
+impl Powers {
+    /// Adds `weight` times `other`.
+    pub fn add(&mut self, weight: f64, other: &Self) {
+        self.drive += weight * other.drive;
+        self.restitution += weight * other.restitution;
+        self.friction += weight * other.friction;
+        self.clearance += weight * other.clearance;
+        self.damping += weight * other.damping;
+        self.external += weight * other.external;
+    }
 }
 
 /// Something that loads bodies depending on their motion and on time. Allocates nothing.

@@ -37,7 +37,21 @@ struct Plot {
     label: &'static str,
     /// Axis unit, and its value in SI units.
     unit: (&'static str, f64),
+    kind: PlotKind,
     help: &'static str,
+}
+
+/// What a plot shows of its channels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PlotKind {
+    /// A curve of each, over whatever range they have.
+    Curves,
+    /// The same over a range that begins at zero: none is ever negative.
+    FromZero,
+    /// The same with the clearances of the joints.
+    FromZeroWithClearances,
+    /// Bands stacked on both sides of zero.
+    Bands,
 }
 
 /// Every plot, in list order.
@@ -46,84 +60,98 @@ const PLOTS: &[Plot] = &[
         quantity: Q::NormalForce,
         label: "Normal force",
         unit: ("N", 1.0),
+        kind: PlotKind::FromZero,
         help: "Size of the normal force on each ball; of the whole reaction where a joint is ideal.",
     },
     Plot {
         quantity: Q::FrictionForce,
         label: "Friction force",
         unit: ("N", 1.0),
+        kind: PlotKind::FromZero,
         help: "Size of the friction force on each ball.",
     },
     Plot {
         quantity: Q::Eccentricity,
         label: "Eccentricity",
         unit: ("mm", 1e-3),
+        kind: PlotKind::FromZeroWithClearances,
         help: "Distance of each ball's centre from its socket's centre. Contact begins at the clearance.",
     },
     Plot {
         quantity: Q::Penetration,
         label: "Penetration",
         unit: ("µm", 1e-6),
+        kind: PlotKind::Curves,
         help: "How deep each ball presses into its socket; below zero there is a gap.",
     },
     Plot {
         quantity: Q::Position,
         label: "Position",
         unit: ("mm", 1e-3),
+        kind: PlotKind::Curves,
         help: "Origin of the output body in world axes.",
     },
     Plot {
         quantity: Q::Angles,
         label: "Angles",
         unit: ("mrad", 1e-3),
+        kind: PlotKind::Curves,
         help: "Angles α, β, γ of the output body.",
     },
     Plot {
         quantity: Q::Velocity,
         label: "Velocity",
         unit: ("m/s", 1.0),
+        kind: PlotKind::Curves,
         help: "Velocity of the output body's origin.",
     },
     Plot {
         quantity: Q::AngleRates,
         label: "Angle rates",
         unit: ("rad/s", 1.0),
+        kind: PlotKind::Curves,
         help: "Rates of the angles α, β, γ.",
     },
     Plot {
         quantity: Q::Acceleration,
         label: "Acceleration",
         unit: ("m/s²", 1.0),
+        kind: PlotKind::Curves,
         help: "Acceleration of the output body's origin.",
     },
     Plot {
         quantity: Q::AngleAccelerations,
         label: "Angle accelerations",
         unit: ("rad/s²", 1.0),
+        kind: PlotKind::Curves,
         help: "Second derivatives of the angles α, β, γ.",
     },
     Plot {
         quantity: Q::ActuatorForce,
         label: "Actuator force",
         unit: ("N", 1.0),
+        kind: PlotKind::Curves,
         help: "Force that each driven slide needs, positive along its axis.",
     },
     Plot {
         quantity: Q::ActuatorTorque,
         label: "Actuator torque",
         unit: ("N m", 1.0),
+        kind: PlotKind::Curves,
         help: "Torque that each driven hinge needs, positive about its axis.",
     },
     Plot {
         quantity: Q::Energy,
         label: "Energy",
         unit: ("mJ", 1e-3),
+        kind: PlotKind::Curves,
         help: "Kinetic, potential and elastic energy of the whole mechanism.",
     },
     Plot {
         quantity: Q::EnergyBalance,
         label: "Energy balance",
         unit: ("mJ", 1e-3),
+        kind: PlotKind::Bands,
         help: "Since the start: work of drives, gravity, moving clearances, changed parameters and loads from outside, loss \
                by restitution, friction and dampers, change of kinetic and elastic energy, and the residual, which is the \
                error of the integration.",
@@ -132,12 +160,14 @@ const PLOTS: &[Plot] = &[
         quantity: Q::ProbeError,
         label: "Probe error",
         unit: ("mm", 1e-3),
+        kind: PlotKind::Curves,
         help: "Probe tip minus the tip of the ideal mechanism at the same time.",
     },
     Plot {
         quantity: Q::TipError,
         label: "Tip error",
         unit: ("µm", 1e-6),
+        kind: PlotKind::FromZero,
         help: "Distance of the output point (the probe tip, or the output body's origin) from where ideal joints have it at the \
                same time. Recorded while the ideal ghost is on (key G).",
     },
@@ -168,6 +198,11 @@ impl Quantity {
     /// Axis unit, and its value in SI units.
     pub fn unit(self) -> (&'static str, f64) {
         self.plot().unit
+    }
+
+    /// What its plot shows of its channels.
+    pub fn kind(self) -> PlotKind {
+        self.plot().kind
     }
 
     /// A one-sentence description.

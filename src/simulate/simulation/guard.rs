@@ -1,7 +1,6 @@
 //! The divergence guard: what no accepted step may show.
 
 use super::{OPEN_LOOP, Simulation};
-use crate::scene::Formulation;
 use crate::simulate::StopFault;
 
 /// Speed beyond which a state is absurd, m/s and rad/s.
@@ -12,9 +11,6 @@ const LEFT_SOCKET: f64 = 0.1;
 const MOST_OVERSHOOT: f64 = 4.0;
 /// Stabilised constraints that are off by more than this no longer hold anything together, m.
 const MOST_DRIFT: f64 = 1e-3;
-/// Smallest pivot ratio of the constraints of the `lagrange` form: below it they determine the motion to fewer than four
-/// digits.
-const LEAST_PIVOT: f64 = 1e-12;
 
 impl Simulation {
     /// What is wrong with the step of size `h` just attempted, if anything.
@@ -26,9 +22,7 @@ impl Simulation {
         if !(drift <= MOST_DRIFT) {
             return Some(StopFault::Drift { drift });
         }
-        if self.running.formulation == Formulation::Lagrange
-            && !(self.mechanism.least_pivot() >= LEAST_PIVOT)
-        {
+        if self.mechanism.is_undetermined() {
             return Some(StopFault::SingularConstraints);
         }
         for j in 0..self.attempt.end.gaps.len() {

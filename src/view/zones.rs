@@ -1,0 +1,40 @@
+//! Meshes of the cells of a socket's inner face, for the wear map.
+
+use super::MeshData;
+use crate::simulate::{Edges, Grid};
+
+/// Largest part of a cell that is drawn flat, rad.
+const FLAT: f64 = 0.07;
+
+/// A mesh for each zone of the grid: its cell that begins at azimuth 0, on the unit sphere, seen from inside.
+pub(super) fn meshes() -> Vec<MeshData> {
+    let grid = Grid::of_sockets();
+    let zones = (0..).map_while(|zone| grid.zone(zone));
+    zones.map(|cells| patch(&grid.edges(cells.start))).collect()
+}
+
+fn patch(edges: &Edges) -> MeshData {
+    let Edges { polar, azimuth } = *edges;
+    let parts = |[from, to]: [f64; 2]| ((to - from) / FLAT).ceil() as u32;
+    let (rows, columns) = (parts(polar), parts(azimuth));
+    let mut mesh = MeshData::default();
+    for i in 0..=rows {
+        for k in 0..=columns {
+            let at = |[from, to]: [f64; 2], part: u32, parts: u32| {
+                from + (to - from) * f64::from(part) / f64::from(parts)
+            };
+            let (polar, azimuth) = (at(polar, i, rows), at(azimuth, k, columns));
+            let ((s, c), (sa, ca)) = (polar.sin_cos(), azimuth.sin_cos());
+            let [x, y, z] = [s * ca, s * sa, c].map(|part| part as f32);
+            mesh.vertices.push(([x, y, z, 0.0], [-x, -y, -z]));
+        }
+    }
+    for i in 0..rows {
+        for k in 0..columns {
+            let a = i * (columns + 1) + k;
+            let b = a + columns + 1;
+            mesh.indices.extend([a, a + 1, b, b, a + 1, b + 1]);
+        }
+    }
+    mesh
+}
