@@ -259,10 +259,7 @@ impl<'a> Block<'a> {
 
 fn tell_result(point: &mut SweptPoint, result: &PointResult) {
     let finite = |value: f64| value.is_finite().then_some(value);
-    point.regime = match result.regime.period() {
-        0 => result.regime.word().to_owned(),
-        n => format!("{} {n}", result.regime.word()),
-    };
+    point.regime = result.regime.to_string();
     point.regime_code = result.regime.code();
     point.exponent = result
         .evidence

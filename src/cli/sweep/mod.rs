@@ -143,14 +143,7 @@ pub(super) fn meta(sweep: &Sweep) -> Map<String, Json> {
         .iter()
         .any(|axis| axis.key() == "spcmm.frequency");
     let period = drive_period(scene).ok().filter(|_| !varies_period);
-    let regimes = [
-        Regime::Unclear,
-        Regime::Periodic(1),
-        Regime::QuasiPeriodic,
-        Regime::Chaotic,
-        Regime::NotSettled,
-    ];
-    let mut words: Map<String, Json> = regimes
+    let mut words: Map<String, Json> = Regime::ALL
         .iter()
         .map(|regime| (regime.code().to_string(), json!(regime.word())))
         .collect();
