@@ -613,7 +613,7 @@ mod tests {
         for (run, (forces, last, [x, beta], deviation)) in found.runs.iter_mut().zip(runs) {
             let response = &mut run.response;
             response.full.normal = forces.to_vec();
-            response.last_separation = vec![0.01, last];
+            response.last_separation = vec![Some(0.01), Some(last)];
             response.full.acceleration[0] = x;
             response.full.acceleration[4] = beta;
             response.full.deviation[0] = deviation;
@@ -667,7 +667,7 @@ mod tests {
                 *values = [size; 6];
             }
             response.full.normal = vec![size];
-            response.last_separation = vec![size];
+            response.last_separation = vec![Some(size)];
         };
         for (case, size) in [2.0, 3.0, 4.0, 1.0, 3.0].into_iter().enumerate() {
             grow(&mut found, case, size);

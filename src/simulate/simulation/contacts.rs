@@ -141,7 +141,7 @@ impl Simulation {
                 let coarse = fixed && steps < least;
                 state.record.statistics.coarse[j] += u64::from(coarse);
                 state.now.memory[j] = Memory::default();
-                state.record.statistics.last_separation[j] = state.now.t;
+                state.record.statistics.last_separation[j] = Some(state.now.t);
             }
         }
         switched
