@@ -4,10 +4,10 @@ use std::ops::ControlFlow;
 
 use serde::{Deserialize, Serialize};
 
-use super::{AnalysisError, RunContext};
 use super::presets::{self, Measured};
 use super::source::{SceneSource, TaskFault};
 use super::swept::{self, Range, SweepMessage, SweepTask, SweptPoint};
+use super::{AnalysisError, RunContext};
 use crate::scene::Preset;
 
 /// What to compute.

@@ -24,6 +24,7 @@ pub use impacts::Impact;
 pub use ledger::Ledger;
 pub use pace::{LARGEST_BUDGET, LONGEST_FRAME, Pacer, SCALE_RANGE};
 pub use simulation::ideal::{ProbeFault, closed};
+pub use simulation::live::ChangeError;
 pub use simulation::{CLEARANCE_SPEED, LARGEST_DENSE, LARGEST_IMPLICIT, Simulation};
 pub use stopped::{StopAdvice, StopFault, Stopped};
 pub use wear::{Cell, Edges, Grid, Wear};

@@ -9,7 +9,7 @@ mod doubts;
 mod energy;
 mod guard;
 pub mod ideal;
-mod live;
+pub(super) mod live;
 mod sample;
 mod search;
 mod snapshot;

@@ -199,7 +199,9 @@ impl Diagram {
             .iter()
             .map(|(regime, colour)| {
                 let points = swept.points.iter().flatten();
-                let count = points.filter(|point| point.regime_code == regime.code()).count();
+                let count = points
+                    .filter(|point| point.regime_code == regime.code())
+                    .count();
                 let help = "Kind of motion, and at how many values it was found";
                 (count, regime.word(), theme::series(*colour, dark), help)
             })
