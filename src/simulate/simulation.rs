@@ -658,8 +658,8 @@ impl Simulation {
 fn store_gaps(mechanism: &Mechanism, out: &mut [Approach]) {
     for (out, gap) in out.iter_mut().zip(mechanism.contacts.gaps()) {
         *out = Approach {
-            penetration: gap.penetration,
-            rate: gap.rate,
+            penetration: gap.separation.penetration,
+            rate: gap.separation.rate,
             speed: gap.eccentricity_rate.norm(),
         };
     }

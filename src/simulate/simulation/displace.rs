@@ -28,14 +28,14 @@ impl Simulation {
                 state.now.memory[j].approach_piece,
             ) = (FrictionPiece::Unsplit, ApproachPiece::Unsplit);
             let gap = *mechanism.contacts.gap(j);
-            let touching = gap.penetration > 0.0;
+            let touching = gap.separation.penetration > 0.0;
             if touching == state.now.memory[j].active {
                 continue;
             }
             state.now.memory[j] = if touching {
                 state.control.contact_began = true;
                 state.control.h_next = state.control.h_next.min(state.control.h_contact);
-                Memory::begun(mechanism.contacts.coefficients(j), gap.rate)
+                Memory::begun(mechanism.contacts.coefficients(j), gap.separation.rate)
             } else {
                 Memory::default()
             };

@@ -196,7 +196,7 @@ impl Simulation {
         mechanism.measure(state.now.t, &state.now.y);
         let now = mechanism.contacts.clearance(j);
         let gap = *mechanism.contacts.gap(j);
-        let distance = gap.penetration + now;
+        let distance = gap.separation.penetration + now;
         let clearance = if contact.clearance < now && distance > contact.clearance {
             let ramp = Ramp {
                 start: state.now.t,

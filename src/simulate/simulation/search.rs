@@ -78,7 +78,7 @@ impl Simulation {
                     continue;
                 }
                 let gap = self.mechanism.contacts.gap(j);
-                let (normal, size, friction) = (gap.normal, gap.normal_force, gap.friction);
+                let (normal, size, friction) = (gap.separation.normal, gap.normal_force, gap.friction);
                 if self.is_peak(j, size, time) {
                     self.peaks[j].normal_force = normal * -size;
                     self.peaks[j].friction_force = friction;
