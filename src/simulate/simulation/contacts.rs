@@ -185,14 +185,9 @@ impl Simulation {
             }
             if force > peaks[j].normal {
                 let gap = mechanism.contacts.gap(j);
-                let n = if gap.eccentricity.norm() > 0.0 {
-                    gap.eccentricity.normalize()
-                } else {
-                    gap.eccentricity
-                };
                 peaks[j].normal = force;
                 peaks[j].time = time;
-                peaks[j].normal_force = n * -force;
+                peaks[j].normal_force = gap.separation.normal * -force;
                 // Friction follows the normal force within a step: the ratio at the step's end is used for the peak.
                 peaks[j].friction_force = if gap.normal_force > 0.0 {
                     gap.friction * (force / gap.normal_force)
