@@ -284,7 +284,7 @@ impl Simulation {
         self.mechanism.measure(self.state.now.t, &self.state.now.y);
         for j in 0..self.state.now.memory.len() {
             if self.mechanism.contacts.has_clearance(j)
-                && self.mechanism.contacts.gap(j).penetration > 0.0
+                && self.mechanism.contacts.gap(j).separation.penetration > 0.0
             {
                 let coefficients = self.mechanism.contacts.coefficients(j);
                 self.state.now.memory[j] = Memory::begun(coefficients, f64::NEG_INFINITY);

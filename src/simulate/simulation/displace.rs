@@ -1,7 +1,7 @@
 //! Perturbing the state: for a twin run and its renormalisation.
 
 use super::Simulation;
-use crate::contact::{ApproachPiece, FrictionPiece, Memory};
+use crate::contact::Memory;
 
 impl Simulation {
     /// Adds `offset` to coordinates and velocities (ordered as in [`Self::state`]) and continues from there: quaternions
@@ -23,10 +23,7 @@ impl Simulation {
                 continue;
             }
             // The offset may lie beyond a corner of the laws.
-            (
-                state.now.memory[j].friction_piece,
-                state.now.memory[j].approach_piece,
-            ) = (FrictionPiece::Unsplit, ApproachPiece::Unsplit);
+            state.now.memory[j] = state.now.memory[j].unsplit();
             let gap = *mechanism.contacts.gap(j);
             let touching = gap.separation.penetration > 0.0;
             if touching == state.now.memory[j].active {
