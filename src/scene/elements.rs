@@ -42,6 +42,8 @@ pub struct ElementKind {
     pub acts_by: &'static [&'static str],
     /// Its choices: key, words with the default first, help.
     pub choices: &'static [(&'static str, &'static [&'static str], &'static str)],
+    /// Largest force at its points that its own values give, N: without what the motion adds.
+    pub force: fn(&Element) -> f64,
 }
 
 /// A force element of a scene, according to its row.
@@ -103,6 +105,7 @@ pub static ELEMENT_KINDS: [ElementKind; 2] = [
         vectors: &[],
         acts_by: &["stiffness", "damping", "preload"],
         choices: &[],
+        force: |spring| spring.number("preload").abs(),
     },
     ElementKind {
         section: "load",
@@ -136,6 +139,7 @@ pub static ELEMENT_KINDS: [ElementKind; 2] = [
             &["world", "body"],
             "whether force and torque keep to the world's axes or turn with the body",
         )],
+        force: |load| load.vector("force").norm(),
     },
 ];
 
