@@ -82,7 +82,9 @@ const JOINT: [OfJoint; 6] = [
     ("mean_N", false, |joint| joint.mean),
     ("impacts", true, |joint| joint.impacts as f64),
     ("impacts_kept", true, |joint| joint.impacts_kept as f64),
-    ("last_separation_s", false, |joint| joint.last_separation),
+    ("last_separation_s", false, |joint| {
+        joint.last_separation.unwrap_or(f64::NAN)
+    }),
 ];
 
 /// A value that only a point that reached its end has.

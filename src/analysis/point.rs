@@ -47,8 +47,8 @@ pub struct JointResult {
     pub impacts: u64,
     /// Contacts begun in the kept periods.
     pub impacts_kept: u64,
-    /// Time from the point's start to the last separation, s; NaN without one.
-    pub last_separation: f64,
+    /// Time from the point's start to the last separation, if any, s.
+    pub last_separation: Option<f64>,
 }
 
 /// Result of a point.
@@ -226,20 +226,15 @@ impl PointRun {
         let statistics = simulation.statistics();
         let span = self.means.span;
         let joints = (0..self.peaks.len())
-            .map(|j| {
-                let separation = statistics.last_separation[j];
-                JointResult {
-                    peak: self.peaks[j].normal.max(self.transient_peaks[j]),
-                    peak_kept: self.peaks[j].normal,
-                    mean: self.means.normal[j] / span,
-                    impacts: statistics.impacts[j] - self.impacts_at_start[j],
-                    impacts_kept: statistics.impacts[j] - self.impacts_at_discard[j],
-                    last_separation: if separation > self.started {
-                        separation - self.started
-                    } else {
-                        f64::NAN
-                    },
-                }
+            .map(|j| JointResult {
+                peak: self.peaks[j].normal.max(self.transient_peaks[j]),
+                peak_kept: self.peaks[j].normal,
+                mean: self.means.normal[j] / span,
+                impacts: statistics.impacts[j] - self.impacts_at_start[j],
+                impacts_kept: statistics.impacts[j] - self.impacts_at_discard[j],
+                last_separation: statistics.last_separation[j]
+                    .filter(|&time| time > self.started)
+                    .map(|time| time - self.started),
             })
             .collect();
         let known = self.means.probe_now.filter(|_| !self.means.probe_lost);
@@ -279,7 +274,6 @@ impl PointResult {
             peak: f64::NAN,
             peak_kept: f64::NAN,
             mean: f64::NAN,
-            last_separation: f64::NAN,
             ..JointResult::default()
         };
         let (regime, evidence) = classify(&[], &[1.0], 1.0, None);

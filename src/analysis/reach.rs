@@ -169,7 +169,7 @@ fn run_to(
         false
     };
     let ended = stretch(&mut simulation, end, &Effort::REFERENCE, context, look)?;
-    done(ended, &mut simulation)?;
+    done(ended)?;
     Ok(simulation)
 }
 

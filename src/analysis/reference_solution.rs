@@ -221,7 +221,7 @@ impl ReferenceSolution {
     ) -> Result<(Vec<f64>, Vec3), AnalysisError> {
         let mut simulation = setting.start(&self.scene)?;
         let (end, peaks, position) = self.look(&mut simulation, &Effort::REFERENCE, context)?;
-        done(end, &mut simulation)?;
+        done(end)?;
         Ok((peaks, position.unwrap_or_default()))
     }
 
@@ -439,14 +439,14 @@ impl MeanForces {
 }
 
 /// The reference must reach its end; the error says why it did not.
-pub(super) fn done(end: End, simulation: &mut Simulation) -> Result<(), AnalysisError> {
+pub(super) fn done(end: End) -> Result<(), AnalysisError> {
     match end {
         End::Reached => Ok(()),
         End::Capped => Err(AnalysisError::TooLong {
             evaluations: Effort::REFERENCE.evaluations,
         }),
-        // Stepping again returns the guard's error.
-        End::Stopped(_) => Ok(simulation.step()?),
+        End::Stopped(stopped) => Err(stopped.into()),
+        End::Refused(refused) => Err(refused.into()),
     }
 }
 
@@ -506,7 +506,7 @@ fn first_contacts(
     match end {
         // A large scene may be capped before its sixth impact: those until then are compared.
         End::Capped if !contacts.is_empty() => {}
-        end => done(end, &mut simulation)?,
+        end => done(end)?,
     }
     let last = simulation.time();
     // A contact that has not ended by then cannot be compared to its end.

@@ -23,6 +23,15 @@ pub enum Regime {
 }
 
 impl Regime {
+    /// Every regime in the order of its code; what is periodic has period 1.
+    pub const ALL: [Self; 5] = [
+        Self::Unclear,
+        Self::Periodic(1),
+        Self::QuasiPeriodic,
+        Self::Chaotic,
+        Self::NotSettled,
+    ];
+
     /// Its word for people and files.
     pub fn word(self) -> &'static str {
         match self {
@@ -45,11 +54,31 @@ impl Regime {
         }
     }
 
+    /// The regime with this code in files, and with this period if it has one; `None` for a point that did not reach its end.
+    pub fn of_code(code: i64, period: usize) -> Option<Self> {
+        let found = Self::ALL.into_iter().find(|regime| regime.code() == code);
+        found.map(|regime| match regime {
+            Self::Periodic(_) => Self::Periodic(period),
+            other => other,
+        })
+    }
+
     /// Intervals after which it repeats; 0 if it does not.
     pub fn period(self) -> usize {
         match self {
             Self::Periodic(n) => n,
             _ => 0,
+        }
+    }
+}
+
+impl std::fmt::Display for Regime {
+    /// Its word, and its period if it has one.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.word())?;
+        match self {
+            Self::Periodic(n) => write!(f, " {n}"),
+            _ => Ok(()),
         }
     }
 }

@@ -81,8 +81,8 @@ pub struct Response {
     pub full: Extremes,
     /// Only at whole multiples of the sampling interval, as a solver with that output step would report.
     pub sampled: Extremes,
-    /// Time of the last separation of each joint, s; NaN if there was none.
-    pub last_separation: Vec<f64>,
+    /// Time of the last separation of each joint, if any, s.
+    pub last_separation: Vec<Option<f64>>,
     /// Largest constraint violation of the `lagrange` form, m or rad.
     pub constraint_drift: f64,
 }
@@ -262,7 +262,7 @@ mod tests {
         assert!((response.full.acceleration[0] - pi * pi / 40.0).abs() < 1e-6);
         assert!((response.sampled.rate[4] - pi / 40.0).abs() < 1e-9);
         assert!(response.full.deviation.iter().all(|d| *d < 1e-9));
-        assert!(response.last_separation.iter().all(|t| t.is_nan()));
+        assert!(response.last_separation.iter().all(Option::is_none));
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use crate::scene::SceneError;
-use crate::simulate::{StartError, Stopped};
+use crate::simulate::{ChangeError, StartError, Stopped};
 
 /// Clock and progress callback from the caller of an analysis: the command line, a background thread, a worker in a browser.
 pub struct RunContext<'a> {
@@ -71,6 +71,9 @@ pub enum AnalysisError {
     /// A setting that the scene does not accept.
     #[error(transparent)]
     Setting(#[from] SceneError),
+    /// A setting that the running simulation does not accept.
+    #[error(transparent)]
+    Change(#[from] ChangeError),
     /// The divergence guard stopped the reference run.
     #[error("the reference run cannot be made: {0}")]
     Stopped(#[from] Stopped),

@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::AnalysisError;
+use super::grid::RangeError;
+use super::sweep::SweepError;
 use crate::scene::{Scene, SceneError};
 
 /// A scene in transferable form: text and changes, from which it is parsed again.
@@ -36,22 +38,27 @@ impl SceneSource {
 }
 
 /// Why there is no result.
+#[derive(Debug, thiserror::Error)]
 pub(super) enum TaskFault {
-    Cancelled,
-    Said(String),
-}
-
-impl From<AnalysisError> for TaskFault {
-    fn from(error: AnalysisError) -> Self {
-        match error {
-            AnalysisError::Cancelled => Self::Cancelled,
-            other => Self::Said(other.to_string()),
-        }
-    }
-}
-
-impl From<SceneError> for TaskFault {
-    fn from(error: SceneError) -> Self {
-        Self::Said(error.to_string())
-    }
+    #[error(transparent)]
+    Analysis(#[from] AnalysisError),
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    #[error(transparent)]
+    Range(#[from] RangeError),
+    #[error(transparent)]
+    Sweep(#[from] SweepError),
+    #[error("drive phase {0}: allowed 0 to below 1 period")]
+    Phase(f64),
+    #[error(
+        "{points} points with {kept} kept sections each are more than the window draws ({most} sections): take fewer values or \
+         periods, or run `jointplay sweep`"
+    )]
+    TooManySections {
+        points: usize,
+        kept: usize,
+        most: usize,
+    },
+    #[error("no preset is called {0}")]
+    NoPreset(String),
 }

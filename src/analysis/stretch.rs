@@ -1,9 +1,11 @@
 //! A stretch of stepping under a cap on work, timed piece by piece.
 
-use serde::Serialize;
+use std::fmt::Display;
+
+use serde::{Serialize, Serializer};
 
 use super::{AnalysisError, RunContext};
-use crate::simulate::Simulation;
+use crate::simulate::{Simulation, StartError, Stopped};
 
 /// Steps between two checks of the clock, the cap and cancellation.
 const STEPS_IN_A_PIECE: u32 = 32;
@@ -62,8 +64,27 @@ pub enum End {
     Reached,
     /// It reached the cap on work.
     Capped,
-    /// The divergence guard stopped it, for this reason.
-    Stopped(String),
+    /// The divergence guard stopped it.
+    #[serde(serialize_with = "as_words")]
+    Stopped(Stopped),
+    /// The method refused the scene, say one too large for its matrices; in files it is stopped, too.
+    #[serde(rename = "stopped", serialize_with = "as_words")]
+    Refused(StartError),
+}
+
+impl End {
+    /// Why it was stopped or refused, if it was.
+    pub fn fault(&self) -> Option<&dyn Display> {
+        match self {
+            Self::Reached | Self::Capped => None,
+            Self::Stopped(why) => Some(why),
+            Self::Refused(why) => Some(why),
+        }
+    }
+}
+
+fn as_words<S: Serializer>(fault: &impl Display, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(fault)
 }
 
 /// Steps `simulation` to exactly `end`; `seen` is called after every step and returns whether that is enough.
@@ -99,7 +120,7 @@ fn run_until_timed(
         match outcome {
             Ok(true) => return Ok(End::Reached),
             Ok(false) => {}
-            Err(stopped) => return Ok(End::Stopped(stopped.to_string())),
+            Err(stopped) => return Ok(End::Stopped(stopped)),
         }
         context.go_on(0.0)?;
         if simulation.statistics().evaluations > most || now > deadline {
@@ -114,7 +135,7 @@ fn some_steps(
     simulation: &mut Simulation,
     end: f64,
     seen: &mut impl FnMut(&mut Simulation) -> bool,
-) -> Result<bool, crate::simulate::Stopped> {
+) -> Result<bool, Stopped> {
     for _ in 0..STEPS_IN_A_PIECE {
         if simulation.time() >= end {
             return Ok(true);

@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 
 use serde::{Deserialize, Serialize};
 
+use super::AnalysisError;
 use super::drive::drive_period;
 use super::grid::{Grid, ParameterRange, Start};
 use super::point::{Plan, PointResult};
@@ -97,14 +98,14 @@ pub(super) fn run(
 ) -> Result<(), TaskFault> {
     let mut say = |message| match tell(message) {
         ControlFlow::Continue(()) => Ok(()),
-        ControlFlow::Break(()) => Err(TaskFault::Cancelled),
+        ControlFlow::Break(()) => Err(AnalysisError::Cancelled),
     };
     let scene = task.scene.scene()?;
     let axes = task
         .vary
         .iter()
         .map(|text| ParameterRange::parse(&scene, text));
-    let axes = axes.collect::<Result<Vec<_>, _>>().map_err(said)?;
+    let axes = axes.collect::<Result<Vec<_>, _>>()?;
     let ranges = axes.iter().map(|axis| Range {
         key: axis.key().to_owned(),
         from: axis.value(0),
@@ -113,10 +114,7 @@ pub(super) fn run(
     });
     let ranges: Vec<Range> = ranges.collect();
     if !(0.0..1.0).contains(&task.phase) {
-        return Err(TaskFault::Said(format!(
-            "drive phase {}: allowed 0 to below 1 period",
-            task.phase
-        )));
+        return Err(TaskFault::Phase(task.phase));
     }
     let plan = Plan {
         periods: task.periods,
@@ -124,16 +122,16 @@ pub(super) fn run(
         phase: task.phase,
         exponent: task.exponent,
     };
-    let grid = Grid::new(&scene, axes, task.start).map_err(said)?;
+    let grid = Grid::new(&scene, axes, task.start)?;
     let kept = task.periods.saturating_sub(task.discard);
     if kept.saturating_mul(grid.points()) > MOST_SECTIONS {
-        return Err(TaskFault::Said(format!(
-            "{} points with {kept} kept sections each are more than the window draws ({MOST_SECTIONS} sections): take fewer \
-             values or periods, or run `jointplay sweep`",
-            grid.points()
-        )));
+        return Err(TaskFault::TooManySections {
+            points: grid.points(),
+            kept,
+            most: MOST_SECTIONS,
+        });
     }
-    let sweep = Sweep::new(scene, grid, plan).map_err(said)?;
+    let sweep = Sweep::new(scene, grid, plan)?;
     say(SweepMessage::Ranges(ranges))?;
     let blocks = sweep.grid().blocks();
     let mut through = 0;
@@ -155,10 +153,6 @@ pub(super) fn run(
         }
     }
     Ok(())
-}
-
-fn said(error: impl ToString) -> TaskFault {
-    TaskFault::Said(error.to_string())
 }
 
 /// 0 to n - 1, each number once: the ends, then the midpoints of the gaps, and so on.
@@ -265,10 +259,7 @@ impl<'a> Block<'a> {
 
 fn tell_result(point: &mut SweptPoint, result: &PointResult) {
     let finite = |value: f64| value.is_finite().then_some(value);
-    point.regime = match result.regime.period() {
-        0 => result.regime.word().to_owned(),
-        n => format!("{} {n}", result.regime.word()),
-    };
+    point.regime = result.regime.to_string();
     point.regime_code = result.regime.code();
     point.exponent = result
         .evidence

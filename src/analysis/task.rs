@@ -4,10 +4,10 @@ use std::ops::ControlFlow;
 
 use serde::{Deserialize, Serialize};
 
-use super::RunContext;
 use super::presets::{self, Measured};
 use super::source::{SceneSource, TaskFault};
 use super::swept::{self, Range, SweepMessage, SweepTask, SweptPoint};
+use super::{AnalysisError, RunContext};
 use crate::scene::Preset;
 
 /// What to compute.
@@ -64,8 +64,8 @@ pub fn perform(
     };
     let last = match outcome {
         Ok(()) => Message::Done,
-        Err(TaskFault::Cancelled) => return,
-        Err(TaskFault::Said(words)) => Message::Failed(words),
+        Err(TaskFault::Analysis(AnalysisError::Cancelled)) => return,
+        Err(fault) => Message::Failed(fault.to_string()),
     };
     // Nothing follows that could be cancelled.
     let _ = tell(last);
@@ -82,7 +82,7 @@ fn measure_presets(
         .iter()
         .map(|word| {
             let found = Preset::ALL.into_iter().find(|preset| preset.word() == word);
-            found.ok_or_else(|| TaskFault::Said(format!("no preset is called {word}")))
+            found.ok_or_else(|| TaskFault::NoPreset(word.clone()))
         })
         .collect::<Result<_, _>>()?;
     let mut progress = |done| tell(Message::Progress(done));
@@ -91,7 +91,7 @@ fn measure_presets(
     let message = Message::Presets(words.iter().cloned().zip(measured).collect());
     match tell(message) {
         ControlFlow::Continue(()) => Ok(()),
-        ControlFlow::Break(()) => Err(TaskFault::Cancelled),
+        ControlFlow::Break(()) => Err(AnalysisError::Cancelled.into()),
     }
 }
 

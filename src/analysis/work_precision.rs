@@ -178,13 +178,12 @@ pub(super) fn measure(
 ) -> Result<Point, AnalysisError> {
     let (end, mut errors, work) = match reference.impacts_of(&setting, effort, context) {
         Ok(found) => found,
-        // A method may refuse a scene, say one too large for its matrices.
         Err(AnalysisError::Start(refused)) => {
-            let end = End::Stopped(refused.to_string());
+            let (end, none) = (End::Refused(refused), PhaseCost::default());
             return Ok(Point {
                 setting,
                 preset: None,
-                impacts: phase(end, reference.span, None, &PhaseCost::default()),
+                impacts: phase(end, reference.span, None, &none),
                 settled: None,
                 errors: Errors::default(),
             });

@@ -15,7 +15,7 @@ use super::{keys, theme, value};
 use crate::scene::{
     Kind, Parameter, SceneError, Scope, Value, format_quantity_digits, from_display, to_display,
 };
-use crate::simulate::Effect;
+use crate::simulate::{ChangeError, Effect};
 
 /// Shown with the accuracy that it gives.
 const PRESET: &str = "solver.preset";
@@ -437,15 +437,26 @@ impl Controls {
     }
 
     /// An accepted value clears its draft; a rejected one stays, with the reason.
-    fn settle(&mut self, key: &str, text: &str, done: Result<Effect, SceneError>) {
+    fn settle(&mut self, key: &str, text: &str, done: Result<Effect, ChangeError>) {
         match done {
             Ok(Effect::Now | Effect::AtReset) => {
                 self.drafts.remove(key);
             }
             Err(error) => {
-                let reason = match &error.value {
-                    Some(value) => format!("{value}: {}", error.message),
-                    None => error.message,
+                // The control shows which key it is.
+                let reason = match error {
+                    ChangeError::Scene(SceneError {
+                        value: Some(value),
+                        message,
+                        ..
+                    }) => {
+                        format!("{value}: {message}")
+                    }
+                    ChangeError::Scene(error) => error.message,
+                    ChangeError::Method(error) => error.to_string(),
+                    pull @ (ChangeError::NoBody { .. } | ChangeError::TooFar { .. }) => {
+                        pull.to_string()
+                    }
                 };
                 let draft = Draft {
                     text: text.to_owned(),

@@ -14,10 +14,10 @@ use super::settled::Settling;
 use super::twin::Twin;
 use super::watch::RunWatch;
 use crate::analysis::section::Schedule;
-use crate::scene::{SOLVER_KEYS, Scene, SceneError, Value};
+use crate::scene::{SOLVER_KEYS, Scene, Value};
 use crate::simulate::{
-    Channels, Effect, Frame, History, Pacer, Peak, Pull, RECORDED_JOINTS, Simulation, StartError,
-    Stopped, Wear,
+    ChangeError, Channels, Effect, Frame, History, Pacer, Peak, Pull, RECORDED_JOINTS, Simulation,
+    StartError, Stopped, Wear,
 };
 use contact_history::ContactHistory;
 use keyframes::Keyframes;
@@ -440,7 +440,7 @@ impl Player {
     ///
     /// # Errors
     /// As [`Simulation::set`]; nothing has changed then.
-    pub fn set(&mut self, key: &str, value: &str) -> Result<Effect, SceneError> {
+    pub fn set(&mut self, key: &str, value: &str) -> Result<Effect, ChangeError> {
         if self.has_future() {
             // A refused change must not abandon the future.
             self.wanted().clone().set(key, value)?;
@@ -451,7 +451,7 @@ impl Player {
         Ok(effect)
     }
 
-    fn apply_set(&mut self, key: &str, value: &str) -> Result<Effect, SceneError> {
+    fn apply_set(&mut self, key: &str, value: &str) -> Result<Effect, ChangeError> {
         let effect = self.change(|run| run.set(key, value))?;
         if key == "solver.preset" {
             // A preset chosen here must take effect: it replaces solver keys set by name before.
@@ -474,7 +474,7 @@ impl Player {
     ///
     /// # Errors
     /// As [`Simulation::set_value`]; nothing has changed then.
-    pub fn set_original(&mut self, key: &str) -> Result<Effect, SceneError> {
+    pub fn set_original(&mut self, key: &str) -> Result<Effect, ChangeError> {
         self.original.get(key)?;
         self.branch();
         let effect = self.apply_original(key)?;
@@ -483,7 +483,7 @@ impl Player {
         Ok(effect)
     }
 
-    fn apply_original(&mut self, key: &str) -> Result<Effect, SceneError> {
+    fn apply_original(&mut self, key: &str) -> Result<Effect, ChangeError> {
         let value = self.original.get(key)?;
         let effect = self.change(|run| run.set_value(key, &value))?;
         self.after_change();
@@ -494,7 +494,7 @@ impl Player {
     ///
     /// # Errors
     /// As [`Simulation::pull`]; the run is as it was then.
-    pub fn pull(&mut self, pull: Option<Pull>) -> Result<(), SceneError> {
+    pub fn pull(&mut self, pull: Option<Pull>) -> Result<(), ChangeError> {
         if self.simulation.pulled() == pull {
             return Ok(());
         }
@@ -513,7 +513,7 @@ impl Player {
         Ok(())
     }
 
-    fn apply_pull(&mut self, pull: Option<Pull>) -> Result<Effect, SceneError> {
+    fn apply_pull(&mut self, pull: Option<Pull>) -> Result<Effect, ChangeError> {
         self.change(|run| run.pull(pull))?;
         self.after_change();
         Ok(Effect::Now)
@@ -522,8 +522,8 @@ impl Player {
     /// Changes the run at its latest state. The rest of the latest step is still shown as it was.
     fn change<T>(
         &mut self,
-        change: impl FnOnce(&mut Simulation) -> Result<T, SceneError>,
-    ) -> Result<T, SceneError> {
+        change: impl FnOnce(&mut Simulation) -> Result<T, ChangeError>,
+    ) -> Result<T, ChangeError> {
         let run = &mut self.simulation;
         if self.pacer.shown() >= run.time() || run.step_start() >= run.time() {
             return change(run);

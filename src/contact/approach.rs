@@ -19,19 +19,25 @@ pub enum ApproachPiece {
 }
 
 impl Coefficients {
+    /// `rate`, but not below the floor, m/s: what the damping term divides by where nothing is remembered.
+    #[inline]
+    pub(super) fn floored(&self, rate: f64) -> f64 {
+        rate.max(self.speed_floor)
+    }
+
     /// Speed that the damping term divides by, m/s, for a contact whose memory holds `remembered` (m/s) and whose penetration
     /// grows at `rate` (m/s).
     #[inline]
-    pub fn approach(&self, pace: ApproachPiece, remembered: f64, rate: f64) -> f64 {
+    pub(super) fn approach(&self, pace: ApproachPiece, remembered: f64, rate: f64) -> f64 {
         match pace {
             ApproachPiece::Unsplit if self.largest => remembered.max(rate),
             ApproachPiece::Unsplit | ApproachPiece::Held => remembered,
-            ApproachPiece::Rising => rate.max(self.speed_floor),
+            ApproachPiece::Rising => self.floored(rate),
         }
     }
 
     /// Whether that is the rate itself, so that the damping term does not depend on it.
-    pub fn approach_follows(&self, pace: ApproachPiece, remembered: f64, rate: f64) -> bool {
+    pub(super) fn approach_follows(&self, pace: ApproachPiece, remembered: f64, rate: f64) -> bool {
         match pace {
             ApproachPiece::Unsplit => self.largest && rate > remembered,
             ApproachPiece::Held => false,
@@ -40,7 +46,7 @@ impl Coefficients {
     }
 
     /// Active piece for a contact whose memory holds `remembered`.
-    pub fn approach_piece_at(&self, remembered: f64, rate: f64) -> ApproachPiece {
+    pub(super) fn approach_piece_at(&self, remembered: f64, rate: f64) -> ApproachPiece {
         if !self.largest {
             ApproachPiece::Unsplit
         } else if rate >= remembered {

@@ -4,11 +4,11 @@
 use super::{Coefficients, FrictionPiece, FrictionVelocity, Mat3, Memory, Vec3};
 
 /// Where a ball is in its socket, and how fast it moves there.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Separation {
     /// |e|, m.
     pub distance: f64,
-    /// n = e / |e| (8).
+    /// n = e / |e| (8); zero if e is.
     pub normal: Vec3,
     /// delta = |e| - c, m (10).
     pub penetration: f64,
@@ -65,16 +65,22 @@ impl Stiffness {
 }
 
 impl Coefficients {
-    /// Separation of a ball at the eccentricity e != 0 (m) that moves at de/dt (m/s).
+    /// Separation of a ball at the eccentricity e (m) that moves at de/dt (m/s).
     #[inline]
     pub fn separation(&self, eccentricity: &Vec3, velocity: &Vec3) -> Separation {
         let distance = eccentricity.norm();
-        let normal = eccentricity / distance;
+        let (normal, opening) = if distance > 0.0 {
+            let normal = eccentricity / distance;
+            (normal, normal.dot(velocity))
+        } else {
+            // A ball exactly at the centre leaves it in its direction of motion.
+            (Vec3::zeros(), velocity.norm())
+        };
         Separation {
             distance,
             normal,
             penetration: distance - self.clearance,
-            rate: normal.dot(velocity) - self.clearance_rate,
+            rate: opening - self.clearance_rate,
         }
     }
 

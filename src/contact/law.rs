@@ -26,6 +26,13 @@ pub fn impact_duration(stiffness: f64, damping: f64, mass: f64, speed: f64) -> f
     2.94 * deepest / speed
 }
 
+/// Half a period of a mass `mass` (kg) that rests on a contact of `stiffness` K under `force` (N), s; infinite without one.
+pub fn settled_half_period(stiffness: f64, mass: f64, force: f64) -> f64 {
+    // dF/d(delta) = 1.5 K delta^0.5 at F = K delta^1.5.
+    let slope = 1.5 * libm::cbrt(stiffness * stiffness * force);
+    std::f64::consts::PI * (mass / slope).sqrt()
+}
+
 /// Damping factor chi of a law for the requested restitution.
 ///
 /// - Lankarani & Nikravesh (1990): 3 (1 - ce^2) / 4, derived for ce near 1.

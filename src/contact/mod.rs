@@ -10,7 +10,7 @@ pub use approach::ApproachPiece;
 pub use force::{Force, Separation, Slope, Stiffness};
 pub use law::{
     Coefficients, damping_factor, hertz_stiffness, impact_duration, restitution_given,
-    settled_penetration,
+    settled_half_period, settled_penetration,
 };
 pub use memory::Memory;
 pub use slip::FrictionPiece;

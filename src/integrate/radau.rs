@@ -74,10 +74,6 @@ pub struct Radau {
     error: Vec<f64>,
     linearised_at: Option<f64>,
     previous: Polynomial,
-    /// Iterations of the latest attempt.
-    pub iterations: u32,
-    /// The latest attempt's convergence was slow: a longer step would not pay.
-    pub slow: bool,
 }
 
 impl Radau {
@@ -100,8 +96,6 @@ impl Radau {
                 z: triple(),
                 contraction: 1.0,
             },
-            iterations: 0,
-            slow: false,
         }
     }
 
@@ -197,9 +191,7 @@ impl Radau {
         let trusted = libm::pow(self.previous.contraction.max(f64::EPSILON), 0.8);
         self.previous.contraction = trusted;
         let mut before = 0.0;
-        self.slow = false;
         for iteration in 0..MOST_ITERATIONS {
-            self.iterations = iteration + 1;
             for j in 0..3 {
                 for i in 0..n {
                     self.stage[i] = y[i] + self.z[j][i];
@@ -252,7 +244,6 @@ impl Radau {
                 if theta >= 0.99 {
                     return false;
                 }
-                self.slow = theta > 0.3;
                 self.previous.contraction = theta / (1.0 - theta);
                 let left = self.previous.contraction * size;
                 if left <= target {

@@ -150,14 +150,12 @@ impl Contacts {
         }
     }
 
-    /// Gap geometry alone (no force) at `t`: eccentricity, its rate, normal, penetration and its rate.
+    /// Gap geometry alone (no force) at `t`.
     pub fn measure(&mut self, t: f64, motion: &[Kinematics]) {
         self.update_ramps(t);
-        for Contact { joint, gap, .. } in &mut self.joints {
-            gap.eccentricity = joint.eccentricity(motion);
-            gap.eccentricity_rate = joint.opening_rate(motion);
+        for contact in &mut self.joints {
+            contact.measure(motion);
         }
-        self.finish();
     }
 
     /// Relative velocity used by friction at the contact of joint `i` for the normal `n`, m/s.
@@ -168,12 +166,12 @@ impl Contacts {
     /// Sliding speed of joint `i`, whose ball must be off centre, in the motion last measured, m/s.
     pub fn slip_speed(&self, i: usize, motion: &[Kinematics]) -> f64 {
         let contact = &self.joints[i];
-        let at = contact.separation();
+        let at = &contact.gap.separation;
         let read = contact.friction_reads(&at.normal, motion);
-        contact.law.sliding(&at, &read).norm()
+        contact.law.sliding(at, &read).norm()
     }
 
-    /// Completes normal, penetration and rate of every gap from the eccentricities of the latest evaluation.
+    /// Completes the separation of every gap from the eccentricities of the latest evaluation.
     pub fn finish(&mut self) {
         for contact in &mut self.joints {
             contact.finish();

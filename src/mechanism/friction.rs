@@ -213,7 +213,7 @@ impl Friction {
                 continue;
             }
             self.active.push(slot);
-            let n = contact.separation().normal;
+            let n = contact.direction();
             touch.law = contact.law;
             touch.memory = *memory;
             touch.eccentricity = contact.gap.eccentricity;

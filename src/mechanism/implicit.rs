@@ -175,7 +175,7 @@ impl ImplicitContacts {
             let Some(&memory) = touching.memory(j) else {
                 continue;
             };
-            near |= gap.penetration > 0.0;
+            near |= gap.separation.penetration > 0.0;
             let law = *contacts.coefficients(j);
             self.touches.push(Touch {
                 joint: j,
@@ -185,7 +185,7 @@ impl ImplicitContacts {
                 } else {
                     Memory {
                         approach_piece: ApproachPiece::Held,
-                        ..Memory::begun(&law, gap.rate)
+                        ..Memory::begun(&law, gap.separation.rate)
                     }
                 },
                 eccentricity: gap.eccentricity,
@@ -193,8 +193,8 @@ impl ImplicitContacts {
                 read: gap.eccentricity_rate,
                 added: Vec3::zeros(),
                 slipping: Vec3::zeros(),
-                arm: gap.normal,
-                normal: gap.normal,
+                arm: gap.separation.normal,
+                normal: gap.separation.normal,
                 force: Vec3::zeros(),
                 impedance: Mat3::zeros(),
                 resistance: Mat3::zeros(),

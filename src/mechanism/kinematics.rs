@@ -1,6 +1,6 @@
 //! Motion of bodies: from coordinates to poses, velocities and accelerations of the centroids. World axes.
 
-use super::model::{Anchor, BallJoint, Body, Model, Motion};
+use super::model::{BallJoint, Body, Model, Motion};
 use super::spcmm::Ideal;
 use crate::scene::{Mat3, Quat, Vec3};
 
@@ -69,26 +69,37 @@ pub fn spin_of(q: &[f64], d: &[f64]) -> [f64; 3] {
 }
 
 impl BallJoint {
+    /// Centres of ball and socket from the centroids of their bodies, m.
+    #[inline]
+    pub fn arms(&self, motion: &[Kinematics]) -> [Vec3; 2] {
+        [&self.ball, &self.socket].map(|anchor| motion[anchor.body].rotation * anchor.offset)
+    }
+
+    /// e and de/dt, m and m/s, of the centres at these arms.
+    #[inline]
+    pub fn opening(&self, motion: &[Kinematics], [ball, socket]: &[Vec3; 2]) -> (Vec3, Vec3) {
+        let (b, s) = (&motion[self.ball.body], &motion[self.socket.body]);
+        (
+            (b.position + ball) - (s.position + socket),
+            b.point_velocity(ball) - s.point_velocity(socket),
+        )
+    }
+
     /// e = Z_j - Z_i, m (5).
     pub fn eccentricity(&self, motion: &[Kinematics]) -> Vec3 {
-        let at = |a: &Anchor| motion[a.body].position + motion[a.body].rotation * a.offset;
-        at(&self.ball) - at(&self.socket)
+        self.opening(motion, &self.arms(motion)).0
     }
 
     /// de/dt, m/s.
     pub fn opening_rate(&self, motion: &[Kinematics]) -> Vec3 {
-        self.relative(motion, Kinematics::point_velocity)
+        self.opening(motion, &self.arms(motion)).1
     }
 
     /// d2e/dt2, m/s^2.
     pub fn opening_acceleration(&self, motion: &[Kinematics]) -> Vec3 {
-        self.relative(motion, Kinematics::point_acceleration)
-    }
-
-    /// Difference of `rate` at the centres, ball minus socket.
-    fn relative(&self, motion: &[Kinematics], rate: fn(&Kinematics, &Vec3) -> Vec3) -> Vec3 {
-        let at = |a: &Anchor| rate(&motion[a.body], &(motion[a.body].rotation * a.offset));
-        at(&self.ball) - at(&self.socket)
+        let [ball, socket] = &self.arms(motion);
+        motion[self.ball.body].point_acceleration(ball)
+            - motion[self.socket.body].point_acceleration(socket)
     }
 }
 

@@ -338,7 +338,10 @@ mod tests {
             let (mut m, y, memory) = resting(&changes, remembered);
             let (t, nq) = (0.0, m.positions());
             m.measure(t, &y);
-            let rises = m.contacts.gaps().all(|gap| gap.rate > remembered);
+            let rises = m
+                .contacts
+                .gaps()
+                .all(|gap| gap.separation.rate > remembered);
             assert_eq!(rises, remembered < 1e-6);
             let touching = Touching::Located(&memory);
             m.evaluator(touching).linearise(t, &y);

@@ -114,8 +114,9 @@ impl Scene {
             .ball_joints
             .iter()
             .filter(|j| j.contact.clearance > 0.0);
+        let pushes = self.pushes();
         let (joint, duration) = clearances
-            .map(|joint| (joint, self.impact_duration(joint)))
+            .map(|joint| (joint, self.impact_duration(joint, &pushes)))
             .min_by(|a, b| (a.1.0 / a.1.1).total_cmp(&(b.1.0 / b.1.1)))?;
         let (impact, friction) = duration;
         let duration = impact / friction;
@@ -141,13 +142,33 @@ impl Scene {
         })
     }
 
-    /// Estimated duration of the first impact of a joint with clearance, s, whose bodies fall freely through the gap; and
-    /// how many times within it friction could reverse sliding at the approach speed, at least 1.
-    fn impact_duration(&self, joint: &BallJoint) -> (f64, f64) {
+    /// Sum of the magnitudes of the forces of elements on each body, N. What the stretch of a spring adds is left out: it needs
+    /// the start poses.
+    fn pushes(&self) -> Vec<f64> {
+        let mut pushes = vec![0.0; self.bodies.len()];
+        for element in &self.elements {
+            for body in element.points.iter().filter_map(|point| point.body) {
+                pushes[body] += (element.kind.force)(element);
+            }
+        }
+        pushes
+    }
+
+    /// Bound on the acceleration between bodies that gravity and forces, each N on kg, can cause, m/s^2.
+    pub fn most_acceleration(&self, pushes: impl IntoIterator<Item = (f64, f64)>) -> f64 {
+        let pushes = pushes.into_iter().map(|(force, mass)| force / mass);
+        pushes.fold(self.gravity.norm(), |sum, push| sum + push)
+    }
+
+    /// Estimated duration of the first impact of a joint with clearance, s, whose bodies gravity and the forces `pushes` (N, by
+    /// body) drive through the gap, or of the oscillation under those forces, if shorter; and how many times within it friction
+    /// could reverse sliding at the approach speed, at least 1.
+    fn impact_duration(&self, joint: &BallJoint, pushes: &[f64]) -> (f64, f64) {
         let c = &joint.contact;
         let coefficients = contact::Coefficients::new(c, c.clearance);
         // Inverse effective masses at the ball's centre, normal and in sliding: a force there also rotates the body.
         let (mut normal, mut sliding) = (0.0, 0.0);
+        let mut pushed = Vec::new();
         for attachment in [&joint.ball, &joint.socket] {
             let Some(b) = attachment.body else { continue };
             let (body, hung) = (&self.bodies[b], &self.joints[b]);
@@ -163,18 +184,17 @@ impl Scene {
                 contact::FrictionVelocity::Centres | contact::FrictionVelocity::Printed => 0.0,
             };
             sliding += at_centre + turning;
+            pushed.push((pushes[b], body.mass));
         }
         if normal == 0.0 {
             return (f64::INFINITY, 1.0);
         }
-        let fall = (2.0 * self.gravity.norm() * c.clearance).sqrt();
+        let load = pushed.iter().map(|(force, _)| force).sum();
+        let fall = (2.0 * self.most_acceleration(pushed) * c.clearance).sqrt();
         let speed = fall.max(c.impact_speed_floor);
-        let duration = contact::impact_duration(
-            coefficients.stiffness,
-            coefficients.damping,
-            1.0 / normal,
-            speed,
-        );
+        let (stiffness, damping) = (coefficients.stiffness, coefficients.damping);
+        let duration = contact::impact_duration(stiffness, damping, 1.0 / normal, speed)
+            .min(contact::settled_half_period(stiffness, 1.0 / normal, load));
         (
             duration,
             (coefficients.friction * sliding / normal).max(1.0),
@@ -332,4 +352,35 @@ fn check_contact(contact: &contact::Parameters) -> Result<(), ContactFault> {
         return Err(ContactFault::DividesByRestitution(contact.normal_law));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Estimated duration of the pendulum's impacts with these sections added, s, if a step of 10 us does not resolve it.
+    fn doubted(sections: &str) -> Option<f64> {
+        let text = format!(
+            "{}\n{sections}",
+            built_in_text("pendulum").expect("built in")
+        );
+        let method = ("solver.method".to_owned(), "rk4".to_owned());
+        let step = ("solver.step".to_owned(), "10 us".to_owned());
+        let scene = Scene::parse(&text, None, &[method, step]).expect("reads");
+        scene.doubts().into_iter().find_map(|doubt| match doubt {
+            Doubt::Step { duration, .. } => Some(duration),
+            _ => None,
+        })
+    }
+
+    #[test]
+    fn a_load_shortens_the_estimated_impact() {
+        let load = |force: &str| {
+            let on = "{ body = \"rod\", at = [0, 0, 0] }";
+            format!("[[load]]\nname = \"l\"\non = {on}\nforce = \"0 0 {force}\"\n")
+        };
+        assert_eq!(doubted(&load("1 N")), None);
+        let [less, more] = ["-1e4 N", "-1e8 N"].map(|force| doubted(&load(force)).expect("short"));
+        assert!(less < 5e-5 && more < 0.5 * less, "{less:e} {more:e}");
+    }
 }

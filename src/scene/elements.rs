@@ -54,6 +54,7 @@ pub static ELEMENT_KINDS: [ElementKind; 2] = [
         vectors: &[],
         acts_by: &["stiffness", "damping", "preload"],
         choices: &[],
+        force: |spring| spring.number("preload").abs(),
     },
     ElementKind {
         section: "load",
@@ -87,6 +88,7 @@ pub static ELEMENT_KINDS: [ElementKind; 2] = [
             LoadAxes::WORDS,
             "whether force and torque keep to the world's axes or turn with the body",
         )],
+        force: |load| load.vector("force").norm(),
     },
 ];
 

@@ -542,6 +542,8 @@ pub struct ElementKind {
     pub acts_by: &'static [&'static str],
     /// Its choices: key, words with the default first, help.
     pub choices: &'static [(&'static str, &'static [&'static str], &'static str)],
+    /// Largest force at its points that its own values give, N: without what the motion adds.
+    pub force: fn(&Element) -> f64,
 }
 
 /// A force element of a scene, according to its row.

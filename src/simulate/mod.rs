@@ -24,6 +24,7 @@ pub use impacts::Impact;
 pub use ledger::Ledger;
 pub use pace::{LARGEST_BUDGET, LONGEST_FRAME, Pacer, SCALE_RANGE};
 pub use simulation::ideal::{ProbeFault, closed};
+pub use simulation::live::ChangeError;
 pub use simulation::{CLEARANCE_SPEED, LARGEST_DENSE, LARGEST_IMPLICIT, Simulation};
 pub use stopped::{StopAdvice, StopFault, Stopped};
 pub use wear::{Cell, Edges, Grid, Wear};
@@ -103,7 +104,7 @@ pub struct NotUnique {
 }
 
 /// Counters since the last reset.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Statistics {
     /// Accepted steps.
     pub steps: u64,
@@ -128,8 +129,8 @@ pub struct Statistics {
     pub peak_normal: Vec<f64>,
     /// When it occurred, per ball joint, s.
     pub peak_time: Vec<f64>,
-    /// Time of the last separation, per ball joint, s; NaN if none.
-    pub last_separation: Vec<f64>,
+    /// Time of the last separation, if any, per ball joint, s.
+    pub last_separation: Vec<Option<f64>>,
     /// Simulated time that an explicit adaptive method spent in steps limited by stability, s.
     pub held_time: f64,
     /// Largest ratio of damping to elastic force in any contact, per ball joint.
@@ -148,7 +149,7 @@ impl Statistics {
             coarse: vec![0; joints],
             peak_normal: vec![0.0; joints],
             peak_time: vec![0.0; joints],
-            last_separation: vec![f64::NAN; joints],
+            last_separation: vec![None; joints],
             damping: vec![0.0; joints],
             damping_time: vec![0.0; joints],
             ..Self::default()
@@ -159,28 +160,6 @@ impl Statistics {
         self.evaluations += counts.equations;
         self.contact_evaluations += counts.contacts;
         self.friction_evaluations += counts.friction;
-    }
-}
-
-impl PartialEq for Statistics {
-    /// Compares bits, so that "no separation yet" equals itself.
-    fn eq(&self, other: &Self) -> bool {
-        let bits = |v: &[f64]| v.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
-        let counts = |s: &Self| {
-            let evaluations = (s.evaluations, s.contact_evaluations, s.friction_evaluations);
-            (s.steps, evaluations, s.rejected, s.corners)
-        };
-        counts(self) == counts(other)
-            && self.impacts == other.impacts
-            && self.floored == other.floored
-            && self.coarse == other.coarse
-            && bits(&self.peak_normal) == bits(&other.peak_normal)
-            && bits(&self.peak_time) == bits(&other.peak_time)
-            && bits(&self.last_separation) == bits(&other.last_separation)
-            && bits(&self.damping) == bits(&other.damping)
-            && bits(&self.damping_time) == bits(&other.damping_time)
-            && self.held_time.to_bits() == other.held_time.to_bits()
-            && self.constraint_drift.to_bits() == other.constraint_drift.to_bits()
     }
 }
 

@@ -1,6 +1,6 @@
 //! Peaks in continuous time: the largest force between two steps, from the cubic through penetration and rate at both ends.
 
-use crate::contact::{ApproachPiece, Coefficients};
+use crate::contact::{Coefficients, Memory};
 
 /// Penetration and its rate at one instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -131,35 +131,32 @@ impl Course {
     }
 
     /// Largest ratio of damping to elastic force from `from` to the end of the step, and where. It grows with the rate.
-    pub(super) fn most_damped(&self, c: &Coefficients, remembered: f64, from: f64) -> (f64, f64) {
+    pub(super) fn most_damped(&self, c: &Coefficients, memory: &Memory, from: f64) -> (f64, f64) {
         let (rate, theta) = self.fastest(from);
-        let approach = c.approach(ApproachPiece::Unsplit, remembered, rate);
-        (c.damping * rate / approach, theta)
+        (c.damping * rate / memory.approach(c, rate), theta)
     }
 
     /// The larger of the normal forces at both ends, and where: (N, theta).
-    pub(super) fn stronger_end(&self, c: &Coefficients, approach_speed: f64) -> (f64, f64) {
-        let force = |at: &Approach| {
-            let approach = c.approach(ApproachPiece::Unsplit, approach_speed, at.rate);
-            c.normal_force(at.penetration, at.rate, approach)
-        };
+    pub(super) fn stronger_end(&self, c: &Coefficients, memory: &Memory) -> (f64, f64) {
+        let force =
+            |at: &Approach| c.normal_force(at.penetration, at.rate, memory.approach(c, at.rate));
         let (f0, f1) = (force(&self.start), force(&self.end));
         if f1 >= f0 { (f1, 1.0) } else { (f0, 0.0) }
     }
 
-    /// Largest normal force over the step, and where: (N, theta). The contact's memory holds `approach_speed`.
-    pub(super) fn strongest(&self, c: &Coefficients, approach_speed: f64) -> (f64, f64) {
+    /// Largest normal force over the step of a contact with this memory, and where: (N, theta).
+    pub(super) fn strongest(&self, c: &Coefficients, memory: &Memory) -> (f64, f64) {
         let force = |theta: f64| {
             let (p, v, _) = self.at(theta);
-            c.normal_force(p, v, c.approach(ApproachPiece::Unsplit, approach_speed, v))
+            c.normal_force(p, v, memory.approach(c, v))
         };
         // Sign of dF/dt, F = K p^1.5 (1 + chi v / v0): 1.5 v (1 + chi v / v0) + p chi a / v0; where v0 is v, the sign of v.
         let slope = |theta: f64| {
             let (p, v, a) = self.at(theta);
-            if p <= 0.0 || c.approach_follows(ApproachPiece::Unsplit, approach_speed, v) {
+            if p <= 0.0 || memory.follows(c, v) {
                 return v;
             }
-            let chi = c.damping / approach_speed;
+            let chi = c.damping / memory.approach(c, v);
             1.5 * v * (1.0 + chi * v) + p * chi * a
         };
         let (f0, f1) = (force(0.0), force(1.0));
@@ -216,7 +213,8 @@ mod tests {
             }
         };
         let (start, end) = (0.43e-4, 0.53e-4);
-        let (force, theta) = Course::new(at(start), at(end), end - start).strongest(&c, 0.1);
+        let (force, theta) =
+            Course::new(at(start), at(end), end - start).strongest(&c, &Memory::begun(&c, 0.1));
         let exact = c.normal_force(a, 0.0, 0.1);
         // The Hermite interpolation error of the penetration, (pi h / T)^4 / 384 = 2.5e-5, enters the force to the power
         // 1.5.

@@ -68,9 +68,9 @@ fn joint_report(
         ball_centre,
         eccentricity: gap.eccentricity,
         clearance: contacts.clearance(j),
-        penetration: gap.penetration,
-        penetration_rate: gap.rate,
-        contact_point: ball_centre + gap.normal * coefficients.ball_radius,
+        penetration: gap.separation.penetration,
+        penetration_rate: gap.separation.rate,
+        contact_point: ball_centre + gap.separation.normal * coefficients.ball_radius,
         slip_speed: gap.slip_speed,
         ..JointReport::default()
     };
@@ -80,7 +80,7 @@ fn joint_report(
         report.state = ContactState::Ideal;
         return report;
     }
-    report.normal_force = gap.normal * -gap.normal_force;
+    report.normal_force = gap.separation.normal * -gap.normal_force;
     report.friction_force = gap.friction;
     report.state = if !memory.active && gap.normal_force == 0.0 {
         ContactState::Free

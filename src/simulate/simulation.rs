@@ -9,7 +9,7 @@ mod doubts;
 mod energy;
 mod guard;
 pub mod ideal;
-mod live;
+pub(super) mod live;
 mod sample;
 mod search;
 mod snapshot;
@@ -292,7 +292,7 @@ impl Simulation {
         self.mechanism.measure(self.state.now.t, &self.state.now.y);
         for j in 0..self.state.now.memory.len() {
             if self.mechanism.contacts.has_clearance(j)
-                && self.mechanism.contacts.gap(j).penetration > 0.0
+                && self.mechanism.contacts.gap(j).separation.penetration > 0.0
             {
                 let coefficients = self.mechanism.contacts.coefficients(j);
                 self.state.now.memory[j] = Memory::begun(coefficients, f64::NEG_INFINITY);
@@ -667,8 +667,8 @@ impl Simulation {
 fn store_gaps(mechanism: &Mechanism, out: &mut [Approach]) {
     for (out, gap) in out.iter_mut().zip(mechanism.contacts.gaps()) {
         *out = Approach {
-            penetration: gap.penetration,
-            rate: gap.rate,
+            penetration: gap.separation.penetration,
+            rate: gap.separation.rate,
             speed: gap.eccentricity_rate.norm(),
         };
     }

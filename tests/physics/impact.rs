@@ -102,7 +102,7 @@ fn rebound(speed: f64, changes: &[(&str, &str)]) -> (f64, Simulation) {
         0.0,
         changes,
     );
-    while simulation.statistics().last_separation[0].is_nan() {
+    while simulation.statistics().last_separation[0].is_none() {
         simulation.step().unwrap();
         assert!(simulation.time() < 1.0);
     }

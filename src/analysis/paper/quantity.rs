@@ -82,11 +82,14 @@ impl FigureValue {
 
     /// Value in continuous time; NaN where undefined.
     pub fn of(self, response: &Response) -> f64 {
-        if self == Self::LastSeparation {
-            let last = response.last_separation.iter().copied();
-            return last.fold(f64::NAN, f64::max);
-        }
-        self.of_extremes(&response.full).unwrap_or(f64::NAN)
+        let value = match self {
+            Self::LastSeparation => {
+                let last = response.last_separation.iter().flatten();
+                last.copied().reduce(f64::max)
+            }
+            _ => self.of_extremes(&response.full),
+        };
+        value.unwrap_or(f64::NAN)
     }
 
     /// Value at the paper's sampling; `None` where sampling does not matter.

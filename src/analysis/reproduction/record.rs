@@ -129,15 +129,16 @@ pub struct SettledCurve {
     pub width: [f64; 2],
 }
 
+/// Word for the regime of a point that did not reach its end.
+const NO_REGIME: &str = "none";
+
 /// One value of a swept parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Swept {
     /// Value: clearance in mm, or friction.
     pub value: f64,
-    /// Regime, in a word.
-    pub regime: &'static str,
-    /// Drive periods after which it repeats; 0 if it does not.
-    pub period: usize,
+    /// Regime; `None` if the point did not reach its end.
+    pub regime: Option<Regime>,
     /// Largest Lyapunov exponent and its standard error, 1/s; NaN where none was measured.
     pub exponent: (f64, f64),
     /// Kept sections in x (m) and beta (rad), in order of time.
@@ -157,12 +158,15 @@ impl Swept {
         extent(all[all.len() / 2..].iter().copied())
     }
 
+    /// Drive periods after which it repeats; 0 if it does not.
+    pub fn period(&self) -> usize {
+        self.regime.map_or(0, Regime::period)
+    }
+
     /// Regime with its period.
     pub fn word(&self) -> String {
-        match self.period {
-            0 => self.regime.to_owned(),
-            period => format!("{} {period}", self.regime),
-        }
+        self.regime
+            .map_or_else(|| NO_REGIME.to_owned(), |regime| regime.to_string())
     }
 }
 
@@ -239,8 +243,7 @@ impl SweepData {
         let part = |all: &[f64], k: usize| all[k * kept..(k + 1) * kept].to_vec();
         let points = axis.values().enumerate().map(|(k, value)| Swept {
             value: value * factor,
-            regime: regime_word(regimes[k] as i64),
-            period: periods[k] as usize,
+            regime: Regime::of_code(regimes[k] as i64, periods[k] as usize),
             exponent: (exponents[k], errors[k]),
             sections: [part(&x, k), part(&beta, k)],
         });
@@ -250,14 +253,5 @@ impl SweepData {
 
 /// Word for a regime code in files.
 pub fn regime_word(code: i64) -> &'static str {
-    let all = [
-        Regime::Unclear,
-        Regime::Periodic(1),
-        Regime::QuasiPeriodic,
-        Regime::Chaotic,
-        Regime::NotSettled,
-    ];
-    all.into_iter()
-        .find(|r| r.code() == code)
-        .map_or("none", Regime::word)
+    Regime::of_code(code, 1).map_or(NO_REGIME, Regime::word)
 }

@@ -7,6 +7,7 @@ use super::record::{COLUMNS, Swept, Traced, TracedRow, column_of, derivative, ex
 use crate::analysis::paper::{
     Case, Claim, Coordinate, Curves, FigureValue, PAPER, Sections, Series, Test,
 };
+use crate::analysis::regime::Regime;
 
 /// A change below this fraction of the amplitude counts as none.
 const LITTLE: f64 = 0.05;
@@ -325,7 +326,7 @@ impl Findings {
                 let runs = self.sections(over);
                 (
                     "all three are of the regime quasi-periodic (exponent not told from 0, regular 0-1 test, no period)".to_owned(),
-                    runs.iter().all(|r| r.regime == "quasi-periodic"),
+                    runs.iter().all(|r| r.regime == Some(Regime::QuasiPeriodic)),
                     each(over, runs, Swept::word),
                 )
             }
@@ -333,13 +334,13 @@ impl Findings {
                 let points = self.swept(over);
                 (
                     "every point is periodic 1".to_owned(),
-                    points.iter().all(|p| p.period == 1),
+                    points.iter().all(|p| p.period() == 1),
                     regimes(points),
                 )
             }
             Test::PeriodicToChaotic(over) => {
                 let points = self.swept(over);
-                let regular = points.first().is_some_and(|p| p.period > 0);
+                let regular = points.first().is_some_and(|p| p.period() > 0);
                 (
                     format!(
                         "the smallest {over} is periodic, the largest chaotic (exponent above 0 by more than its uncertainty)"
@@ -461,7 +462,7 @@ fn widest(points: &[Swept], coordinate: Coordinate) -> f64 {
 }
 
 fn is_chaotic(point: &Swept) -> bool {
-    point.regime == "chaotic"
+    point.regime == Some(Regime::Chaotic)
 }
 
 fn chaotic(points: &[Swept]) -> usize {
@@ -580,11 +581,10 @@ mod tests {
         }
     }
 
-    fn point(value: f64, regime: &'static str, x: f64, beta: &[f64]) -> Swept {
+    fn point(value: f64, regime: Regime, x: f64, beta: &[f64]) -> Swept {
         Swept {
             value,
-            regime,
-            period: usize::from(regime == "periodic"),
+            regime: Some(regime),
             exponent: (-1.0, 0.1),
             sections: [vec![x; beta.len()], beta.to_vec()],
         }
@@ -613,7 +613,7 @@ mod tests {
         for (run, (forces, last, [x, beta], deviation)) in found.runs.iter_mut().zip(runs) {
             let response = &mut run.response;
             response.full.normal = forces.to_vec();
-            response.last_separation = vec![0.01, last];
+            response.last_separation = vec![Some(0.01), Some(last)];
             response.full.acceleration[0] = x;
             response.full.acceleration[4] = beta;
             response.full.deviation[0] = deviation;
@@ -667,7 +667,7 @@ mod tests {
                 *values = [size; 6];
             }
             response.full.normal = vec![size];
-            response.last_separation = vec![size];
+            response.last_separation = vec![Some(size)];
         };
         for (case, size) in [2.0, 3.0, 4.0, 1.0, 3.0].into_iter().enumerate() {
             grow(&mut found, case, size);
@@ -745,9 +745,9 @@ mod tests {
         // As the paper has it.
         let mut found = nothing_moves();
         let as_printed = vec![
-            point(0.01, "periodic", 0.2, &wide(0.0)),
-            point(0.5, "periodic", 0.2, &wide(0.0)),
-            point(1.0, "chaotic", 0.2, &wide(1e-3)),
+            point(0.01, Regime::Periodic(1), 0.2, &wide(0.0)),
+            point(0.5, Regime::Periodic(1), 0.2, &wide(0.0)),
+            point(1.0, Regime::Chaotic, 0.2, &wide(1e-3)),
         ];
         let runs = |regime, width: f64| {
             [1.0, 2.0, 3.0]
@@ -758,7 +758,7 @@ mod tests {
         put(
             &mut found,
             "runs_by_clearance",
-            runs("quasi-periodic", 1e-4),
+            runs(Regime::QuasiPeriodic, 1e-4),
         );
         expect(
             &found,
@@ -772,7 +772,7 @@ mod tests {
             ],
         );
         // All periodic: by clearance all at one place, by friction at places 10 mm of 25 mm apart.
-        let still = [0.01, 0.5, 1.0].map(|c| point(c, "periodic", 0.2, &wide(0.0)));
+        let still = [0.01, 0.5, 1.0].map(|c| point(c, Regime::Periodic(1), 0.2, &wide(0.0)));
         put(&mut found, "clearance_cold", still.to_vec());
         put(&mut found, "runs_by_clearance", still.to_vec());
         put(&mut found, "runs_by_friction", still.to_vec());
@@ -816,13 +816,13 @@ mod tests {
         let near = [0.0, 1.0, -1.0, 0.0, 1.0, -1.0, 0.0, 9.0, -9.0];
         let with = |size: f64| {
             crowd(
-                &point(0.2, "chaotic", 0.2, &near.map(|v| v * size)),
+                &point(0.2, Regime::Chaotic, 0.2, &near.map(|v| v * size)),
                 [1e-7, 1e-6],
             )
         };
         assert_eq!(with(1e-5), Some(7.0 / 9.0));
         assert_eq!(with(1e-9), None);
-        let ring = point(0.2, "chaotic", 0.2, &[1e-4, -1e-4, 1e-4, -1e-4]);
+        let ring = point(0.2, Regime::Chaotic, 0.2, &[1e-4, -1e-4, 1e-4, -1e-4]);
         assert_eq!(crowd(&ring, [1e-7, 1e-6]), Some(0.0));
     }
 

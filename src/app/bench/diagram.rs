@@ -7,6 +7,7 @@ use super::coordinate::Coordinate;
 use super::plane::{AxisLabel, plane};
 use super::portrait::title;
 use super::swept::Swept;
+use crate::analysis::regime::Regime;
 use crate::analysis::swept::SweptPoint;
 use crate::app::{theme, value};
 use crate::scene::{table, to_display};
@@ -47,13 +48,13 @@ impl Ordinate {
     }
 }
 
-/// The kinds of motion: number in files, word, index in the colour series.
-const REGIMES: [(i64, &str, usize); 5] = [
-    (1, "periodic", 0),
-    (2, "quasi-periodic", 2),
-    (3, "chaotic", 1),
-    (4, "not settled", 4),
-    (0, "unclear", 7),
+/// The kinds of motion, each with its index in the colour series.
+const REGIMES: [(Regime, usize); 5] = [
+    (Regime::Periodic(1), 0),
+    (Regime::QuasiPeriodic, 2),
+    (Regime::Chaotic, 1),
+    (Regime::NotSettled, 4),
+    (Regime::Unclear, 7),
 ];
 
 /// A drawn point: its position, and the indices of its sweep point and of its section.
@@ -140,8 +141,8 @@ impl Diagram {
                     let line = VLine::new("diverged", *value).color(bad);
                     plot.vline(line.style(LineStyle::dotted_dense()).width(1.0));
                 }
-                for ((_, word, colour), marks) in REGIMES.iter().zip(&self.marks) {
-                    let points = Points::new(*word, PlotPoints::Borrowed(marks));
+                for ((regime, colour), marks) in REGIMES.iter().zip(&self.marks) {
+                    let points = Points::new(regime.word(), PlotPoints::Borrowed(marks));
                     plot.points(points.color(theme::series(*colour, dark)).radius(1.8));
                 }
                 if let Some(now) = now {
@@ -196,11 +197,13 @@ impl Diagram {
         let weak = ui.visuals().weak_text_color();
         let mut entries: Vec<_> = REGIMES
             .iter()
-            .map(|(code, word, colour)| {
+            .map(|(regime, colour)| {
                 let points = swept.points.iter().flatten();
-                let count = points.filter(|point| point.regime_code == *code).count();
+                let count = points
+                    .filter(|point| point.regime_code == regime.code())
+                    .count();
                 let help = "Kind of motion, and at how many values it was found";
-                (count, *word, theme::series(*colour, dark), help)
+                (count, regime.word(), theme::series(*colour, dark), help)
             })
             .collect();
         let help = "Values at which the divergence guard stopped the run, or that could not start";
@@ -238,7 +241,7 @@ impl Diagram {
                 self.diverged.push(value);
                 continue;
             }
-            let is = |regime: &(i64, &str, usize)| regime.0 == point.regime_code;
+            let is = |(regime, _): &(Regime, usize)| regime.code() == point.regime_code;
             let place = REGIMES.iter().position(is).unwrap_or(REGIMES.len() - 1);
             let mut add = |up: f64, section| {
                 let at = PlotPoint::new(value, up);

@@ -7,8 +7,7 @@ use super::{FINEST_BIN, Player, sentences};
 use crate::app::log::{Entry, Event};
 use crate::app::paths::Paths;
 use crate::app::settled::Settling;
-use crate::scene::SceneError;
-use crate::simulate::{Bin, Effect, History, Pull};
+use crate::simulate::{Bin, ChangeError, Effect, History, Pull};
 
 /// Most steps retaken before a past instant, so that the plots show in detail what led to it.
 const LEAD: u64 = 512;
@@ -313,8 +312,8 @@ impl Player {
         }
     }
 
-    fn apply(&mut self, entry: &Entry) -> Result<(), SceneError> {
-        let done: Result<Effect, SceneError> = match &entry.event {
+    fn apply(&mut self, entry: &Entry) -> Result<(), ChangeError> {
+        let done: Result<Effect, ChangeError> = match &entry.event {
             Event::Set { key, value } => self.apply_set(key, value),
             Event::Original { key } => self.apply_original(key),
             Event::Sections { .. } => {

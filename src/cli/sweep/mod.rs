@@ -144,14 +144,7 @@ pub(super) fn meta(sweep: &Sweep) -> Map<String, Json> {
         drive_period(&scene).ok()
     });
     let period = period.filter(|_| period == other);
-    let regimes = [
-        Regime::Unclear,
-        Regime::Periodic(1),
-        Regime::QuasiPeriodic,
-        Regime::Chaotic,
-        Regime::NotSettled,
-    ];
-    let mut words: Map<String, Json> = regimes
+    let mut words: Map<String, Json> = Regime::ALL
         .iter()
         .map(|regime| (regime.code().to_string(), json!(regime.word())))
         .collect();

@@ -97,7 +97,7 @@ fn cells(phase: &Phase) -> [String; OF_PHASE.len()] {
     let end = match phase.end {
         End::Reached => "reached",
         End::Capped => "capped",
-        End::Stopped(_) => "stopped",
+        End::Stopped(_) | End::Refused(_) => "stopped",
     };
     [
         end.to_owned(),

@@ -255,7 +255,7 @@ fn reading(found: &WorkPrecision) -> Vec<String> {
     let stopped = found
         .points
         .iter()
-        .filter(|point| end(&point.impacts) == "stopped");
+        .filter(|point| point.impacts.end.fault().is_some());
     let stopped: Vec<String> = stopped.map(setting).collect();
     if !stopped.is_empty() {
         told.push(format!(

@@ -54,7 +54,7 @@ pub(super) fn end(phase: &Phase) -> &'static str {
     match phase.end {
         End::Reached => "",
         End::Capped => "capped",
-        End::Stopped(_) => "stopped",
+        End::Stopped(_) | End::Refused(_) => "stopped",
     }
 }
 
@@ -162,7 +162,7 @@ pub(super) fn text(found: &WorkPrecision) -> String {
         );
     }
     for point in &found.points {
-        if let End::Stopped(why) = &point.impacts.end {
+        if let Some(why) = point.impacts.end.fault() {
             let _ = writeln!(
                 out,
                 "{} {}: {why}",

@@ -15,12 +15,9 @@ pub struct Gap {
     pub eccentricity: Vec3,
     /// de/dt, m/s.
     pub eccentricity_rate: Vec3,
-    /// n = e / |e| (8); zero if e is.
-    pub normal: Vec3,
-    /// delta, m (10).
-    pub penetration: f64,
-    /// d(delta)/dt, m/s.
-    pub rate: f64,
+    /// Where the ball is in its socket: of a ball beyond the wall from every evaluation, of others once [`Contact::finish`]
+    /// has completed it. An ideal joint has no penetration.
+    pub separation: Separation,
     /// F_N, N (19).
     pub normal_force: f64,
     /// F_T on the ball, N (20).
@@ -54,21 +51,14 @@ impl Contact {
         self.joint.ideal.is_none()
     }
 
-    /// Separation at the latest evaluation, for a ball that is off centre.
-    #[inline]
-    pub fn separation(&self) -> Separation {
-        let gap = &self.gap;
-        self.law
-            .separation(&gap.eccentricity, &gap.eccentricity_rate)
-    }
-
-    /// Power dissipated by friction for the contact normal `n`, W.
-    fn friction_power(&self, n: &Vec3, motion: &[Kinematics]) -> f64 {
+    /// Power dissipated by friction, W.
+    fn friction_power(&self, motion: &[Kinematics]) -> f64 {
         let (gap, law) = (&self.gap, &self.law);
         if gap.friction == Vec3::zeros() {
             return 0.0;
         }
         let [ball, socket] = self.spins(motion);
+        let n = &gap.separation.normal;
         let surfaces = law.surface_velocity(n, &gap.eccentricity_rate, ball, socket);
         -gap.friction.dot(&surfaces)
     }
@@ -81,7 +71,7 @@ impl Contact {
         Some(Touch {
             direction: self.wall_direction(motion),
             normal_force: self.gap.normal_force,
-            friction_power: self.friction_power(&self.separation().normal, motion),
+            friction_power: self.friction_power(motion),
         })
     }
 
@@ -89,7 +79,12 @@ impl Contact {
     /// of the socket's body: towards the point of the wall nearest to the ball.
     pub fn wall_direction(&self, motion: &[Kinematics]) -> Vec3 {
         let socket = &motion[self.joint.socket.body];
-        socket.rotation.tr_mul(&self.separation().normal)
+        socket.rotation.tr_mul(&self.direction())
+    }
+
+    /// e / |e| of a ball off centre, whether or not its gap has been finished.
+    pub fn direction(&self) -> Vec3 {
+        self.gap.eccentricity.normalize()
     }
 
     /// Angular velocities of ball and socket, rad/s.
@@ -106,28 +101,22 @@ impl Contact {
             .friction_reads(n, &self.gap.eccentricity_rate, ball, socket)
     }
 
-    /// Completes normal, penetration and rate from the eccentricity of the latest evaluation.
+    /// Measures eccentricity and its rate; forces stay.
+    pub fn measure(&mut self, motion: &[Kinematics]) {
+        let joint = &self.joint;
+        let (e, rate) = joint.opening(motion, &joint.arms(motion));
+        (self.gap.eccentricity, self.gap.eccentricity_rate) = (e, rate);
+        self.finish();
+    }
+
+    /// Completes the separation from the eccentricity of the latest evaluation.
     pub fn finish(&mut self) {
         let loose = self.is_loose();
         let Self { law, gap, .. } = self;
-        let distance = gap.eccentricity.norm();
-        gap.normal = if distance > 0.0 {
-            gap.eccentricity / distance
-        } else {
-            Vec3::zeros()
-        };
+        gap.separation = law.separation(&gap.eccentricity, &gap.eccentricity_rate);
         if !loose {
-            (gap.penetration, gap.rate) = (0.0, 0.0);
-            return;
+            (gap.separation.penetration, gap.separation.rate) = (0.0, 0.0);
         }
-        gap.penetration = distance - law.clearance;
-        // A ball exactly at the centre leaves it in its direction of motion.
-        let opening = if distance > 0.0 {
-            gap.normal.dot(&gap.eccentricity_rate)
-        } else {
-            gap.eccentricity_rate.norm()
-        };
-        gap.rate = opening - law.clearance_rate;
     }
 }
 
@@ -135,11 +124,8 @@ impl ForceElement for Contact {
     #[inline]
     fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
         let (joint, law) = (&self.joint, &self.law);
-        let (ball, socket) = (&at.motion[joint.ball.body], &at.motion[joint.socket.body]);
-        let arm_ball = ball.rotation * joint.ball.offset;
-        let arm_socket = socket.rotation * joint.socket.offset;
-        let velocity = ball.point_velocity(&arm_ball) - socket.point_velocity(&arm_socket);
-        let e = (ball.position + arm_ball) - (socket.position + arm_socket);
+        let arms = joint.arms(at.motion);
+        let (e, velocity) = joint.opening(at.motion, &arms);
         let gap = &mut self.gap;
         *gap = Gap {
             eccentricity: e,
@@ -147,16 +133,18 @@ impl ForceElement for Contact {
             ..Gap::default()
         };
         let clearance = law.clearance;
-        let Some(memory) = at.touching.memory(self.index) else {
-            return;
-        };
         if e.norm_squared() <= clearance * clearance {
             return;
         }
         let separation = law.separation(&e, &velocity);
+        gap.separation = separation;
+        let Some(memory) = at.touching.memory(self.index) else {
+            return;
+        };
         let counts = &mut *loads.counts;
         let force = law.force(memory, &separation, || {
             counts.friction += 1;
+            let [ball, socket] = [&joint.ball, &joint.socket].map(|anchor| &at.motion[anchor.body]);
             let (ball, socket) = (&ball.angular_velocity, &socket.angular_velocity);
             law.friction_reads(&separation.normal, &velocity, ball, socket)
         });
@@ -170,6 +158,7 @@ impl ForceElement for Contact {
         let n = separation.normal;
         let on_ball = n * -force.normal + force.friction;
         let radius = law.ball_radius;
+        let [arm_ball, arm_socket] = arms;
         let ball = &mut loads.wrench[joint.ball.body];
         ball.force += on_ball;
         ball.torque += (arm_ball + n * radius).cross(&on_ball);
@@ -186,8 +175,7 @@ impl ForceElement for Contact {
         let gap = &self.gap;
         let memory = at.touching.memory(self.index);
         let memory = memory.filter(|_| gap.normal_force > 0.0)?;
-        let separation = self.separation();
-        let n = separation.normal;
+        let n = gap.separation.normal;
         let read = self.friction_reads(&n, at.motion);
         let force = Force {
             normal: gap.normal_force,
@@ -196,7 +184,7 @@ impl ForceElement for Contact {
         };
         let stiffness = self.law.linearise(
             memory,
-            &separation,
+            &gap.separation,
             &gap.eccentricity_rate,
             &read,
             &force,
@@ -212,7 +200,7 @@ impl ForceElement for Contact {
     }
 
     fn stored(&self, _: &[Kinematics]) -> f64 {
-        self.law.elastic_energy(self.gap.penetration)
+        self.law.elastic_energy(self.gap.separation.penetration)
     }
 
     fn add_powers(&self, _: f64, motion: &[Kinematics], powers: &mut Powers) {
@@ -220,9 +208,9 @@ impl ForceElement for Contact {
         if gap.eccentricity.norm_squared() <= law.clearance * law.clearance {
             return;
         }
-        let at = self.separation();
-        powers.restitution += law.restitution_power(&at, gap.normal_force);
-        powers.clearance += law.clearance_power(&at, gap.normal_force);
-        powers.friction += self.friction_power(&at.normal, motion);
+        let at = &gap.separation;
+        powers.restitution += law.restitution_power(at, gap.normal_force);
+        powers.clearance += law.clearance_power(at, gap.normal_force);
+        powers.friction += self.friction_power(motion);
     }
 }

@@ -233,8 +233,8 @@ impl Simulation {
         let gap = self.mechanism.contacts.gap(j);
         SignedGap {
             theta,
-            gap: sign * gap.penetration,
-            rate: sign * gap.rate,
+            gap: sign * gap.separation.penetration,
+            rate: sign * gap.separation.rate,
         }
     }
 }

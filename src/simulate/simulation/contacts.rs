@@ -2,8 +2,7 @@
 
 use super::search::NEAR_PEAK;
 use super::{Simulation, State};
-use crate::contact::Memory;
-use crate::contact::{ApproachPiece, Coefficients};
+use crate::contact::{Coefficients, Memory};
 use crate::scene::least_impact_steps;
 use crate::simulate::peaks::Course;
 
@@ -17,18 +16,17 @@ pub(super) struct Switched {
 }
 
 impl State {
-    /// Records a step of contact `j`, from fraction `from` on, with the largest normal force `force` (N) and the remembered
-    /// approach speed `remembered` (m/s).
+    /// Records a step of contact `j`, from fraction `from` on, with the largest normal force `force` (N).
     fn follow(
         &mut self,
         j: usize,
         course: &Course,
         c: &Coefficients,
         force: f64,
-        remembered: f64,
+        memory: &Memory,
         from: f64,
     ) {
-        let (damping, theta) = course.most_damped(c, remembered, from);
+        let (damping, theta) = course.most_damped(c, memory, from);
         self.record.impacts.follow(j, course, force, damping);
         if damping > self.record.statistics.damping[j] {
             self.record.statistics.damping[j] = damping;
@@ -64,8 +62,8 @@ impl Simulation {
             let coefficients = mechanism.contacts.coefficients(j);
             if state.now.memory[j].active {
                 let course = Course::new(start, end, h);
-                let remembered = state.now.memory[j].approach_speed;
-                state.follow(j, &course, coefficients, strongest[j].0, remembered, 0.0);
+                let memory = state.now.memory[j].unsplit();
+                state.follow(j, &course, coefficients, strongest[j].0, &memory, 0.0);
             }
             // A located switch ends within rounding of the wall, on either side; but the repeated step may show that a ball
             // about to separate turned around before.
@@ -77,16 +75,10 @@ impl Simulation {
             };
             state.record.contact_steps[j] += 1;
             if touching == state.now.memory[j].active {
-                if touching && coefficients.largest {
-                    let whole = state.now.memory[j].approach_piece == ApproachPiece::Unsplit;
-                    let fastest = if whole {
-                        Course::new(start, end, h).fastest(0.0).0
-                    } else {
-                        end.rate
-                    };
+                if touching {
+                    let fastest = || Course::new(start, end, h).fastest(0.0).0;
                     let memory = &mut state.now.memory[j];
-                    switched.forces |= whole && fastest > memory.approach_speed.max(end.rate);
-                    memory.approach_speed = memory.approach_speed.max(fastest);
+                    switched.forces |= memory.rise(coefficients, end.rate, fastest);
                 }
                 continue;
             }
@@ -112,12 +104,9 @@ impl Simulation {
                 let mut memory = Memory::begun(coefficients, rate);
                 // A located contact begins where the step ends.
                 if fixed {
-                    if coefficients.largest {
-                        memory.approach_speed = memory.approach_speed.max(course.fastest(theta).0);
-                    }
-                    let remembered = memory.approach_speed;
-                    let (force, _) = course.strongest(coefficients, remembered);
-                    state.follow(j, &course, coefficients, force, remembered, theta);
+                    memory.rise(coefficients, end.rate, || course.fastest(theta).0);
+                    let (force, _) = course.strongest(coefficients, &memory);
+                    state.follow(j, &course, coefficients, force, &memory, theta);
                 }
                 state.now.memory[j] = memory;
                 state.record.statistics.impacts[j] += 1;
@@ -140,7 +129,7 @@ impl Simulation {
                 let coarse = fixed && steps < least;
                 state.record.statistics.coarse[j] += u64::from(coarse);
                 state.now.memory[j] = Memory::default();
-                state.record.statistics.last_separation[j] = state.now.t;
+                state.record.statistics.last_separation[j] = Some(state.now.t);
             }
         }
         switched
@@ -164,16 +153,14 @@ impl Simulation {
             if start.penetration <= 0.0 && end.penetration <= 0.0 && !grazes {
                 continue;
             }
-            let mut coefficients = *mechanism.contacts.coefficients(j);
+            let coefficients = mechanism.contacts.coefficients(j);
             let course = Course::new(start, end, h);
             let (force, theta) = if state.before.memory[j].active {
                 attempt.strongest[j]
             } else if state.now.memory[j].active {
-                course.strongest(&coefficients, state.now.memory[j].approach_speed)
+                course.strongest(coefficients, &state.now.memory[j].unsplit())
             } else {
-                // It began and ended within the step, with no memory: its approach speed was the rate at each instant.
-                coefficients.largest = true;
-                course.strongest(&coefficients, coefficients.speed_floor)
+                course.strongest(coefficients, &Memory::passing(coefficients))
             };
             let time = state.before.t + theta * h;
             attempt.near_peak |= force > NEAR_PEAK * state.record.statistics.peak_normal[j];
@@ -183,16 +170,12 @@ impl Simulation {
             }
             if force > state.record.peaks[j].normal {
                 let gap = mechanism.contacts.gap(j);
-                let n = if gap.eccentricity.norm() > 0.0 {
-                    gap.eccentricity.normalize()
-                } else {
-                    gap.eccentricity
-                };
-                state.record.peaks[j].normal = force;
-                state.record.peaks[j].time = time;
-                state.record.peaks[j].normal_force = n * -force;
+                let peak = &mut state.record.peaks[j];
+                peak.normal = force;
+                peak.time = time;
+                peak.normal_force = gap.separation.normal * -force;
                 // Friction follows the normal force within a step: the ratio at the step's end is used for the peak.
-                state.record.peaks[j].friction_force = if gap.normal_force > 0.0 {
+                peak.friction_force = if gap.normal_force > 0.0 {
                     gap.friction * (force / gap.normal_force)
                 } else {
                     gap.friction

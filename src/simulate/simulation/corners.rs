@@ -1,7 +1,7 @@
 //! Corners of the contact laws as events: over a whole step each touching joint stays on one piece of the friction law and
 //! one piece of the approach-speed rule, and the step ends where its sliding speed or penetration rate leaves that piece.
 
-use super::Simulation;
+use super::{Simulation, State};
 use crate::contact::{ApproachPiece, FrictionPiece, Memory};
 use crate::integrate::{Method, find_root};
 use crate::simulate::stepper::Member;
@@ -68,53 +68,34 @@ impl Simulation {
     /// Where corners are not located, all follow the whole laws.
     pub(super) fn hold_pieces(&mut self, anew: bool) {
         let holds = self.locates_corners() && !self.state.control.chatters;
-        let keeps = |slip: FrictionPiece| slip != FrictionPiece::Unsplit && !anew;
-        if !holds {
-            for memory in &mut self.state.now.memory {
-                (memory.friction_piece, memory.approach_piece) =
-                    (FrictionPiece::Unsplit, ApproachPiece::Unsplit);
-            }
-            return;
-        }
         let Self {
             mechanism, state, ..
         } = self;
-        // A rate below the largest so far exceeds it only at a corner; a rising one may have stopped rising.
-        for (j, memory) in state.now.memory.iter_mut().enumerate() {
-            let c = mechanism.contacts.coefficients(j);
-            if memory.approach_piece == ApproachPiece::Rising
-                && state.now.gaps[j].rate < memory.approach_speed
-            {
-                memory.approach_piece = ApproachPiece::Held;
-            } else if memory.active
-                && c.largest
-                && memory.approach_piece == ApproachPiece::Unsplit
-                && !anew
-            {
-                memory.approach_piece =
-                    c.approach_piece_at(memory.approach_speed, state.now.gaps[j].rate);
+        let State { now, .. } = state;
+        if anew || !holds {
+            for memory in &mut now.memory {
+                *memory = memory.unsplit();
             }
         }
-        if state
-            .now
-            .memory
-            .iter()
-            .all(|m| !m.active || keeps(m.friction_piece))
-        {
+        if !holds {
             return;
         }
-        mechanism.measure(state.now.t, &state.now.y);
-        for (j, memory) in state.now.memory.iter_mut().enumerate() {
-            let c = mechanism.contacts.coefficients(j);
-            if !memory.active {
-                memory.friction_piece = FrictionPiece::Unsplit;
-            } else if !keeps(memory.friction_piece) {
-                let speed = mechanism.slip_speed(j);
-                memory.friction_piece = c.friction_piece_at(speed);
-                if anew {
-                    let rate = mechanism.contacts.gap(j).rate;
-                    memory.approach_piece = c.approach_piece_at(memory.approach_speed, rate);
-                }
+        // Anew the gaps may be those of another state until they are measured.
+        if !anew {
+            for (j, memory) in now.memory.iter_mut().enumerate() {
+                memory.hold_approach(mechanism.contacts.coefficients(j), now.gaps[j].rate);
+            }
+        }
+        let holds_none = |m: &Memory| m.active && m.friction_piece == FrictionPiece::Unsplit;
+        if !now.memory.iter().any(holds_none) {
+            return;
+        }
+        mechanism.measure(now.t, &now.y);
+        for (j, memory) in now.memory.iter_mut().enumerate() {
+            if holds_none(memory) {
+                let c = mechanism.contacts.coefficients(j);
+                memory.friction_piece = c.friction_piece_at(mechanism.slip_speed(j));
+                memory.hold_approach(c, mechanism.contacts.gap(j).separation.rate);
             }
         }
     }
@@ -206,7 +187,7 @@ impl Simulation {
     /// Penetration rate of joint `j` on the interpolant of the attempted step, m/s.
     fn rate_at(&mut self, j: usize, theta: f64, h: f64) -> f64 {
         self.measure_at(theta, h);
-        self.mechanism.contacts.gap(j).rate
+        self.mechanism.contacts.gap(j).separation.rate
     }
 
     /// Measures the interpolant of the attempted step.

@@ -1,7 +1,7 @@
 //! Perturbing the state: for a twin run and its renormalisation.
 
 use super::Simulation;
-use crate::contact::{ApproachPiece, FrictionPiece, Memory};
+use crate::contact::Memory;
 
 impl Simulation {
     /// Adds `offset` to coordinates and velocities (ordered as in [`Self::state`]) and continues from there: quaternions
@@ -23,19 +23,16 @@ impl Simulation {
                 continue;
             }
             // The offset may lie beyond a corner of the laws.
-            (
-                state.now.memory[j].friction_piece,
-                state.now.memory[j].approach_piece,
-            ) = (FrictionPiece::Unsplit, ApproachPiece::Unsplit);
+            state.now.memory[j] = state.now.memory[j].unsplit();
             let gap = *mechanism.contacts.gap(j);
-            let touching = gap.penetration > 0.0;
+            let touching = gap.separation.penetration > 0.0;
             if touching == state.now.memory[j].active {
                 continue;
             }
             state.now.memory[j] = if touching {
                 state.control.contact_began = true;
                 state.control.h_next = state.control.h_next.min(state.control.h_contact);
-                Memory::begun(mechanism.contacts.coefficients(j), gap.rate)
+                Memory::begun(mechanism.contacts.coefficients(j), gap.separation.rate)
             } else {
                 Memory::default()
             };

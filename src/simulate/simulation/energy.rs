@@ -22,24 +22,18 @@ impl Simulation {
 
     /// Opens a new account at the current state, just fully evaluated.
     pub(super) fn open_account(&mut self) {
-        let Self {
-            mechanism, state, ..
-        } = self;
-        let energies = energies(mechanism, state);
-        state.record.account = Account::start(self.running.solver.energy_ledger, energies);
+        let on = self.running.solver.energy_ledger;
+        self.state.record.account = Account::start(on, energies(&self.mechanism));
     }
 
     /// Books what a live change did to the energies; the state was just fully evaluated.
     pub(super) fn book_change(&mut self) {
-        let Self {
-            mechanism, state, ..
-        } = self;
-        if state.record.account.on {
-            let energies = energies(mechanism, state);
-            state.record.account.book_change(energies);
+        let account = &mut self.state.record.account;
+        if account.on {
+            account.book_change(energies(&self.mechanism));
         }
         // A wear map keeps them even without a ledger.
-        state.record.account.powers = None;
+        account.powers = None;
     }
 
     /// Books the step just accepted, of size `h`, in the ledger and the wear map. The contact memory is still that of the
@@ -60,7 +54,7 @@ impl Simulation {
         if !mechanism.is_evaluated_at(state.now.t) {
             mechanism.measure(state.now.t, &state.now.y);
         }
-        let energies = energies(mechanism, state);
+        let energies = energies(mechanism);
         if mechanism.has_powers() {
             let now = &state.now;
             scratch_k.copy_from_slice(&now.k);
@@ -176,20 +170,11 @@ impl Simulation {
 }
 
 /// Energies at the latest evaluation, that of the current state.
-fn energies(mechanism: &Mechanism, state: &State) -> Energies {
+fn energies(mechanism: &Mechanism) -> Energies {
     let (kinetic, gravitational) = mechanism.energies();
-    let contacts = &mechanism.contacts;
-    let in_contacts: f64 = (0..contacts.len())
-        .filter(|&j| contacts.has_clearance(j))
-        .map(|j| {
-            contacts
-                .coefficients(j)
-                .elastic_energy(state.now.gaps[j].penetration)
-        })
-        .sum();
     Energies {
         kinetic,
         gravitational,
-        elastic: in_contacts + mechanism.energy_in_elements(),
+        elastic: mechanism.elastic_energy(),
     }
 }

@@ -77,7 +77,8 @@ impl Simulation {
         let least = self.running.bodies.iter().map(|body| body.mass);
         let pushed = self.mechanism.element_reports(self.state.now.t + h);
         let push: f64 = pushed.map(|element| element.force.norm()).sum();
-        let pull = self.running.gravity.norm() + push / least.fold(f64::INFINITY, f64::min);
+        let least = least.fold(f64::INFINITY, f64::min);
+        let pull = self.running.most_acceleration([(push, least)]);
         let speed = start.speed + pull * h + coefficients.speed_floor;
         let times = coefficients.elastic_energy(end.penetration) / (0.5 * mass * speed * speed);
         (times > MOST_OVERSHOOT).then_some(times)

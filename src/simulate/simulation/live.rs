@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::automatic::{Choice, controller_of, prepare_implicit};
 use super::{CLEARANCE_SPEED, Simulation};
 use crate::contact::Memory;
-use crate::mechanism::{ElementReport, Pull, Ramp};
+use crate::mechanism::{ElementReport, MechanismError, Pull, Ramp};
 use crate::scene::{Scene, SceneError};
 use crate::simulate::stepper::{AnyStepper, Member};
 use crate::simulate::{Effect, Frame};
@@ -13,12 +13,39 @@ use crate::simulate::{Effect, Frame};
 /// Largest distance of a hand, or of the point it holds, m: beyond it a pull makes no sense.
 const FARTHEST_HAND: f64 = 1e6;
 
+/// Why a running simulation was not changed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ChangeError {
+    /// A parameter or value that the scene does not accept.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A method that the equations do not allow.
+    #[error("solver.method: {0}")]
+    Method(#[from] MechanismError),
+    /// A pull on a body that does not exist.
+    #[error("body {body} is pulled, of {bodies} (counted from 0)")]
+    NoBody {
+        /// Index.
+        body: usize,
+        /// Number of bodies.
+        bodies: usize,
+    },
+    /// A hand, or the point that it holds, out of reach.
+    #[error(
+        "a hand, or the point that it holds, is {far:e} m away; allowed at most {FARTHEST_HAND} m"
+    )]
+    TooFar {
+        /// m.
+        far: f64,
+    },
+}
+
 impl Simulation {
     /// Changes a parameter (`contact.clearance`, `joint.S1.friction`, …) to a value as a user writes it.
     ///
     /// # Errors
     /// Unknown key, bad unit, out of range: the running simulation is unchanged.
-    pub fn set(&mut self, key: &str, value: &str) -> Result<Effect, SceneError> {
+    pub fn set(&mut self, key: &str, value: &str) -> Result<Effect, ChangeError> {
         let mut next = Scene::clone(&self.scene);
         let waits = next.set(key, value)?.at_reset;
         self.adopt(next, |running| running.set(key, value).map(|_| ()), waits)
@@ -32,7 +59,7 @@ impl Simulation {
         &mut self,
         key: &str,
         value: &crate::scene::Value,
-    ) -> Result<Effect, SceneError> {
+    ) -> Result<Effect, ChangeError> {
         let mut next = Scene::clone(&self.scene);
         let waits = next.set_value(key, value)?.at_reset;
         self.adopt(
@@ -46,7 +73,7 @@ impl Simulation {
     ///
     /// # Errors
     /// As [`Self::check_pull`]: the running simulation is unchanged.
-    pub fn pull(&mut self, pull: Option<Pull>) -> Result<(), SceneError> {
+    pub fn pull(&mut self, pull: Option<Pull>) -> Result<(), ChangeError> {
         pull.map_or(Ok(()), |pull| self.check_pull(&pull))?;
         self.state.pull = pull;
         self.put_conditions();
@@ -59,22 +86,17 @@ impl Simulation {
     ///
     /// # Errors
     /// An unknown body, or a position out of reach.
-    pub fn check_pull(&self, pull: &Pull) -> Result<(), SceneError> {
+    pub fn check_pull(&self, pull: &Pull) -> Result<(), ChangeError> {
         let bodies = self.running.bodies.len();
         let far = pull.hand.amax().max(pull.point.amax());
-        let message = if pull.body >= bodies {
-            format!("body {} is pulled, of {bodies} (counted from 0)", pull.body)
+        if pull.body >= bodies {
+            let body = pull.body;
+            Err(ChangeError::NoBody { body, bodies })
         } else if far > FARTHEST_HAND {
-            format!(
-                "a hand, or the point that it holds, is {far:e} m away; allowed at most {FARTHEST_HAND} m"
-            )
+            Err(ChangeError::TooFar { far })
         } else {
-            return Ok(());
-        };
-        Err(SceneError {
-            message,
-            ..SceneError::default()
-        })
+            Ok(())
+        }
     }
 
     /// Force of the hand that pulls, if any, with the bodies as in `frame`.
@@ -96,7 +118,7 @@ impl Simulation {
         next: Scene,
         change: impl FnOnce(&mut Scene) -> Result<(), SceneError>,
         waits: bool,
-    ) -> Result<Effect, SceneError> {
+    ) -> Result<Effect, ChangeError> {
         let mut running = Scene::clone(&self.running);
         // What the running scene cannot accept may suit the waiting one, say a joint of a longer chain.
         let waits = waits || change(&mut running).is_err();
@@ -112,13 +134,7 @@ impl Simulation {
             return Ok(Effect::AtReset);
         }
         if running.solver.method != self.running.solver.method {
-            prepare_implicit(&mut self.mechanism, running.solver.method).map_err(|error| {
-                SceneError {
-                    key: Some("solver.method".to_owned()),
-                    message: error.to_string(),
-                    ..SceneError::default()
-                }
-            })?;
+            prepare_implicit(&mut self.mechanism, running.solver.method)?;
         }
         self.scene = Arc::new(next);
         let before = std::mem::replace(&mut self.running, Arc::new(running));
@@ -201,7 +217,7 @@ impl Simulation {
         mechanism.measure(state.now.t, &state.now.y);
         let now = mechanism.contacts.clearance(j);
         let gap = *mechanism.contacts.gap(j);
-        let distance = gap.penetration + now;
+        let distance = gap.separation.penetration + now;
         let clearance = if contact.clearance < now && distance > contact.clearance {
             let ramp = Ramp {
                 start: state.now.t,

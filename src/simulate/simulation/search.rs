@@ -30,13 +30,13 @@ impl Simulation {
     pub(super) fn find_strongest(&mut self, h: f64) {
         let located = self.locates();
         for j in 0..self.state.now.gaps.len() {
-            let memory = self.state.before.memory[j];
+            let memory = self.state.before.memory[j].unsplit();
             if !memory.active || !self.mechanism.contacts.has_clearance(j) {
                 continue;
             }
             let course = Course::new(self.state.before.gaps[j], self.state.now.gaps[j], h);
             let c = *self.mechanism.contacts.coefficients(j);
-            let (force, theta) = course.strongest(&c, memory.approach_speed);
+            let (force, theta) = course.strongest(&c, &memory);
             self.attempt.strongest[j] = (force, theta);
             let least = self.state.record.statistics.peak_normal[j]
                 .min(self.state.record.peaks[j].normal)
@@ -46,7 +46,7 @@ impl Simulation {
             }
             self.look(self.state.before.t + theta * h);
             let inside = self.mechanism.contacts.gap(j).normal_force;
-            let ends = course.stronger_end(&c, memory.approach_speed);
+            let ends = course.stronger_end(&c, &memory);
             self.attempt.strongest[j] = if inside > ends.0 {
                 (inside, theta)
             } else {
@@ -78,7 +78,8 @@ impl Simulation {
                     continue;
                 }
                 let gap = self.mechanism.contacts.gap(j);
-                let (normal, size, friction) = (gap.normal, gap.normal_force, gap.friction);
+                let (normal, size, friction) =
+                    (gap.separation.normal, gap.normal_force, gap.friction);
                 if self.is_peak(j, size, time) {
                     self.state.record.peaks[j].normal_force = normal * -size;
                     self.state.record.peaks[j].friction_force = friction;
