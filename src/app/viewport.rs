@@ -335,7 +335,7 @@ impl Viewport {
                 size,
             );
             if first {
-                self.camera = goal;
+                (self.camera, self.goal) = (goal, None);
             } else {
                 self.goal = Some(goal);
                 ui.ctx().request_repaint();
@@ -776,6 +776,33 @@ fn describe(ui: &mut Ui, player: &Player, picked: Picked) {
                     row(ui, "Penetration", joint.penetration.max(0.0), "um");
                 }
             }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Scene;
+
+    #[test]
+    fn the_first_picture_does_not_move_into_place() {
+        let scene = Scene::load("spcmm", &[]).expect("built in");
+        let player = Player::new(&scene).expect("starts");
+        let mut viewport = Viewport::new(&player, ViewOptions::default());
+        let draw = |viewport: &mut Viewport| {
+            let mut output = egui::Context::default().run_ui(egui::RawInput::default(), |ui| {
+                viewport.ui(ui, &player, true)
+            });
+            // No texture is made of it.
+            output.textures_delta.clear();
+        };
+        let unfitted = viewport.camera;
+        draw(&mut viewport);
+        assert_ne!(viewport.camera, unfitted);
+        assert_eq!(viewport.goal, None);
+        viewport.preset(Preset::Top);
+        draw(&mut viewport);
+        assert!(viewport.goal.is_some(), "later ones do");
+    }
+}
         }
         Picked::Fixed(_) => {}
     }

@@ -291,11 +291,11 @@ pub struct DrawList {
 }
 
 impl Default for DrawList {
-    /// An empty picture; its buffers are reused from build to build.
+    /// No picture yet: of no size. Its buffers are reused from build to build.
     fn default() -> Self {
         let ground = Colour::hex(0xFFFFFF);
         Self {
-            size: [1, 1],
+            size: [0, 0],
             eye: Eye {
                 clip_from_world: Mat4::IDENTITY,
                 position: Vec3::ZERO,
