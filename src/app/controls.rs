@@ -194,11 +194,7 @@ impl Controls {
             Kind::Count { min, max } => self.count(ui, player, &row, (*min, *max)),
         });
         if let Some(error) = self.drafts.get(key).and_then(|draft| draft.error.as_ref()) {
-            ui.label(
-                RichText::new(value::typeset(error))
-                    .small()
-                    .color(ui.visuals().error_fg_color),
-            );
+            theme::error(ui, value::typeset(error));
         }
         let beats = player.keys_overriding_preset();
         if key == PRESET && !beats.is_empty() {
@@ -210,18 +206,10 @@ impl Controls {
             ui.label(RichText::new(words).small().weak());
         }
         if player.is_waiting(key) {
-            ui.label(
-                RichText::new("Applies at the next reset")
-                    .small()
-                    .color(ui.visuals().warn_fg_color),
-            );
+            theme::warning(ui, "Applies at the next reset");
         }
         if let Some(warning) = player.warning(key) {
-            ui.label(
-                RichText::new(value::typeset(warning))
-                    .small()
-                    .color(ui.visuals().warn_fg_color),
-            );
+            theme::warning(ui, value::typeset(warning));
         }
     }
 

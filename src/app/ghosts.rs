@@ -1,10 +1,10 @@
 //! The ghosts of the 3D view, the twin run and the ideal motion, and their notes.
 
-use eframe::egui::{RichText, Ui};
+use eframe::egui::Ui;
 
 use super::App;
 use super::player::Player;
-use super::value;
+use super::{theme, value};
 use crate::view::{DrawList, Ghost, SceneView, Shot};
 
 /// Adds the ghosts at the displayed instant to the draw list built from `shot`; returns a note on each.
@@ -66,8 +66,7 @@ impl App {
             self.show_ideal(on);
         }
         if let Some(fault) = self.player.ideal().and_then(|ideal| ideal.fault()) {
-            let words = RichText::new(format!("No ideal ghost: {fault}")).small();
-            ui.label(words.color(ui.visuals().warn_fg_color));
+            theme::warning(ui, format!("No ideal ghost: {fault}"));
         }
     }
 }

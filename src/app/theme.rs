@@ -1,8 +1,8 @@
 //! Look of the window: spacing, type sizes and the colours of both themes.
 
 use eframe::egui::{
-    self, Color32, CornerRadius, FontFamily, FontId, Margin, Stroke, TextStyle, Theme, Visuals,
-    vec2,
+    self, Color32, CornerRadius, FontFamily, FontId, Margin, Response, RichText, Stroke, TextStyle,
+    Theme, Ui, Visuals, vec2,
 };
 
 /// Series colours for plots, dark enough on white and light enough on black; distinguishable for the colour-blind (after Okabe
@@ -52,12 +52,24 @@ pub fn apply_size(ctx: &egui::Context, fingers: bool) {
 }
 
 /// Side of a small button, points: `mouse` where there is no need to make it larger.
-pub fn side(ui: &egui::Ui, mouse: f32) -> f32 {
+pub fn side(ui: &Ui, mouse: f32) -> f32 {
     if ui.spacing().interact_size.y >= FINGER {
         FINGER
     } else {
         mouse
     }
+}
+
+/// A small line of text that warns.
+pub fn warning(ui: &mut Ui, words: impl Into<String>) -> Response {
+    let colour = ui.visuals().warn_fg_color;
+    ui.label(RichText::new(words).small().color(colour))
+}
+
+/// A small line of text that says what went wrong.
+pub fn error(ui: &mut Ui, words: impl Into<String>) -> Response {
+    let colour = ui.visuals().error_fg_color;
+    ui.label(RichText::new(words).small().color(colour))
 }
 
 /// Sets both themes' styles.
@@ -133,5 +145,5 @@ fn visuals(dark: bool) -> Visuals {
     visuals.window_corner_radius = CornerRadius::same(10);
     visuals.menu_corner_radius = CornerRadius::same(8);
     visuals.slider_trailing_fill = true;
-}
     visuals
+}
