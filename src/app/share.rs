@@ -116,7 +116,7 @@ pub struct CameraPose {
 }
 
 /// What a link says.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Link {
     /// The scene.
     pub scene: SceneText,
@@ -148,28 +148,6 @@ pub struct Link {
     pub theme: Option<ThemePreference>,
     /// Version of the program that made the link.
     pub version: Option<String>,
-}
-
-impl Default for Link {
-    fn default() -> Self {
-        Self {
-            scene: SceneText::BuiltIn(DEFAULT_SCENE.to_owned()),
-            log: Log::default(),
-            steps: None,
-            time: None,
-            hash: None,
-            time_scale: None,
-            camera: None,
-            magnification: None,
-            follow: None,
-            plots: None,
-            window: None,
-            instruments: None,
-            playing: None,
-            theme: None,
-            version: None,
-        }
-    }
 }
 
 /// Whether `text` is a link in one of the forms of [`Link::parse`], rather than the name of a scene or of a file.
@@ -460,6 +438,12 @@ impl Link {
             || self.time.is_some()
             || self.hash.is_some()
             || !self.log.entries.is_empty()
+    }
+}
+
+impl Default for SceneText {
+    fn default() -> Self {
+        Self::BuiltIn(DEFAULT_SCENE.to_owned())
     }
 }
 
