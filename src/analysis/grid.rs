@@ -225,8 +225,9 @@ impl ParameterRange {
 
 /// State from which a point starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(not(target_arch = "wasm32"), derive(clap::ValueEnum))]
 pub enum Start {
-    /// Every point from the scene's own initial state.
+    /// From the scene's own initial state.
     Cold,
     /// From the final state of the point with the next lower value.
     FollowUp,

@@ -115,7 +115,7 @@ fn read(arguments: &SweepArguments) -> Result<Sweep, Failure> {
         .iter()
         .map(|text| ParameterRange::parse(&scene, text));
     let axes = axes.collect::<Result<Vec<_>, _>>().map_err(|e| usage(&e))?;
-    let grid = Grid::new(&scene, axes, arguments.start.into()).map_err(|e| usage(&e))?;
+    let grid = Grid::new(&scene, axes, arguments.start).map_err(|e| usage(&e))?;
     let plan = Plan {
         periods: arguments.periods,
         discard: arguments.discard,
