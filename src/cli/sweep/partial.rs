@@ -41,9 +41,7 @@ pub struct Partial {
 impl Partial {
     /// The file beside `out`.
     fn path_of(out: &Path) -> PathBuf {
-        let mut name = out.as_os_str().to_owned();
-        name.push(".partial");
-        PathBuf::from(name)
+        out.with_added_extension("partial")
     }
 
     /// Opens or creates the file beside `out`; `blocks` are those of the output.
