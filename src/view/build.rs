@@ -525,13 +525,10 @@ pub(super) fn push_solid(layer: &mut Layer, solid: &Solid<'_>, material: Materia
 /// The older, the fainter.
 fn push_trail(shot: &Shot<'_>, palette: &Palette, lines: &mut Vec<Line>) {
     let last = shot.trail.len().saturating_sub(1) as f32;
-    let colour = |i: usize| palette.trail.with_opacity(0.9 * (i as f32 / last).sqrt()).0;
-    lines.extend(shot.trail.windows(2).enumerate().map(|(i, ends)| Line {
-        from: ends[0].to_array(),
-        width: 2.2 * shot.pixels_per_point,
-        to: ends[1].to_array(),
-        pad: 0.0,
-        from_colour: colour(i),
-        to_colour: colour(i + 1),
-    }));
+    let colour = |i: usize| palette.trail.with_opacity(0.9 * (i as f32 / last).sqrt());
+    let width = 2.2 * shot.pixels_per_point;
+    for (i, ends) in shot.trail.windows(2).enumerate() {
+        let colours = [colour(i), colour(i + 1)];
+        lines.push(Line::new(ends[0], ends[1], width, colours));
+    }
 }

@@ -115,6 +115,19 @@ pub struct Line {
     pub to_colour: [f32; 4],
 }
 
+impl Line {
+    pub(super) fn new(from: Vec3, to: Vec3, width: f32, [start, end]: [Colour; 2]) -> Self {
+        Self {
+            from: from.to_array(),
+            width,
+            to: to.to_array(),
+            pad: 0.0,
+            from_colour: start.0,
+            to_colour: end.0,
+        }
+    }
+}
+
 /// Viewpoint of the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Eye {
