@@ -451,11 +451,6 @@ impl App {
         }
     }
 
-    /// Shows `problem` above everything until it is dismissed.
-    pub fn report(&mut self, problem: String) {
-        self.problem = Some(problem);
-    }
-
     /// Back to t = 0 with every change applied.
     pub fn reset(&mut self) {
         match self.player.reset() {

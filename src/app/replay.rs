@@ -76,7 +76,7 @@ impl Replay {
                 player.show(player.simulation().time());
                 return None;
             }
-            if !player.replay_step() {
+            if !player.step() {
                 return Some(match self.due(player) {
                     // As in the original run: the guard's refusal is itself the next event of the log.
                     Some(Entry {

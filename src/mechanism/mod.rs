@@ -418,11 +418,6 @@ impl Mechanism {
         self.model.drives.len()
     }
 
-    /// Driven body of drive `i`.
-    pub fn driven_body(&self, i: usize) -> usize {
-        self.model.drives[i].body
-    }
-
     /// Force (N) or torque (N m) of every actuator after [`Evaluator::evaluate_fully`], positive along the joint's axis.
     pub fn actuators(&mut self, out: &mut [f64]) {
         self.equations.actuators(&self.model, &self.gravity, out);

@@ -252,7 +252,6 @@ pub(super) fn push_forces(
         reference,
         pixels: ARROW_LENGTH * height,
         scaling: options.scaling,
-        automatic: options.reference.is_none(),
         clipped,
         ticks: marks.iter().map(tick).collect(),
         normal: options.normal.then_some(palette.normal),

@@ -226,8 +226,6 @@ pub struct Legend {
     pub pixels: f32,
     /// Length against force.
     pub scaling: super::Scaling,
-    /// Whether the reference follows the forces.
-    pub automatic: bool,
     /// Whether some arrow is longer than can be drawn (a fixed reference far too small): its shaft is broken.
     pub clipped: bool,
     /// Ticks on the scale, ascending.
