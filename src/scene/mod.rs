@@ -25,7 +25,7 @@ mod write;
 
 pub use check::least_impact_steps;
 pub use doubt::{Doubt, Warning, WarningKind};
-pub use elements::{ELEMENT_KINDS, Element, ElementKind, ElementNumber, element_table};
+pub use elements::{ELEMENT_KINDS, Element, ElementKind, ElementNumber};
 pub use error::SceneError;
 pub use load::*;
 pub use model::*;
