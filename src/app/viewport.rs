@@ -762,12 +762,7 @@ fn describe(ui: &mut Ui, player: &Player, picked: Picked) {
         }
         Picked::Joint(index) => {
             if let Some(joint) = frame.joints.get(index) {
-                ui.label(match joint.state {
-                    ContactState::Free => "The ball touches nothing",
-                    ContactState::Stick => "In contact, sticking",
-                    ContactState::Slip => "In contact, sliding",
-                    ContactState::Ideal => "Ideal joint: no clearance",
-                });
+                ui.label(value::contact(joint.state));
                 row(ui, "Normal force", joint.normal_force.norm(), "N");
                 row(ui, "Friction force", joint.friction_force.norm(), "N");
                 if joint.state != ContactState::Ideal {
@@ -776,6 +771,11 @@ fn describe(ui: &mut Ui, player: &Player, picked: Picked) {
                     row(ui, "Penetration", joint.penetration.max(0.0), "um");
                 }
             }
+        }
+        Picked::Fixed(_) => {}
+    }
+    ui.label(RichText::new("Double-click to follow").small().weak());
+}
 
 #[cfg(test)]
 mod tests {
@@ -802,9 +802,4 @@ mod tests {
         draw(&mut viewport);
         assert!(viewport.goal.is_some(), "later ones do");
     }
-}
-        }
-        Picked::Fixed(_) => {}
-    }
-    ui.label(RichText::new("Double-click to follow").small().weak());
 }

@@ -22,7 +22,7 @@ use self::options::Shard;
 use super::args::{SummaryForm, SweepArguments};
 use super::check::{NearSingular, near_singular};
 use super::summary::count;
-use super::{Failure, interrupt, load, print, progress, warn};
+use super::{Failure, interrupt, load, print, progress, threads, warn};
 use crate::analysis::drive::drive_period;
 use crate::analysis::grid::{FOLLOW_BLOCK, Grid, ParameterRange};
 use crate::analysis::layout::Status;
@@ -76,8 +76,7 @@ pub fn sweep(arguments: &SweepArguments) -> Result<(), Failure> {
     let bar = progress::bar(!arguments.quiet, all);
     bar.set_position(all - left);
     bar.reset_eta();
-    let cores = || thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
-    let threads = arguments.threads.map_or_else(cores, usize::from);
+    let threads = threads(arguments.threads);
     let started = Instant::now();
     let outcome = compute(&sweep, &todo, threads, &mut partial, &bar);
     let wall = started.elapsed().as_secs_f64();
