@@ -63,7 +63,7 @@ use controls::Controls;
 pub use desktop::DesktopHost;
 use dialogs::{Answer, Dialog};
 #[cfg(not(target_arch = "wasm32"))]
-pub use headless::{Headless, HeadlessError, Overlay, UiFrame};
+pub use headless::{Headless, Overlay};
 pub use host::{Host, NoHost, OpenedFile, Running, SaveFile};
 use keys::Action;
 use layout::Sheet;
