@@ -42,7 +42,7 @@ pub enum RangeError {
         error: ValueError,
     },
     /// A parameter with words for values.
-    #[error("--vary {text}: {key} is no number; only numbers can be varied")]
+    #[error("--vary {text}: {key} is not a number; only numbers can be varied")]
     Words {
         /// As written.
         text: String,

@@ -279,7 +279,7 @@ fn solver(player: &Player, preset: Option<Preset>) -> AccuracyLine {
         value: value::solver(player.wanted()),
         doubtful: false,
         help: format!(
-            "Method with its tolerance, or its fixed step: {name}. They stand under Solver; a measured error is given for presets \
+            "Method with its tolerance, or its fixed step: {name}. They are set under Solver; a measured error is given for presets \
              only."
         ),
     }

@@ -123,7 +123,7 @@ impl Controls {
                 accuracy.ui(ui, player);
             });
         header.header_response.on_hover_text(
-            "How far the numbers can be trusted. Method, step and tolerance stand under Solver.",
+            "How far the numbers can be trusted. Method, step and tolerance are set under Solver.",
         );
     }
 
@@ -159,7 +159,7 @@ impl Controls {
             }
         });
         header.header_response.on_hover_text(
-            "Values of one ball joint only; they beat the values of the whole scene.",
+            "Values of one ball joint only; they override those of the whole scene.",
         );
     }
 

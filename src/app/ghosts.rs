@@ -38,7 +38,7 @@ pub fn add(view: &SceneView, shot: &Shot<'_>, player: &Player, list: &mut DrawLi
     } else if ideal.fault().is_some() {
         notes.push("no ideal ghost: see View options".to_owned());
     } else {
-        notes.push("ideal ghost on its way".to_owned());
+        notes.push("computing the ideal ghost".to_owned());
     }
     notes
 }

@@ -106,9 +106,9 @@ fn buttons(ui: &mut Ui, player: &mut Player) -> bool {
     };
     let asked = icon_button(ui, Icon::Restart, "Reset", help, small, false).clicked();
     let (icon, name, help) = if player.is_playing() {
-        (Icon::Pause, "Pause", "Stand still (space)")
+        (Icon::Pause, "Pause", "Pause (space)")
     } else {
-        (Icon::Play, "Play", "Let time pass (space)")
+        (Icon::Play, "Play", "Play (space)")
     };
     let runs = player.stopped().is_none();
     ui.add_enabled_ui(runs, |ui| {

@@ -674,7 +674,7 @@ impl Viewport {
         if self.followed.is_some()
             && ui
                 .button("Stop following")
-                .on_hover_text("Let the view go (double-click on the ground)")
+                .on_hover_text("Stop following (double-click on the ground)")
                 .clicked()
         {
             self.follow(None);

@@ -146,7 +146,7 @@ pub enum MechanismError {
     /// A start pose in which constraints become dependent that are independent in every neighbouring pose.
     #[error(
         "the mechanism starts in a singular pose: at {} directions that the ideal joints hold elsewhere coincide here, \
-         and the motion could go on in more than one way; start it beside that pose",
+         and the motion could continue in more than one way; start it away from that pose",
         .joints.join(", ")
     )]
     Branching {
@@ -186,7 +186,7 @@ fn unclosed(stays: &[(String, Vec3)]) -> String {
     };
     let each: Vec<String> = stays.iter().map(each).collect();
     format!(
-        ": what stays open is {}, where no joint of the mechanism moves",
+        ": remaining gaps: {} (no joint can move that way)",
         each.join(", ")
     )
 }

@@ -257,7 +257,7 @@ impl SweepPanel {
             && solver.tolerance > LOOSEST_FOR_EXPONENT * (1.0 + 1e-9)
         {
             let words = format!(
-                "At a tolerance of {} exponents drown in the errors of the steps: {} or less",
+                "At a tolerance of {} integration error hides the exponents; use {} or less",
                 value::power_of_ten(solver.tolerance),
                 value::power_of_ten(LOOSEST_FOR_EXPONENT)
             );

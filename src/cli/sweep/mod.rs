@@ -214,8 +214,8 @@ fn warnings(sweep: &Sweep) -> Vec<String> {
     let kept = plan.periods.saturating_sub(plan.discard);
     if kept < FEWEST {
         all.push(format!(
-            "{} of each point: with fewer than {FEWEST} no regime is told, they all come out unclear; raise --periods or \
-             lower --discard.",
+            "{} of each point: with fewer than {FEWEST} no regime can be classified and all are reported as unclear; \
+             raise --periods or lower --discard.",
             count(kept as u64, "section")
         ));
     }
@@ -224,8 +224,8 @@ fn warnings(sweep: &Sweep) -> Vec<String> {
         solver.method.is_adaptive() && solver.tolerance > LOOSEST_FOR_EXPONENT * (1.0 + 1e-9);
     if loose && sweep.plan().exponent {
         all.push(format!(
-            "solver.tolerance {:e}: two runs part by their steps' errors alone at this tolerance, so exponents and the \
-             regimes told from them mean little; use {LOOSEST_FOR_EXPONENT:e} or less, or --no-exponent.",
+            "solver.tolerance {:e}: integration error alone separates two runs at this tolerance, so exponents and the \
+             regimes classified from them are unreliable; use {LOOSEST_FOR_EXPONENT:e} or less, or --no-exponent.",
             solver.tolerance
         ));
     }

@@ -197,7 +197,7 @@ impl Partial {
             return Err(self.damaged(if old {
                 "it is of another version of the format"
             } else {
-                "it is no partial sweep"
+                "it is not a partial sweep"
             }));
         }
         let size = read_u64(&mut reader).map_err(cut)?;
