@@ -307,9 +307,10 @@ impl Mechanism {
         loads.fold(self.model.shortest_period(), f64::min) / 50.0
     }
 
-    /// Where the motion is a function of time alone: which side of a singular pose the loops are on. True elsewhere.
-    pub fn is_right_handed(&mut self) -> bool {
-        !self.is_kinematic() || self.equations.is_right_handed(&self.model)
+    /// Where the motion is a function of time alone: the determinant of the loops' Jacobian, whose sign tells the side of a
+    /// singular pose. True elsewhere.
+    pub fn is_determinant_positive(&mut self) -> bool {
+        !self.is_kinematic() || self.equations.is_determinant_positive(&self.model)
     }
 
     /// Where the motion is a function of time alone and known in closed form: distance of the output body from that motion
@@ -344,7 +345,7 @@ impl Mechanism {
     /// Poses, velocities and gaps at (t, y), without forces.
     pub fn measure(&mut self, t: f64, y: &[f64]) {
         self.evaluated = None;
-        self.equations.forward(&self.model, t, y);
+        self.equations.update_kinematics(&self.model, t, y);
         self.contacts.measure(t, self.equations.motion());
     }
 

@@ -5,7 +5,7 @@ use super::{Simulation, State};
 use crate::contact::Memory;
 use crate::contact::{ApproachPiece, Coefficients};
 use crate::scene::least_impact_steps;
-use crate::simulate::peaks::Course;
+use crate::simulate::peaks::PenetrationCubic;
 
 /// What the end of a step changed in the contact memory.
 #[derive(Clone, Copy)]
@@ -22,7 +22,7 @@ impl State {
     fn follow(
         &mut self,
         j: usize,
-        course: &Course,
+        course: &PenetrationCubic,
         c: &Coefficients,
         force: f64,
         remembered: f64,
@@ -63,7 +63,7 @@ impl Simulation {
             let (start, end) = (state.before.gaps[j], state.now.gaps[j]);
             let coefficients = mechanism.contacts.coefficients(j);
             if state.now.memory[j].active {
-                let course = Course::new(start, end, h);
+                let course = PenetrationCubic::new(start, end, h);
                 let remembered = state.now.memory[j].approach_speed;
                 state.follow(j, &course, coefficients, strongest[j].0, remembered, 0.0);
             }
@@ -80,7 +80,7 @@ impl Simulation {
                 if touching && coefficients.largest {
                     let whole = state.now.memory[j].approach_piece == ApproachPiece::Unsplit;
                     let fastest = if whole {
-                        Course::new(start, end, h).fastest(0.0).0
+                        PenetrationCubic::new(start, end, h).fastest(0.0).0
                     } else {
                         end.rate
                     };
@@ -94,7 +94,7 @@ impl Simulation {
             switched.forces |= fixed;
             let steps = std::mem::replace(&mut state.record.contact_steps[j], 0);
             if touching {
-                let course = Course::new(start, end, h);
+                let course = PenetrationCubic::new(start, end, h);
                 let crosses = start.penetration < 0.0 && end.penetration > 0.0;
                 let theta = if crosses { course.crossing() } else { 1.0 };
                 let rate = if crosses {
@@ -130,7 +130,7 @@ impl Simulation {
             } else {
                 let crosses = start.penetration > 0.0 && end.penetration < 0.0;
                 let (time, rate) = if crosses && located != Some(j) {
-                    let course = Course::new(start, end, h);
+                    let course = PenetrationCubic::new(start, end, h);
                     let theta = course.crossing();
                     (state.before.t + theta * h, course.at(theta).1)
                 } else {
@@ -165,7 +165,7 @@ impl Simulation {
                 continue;
             }
             let mut coefficients = *mechanism.contacts.coefficients(j);
-            let course = Course::new(start, end, h);
+            let course = PenetrationCubic::new(start, end, h);
             let (force, theta) = if state.before.memory[j].active {
                 attempt.strongest[j]
             } else if state.now.memory[j].active {
