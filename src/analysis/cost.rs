@@ -1,7 +1,7 @@
 //! What each part of the model costs: the same scene with more and less of it.
 
 use super::stretch::time_to;
-use super::{AnalysisError, Effort, RunContext, Setting};
+use super::{AnalysisError, RunContext, Setting, WorkBudget};
 use crate::integrate::System as _;
 use crate::mechanism::{Mechanism, Touching};
 use crate::scene::{Preset, Scene};
@@ -92,18 +92,18 @@ pub struct CaseCost {
 /// # Errors
 /// As [`super::work_precision`].
 pub fn model_costs(
-    effort: &Effort,
+    budget: &WorkBudget,
     context: &mut RunContext,
 ) -> Result<Vec<CaseCost>, AnalysisError> {
     let parts = PARTS.iter().enumerate();
     parts
-        .map(|(n, part)| one(part, effort, &mut context.part(n, PARTS.len())))
+        .map(|(n, part)| one(part, budget, &mut context.part(n, PARTS.len())))
         .collect()
 }
 
 fn one(
     part: &CostCase,
-    effort: &Effort,
+    budget: &WorkBudget,
     context: &mut RunContext,
 ) -> Result<CaseCost, AnalysisError> {
     let owned = |(key, value): &(&str, &str)| ((*key).to_owned(), (*value).to_owned());
@@ -119,10 +119,10 @@ fn one(
     let evaluations = simulation.statistics().evaluations;
     let seconds = time_to(
         part.span,
-        &Effort {
+        &WorkBudget {
             evaluations: u64::MAX / 2,
             seconds: f64::INFINITY,
-            ..*effort
+            ..*budget
         },
         context,
         |_| setting.start(&scene),

@@ -50,7 +50,6 @@ pub struct Benettin {
     at_sections: Vec<f64>,
     /// To be subtracted: `ln(latest / from)` at the start of counting.
     offset: f64,
-    renormalisations: u64,
     difference: Vec<f64>,
 }
 
@@ -70,7 +69,6 @@ impl Benettin {
             counting: false,
             at_sections: Vec::with_capacity(sections),
             offset: 0.0,
-            renormalisations: 0,
             difference: Vec::new(),
         }
     }
@@ -95,11 +93,6 @@ impl Benettin {
         time >= self.next
     }
 
-    /// Number of renormalisations so far.
-    pub fn renormalisations(&self) -> u64 {
-        self.renormalisations
-    }
-
     /// Advances the twin to the orbit's time and measures the separation.
     ///
     /// # Errors
@@ -117,7 +110,6 @@ impl Benettin {
             self.push_away(orbit, twin);
             self.from = distance(orbit, twin);
             self.latest = self.from;
-            self.renormalisations += 1;
             self.next = now + self.check;
             return Ok(());
         }
@@ -147,7 +139,6 @@ impl Benettin {
         // The requested and the actual separation differ because loops are closed again.
         self.from = distance(orbit, twin).max(VANISHED * self.separation);
         self.latest = self.from;
-        self.renormalisations += 1;
         Ok(())
     }
 

@@ -42,7 +42,7 @@ pub enum RangeError {
         error: ValueError,
     },
     /// A parameter with words for values.
-    #[error("--vary {text}: {key} is no number; only numbers can be varied")]
+    #[error("--vary {text}: {key} is not a number; only numbers can be varied")]
     Words {
         /// As written.
         text: String,
@@ -225,8 +225,9 @@ impl ParameterRange {
 
 /// State from which a point starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(not(target_arch = "wasm32"), derive(clap::ValueEnum))]
 pub enum Start {
-    /// Every point from the scene's own initial state.
+    /// From the scene's own initial state.
     Cold,
     /// From the final state of the point with the next lower value.
     FollowUp,

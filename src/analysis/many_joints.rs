@@ -1,7 +1,7 @@
 //! Speed goals of machines with many loose joints, at the loosest tolerance that has the peaks of the first impacts.
 
 use super::stretch::time_to;
-use super::{AnalysisError, Effort, ReferenceSolution, RunContext, Setting};
+use super::{AnalysisError, ReferenceSolution, RunContext, Setting, WorkBudget};
 use crate::scene::{Scene, built_in_text};
 
 /// Tolerance of the reference.
@@ -9,9 +9,9 @@ const REFERENCE: f64 = 1e-9;
 /// Tolerances tried, from the loosest; and the relative error of the peaks that is good enough.
 const TOLERANCES: [f64; 5] = [1e-3, 1e-4, 1e-5, 1e-6, 1e-7];
 const ALLOWED: f64 = 0.01;
-const EFFORT: Effort = Effort {
+const BUDGET: WorkBudget = WorkBudget {
     measured: 0.1,
-    ..Effort::REFERENCE
+    ..WorkBudget::REFERENCE
 };
 
 /// A machine and the speed required of it.
@@ -120,14 +120,14 @@ pub fn speed(goal: SpeedGoal, context: &mut RunContext) -> Result<Speed, Analysi
     let (mut tolerance, mut error) = (TOLERANCES[0], None);
     for tried in TOLERANCES {
         let setting = Setting::automatic(tried);
-        let (_, errors, _) = reference.impacts_of(&setting, &EFFORT, &mut context)?;
+        let (_, errors, _) = reference.impacts_of(&setting, &BUDGET, &mut context)?;
         (tolerance, error) = (tried, errors.peak);
         if error.is_some_and(|error| error <= ALLOWED) {
             break;
         }
     }
     let setting = Setting::automatic(tolerance);
-    let seconds = time_to(goal.span, &EFFORT, &mut context, |_| setting.start(&scene))?;
+    let seconds = time_to(goal.span, &BUDGET, &mut context, |_| setting.start(&scene))?;
     Ok(Speed {
         goal,
         tolerance,
@@ -148,7 +148,7 @@ pub fn growth(tolerance: f64, context: &mut RunContext) -> Result<f64, AnalysisE
         let mut scene = Scene::load("chain", &[])?;
         scene.set("chain.links", &links.to_string())?;
         let mut context = context.part(n, 2);
-        *cost = time_to(span, &EFFORT, &mut context, |_| setting.start(&scene))? / f64::from(links);
+        *cost = time_to(span, &BUDGET, &mut context, |_| setting.start(&scene))? / f64::from(links);
     }
     Ok(cost[1] / cost[0])
 }

@@ -35,5 +35,5 @@ pub use reach::{Goal, Reach, reach};
 pub use reference_solution::{Errors, ReferenceSolution, SettledSpan, Slot};
 pub use run_context::{AnalysisError, RunContext};
 pub use setting::Setting;
-pub use stretch::{Effort, End};
+pub use stretch::{End, WorkBudget};
 pub use work_precision::{Phase, Point, View, WorkPrecision, work_precision};

@@ -6,8 +6,10 @@ use std::sync::OnceLock;
 
 use serde::{Deserialize, Serialize};
 
-use super::work_precision::{Yardstick, measure as measure_point};
-use super::{AnalysisError, Effort, Point, ReferenceSolution, RunContext, Setting, WorkPrecision};
+use super::work_precision::{Baseline, measure as measure_point};
+use super::{
+    AnalysisError, Point, ReferenceSolution, RunContext, Setting, WorkBudget, WorkPrecision,
+};
 use crate::scene::{Preset, Scene};
 
 /// What `jointplay tradeoff --all --write` measured.
@@ -106,21 +108,21 @@ pub fn measure(
     presets: &[Preset],
     context: &mut RunContext,
 ) -> Result<Vec<Point>, AnalysisError> {
-    let effort = Effort::QUICK;
+    let budget = WorkBudget::QUICK;
     let parts = presets.len() + 2;
     let reference = ReferenceSolution::new(scene, &mut context.part(0, parts))?;
-    let yardstick = Yardstick::new(&reference, &effort, &mut context.part(1, parts))?;
+    let baseline = Baseline::new(&reference, &budget, &mut context.part(1, parts))?;
     let mut points = Vec::with_capacity(presets.len());
     for (n, preset) in presets.iter().enumerate() {
         let setting = Setting::of_preset(*preset);
         let mut point = measure_point(
             &reference,
             setting,
-            &effort,
+            &budget,
             &mut context.part(n + 2, parts),
         )?;
         point.preset = Some(*preset);
-        yardstick.divide(&mut point);
+        baseline.divide(&mut point);
         points.push(point);
     }
     Ok(points)

@@ -1,8 +1,8 @@
 //! Speed goals of the program: three spans of the default scene, each with the speed required of it.
 
 use super::reference_solution::{MeanForces, done};
-use super::stretch::{stretch, time_to};
-use super::{AnalysisError, Effort, ReferenceSolution, RunContext, Setting};
+use super::stretch::{advance_capped, time_to};
+use super::{AnalysisError, ReferenceSolution, RunContext, Setting, WorkBudget};
 use crate::scene::Scene;
 use crate::simulate::Simulation;
 
@@ -77,7 +77,7 @@ pub struct Reach {
     pub speed: f64,
     /// Speed of Runge-Kutta 4 at 10 microseconds; `None` where no differential equation is solved, so that the stepper
     /// does not matter.
-    pub yardstick: Option<f64>,
+    pub baseline: Option<f64>,
     /// Relative error; `None` where nothing is approximated.
     pub error: Option<f64>,
 }
@@ -108,22 +108,22 @@ pub fn reach(scene: &Scene, context: &mut RunContext) -> Result<Vec<Reach>, Anal
 
 fn one(scene: &Scene, goal: Goal, context: &mut RunContext) -> Result<Reach, AnalysisError> {
     let setting = Setting::automatic(TOLERANCE);
-    let yardstick = Setting::yardstick();
+    let baseline = Setting::baseline();
     let integrates = !setting.start(scene)?.mechanism().is_kinematic();
-    let effort = Effort {
+    let budget = WorkBudget {
         measured: 0.5,
-        ..Effort::REFERENCE
+        ..WorkBudget::REFERENCE
     };
     let (from, to) = goal.span();
     let speed = |setting: &Setting, context: &mut RunContext| {
         let start = run_to(setting, scene, from, context, |_| {})?.snapshot();
-        let seconds = time_to(to, &effort, context, |_| Ok(Simulation::of(&start)))?;
+        let seconds = time_to(to, &budget, context, |_| Ok(Simulation::of(&start)))?;
         Ok::<_, AnalysisError>((to - from) / seconds)
     };
-    // Timed before and after the yardstick, so that a load that sets in between slows both.
+    // Timed before and after the baseline, so that a load that sets in between slows both.
     let first = speed(&setting, &mut context.part(0, 4))?;
-    let yardstick = if integrates {
-        Some(speed(&yardstick, &mut context.part(1, 4))?)
+    let baseline = if integrates {
+        Some(speed(&baseline, &mut context.part(1, 4))?)
     } else {
         None
     };
@@ -132,7 +132,7 @@ fn one(scene: &Scene, goal: Goal, context: &mut RunContext) -> Result<Reach, Ana
     let error = match goal {
         Goal::FirstSecond => {
             let reference = ReferenceSolution::new(scene, &mut last)?;
-            let (_, errors, _) = reference.impacts_of(&setting, &effort, &mut last)?;
+            let (_, errors, _) = reference.impacts_of(&setting, &budget, &mut last)?;
             errors.peak
         }
         Goal::Settled => {
@@ -150,7 +150,7 @@ fn one(scene: &Scene, goal: Goal, context: &mut RunContext) -> Result<Reach, Ana
         goal,
         setting,
         speed: first.max(second),
-        yardstick,
+        baseline,
         error,
     })
 }
@@ -168,7 +168,7 @@ fn run_to(
         seen(simulation);
         false
     };
-    let ended = stretch(&mut simulation, end, &Effort::REFERENCE, context, look)?;
+    let ended = advance_capped(&mut simulation, end, &WorkBudget::REFERENCE, context, look)?;
     done(ended)?;
     Ok(simulation)
 }

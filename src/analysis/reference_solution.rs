@@ -6,8 +6,8 @@
 
 use serde::Serialize;
 
-use super::stretch::stretch;
-use super::{AnalysisError, Effort, End, RunContext, Setting};
+use super::stretch::advance_capped;
+use super::{AnalysisError, End, RunContext, Setting, WorkBudget};
 use crate::scene::{Scene, Vec3};
 use crate::simulate::{Frame, Peak, Simulation, Snapshot};
 
@@ -220,7 +220,7 @@ impl ReferenceSolution {
         context: &mut RunContext,
     ) -> Result<(Vec<f64>, Vec3), AnalysisError> {
         let mut simulation = setting.start(&self.scene)?;
-        let (end, peaks, position) = self.look(&mut simulation, &Effort::REFERENCE, context)?;
+        let (end, peaks, position) = self.look(&mut simulation, &WorkBudget::REFERENCE, context)?;
         done(end)?;
         Ok((peaks, position.unwrap_or_default()))
     }
@@ -229,14 +229,14 @@ impl ReferenceSolution {
     fn look(
         &self,
         simulation: &mut Simulation,
-        effort: &Effort,
+        budget: &WorkBudget,
         context: &mut RunContext,
     ) -> Result<(End, Vec<f64>, Option<Vec3>), AnalysisError> {
         let mut found = vec![0.0_f64; self.slots.len()];
         let mut position = None;
         let mut peaks: Vec<Peak> = Vec::new();
         let mut frame = Frame::default();
-        let end = stretch(simulation, self.span, effort, context, |simulation| {
+        let end = advance_capped(simulation, self.span, budget, context, |simulation| {
             simulation.take_peaks(&mut peaks);
             for (slot, found) in self.slots.iter().zip(&mut found) {
                 let peak = &peaks[slot.joint];
@@ -266,11 +266,11 @@ impl ReferenceSolution {
     pub(super) fn impacts_of(
         &self,
         setting: &Setting,
-        effort: &Effort,
+        budget: &WorkBudget,
         context: &mut RunContext,
     ) -> Result<(End, Errors, PhaseCost), AnalysisError> {
         let mut simulation = setting.start(&self.scene)?;
-        let (end, peaks, position) = self.look(&mut simulation, effort, context)?;
+        let (end, peaks, position) = self.look(&mut simulation, budget, context)?;
         let mut errors = Errors::default();
         if end == End::Reached {
             errors.peak = self.peak_error(&peaks);
@@ -297,10 +297,10 @@ impl ReferenceSolution {
             means: vec![0.0; self.scene.ball_joints.len()],
             start,
         });
-        let effort = Effort::REFERENCE;
+        let budget = WorkBudget::REFERENCE;
         let mut means = [Vec::new(), Vec::new()];
         for (n, (setting, means)) in [setting, tighter].into_iter().zip(&mut means).enumerate() {
-            let (end, found, _) = self.averages(setting, &effort, &mut context.part(n + 1, 3))?;
+            let (end, found, _) = self.averages(setting, &budget, &mut context.part(n + 1, 3))?;
             if end != End::Reached {
                 // Settled motion that the reference cannot follow is no basis for comparison.
                 self.settled = None;
@@ -321,31 +321,31 @@ impl ReferenceSolution {
         &self,
         span: &SettledSpan,
         setting: &Setting,
-        effort: &Effort,
+        budget: &WorkBudget,
         context: &mut RunContext,
     ) -> Result<(End, Simulation), AnalysisError> {
         let mut simulation = setting.resume(&span.start)?;
-        let end = stretch(&mut simulation, span.from, effort, context, |_| false)?;
+        let end = advance_capped(&mut simulation, span.from, budget, context, |_| false)?;
         Ok((end, simulation))
     }
 
     fn averages(
         &self,
         setting: &Setting,
-        effort: &Effort,
+        budget: &WorkBudget,
         context: &mut RunContext,
     ) -> Result<(End, Vec<f64>, PhaseCost), AnalysisError> {
         let span = self
             .settled
             .as_ref()
             .expect("asked only of a scene that settles");
-        let (end, mut simulation) = self.resume(span, setting, effort, context)?;
+        let (end, mut simulation) = self.resume(span, setting, budget, context)?;
         let before = work(&simulation, &PhaseCost::default());
         let mut forces = MeanForces::new(&self.scene, (span.from, span.to), SAMPLES);
         if end != End::Reached {
             return Ok((end, forces.means, work(&simulation, &before)));
         }
-        let end = stretch(&mut simulation, span.to, effort, context, |simulation| {
+        let end = advance_capped(&mut simulation, span.to, budget, context, |simulation| {
             forces.see(simulation);
             false
         })?;
@@ -366,13 +366,13 @@ impl ReferenceSolution {
     pub(super) fn settled_of(
         &self,
         setting: &Setting,
-        effort: &Effort,
+        budget: &WorkBudget,
         context: &mut RunContext,
     ) -> Result<Option<(End, Option<f64>, PhaseCost)>, AnalysisError> {
         if self.settled.is_none() {
             return Ok(None);
         }
-        let (end, means, work) = self.averages(setting, effort, context)?;
+        let (end, means, work) = self.averages(setting, budget, context)?;
         let error = (end == End::Reached).then(|| self.mean_error(&means));
         Ok(Some((end, error.flatten(), work)))
     }
@@ -443,7 +443,7 @@ pub(super) fn done(end: End) -> Result<(), AnalysisError> {
     match end {
         End::Reached => Ok(()),
         End::Capped => Err(AnalysisError::TooLong {
-            evaluations: Effort::REFERENCE.evaluations,
+            evaluations: WorkBudget::REFERENCE.evaluations,
         }),
         End::Stopped(stopped) => Err(stopped.into()),
         End::Refused(refused) => Err(refused.into()),
@@ -472,11 +472,11 @@ fn first_contacts(
         .collect();
     let mut peaks: Vec<Peak> = Vec::new();
     simulation.take_peaks(&mut peaks);
-    let effort = Effort::REFERENCE;
-    let end = stretch(
+    let budget = WorkBudget::REFERENCE;
+    let end = advance_capped(
         &mut simulation,
         IMPACTS_WITHIN,
-        &effort,
+        &budget,
         context,
         |simulation| {
             let now = simulation.time();
@@ -532,14 +532,14 @@ fn settled_state(
         .filter(|&j| scene.ball_joints[j].contact.clearance > 0.0)
         .collect();
     let mut settled = false;
-    let effort = Effort {
+    let budget = WorkBudget {
         seconds: f64::INFINITY,
-        ..Effort::FULL
+        ..WorkBudget::FULL
     };
-    stretch(
+    advance_capped(
         &mut simulation,
         SETTLED_WITHIN,
-        &effort,
+        &budget,
         context,
         |simulation| {
             simulation.take_peaks(&mut peaks);

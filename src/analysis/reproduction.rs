@@ -15,7 +15,7 @@ pub use statements::Statement;
 use super::grid::{Grid, ParameterRange, RangeError, Start};
 use super::paper::{CASES, Case, Coordinate, DURATION, SAMPLING, Series};
 use super::point::{Plan, resolution};
-use super::response::{Look, Response, ResponseError, derivatives, respond};
+use super::response::{Observation, Response, ResponseError, derivatives, respond};
 use super::sweep::{Sweep, SweepError};
 use crate::scene::{Scene, SceneError};
 use crate::simulate::{Frame, Simulation};
@@ -333,8 +333,8 @@ impl Agenda {
             ReportJob::Run(n) => {
                 let (name, _, scene) = &self.runs[n];
                 let mut rows = Vec::new();
-                let see = |look: &Look| rows.push(row(look));
-                let response = respond(scene, DURATION, SAMPLING, see, go_on);
+                let observe = |look: &Observation| rows.push(row(look));
+                let response = respond(scene, DURATION, SAMPLING, observe, go_on);
                 let response = response.map_err(|e| failed(name, e))?;
                 Ok(Outcome::Run(Box::new((response, rows))))
             }

@@ -135,7 +135,7 @@ impl Ideal {
 }
 
 /// One examined instant of a run.
-pub struct Look<'a> {
+pub struct Observation<'a> {
     /// Time, s.
     pub time: f64,
     /// State of the run.
@@ -148,7 +148,7 @@ pub struct Look<'a> {
     pub constraint_drift: f64,
 }
 
-impl Look<'_> {
+impl Observation<'_> {
     /// Coordinates x, y, z, alpha, beta, gamma, their rates and their second derivatives, SI units.
     pub fn derivatives(&self) -> [[f64; COORDINATES]; 3] {
         derivatives(&self.frame.pose)
@@ -163,7 +163,7 @@ impl Look<'_> {
 }
 
 /// Runs `scene` for `duration` (s) and compares it with its ideal motion; `every` (s) is the sampling interval of
-/// [`Response::sampled`]. `see` receives every examined instant in order of time; `go_on` receives the simulated time
+/// [`Response::sampled`]. `observe` receives every examined instant in order of time; `go_on` receives the simulated time
 /// after every step and returns false to cancel.
 ///
 /// # Errors
@@ -172,7 +172,7 @@ pub fn respond(
     scene: &Scene,
     duration: f64,
     every: f64,
-    mut see: impl FnMut(&Look),
+    mut observe: impl FnMut(&Observation),
     mut go_on: impl FnMut(f64) -> bool,
 ) -> Result<Response, ResponseError> {
     let mut simulation = Simulation::new(scene)?;
@@ -205,7 +205,7 @@ pub fn respond(
             simulation.sample(time, &mut frame);
             let pose = ideal.at(time);
             if time <= duration {
-                see(&Look {
+                observe(&Observation {
                     time,
                     frame: &frame,
                     ideal: pose,

@@ -132,17 +132,6 @@ impl<O: Orbit> SectionRun<O> {
         Ok(at_section)
     }
 
-    /// Steps through all sections.
-    ///
-    /// # Errors
-    /// As [`Self::step`].
-    pub fn finish(&mut self) -> Result<(), O::Stop> {
-        while !self.is_done() {
-            self.step()?;
-        }
-        Ok(())
-    }
-
     fn maybe_start_twin(&mut self) {
         let Some(separation) = self.separation else {
             return;

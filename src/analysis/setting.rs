@@ -48,7 +48,7 @@ impl Setting {
     }
 
     /// Runge-Kutta 4 at 10 microseconds, relative to which speeds are given.
-    pub fn yardstick() -> Self {
+    pub fn baseline() -> Self {
         Self::new(Method::RungeKutta4, 10e-6)
     }
 

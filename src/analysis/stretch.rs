@@ -16,7 +16,7 @@ const LONG: f64 = 4.0;
 
 /// How much work an analysis may take.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Effort {
+pub struct WorkBudget {
     /// Evaluations of the equations after which a run is capped.
     pub evaluations: u64,
     /// Clock seconds after which it is capped, too: the linear algebra of implicit methods is no evaluation.
@@ -29,7 +29,7 @@ pub struct Effort {
     pub tolerances: &'static [f64],
 }
 
-impl Effort {
+impl WorkBudget {
     /// A coarse grid within seconds.
     pub const QUICK: Self = Self {
         evaluations: 400_000,
@@ -88,27 +88,27 @@ fn as_words<S: Serializer>(fault: &impl Display, serializer: S) -> Result<S::Ok,
 }
 
 /// Steps `simulation` to exactly `end`; `seen` is called after every step and returns whether that is enough.
-pub(super) fn stretch(
+pub(super) fn advance_capped(
     simulation: &mut Simulation,
     end: f64,
-    effort: &Effort,
+    budget: &WorkBudget,
     context: &mut RunContext,
     mut seen: impl FnMut(&mut Simulation) -> bool,
 ) -> Result<End, AnalysisError> {
-    run_until_timed(simulation, end, effort, context, &mut Vec::new(), &mut seen)
+    run_until_timed(simulation, end, budget, context, &mut Vec::new(), &mut seen)
 }
 
 /// The same; `pieces` keeps the shortest time so far of each piece, s.
 fn run_until_timed(
     simulation: &mut Simulation,
     end: f64,
-    effort: &Effort,
+    budget: &WorkBudget,
     context: &mut RunContext,
     pieces: &mut Vec<f64>,
     seen: &mut impl FnMut(&mut Simulation) -> bool,
 ) -> Result<End, AnalysisError> {
-    let most = simulation.statistics().evaluations + effort.evaluations;
-    let deadline = context.now() + effort.seconds;
+    let most = simulation.statistics().evaluations + budget.evaluations;
+    let deadline = context.now() + budget.seconds;
     for piece in 0.. {
         let before = context.now();
         let outcome = some_steps(simulation, end, seen);
@@ -152,7 +152,7 @@ fn some_steps(
 /// little as possible. Every run starts from what `start` returns; the time for that does not count.
 pub(super) fn time_to(
     end: f64,
-    effort: &Effort,
+    budget: &WorkBudget,
     context: &mut RunContext,
     mut start: impl FnMut(&mut RunContext) -> Result<Simulation, AnalysisError>,
 ) -> Result<f64, AnalysisError> {
@@ -164,14 +164,14 @@ pub(super) fn time_to(
         run_until_timed(
             &mut simulation,
             end,
-            effort,
+            budget,
             context,
             &mut pieces,
             &mut |_| false,
         )?;
         measured += context.now() - before;
-        let long = measured >= LONG * effort.measured && run > 0;
-        if long || (measured >= effort.measured && run + 1 >= FEWEST_RUNS) {
+        let long = measured >= LONG * budget.measured && run > 0;
+        if long || (measured >= budget.measured && run + 1 >= FEWEST_RUNS) {
             break;
         }
     }
@@ -188,15 +188,15 @@ mod tests {
     #[test]
     fn work_is_capped_and_can_be_broken_off() {
         let scene = Scene::load("spcmm", &[]).expect("built in");
-        let small = Effort {
+        let small = WorkBudget {
             evaluations: 500,
-            ..Effort::QUICK
+            ..WorkBudget::QUICK
         };
         let mut clock = || 0.0;
         let mut simulation = Simulation::new(&scene).expect("starts");
         let mut go_on = |_: f64| ControlFlow::Continue(());
         let mut context = RunContext::new(&mut clock, &mut go_on);
-        let end = stretch(&mut simulation, 1.0, &small, &mut context, |_| false);
+        let end = advance_capped(&mut simulation, 1.0, &small, &mut context, |_| false);
         assert_eq!(end, Ok(End::Capped));
         let evaluations = simulation.statistics().evaluations;
         assert!((501..1500).contains(&evaluations), "{evaluations}");
@@ -211,7 +211,13 @@ mod tests {
             }
         };
         let mut context = RunContext::new(&mut clock, &mut stop);
-        let end = stretch(&mut simulation, 1.0, &Effort::FULL, &mut context, |_| false);
+        let end = advance_capped(
+            &mut simulation,
+            1.0,
+            &WorkBudget::FULL,
+            &mut context,
+            |_| false,
+        );
         assert_eq!(end, Err(AnalysisError::Cancelled));
     }
 
@@ -227,13 +233,13 @@ mod tests {
         };
         let mut go_on = |_: f64| ControlFlow::Continue(());
         let mut context = RunContext::new(&mut clock, &mut go_on);
-        let effort = Effort {
+        let budget = WorkBudget {
             measured: 1e6,
             seconds: 1e9,
-            ..Effort::QUICK
+            ..WorkBudget::QUICK
         };
         let mut steps = 0;
-        let seconds = time_to(5e-3, &effort, &mut context, |_| {
+        let seconds = time_to(5e-3, &budget, &mut context, |_| {
             let mut simulation = Simulation::new(&scene)?;
             while simulation.step_until(5e-3).is_ok() && simulation.time() < 5e-3 {}
             steps = simulation.statistics().steps;

@@ -4,7 +4,9 @@ use serde::Serialize;
 
 use super::reference_solution::PhaseCost;
 use super::stretch::time_to;
-use super::{AnalysisError, Effort, End, Errors, ReferenceSolution, RunContext, Setting, front};
+use super::{
+    AnalysisError, End, Errors, ReferenceSolution, RunContext, Setting, WorkBudget, front,
+};
 use crate::integrate::Method;
 use crate::scene::{Preset, Scene};
 
@@ -115,42 +117,42 @@ impl WorkPrecision {
 /// A scene without a reference ([`ReferenceSolution::new`]); cancellation by [`RunContext`].
 pub fn work_precision(
     scene: &Scene,
-    effort: &Effort,
+    budget: &WorkBudget,
     context: &mut RunContext,
 ) -> Result<WorkPrecision, AnalysisError> {
-    let settings = grid(effort)?;
+    let settings = grid(budget)?;
     let parts = settings.len() + 3;
     let reference = ReferenceSolution::new(scene, &mut context.part(0, parts))?;
     let mut points = Vec::with_capacity(settings.len());
-    let mut yardstick = Yardstick::new(&reference, effort, &mut context.part(1, parts))?;
+    let mut baseline = Baseline::new(&reference, budget, &mut context.part(1, parts))?;
     for (n, (setting, preset)) in settings.into_iter().enumerate() {
         let mut part = context.part(2 + n, parts);
-        let mut point = measure(&reference, setting, effort, &mut part)?;
+        let mut point = measure(&reference, setting, budget, &mut part)?;
         point.preset = preset;
         points.push(point);
     }
-    // Timed again after the points, so that other load on the machine slows the yardstick as little as them.
-    yardstick.again(&reference, effort, &mut context.part(parts - 1, parts))?;
+    // Timed again after the points, so that other load on the machine slows the baseline as little as them.
+    baseline.again(&reference, budget, &mut context.part(parts - 1, parts))?;
     for point in &mut points {
-        yardstick.divide(point);
+        baseline.divide(point);
     }
     mark_fronts(&mut points, &reference.floor);
     Ok(WorkPrecision { reference, points })
 }
 
 /// Every method at its values, including those of the presets.
-fn grid(effort: &Effort) -> Result<Vec<(Setting, Option<Preset>)>, AnalysisError> {
+fn grid(budget: &WorkBudget) -> Result<Vec<(Setting, Option<Preset>)>, AnalysisError> {
     let mut presets = Vec::new();
     for preset in Preset::ALL {
         presets.push((Setting::of_preset(preset), preset));
     }
     let mut settings = Vec::new();
     for method in Method::ALL {
-        let probe = Setting::new(method, effort.tolerances[0]);
+        let probe = Setting::new(method, budget.tolerances[0]);
         let mut values = if probe.adaptive {
-            effort.tolerances.to_vec()
+            budget.tolerances.to_vec()
         } else {
-            effort.steps.to_vec()
+            budget.steps.to_vec()
         };
         let own = presets
             .iter()
@@ -173,10 +175,10 @@ fn grid(effort: &Effort) -> Result<Vec<(Setting, Option<Preset>)>, AnalysisError
 pub(super) fn measure(
     reference: &ReferenceSolution,
     setting: Setting,
-    effort: &Effort,
+    budget: &WorkBudget,
     context: &mut RunContext,
 ) -> Result<Point, AnalysisError> {
-    let (end, mut errors, work) = match reference.impacts_of(&setting, effort, context) {
+    let (end, mut errors, work) = match reference.impacts_of(&setting, budget, context) {
         Ok(found) => found,
         Err(AnalysisError::Start(refused)) => {
             let (end, none) = (End::Refused(refused), PhaseCost::default());
@@ -191,20 +193,20 @@ pub(super) fn measure(
         Err(error) => return Err(error),
     };
     let wall = match end {
-        End::Reached => Some(time_to(reference.span, effort, context, |_| {
+        End::Reached => Some(time_to(reference.span, budget, context, |_| {
             setting.start(reference.scene())
         })?),
         _ => None,
     };
     let impacts = phase(end, reference.span, wall, &work);
     let mut settled = None;
-    if let Some((end, error, work)) = reference.settled_of(&setting, effort, context)?
+    if let Some((end, error, work)) = reference.settled_of(&setting, budget, context)?
         && let Some(span) = &reference.settled
     {
         errors.settled = error;
         let wall = match end {
-            End::Reached => Some(time_to(span.to, effort, context, |context| {
-                Ok(reference.resume(span, &setting, effort, context)?.1)
+            End::Reached => Some(time_to(span.to, budget, context, |context| {
+                Ok(reference.resume(span, &setting, budget, context)?.1)
             })?),
             _ => None,
         };
@@ -233,34 +235,34 @@ fn phase(end: End, simulated_s: f64, wall_s: Option<f64>, work: &PhaseCost) -> P
 }
 
 /// Shortest times so far of Runge-Kutta 4 at 10 microseconds over both phases, s.
-pub(super) struct Yardstick {
+pub(super) struct Baseline {
     setting: Setting,
     impacts: Option<f64>,
     settled: Option<f64>,
 }
 
-impl Yardstick {
+impl Baseline {
     pub(super) fn new(
         reference: &ReferenceSolution,
-        effort: &Effort,
+        budget: &WorkBudget,
         context: &mut RunContext,
     ) -> Result<Self, AnalysisError> {
-        let mut yardstick = Self {
-            setting: Setting::yardstick(),
+        let mut baseline = Self {
+            setting: Setting::baseline(),
             impacts: None,
             settled: None,
         };
-        yardstick.again(reference, effort, context)?;
-        Ok(yardstick)
+        baseline.again(reference, budget, context)?;
+        Ok(baseline)
     }
 
     pub(super) fn again(
         &mut self,
         reference: &ReferenceSolution,
-        effort: &Effort,
+        budget: &WorkBudget,
         context: &mut RunContext,
     ) -> Result<(), AnalysisError> {
-        let point = measure(reference, self.setting, effort, context)?;
+        let point = measure(reference, self.setting, budget, context)?;
         let shorter = |a: Option<f64>, b: Option<f64>| match (a, b) {
             (Some(a), Some(b)) => Some(a.min(b)),
             (a, b) => a.or(b),

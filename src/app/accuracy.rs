@@ -5,7 +5,7 @@ use eframe::egui::{Button, Label, ProgressBar, RichText, Ui, vec2};
 use super::host::{Host, Running};
 use super::layout::reserved;
 use super::player::Player;
-use super::value;
+use super::{theme, value};
 use crate::analysis::presets::{self, Measured};
 use crate::analysis::source::SceneSource;
 use crate::analysis::task::{Job, Message};
@@ -132,15 +132,14 @@ impl Accuracy {
         };
         doubts.retain(|doubt| !said.contains(doubt));
         reserved(ui, "doubts", DOUBTS, |ui| {
-            let small = |words: &str| RichText::new(words).small();
             if let Some(problem) = &self.problem {
-                ui.label(small(problem).color(ui.visuals().error_fg_color));
+                theme::error(ui, problem);
             }
             for doubt in &doubts {
-                ui.label(small(&value::typeset(doubt)).color(ui.visuals().warn_fg_color));
+                theme::warning(ui, value::typeset(doubt));
             }
             if doubts.is_empty() && self.problem.is_none() {
-                ui.label(small(none).weak())
+                ui.label(RichText::new(none).small().weak())
                     .on_hover_text("Reasons not to trust the numbers, if there are any");
             }
         });
@@ -280,7 +279,7 @@ fn solver(player: &Player, preset: Option<Preset>) -> AccuracyLine {
         value: value::solver(player.wanted()),
         doubtful: false,
         help: format!(
-            "Method with its tolerance, or its fixed step: {name}. They stand under Solver; a measured error is given for presets \
+            "Method with its tolerance, or its fixed step: {name}. They are set under Solver; a measured error is given for presets \
              only."
         ),
     }

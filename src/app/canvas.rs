@@ -2,14 +2,14 @@
 
 use std::future::Future;
 use std::pin::Pin;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 use std::task::{Context, Poll, Waker};
 
 use eframe::egui::mutex::RwLock;
 use eframe::egui::{self, Ui, vec2};
 use eframe::egui_wgpu::{self, RenderState, RendererOptions, ScreenDescriptor};
 
-use crate::render::{self, Image, RenderError, wgpu};
+use crate::render::{self, Arrival, Image, Readback, RenderError, check_size, device_error, wgpu};
 
 /// Time between two passes, s.
 const FRAME: f64 = 1.0 / 60.0;
@@ -157,62 +157,21 @@ impl Canvas {
         let short = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let wrong = device.push_error_scope(wgpu::ErrorFilter::Validation);
         let (mut commands, texture) = self.encode(output, size, scale);
-        let [width, height] = size;
-        let stride = (width * 4).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-        let buffer = device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("read back"),
-            size: u64::from(stride) * u64::from(height),
-            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
-            mapped_at_creation: false,
-        });
+        let readback = Readback::new(&device, size);
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        encoder.copy_texture_to_buffer(
-            texture.as_image_copy(),
-            wgpu::TexelCopyBufferInfo {
-                buffer: &buffer,
-                layout: wgpu::TexelCopyBufferLayout {
-                    offset: 0,
-                    bytes_per_row: Some(stride),
-                    rows_per_image: None,
-                },
-            },
-            texture.size(),
-        );
+        readback.copy(&mut encoder, &texture);
         commands.push(encoder.finish());
         self.state.queue.submit(commands);
-        let mapped = Arc::new(OnceLock::new());
-        let report = mapped.clone();
-        buffer.map_async(wgpu::MapMode::Read, .., move |result| {
-            // It is reported once.
-            let _ = report.set(result.map_err(|error| error.to_string()));
-        });
+        let arrival = readback.request();
         let wrong = wrong.pop();
         let short = short.pop();
         Pending {
             device,
-            buffer,
-            size,
-            stride,
-            mapped,
+            readback,
+            arrival,
             faults: vec![Box::pin(short), Box::pin(wrong)],
         }
     }
-}
-
-/// Largest edge that the device can draw, pixels.
-///
-/// # Errors
-/// [`RenderError::Size`]: `size` is beyond that, or 0.
-fn check_size(device: &wgpu::Device, [width, height]: [u32; 2]) -> Result<u32, RenderError> {
-    let limit = device.limits().max_texture_dimension_2d;
-    if (1..=limit).contains(&width) && (1..=limit).contains(&height) {
-        return Ok(limit);
-    }
-    Err(RenderError::Size {
-        width,
-        height,
-        limit,
-    })
 }
 
 type Fault = Pin<Box<dyn Future<Output = Option<wgpu::Error>>>>;
@@ -220,10 +179,8 @@ type Fault = Pin<Box<dyn Future<Output = Option<wgpu::Error>>>>;
 /// A picture being read back from the graphics adapter.
 pub struct Pending {
     device: wgpu::Device,
-    buffer: wgpu::Buffer,
-    size: [u32; 2],
-    stride: u32,
-    mapped: Arc<OnceLock<Result<(), String>>>,
+    readback: Readback,
+    arrival: Arrival,
     /// Errors that the device may report.
     faults: Vec<Fault>,
 }
@@ -232,7 +189,7 @@ impl Pending {
     /// The picture once it is there; does not block.
     pub fn take(&mut self) -> Option<Result<Image, RenderError>> {
         if let Err(error) = self.device.poll(wgpu::PollType::Poll) {
-            return Some(Err(RenderError::Device(error.to_string())));
+            return Some(Err(device_error(error)));
         }
         let mut found = None;
         self.faults.retain_mut(|fault| {
@@ -248,17 +205,17 @@ impl Pending {
         if let Some(error) = found {
             let reason = match error {
                 wgpu::Error::OutOfMemory { .. } => {
-                    let [width, height] = self.size;
+                    let [width, height] = self.readback.size();
                     format!("{width}x{height} pixels are more than its memory holds")
                 }
                 other => other.to_string(),
             };
-            return Some(Err(RenderError::Device(reason)));
+            return Some(Err(device_error(reason)));
         }
-        match self.mapped.get()? {
+        match self.arrival.get()? {
             Ok(()) if self.faults.is_empty() => Some(self.read()),
             Ok(()) => None,
-            Err(reason) => Some(Err(RenderError::Device(reason.clone()))),
+            Err(reason) => Some(Err(device_error(reason))),
         }
     }
 
@@ -270,33 +227,16 @@ impl Pending {
     pub fn wait(mut self) -> Result<Image, RenderError> {
         self.device
             .poll(wgpu::PollType::wait_indefinitely())
-            .map_err(|error| RenderError::Device(error.to_string()))?;
-        let never = || {
-            Err(RenderError::Device(
-                "the picture never came back".to_owned(),
-            ))
-        };
+            .map_err(device_error)?;
+        let never = || Err(device_error("the picture never came back"));
         self.take().unwrap_or_else(never)
     }
 
     fn read(&self) -> Result<Image, RenderError> {
-        let [width, height] = self.size;
-        let rows = self
-            .buffer
-            .get_mapped_range(..)
-            .map_err(|error| RenderError::Device(error.to_string()))?;
-        let row = 4 * width as usize;
-        let mut rgba = Vec::with_capacity(row * height as usize);
-        for line in rows.chunks(self.stride as usize) {
-            rgba.extend_from_slice(&line[..row]);
-        }
-        for pixel in rgba.chunks_exact_mut(4) {
+        let mut image = self.readback.read()?;
+        for pixel in image.rgba.chunks_exact_mut(4) {
             pixel[3] = 255;
         }
-        Ok(Image {
-            width,
-            height,
-            rgba,
-        })
+        Ok(image)
     }
 }

@@ -45,6 +45,22 @@ struct Draft {
     error: Option<String>,
 }
 
+/// One parameter as it stands.
+struct Row<'a> {
+    parameter: &'static Parameter,
+    /// The scene's, or a joint's own.
+    key: &'a str,
+    /// For screen readers.
+    name: String,
+    now: Value,
+}
+
+impl Row<'_> {
+    fn shown(&self) -> String {
+        value::shown(&self.now, &self.parameter.kind)
+    }
+}
+
 impl Controls {
     /// Forgets half-typed values, e.g. for a new scene.
     pub fn clear(&mut self) {
@@ -107,7 +123,7 @@ impl Controls {
                 accuracy.ui(ui, player);
             });
         header.header_response.on_hover_text(
-            "How far the numbers can be trusted. Method, step and tolerance stand under Solver.",
+            "How far the numbers can be trusted. Method, step and tolerance are set under Solver.",
         );
     }
 
@@ -143,7 +159,7 @@ impl Controls {
             }
         });
         header.header_response.on_hover_text(
-            "Values of one ball joint only; they beat the values of the whole scene.",
+            "Values of one ball joint only; they override those of the whole scene.",
         );
     }
 
@@ -166,19 +182,19 @@ impl Controls {
             Some((joint, _)) => format!("{} of {joint}", parameter.label),
             None => parameter.label.to_owned(),
         };
+        let row = Row {
+            parameter,
+            key,
+            name,
+            now,
+        };
         ui.push_id(key, |ui| match &parameter.kind {
-            Kind::Number { .. } => self.number(ui, player, parameter, key, &name, &now),
-            Kind::Choice(words) => self.choice(ui, player, parameter, key, &name, &now, words),
-            Kind::Count { min, max } => {
-                self.count(ui, player, parameter, key, &name, &now, (*min, *max))
-            }
+            Kind::Number { .. } => self.number(ui, player, &row),
+            Kind::Choice(words) => self.choice(ui, player, &row, words),
+            Kind::Count { min, max } => self.count(ui, player, &row, (*min, *max)),
         });
         if let Some(error) = self.drafts.get(key).and_then(|draft| draft.error.as_ref()) {
-            ui.label(
-                RichText::new(value::typeset(error))
-                    .small()
-                    .color(ui.visuals().error_fg_color),
-            );
+            theme::error(ui, value::typeset(error));
         }
         let beats = player.keys_overriding_preset();
         if key == PRESET && !beats.is_empty() {
@@ -190,46 +206,30 @@ impl Controls {
             ui.label(RichText::new(words).small().weak());
         }
         if player.is_waiting(key) {
-            ui.label(
-                RichText::new("Applies at the next reset")
-                    .small()
-                    .color(ui.visuals().warn_fg_color),
-            );
+            theme::warning(ui, "Applies at the next reset");
         }
         if let Some(warning) = player.warning(key) {
-            ui.label(
-                RichText::new(value::typeset(warning))
-                    .small()
-                    .color(ui.visuals().warn_fg_color),
-            );
+            theme::warning(ui, value::typeset(warning));
         }
     }
 
-    fn number(
-        &mut self,
-        ui: &mut Ui,
-        player: &mut Player,
-        parameter: &'static Parameter,
-        key: &str,
-        name: &str,
-        now: &Value,
-    ) {
+    fn number(&mut self, ui: &mut Ui, player: &mut Player, row: &Row) {
         let Kind::Number {
             display,
             slider,
             logarithmic,
             ..
-        } = parameter.kind
+        } = row.parameter.kind
         else {
             return;
         };
-        let Value::Number(si) = *now else {
+        let Value::Number(si) = row.now else {
             return;
         };
         let room = 92.0 + theme::side(ui, UNDO);
-        self.heading(ui, player, room, parameter, key, |this, ui, player| {
-            this.default_button(ui, player, parameter, key, name, now);
-            this.entry(ui, player, parameter, key, name, now);
+        self.heading(ui, player, room, row, |this, ui, player| {
+            this.default_button(ui, player, row);
+            this.entry(ui, player, row);
         });
         let mut shown = to_display(si, display);
         let (least, greatest) = (to_display(slider.0, display), to_display(slider.1, display));
@@ -239,38 +239,29 @@ impl Controls {
             .clamping(SliderClamping::Never)
             .show_value(false);
         let response = keys::slider(ui, slider);
-        tooltip(ui, &response, player, parameter, key);
+        tooltip(ui, &response, player, row);
         let changed = response.changed();
-        response.accessible_name(name);
+        response.accessible_name(&row.name);
         if changed {
             self.set(
                 player,
-                key,
+                row.key,
                 &format_quantity_digits(from_display(shown, display), display, 4),
             );
         }
     }
 
-    fn choice(
-        &mut self,
-        ui: &mut Ui,
-        player: &mut Player,
-        parameter: &'static Parameter,
-        key: &str,
-        name: &str,
-        now: &Value,
-        words: &[&'static str],
-    ) {
+    fn choice(&mut self, ui: &mut Ui, player: &mut Player, row: &Row, words: &[&'static str]) {
         let room = 168.0 + theme::side(ui, UNDO);
-        self.heading(ui, player, room, parameter, key, |this, ui, player| {
-            this.default_button(ui, player, parameter, key, name, now);
+        self.heading(ui, player, room, row, |this, ui, player| {
+            this.default_button(ui, player, row);
             let mut chosen = None;
             let width = ui.available_width().min(170.0);
             // Method and tolerance may match a preset that was not named, or differ from the one that was.
-            let (now, text) = match (key, accuracy::preset_of(player)) {
+            let (now, text) = match (row.key, accuracy::preset_of(player)) {
                 (PRESET, Some(preset)) => (Value::Choice(preset.word()), preset.word().to_owned()),
                 (PRESET, None) => (Value::Unset, "own choice".to_owned()),
-                _ => (now.clone(), value::shown(now, &parameter.kind)),
+                _ => (row.now.clone(), row.shown()),
             };
             let response = ComboBox::from_id_salt("choice")
                 .width(width)
@@ -287,40 +278,31 @@ impl Controls {
                     }
                 })
                 .response;
-            tooltip(ui, &response, player, parameter, key);
-            response.accessible_name(name);
+            tooltip(ui, &response, player, row);
+            response.accessible_name(&row.name);
             if let Some(word) = chosen {
-                this.set(player, key, word);
+                this.set(player, row.key, word);
             }
         });
     }
 
-    fn count(
-        &mut self,
-        ui: &mut Ui,
-        player: &mut Player,
-        parameter: &'static Parameter,
-        key: &str,
-        name: &str,
-        now: &Value,
-        (min, max): (u64, u64),
-    ) {
-        let Value::Count(mut count) = *now else {
+    fn count(&mut self, ui: &mut Ui, player: &mut Player, row: &Row, (min, max): (u64, u64)) {
+        let Value::Count(mut count) = row.now else {
             return;
         };
         let room = 78.0 + theme::side(ui, UNDO);
-        self.heading(ui, player, room, parameter, key, |this, ui, player| {
-            this.default_button(ui, player, parameter, key, name, now);
+        self.heading(ui, player, room, row, |this, ui, player| {
+            this.default_button(ui, player, row);
             let response = ui.add(
                 DragValue::new(&mut count)
                     .range(min..=max)
                     .update_while_editing(false),
             );
-            tooltip(ui, &response, player, parameter, key);
+            tooltip(ui, &response, player, row);
             let changed = response.changed();
-            response.accessible_name(name);
+            response.accessible_name(&row.name);
             if changed {
-                this.set(player, key, &count.to_string());
+                this.set(player, row.key, &count.to_string());
             }
         });
     }
@@ -331,25 +313,24 @@ impl Controls {
         ui: &mut Ui,
         player: &mut Player,
         room: f32,
-        parameter: &'static Parameter,
-        key: &str,
+        row: &Row,
         rest: impl FnOnce(&mut Self, &mut Ui, &mut Player),
     ) {
         let font = egui::TextStyle::Body.resolve(ui.style());
         let colour = ui.visuals().text_color();
-        let name = parameter.label;
+        let name = row.parameter.label;
         let words = ui.painter().layout_no_wrap(name.to_owned(), font, colour);
         let below = words.size().x + ui.spacing().item_spacing.x + room > ui.available_width();
         let backwards = egui::Layout::right_to_left(egui::Align::Center);
         let mut rest = Some(rest);
         ui.horizontal(|ui| {
-            let text = if FIRST.contains(&key) {
+            let text = if FIRST.contains(&row.key) {
                 RichText::new(name).strong()
             } else {
                 RichText::new(name)
             };
             let label = ui.label(text);
-            tooltip(ui, &label, player, parameter, key);
+            tooltip(ui, &label, player, row);
             if !below && let Some(rest) = rest.take() {
                 ui.with_layout(backwards, |ui| rest(self, ui, player));
             }
@@ -361,19 +342,11 @@ impl Controls {
     }
 
     /// Text field; unreadable input stays to be corrected.
-    fn entry(
-        &mut self,
-        ui: &mut Ui,
-        player: &mut Player,
-        parameter: &'static Parameter,
-        key: &str,
-        name: &str,
-        now: &Value,
-    ) {
-        let shown = value::shown(now, &parameter.kind);
+    fn entry(&mut self, ui: &mut Ui, player: &mut Player, row: &Row) {
+        let shown = row.shown();
         let mut text = self
             .drafts
-            .get(key)
+            .get(row.key)
             .map_or_else(|| shown.clone(), |draft| draft.text.clone());
         let font = fitting(ui, &text, ENTRY - 2.0 * f32::from(MARGIN));
         let response = ui.add(
@@ -387,7 +360,7 @@ impl Controls {
         );
         if response.changed() {
             self.drafts.insert(
-                key.to_owned(),
+                row.key.to_owned(),
                 Draft {
                     text: text.clone(),
                     error: None,
@@ -396,38 +369,37 @@ impl Controls {
         }
         if response.lost_focus() {
             if ui.input(|i| i.key_pressed(egui::Key::Escape)) {
-                self.drafts.remove(key);
+                self.drafts.remove(row.key);
             } else if text != shown {
-                self.set(player, key, &value::completed(&text, &parameter.kind));
-                if let Some(draft) = self.drafts.get_mut(key) {
+                self.set(
+                    player,
+                    row.key,
+                    &value::completed(&text, &row.parameter.kind),
+                );
+                if let Some(draft) = self.drafts.get_mut(row.key) {
                     draft.text = text;
                 }
             }
         }
-        tooltip(ui, &response, player, parameter, key);
-        response.accessible_name(name);
+        tooltip(ui, &response, player, row);
+        response.accessible_name(&row.name);
     }
 
-    fn default_button(
-        &mut self,
-        ui: &mut Ui,
-        player: &mut Player,
-        parameter: &'static Parameter,
-        key: &str,
-        name: &str,
-        now: &Value,
-    ) {
+    fn default_button(&mut self, ui: &mut Ui, player: &mut Player, row: &Row) {
         let size = theme::side(ui, UNDO);
         // Keep the space where there is nothing to undo, so that rows stay aligned.
-        let Some(original) = player.original(key).filter(|original| original != now) else {
+        let Some(original) = player
+            .original(row.key)
+            .filter(|original| *original != row.now)
+        else {
             ui.allocate_space(egui::Vec2::splat(size));
             return;
         };
-        let help = format!("Back to {}", value::shown(&original, &parameter.kind));
-        let label = format!("Reset {name}");
+        let help = format!("Back to {}", value::shown(&original, &row.parameter.kind));
+        let label = format!("Reset {}", row.name);
         if icon_button(ui, Icon::Undo, &label, &help, size, false).clicked() {
-            let done = player.set_original(key);
-            self.settle(key, "", done);
+            let done = player.set_original(row.key);
+            self.settle(row.key, "", done);
         }
     }
 
@@ -483,7 +455,8 @@ fn fitting(ui: &Ui, text: &str, room: f32) -> FontId {
 }
 
 /// Tooltip of a control, above or below it within its panel: the control in use and the picture stay visible.
-fn tooltip(ui: &Ui, response: &Response, player: &Player, parameter: &Parameter, key: &str) {
+fn tooltip(ui: &Ui, response: &Response, player: &Player, row: &Row) {
+    let Row { parameter, key, .. } = row;
     const ABOVE: [RectAlign; 1] = [RectAlign::TOP_START];
     let panel = ui.clip_rect().x_range();
     let row = Rect::from_x_y_ranges(panel, response.rect.y_range());

@@ -205,7 +205,7 @@ fn save(ui: &mut Ui, path: &mut String, files: &[SaveFile], error: Option<&str>)
 }
 
 fn load(ui: &mut Ui, changes: &[String]) -> bool {
-    ui.label("The sweep was not made of what is on show. To run to this section changes:");
+    ui.label("The sweep was made from a different scene. Running to this section changes:");
     for change in changes {
         ui.label(RichText::new(change).strong());
     }

@@ -329,7 +329,7 @@ fn meta(player: &Player) -> String {
     format!("{meta:#}\n")
 }
 
-/// Description of a picture, stored in it; letters that PNG cannot hold are replaced.
+/// Description of a picture, stored in it.
 fn describe(player: &Player) -> String {
     let mut words = format!(
         "{} at t = {} s, state hash {:016x}",
@@ -340,8 +340,7 @@ fn describe(player: &Player) -> String {
     for (key, value) in &player.scene().changes {
         let _ = write!(words, ", {key} = {value}");
     }
-    let latin = |c: char| if u32::from(c) < 256 { c } else { '?' };
-    words.chars().map(latin).collect()
+    words
 }
 
 #[cfg(test)]

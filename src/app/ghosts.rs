@@ -1,10 +1,10 @@
 //! The ghosts of the 3D view, the twin run and the ideal motion, and their notes.
 
-use eframe::egui::{RichText, Ui};
+use eframe::egui::Ui;
 
 use super::App;
 use super::player::Player;
-use super::value;
+use super::{theme, value};
 use crate::view::{DrawList, Ghost, SceneView, Shot};
 
 /// Adds the ghosts at the displayed instant to the draw list built from `shot`; returns a note on each.
@@ -38,7 +38,7 @@ pub fn add(view: &SceneView, shot: &Shot<'_>, player: &Player, list: &mut DrawLi
     } else if ideal.fault().is_some() {
         notes.push("no ideal ghost: see View options".to_owned());
     } else {
-        notes.push("ideal ghost on its way".to_owned());
+        notes.push("computing the ideal ghost".to_owned());
     }
     notes
 }
@@ -66,8 +66,7 @@ impl App {
             self.show_ideal(on);
         }
         if let Some(fault) = self.player.ideal().and_then(|ideal| ideal.fault()) {
-            let words = RichText::new(format!("No ideal ghost: {fault}")).small();
-            ui.label(words.color(ui.visuals().warn_fg_color));
+            theme::warning(ui, format!("No ideal ghost: {fault}"));
         }
     }
 }

@@ -1,6 +1,5 @@
 //! Pictures of the interface without a window: the same egui code, painted to a texture.
 
-use eframe::egui;
 use eframe::egui_wgpu::{self, RenderState, RendererOptions, WgpuConfiguration, WgpuSetup};
 
 use std::sync::Arc;
@@ -8,36 +7,8 @@ use std::sync::Arc;
 use super::canvas::Canvas;
 use super::{App, AppOptions, overlay, theme};
 use crate::render::{self, Image, NoAdapter, RenderError, wgpu};
-use crate::scene::SceneError;
 use crate::simulate::StartError;
 use crate::view::{DrawList, Theme};
-
-/// Why a picture of the interface could not be made.
-#[derive(Debug, thiserror::Error)]
-pub enum HeadlessError {
-    /// No graphics adapter.
-    #[error(transparent)]
-    NoAdapter(#[from] NoAdapter),
-    /// The scene cannot start.
-    #[error(transparent)]
-    Start(#[from] SceneError),
-    /// The picture cannot be drawn.
-    #[error(transparent)]
-    Render(#[from] RenderError),
-}
-
-/// A frame of the whole application.
-#[derive(Clone, Debug)]
-pub struct UiFrame {
-    /// How the application starts; its theme must not be the system's, since there is no system theme here.
-    pub options: AppOptions,
-    /// Simulated time to show, s.
-    pub at: f64,
-    /// Size of the picture, pixels.
-    pub size: [u32; 2],
-    /// Pixels per point: 1 on an ordinary screen.
-    pub scale: f32,
-}
 
 /// What is written over a plain picture.
 #[derive(Clone, Debug, Default)]
@@ -88,20 +59,6 @@ impl Headless {
     pub fn adapter(&self) -> String {
         let info = self.canvas.state().adapter.get_info();
         format!("{} ({})", info.name, info.backend)
-    }
-
-    /// One frame of the whole application with its panels, as `jointplay render --ui` writes it.
-    ///
-    /// # Errors
-    /// A scene that cannot start, a size that cannot be drawn.
-    pub fn ui_frame(&mut self, frame: &UiFrame) -> Result<Image, HeadlessError> {
-        self.canvas.ctx = egui::Context::default();
-        let mut app = self
-            .app(frame.options.clone())
-            .map_err(|error| error.located(&frame.options.scene))?;
-        app.run_to(frame.at);
-        self.app_frame(&mut app, frame.size, frame.scale)
-            .map_err(Into::into)
     }
 
     /// The application as it stands. It must have been made with this device, see [`Self::app`].

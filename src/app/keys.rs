@@ -146,17 +146,17 @@ pub const POINTER: [(&str, &str); 10] = [
     ),
     (
         "Right or middle drag, shift-drag, two fingers",
-        "Shift the view",
+        "Pan the view",
     ),
-    ("Wheel, pinch", "Come nearer to what is under the cursor"),
-    ("Hover", "What is known about a part"),
+    ("Wheel, pinch", "Zoom in on what is under the cursor"),
+    ("Hover", "Details of a part"),
     (
         "Click, tap on a ball joint",
         "Put it into the middle and under the microscope",
     ),
     (
         "Double-click, double tap",
-        "Follow a body or joint; the ground lets go",
+        "Follow a body or joint; on the ground: stop following",
     ),
     ("Drop a file", "Open a scene"),
     ("Paste", "Open a link"),

@@ -250,14 +250,9 @@ impl App {
                 contents.inner
             })
             .inner;
-        let stop = CentralPanel::no_frame()
-            .show(ui, |ui| self.picture(ui))
-            .inner;
+        self.central(ui, asked);
         if let Some(load) = load.and_then(|shown| shown.inner) {
             self.start_load(load);
-        }
-        if asked.or(stop).is_some() {
-            self.reset();
         }
     }
 
@@ -279,12 +274,7 @@ impl App {
                 asked.inner
             })
             .inner;
-        let stop = CentralPanel::no_frame()
-            .show(ui, |ui| self.picture(ui))
-            .inner;
-        if asked.or(stop).is_some() {
-            self.reset();
-        }
+        self.central(ui, asked);
     }
 
     fn landscape(&mut self, ui: &mut Ui, bar: Frame) {
@@ -316,10 +306,13 @@ impl App {
                 .exact_size(width)
                 .show(ui, |ui| self.sheet(ui));
         }
-        let stop = CentralPanel::no_frame()
-            .show(ui, |ui| self.picture(ui))
-            .inner;
-        if asked.or(stop).is_some() {
+        self.central(ui, asked);
+    }
+
+    /// The picture in what the panels leave; resets the run if that was `asked` in them or in the picture.
+    fn central(&mut self, ui: &mut Ui, asked: bool) {
+        let picture = CentralPanel::no_frame().show(ui, |ui| self.picture(ui));
+        if asked || picture.inner {
             self.reset();
         }
     }
@@ -397,8 +390,8 @@ impl App {
         }
     }
 
-    /// The 3D view with its buttons and, after a stop, the reason.
-    pub(super) fn picture(&mut self, ui: &mut Ui) -> Option<transport::Asked> {
+    /// The 3D view with its buttons and, after a stop, the reason. Returns whether the user asked for a reset.
+    pub(super) fn picture(&mut self, ui: &mut Ui) -> bool {
         let area = ui.max_rect();
         self.picture_rect = area;
         let plain = self.picture.is_plain();
@@ -412,7 +405,7 @@ impl App {
         }
         if plain {
             // A saved picture has no buttons in it.
-            return None;
+            return false;
         }
         let inner = area.shrink(10.0);
         let narrow = area.width() < 520.0;

@@ -105,7 +105,7 @@ impl Load {
                 player.show(player.simulation().time());
                 return None;
             }
-            if !player.replay_step() {
+            if !player.step() {
                 let why = player.stopped().map(ToString::to_string);
                 return Some(Err(why.unwrap_or_default()));
             }

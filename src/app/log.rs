@@ -200,7 +200,7 @@ impl Log {
         for line in text.lines() {
             let wrong = || {
                 let start: String = line.chars().take(60).collect();
-                format!("`{start}` is no line of a log")
+                format!("`{start}` is not a line of a log")
             };
             let (steps, what) = line.split_once(' ').ok_or_else(wrong)?;
             let more: u64 = steps.parse().map_err(|_| wrong())?;

@@ -187,7 +187,7 @@ impl Microscope {
         let words = format!(
             "Ball joint {} under the microscope. {}. Ball's centre {} from the socket's, clearance {}.",
             name.map_or("", |joint| &joint.name),
-            sight.state(),
+            value::contact(sight.report.state),
             draw::length(report.eccentricity.norm(), 3),
             draw::length(report.clearance, 3)
         );
@@ -256,7 +256,7 @@ fn section(ui: &mut Ui, sight: &Sight) {
 fn numbers(ui: &mut Ui, player: &Player, sight: &Sight, axes: [Vec3; 2]) {
     const NONE: &str = "—";
     let report = &sight.report;
-    ui.label(RichText::new(sight.state()).strong());
+    ui.label(RichText::new(value::contact(sight.report.state)).strong());
     let speed = |si: f64| value::quantity(si, "m/s", 3);
     let towards = crate::view::to_f32(&report.eccentricity).dot(axes[0].cross(axes[1]));
     let (beside, pressed) = match &sight.patch {

@@ -63,7 +63,7 @@ use controls::Controls;
 pub use desktop::DesktopHost;
 use dialogs::{Answer, Dialog};
 #[cfg(not(target_arch = "wasm32"))]
-pub use headless::{Headless, HeadlessError, Overlay, UiFrame};
+pub use headless::{Headless, Overlay};
 pub use host::{Clock, Host, NoHost, OpenedFile, Running, SaveFile};
 use keys::Action;
 use layout::Sheet;
@@ -449,11 +449,6 @@ impl App {
         } else {
             self.open(text.trim())
         }
-    }
-
-    /// Shows `problem` above everything until it is dismissed.
-    pub fn report(&mut self, problem: String) {
-        self.problem = Some(problem);
     }
 
     /// Back to t = 0 with every change applied.

@@ -404,11 +404,6 @@ impl Player {
         self.show(time);
     }
 
-    /// One recorded step towards the instant of a link; false if the guard stopped the run.
-    pub(super) fn replay_step(&mut self) -> bool {
-        self.step()
-    }
-
     /// Displays `time`, s, limited to what is left of the latest step: this never goes back.
     pub(super) fn show(&mut self, time: f64) {
         let shown = time.max(self.recorded_to).min(self.simulation.time());
@@ -582,7 +577,7 @@ impl Player {
     }
 
     /// One step, after recording the rest of the one before; false if the guard stopped it.
-    fn step(&mut self) -> bool {
+    pub(super) fn step(&mut self) -> bool {
         self.record_until(self.simulation.time());
         self.keep();
         match self.simulation.step_until(self.next_section()) {

@@ -69,11 +69,8 @@ mod tests {
         let scene = Scene::load("pendulum", &[]).expect("built in");
         let mut player = Player::new(&scene).expect("starts");
         let place = player.frame().bodies[0].position;
-        let hit = |what| Hit {
-            what,
-            point: to_f32(&place),
-            distance: 1.0,
-        };
+        let point = to_f32(&place);
+        let hit = |what| Hit { what, point };
         assert!(Grip::new(&player, hit(Picked::Fixed(0))).is_none());
         let mut grip = Grip::new(&player, hit(Picked::Body(0))).expect("moves");
         // Length of the spring, m.

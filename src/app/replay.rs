@@ -76,7 +76,7 @@ impl Replay {
                 player.show(player.simulation().time());
                 return None;
             }
-            if !player.replay_step() {
+            if !player.step() {
                 return Some(match self.due(player) {
                     // As in the original run: the guard's refusal is itself the next event of the log.
                     Some(Entry {
@@ -134,25 +134,20 @@ impl Replay {
 }
 
 fn apply(player: &mut Player, entry: &Entry) -> Result<(), String> {
-    match &entry.event {
-        Event::Set { key, value } => player.set(key, value).map_err(|error| error.to_string())?,
-        Event::Original { key } => player
-            .set_original(key)
-            .map_err(|error| error.to_string())?,
+    let done = match &entry.event {
+        Event::Set { key, value } => player.set(key, value).map(|_| ()),
+        Event::Original { key } => player.set_original(key).map(|_| ()),
         Event::Sections { .. } => {
             if let Some(schedule) = entry.event.schedule() {
                 player.end_steps_at(schedule);
             }
-            return Ok(());
+            Ok(())
         }
-        Event::Pull(pulled) => {
-            let pull = pulled.map(Into::into);
-            return player.pull(pull).map_err(|error| error.to_string());
-        }
+        Event::Pull(pulled) => player.pull(pulled.map(Into::into)),
         // Handled by the step before.
-        Event::Stop => return Ok(()),
+        Event::Stop => Ok(()),
     };
-    Ok(())
+    done.map_err(|error| error.to_string())
 }
 
 #[cfg(test)]

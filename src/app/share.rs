@@ -116,7 +116,7 @@ pub struct CameraPose {
 }
 
 /// What a link says.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Link {
     /// The scene.
     pub scene: SceneText,
@@ -148,28 +148,6 @@ pub struct Link {
     pub theme: Option<ThemePreference>,
     /// Version of the program that made the link.
     pub version: Option<String>,
-}
-
-impl Default for Link {
-    fn default() -> Self {
-        Self {
-            scene: SceneText::BuiltIn(DEFAULT_SCENE.to_owned()),
-            log: Log::default(),
-            steps: None,
-            time: None,
-            hash: None,
-            time_scale: None,
-            camera: None,
-            magnification: None,
-            follow: None,
-            plots: None,
-            window: None,
-            instruments: None,
-            playing: None,
-            theme: None,
-            version: None,
-        }
-    }
 }
 
 /// Whether `text` is a link in one of the forms of [`Link::parse`], rather than the name of a scene or of a file.
@@ -244,17 +222,18 @@ impl Link {
                     link.time = Some(time);
                 }
                 "steps" => {
-                    let steps = value.parse().map_err(|_| wrong("is no number of steps"))?;
+                    let steps = value
+                        .parse()
+                        .map_err(|_| wrong("is not a number of steps"))?;
                     link.steps = Some(steps);
                 }
                 "hash" => {
                     let hash = (value.len() == 16)
                         .then(|| u64::from_str_radix(value, 16).ok())
                         .flatten();
-                    link.hash =
-                        Some(hash.ok_or_else(|| {
-                            wrong("is no state hash: 16 digits, 0 to 9 and a to f")
-                        })?);
+                    link.hash = Some(hash.ok_or_else(|| {
+                        wrong("is not a state hash: 16 digits, 0 to 9 and a to f")
+                    })?);
                 }
                 "scale" => link.time_scale = Some(read_scale(value).map_err(|m| wrong(&m))?),
                 "camera" => link.camera = Some(read_camera(value).map_err(|m| wrong(&m))?),
@@ -306,7 +285,7 @@ impl Link {
         };
         let last = link.log.entries.last().map_or(0, |entry| entry.steps);
         if last > 0 && link.steps.is_none_or(|steps| steps < last) {
-            return Err(fault("log", "", "goes on after the last step of the link"));
+            return Err(fault("log", "", "continues past the link's last step"));
         }
         link.scene = match (file, name) {
             (Some(text), name) => SceneText::File {
@@ -463,6 +442,12 @@ impl Link {
     }
 }
 
+impl Default for SceneText {
+    fn default() -> Self {
+        Self::BuiltIn(DEFAULT_SCENE.to_owned())
+    }
+}
+
 impl SceneText {
     /// Where `scene` comes from.
     pub fn of(scene: &Scene) -> Self {
@@ -544,7 +529,7 @@ fn read_camera(text: &str) -> Result<CameraPose, String> {
             })
         }
         _ => Err(
-            "is no camera: yaw and pitch (-1.57 to 1.57) in rad, distance (0.0001 to 10000) and target x, y, z \
+            "is not a camera: yaw and pitch (-1.57 to 1.57) in rad, distance (0.0001 to 10000) and target x, y, z \
              (-10000 to 10000) in m; then, if it shows everything, width over height (0.01 to 100) of the picture"
                 .to_owned(),
         ),

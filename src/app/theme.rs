@@ -1,50 +1,28 @@
 //! Look of the window: spacing, type sizes and the colours of both themes.
 
 use eframe::egui::{
-    self, Color32, CornerRadius, FontFamily, FontId, Margin, Stroke, TextStyle, Theme, Visuals,
-    vec2,
+    self, Color32, CornerRadius, FontFamily, FontId, Margin, Response, RichText, Stroke, TextStyle,
+    Theme, Ui, Visuals, vec2,
 };
 
 /// Series colours for plots, dark enough on white and light enough on black; distinguishable for the colour-blind (after Okabe
 /// & Ito).
 const SERIES: [(Color32, Color32); 9] = [
-    (
-        Color32::from_rgb(0x00, 0x72, 0xB2),
-        Color32::from_rgb(0x56, 0xB4, 0xE9),
-    ),
-    (
-        Color32::from_rgb(0xD5, 0x5E, 0x00),
-        Color32::from_rgb(0xFF, 0x8C, 0x3A),
-    ),
-    (
-        Color32::from_rgb(0x00, 0x8F, 0x68),
-        Color32::from_rgb(0x2C, 0xD0, 0xA0),
-    ),
-    (
-        Color32::from_rgb(0xB8, 0x4E, 0x90),
-        Color32::from_rgb(0xE4, 0x93, 0xC4),
-    ),
-    (
-        Color32::from_rgb(0xA8, 0x7B, 0x00),
-        Color32::from_rgb(0xF0, 0xD0, 0x42),
-    ),
-    (
-        Color32::from_rgb(0x5B, 0x5F, 0xC7),
-        Color32::from_rgb(0xA5, 0xA8, 0xF5),
-    ),
-    (
-        Color32::from_rgb(0x7A, 0x4A, 0x1E),
-        Color32::from_rgb(0xC9, 0x9A, 0x6B),
-    ),
-    (
-        Color32::from_rgb(0x6B, 0x6B, 0x6B),
-        Color32::from_rgb(0xB5, 0xB5, 0xB5),
-    ),
-    (
-        Color32::from_rgb(0x9B, 0x1C, 0x31),
-        Color32::from_rgb(0xFF, 0x8A, 0x94),
-    ),
+    (rgb(0x0072B2), rgb(0x56B4E9)),
+    (rgb(0xD55E00), rgb(0xFF8C3A)),
+    (rgb(0x008F68), rgb(0x2CD0A0)),
+    (rgb(0xB84E90), rgb(0xE493C4)),
+    (rgb(0xA87B00), rgb(0xF0D042)),
+    (rgb(0x5B5FC7), rgb(0xA5A8F5)),
+    (rgb(0x7A4A1E), rgb(0xC99A6B)),
+    (rgb(0x6B6B6B), rgb(0xB5B5B5)),
+    (rgb(0x9B1C31), rgb(0xFF8A94)),
 ];
+
+const fn rgb(hex: u32) -> Color32 {
+    let [_, red, green, blue] = hex.to_be_bytes();
+    Color32::from_rgb(red, green, blue)
+}
 
 /// Colour of the `index`th series of a plot.
 pub fn series(index: usize, dark: bool) -> Color32 {
@@ -74,7 +52,7 @@ pub fn apply_size(ctx: &egui::Context, fingers: bool) {
 }
 
 /// Side of a small button, points: `mouse` where there is no need to make it larger.
-pub fn side(ui: &egui::Ui, mouse: f32) -> f32 {
+pub fn side(ui: &Ui, mouse: f32) -> f32 {
     if ui.spacing().interact_size.y >= FINGER {
         FINGER
     } else {
@@ -82,11 +60,23 @@ pub fn side(ui: &egui::Ui, mouse: f32) -> f32 {
     }
 }
 
+/// A small line of text that warns.
+pub fn warning(ui: &mut Ui, words: impl Into<String>) -> Response {
+    let colour = ui.visuals().warn_fg_color;
+    ui.label(RichText::new(words).small().color(colour))
+}
+
+/// A small line of text that says what went wrong.
+pub fn error(ui: &mut Ui, words: impl Into<String>) -> Response {
+    let colour = ui.visuals().error_fg_color;
+    ui.label(RichText::new(words).small().color(colour))
+}
+
 /// Sets both themes' styles.
 pub fn apply(ctx: &egui::Context) {
     apply_size(ctx, false);
-    ctx.style_mut_of(Theme::Light, |style| style.visuals = light());
-    ctx.style_mut_of(Theme::Dark, |style| style.visuals = dark());
+    ctx.style_mut_of(Theme::Light, |style| style.visuals = visuals(false));
+    ctx.style_mut_of(Theme::Dark, |style| style.visuals = visuals(true));
     ctx.all_styles_mut(|style| {
         let spacing = &mut style.spacing;
         spacing.item_spacing = vec2(8.0, 6.0);
@@ -118,55 +108,30 @@ pub fn apply(ctx: &egui::Context) {
     });
 }
 
-fn light() -> Visuals {
-    let mut visuals = Visuals::light();
-    visuals.panel_fill = Color32::from_rgb(0xFA, 0xFB, 0xFC);
-    visuals.window_fill = Color32::WHITE;
-    visuals.extreme_bg_color = Color32::WHITE;
-    visuals.faint_bg_color = Color32::from_rgb(0xF0, 0xF3, 0xF6);
-    visuals.selection.bg_fill = Color32::from_rgb(0xB5, 0xD5, 0xF5);
-    visuals.selection.stroke = Stroke::new(1.0, Color32::from_rgb(0x15, 0x62, 0xB8));
-    visuals.hyperlink_color = Color32::from_rgb(0x15, 0x62, 0xB8);
-    visuals.warn_fg_color = Color32::from_rgb(0x9A, 0x55, 0x00);
-    visuals.error_fg_color = Color32::from_rgb(0xC0, 0x1C, 0x28);
-    visuals.widgets.noninteractive.bg_stroke =
-        Stroke::new(1.0, Color32::from_rgb(0xDC, 0xE2, 0xE8));
-    visuals.widgets.noninteractive.fg_stroke.color = Color32::from_rgb(0x1E, 0x2A, 0x36);
-    visuals.weak_text_color = Some(Color32::from_rgb(0x57, 0x64, 0x70));
-    visuals.widgets.inactive.weak_bg_fill = Color32::from_rgb(0xE9, 0xED, 0xF1);
-    visuals.widgets.inactive.bg_fill = Color32::from_rgb(0xD6, 0xDD, 0xE4);
-    visuals.widgets.inactive.fg_stroke.color = Color32::from_rgb(0x2B, 0x38, 0x45);
-    visuals.widgets.hovered.weak_bg_fill = Color32::from_rgb(0xDC, 0xE6, 0xF1);
-    visuals.widgets.active.weak_bg_fill = Color32::from_rgb(0xC6, 0xDB, 0xF0);
-    common(&mut visuals);
-    visuals
-}
-
-fn dark() -> Visuals {
-    let mut visuals = Visuals::dark();
-    visuals.panel_fill = Color32::from_rgb(0x1B, 0x20, 0x26);
-    visuals.window_fill = Color32::from_rgb(0x22, 0x28, 0x2F);
-    visuals.extreme_bg_color = Color32::from_rgb(0x12, 0x16, 0x1A);
-    visuals.faint_bg_color = Color32::from_rgb(0x24, 0x2A, 0x31);
-    visuals.selection.bg_fill = Color32::from_rgb(0x1F, 0x4E, 0x7D);
-    visuals.selection.stroke = Stroke::new(1.0, Color32::from_rgb(0x6C, 0xB8, 0xFF));
-    visuals.hyperlink_color = Color32::from_rgb(0x6C, 0xB8, 0xFF);
-    visuals.warn_fg_color = Color32::from_rgb(0xFF, 0xB8, 0x4D);
-    visuals.error_fg_color = Color32::from_rgb(0xFF, 0x7B, 0x72);
-    visuals.widgets.noninteractive.bg_stroke =
-        Stroke::new(1.0, Color32::from_rgb(0x33, 0x3B, 0x44));
-    visuals.widgets.noninteractive.fg_stroke.color = Color32::from_rgb(0xD9, 0xE0, 0xE7);
-    visuals.weak_text_color = Some(Color32::from_rgb(0x9A, 0xA7, 0xB4));
-    visuals.widgets.inactive.weak_bg_fill = Color32::from_rgb(0x35, 0x3E, 0x48);
-    visuals.widgets.inactive.bg_fill = Color32::from_rgb(0x3C, 0x45, 0x4F);
-    visuals.widgets.inactive.fg_stroke.color = Color32::from_rgb(0xD0, 0xD8, 0xE0);
-    visuals.widgets.hovered.weak_bg_fill = Color32::from_rgb(0x40, 0x4D, 0x5A);
-    visuals.widgets.active.weak_bg_fill = Color32::from_rgb(0x46, 0x5D, 0x74);
-    common(&mut visuals);
-    visuals
-}
-
-fn common(visuals: &mut Visuals) {
+fn visuals(dark: bool) -> Visuals {
+    let mut visuals = if dark {
+        Visuals::dark()
+    } else {
+        Visuals::light()
+    };
+    let pick = |on_light, on_dark| rgb(if dark { on_dark } else { on_light });
+    visuals.panel_fill = pick(0xFAFBFC, 0x1B2026);
+    visuals.window_fill = pick(0xFFFFFF, 0x22282F);
+    visuals.extreme_bg_color = pick(0xFFFFFF, 0x12161A);
+    visuals.faint_bg_color = pick(0xF0F3F6, 0x242A31);
+    visuals.selection.bg_fill = pick(0xB5D5F5, 0x1F4E7D);
+    visuals.selection.stroke = Stroke::new(1.0, pick(0x1562B8, 0x6CB8FF));
+    visuals.hyperlink_color = pick(0x1562B8, 0x6CB8FF);
+    visuals.warn_fg_color = pick(0x9A5500, 0xFFB84D);
+    visuals.error_fg_color = pick(0xC01C28, 0xFF7B72);
+    visuals.widgets.noninteractive.bg_stroke = Stroke::new(1.0, pick(0xDCE2E8, 0x333B44));
+    visuals.widgets.noninteractive.fg_stroke.color = pick(0x1E2A36, 0xD9E0E7);
+    visuals.weak_text_color = Some(pick(0x576470, 0x9AA7B4));
+    visuals.widgets.inactive.weak_bg_fill = pick(0xE9EDF1, 0x353E48);
+    visuals.widgets.inactive.bg_fill = pick(0xD6DDE4, 0x3C454F);
+    visuals.widgets.inactive.fg_stroke.color = pick(0x2B3845, 0xD0D8E0);
+    visuals.widgets.hovered.weak_bg_fill = pick(0xDCE6F1, 0x404D5A);
+    visuals.widgets.active.weak_bg_fill = pick(0xC6DBF0, 0x465D74);
     let radius = CornerRadius::same(6);
     for widget in [
         &mut visuals.widgets.noninteractive,
@@ -180,4 +145,5 @@ fn common(visuals: &mut Visuals) {
     visuals.window_corner_radius = CornerRadius::same(10);
     visuals.menu_corner_radius = CornerRadius::same(8);
     visuals.slider_trailing_fill = true;
+    visuals
 }

@@ -61,7 +61,7 @@ impl Timeline {
                     player.go_to_contact(focus, false);
                     moved = true;
                 }
-                let help = "Let time pass backwards, to the start (key J)";
+                let help = "Play backwards to the start (key J)";
                 let backwards = player.is_playing_backwards();
                 let (icon, name) = if backwards {
                     (Icon::Pause, "Pause backwards")
@@ -397,8 +397,8 @@ fn describe(ui: &mut Ui, player: &Player, scale: &Scale, pos: Pos2) {
         let words = format!("Contacts before {} are no longer kept", value::time(known));
         ui.label(words);
     }
-    let help = "Click or drag: any instant again, by the same steps; wheel or pinch: nearer; double click: all of it. Half \
-                colour slides, full colour sticks, a mark is a ball that comes to touch; pale is what is to come, or was left.";
+    let help = "Click or drag to go to an instant; wheel or pinch to zoom; double-click to show the whole run. Half colour: \
+                sliding; full colour: sticking; mark: contact begins; pale: still to come, or abandoned.";
     ui.label(egui::RichText::new(help).small().color(faint(ui)));
 }
 

@@ -18,13 +18,6 @@ const SCALE_APART: f32 = 20.0;
 /// Size of the button that plays and pauses, points.
 const PLAY: f32 = 40.0;
 
-/// What the user asked the transport for; the caller does it, since a reset touches more than the player.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Asked {
-    /// Back to t = 0.
-    Reset,
-}
-
 /// The next scale of [`SCALES`] faster or slower than the present one.
 pub fn next_scale(scale: f64, faster: bool) -> f64 {
     if faster {
@@ -43,8 +36,9 @@ pub fn next_scale(scale: f64, faster: bool) -> f64 {
     }
 }
 
-/// The bar: one row, or two where it is narrow.
-pub fn ui(ui: &mut Ui, player: &mut Player) -> Option<Asked> {
+/// The bar: one row, or two where it is narrow. Returns whether the user asked for a reset; the caller does it, since it touches
+/// more than the player.
+pub fn ui(ui: &mut Ui, player: &mut Player) -> bool {
     let narrow = ui.available_width() < 620.0;
     let row = egui::Layout::left_to_right(egui::Align::Center);
     let size = egui::vec2(ui.available_width(), theme::side(ui, PLAY));
@@ -69,8 +63,8 @@ pub fn ui(ui: &mut Ui, player: &mut Player) -> Option<Asked> {
     asked
 }
 
-/// The bar in one row, without what does not fit.
-pub fn row(ui: &mut Ui, player: &mut Player) -> Option<Asked> {
+/// The bar in one row, without what does not fit. Returns as [`ui`].
+pub fn row(ui: &mut Ui, player: &mut Player) -> bool {
     ui.horizontal(|ui| {
         let asked = buttons(ui, player);
         // Otherwise the time scale would stick out; the time is shown over the picture as well.
@@ -102,22 +96,19 @@ fn settled(ui: &mut Ui, player: &Player) {
     });
 }
 
-/// Reset, play and step.
-fn buttons(ui: &mut Ui, player: &mut Player) -> Option<Asked> {
-    let mut asked = None;
+/// Reset, play and step. Returns as [`ui`].
+fn buttons(ui: &mut Ui, player: &mut Player) -> bool {
     let (small, large) = (theme::side(ui, 30.0), theme::side(ui, PLAY));
     let help = if player.has_waiting() {
         "Back to t = 0; applies the changes that wait for it (key R)"
     } else {
         "Back to t = 0 (key R)"
     };
-    if icon_button(ui, Icon::Restart, "Reset", help, small, false).clicked() {
-        asked = Some(Asked::Reset);
-    }
+    let asked = icon_button(ui, Icon::Restart, "Reset", help, small, false).clicked();
     let (icon, name, help) = if player.is_playing() {
-        (Icon::Pause, "Pause", "Stand still (space)")
+        (Icon::Pause, "Pause", "Pause (space)")
     } else {
-        (Icon::Play, "Play", "Let time pass (space)")
+        (Icon::Play, "Play", "Play (space)")
     };
     let runs = player.stopped().is_none();
     ui.add_enabled_ui(runs, |ui| {
@@ -227,10 +218,11 @@ fn reached(ui: &mut Ui, player: &Player) {
     }
 }
 
-/// Banner of a run that the divergence guard stopped.
-pub fn banner(ui: &mut Ui, player: &Player) -> Option<Asked> {
-    let stopped = player.stopped()?;
-    let mut asked = None;
+/// Banner of a run that the divergence guard stopped. Returns as [`ui`].
+pub fn banner(ui: &mut Ui, player: &Player) -> bool {
+    let Some(stopped) = player.stopped() else {
+        return false;
+    };
     let colour = ui.visuals().error_fg_color;
     egui::Frame::new()
         .fill(ui.visuals().window_fill)
@@ -246,12 +238,11 @@ pub fn banner(ui: &mut Ui, player: &Player) -> Option<Asked> {
                 );
                 ui.label(stopped.fault.to_string());
                 ui.label(stopped.advice.to_string());
-                if ui.button("Reset the run").clicked() {
-                    asked = Some(Asked::Reset);
-                }
-            });
-        });
-    asked
+                ui.button("Reset the run").clicked()
+            })
+            .inner
+        })
+        .inner
 }
 
 #[cfg(test)]

@@ -1,6 +1,17 @@
 //! Values as text on the screen: words as in files and on the command line, typeset units.
 
 use crate::scene::{Kind, Scene, Value, format_quantity, format_quantity_digits};
+use crate::simulate::ContactState;
+
+/// What a contact does.
+pub fn contact(state: ContactState) -> &'static str {
+    match state {
+        ContactState::Free => "The ball touches nothing",
+        ContactState::Stick => "In contact, sticking",
+        ContactState::Slip => "In contact, sliding",
+        ContactState::Ideal => "Ideal joint: no clearance",
+    }
+}
 
 /// Units in `text` as they are printed, `µm` and `m/s²`. Files and the command line write `um` and `m/s^2`, and read both.
 pub fn typeset(text: &str) -> String {

@@ -335,7 +335,7 @@ impl Viewport {
                 size,
             );
             if first {
-                self.camera = goal;
+                (self.camera, self.goal) = (goal, None);
             } else {
                 self.goal = Some(goal);
                 ui.ctx().request_repaint();
@@ -674,7 +674,7 @@ impl Viewport {
         if self.followed.is_some()
             && ui
                 .button("Stop following")
-                .on_hover_text("Let the view go (double-click on the ground)")
+                .on_hover_text("Stop following (double-click on the ground)")
                 .clicked()
         {
             self.follow(None);
@@ -762,12 +762,7 @@ fn describe(ui: &mut Ui, player: &Player, picked: Picked) {
         }
         Picked::Joint(index) => {
             if let Some(joint) = frame.joints.get(index) {
-                ui.label(match joint.state {
-                    ContactState::Free => "The ball touches nothing",
-                    ContactState::Stick => "In contact, sticking",
-                    ContactState::Slip => "In contact, sliding",
-                    ContactState::Ideal => "Ideal joint: no clearance",
-                });
+                ui.label(value::contact(joint.state));
                 row(ui, "Normal force", joint.normal_force.norm(), "N");
                 row(ui, "Friction force", joint.friction_force.norm(), "N");
                 if joint.state != ContactState::Ideal {
@@ -780,4 +775,31 @@ fn describe(ui: &mut Ui, player: &Player, picked: Picked) {
         Picked::Fixed(_) => {}
     }
     ui.label(RichText::new("Double-click to follow").small().weak());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Scene;
+
+    #[test]
+    fn the_first_picture_does_not_move_into_place() {
+        let scene = Scene::load("spcmm", &[]).expect("built in");
+        let player = Player::new(&scene).expect("starts");
+        let mut viewport = Viewport::new(&player, ViewOptions::default());
+        let draw = |viewport: &mut Viewport| {
+            let mut output = egui::Context::default().run_ui(egui::RawInput::default(), |ui| {
+                viewport.ui(ui, &player, true)
+            });
+            // No texture is made of it.
+            output.textures_delta.clear();
+        };
+        let unfitted = viewport.camera;
+        draw(&mut viewport);
+        assert_ne!(viewport.camera, unfitted);
+        assert_eq!(viewport.goal, None);
+        viewport.preset(Preset::Top);
+        draw(&mut viewport);
+        assert!(viewport.goal.is_some(), "later ones do");
+    }
 }

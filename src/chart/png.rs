@@ -38,7 +38,7 @@ impl Sheet {
             .flatten();
         let Some(mut pixmap) = pixmap else {
             return Err(SheetError(format!(
-                "no picture is {width} by {height} pixels"
+                "cannot make a picture of {width} by {height} pixels"
             )));
         };
         resvg::render(

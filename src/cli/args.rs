@@ -5,6 +5,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::analysis::grid::Start;
+
 /// A 3D laboratory that shows what play in a ball joint does to a machine.
 ///
 /// Without a command it opens the window.
@@ -139,7 +141,7 @@ pub struct SweepArguments {
     pub phase: String,
     /// Where each point starts from.
     #[arg(long, value_enum, value_name = "START", default_value = "cold")]
-    pub start: StartChoice,
+    pub start: Start,
     /// Leave out the twin runs that measure the largest Lyapunov exponent.
     #[arg(long)]
     pub no_exponent: bool,
@@ -185,27 +187,6 @@ pub struct MergeArguments {
 pub enum SectionChoice {
     /// At one phase of the drive.
     Phase,
-}
-
-/// Where each point of a sweep starts from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum StartChoice {
-    /// From the scene's own initial state.
-    Cold,
-    /// From the final state of the point with the next lower value.
-    FollowUp,
-    /// From the final state of the point with the next higher value.
-    FollowDown,
-}
-
-impl From<StartChoice> for crate::analysis::grid::Start {
-    fn from(choice: StartChoice) -> Self {
-        match choice {
-            StartChoice::Cold => Self::Cold,
-            StartChoice::FollowUp => Self::FollowUp,
-            StartChoice::FollowDown => Self::FollowDown,
-        }
-    }
 }
 
 /// Form of the summary.

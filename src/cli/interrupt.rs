@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use super::Failure;
 
 /// `timeout` signals its child and then the child's group: signals this close together are one request.
-const ONE_WISH: Duration = Duration::from_secs(1);
+const ONE_REQUEST: Duration = Duration::from_secs(1);
 
 static ASKED: AtomicBool = AtomicBool::new(false);
 static LISTEN: Once = Once::new();
@@ -19,10 +19,10 @@ pub fn listen() {
         return;
     }
     LISTEN.call_once(|| {
-        let mut wishes = Signals::default();
+        let mut signals = Signals::default();
         let outcome = catch(move || {
             ASKED.store(true, Ordering::Relaxed);
-            if wishes.insist(Instant::now()) {
+            if signals.must_exit(Instant::now()) {
                 std::process::exit(i32::from(Failure::INTERRUPTED));
             }
         });
@@ -46,10 +46,10 @@ struct Signals {
 
 impl Signals {
     /// Records a signal; whether to exit at once: on the third, or on the second if it does not just echo the first.
-    fn insist(&mut self, now: Instant) -> bool {
+    fn must_exit(&mut self, now: Instant) -> bool {
         self.count += 1;
         let first = *self.first.get_or_insert(now);
-        self.count > 2 || now.duration_since(first) > ONE_WISH
+        self.count > 2 || now.duration_since(first) > ONE_REQUEST
     }
 }
 
@@ -91,16 +91,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_echo_is_no_second_wish_and_a_third_is_final() {
+    fn an_echo_is_no_second_request_and_a_third_is_final() {
         let start = Instant::now();
-        let insisted = |after: &[u64]| {
-            let mut wishes = Signals::default();
+        let exits = |after: &[u64]| {
+            let mut signals = Signals::default();
             let mut each = after.iter().map(|ms| start + Duration::from_millis(*ms));
-            each.position(|now| wishes.insist(now))
+            each.position(|now| signals.must_exit(now))
         };
-        assert_eq!(insisted(&[0, 20]), None);
-        assert_eq!(insisted(&[0, 0, 40]), Some(2));
-        assert_eq!(insisted(&[0, 20, 5000]), Some(2));
-        assert_eq!(insisted(&[0, 1500]), Some(1));
+        assert_eq!(exits(&[0, 20]), None);
+        assert_eq!(exits(&[0, 0, 40]), Some(2));
+        assert_eq!(exits(&[0, 20, 5000]), Some(2));
+        assert_eq!(exits(&[0, 1500]), Some(1));
     }
 }

@@ -31,6 +31,7 @@ mod wear;
 
 use std::fmt::Write as _;
 use std::io::{self, Write as _};
+use std::num::NonZero;
 
 use clap::Parser;
 
@@ -59,6 +60,12 @@ pub fn main() -> u8 {
             failure.code
         }
     }
+}
+
+/// Threads to compute with: as many as `asked` for, or one for each core.
+fn threads(asked: Option<u16>) -> usize {
+    let cores = || std::thread::available_parallelism().map_or(1, NonZero::get);
+    asked.map_or_else(cores, usize::from)
 }
 
 fn dispatch(arguments: Arguments) -> Result<(), Failure> {

@@ -29,7 +29,7 @@ fn choose(option: Option<&str>, variable: Option<String>) -> Result<String, Fail
         return Ok(page.to_owned());
     }
     Err(Failure::usage(format!(
-        "{name} {page}: no address of a page; expected one that begins with https:// or http:// and has no `#`, e.g. \
+        "{name} {page}: not an address of a page; expected one that begins with https:// or http:// and has no `#`, e.g. \
          https://example.org/lab/"
     )))
 }

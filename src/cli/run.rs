@@ -117,7 +117,9 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     }
     if !arguments.quiet {
         if times.is_some_and(|times| !times.reach_the_end()) {
-            warn("the duration is no whole number of intervals: the last row lies before the end");
+            warn(
+                "the duration is not a whole number of intervals: the last row lies before the end",
+            );
         }
         let warnings = scene.warnings().into_iter().map(|w| w.to_string());
         warnings

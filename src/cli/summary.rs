@@ -10,6 +10,7 @@ use super::output::significant;
 use super::provenance;
 use crate::scene::{Preset, Scene};
 use crate::simulate::{Impact, Ledger, Simulation};
+use crate::words::words;
 
 /// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,16 +23,7 @@ pub enum Status {
     Diverged,
 }
 
-impl Status {
-    /// The word in summaries and files.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Done => "done",
-            Self::Interrupted => "interrupted",
-            Self::Diverged => "diverged",
-        }
-    }
-}
+words! { Status { Done => "done", Interrupted => "interrupted", Diverged => "diverged" } }
 
 /// The summary as JSON: provenance, then results; `impacts` if all of them were collected.
 pub fn json(

@@ -148,11 +148,9 @@ impl Seek for &File {
     }
 }
 
-/// Held while the names in a folder are changed, so that no other run does so; empty where there are no such locks.
-pub struct FolderLock(#[expect(dead_code, reason = "held until dropped")] Option<fs::File>);
-
-/// Waits for the lock on the names in `folder`.
-pub fn lock_folder(folder: &Path) -> FolderLock {
+/// Waits for the lock on the names in `folder`, held until dropped, so that no other run changes them meanwhile; `None` where
+/// there are no such locks.
+pub fn lock_folder(folder: &Path) -> Option<fs::File> {
     let lock = || {
         Gate::here().pass(Call::Lock)?;
         // Other than on Unix a folder cannot be opened, and avoiding two runs of one output is up to the user.
@@ -160,7 +158,7 @@ pub fn lock_folder(folder: &Path) -> FolderLock {
         file.lock()?;
         io::Result::Ok(file)
     };
-    FolderLock(lock().inspect_err(|e| log::debug!("no lock: {e}")).ok())
+    lock().inspect_err(|e| log::debug!("no lock: {e}")).ok()
 }
 
 /// Creates a folder that does not exist yet.

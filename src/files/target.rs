@@ -35,7 +35,10 @@ impl OutputFile {
             return Err(FileError::Exists(path.to_owned()));
         }
         if path.metadata().is_ok_and(|it| !it.is_file()) {
-            return Err(FileError::cannot(path, "it is there and no file"));
+            return Err(FileError::cannot(
+                path,
+                "it exists and is not a regular file",
+            ));
         }
         ScratchFile::new(folder).map_err(|error| FileError::of(path, &error))?;
         Ok(Self {

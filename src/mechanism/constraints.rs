@@ -102,7 +102,7 @@ impl Constraints {
 
     /// Whether the Jacobian of the latest factorisation, if square, has a positive determinant: the sign changes when the
     /// loops pass through a singular pose.
-    pub fn is_right_handed(&mut self, model: &Model) -> bool {
+    pub fn is_determinant_positive(&mut self, model: &Model) -> bool {
         self.is_minor_positive(model, Some)
     }
 

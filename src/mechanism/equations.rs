@@ -31,10 +31,10 @@ pub(super) trait Equations: Send {
     fn driven(&self) -> &Driven;
 
     /// Poses and velocities at (t, y).
-    fn forward(&mut self, model: &Model, t: f64, y: &[f64]);
+    fn update_kinematics(&mut self, model: &Model, t: f64, y: &[f64]);
 
-    /// Motion of the latest [`Self::forward`], and the loads on the bodies about their centroids, for the caller to fill in;
-    /// the last entry of each is the world's.
+    /// Motion of the latest [`Self::update_kinematics`], and the loads on the bodies about their centroids, for the caller to
+    /// fill in; the last entry of each is the world's.
     fn loads(&mut self) -> (&[Kinematics], &mut [Wrench]);
 
     /// Accelerations of the velocity coordinates into `dv`, under the loads in [`Self::loads`].
@@ -96,8 +96,8 @@ pub(super) trait Equations: Send {
     /// Whether the motion is a function of time alone: as many independent rows as coordinates.
     fn is_kinematic(&self, model: &Model) -> bool;
 
-    /// For such a motion: which side of a singular pose the loops are on.
-    fn is_right_handed(&mut self, model: &Model) -> bool;
+    /// For such a motion: the determinant of the loops' Jacobian, whose sign tells the side of a singular pose.
+    fn is_determinant_positive(&mut self, model: &Model) -> bool;
 
     /// Force on the ball of the `k`-th ideal joint at the latest evaluation, N.
     fn reaction(&self, k: usize) -> Vec3;

@@ -75,7 +75,7 @@ impl Equations for Forest {
         &self.tree.driven
     }
 
-    fn forward(&mut self, model: &Model, t: f64, y: &[f64]) {
+    fn update_kinematics(&mut self, model: &Model, t: f64, y: &[f64]) {
         self.tree.forward(model, t, y);
     }
 
@@ -191,9 +191,9 @@ impl Equations for Forest {
         model.nv == rows.map_or(0, Constraints::rows)
     }
 
-    fn is_right_handed(&mut self, model: &Model) -> bool {
+    fn is_determinant_positive(&mut self, model: &Model) -> bool {
         match &mut self.constraints {
-            Some(constraints) => constraints.is_right_handed(model),
+            Some(constraints) => constraints.is_determinant_positive(model),
             None => true,
         }
     }

@@ -251,7 +251,7 @@ impl ImplicitContacts {
             let (mut off, mut largest) = (0.0_f64, 0.0_f64);
             counts.contacts += 1;
             for i in 0..self.touches.len() {
-                let [added, slipping] = self.driven_by(i, h);
+                let [added, slipping] = self.velocity_from_forces(i, h);
                 let touch = &mut self.touches[i];
                 (touch.added, touch.slipping) = (added, slipping);
                 touch.evaluate(h, counts);
@@ -332,7 +332,7 @@ impl ImplicitContacts {
     }
 
     /// Velocities added at touch `i` by the forces in `right`.
-    fn driven_by(&self, i: usize, h: f64) -> [Vec3; 2] {
+    fn velocity_from_forces(&self, i: usize, h: f64) -> [Vec3; 2] {
         let band = self.band();
         let mut sum = [Vec3::zeros(); 2];
         for j in band.row(i) {

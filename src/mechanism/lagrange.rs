@@ -423,7 +423,7 @@ impl Equations for Lagrange {
         &self.driven
     }
 
-    fn forward(&mut self, model: &Model, t: f64, y: &[f64]) {
+    fn update_kinematics(&mut self, model: &Model, t: f64, y: &[f64]) {
         self.driven.update(model, t, &mut self.motion);
         let n = model.bodies.len();
         let (qs, vs) = y.split_at(7 * n);
@@ -602,7 +602,7 @@ impl Equations for Lagrange {
         false
     }
 
-    fn is_right_handed(&mut self, _: &Model) -> bool {
+    fn is_determinant_positive(&mut self, _: &Model) -> bool {
         true
     }
 

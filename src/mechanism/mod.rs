@@ -145,7 +145,7 @@ pub enum MechanismError {
     /// A start pose in which constraints become dependent that are independent in every neighbouring pose.
     #[error(
         "the mechanism starts in a singular pose: at {} directions that the ideal joints hold elsewhere coincide here, \
-         and the motion could go on in more than one way; start it beside that pose",
+         and the motion could continue in more than one way; start it away from that pose",
         .joints.join(", ")
     )]
     Branching {
@@ -185,7 +185,7 @@ fn unclosed(stays: &[(String, Vec3)]) -> String {
     };
     let each: Vec<String> = stays.iter().map(each).collect();
     format!(
-        ": what stays open is {}, where no joint of the mechanism moves",
+        ": remaining gaps: {} (no joint can move that way)",
         each.join(", ")
     )
 }
@@ -306,9 +306,10 @@ impl Mechanism {
         loads.fold(self.model.shortest_period, f64::min) / 50.0
     }
 
-    /// Where the motion is a function of time alone: which side of a singular pose the loops are on. True elsewhere.
-    pub fn is_right_handed(&mut self) -> bool {
-        !self.is_kinematic() || self.equations.is_right_handed(&self.model)
+    /// Where the motion is a function of time alone: the determinant of the loops' Jacobian, whose sign tells the side of a
+    /// singular pose. True elsewhere.
+    pub fn is_determinant_positive(&mut self) -> bool {
+        !self.is_kinematic() || self.equations.is_determinant_positive(&self.model)
     }
 
     /// Where the motion is a function of time alone and known in closed form: distance of the output body from that motion
@@ -343,7 +344,7 @@ impl Mechanism {
     /// Poses, velocities and gaps at (t, y), without forces.
     pub fn measure(&mut self, t: f64, y: &[f64]) {
         self.evaluated = None;
-        self.equations.forward(&self.model, t, y);
+        self.equations.update_kinematics(&self.model, t, y);
         self.contacts.measure(t, self.equations.motion());
     }
 
@@ -419,11 +420,6 @@ impl Mechanism {
     /// Number of driven coordinates.
     pub fn drives(&self) -> usize {
         self.model.drives.len()
-    }
-
-    /// Driven body of drive `i`.
-    pub fn driven_body(&self, i: usize) -> usize {
-        self.model.drives[i].body
     }
 
     /// Force (N) or torque (N m) of every actuator after [`Evaluator::evaluate_fully`], positive along the joint's axis.

@@ -58,7 +58,7 @@ impl Evaluator<'_> {
             ..
         } = &mut *self.mechanism;
         *evaluated = None;
-        equations.forward(model, t, y);
+        equations.update_kinematics(model, t, y);
         let (motion, wrench) = equations.loads();
         wrench.fill(Wrench::zero());
         let at = At {

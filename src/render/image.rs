@@ -32,18 +32,20 @@ pub struct Image {
 }
 
 impl Image {
-    /// Encodes as PNG; `texts` are its keyword and text pairs (`Software`, `Description`, …; Latin-1).
+    /// Encodes as PNG; `texts` are its keyword and text pairs (`Software`, `Description`, …). Letters of a text beyond Latin-1,
+    /// which PNG cannot hold, become `?`.
     ///
     /// # Errors
-    /// A text that PNG cannot hold.
+    /// A keyword that PNG cannot hold.
     pub fn png(&self, texts: &[(&str, &str)]) -> Result<Vec<u8>, png::EncodingError> {
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, self.width, self.height);
         encoder.set_color(png::ColorType::Rgba);
         encoder.set_depth(png::BitDepth::Eight);
         encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+        let latin = |c: char| if u32::from(c) < 256 { c } else { '?' };
         for (keyword, text) in texts {
-            encoder.add_text_chunk((*keyword).to_owned(), (*text).to_owned())?;
+            encoder.add_text_chunk((*keyword).to_owned(), text.chars().map(latin).collect())?;
         }
         let mut writer = encoder.write_header()?;
         writer.write_image_data(&self.rgba)?;

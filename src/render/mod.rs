@@ -11,6 +11,7 @@ mod meshes;
 #[cfg(not(target_arch = "wasm32"))]
 mod offscreen;
 mod pipelines;
+mod readback;
 mod renderer;
 mod target;
 #[cfg(test)]
@@ -21,5 +22,6 @@ pub use eframe::egui_wgpu::wgpu;
 pub use image::{Image, RenderError};
 #[cfg(not(target_arch = "wasm32"))]
 pub use offscreen::{NoAdapter, Offscreen};
+pub use readback::{Arrival, Readback, check_size, device_error};
 pub use renderer::Renderer;
 pub use target::RenderTarget;

@@ -1,6 +1,6 @@
 //! Pictures without a window.
 
-use super::{Image, RenderError, RenderTarget, Renderer, wgpu};
+use super::{Image, Readback, RenderError, RenderTarget, Renderer, check_size, device_error, wgpu};
 use crate::view::DrawList;
 
 /// No graphics adapter on this machine.
@@ -16,7 +16,7 @@ pub struct Offscreen {
     device: wgpu::Device,
     queue: wgpu::Queue,
     renderer: Renderer,
-    frame: Option<(RenderTarget, wgpu::Buffer)>,
+    frame: Option<(RenderTarget, Readback)>,
 }
 
 impl Offscreen {
@@ -75,18 +75,8 @@ impl Offscreen {
     ///
     /// # Errors
     /// [`RenderError::Size`].
-    pub fn check_size(&self, [width, height]: [u32; 2]) -> Result<(), RenderError> {
-        let limit = self.device.limits().max_texture_dimension_2d;
-        let good = 1..=limit;
-        if good.contains(&width) && good.contains(&height) {
-            Ok(())
-        } else {
-            Err(RenderError::Size {
-                width,
-                height,
-                limit,
-            })
-        }
+    pub fn check_size(&self, size: [u32; 2]) -> Result<(), RenderError> {
+        check_size(&self.device, size).map(|_| ())
     }
 
     /// Draws `list` at `list.size`.
@@ -94,74 +84,30 @@ impl Offscreen {
     /// # Errors
     /// A size the device cannot draw, or a lost device.
     pub fn render(&mut self, list: &DrawList) -> Result<Image, RenderError> {
-        let [width, height] = list.size;
         self.check_size(list.size)?;
-        let stride = (width * 4).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-        if self
-            .frame
-            .as_ref()
-            .is_none_or(|(target, _)| target.size() != list.size)
-        {
-            let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("read back"),
-                size: u64::from(stride) * u64::from(height),
-                usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
-                mapped_at_creation: false,
-            });
-            self.frame = Some((RenderTarget::new(&self.device, list.size), buffer));
-        }
-        let Some((target, buffer)) = &self.frame else {
-            return Err(RenderError::Device("no target".to_owned()));
+        let fits = |frame: &(RenderTarget, Readback)| frame.0.size() == list.size;
+        let (target, readback) = match self.frame.take().filter(fits) {
+            Some(frame) => frame,
+            None => (
+                RenderTarget::new(&self.device, list.size),
+                Readback::new(&self.device, list.size),
+            ),
         };
-
+        let (target, readback) = self.frame.insert((target, readback));
         let mut encoder = self.device.create_command_encoder(&Default::default());
         self.renderer
             .draw(&self.device, &self.queue, &mut encoder, target, list);
-        encoder.copy_texture_to_buffer(
-            target.picture.as_image_copy(),
-            wgpu::TexelCopyBufferInfo {
-                buffer,
-                layout: wgpu::TexelCopyBufferLayout {
-                    offset: 0,
-                    bytes_per_row: Some(stride),
-                    rows_per_image: None,
-                },
-            },
-            target.picture.size(),
-        );
+        readback.copy(&mut encoder, &target.picture);
         self.queue.submit([encoder.finish()]);
-
-        let device_error = |error: &dyn std::fmt::Display| RenderError::Device(error.to_string());
-        let mapped = std::sync::Arc::new(std::sync::OnceLock::new());
-        let report = mapped.clone();
-        buffer.map_async(wgpu::MapMode::Read, .., move |result| {
-            let _ = report.set(result);
-        });
+        let arrival = readback.request();
         self.device
             .poll(wgpu::PollType::wait_indefinitely())
-            .map_err(|e| device_error(&e))?;
-        match mapped.get() {
-            Some(Ok(())) => {}
-            Some(Err(error)) => return Err(device_error(error)),
-            None => {
-                return Err(RenderError::Device(
-                    "the picture never came back".to_owned(),
-                ));
-            }
+            .map_err(device_error)?;
+        match arrival.get() {
+            Some(Ok(())) => readback.read(),
+            Some(Err(reason)) => Err(device_error(reason)),
+            None => Err(device_error("the picture never came back")),
         }
-        let mut rgba = Vec::with_capacity(width as usize * height as usize * 4);
-        {
-            let rows = buffer.get_mapped_range(..).map_err(|e| device_error(&e))?;
-            for row in rows.chunks_exact(stride as usize) {
-                rgba.extend_from_slice(&row[..width as usize * 4]);
-            }
-        }
-        buffer.unmap();
-        Ok(Image {
-            width,
-            height,
-            rgba,
-        })
     }
 }
 

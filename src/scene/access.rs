@@ -101,7 +101,7 @@ impl Scene {
             let message = if hinge {
                 let parts: Vec<&str> = table().iter().filter_map(contact_part).collect();
                 format!(
-                    "`{first}` is no ball joint: its drive, start, axis and points stand in the scene file alone. Such keys \
+                    "`{first}` is not a ball joint: its drive, start, axis and points can be set only in the scene file. Such keys \
                      are joint.<ball joint>.<key>; ball joints: {listed}; keys: {}",
                     parts.join(", ")
                 )

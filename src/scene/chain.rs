@@ -157,7 +157,7 @@ fn read_own<'d>(
             return Err(own.error("name", message));
         };
         if !joint.overrides.is_empty() {
-            let message = format!("the ball joint `{name}` stands here twice");
+            let message = format!("the ball joint `{name}` is listed twice");
             return Err(own.error("name", message));
         }
         places.extend(read_own_contact(&own, joint)?);

@@ -26,7 +26,7 @@ mod write;
 
 pub use check::least_impact_steps;
 pub use doubt::{Doubt, Warning, WarningKind};
-pub use elements::{ELEMENT_KINDS, element_table};
+pub use elements::ELEMENT_KINDS;
 pub use error::SceneError;
 pub use load::*;
 pub use model::*;

@@ -397,7 +397,7 @@ pub(super) fn sort_forest(
         if let Some(first) = of_child[child].replace(text) {
             let node = text.section.require("child", "")?;
             return Err(node.error(format!(
-                "this body already hangs on joint `{}`: {closing}",
+                "this body is already the child of joint `{}`: {closing}",
                 first.name
             )));
         }
@@ -436,7 +436,7 @@ pub(super) fn sort_forest(
     {
         let node = text.section.require("parent", "\"world\"")?;
         return Err(node.error(format!(
-            "these joints go round in a circle and never reach the world: {closing}"
+            "these joints form a cycle that does not reach the world: {closing}"
         )));
     }
     let mut sorted_joints: Vec<Joint> = joints.into_iter().map(|text| text.joint).collect();

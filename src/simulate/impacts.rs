@@ -1,6 +1,6 @@
 //! The restitution check: for each impact the restitution asked for, the one its law gives, and the one that resulted.
 
-use super::peaks::Course;
+use super::peaks::PenetrationCubic;
 use crate::contact::{Coefficients, restitution_given};
 
 /// How many of the latest impacts are kept.
@@ -113,7 +113,13 @@ impl Impacts {
 
     /// Follows the contact of `joint` over a step in which it was, or became, active: the course of its penetration, its
     /// largest normal force (N) and its largest ratio of damping to elastic force.
-    pub(super) fn follow(&mut self, joint: usize, course: &Course, force: f64, damping: f64) {
+    pub(super) fn follow(
+        &mut self,
+        joint: usize,
+        course: &PenetrationCubic,
+        force: f64,
+        damping: f64,
+    ) {
         if let Some(impact) = &mut self.under_way[joint] {
             impact.steps += 1;
             impact.damping = impact.damping.max(damping);

@@ -79,13 +79,13 @@ const EVENLY: f64 = 1e-9;
 
 /// Powers at some instants, and the polynomial through them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct PowerCourse {
+pub(super) struct PowerInterpolant {
     times: [f64; NODES],
     powers: [Powers; NODES],
     count: usize,
 }
 
-impl PowerCourse {
+impl PowerInterpolant {
     pub(super) fn len(&self) -> usize {
         self.count
     }
@@ -176,9 +176,9 @@ pub(super) struct Account {
     before: (Ledger, Energies),
     now: (Ledger, Energies),
     /// Powers over the latest step, in step time 0 to 1: the works are integrated from it.
-    pub course: PowerCourse,
+    pub course: PowerInterpolant,
     /// Powers at the ends of past steps, by time, for kinematic scenes.
-    pub past: PowerCourse,
+    pub past: PowerInterpolant,
     /// Current powers, if known.
     pub powers: Option<Powers>,
 }
@@ -285,7 +285,7 @@ mod tests {
         let p = |t: f64| 1.0 + t * (2.0 - t * (3.0 - t * (0.5 + t * (0.25 - t))));
         let integral =
             |t: f64| t + t * t - t.powi(3) + 0.125 * t.powi(4) + 0.05 * t.powi(5) - t.powi(6) / 6.0;
-        let mut course = PowerCourse::default();
+        let mut course = PowerInterpolant::default();
         for t in [-9.0, -0.9, -0.5, -0.2, 0.0, 0.299] {
             course.push_apart(t, drive(p(t)), 1e-2);
         }
@@ -307,7 +307,7 @@ mod tests {
     #[test]
     fn even_instants_have_the_weights_of_the_polynomial_through_them() {
         for (i, weight) in EVEN.into_iter().enumerate() {
-            let (mut even, mut uneven) = (PowerCourse::default(), PowerCourse::default());
+            let (mut even, mut uneven) = (PowerInterpolant::default(), PowerInterpolant::default());
             for j in 0..NODES {
                 let (time, power) = (j as f64 - 4.0, if i == j { 1.0 } else { 0.0 });
                 even.push(time, drive(power));
@@ -323,7 +323,7 @@ mod tests {
     #[test]
     fn simpson_and_radau_are_courses_through_their_own_instants() {
         let weight = |times: &[f64], which: usize| {
-            let mut course = PowerCourse::default();
+            let mut course = PowerInterpolant::default();
             for (i, &t) in times.iter().enumerate() {
                 course.push(t, drive(if i == which { 1.0 } else { 0.0 }));
             }

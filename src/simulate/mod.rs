@@ -175,11 +175,6 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
-    /// The scene it belongs to, as it was running.
-    pub fn running_scene(&self) -> &Scene {
-        &self.running
-    }
-
     /// Time of the state, s.
     pub fn time(&self) -> f64 {
         self.state.time()

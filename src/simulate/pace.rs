@@ -21,7 +21,6 @@ pub struct Pacer {
     budget: f64,
     advanced: f64,
     elapsed: f64,
-    behind: bool,
 }
 
 impl Default for Pacer {
@@ -32,7 +31,6 @@ impl Default for Pacer {
             budget: LARGEST_BUDGET,
             advanced: 0.0,
             elapsed: 0.0,
-            behind: false,
         }
     }
 }
@@ -59,7 +57,6 @@ impl Pacer {
     /// Displays `time`, as after a reset or a single step.
     pub fn jump(&mut self, time: f64) {
         self.shown = time;
-        self.behind = false;
         self.forget_average();
     }
 
@@ -83,7 +80,6 @@ impl Pacer {
     /// the simulation. Any shortfall is dropped, not carried over.
     pub fn end(&mut self, dt: f64, target: f64, reached: f64) {
         let shown = target.min(reached).max(self.shown);
-        self.behind = reached < target;
         // So long a pause was no frame: it says nothing about the machine.
         if dt.is_finite() && dt < 1.0 {
             let keep = libm::exp(-dt / AVERAGE);
@@ -96,11 +92,6 @@ impl Pacer {
     /// Simulated seconds per second achieved lately; `None` before anything was measured.
     pub fn reached_scale(&self) -> Option<f64> {
         (self.elapsed > 0.05).then(|| self.advanced / self.elapsed)
-    }
-
-    /// Whether the last frame fell short of its target.
-    pub fn is_behind(&self) -> bool {
-        self.behind
     }
 
     fn forget_average(&mut self) {
@@ -140,7 +131,6 @@ mod tests {
         assert!((pacer.shown() - 1.0).abs() < 1e-9);
         let reached = pacer.reached_scale().expect("measured over two seconds");
         assert!((reached - 0.5).abs() < 1e-9, "{reached}");
-        assert!(!pacer.is_behind());
     }
 
     #[test]
@@ -151,7 +141,6 @@ mod tests {
         let reached = pacer.reached_scale().expect("measured");
         // 12 ms of stepping at half speed in a frame of 16.7 ms.
         assert!((reached - 0.5 * 0.012 * 60.0).abs() < 0.01, "{reached}");
-        assert!(pacer.is_behind());
     }
 
     #[test]

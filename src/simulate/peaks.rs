@@ -46,13 +46,13 @@ impl Recent {
 
 /// Cubic Hermite polynomial of the penetration over one step.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Course {
+pub(super) struct PenetrationCubic {
     start: Approach,
     end: Approach,
     h: f64,
 }
 
-impl Course {
+impl PenetrationCubic {
     pub(super) fn new(start: Approach, end: Approach, h: f64) -> Self {
         Self { start, end, h }
     }
@@ -213,8 +213,8 @@ mod tests {
             }
         };
         let (start, end) = (0.43e-4, 0.53e-4);
-        let (force, theta) =
-            Course::new(at(start), at(end), end - start).strongest(&c, &Memory::begun(&c, 0.1));
+        let (force, theta) = PenetrationCubic::new(at(start), at(end), end - start)
+            .strongest(&c, &Memory::begun(&c, 0.1));
         let exact = c.normal_force(a, 0.0, 0.1);
         // The Hermite interpolation error of the penetration, (pi h / T)^4 / 384 = 2.5e-5, enters the force to the power
         // 1.5.

@@ -170,7 +170,7 @@ struct Record {
     /// Of each ball joint since they were last taken.
     peaks: Vec<Peak>,
     /// On which side of singular poses a kinematic scene started.
-    right_handed: bool,
+    determinant_positive: bool,
 }
 
 impl Control {
@@ -212,7 +212,7 @@ impl State {
                 reactions: vec![Recent::default(); joints],
                 contact_steps: vec![0; joints],
                 peaks: vec![Peak::default(); joints],
-                right_handed: true,
+                determinant_positive: true,
             },
         }
     }
@@ -240,7 +240,8 @@ impl Simulation {
         let mut simulation = Self::assembled(&scene, mechanism, state, reference);
         simulation.begin_contacts_at_start();
         simulation.refresh();
-        simulation.state.record.right_handed = simulation.mechanism.is_right_handed();
+        simulation.state.record.determinant_positive =
+            simulation.mechanism.is_determinant_positive();
         if simulation.mechanism.distance_from_ideal() > OTHER_BRANCH {
             return Err(MechanismError::OtherBranch.into());
         }
@@ -516,7 +517,8 @@ impl Simulation {
         }
         self.state.record.statistics.count(self.attempt.counts);
         // Beyond the pose the loops may close again on another branch.
-        let passed = self.mechanism.is_right_handed() != self.state.record.right_handed
+        let passed = self.mechanism.is_determinant_positive()
+            != self.state.record.determinant_positive
             || self.mechanism.distance_from_ideal() > OTHER_BRANCH;
         let fault = if passed {
             Some(StopFault::SingularLoops)

@@ -100,13 +100,9 @@ impl Arrow {
             neck + shaft,
             self.tail + shaft,
         ];
-        lines.extend((0..corners.len()).map(|i| Line {
-            from: corners[i].to_array(),
-            width,
-            to: corners[(i + 1) % corners.len()].to_array(),
-            pad: 0.0,
-            from_colour: colour.0,
-            to_colour: colour.0,
+        lines.extend((0..corners.len()).map(|i| {
+            let next = corners[(i + 1) % corners.len()];
+            Line::new(corners[i], next, width, [colour; 2])
         }));
     }
 }
@@ -215,16 +211,10 @@ pub(super) fn push_forces(
         }
     }
     if let Some(pull) = &shot.frame.pull {
-        let [from, to] = pull.points.map(|point| to_f32(&point).to_array());
+        let [from, to] = pull.points.map(|point| to_f32(&point));
+        let width = OUTLINE * shot.pixels_per_point;
         let faint = palette.outside.with_opacity(0.6);
-        out.lines.push(Line {
-            from,
-            width: OUTLINE * shot.pixels_per_point,
-            to,
-            pad: 0.0,
-            from_colour: faint.0,
-            to_colour: faint.0,
-        });
+        out.lines.push(Line::new(from, to, width, [faint; 2]));
     }
     if !at_joints {
         return;
@@ -262,7 +252,6 @@ pub(super) fn push_forces(
         reference,
         pixels: ARROW_LENGTH * height,
         scaling: options.scaling,
-        automatic: options.reference.is_none(),
         clipped,
         ticks: marks.iter().map(tick).collect(),
         normal: options.normal.then_some(palette.normal),

@@ -9,7 +9,7 @@ use super::arrows::{ARROW_LENGTH, push_arrow, push_forces};
 use super::cast::{cast, room};
 use super::coil::push_coil;
 use super::drawn::{self, BarKind, DrawnJoint, DrawnShape, Solid};
-use super::instances::{bar, placed, push_label};
+use super::instances::{self, bar, placed, push_label};
 use super::theme::Material;
 use super::{
     Background, Bounds, Camera, DrawList, Floor, Instance, LabelKind, Layer, Light, Line, Mesh,
@@ -221,11 +221,7 @@ impl SceneView {
             push_solid(layer, &part.place(frame, &joints), material);
         }
         for (i, joint) in joints.iter().enumerate() {
-            let ball = placed(
-                Mat3::from_diagonal(Vec3::splat(joint.ball_radius)),
-                joint.ball_centre,
-                palette.ball,
-            );
+            let ball = instances::ball(joint.ball_centre, joint.ball_radius, palette.ball);
             if options.wear == WearMap::Off || frame.joints[i].clearance == 0.0 {
                 out.solid.push(Mesh::Sphere, ball);
             } else {
@@ -239,8 +235,8 @@ impl SceneView {
                     colour: palette.flash.with_opacity(flash),
                     ..palette.ball
                 };
-                let size = Mat3::from_diagonal(Vec3::splat(HALO * joint.outer));
-                out.halos.push(placed(size, joint.socket_centre, light));
+                let halo = instances::ball(joint.socket_centre, HALO * joint.outer, light);
+                out.halos.push(halo);
             }
             if options.sockets {
                 let half = |opening, material| {
@@ -476,8 +472,6 @@ fn magnification_text(drawn: f32, asked: f32) -> String {
 }
 
 pub(super) fn push_solid(layer: &mut Layer, solid: &Solid<'_>, material: Material) {
-    let ball =
-        |centre, radius: f32| placed(Mat3::from_diagonal(Vec3::splat(radius)), centre, material);
     match *solid {
         Solid::Bar {
             from,
@@ -501,7 +495,7 @@ pub(super) fn push_solid(layer: &mut Layer, solid: &Solid<'_>, material: Materia
                     .zip(capped)
                     .filter(|(_, capped)| *capped)
                 {
-                    layer.push(Mesh::Sphere, ball(end, radius));
+                    layer.push(Mesh::Sphere, instances::ball(end, radius, material));
                 }
             }
         }
@@ -515,7 +509,9 @@ pub(super) fn push_solid(layer: &mut Layer, solid: &Solid<'_>, material: Materia
                 placed(rotation * Mat3::from_diagonal(size), centre, material),
             );
         }
-        Solid::Ball { centre, radius } => layer.push(Mesh::Sphere, ball(centre, radius)),
+        Solid::Ball { centre, radius } => {
+            layer.push(Mesh::Sphere, instances::ball(centre, radius, material))
+        }
         Solid::Plate { mesh, pose, .. } => {
             layer.push(mesh, placed(pose.rotation, pose.position, material))
         }
@@ -525,13 +521,10 @@ pub(super) fn push_solid(layer: &mut Layer, solid: &Solid<'_>, material: Materia
 /// The older, the fainter.
 fn push_trail(shot: &Shot<'_>, palette: &Palette, lines: &mut Vec<Line>) {
     let last = shot.trail.len().saturating_sub(1) as f32;
-    let colour = |i: usize| palette.trail.with_opacity(0.9 * (i as f32 / last).sqrt()).0;
-    lines.extend(shot.trail.windows(2).enumerate().map(|(i, ends)| Line {
-        from: ends[0].to_array(),
-        width: 2.2 * shot.pixels_per_point,
-        to: ends[1].to_array(),
-        pad: 0.0,
-        from_colour: colour(i),
-        to_colour: colour(i + 1),
-    }));
+    let colour = |i: usize| palette.trail.with_opacity(0.9 * (i as f32 / last).sqrt());
+    let width = 2.2 * shot.pixels_per_point;
+    for (i, ends) in shot.trail.windows(2).enumerate() {
+        let colours = [colour(i), colour(i + 1)];
+        lines.push(Line::new(ends[0], ends[1], width, colours));
+    }
 }

@@ -33,14 +33,7 @@ pub(super) fn push_coil(
         from + (to - from) * part + (side * cos + other * sin) * out
     };
     let at = |k: u16| point(f32::from(k) / f32::from(SEGMENTS));
-    lines.extend((0..SEGMENTS).map(|k| Line {
-        from: at(k).to_array(),
-        width,
-        to: at(k + 1).to_array(),
-        pad: 0.0,
-        from_colour: colour.0,
-        to_colour: colour.0,
-    }));
+    lines.extend((0..SEGMENTS).map(|k| Line::new(at(k), at(k + 1), width, [colour; 2])));
 }
 
 #[cfg(test)]

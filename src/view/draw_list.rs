@@ -115,6 +115,19 @@ pub struct Line {
     pub to_colour: [f32; 4],
 }
 
+impl Line {
+    pub(super) fn new(from: Vec3, to: Vec3, width: f32, [start, end]: [Colour; 2]) -> Self {
+        Self {
+            from: from.to_array(),
+            width,
+            to: to.to_array(),
+            pad: 0.0,
+            from_colour: start.0,
+            to_colour: end.0,
+        }
+    }
+}
+
 /// Viewpoint of the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Eye {
@@ -213,8 +226,6 @@ pub struct Legend {
     pub pixels: f32,
     /// Length against force.
     pub scaling: super::Scaling,
-    /// Whether the reference follows the forces.
-    pub automatic: bool,
     /// Whether some arrow is longer than can be drawn (a fixed reference far too small): its shaft is broken.
     pub clipped: bool,
     /// Ticks on the scale, ascending.
@@ -291,11 +302,11 @@ pub struct DrawList {
 }
 
 impl Default for DrawList {
-    /// An empty picture; its buffers are reused from build to build.
+    /// No picture yet: of no size. Its buffers are reused from build to build.
     fn default() -> Self {
         let ground = Colour::hex(0xFFFFFF);
         Self {
-            size: [1, 1],
+            size: [0, 0],
             eye: Eye {
                 clip_from_world: Mat4::IDENTITY,
                 position: Vec3::ZERO,

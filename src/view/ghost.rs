@@ -1,10 +1,10 @@
 //! Ghosts: other states of the machine, drawn translucent and outlined in front of it.
 
-use glam::{Mat3, Vec3};
+use glam::Vec3;
 
 use super::arrows::push_error;
 use super::build::{self, push_solid};
-use super::instances::placed;
+use super::instances::ball;
 use super::theme::{Ghost, GhostLook, Material};
 use super::{Colour, DrawList, Mesh, Palette, SceneView, Shot, drawn, to_f32};
 use crate::scene::{Output, format_quantity_digits};
@@ -74,8 +74,7 @@ impl SceneView {
         }
         for (from, to) in here.iter().zip(&there) {
             if let Some([fill, edge]) = materials(from.ball_centre, to.ball_centre) {
-                let size = Mat3::from_diagonal(Vec3::splat(to.ball_radius));
-                let ball = |material| placed(size, to.ball_centre, material);
+                let ball = |material| ball(to.ball_centre, to.ball_radius, material);
                 out.ghost.push(Mesh::Sphere, ball(fill));
                 out.ghost_edges.push(Mesh::Sphere, ball(edge));
                 differs = true;

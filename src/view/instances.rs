@@ -20,6 +20,11 @@ pub(super) fn placed(linear: Mat3, at: Vec3, material: Material) -> Instance {
     }
 }
 
+/// A unit sphere of another `radius`, at `at`.
+pub(super) fn ball(at: Vec3, radius: f32, material: Material) -> Instance {
+    placed(Mat3::from_diagonal(Vec3::splat(radius)), at, material)
+}
+
 /// A bar mesh (axis z from 0 to 1) from `from` along `along`.
 pub(super) fn bar(from: Vec3, along: Vec3, radius: f32, material: Material) -> Instance {
     let turn = Mat3::from_quat(Quat::from_rotation_arc(

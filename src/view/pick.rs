@@ -26,8 +26,6 @@ pub struct Hit {
     pub what: Picked,
     /// Where, m, world axes.
     pub point: Vec3,
-    /// Distance from the eye, m.
-    pub distance: f32,
 }
 
 impl SceneView {
@@ -63,7 +61,6 @@ impl SceneView {
         Some(Hit {
             what,
             point: ray.point_at(distance),
-            distance,
         })
     }
 

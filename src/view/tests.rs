@@ -267,10 +267,7 @@ fn arrows_start_at_the_contact_and_have_the_legends_length() {
         place(&shaft).distance(contact) < 1e-6,
         "on the ball, where it touches"
     );
-    assert_eq!(
-        (legend.reference, legend.automatic, legend.friction),
-        (4.0, false, None)
-    );
+    assert_eq!((legend.reference, legend.friction), (4.0, None));
 }
 
 #[test]
@@ -336,7 +333,6 @@ fn what_is_under_the_cursor_is_what_is_drawn_there() {
         .project(to_f32(&frame.joints[1].socket_centre), SIZE)
         .expect("before the eye");
     let hit = view.pick(&shot, pixel).expect("a socket");
-    assert!((hit.point.distance(camera.eye()) - hit.distance).abs() < 1e-4);
     assert_eq!(
         view.anchor(&frame, hit.what),
         Some(to_f32(&frame.joints[1].socket_centre))

@@ -165,11 +165,7 @@ impl Palette {
                 ],
                 trail: Colour::hex(0xA61E4D),
                 ball: material(0xD8DCE0, 0.22, 0.75),
-                socket: Material {
-                    colour: Colour::hex(0x6FA8DC).with_opacity(0.20),
-                    roughness: 0.15,
-                    metal: 0.0,
-                },
+                socket: material(0x6FA8DC, 0.15, 0.0).with_opacity(0.20),
                 ghosts: [
                     twin(0x7B2FBE, 0.85, 0x5A189A),
                     ideal(0xFFFFFF, 0.9, 0x2F4858),
@@ -194,11 +190,7 @@ impl Palette {
                 ],
                 trail: Colour::hex(0xF783AC),
                 ball: material(0xE3E7EB, 0.22, 0.75),
-                socket: Material {
-                    colour: Colour::hex(0x8CC4F0).with_opacity(0.17),
-                    roughness: 0.15,
-                    metal: 0.0,
-                },
+                socket: material(0x8CC4F0, 0.15, 0.0).with_opacity(0.17),
                 ghosts: [
                     twin(0xC9A0FF, 0.85, 0xE0C3FF),
                     ideal(0xFFFFFF, 0.5, 0xFFFFFF),

@@ -124,7 +124,7 @@ fn neither_threads_nor_shards_change_a_bit() {
     );
     let whole = merge("one.npz --out bad.npz").expect(2);
     assert!(
-        whole.stderr.contains("one.npz is no shard"),
+        whole.stderr.contains("one.npz is not a shard"),
         "{}",
         whole.stderr
     );

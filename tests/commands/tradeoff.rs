@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use jointplay::analysis::{
-    AnalysisError, Effort, End, RunContext, Setting, WorkPrecision, presets, work_precision,
+    AnalysisError, End, RunContext, Setting, WorkBudget, WorkPrecision, presets, work_precision,
 };
 use jointplay::integrate::Method;
 use jointplay::scene::{Preset, Scene};
@@ -173,14 +173,14 @@ fn error_at(found: &WorkPrecision, method: Method, value: f64) -> f64 {
 #[test]
 fn finer_steps_and_tolerances_err_less_and_cost_more() {
     let scene = crate::common::scene("spcmm", &[]);
-    let effort = Effort {
+    let budget = WorkBudget {
         evaluations: 100_000,
         measured: 0.0,
         steps: &[10e-6, 1e-6],
         tolerances: &[1e-4, 1e-8],
         seconds: f64::INFINITY,
     };
-    let found = measure(|context| work_precision(&scene, &effort, context), u64::MAX).unwrap();
+    let found = measure(|context| work_precision(&scene, &budget, context), u64::MAX).unwrap();
     for method in Method::ALL {
         let own: Vec<_> = found
             .points

@@ -4,8 +4,8 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 use eframe::egui::ThemePreference;
-use jointplay::app::{AppOptions, Headless, Overlay, UiFrame, force_notes};
-use jointplay::render::Image;
+use jointplay::app::{AppOptions, Headless, Overlay, force_notes};
+use jointplay::render::{Image, RenderError};
 use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation};
 use jointplay::view::{DrawList, PeakMarks, SceneView, Shot, Theme, ViewOptions};
@@ -15,22 +15,20 @@ fn colours(image: &Image) -> usize {
     pixels.len()
 }
 
-fn ui_frame(at: f64) -> UiFrame {
+/// The application at `at`, s, in a context of its own.
+fn app_frame(at: f64, size: [u32; 2]) -> Result<Image, RenderError> {
     let mut options = AppOptions::new(Scene::load("spcmm", &[]).expect("built in"));
     options.theme = ThemePreference::Light;
     options.playing = false;
-    UiFrame {
-        options,
-        at,
-        size: [900, 600],
-        scale: 1.0,
-    }
+    let mut headless = Headless::new().expect("software Vulkan at least");
+    let mut app = headless.app(options).expect("starts");
+    app.run_to(at);
+    headless.app_frame(&mut app, size, 1.0)
 }
 
 #[test]
 fn a_frame_of_the_application_is_the_same_each_time_and_shows_its_instant() {
-    let mut headless = Headless::new().expect("software Vulkan at least");
-    let first = headless.ui_frame(&ui_frame(7.85e-3)).expect("drawn");
+    let first = app_frame(7.85e-3, [900, 600]).expect("drawn");
     assert_eq!((first.width, first.height), (900, 600));
     assert_eq!(first.rgba.len(), 900 * 600 * 4);
     assert!(
@@ -38,18 +36,15 @@ fn a_frame_of_the_application_is_the_same_each_time_and_shows_its_instant() {
         "an empty picture has few colours: {}",
         colours(&first)
     );
-    let again = headless.ui_frame(&ui_frame(7.85e-3)).expect("drawn");
+    let again = app_frame(7.85e-3, [900, 600]).expect("drawn");
     assert!(first == again, "same instant, same picture");
-    let later = headless.ui_frame(&ui_frame(12e-3)).expect("drawn");
+    let later = app_frame(12e-3, [900, 600]).expect("drawn");
     assert!(first != later, "another instant, another picture");
 }
 
 #[test]
 fn a_size_that_cannot_be_drawn_is_refused() {
-    let mut headless = Headless::new().expect("software Vulkan at least");
-    let mut frame = ui_frame(0.0);
-    frame.size = [0, 600];
-    let error = headless.ui_frame(&frame).expect_err("no picture is empty");
+    let error = app_frame(0.0, [0, 600]).expect_err("no picture is empty");
     assert!(error.to_string().contains("0x600"), "{error}");
 }
 

@@ -131,11 +131,12 @@ fn the_joint_in_focus_stays_in_the_middle_and_a_click_opens_its_microscope() {
     assert!(!harness.state().microscope().is_open());
     // With a message on show Esc takes that first.
     harness.key_press(Key::L);
-    harness.state_mut().report("something".to_owned());
+    let opened = harness.state_mut().open_bytes("bad.toml", vec![0xFF]);
+    let problem = opened.expect_err("no text");
     harness.run();
     harness.key_press(Key::Escape);
     harness.run();
-    assert!(harness.query_by_label("something").is_none());
+    assert!(harness.query_by_label(&problem).is_none());
     assert!(harness.state().microscope().is_open());
     harness.get_by_role_and_label(Role::Button, "Close").click();
     harness.run();

@@ -508,6 +508,13 @@ fn pictures() {
     }
 }
 
+fn open_a_bad_file(h: &mut Harness<'_, App>) {
+    let text = b"name = 'mine'\n[contact]\nclearance = 3\n".to_vec();
+    h.state_mut()
+        .open_bytes("mine.toml", text)
+        .expect_err("needs a unit");
+}
+
 #[test]
 #[ignore = "writes pictures to look at, to $JOINTPLAY_LOOK"]
 fn look() {
@@ -562,8 +569,7 @@ fn look() {
     player.run_to(2.5);
     h.run();
     save(&mut h, "stopped");
-    h.state_mut()
-        .report("mine.toml:2: contact.clearance = 3: needs a unit".to_owned());
+    open_a_bad_file(&mut h);
     h.get_by_role_and_label(Role::Button, "Save").click();
     h.run_steps(5);
     save(&mut h, "save_menu");
@@ -572,8 +578,7 @@ fn look() {
     h.get_by_role_and_label(Role::Button, "Plots").click();
     h.run();
     save(&mut h, "narrow_dark");
-    h.state_mut()
-        .report("mine.toml:2: contact.clearance = 3: needs a unit".to_owned());
+    open_a_bad_file(&mut h);
     h.get_by_label("Menu").click();
     h.run_steps(5);
     save(&mut h, "narrow_menu");

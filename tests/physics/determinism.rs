@@ -170,7 +170,7 @@ fn a_snapshot_keeps_a_clearance_on_its_way_and_changes_that_wait() {
         fresh.restore(&snapshot);
         assert_eq!(fresh.state_hash(), hash);
         assert_eq!(go_on(&mut fresh, 300), first, "{method}");
-        assert_eq!(snapshot.running_scene().contact.friction, 0.3);
+        assert_eq!(fresh.running_scene().contact.friction, 0.3);
         fresh.reset().unwrap();
         assert_eq!(fresh.scene().spcmm.unwrap().frequency, 1.0);
         assert_eq!(fresh.running_scene().spcmm.unwrap().frequency, 1.0);

@@ -195,7 +195,8 @@ impl Equations for Borrowed {
         let mut mechanism = self.mechanism.borrow_mut();
         mechanism.measure(t, y);
         let gaps = mechanism.contacts.gaps();
-        gaps.map(|gap| (gap.penetration, gap.rate)).collect()
+        gaps.map(|gap| (gap.separation.penetration, gap.separation.rate))
+            .collect()
     }
 
     fn forces(&self, t: f64, y: &[f64]) -> Vec<f64> {

@@ -427,8 +427,8 @@ fn what_no_motion_closes_is_refused_by_joint_and_direction() {
         };
         let error = start_error(&GRASHOF.scene(Quat::identity(), aside, &[]));
         let words = if start == "ideal" {
-            "ball joint B: ball and socket centres are 5 mm apart as given and cannot be closed: what stays open is B by \
-             5 mm along y, where no joint"
+            "ball joint B: ball and socket centres are 5 mm apart as given and cannot be closed: remaining gaps: B by \
+             5 mm along y (no joint"
         } else {
             "5 mm apart as given, and an ideal joint may be open by at most 0.01 mm"
         };

@@ -219,7 +219,7 @@ fn the_latest_are_kept_all_can_be_taken_and_snapshots_hold_them() {
 
     let snapshot = simulation.snapshot();
     let go_on = |simulation: &mut Simulation| {
-        let end = snapshot.running_scene().solver.step * 2000.0 + simulation.time();
+        let end = simulation.running_scene().solver.step * 2000.0 + simulation.time();
         let mut more = Vec::new();
         while simulation.time() < end {
             simulation.step().unwrap();

@@ -95,7 +95,7 @@ fn a_resumed_implicit_run_gives_the_same_bits() {
         simulation.restore(&snapshot);
         simulation.advance_to(0.4).unwrap();
         assert_eq!(simulation.state_hash(), expected, "{method}");
-        let mut fresh = Simulation::new(snapshot.running_scene()).unwrap();
+        let mut fresh = Simulation::new(simulation.running_scene()).unwrap();
         fresh.restore(&snapshot);
         fresh.advance_to(0.4).unwrap();
         assert_eq!(fresh.state_hash(), expected, "{method}, fresh");

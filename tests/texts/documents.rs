@@ -3,7 +3,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use jointplay::scene::{Scene, Vec3, element_table, reference_page, unit_table};
+use jointplay::scene::{
+    ELEMENT_KINDS, Scene, Vec3, format_quantity, reference_page, si_unit, unit_table,
+};
 use jointplay::simulate::{Frame, Simulation};
 
 fn root() -> PathBuf {
@@ -31,6 +33,47 @@ fn example(number: usize) -> String {
         .nth(number)
         .and_then(|rest| rest.split("```").next());
     block.expect("a block of TOML").to_owned()
+}
+
+/// The sections of all kinds as table rows for the file-format page.
+fn element_table() -> String {
+    let mut out = String::new();
+    for kind in &ELEMENT_KINDS {
+        let points = kind.points.iter();
+        let mut keys: Vec<String> = points
+            .map(|key| format!("`{key}` (`{{ body, at }}`)"))
+            .collect();
+        for number in kind.numbers {
+            let default = match number.default {
+                None => "must be given".to_owned(),
+                Some(value) => format!(
+                    "{} if left out",
+                    format_quantity(value, si_unit(number.dimension))
+                ),
+            };
+            keys.push(format!("`{}`: {} ({default})", number.key, number.help));
+        }
+        for (key, dimension, help) in kind.vectors {
+            keys.push(format!(
+                "`{key}`: {help}, a vector in {} (0 if left out)",
+                si_unit(*dimension)
+            ));
+        }
+        for (key, words, help) in kind.choices {
+            keys.push(format!(
+                "`{key}`: {help}, {} ({} if left out)",
+                words.join(" or "),
+                words[0]
+            ));
+        }
+        out.push_str(&format!(
+            "| `[[{}]]` | {}: `name`, {} |\n",
+            kind.section,
+            kind.help,
+            keys.join("; ")
+        ));
+    }
+    out
 }
 
 #[test]

@@ -491,7 +491,7 @@ fn additions_that_contradict_the_scene_are_refused() {
             &[
                 "my.toml:24:9",
                 "joint.again.child",
-                "already hangs on joint `free`",
+                "is already the child of joint `free`",
                 "[[ball_joint]]",
             ],
         ),
@@ -621,8 +621,8 @@ fn changes_are_refused_with_key_value_and_range() {
             "joint.crank.drive.velocity",
             "7 rad/s",
             &[
-                "`crank` is no ball joint",
-                "in the scene file alone",
+                "`crank` is not a ball joint",
+                "only in the scene file",
                 "joint.<ball joint>.<key>; ball joints: B, C; keys: clearance, friction,",
             ],
         ),

@@ -3,7 +3,7 @@
 use super::Variant;
 use crate::analysis::paper::{Case, Coordinate};
 use crate::analysis::regime::Regime;
-use crate::analysis::response::{Look, Response};
+use crate::analysis::response::{Observation, Response};
 use crate::analysis::sweep::Sweep;
 
 /// A column of a [`TracedRow`].
@@ -63,7 +63,7 @@ pub fn derivative(coordinate: Coordinate, nth: usize) -> usize {
 /// One instant of a run, in the order of [`COLUMNS`]; the last is 1 at whole multiples of the paper's output step.
 pub type TracedRow = [f64; COLUMNS.len()];
 
-pub(super) fn row(look: &Look) -> TracedRow {
+pub(super) fn row(look: &Observation) -> TracedRow {
     let [c, r, a] = look.derivatives();
     let deviation = look.deviation();
     let joints = &look.frame.joints;

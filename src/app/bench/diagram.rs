@@ -188,7 +188,7 @@ impl Diagram {
             let come = swept.points.iter().flatten().count();
             let words = format!("{come} of {} values", swept.points.len());
             ui.label(RichText::new(words).small().weak())
-                .on_hover_text("Values of the varied parameter that are through");
+                .on_hover_text("Values computed so far");
         });
     }
 

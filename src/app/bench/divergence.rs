@@ -1,6 +1,6 @@
 //! The twin run: its distance from the run on a logarithmic plot, and the slope.
 
-use eframe::egui::{Checkbox, RichText, Ui};
+use eframe::egui::{Checkbox, Ui};
 use egui_plot::{GridMark, Line, LineStyle, PlotPoint, PlotPoints};
 
 use super::plane::{AxisLabel, plane};
@@ -99,8 +99,7 @@ pub fn ui(ui: &mut Ui, player: &mut Player) {
     ));
     reserved(ui, "twin says", 2, |ui| {
         if let Some(why) = twin.ended() {
-            let words = RichText::new(format!("The twin run {why}")).small();
-            ui.label(words.color(ui.visuals().warn_fg_color));
+            theme::warning(ui, format!("The twin run {why}"));
         }
     });
 }

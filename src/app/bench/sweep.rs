@@ -14,7 +14,7 @@ use crate::app::host::{Host, Running};
 use crate::app::layout::reserved;
 use crate::app::load::Load;
 use crate::app::player::Player;
-use crate::app::value;
+use crate::app::{theme, value};
 use crate::scene::{Kind, Parameter, Value};
 
 /// Parameter varied by default, and its range.
@@ -141,7 +141,7 @@ impl SweepPanel {
     fn state_ui(&self, ui: &mut Ui, player: &Player) {
         let small = |words: &str| RichText::new(words).small();
         if let Some(problem) = &self.problem {
-            ui.label(small(problem).color(ui.visuals().error_fg_color));
+            theme::error(ui, problem);
             return;
         }
         let running = self.running.as_ref().map(|(_, task)| task);
@@ -161,7 +161,7 @@ impl SweepPanel {
             ui.label(small("For the scene shown, with its values").weak());
         } else {
             let words = format!("Not for what is shown. {}", differences.join("; "));
-            ui.label(small(&words).color(ui.visuals().warn_fg_color))
+            theme::warning(ui, words)
                 .on_hover_text("A click on a point asks before it changes this");
         }
     }
@@ -257,12 +257,11 @@ impl SweepPanel {
             && solver.tolerance > LOOSEST_FOR_EXPONENT * (1.0 + 1e-9)
         {
             let words = format!(
-                "At a tolerance of {} exponents drown in the errors of the steps: {} or less",
+                "At a tolerance of {} integration error hides the exponents; use {} or less",
                 value::power_of_ten(solver.tolerance),
                 value::power_of_ten(LOOSEST_FOR_EXPONENT)
             );
-            let words = RichText::new(words).small();
-            ui.label(words.color(ui.visuals().warn_fg_color));
+            theme::warning(ui, words);
         }
     }
 

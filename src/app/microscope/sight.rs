@@ -103,16 +103,6 @@ impl Sight {
             since,
         })
     }
-
-    /// What the contact does, in words.
-    pub fn state(&self) -> &'static str {
-        match self.report.state {
-            ContactState::Free => "The ball touches nothing",
-            ContactState::Stick => "In contact, sticking",
-            ContactState::Slip => "In contact, sliding",
-            ContactState::Ideal => "Ideal joint: no clearance",
-        }
-    }
 }
 
 #[cfg(test)]

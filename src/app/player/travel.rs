@@ -7,7 +7,7 @@ use super::{FINEST_BIN, Player, sentences};
 use crate::app::log::{Entry, Event};
 use crate::app::paths::Paths;
 use crate::app::settled::Settling;
-use crate::simulate::{Bin, ChangeError, Effect, History, Pull};
+use crate::simulate::{Bin, History, Pull};
 
 /// Most steps retaken before a past instant, so that the plots show in detail what led to it.
 const LEAD: u64 = 512;
@@ -307,23 +307,22 @@ impl Player {
             }
             let entry = entry.clone();
             self.applied += 1;
-            // It was accepted before, for the same scene in the same state.
-            let _ = self.apply(&entry);
+            self.apply(&entry);
         }
     }
 
-    fn apply(&mut self, entry: &Entry) -> Result<(), ChangeError> {
-        let done: Result<Effect, ChangeError> = match &entry.event {
+    fn apply(&mut self, entry: &Entry) {
+        // It was accepted before, for the same scene in the same state.
+        let _ = match &entry.event {
             Event::Set { key, value } => self.apply_set(key, value),
             Event::Original { key } => self.apply_original(key),
+            Event::Pull(pulled) => self.apply_pull(pulled.map(Pull::from)),
             Event::Sections { .. } => {
                 self.sections = entry.event.schedule();
-                return Ok(());
+                return;
             }
-            Event::Pull(pulled) => self.apply_pull(pulled.map(Pull::from)),
-            Event::Stop => return Ok(()),
+            Event::Stop => return,
         };
-        done.map(|_| ())
     }
 
     /// Continues from the displayed instant by retaking the known steps; if more events were logged after it, that future is

@@ -7,6 +7,7 @@ mod rows;
 mod table;
 
 pub use csv::significant;
+pub use npz::as_io;
 pub use table::{NoRow, Table};
 
 use std::path::{Path, PathBuf};
@@ -87,9 +88,7 @@ impl RowsFile {
 
     /// The metadata file beside a CSV file: `run.csv` has `run.csv.meta.json`.
     fn meta_path(path: &Path) -> PathBuf {
-        let mut name = path.as_os_str().to_owned();
-        name.push(".meta.json");
-        PathBuf::from(name)
+        path.with_added_extension("meta.json")
     }
 
     /// The files that `option` with `path` writes, for [`check_distinct`].

@@ -27,7 +27,8 @@ pub(super) fn write(out: &mut Sink, table: &Table, meta: &Map<String, Json>) -> 
     Ok(())
 }
 
-fn as_io(error: WriteNpzError) -> io::Error {
+/// An archive's error, as that of the file.
+pub fn as_io(error: WriteNpzError) -> io::Error {
     match error {
         WriteNpzError::Zip(zip) => zip.into(),
         WriteNpzError::Npy(ndarray_npy::WriteNpyError::Io(io)) => io,

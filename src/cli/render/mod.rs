@@ -196,14 +196,8 @@ fn common_reference(
 
 /// Provenance of a picture, as texts inside it: a frame that has lost its manifest still carries it.
 fn labels(meta: &Map<String, Json>) -> Vec<(&'static str, String)> {
-    // PNG texts are Latin-1.
-    let latin = |text: String| {
-        text.chars()
-            .map(|c| if u32::from(c) < 256 { c } else { '?' })
-            .collect()
-    };
     vec![
         ("Software", format!("jointplay {}", crate::VERSION)),
-        ("Description", latin(Json::Object(meta.clone()).to_string())),
+        ("Description", Json::Object(meta.clone()).to_string()),
     ]
 }

@@ -9,14 +9,13 @@ mod scatter;
 mod text;
 
 use std::path::Path;
-use std::thread;
 use std::time::Instant;
 
 use serde_json::{Value as Json, json};
 
 use self::kept::Kept;
 use super::args::ReproduceArguments;
-use super::{Failure, interrupt, print, progress, warn};
+use super::{Failure, interrupt, print, progress, threads, warn};
 use crate::analysis::paper::{Agreement, Series};
 use crate::analysis::reproduction::{Agenda, Extent, Findings, Report, Statement};
 use crate::files::Folder;
@@ -33,8 +32,7 @@ pub fn reproduce(arguments: &ReproduceArguments) -> Result<(), Failure> {
     } else {
         Extent::FULL
     };
-    let cores = || thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
-    let threads = arguments.threads.map_or_else(cores, usize::from);
+    let threads = threads(arguments.threads);
     let started = Instant::now();
     let folder = Folder::claim(&arguments.out, arguments.force)?;
     let report = make(folder, &arguments.out, extent, threads, arguments.quiet)?;

@@ -4,13 +4,14 @@ use std::io;
 use std::path::Path;
 
 use ndarray::{Array1, ArrayD, IxDyn};
-use ndarray_npy::{NpzWriter, WriteNpyError, WriteNpzError};
+use ndarray_npy::NpzWriter;
 use serde_json::{Map, Value as Json, json};
 
 use super::options::Shard;
 use crate::analysis::layout::Column;
 use crate::analysis::sweep::Sweep;
 use crate::cli::Failure;
+use crate::cli::output::as_io;
 use crate::files::OutputFile;
 
 /// Source of an archive's numbers.
@@ -197,12 +198,4 @@ fn add<W: io::Write + io::Seek, T: ndarray_npy::WritableElement>(
 ) -> io::Result<()> {
     let array = ArrayD::from_shape_vec(IxDyn(&shape), values).map_err(io::Error::other)?;
     archive.add_array(name, &array).map_err(as_io)
-}
-
-fn as_io(error: WriteNpzError) -> io::Error {
-    match error {
-        WriteNpzError::Zip(zip) => zip.into(),
-        WriteNpzError::Npy(WriteNpyError::Io(io)) => io,
-        other => io::Error::other(other.to_string()),
-    }
 }

@@ -120,7 +120,7 @@ fn check_points(parts: &[OpenShard], count: usize) -> Result<(), Failure> {
 
 fn no_shard(path: &Path) -> Failure {
     Failure::usage(format!(
-        "{} is no shard of a sweep (jointplay sweep … --shard K/M writes them)",
+        "{} is not a shard of a sweep (jointplay sweep … --shard K/M writes them)",
         path.display()
     ))
 }

@@ -22,7 +22,7 @@ use self::options::Shard;
 use super::args::{SummaryForm, SweepArguments};
 use super::check::{NearSingular, near_singular};
 use super::summary::count;
-use super::{Failure, interrupt, load, print, progress, warn};
+use super::{Failure, interrupt, load, print, progress, threads, warn};
 use crate::analysis::drive::drive_period;
 use crate::analysis::grid::{FOLLOW_BLOCK, Grid, ParameterRange};
 use crate::analysis::layout::Status;
@@ -76,8 +76,7 @@ pub fn sweep(arguments: &SweepArguments) -> Result<(), Failure> {
     let bar = progress::bar(!arguments.quiet, all);
     bar.set_position(all - left);
     bar.reset_eta();
-    let cores = || thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
-    let threads = arguments.threads.map_or_else(cores, usize::from);
+    let threads = threads(arguments.threads);
     let started = Instant::now();
     let outcome = compute(&sweep, &todo, threads, &mut partial, &bar);
     let wall = started.elapsed().as_secs_f64();
@@ -115,7 +114,7 @@ fn read(arguments: &SweepArguments) -> Result<Sweep, Failure> {
         .iter()
         .map(|text| ParameterRange::parse(&scene, text));
     let axes = axes.collect::<Result<Vec<_>, _>>().map_err(|e| usage(&e))?;
-    let grid = Grid::new(&scene, axes, arguments.start.into()).map_err(|e| usage(&e))?;
+    let grid = Grid::new(&scene, axes, arguments.start).map_err(|e| usage(&e))?;
     let plan = Plan {
         periods: arguments.periods,
         discard: arguments.discard,
@@ -209,8 +208,8 @@ fn warnings(sweep: &Sweep) -> Vec<String> {
     let kept = plan.periods.saturating_sub(plan.discard);
     if kept < FEWEST {
         all.push(format!(
-            "{} of each point: with fewer than {FEWEST} no regime is told, they all come out unclear; raise --periods or \
-             lower --discard.",
+            "{} of each point: with fewer than {FEWEST} no regime can be classified and all are reported as unclear; \
+             raise --periods or lower --discard.",
             count(kept as u64, "section")
         ));
     }
@@ -219,8 +218,8 @@ fn warnings(sweep: &Sweep) -> Vec<String> {
         solver.method.is_adaptive() && solver.tolerance > LOOSEST_FOR_EXPONENT * (1.0 + 1e-9);
     if loose && sweep.plan().exponent {
         all.push(format!(
-            "solver.tolerance {:e}: two runs part by their steps' errors alone at this tolerance, so exponents and the \
-             regimes told from them mean little; use {LOOSEST_FOR_EXPONENT:e} or less, or --no-exponent.",
+            "solver.tolerance {:e}: integration error alone separates two runs at this tolerance, so exponents and the \
+             regimes classified from them are unreliable; use {LOOSEST_FOR_EXPONENT:e} or less, or --no-exponent.",
             solver.tolerance
         ));
     }

@@ -41,9 +41,7 @@ pub struct Partial {
 impl Partial {
     /// The file beside `out`.
     fn path_of(out: &Path) -> PathBuf {
-        let mut name = out.as_os_str().to_owned();
-        name.push(".partial");
-        PathBuf::from(name)
+        out.with_added_extension("partial")
     }
 
     /// Opens or creates the file beside `out`; `blocks` are those of the output.
@@ -199,7 +197,7 @@ impl Partial {
             return Err(self.damaged(if old {
                 "it is of another version of the format"
             } else {
-                "it is no partial sweep"
+                "it is not a partial sweep"
             }));
         }
         let size = read_u64(&mut reader).map_err(cut)?;

@@ -13,7 +13,7 @@ use std::path::Path;
 
 use super::args::TradeoffArguments;
 use super::{Failure, interrupt, load, measuring, print, warn};
-use crate::analysis::{Effort, WorkPrecision, model_costs, work_precision};
+use crate::analysis::{WorkBudget, WorkPrecision, model_costs, work_precision};
 use crate::cli::args::SceneArguments;
 use crate::files::Folder;
 use crate::scene::{BUILT_IN, Scene};
@@ -23,21 +23,21 @@ use crate::scene::{BUILT_IN, Scene};
 /// # Errors
 /// Bad input before it starts; a scene without a reference, Ctrl-C and the file system afterwards.
 pub fn tradeoff(arguments: &TradeoffArguments) -> Result<(), Failure> {
-    let effort = if arguments.quick {
-        Effort::QUICK
+    let budget = if arguments.quick {
+        WorkBudget::QUICK
     } else {
-        Effort::FULL
+        WorkBudget::FULL
     };
     match (&arguments.scene, &arguments.write) {
-        (Some(scene), _) => one(scene, arguments, &effort),
-        (None, Some(root)) => all(root, arguments.quiet, &effort),
+        (Some(scene), _) => one(scene, arguments, &budget),
+        (None, Some(root)) => all(root, arguments.quiet, &budget),
         (None, None) => Err(Failure::usage(
             "name a scene, or write --all --write FOLDER",
         )),
     }
 }
 
-fn one(name: &OsStr, arguments: &TradeoffArguments, effort: &Effort) -> Result<(), Failure> {
+fn one(name: &OsStr, arguments: &TradeoffArguments, budget: &WorkBudget) -> Result<(), Failure> {
     let scene = load(&SceneArguments {
         scene: name.to_owned(),
         changes: arguments.changes.clone(),
@@ -54,7 +54,7 @@ fn one(name: &OsStr, arguments: &TradeoffArguments, effort: &Effort) -> Result<(
             warn(&warning.to_string());
         }
     }
-    let found = measure(&scene, effort, arguments.quiet)?;
+    let found = measure(&scene, budget, arguments.quiet)?;
     print(&words::text(&found))?;
     if let Some((path, folder)) = folder {
         let manifest = files::fill(&folder, &found, &scene)?;
@@ -64,20 +64,20 @@ fn one(name: &OsStr, arguments: &TradeoffArguments, effort: &Effort) -> Result<(
     Ok(())
 }
 
-fn measure(scene: &Scene, effort: &Effort, quiet: bool) -> Result<WorkPrecision, Failure> {
+fn measure(scene: &Scene, budget: &WorkBudget, quiet: bool) -> Result<WorkPrecision, Failure> {
     measuring::measure(quiet, Some(scene), |context| {
-        work_precision(scene, effort, context)
+        work_precision(scene, budget, context)
     })
 }
 
 /// Measures everything that the documentation states, and writes it in one go at the end.
-fn all(root: &Path, quiet: bool, effort: &Effort) -> Result<(), Failure> {
+fn all(root: &Path, quiet: bool, budget: &WorkBudget) -> Result<(), Failure> {
     let targets = page::Targets::claim(root)?;
     let mut found = Vec::with_capacity(BUILT_IN.len());
     for name in BUILT_IN {
-        found.push(measure(&Scene::load(name, &[])?, effort, quiet)?);
+        found.push(measure(&Scene::load(name, &[])?, budget, quiet)?);
     }
-    let costs = measuring::measure(quiet, None, |context| model_costs(effort, context))?;
+    let costs = measuring::measure(quiet, None, |context| model_costs(budget, context))?;
     targets.write(&found, &costs)?;
     for found in &found {
         print(&words::text(found))?;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::io::Write as _;
 use std::path::Path;
 
-use super::picture::{is_yardstick, picture};
+use super::picture::{is_baseline, picture};
 use super::words::{cost_rows, end, error, reference, times, value};
 use crate::analysis::presets::{Measured, Record, choose, limit};
 use crate::analysis::{CaseCost, Phase, Point, Setting, WorkPrecision};
@@ -210,10 +210,10 @@ fn row(names: [String; 2], found: &WorkPrecision, point: &Point, last: &str) -> 
     row
 }
 
-/// Points that the page names: on a front, a preset, or the yardstick.
+/// Points that the page names: on a front, a preset, or the baseline.
 fn is_told(point: &Point) -> bool {
     let front = point.impacts.front || point.settled.as_ref().is_some_and(|phase| phase.front);
-    front || point.preset.is_some() || is_yardstick(point)
+    front || point.preset.is_some() || is_baseline(point)
 }
 
 fn point_row(found: &WorkPrecision, point: &Point) -> Vec<String> {

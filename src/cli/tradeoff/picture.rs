@@ -113,7 +113,7 @@ fn diagram(
         .filter_map(|point| {
             let text = match point.preset {
                 Some(preset) => preset.word().to_owned(),
-                None if is_yardstick(point) => {
+                None if is_baseline(point) => {
                     format!("{} {}", point.setting.method, value(&point.setting))
                 }
                 None => return None,
@@ -156,6 +156,6 @@ fn diagram(
 }
 
 /// Whether it is Runge-Kutta 4 at 10 microseconds.
-pub(super) fn is_yardstick(point: &Point) -> bool {
+pub(super) fn is_baseline(point: &Point) -> bool {
     point.setting.method == Method::RungeKutta4 && point.setting.step_s == 10e-6
 }

@@ -1,6 +1,6 @@
 //! External force and torque on a body, constant or harmonic, in world or body axes.
 
-use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, point_of, push};
+use super::{At, ElementReport, ForceElement, Loads, SceneElement, point_of, push};
 use crate::mechanism::Powers;
 use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::model::Anchor;
@@ -52,18 +52,6 @@ impl ForceElement for Load {
         let wrench = &mut loads.wrench[self.on.body];
         push(wrench, &arm, &force);
         wrench.torque += torque;
-    }
-
-    fn ends(&self) -> Option<[Anchor; 2]> {
-        None
-    }
-
-    fn coupling(&self, _: &At<'_>) -> Option<Coupling> {
-        None
-    }
-
-    fn stored(&self, _: &[Kinematics]) -> f64 {
-        0.0
     }
 
     fn add_powers(&self, t: f64, motion: &[Kinematics], powers: &mut Powers) {

@@ -168,13 +168,19 @@ pub(super) trait ForceElement: Send {
     fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>);
 
     /// The two points on whose relative motion it depends; `None` if nothing about it is stiff.
-    fn ends(&self) -> Option<[Anchor; 2]>;
+    fn ends(&self) -> Option<[Anchor; 2]> {
+        None
+    }
 
     /// Its linearisation there, after an evaluation; `None` if it has none.
-    fn coupling(&self, at: &At<'_>) -> Option<Coupling>;
+    fn coupling(&self, _at: &At<'_>) -> Option<Coupling> {
+        None
+    }
 
     /// Energy stored, J; for a contact, at the gap last measured.
-    fn stored(&self, motion: &[Kinematics]) -> f64;
+    fn stored(&self, _motion: &[Kinematics]) -> f64 {
+        0.0
+    }
 
     /// Adds its powers at `t`, after an evaluation.
     fn add_powers(&self, t: f64, motion: &[Kinematics], powers: &mut Powers);

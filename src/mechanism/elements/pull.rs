@@ -1,9 +1,7 @@
 //! A hand that pulls on a body: a spring and a damper between a point of the body and the hand. It is external to the
 //! scene, so all its work is external.
 
-use super::{
-    At, Coupling, ElementReport, ForceElement, Loads, Powers, SceneElement, point_of, push,
-};
+use super::{At, ElementReport, ForceElement, Loads, Powers, SceneElement, point_of, push};
 use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::model::Anchor;
 use crate::scene::{Scene, Vec3};
@@ -66,23 +64,11 @@ impl Hand {
     }
 }
 
+// Soft by design: nothing that an implicit method has to linearise.
 impl ForceElement for Hand {
     fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
         let (report, _, arm) = self.at(at.motion);
         push(&mut loads.wrench[self.on.body], &arm, &report.force);
-    }
-
-    // Soft by design: nothing that an implicit method has to linearise.
-    fn ends(&self) -> Option<[Anchor; 2]> {
-        None
-    }
-
-    fn coupling(&self, _: &At<'_>) -> Option<Coupling> {
-        None
-    }
-
-    fn stored(&self, _: &[Kinematics]) -> f64 {
-        0.0
     }
 
     fn add_powers(&self, _: f64, motion: &[Kinematics], powers: &mut Powers) {

@@ -4,7 +4,7 @@ use super::search::NEAR_PEAK;
 use super::{Simulation, State};
 use crate::contact::{Coefficients, Memory};
 use crate::scene::least_impact_steps;
-use crate::simulate::peaks::Course;
+use crate::simulate::peaks::PenetrationCubic;
 
 /// What the end of a step changed in the contact memory.
 #[derive(Clone, Copy)]
@@ -20,7 +20,7 @@ impl State {
     fn follow(
         &mut self,
         j: usize,
-        course: &Course,
+        course: &PenetrationCubic,
         c: &Coefficients,
         force: f64,
         memory: &Memory,
@@ -61,7 +61,7 @@ impl Simulation {
             let (start, end) = (state.before.gaps[j], state.now.gaps[j]);
             let coefficients = mechanism.contacts.coefficients(j);
             if state.now.memory[j].active {
-                let course = Course::new(start, end, h);
+                let course = PenetrationCubic::new(start, end, h);
                 let memory = state.now.memory[j].unsplit();
                 state.follow(j, &course, coefficients, strongest[j].0, &memory, 0.0);
             }
@@ -76,7 +76,7 @@ impl Simulation {
             state.record.contact_steps[j] += 1;
             if touching == state.now.memory[j].active {
                 if touching {
-                    let fastest = || Course::new(start, end, h).fastest(0.0).0;
+                    let fastest = || PenetrationCubic::new(start, end, h).fastest(0.0).0;
                     let memory = &mut state.now.memory[j];
                     switched.forces |= memory.rise(coefficients, end.rate, fastest);
                 }
@@ -86,7 +86,7 @@ impl Simulation {
             switched.forces |= fixed;
             let steps = std::mem::replace(&mut state.record.contact_steps[j], 0);
             if touching {
-                let course = Course::new(start, end, h);
+                let course = PenetrationCubic::new(start, end, h);
                 let crosses = start.penetration < 0.0 && end.penetration > 0.0;
                 let theta = if crosses { course.crossing() } else { 1.0 };
                 let rate = if crosses {
@@ -119,7 +119,7 @@ impl Simulation {
             } else {
                 let crosses = start.penetration > 0.0 && end.penetration < 0.0;
                 let (time, rate) = if crosses && located != Some(j) {
-                    let course = Course::new(start, end, h);
+                    let course = PenetrationCubic::new(start, end, h);
                     let theta = course.crossing();
                     (state.before.t + theta * h, course.at(theta).1)
                 } else {
@@ -154,7 +154,7 @@ impl Simulation {
                 continue;
             }
             let coefficients = mechanism.contacts.coefficients(j);
-            let course = Course::new(start, end, h);
+            let course = PenetrationCubic::new(start, end, h);
             let (force, theta) = if state.before.memory[j].active {
                 attempt.strongest[j]
             } else if state.now.memory[j].active {

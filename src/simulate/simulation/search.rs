@@ -1,7 +1,7 @@
 //! Peaks that the ends of a step do not show: its inside is sampled, as an output row would.
 
 use super::Simulation;
-use crate::simulate::peaks::Course;
+use crate::simulate::peaks::PenetrationCubic;
 
 /// A step whose forces stay below this fraction of their peaks so far is not searched.
 pub(super) const NEAR_PEAK: f64 = 0.5;
@@ -34,7 +34,8 @@ impl Simulation {
             if !memory.active || !self.mechanism.contacts.has_clearance(j) {
                 continue;
             }
-            let course = Course::new(self.state.before.gaps[j], self.state.now.gaps[j], h);
+            let course =
+                PenetrationCubic::new(self.state.before.gaps[j], self.state.now.gaps[j], h);
             let c = *self.mechanism.contacts.coefficients(j);
             let (force, theta) = course.strongest(&c, &memory);
             self.attempt.strongest[j] = (force, theta);

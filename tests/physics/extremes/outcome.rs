@@ -141,7 +141,8 @@ pub fn run(row: &Row, form: &str, column: &str) -> Outcome {
             }
         }
         pacer.end(FRAME, target.min(row.duration), simulation.time());
-        said_slow |= pacer.is_behind();
+        let reached = pacer.reached_scale();
+        said_slow |= reached.is_some_and(|reached| reached < (1.0 - 1e-6) * ASKED);
         frames += 1.0;
     }
     let doubts = simulation.doubts();
