@@ -68,12 +68,9 @@ pub enum AnalysisError {
     /// The scene does not start.
     #[error(transparent)]
     Start(#[from] StartError),
-    /// A setting that the scene does not accept.
+    /// A setting that the scene, or the simulation of it, does not accept.
     #[error(transparent)]
-    Setting(#[from] SceneError),
-    /// A setting that the running simulation does not accept.
-    #[error(transparent)]
-    Change(#[from] ChangeError),
+    Setting(#[from] ChangeError),
     /// The divergence guard stopped the reference run.
     #[error("the reference run cannot be made: {0}")]
     Stopped(#[from] Stopped),
@@ -85,4 +82,10 @@ pub enum AnalysisError {
         /// The cap.
         evaluations: u64,
     },
+}
+
+impl From<SceneError> for AnalysisError {
+    fn from(error: SceneError) -> Self {
+        Self::Setting(error.into())
+    }
 }

@@ -40,8 +40,10 @@ impl SceneSource {
 /// Why there is no result.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum TaskFault {
+    #[error("cancelled")]
+    Cancelled,
     #[error(transparent)]
-    Analysis(#[from] AnalysisError),
+    Analysis(Box<AnalysisError>),
     #[error(transparent)]
     Scene(#[from] SceneError),
     #[error(transparent)]
@@ -61,4 +63,13 @@ pub(super) enum TaskFault {
     },
     #[error("no preset is called {0}")]
     NoPreset(String),
+}
+
+impl From<AnalysisError> for TaskFault {
+    fn from(error: AnalysisError) -> Self {
+        match error {
+            AnalysisError::Cancelled => Self::Cancelled,
+            other => Self::Analysis(Box::new(other)),
+        }
+    }
 }

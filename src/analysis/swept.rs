@@ -4,7 +4,6 @@ use std::ops::ControlFlow;
 
 use serde::{Deserialize, Serialize};
 
-use super::AnalysisError;
 use super::drive::drive_period;
 use super::grid::{Grid, ParameterRange, Start};
 use super::point::{Plan, PointResult};
@@ -98,7 +97,7 @@ pub(super) fn run(
 ) -> Result<(), TaskFault> {
     let mut say = |message| match tell(message) {
         ControlFlow::Continue(()) => Ok(()),
-        ControlFlow::Break(()) => Err(AnalysisError::Cancelled),
+        ControlFlow::Break(()) => Err(TaskFault::Cancelled),
     };
     let scene = task.scene.scene()?;
     let axes = task

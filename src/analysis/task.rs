@@ -4,10 +4,10 @@ use std::ops::ControlFlow;
 
 use serde::{Deserialize, Serialize};
 
+use super::RunContext;
 use super::presets::{self, Measured};
 use super::source::{SceneSource, TaskFault};
 use super::swept::{self, Range, SweepMessage, SweepTask, SweptPoint};
-use super::{AnalysisError, RunContext};
 use crate::scene::Preset;
 
 /// What to compute.
@@ -64,7 +64,7 @@ pub fn perform(
     };
     let last = match outcome {
         Ok(()) => Message::Done,
-        Err(TaskFault::Analysis(AnalysisError::Cancelled)) => return,
+        Err(TaskFault::Cancelled) => return,
         Err(fault) => Message::Failed(fault.to_string()),
     };
     // Nothing follows that could be cancelled.
@@ -91,7 +91,7 @@ fn measure_presets(
     let message = Message::Presets(words.iter().cloned().zip(measured).collect());
     match tell(message) {
         ControlFlow::Continue(()) => Ok(()),
-        ControlFlow::Break(()) => Err(AnalysisError::Cancelled.into()),
+        ControlFlow::Break(()) => Err(TaskFault::Cancelled),
     }
 }
 

@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 use super::{Failure, interrupt, progress};
 use crate::analysis::{AnalysisError, RunContext};
 use crate::scene::Scene;
+use crate::simulate::ChangeError;
 
 /// Parts of the progress bar.
 const PARTS: f64 = 1000.0;
@@ -37,8 +38,10 @@ pub fn measure<T>(
             "interrupted; nothing was written".to_owned(),
         ),
         (AnalysisError::Start(error), Some(scene)) => error.located(scene).into(),
-        (AnalysisError::Setting(error), _) => error.into(),
-        (error @ AnalysisError::Start(_), None) => Failure::usage(error.to_string()),
+        (AnalysisError::Setting(ChangeError::Scene(error)), _) => error.into(),
+        (error @ (AnalysisError::Start(_) | AnalysisError::Setting(_)), _) => {
+            Failure::usage(error.to_string())
+        }
         (error, _) => Failure::new(Failure::DIVERGED, error.to_string()),
     })
 }

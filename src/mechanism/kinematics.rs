@@ -1,6 +1,6 @@
 //! Motion of bodies: from coordinates to poses, velocities and accelerations of the centroids. World axes.
 
-use super::model::{BallJoint, Body, Model, Motion};
+use super::model::{Anchor, BallJoint, Body, Model, Motion};
 use super::spcmm::Ideal;
 use crate::scene::{Mat3, Quat, Vec3};
 
@@ -72,11 +72,13 @@ impl BallJoint {
     /// Centres of ball and socket from the centroids of their bodies, m.
     #[inline]
     pub fn arms(&self, motion: &[Kinematics]) -> [Vec3; 2] {
-        [&self.ball, &self.socket].map(|anchor| motion[anchor.body].rotation * anchor.offset)
+        let arm = |anchor: &Anchor| motion[anchor.body].rotation * anchor.offset;
+        [arm(&self.ball), arm(&self.socket)]
     }
 
     /// e and de/dt, m and m/s, of the centres at these arms.
-    #[inline]
+    // Every evaluation needs it for every contact: a call of its own would cost a few per cent.
+    #[inline(always)]
     pub fn opening(&self, motion: &[Kinematics], [ball, socket]: &[Vec3; 2]) -> (Vec3, Vec3) {
         let (b, s) = (&motion[self.ball.body], &motion[self.socket.body]);
         (

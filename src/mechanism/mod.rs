@@ -445,8 +445,13 @@ impl Mechanism {
         for contact in self.contacts.loose() {
             energy += contact.stored(motion);
         }
-        let of_elements = self.elements.iter().map(|e| e.stored(motion));
-        energy + of_elements.sum::<f64>()
+        energy + self.energy_in_elements()
+    }
+
+    /// Energy stored in springs at the latest evaluation, J.
+    pub fn energy_in_elements(&self) -> f64 {
+        let motion = self.equations.motion();
+        self.elements.iter().map(|e| e.stored(motion)).sum()
     }
 
     /// Reports of the force elements at `t`, the time of the latest evaluation, in the order of the scene.

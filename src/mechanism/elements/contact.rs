@@ -144,8 +144,8 @@ impl ForceElement for Contact {
         let counts = &mut *loads.counts;
         let force = law.force(memory, &separation, || {
             counts.friction += 1;
-            let [ball, socket] = [&joint.ball, &joint.socket].map(|anchor| &at.motion[anchor.body]);
-            let (ball, socket) = (&ball.angular_velocity, &socket.angular_velocity);
+            let spin = |anchor: &Anchor| &at.motion[anchor.body].angular_velocity;
+            let (ball, socket) = (spin(&joint.ball), spin(&joint.socket));
             law.friction_reads(&separation.normal, &velocity, ball, socket)
         });
         loads.left_piece |= law.leaves_piece(memory, &separation, &force);

@@ -95,7 +95,9 @@ impl Simulation {
             if holds_none(memory) {
                 let c = mechanism.contacts.coefficients(j);
                 memory.friction_piece = c.friction_piece_at(mechanism.slip_speed(j));
-                memory.hold_approach(c, mechanism.contacts.gap(j).separation.rate);
+                if anew {
+                    memory.hold_approach(c, mechanism.contacts.gap(j).separation.rate);
+                }
             }
         }
     }

@@ -22,18 +22,24 @@ impl Simulation {
 
     /// Opens a new account at the current state, just fully evaluated.
     pub(super) fn open_account(&mut self) {
-        let on = self.running.solver.energy_ledger;
-        self.state.record.account = Account::start(on, energies(&self.mechanism));
+        let Self {
+            mechanism, state, ..
+        } = self;
+        let energies = energies(mechanism, state);
+        state.record.account = Account::start(self.running.solver.energy_ledger, energies);
     }
 
     /// Books what a live change did to the energies; the state was just fully evaluated.
     pub(super) fn book_change(&mut self) {
-        let account = &mut self.state.record.account;
-        if account.on {
-            account.book_change(energies(&self.mechanism));
+        let Self {
+            mechanism, state, ..
+        } = self;
+        if state.record.account.on {
+            let energies = energies(mechanism, state);
+            state.record.account.book_change(energies);
         }
         // A wear map keeps them even without a ledger.
-        account.powers = None;
+        state.record.account.powers = None;
     }
 
     /// Books the step just accepted, of size `h`, in the ledger and the wear map. The contact memory is still that of the
@@ -54,7 +60,7 @@ impl Simulation {
         if !mechanism.is_evaluated_at(state.now.t) {
             mechanism.measure(state.now.t, &state.now.y);
         }
-        let energies = energies(mechanism);
+        let energies = energies(mechanism, state);
         if mechanism.has_powers() {
             let now = &state.now;
             scratch_k.copy_from_slice(&now.k);
@@ -170,11 +176,20 @@ impl Simulation {
 }
 
 /// Energies at the latest evaluation, that of the current state.
-fn energies(mechanism: &Mechanism) -> Energies {
+fn energies(mechanism: &Mechanism, state: &State) -> Energies {
     let (kinetic, gravitational) = mechanism.energies();
+    let contacts = &mechanism.contacts;
+    let in_contacts: f64 = (0..contacts.len())
+        .filter(|&j| contacts.has_clearance(j))
+        .map(|j| {
+            contacts
+                .coefficients(j)
+                .elastic_energy(state.now.gaps[j].penetration)
+        })
+        .sum();
     Energies {
         kinetic,
         gravitational,
-        elastic: mechanism.elastic_energy(),
+        elastic: in_contacts + mechanism.energy_in_elements(),
     }
 }
