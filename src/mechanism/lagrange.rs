@@ -4,7 +4,7 @@
 //! The KKT system (55) is solved by its Schur complement J M^-1 J^T. Allocates nothing after `new`.
 
 use super::equations::Equations;
-use super::kinematics::{self, Driven, Kinematics, Wrench};
+use super::kinematics::{self, Driven, Kinematics, Wrench, part};
 use super::model::{BodyIndex, Model, Motion};
 use super::rows::RowSystem;
 use super::tree::visit_free;
@@ -428,12 +428,7 @@ impl Equations for Lagrange {
         let n = model.bodies.len();
         let (qs, vs) = y.split_at(7 * n);
         for b in 0..n {
-            let (q, v) = (&qs[7 * b..7 * b + 7], &vs[6 * b..6 * b + 6]);
-            let m = &mut self.motion[b];
-            m.position = Vec3::new(q[0], q[1], q[2]);
-            m.rotation = kinematics::rotation_of(&q[3..7]);
-            m.velocity = Vec3::new(v[0], v[1], v[2]);
-            m.angular_velocity = Vec3::new(v[3], v[4], v[5]);
+            self.motion[b].move_freely(part(qs, 7 * b), part(vs, 6 * b));
         }
     }
 
@@ -485,12 +480,8 @@ impl Equations for Lagrange {
         let n = model.bodies.len();
         let (qs, vs) = y.split_at(7 * n);
         for b in 0..n {
-            dq[7 * b..7 * b + 3].copy_from_slice(&vs[6 * b..6 * b + 3]);
-            kinematics::quaternion_rate(
-                &qs[7 * b + 3..7 * b + 7],
-                &vs[6 * b + 3..6 * b + 6],
-                &mut dq[7 * b + 3..7 * b + 7],
-            );
+            let rate = kinematics::free_rate(part(qs, 7 * b), part(vs, 6 * b));
+            dq[7 * b..7 * b + 7].copy_from_slice(&rate);
         }
     }
 

@@ -3,7 +3,8 @@
 //! Mass matrix by the composite-rigid-body algorithm, bias by one outward and one inward pass (Featherstone 2008,
 //! chapters 5 and 6), in world axes with each body's own centroid as reference. Allocates nothing after `new`.
 
-use super::kinematics::{self, Driven, Kinematics, Wrench};
+use super::jet::Jet;
+use super::kinematics::{self, Driven, Kinematics, Wrench, part};
 use super::model::{Model, Motion};
 use crate::scene::{Mat3, Vec3};
 
@@ -102,35 +103,29 @@ impl Tree {
         let (qs, vs) = y.split_at(model.nq);
         for &b in &self.dynamic {
             let body = &model.bodies[b];
-            self.motion[b] = match body.motion {
-                Motion::Free { q, v } => Kinematics {
-                    rotation: kinematics::rotation_of(&qs[q + 3..q + 7]),
-                    position: Vec3::new(qs[q], qs[q + 1], qs[q + 2]),
-                    velocity: Vec3::new(vs[v], vs[v + 1], vs[v + 2]),
-                    angular_velocity: Vec3::new(vs[v + 3], vs[v + 4], vs[v + 5]),
-                    ..Kinematics::rest()
-                },
+            match body.motion {
+                Motion::Free { q, v } => {
+                    let m = &mut self.motion[b];
+                    m.move_freely(part(qs, q), part(vs, v));
+                    m.acceleration = Vec3::zeros();
+                    m.angular_acceleration = Vec3::zeros();
+                }
                 Motion::Revolute { q, v } => {
-                    kinematics::follow(body, &self.motion[body.parent], true, qs[q], vs[v], 0.0)
+                    let q = Jet::new(qs[q], vs[v], 0.0);
+                    kinematics::follow(&mut self.motion, b, body, true, q);
                 }
                 Motion::Prismatic { q, v } => {
-                    kinematics::follow(body, &self.motion[body.parent], false, qs[q], vs[v], 0.0)
+                    let q = Jet::new(qs[q], vs[v], 0.0);
+                    kinematics::follow(&mut self.motion, b, body, false, q);
                 }
                 Motion::Driven { drive, revolute } => {
                     let q = self.driven.coordinates[drive];
-                    kinematics::follow(
-                        body,
-                        &self.motion[body.parent],
-                        revolute,
-                        q.value,
-                        q.rate,
-                        q.acceleration,
-                    )
+                    kinematics::follow(&mut self.motion, b, body, revolute, q);
                 }
                 Motion::Fixed => {
-                    kinematics::follow(body, &self.motion[body.parent], false, 0.0, 0.0, 0.0)
+                    kinematics::follow(&mut self.motion, b, body, false, Jet::default());
                 }
-            };
+            }
         }
     }
 
@@ -285,12 +280,8 @@ impl Tree {
         for body in &model.bodies {
             match body.motion {
                 Motion::Free { q, v } => {
-                    dq[q..q + 3].copy_from_slice(&vs[v..v + 3]);
-                    kinematics::quaternion_rate(
-                        &qs[q + 3..q + 7],
-                        &vs[v + 3..v + 6],
-                        &mut dq[q + 3..q + 7],
-                    );
+                    let rate = kinematics::free_rate(part(qs, q), part(vs, v));
+                    dq[q..q + 7].copy_from_slice(&rate);
                 }
                 Motion::Revolute { q, v } | Motion::Prismatic { q, v } => dq[q] = vs[v],
                 Motion::Fixed | Motion::Driven { .. } => {}
