@@ -146,6 +146,15 @@ impl Tree {
             let inertia = world_inertia(&m.rotation, &body.inertia, body.diagonal);
             let w = m.angular_velocity;
             let load = &wrench[b];
+            let block_index = model.block_of[b];
+            let block = &model.blocks[block_index];
+            if let (Motion::Free { v, .. }, Some(_)) = (body.motion, block.lone) {
+                // It carries nothing, and its bias accelerations are zero.
+                let force = load.force + gravity * body.mass;
+                let torque = load.torque - w.cross(&(inertia * w));
+                out[v..v + 6].copy_from_slice(&six_of(&force, &torque));
+                continue;
+            }
             let mut c = Composite {
                 mass: body.mass,
                 moment: Vec3::zeros(),
@@ -158,8 +167,6 @@ impl Tree {
                 c.add(&composite[b]);
                 composite[b] = Composite::EMPTY;
             }
-            let block_index = model.block_of[b];
-            let block = &model.blocks[block_index];
             let n = block.n;
             match body.motion {
                 Motion::Revolute { v, .. } => {
@@ -184,11 +191,8 @@ impl Tree {
                     fill_row(model, motion, h, n, block.v, row, b, momentum, angular);
                 }
                 Motion::Free { v, .. } => {
-                    out[v..v + 3].copy_from_slice(c.force.as_slice());
-                    out[v + 3..v + 6].copy_from_slice(c.torque.as_slice());
-                    if block.lone.is_none() {
-                        fill_free(&mut mass[mass_offset[block_index]..][..n * n], n, &c);
-                    }
+                    out[v..v + 6].copy_from_slice(&six_of(&c.force, &c.torque));
+                    fill_free(&mut mass[mass_offset[block_index]..][..n * n], n, &c);
                 }
                 Motion::Fixed | Motion::Driven { .. } => {}
             }
@@ -213,12 +217,11 @@ impl Tree {
         if let Some(b) = block.lone {
             let body = &model.bodies[b];
             let rotation = &self.motion[b].rotation;
-            let torque = Vec3::new(x[3], x[4], x[5]);
+            let [fx, fy, fz, tx, ty, tz] = *part(x, 0);
+            let acceleration = Vec3::new(fx, fy, fz) / body.mass;
+            let torque = Vec3::new(tx, ty, tz);
             let alpha = rotation * (body.inertia_inverse * rotation.tr_mul(&torque));
-            for i in 0..3 {
-                x[i] /= body.mass;
-            }
-            x[3..6].copy_from_slice(alpha.as_slice());
+            x.copy_from_slice(&six_of(&acceleration, &alpha));
         } else {
             let h = &self.mass[self.mass_offset[index]..][..block.n * block.n];
             block
@@ -315,6 +318,13 @@ impl Tree {
             }
         }
     }
+}
+
+/// Both vectors, one after the other.
+#[inline(always)]
+fn six_of(linear: &Vec3, angular: &Vec3) -> [f64; 6] {
+    let (l, a) = (linear, angular);
+    [l.x, l.y, l.z, a.x, a.y, a.z]
 }
 
 /// R I R^T.
