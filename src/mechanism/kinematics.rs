@@ -157,10 +157,7 @@ fn rotation_of(&[w, x, y, z]: &[f64; 4]) -> Mat3 {
 
 /// Position rates of a free body: those of its centroid, and dq/dt = 1/2 omega q for its world angular velocity.
 #[inline]
-pub fn free_rate(
-    &[.., w, x, y, z]: &[f64; 7],
-    &[vx, vy, vz, wx, wy, wz]: &[f64; 6],
-) -> [f64; 7] {
+pub fn free_rate(&[.., w, x, y, z]: &[f64; 7], &[vx, vy, vz, wx, wy, wz]: &[f64; 6]) -> [f64; 7] {
     let (a, b, c) = (0.5 * wx, 0.5 * wy, 0.5 * wz);
     [
         vx,
@@ -236,9 +233,8 @@ pub fn follow(motion: &mut [Kinematics], b: BodyIndex, body: &Body, revolute: bo
         child.position = parent.position + offset;
         child.velocity = parent.point_velocity(&offset) + velocity;
         child.angular_velocity = wp;
-        child.acceleration = parent.point_acceleration(&offset)
-            + 2.0 * wp.cross(&velocity)
-            + axis * acceleration;
+        child.acceleration =
+            parent.point_acceleration(&offset) + 2.0 * wp.cross(&velocity) + axis * acceleration;
         child.angular_acceleration = parent.angular_acceleration;
         child.arm = arm;
     }

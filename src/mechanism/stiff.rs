@@ -198,7 +198,8 @@ impl Stiff {
                 ..
             } = self;
             lu.factor(|i, j, n| {
-                let entry = -by_velocity[j * n + i] - by_position[j * n + i] / shift;
+                let (d, k) = (by_velocity[j * n + i], by_position[j * n + i]);
+                let entry = if k == 0.0 { -d } else { -d - k / shift };
                 if i == j { shift + entry } else { entry }
             });
         }
