@@ -228,9 +228,11 @@ impl Lagrange {
             .flat_map(|(g, group)| std::iter::repeat_n(g, group.rows.count()))
             .collect();
         let pairs = pairs_of(&groups, model.world());
-        let mut first: Vec<usize> = (0..rows).collect();
+        let mut columns = vec![Vec::new(); rows];
         for &(i, j) in &pairs {
-            first[i] = first[i].min(j);
+            if j < i {
+                columns[i].push(j);
+            }
         }
         let n = model.bodies.len();
         let empty = JacobianRow {
@@ -250,7 +252,7 @@ impl Lagrange {
             rows: vec![empty; rows],
             group_of,
             pairs,
-            matrix: RowSystem::new(first),
+            matrix: RowSystem::new(columns),
             multipliers: vec![0.0; rows],
             residual: vec![0.0; rows],
             inverse_inertia: vec![Mat3::zeros(); n],

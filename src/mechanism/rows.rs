@@ -18,10 +18,10 @@ pub struct RowSystem {
 }
 
 impl RowSystem {
-    /// For rows that begin at columns `first`.
-    pub fn new(first: Vec<usize>) -> Self {
+    /// For rows that couple with these `columns` before their own.
+    pub fn new(columns: Vec<Vec<usize>>) -> Self {
         Self {
-            skyline: Skyline::new(first),
+            skyline: Skyline::new(columns),
             dependent: None,
         }
     }
@@ -329,7 +329,7 @@ mod tests {
 
     fn system(a: &DMatrix<f64>) -> RowSystem {
         let n = a.nrows();
-        let mut system = RowSystem::new(vec![0; n]);
+        let mut system = RowSystem::new((0..n).map(|i| (0..i).collect()).collect());
         for i in 0..n {
             for j in 0..=i {
                 system.add(i, j, a[(i, j)]);
