@@ -23,6 +23,14 @@ impl Side {
         let (second, third) = others.split_at(self.n);
         [first, second, third]
     }
+
+    #[inline]
+    fn rows_mut<'a>(&self, of: &'a mut [f64]) -> [&'a mut [f64]; 3] {
+        let rows = &mut of[self.offset..][..3 * self.n];
+        let (first, others) = rows.split_at_mut(self.n);
+        let (second, third) = others.split_at_mut(self.n);
+        [first, second, third]
+    }
 }
 
 /// Constraint rows of a set of ball joints.
@@ -210,24 +218,23 @@ impl Constraints {
                 }) else {
                     continue;
                 };
-                let rows = &mut self.jacobian[side.offset..][..3 * side.n];
+                let [x, y, z] = side.rows_mut(&mut self.jacobian);
                 visit_columns(
                     model,
                     &tree.motion,
                     anchor.body,
                     &point,
                     |column, velocity, _| {
-                        for i in 0..3 {
-                            rows[i * side.n + column] += sign * velocity[i];
-                        }
+                        x[column] += sign * velocity.x;
+                        y[column] += sign * velocity.y;
+                        z[column] += sign * velocity.z;
                     },
                 );
             }
         }
         self.weighted.copy_from_slice(&self.jacobian);
         for side in self.sides.iter().flatten() {
-            for i in 0..3 {
-                let row = &mut self.weighted[side.offset + i * side.n..][..side.n];
+            for row in side.rows_mut(&mut self.weighted) {
                 tree.solve_block(model, side.block, row);
             }
         }
@@ -235,13 +242,8 @@ impl Constraints {
         for &(i, j, si, sj) in &self.pairs {
             let (a, b) = (&self.sides[i][si], &self.sides[j][sj]);
             let (left, right) = (a.rows(&self.jacobian), b.rows(&self.weighted));
-            for r in 0..3 {
-                let limit = if i == j { r + 1 } else { 3 };
-                for c in 0..limit {
-                    self.matrix
-                        .add(3 * i + r, 3 * j + c, dot(left[r], right[c]));
-                }
-            }
+            let block = left.map(|left| right.map(|right| dot(left, right)));
+            self.matrix.add_block(i, j, &block);
         }
         self.least_pivot = self.matrix.factor();
     }
@@ -370,7 +372,7 @@ impl Constraints {
 }
 
 /// Scalar product of two vectors of the same length, mostly of a free body's six coordinates.
-#[inline]
+#[inline(always)]
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     match (a.as_array::<6>(), b.as_array::<6>()) {
         (Some(a), Some(b)) => (0..6).map(|i| a[i] * b[i]).sum(),

@@ -66,6 +66,18 @@ impl Group {
 struct JacobianRow {
     child: [Vec3; 2],
     parent: [Vec3; 2],
+    /// Inverse inertia of both times their angular parts; zero for the world.
+    turned: [Vec3; 2],
+}
+
+impl JacobianRow {
+    fn new(child: [Vec3; 2], parent: [Vec3; 2]) -> Self {
+        Self {
+            child,
+            parent,
+            turned: [Vec3::zeros(); 2],
+        }
+    }
 }
 
 /// Equations of motion with multipliers.
@@ -235,10 +247,7 @@ impl Lagrange {
             }
         }
         let n = model.bodies.len();
-        let empty = JacobianRow {
-            child: [Vec3::zeros(); 2],
-            parent: [Vec3::zeros(); 2],
-        };
+        let empty = JacobianRow::new([Vec3::zeros(); 2], [Vec3::zeros(); 2]);
         // Bodies that depend on time alone are part of the state here too.
         let mut driven = Driven::new(model);
         driven.only_coordinates();
@@ -271,14 +280,17 @@ impl Lagrange {
         );
         let (ri, rj) = (&self.rows[i], &self.rows[j]);
         let mut sum = 0.0;
+        let others = [
+            (gj.child, &rj.child[0], &rj.turned[0]),
+            (gj.parent, &rj.parent[0], &rj.turned[1]),
+        ];
         for (bi, ji) in [(gi.child, &ri.child), (gi.parent, &ri.parent)] {
             if bi == model.bodies.len() {
                 continue;
             }
-            for (bj, jj) in [(gj.child, &rj.child), (gj.parent, &rj.parent)] {
+            for (bj, moved, turned) in others {
                 if bi == bj {
-                    sum += ji[0].dot(&jj[0]) / model.bodies[bi].mass
-                        + ji[1].dot(&(self.inverse_inertia[bi] * jj[1]));
+                    sum += ji[0].dot(moved) / model.bodies[bi].mass + ji[1].dot(turned);
                 }
             }
         }
@@ -302,10 +314,7 @@ impl Lagrange {
                     for i in 0..3 {
                         let mut e = zero;
                         e[i] = 1.0;
-                        self.rows[at + i] = JacobianRow {
-                            child: [e, dc.cross(&e)],
-                            parent: [-e, e.cross(&dp)],
-                        };
+                        self.rows[at + i] = JacobianRow::new([e, dc.cross(&e)], [-e, e.cross(&dp)]);
                         self.residual[at + i] = stabilised(phi[i], rate[i], acceleration[i]);
                         self.drift = self.drift.max(phi[i].abs());
                     }
@@ -319,10 +328,7 @@ impl Lagrange {
                     let acceleration = (c.angular_acceleration - p.angular_acceleration)
                         .dot(&cross)
                         + relative.dot(&turning);
-                    self.rows[at] = JacobianRow {
-                        child: [zero, cross],
-                        parent: [zero, -cross],
-                    };
+                    self.rows[at] = JacobianRow::new([zero, cross], [zero, -cross]);
                     self.residual[at] = stabilised(phi, relative.dot(&cross), acceleration);
                     self.drift = self.drift.max(phi.abs());
                 }
@@ -343,10 +349,8 @@ impl Lagrange {
                     let phi = b.dot(&d) - f.value;
                     let rate = b1.dot(&d) + b.dot(&d1) - f.rate;
                     let acceleration = b2.dot(&d) + 2.0 * b1.dot(&d1) + b.dot(&d2) - f.acceleration;
-                    self.rows[at] = JacobianRow {
-                        child: [b, dc.cross(&b)],
-                        parent: [-b, b.cross(&dp) + b.cross(&d)],
-                    };
+                    self.rows[at] =
+                        JacobianRow::new([b, dc.cross(&b)], [-b, b.cross(&dp) + b.cross(&d)]);
                     self.residual[at] = stabilised(phi, rate, acceleration);
                     self.drift = self.drift.max(phi.abs());
                 }
@@ -370,10 +374,7 @@ impl Lagrange {
                     let acceleration = (c.angular_acceleration - p.angular_acceleration).dot(&x)
                         + relative.dot(&wp.cross(&x))
                         - f.acceleration;
-                    self.rows[at] = JacobianRow {
-                        child: [zero, x],
-                        parent: [zero, -x],
-                    };
+                    self.rows[at] = JacobianRow::new([zero, x], [zero, -x]);
                     self.residual[at] = stabilised(phi, relative.dot(&x) - f.rate, acceleration);
                     self.drift = self.drift.max(phi.abs());
                 }
@@ -450,6 +451,17 @@ impl Equations for Lagrange {
             self.inverse_inertia[b] = m.rotation * body.inertia_inverse * m.rotation.transpose();
         }
         self.linearise();
+        for (row, &group) in self.rows.iter_mut().zip(&self.group_of) {
+            let group = &self.groups[group];
+            for (b, turned, j) in [
+                (group.child, 0, row.child[1]),
+                (group.parent, 1, row.parent[1]),
+            ] {
+                if b < model.bodies.len() {
+                    row.turned[turned] = self.inverse_inertia[b] * j;
+                }
+            }
+        }
         self.matrix.clear();
         for &(i, j) in &self.pairs {
             let value = self.mobility(model, i, j);

@@ -82,6 +82,12 @@ impl RowSystem {
         self.skyline.add(i, j, value);
     }
 
+    /// Adds to the entries of rows 3 i.. and columns 3 j.., j <= i, where rows couple by threes.
+    #[inline]
+    pub fn add_block(&mut self, i: usize, j: usize, block: &[[f64; 3]; 3]) {
+        self.skyline.add_block(i, j, block);
+    }
+
     /// Factors in place. Returns the smallest pivot ratio, without the rows known to be dependent: near rounding level,
     /// further rows are dependent.
     #[inline]
