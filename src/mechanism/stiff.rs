@@ -177,10 +177,10 @@ impl Stiff {
         if self.empty {
             return;
         }
-        for column in self.by_position.chunks_exact_mut(self.n) {
-            equations.apply_inverse_mass(model, column);
-        }
-        for column in self.by_velocity.chunks_exact_mut(self.n) {
+        let columns = self.by_position.chunks_exact_mut(self.n);
+        let columns = columns.chain(self.by_velocity.chunks_exact_mut(self.n));
+        // Most coordinates move no touching ball.
+        for column in columns.filter(|column| column.iter().any(|force| *force != 0.0)) {
             equations.apply_inverse_mass(model, column);
         }
         let positions = self.time_derivative.len() - self.n;
