@@ -2,6 +2,7 @@
 //! (Hairer, Nørsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed., Table II.5.2 and II.6).
 
 use super::{Stepper, System, combine};
+use std::ops::Range;
 
 const C: [f64; 5] = [0.2, 0.3, 0.8, 8.0 / 9.0, 1.0];
 const A: [[f64; 5]; 5] = [
@@ -87,8 +88,17 @@ impl DormandPrince {
         self.kept *= theta;
     }
 
-    /// State at `t + theta h` of the latest attempt, 0 <= theta <= 1, from its start and the derivative there.
-    pub fn interpolate(&self, theta: f64, h: f64, y: &[f64], k: &[f64], out: &mut [f64]) {
+    /// Components `part` of the state at `t + theta h` of the latest attempt, 0 <= theta <= 1, from its start and the
+    /// derivative there.
+    pub fn interpolate(
+        &self,
+        part: Range<usize>,
+        theta: f64,
+        h: f64,
+        y: &[f64],
+        k: &[f64],
+        out: &mut [f64],
+    ) {
         let (theta, h) = (theta * self.kept, h / self.kept);
         let s = 1.0 - theta;
         let Self {
@@ -101,7 +111,8 @@ impl DormandPrince {
             ..
         } = self;
         let [y, k, k3, k4, k5, k6, y_end, k_end] =
-            [y, k, k3, k4, k5, k6, y_end, k_end].map(|x| &x[..out.len()]);
+            [y, k, k3, k4, k5, k6, y_end, k_end].map(|x| &x[part.clone()]);
+        let out = &mut out[part];
         for i in 0..out.len() {
             let d = y_end[i] - y[i];
             let b = h * k[i] - d;

@@ -236,7 +236,7 @@ mod tests {
         let mut stepper = DormandPrince::new(2);
         Oscillator.derivative(0.0, &y, &mut k);
         stepper.attempt(&mut Oscillator, 0.0, h, &y, &k, &mut y1, &mut k1);
-        stepper.interpolate(0.37, h, &y, &k, &mut out);
+        stepper.interpolate(0..2, 0.37, h, &y, &k, &mut out);
         (out[0] - libm::cos(0.37 * h))
             .abs()
             .max((out[1] + libm::sin(0.37 * h)).abs())

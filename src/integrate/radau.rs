@@ -5,6 +5,7 @@
 //! contact by (h v)^2 / (2 L), which is more than a settled penetration at steps of a millisecond.
 
 use super::StiffSystem;
+use std::ops::Range;
 
 const SQRT6: f64 = 2.449_489_742_783_178;
 pub(super) const C: [f64; 3] = [(4.0 - SQRT6) / 10.0, (4.0 + SQRT6) / 10.0, 1.0];
@@ -324,11 +325,11 @@ impl Radau {
         self.previous.h *= theta;
     }
 
-    /// State at `t + theta h`: the collocation polynomial.
-    pub fn interpolate(&self, theta: f64, y: &[f64], out: &mut [f64]) {
-        let y = &y[..out.len()];
-        let z = self.previous.z.each_ref().map(|z| &z[..out.len()]);
-        for (i, out) in out.iter_mut().enumerate() {
+    /// Components `part` of the state at `t + theta h`: the collocation polynomial.
+    pub fn interpolate(&self, part: Range<usize>, theta: f64, y: &[f64], out: &mut [f64]) {
+        let y = &y[part.clone()];
+        let z = self.previous.z.each_ref().map(|z| &z[part.clone()]);
+        for (i, out) in out[part].iter_mut().enumerate() {
             *out = y[i] + polynomial(&z.map(|z| z[i]), theta - 1.0);
         }
     }

@@ -204,11 +204,15 @@ impl Contacts {
     /// Gap geometry alone (no force) at `t`: eccentricity, its rate, normal, penetration and its rate.
     pub fn measure(&mut self, t: f64, motion: &[Kinematics]) {
         self.update_ramps(t);
-        for Contact { joint, gap, .. } in &mut self.joints {
-            gap.eccentricity = joint.eccentricity(motion);
-            gap.eccentricity_rate = joint.opening_rate(motion);
+        for contact in &mut self.joints {
+            contact.measure(motion);
         }
-        self.finish();
+    }
+
+    /// The same of joint `i` alone.
+    pub fn measure_one(&mut self, i: usize, t: f64, motion: &[Kinematics]) {
+        self.update_ramps(t);
+        self.joints[i].measure(motion);
     }
 
     /// Relative velocity used by friction at the contact of joint `i` for the normal `n`, m/s.

@@ -1,7 +1,8 @@
 //! Interface of a formulation of the equations of motion. No other module knows more about one.
 
 use super::kinematics::{Driven, Kinematics, Wrench};
-use super::model::Model;
+use super::model::{BallJoint, Model};
+use super::path::Path;
 use crate::scene::Vec3;
 
 /// Equations of motion in some coordinates. The `model` passed in is always the one they were made for.
@@ -29,6 +30,12 @@ pub(super) trait Equations: Send {
 
     /// Poses and velocities at (t, y).
     fn forward(&mut self, model: &Model, t: f64, y: &[f64]);
+
+    /// What moves the gap of `joint`, unless it is about as much as [`Self::forward`] moves.
+    fn path(&self, model: &Model, joint: &BallJoint) -> Option<Path>;
+
+    /// [`Self::forward`] for the bodies on `path` alone.
+    fn forward_along(&mut self, model: &Model, t: f64, y: &[f64], path: &Path);
 
     /// Motion of the latest [`Self::forward`], and the loads on the bodies about their centroids, for the caller to fill in;
     /// the last entry of each is the world's.

@@ -3,7 +3,8 @@
 use super::constraints::Constraints;
 use super::equations::Equations;
 use super::kinematics::{Driven, Kinematics, Wrench, spin_of};
-use super::model::{Anchor, Model, Motion};
+use super::model::{Anchor, BallJoint, Model, Motion};
+use super::path::Path;
 use super::power::inverse_dynamics;
 use super::tree::{self, Tree};
 use crate::scene::Vec3;
@@ -77,6 +78,14 @@ impl Equations for Forest {
 
     fn forward(&mut self, model: &Model, t: f64, y: &[f64]) {
         self.tree.forward(model, t, y);
+    }
+
+    fn path(&self, model: &Model, joint: &BallJoint) -> Option<Path> {
+        Path::of(model, joint)
+    }
+
+    fn forward_along(&mut self, model: &Model, t: f64, y: &[f64], path: &Path) {
+        self.tree.forward_along(model, t, y, path);
     }
 
     fn loads(&mut self) -> (&[Kinematics], &mut [Wrench]) {

@@ -2,6 +2,7 @@
 
 use super::jet::Jet;
 use super::model::{Anchor, BallJoint, Body, BodyIndex, Model, Motion};
+use super::path::Path;
 use super::spcmm::Ideal;
 use crate::scene::{Mat3, Quat, Vec3};
 
@@ -311,28 +312,53 @@ impl Driven {
             self.coordinates[i] = model.drive(i, t, self.ideal.as_ref());
         }
         for &b in &self.bodies {
-            let body = &model.bodies[b];
-            match body.motion {
-                // A slider on the world moves only along its line.
-                Motion::Driven {
-                    drive,
-                    revolute: false,
-                } if body.parent == model.world() => {
-                    let q = self.coordinates[drive];
-                    let arm = body.axis * q.value + body.fixed * body.to_centroid;
-                    let child = &mut motion[b];
-                    child.rotation = body.fixed;
-                    child.position = body.from_parent + arm;
-                    child.velocity = body.axis * q.rate;
-                    child.acceleration = body.axis * q.acceleration;
-                    child.axis = body.axis;
-                    child.arm = arm;
-                }
-                Motion::Driven { drive, revolute } => {
-                    follow(motion, b, body, revolute, self.coordinates[drive]);
-                }
-                _ => follow(motion, b, body, false, Jet::default()),
+            self.move_body(model, b, motion);
+        }
+    }
+
+    /// The same for the bodies on `path` alone.
+    pub fn update_along(&mut self, model: &Model, t: f64, path: &Path, motion: &mut [Kinematics]) {
+        if self.time == Some(t) || path.drives.is_empty() {
+            return;
+        }
+        if model.trajectory.is_some() {
+            // All its sliders are computed at once.
+            self.update(model, t, motion);
+            return;
+        }
+        // Part of it is at this instant, part of it still at another.
+        self.time = None;
+        for &i in &path.drives {
+            self.coordinates[i] = model.drive(i, t, None);
+        }
+        for &b in &path.driven {
+            self.move_body(model, b, motion);
+        }
+    }
+
+    #[inline]
+    fn move_body(&self, model: &Model, b: BodyIndex, motion: &mut [Kinematics]) {
+        let body = &model.bodies[b];
+        match body.motion {
+            // A slider on the world moves only along its line.
+            Motion::Driven {
+                drive,
+                revolute: false,
+            } if body.parent == model.world() => {
+                let q = self.coordinates[drive];
+                let arm = body.axis * q.value + body.fixed * body.to_centroid;
+                let child = &mut motion[b];
+                child.rotation = body.fixed;
+                child.position = body.from_parent + arm;
+                child.velocity = body.axis * q.rate;
+                child.acceleration = body.axis * q.acceleration;
+                child.axis = body.axis;
+                child.arm = arm;
             }
+            Motion::Driven { drive, revolute } => {
+                follow(motion, b, body, revolute, self.coordinates[drive]);
+            }
+            _ => follow(motion, b, body, false, Jet::default()),
         }
     }
 }

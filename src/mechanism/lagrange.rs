@@ -5,7 +5,8 @@
 
 use super::equations::Equations;
 use super::kinematics::{self, Driven, Kinematics, Wrench, part};
-use super::model::{BodyIndex, Model, Motion};
+use super::model::{BallJoint, BodyIndex, Model, Motion};
+use super::path::Path;
 use super::rows::RowSystem;
 use super::tree::visit_free;
 use crate::scene::{JointKind, Mat3, Scene, Vec3};
@@ -431,6 +432,17 @@ impl Equations for Lagrange {
         let n = model.bodies.len();
         let (qs, vs) = y.split_at(7 * n);
         for b in 0..n {
+            self.motion[b].move_freely(part(qs, 7 * b), part(vs, 6 * b));
+        }
+    }
+
+    fn path(&self, model: &Model, joint: &BallJoint) -> Option<Path> {
+        Some(Path::of_bodies(model, joint))
+    }
+
+    fn forward_along(&mut self, model: &Model, _: f64, y: &[f64], path: &Path) {
+        let (qs, vs) = y.split_at(7 * model.bodies.len());
+        for &b in &path.dynamic {
             self.motion[b].move_freely(part(qs, 7 * b), part(vs, 6 * b));
         }
     }

@@ -5,7 +5,8 @@
 
 use super::jet::Jet;
 use super::kinematics::{self, Driven, Kinematics, Wrench, part};
-use super::model::{Model, Motion};
+use super::model::{BodyIndex, Model, Motion};
+use super::path::Path;
 use crate::scene::{Mat3, Vec3};
 
 /// Mass, first moment and inertia of a body with all its descendants, about that body's centroid.
@@ -100,32 +101,18 @@ impl Tree {
     #[inline]
     pub fn forward(&mut self, model: &Model, t: f64, y: &[f64]) {
         self.driven.update(model, t, &mut self.motion);
-        let (qs, vs) = y.split_at(model.nq);
+        let (motion, coordinates) = (&mut self.motion, &self.driven.coordinates);
         for &b in &self.dynamic {
-            let body = &model.bodies[b];
-            match body.motion {
-                Motion::Free { q, v } => {
-                    let m = &mut self.motion[b];
-                    m.move_freely(part(qs, q), part(vs, v));
-                    m.acceleration = Vec3::zeros();
-                    m.angular_acceleration = Vec3::zeros();
-                }
-                Motion::Revolute { q, v } => {
-                    let q = Jet::new(qs[q], vs[v], 0.0);
-                    kinematics::follow(&mut self.motion, b, body, true, q);
-                }
-                Motion::Prismatic { q, v } => {
-                    let q = Jet::new(qs[q], vs[v], 0.0);
-                    kinematics::follow(&mut self.motion, b, body, false, q);
-                }
-                Motion::Driven { drive, revolute } => {
-                    let q = self.driven.coordinates[drive];
-                    kinematics::follow(&mut self.motion, b, body, revolute, q);
-                }
-                Motion::Fixed => {
-                    kinematics::follow(&mut self.motion, b, body, false, Jet::default());
-                }
-            }
+            move_body(model, b, y, coordinates, motion);
+        }
+    }
+
+    /// The same for the bodies on `path` alone.
+    pub fn forward_along(&mut self, model: &Model, t: f64, y: &[f64], path: &Path) {
+        self.driven.update_along(model, t, path, &mut self.motion);
+        let (motion, coordinates) = (&mut self.motion, &self.driven.coordinates);
+        for &b in &path.dynamic {
+            move_body(model, b, y, coordinates, motion);
         }
     }
 
@@ -316,6 +303,36 @@ impl Tree {
             if let Motion::Free { q, .. } = body.motion {
                 kinematics::normalise_quaternion(&mut y[q + 3..q + 7]);
             }
+        }
+    }
+}
+
+/// Moves body `b` after its parent.
+#[inline(always)]
+fn move_body(model: &Model, b: BodyIndex, y: &[f64], driven: &[Jet], motion: &mut [Kinematics]) {
+    let (qs, vs) = y.split_at(model.nq);
+    let body = &model.bodies[b];
+    match body.motion {
+        Motion::Free { q, v } => {
+            let m = &mut motion[b];
+            m.move_freely(part(qs, q), part(vs, v));
+            m.acceleration = Vec3::zeros();
+            m.angular_acceleration = Vec3::zeros();
+        }
+        Motion::Revolute { q, v } => {
+            let q = Jet::new(qs[q], vs[v], 0.0);
+            kinematics::follow(motion, b, body, true, q);
+        }
+        Motion::Prismatic { q, v } => {
+            let q = Jet::new(qs[q], vs[v], 0.0);
+            kinematics::follow(motion, b, body, false, q);
+        }
+        Motion::Driven { drive, revolute } => {
+            let q = driven[drive];
+            kinematics::follow(motion, b, body, revolute, q);
+        }
+        Motion::Fixed => {
+            kinematics::follow(motion, b, body, false, Jet::default());
         }
     }
 }

@@ -106,6 +106,13 @@ impl Contact {
             .friction_reads(n, &self.gap.eccentricity_rate, ball, socket)
     }
 
+    /// Gap geometry of bodies in `motion`.
+    pub fn measure(&mut self, motion: &[Kinematics]) {
+        self.gap.eccentricity = self.joint.eccentricity(motion);
+        self.gap.eccentricity_rate = self.joint.opening_rate(motion);
+        self.finish();
+    }
+
     /// Completes normal, penetration and rate from the eccentricity of the latest evaluation.
     pub fn finish(&mut self) {
         let loose = self.is_loose();
