@@ -1,7 +1,8 @@
 //! Dormand-Prince 5(4) with its continuous extension of order 4
 //! (Hairer, Nørsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed., Table II.5.2 and II.6).
 
-use super::{Stepper, System};
+use super::{Stepper, System, combine};
+use std::ops::Range;
 
 const C: [f64; 5] = [0.2, 0.3, 0.8, 8.0 / 9.0, 1.0];
 const A: [[f64; 5]; 5] = [
@@ -87,21 +88,42 @@ impl DormandPrince {
         self.kept *= theta;
     }
 
-    /// State at `t + theta h` of the latest attempt, 0 <= theta <= 1, from its start and the derivative there.
-    pub fn interpolate(&self, theta: f64, h: f64, y: &[f64], k: &[f64], out: &mut [f64]) {
+    /// Components `part` of the state at `t + theta h` of the latest attempt, 0 <= theta <= 1, from its start and the
+    /// derivative there.
+    pub fn interpolate(
+        &self,
+        part: Range<usize>,
+        theta: f64,
+        h: f64,
+        y: &[f64],
+        k: &[f64],
+        out: &mut [f64],
+    ) {
         let (theta, h) = (theta * self.kept, h / self.kept);
         let s = 1.0 - theta;
+        let Self {
+            k3,
+            k4,
+            k5,
+            k6,
+            raw_end: y_end,
+            raw_k_end: k_end,
+            ..
+        } = self;
+        let [y, k, k3, k4, k5, k6, y_end, k_end] =
+            [y, k, k3, k4, k5, k6, y_end, k_end].map(|x| &x[part.clone()]);
+        let out = &mut out[part];
         for i in 0..out.len() {
-            let d = self.raw_end[i] - y[i];
+            let d = y_end[i] - y[i];
             let b = h * k[i] - d;
-            let c = d - h * self.raw_k_end[i] - b;
+            let c = d - h * k_end[i] - b;
             let e = h
                 * (D[0] * k[i]
-                    + D[1] * self.k3[i]
-                    + D[2] * self.k4[i]
-                    + D[3] * self.k5[i]
-                    + D[4] * self.k6[i]
-                    + D[5] * self.raw_k_end[i]);
+                    + D[1] * k3[i]
+                    + D[2] * k4[i]
+                    + D[3] * k5[i]
+                    + D[4] * k6[i]
+                    + D[5] * k_end[i]);
             out[i] = y[i] + theta * (d + s * (b + theta * (c + s * e)));
         }
     }
@@ -147,40 +169,32 @@ impl Stepper for DormandPrince {
             kept,
         } = self;
         *kept = 1.0;
-        for i in 0..n {
-            stage[i] = y[i] + h * (A[0][0] * k[i]);
-        }
+        let [a2, a3, a4, a5, a6] = &A;
+        combine(stage, y, h, [(a2[0], k)]);
         system.derivative(t + C[0] * h, stage, k2);
-        for i in 0..n {
-            stage[i] = y[i] + h * (A[1][0] * k[i] + A[1][1] * k2[i]);
-        }
+        combine(stage, y, h, [(a3[0], k), (a3[1], k2)]);
         system.derivative(t + C[1] * h, stage, k3);
-        for i in 0..n {
-            stage[i] = y[i] + h * (A[2][0] * k[i] + A[2][1] * k2[i] + A[2][2] * k3[i]);
-        }
+        combine(stage, y, h, [(a4[0], k), (a4[1], k2), (a4[2], k3)]);
         system.derivative(t + C[2] * h, stage, k4);
-        for i in 0..n {
-            stage[i] =
-                y[i] + h * (A[3][0] * k[i] + A[3][1] * k2[i] + A[3][2] * k3[i] + A[3][3] * k4[i]);
-        }
+        let terms = [(a5[0], k), (a5[1], k2), (a5[2], k3), (a5[3], k4)];
+        combine(stage, y, h, terms);
         system.derivative(t + C[3] * h, stage, k5);
-        for i in 0..n {
-            stage[i] = y[i]
-                + h * (A[4][0] * k[i]
-                    + A[4][1] * k2[i]
-                    + A[4][2] * k3[i]
-                    + A[4][3] * k4[i]
-                    + A[4][4] * k5[i]);
-        }
+        let terms = [
+            (a6[0], k),
+            (a6[1], k2),
+            (a6[2], k3),
+            (a6[3], k4),
+            (a6[4], k5),
+        ];
+        combine(stage, y, h, terms);
         system.derivative(t + C[4] * h, stage, k6);
-        for i in 0..n {
-            y_end[i] = y[i]
-                + h * (B[0] * k[i] + B[1] * k3[i] + B[2] * k4[i] + B[3] * k5[i] + B[4] * k6[i]);
-        }
+        let terms = [(B[0], k), (B[1], k3), (B[2], k4), (B[3], k5), (B[4], k6)];
+        combine(y_end, y, h, terms);
         system.derivative(t + h, y_end, k_end);
         raw_end.copy_from_slice(y_end);
         raw_k_end.copy_from_slice(k_end);
-        let scale = system.scale();
+        let [k, k3, k4, k5, k6, k_end, scale] =
+            [k, k3, k4, k5, k6, k_end, system.scale()].map(|x| &x[..n]);
         let mut error = 0.0;
         for i in 0..n {
             let e = h

@@ -1,6 +1,6 @@
 //! Fixed-step methods.
 
-use super::{ContactSystem, Stepper, System};
+use super::{ContactSystem, Stepper, System, combine};
 
 /// v1 = v + h a(t, q, v), q1 = q + h q_dot(q, v1): order 1, keeps the energy of oscillations bounded.
 pub struct SemiImplicitEuler {
@@ -125,18 +125,14 @@ impl Stepper for RungeKutta4 {
     ) -> f64 {
         let n = y.len();
         let Self { k2, k3, k4, stage } = self;
-        for i in 0..n {
-            stage[i] = y[i] + 0.5 * h * k[i];
-        }
+        combine(stage, y, 0.5 * h, [(1.0, k)]);
         system.derivative(t + 0.5 * h, stage, k2);
-        for i in 0..n {
-            stage[i] = y[i] + 0.5 * h * k2[i];
-        }
+        combine(stage, y, 0.5 * h, [(1.0, k2)]);
         system.derivative(t + 0.5 * h, stage, k3);
-        for i in 0..n {
-            stage[i] = y[i] + h * k3[i];
-        }
+        combine(stage, y, h, [(1.0, k3)]);
         system.derivative(t + h, stage, k4);
+        let [k, k2, k3, k4] = [k, k2, k3, k4].map(|k| &k[..n]);
+        let y_end = &mut y_end[..n];
         for i in 0..n {
             y_end[i] = y[i] + h / 6.0 * (k[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
         }

@@ -144,6 +144,7 @@ pub fn hermite(
     out: &mut [f64],
 ) {
     let s = 1.0 - theta;
+    let [y, k, y_end, k_end] = [y, k, y_end, k_end].map(|x| &x[..out.len()]);
     for i in 0..out.len() {
         let d = y_end[i] - y[i];
         out[i] = s * y[i]
@@ -151,6 +152,27 @@ pub fn hermite(
             + theta
                 * (theta - 1.0)
                 * ((1.0 - 2.0 * theta) * d + (theta - 1.0) * h * k[i] + theta * h * k_end[i]);
+    }
+}
+
+/// `out` = y + h (a_1 k_1 + a_2 k_2 + …) for the `terms` (a, k). All of one length as far as the compiler knows, so that it
+/// takes several components at a time.
+fn combine<const N: usize>(out: &mut [f64], y: &[f64], h: f64, terms: [(f64, &[f64]); N]) {
+    let y = &y[..out.len()];
+    let terms = terms.map(|(a, k)| (a, &k[..out.len()]));
+    for i in 0..out.len() {
+        let mut sum = terms[0].0 * terms[0].1[i];
+        for (a, k) in &terms[1..] {
+            sum += a * k[i];
+        }
+        out[i] = y[i] + h * sum;
+    }
+}
+
+/// `out` += a k.
+fn add_scaled(out: &mut [f64], a: f64, k: &[f64]) {
+    for (out, k) in out.iter_mut().zip(k) {
+        *out += a * k;
     }
 }
 
@@ -214,7 +236,7 @@ mod tests {
         let mut stepper = DormandPrince::new(2);
         Oscillator.derivative(0.0, &y, &mut k);
         stepper.attempt(&mut Oscillator, 0.0, h, &y, &k, &mut y1, &mut k1);
-        stepper.interpolate(0.37, h, &y, &k, &mut out);
+        stepper.interpolate(0..2, 0.37, h, &y, &k, &mut out);
         (out[0] - libm::cos(0.37 * h))
             .abs()
             .max((out[1] + libm::sin(0.37 * h)).abs())

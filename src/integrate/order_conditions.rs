@@ -281,7 +281,7 @@ fn dormand_and_prince_have_order_five_four_inside_and_four_embedded() {
     let k = Probe::units(7, 7).slopes[0].clone();
     for theta in PARTS {
         let mut at = vec![0.0; 7];
-        stepper.interpolate(theta, 1.0, &[0.0; 7], &k, &mut at);
+        stepper.interpolate(0..7, theta, 1.0, &[0.0; 7], &k, &mut at);
         let defects = tableau.defects(&at, theta, 4, false);
         assert!(
             defects.iter().all(|d| *d < ROUNDING),

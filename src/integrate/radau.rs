@@ -5,6 +5,7 @@
 //! contact by (h v)^2 / (2 L), which is more than a settled penetration at steps of a millisecond.
 
 use super::StiffSystem;
+use std::ops::Range;
 
 const SQRT6: f64 = 2.449_489_742_783_178;
 pub(super) const C: [f64; 3] = [(4.0 - SQRT6) / 10.0, (4.0 + SQRT6) / 10.0, 1.0];
@@ -193,35 +194,36 @@ impl Radau {
         let mut before = 0.0;
         for iteration in 0..MOST_ITERATIONS {
             for j in 0..3 {
-                for i in 0..n {
-                    self.stage[i] = y[i] + self.z[j][i];
+                for ((stage, y), z) in self.stage.iter_mut().zip(y).zip(&self.z[j]) {
+                    *stage = y + z;
                 }
                 system.derivative(t + C[j] * h, &self.stage, &mut self.f[j]);
             }
+            let [f1, f2, f3] = self.f.each_mut().map(|f| &mut f[..n]);
+            let [w1, w2, w3] = self.w.each_mut().map(|w| &mut w[..n]);
             for i in 0..n {
-                let f = [self.f[0][i], self.f[1][i], self.f[2][i]];
+                let f = [f1[i], f2[i], f3[i]];
                 let a: [f64; 3] = std::array::from_fn(|j| {
                     T_INVERSE[j][0] * f[0] + T_INVERSE[j][1] * f[1] + T_INVERSE[j][2] * f[2]
                 });
-                let (w1, w2, w3) = (self.w[0][i], self.w[1][i], self.w[2][i]);
-                self.f[0][i] = a[0] - real * w1;
-                self.f[1][i] = a[1] - alpha * w2 + beta * w3;
-                self.f[2][i] = a[2] - alpha * w3 - beta * w2;
+                f1[i] = a[0] - real * w1[i];
+                f2[i] = a[1] - alpha * w2[i] + beta * w3[i];
+                f3[i] = a[2] - alpha * w3[i] - beta * w2[i];
             }
-            let [f1, f2, f3] = &mut self.f;
             system.solve_shifted(f1);
             system.solve_shifted_pair(f2, f3);
-            let scale = system.scale();
+            let scale = &system.scale()[..n];
+            let z = self.z.each_mut().map(|z| &mut z[..n]);
             let mut size: f64 = 0.0;
             for i in 0..n {
                 let mut largest: f64 = 0.0;
-                for j in 0..3 {
-                    self.w[j][i] += self.f[j][i];
-                    largest = largest.max(self.f[j][i].abs());
+                for (w, f) in [(&mut *w1, &*f1), (&mut *w2, &*f2), (&mut *w3, &*f3)] {
+                    w[i] += f[i];
+                    largest = largest.max(f[i].abs());
                 }
-                let w = [self.w[0][i], self.w[1][i], self.w[2][i]];
+                let w = [w1[i], w2[i], w3[i]];
                 for j in 0..3 {
-                    self.z[j][i] = T[j][0] * w[0] + T[j][1] * w[1] + T[j][2] * w[2];
+                    z[j][i] = T[j][0] * w[0] + T[j][1] * w[1] + T[j][2] * w[2];
                 }
                 let relative = largest / (tolerance * scale[i]);
                 if relative > size || relative.is_nan() {
@@ -314,11 +316,12 @@ impl Radau {
         self.previous.h *= theta;
     }
 
-    /// State at `t + theta h`: the collocation polynomial.
-    pub fn interpolate(&self, theta: f64, y: &[f64], out: &mut [f64]) {
-        for (i, out) in out.iter_mut().enumerate() {
-            let z = std::array::from_fn(|j| self.previous.z[j][i]);
-            *out = y[i] + polynomial(&z, theta - 1.0);
+    /// Components `part` of the state at `t + theta h`: the collocation polynomial.
+    pub fn interpolate(&self, part: Range<usize>, theta: f64, y: &[f64], out: &mut [f64]) {
+        let y = &y[part.clone()];
+        let z = self.previous.z.each_ref().map(|z| &z[part.clone()]);
+        for (i, out) in out[part].iter_mut().enumerate() {
+            *out = y[i] + polynomial(&z.map(|z| z[i]), theta - 1.0);
         }
     }
 }

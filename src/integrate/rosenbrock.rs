@@ -5,7 +5,7 @@
 //! Written in the variables U = Gamma K, which need no product with the Jacobian
 //! (Hairer & Wanner, *Solving Ordinary Differential Equations II*, 2nd ed., IV.7, eq. (7.25)).
 
-use super::StiffSystem;
+use super::{StiffSystem, add_scaled};
 
 const STAGES: usize = 4;
 const GAMMA: f64 = 0.435_866_521_508_459;
@@ -149,28 +149,21 @@ impl Rosenbrock {
             } else {
                 stage.copy_from_slice(y);
                 for (j, uj) in done.iter().enumerate() {
-                    let a = table.a[i][j];
-                    for m in 0..n {
-                        stage[m] += a * uj[m];
-                    }
+                    add_scaled(stage, table.a[i][j], uj);
                 }
                 system.derivative(t + table.alpha[i] * h, stage, rate);
                 target.copy_from_slice(rate);
                 for (j, uj) in done.iter().enumerate() {
-                    let c = table.c[i][j] / h;
-                    for m in 0..n {
-                        target[m] += c * uj[m];
-                    }
+                    add_scaled(target, table.c[i][j] / h, uj);
                 }
             }
-            let g = table.gamma[i] * h;
-            for (x, f) in target.iter_mut().zip(system.time_derivative()) {
-                *x += g * f;
-            }
+            add_scaled(target, table.gamma[i] * h, system.time_derivative());
             system.solve_shifted(target);
         }
         let mut error = 0.0;
-        let scale = system.scale();
+        let scale = &system.scale()[..n];
+        let u = u.each_ref().map(|u| &u[..n]);
+        let y_end = &mut y_end[..n];
         for m in 0..n {
             let (mut sum, mut e) = (y[m], 0.0);
             for i in 0..STAGES {

@@ -1,6 +1,7 @@
 //! Ideal ball joints in tree coordinates: three constraint rows each, (45), solved for their Lagrange multipliers, and the
 //! projection that keeps closed loops closed.
 
+use super::kinematics::part;
 use super::model::{BodyIndex, Model};
 use super::rows::RowSystem;
 use super::tree::{Tree, visit_columns};
@@ -11,6 +12,25 @@ struct Side {
     block: usize,
     offset: usize,
     n: usize,
+}
+
+impl Side {
+    /// Its three rows of the Jacobians or of W.
+    #[inline]
+    fn rows<'a>(&self, of: &'a [f64]) -> [&'a [f64]; 3] {
+        let rows = &of[self.offset..][..3 * self.n];
+        let (first, others) = rows.split_at(self.n);
+        let (second, third) = others.split_at(self.n);
+        [first, second, third]
+    }
+
+    #[inline]
+    fn rows_mut<'a>(&self, of: &'a mut [f64]) -> [&'a mut [f64]; 3] {
+        let rows = &mut of[self.offset..][..3 * self.n];
+        let (first, others) = rows.split_at_mut(self.n);
+        let (second, third) = others.split_at_mut(self.n);
+        [first, second, third]
+    }
 }
 
 /// Constraint rows of a set of ball joints.
@@ -66,7 +86,7 @@ impl Constraints {
             })
             .collect();
         let mut pairs = Vec::new();
-        let mut first: Vec<usize> = (0..joints.len()).collect();
+        let mut columns = vec![Vec::new(); 3 * joints.len()];
         // (joint, side) pairs that act on each block so far.
         let mut on_block = vec![Vec::new(); model.blocks.len()];
         for (i, sides) in sides.iter().enumerate() {
@@ -76,16 +96,20 @@ impl Constraints {
                 pairs.extend(on_block[side.block].iter().map(|&(j, sj)| (i, j, si, sj)));
             }
             pairs[from..].sort_unstable();
-            first[i] = pairs.get(from).map_or(i, |&(_, j, ..)| j);
+            for row in 3 * i..3 * i + 3 {
+                let others = pairs[from..]
+                    .iter()
+                    .flat_map(|&(_, j, ..)| 3 * j..3 * j + 3);
+                columns[row].extend(others.filter(|&column| column < row));
+            }
         }
-        let rows = first.iter().flat_map(|&f| [3 * f; 3]).collect();
         Self {
             joints: joints.to_vec(),
             sides,
             pairs,
             jacobian: vec![0.0; total],
             weighted: vec![0.0; total],
-            matrix: RowSystem::new(rows),
+            matrix: RowSystem::new(columns),
             multipliers: vec![0.0; 3 * joints.len()],
             scratch: vec![0.0; 3 * joints.len()],
             step: vec![0.0; model.nv],
@@ -194,39 +218,32 @@ impl Constraints {
                 }) else {
                     continue;
                 };
-                let rows = &mut self.jacobian[side.offset..][..3 * side.n];
+                let [x, y, z] = side.rows_mut(&mut self.jacobian);
                 visit_columns(
                     model,
                     &tree.motion,
                     anchor.body,
                     &point,
                     |column, velocity, _| {
-                        for i in 0..3 {
-                            rows[i * side.n + column] += sign * velocity[i];
-                        }
+                        x[column] += sign * velocity.x;
+                        y[column] += sign * velocity.y;
+                        z[column] += sign * velocity.z;
                     },
                 );
             }
         }
         self.weighted.copy_from_slice(&self.jacobian);
         for side in self.sides.iter().flatten() {
-            for i in 0..3 {
-                let row = &mut self.weighted[side.offset + i * side.n..][..side.n];
+            for row in side.rows_mut(&mut self.weighted) {
                 tree.solve_block(model, side.block, row);
             }
         }
         self.matrix.clear();
         for &(i, j, si, sj) in &self.pairs {
             let (a, b) = (&self.sides[i][si], &self.sides[j][sj]);
-            for r in 0..3 {
-                let limit = if i == j { r + 1 } else { 3 };
-                for c in 0..limit {
-                    let left = &self.jacobian[a.offset + r * a.n..][..a.n];
-                    let right = &self.weighted[b.offset + c * b.n..][..b.n];
-                    let dot: f64 = left.iter().zip(right).map(|(x, y)| x * y).sum();
-                    self.matrix.add(3 * i + r, 3 * j + c, dot);
-                }
-            }
+            let (left, right) = (a.rows(&self.jacobian), b.rows(&self.weighted));
+            let block = left.map(|left| right.map(|right| dot(left, right)));
+            self.matrix.add_block(i, j, &block);
         }
         self.least_pivot = self.matrix.factor();
     }
@@ -240,10 +257,8 @@ impl Constraints {
         let mut sum = Vec3::zeros();
         for side in &self.sides[k] {
             let v = &v[model.blocks[side.block].v..][..side.n];
-            for i in 0..3 {
-                let row = &self.jacobian[side.offset + i * side.n..][..side.n];
-                sum[i] += row.iter().zip(v).map(|(x, y)| x * y).sum::<f64>();
-            }
+            let rows = side.rows(&self.jacobian);
+            sum += Vec3::from(rows.map(|row| dot(row, v)));
         }
         sum
     }
@@ -253,11 +268,10 @@ impl Constraints {
         for (k, sides) in self.sides.iter().enumerate() {
             for side in sides {
                 let v = &mut v[model.blocks[side.block].v..][..side.n];
-                for i in 0..3 {
-                    let row = &self.weighted[side.offset + i * side.n..][..side.n];
-                    for (v, w) in v.iter_mut().zip(row) {
-                        *v += w * x[3 * k + i];
-                    }
+                let [w1, w2, w3] = side.rows(&self.weighted);
+                let [x1, x2, x3] = *part(x, 3 * k);
+                for (c, v) in v.iter_mut().enumerate() {
+                    *v = *v + w1[c] * x1 + w2[c] * x2 + w3[c] * x3;
                 }
             }
         }
@@ -298,7 +312,7 @@ impl Constraints {
         let gravity = Vec3::zeros();
         let mut error = f64::INFINITY;
         for _ in 0..30 {
-            tree.forward(model, t, y);
+            tree.update_kinematics(model, t, y);
             let mut largest: f64 = 0.0;
             for (k, &j) in self.joints.iter().enumerate() {
                 let e = model.joints[j].eccentricity(&tree.motion);
@@ -354,5 +368,14 @@ impl Constraints {
         tree.assemble(model, gravity, &mut scratch);
         self.step = scratch;
         self.factor(model, tree, t, q);
+    }
+}
+
+/// Scalar product of two vectors of the same length, mostly of a free body's six coordinates.
+#[inline(always)]
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    match (a.as_array::<6>(), b.as_array::<6>()) {
+        (Some(a), Some(b)) => (0..6).map(|i| a[i] * b[i]).sum(),
+        _ => a.iter().zip(b).map(|(x, y)| x * y).sum(),
     }
 }

@@ -158,6 +158,12 @@ impl Contacts {
         }
     }
 
+    /// The same of joint `i` alone.
+    pub fn measure_one(&mut self, i: usize, t: f64, motion: &[Kinematics]) {
+        self.update_ramps(t);
+        self.joints[i].measure(motion);
+    }
+
     /// Relative velocity used by friction at the contact of joint `i` for the normal `n`, m/s.
     pub fn friction_reads(&self, i: usize, n: &Vec3, motion: &[Kinematics]) -> Vec3 {
         self.joints[i].friction_reads(n, motion)

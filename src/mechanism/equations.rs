@@ -1,7 +1,8 @@
 //! Interface of a formulation of the equations of motion. No other module knows more about one.
 
 use super::kinematics::{Driven, Kinematics, Wrench};
-use super::model::Model;
+use super::model::{BallJoint, Model};
+use super::path::Path;
 use crate::scene::Vec3;
 
 /// Smallest pivot ratio of the constraints: below it they determine the motion to fewer than four digits.
@@ -32,6 +33,12 @@ pub(super) trait Equations: Send {
 
     /// Poses and velocities at (t, y).
     fn update_kinematics(&mut self, model: &Model, t: f64, y: &[f64]);
+
+    /// What moves the gap of `joint`, unless it is about as much as [`Self::update_kinematics`] moves.
+    fn path(&self, model: &Model, joint: &BallJoint) -> Option<Path>;
+
+    /// [`Self::update_kinematics`] for the bodies on `path` alone.
+    fn update_along(&mut self, model: &Model, t: f64, y: &[f64], path: &Path);
 
     /// Motion of the latest [`Self::update_kinematics`], and the loads on the bodies about their centroids, for the caller to
     /// fill in; the last entry of each is the world's.

@@ -190,109 +190,285 @@ pub fn is_determinant_positive(a: &mut [f64], n: usize) -> bool {
     positive
 }
 
-/// Cholesky factorisation of a symmetric positive definite matrix stored by its row envelope.
+/// Rows of a block.
+const SIDE: usize = 3;
+
+type Block = [[f64; SIDE]; SIDE];
+
+/// Cholesky factorisation of a symmetric positive definite matrix stored by its row envelope, in blocks of up to three rows
+/// that couple alike, such as those of a ball joint; smaller ones are filled up with rows of the unit matrix.
 ///
-/// Row i holds columns `first[i]..=i`; nothing outside the envelope fills in, so that a chain costs linear time.
+/// Nothing outside the envelope fills in, so that a chain costs linear time. Inside it, blocks that stay zero are skipped: two
+/// legs of a platform couple only through their rows on it. Otherwise every sum runs in the order of the rows.
 pub struct Skyline {
+    /// Block of each row, and its place there.
+    place: Vec<(usize, usize)>,
+    /// Rows in each block.
+    size: Vec<usize>,
+    /// The row of blocks i holds the columns `first[i]..=i` from `offset[i]`, of which those in
+    /// `coupled[coupled_of[i]..coupled_of[i + 1]]`, and the last, are not zero.
     first: Vec<usize>,
     offset: Vec<usize>,
-    values: Vec<f64>,
+    coupled: Vec<usize>,
+    coupled_of: Vec<usize>,
+    blocks: Vec<Block>,
+    /// Right side and solution by blocks.
+    x: Vec<[f64; SIDE]>,
 }
 
 impl Skyline {
-    /// For rows that begin at columns `first`.
-    pub fn new(first: Vec<usize>) -> Self {
-        let mut offset = Vec::with_capacity(first.len());
+    /// For rows that hold an entry at these `columns` before the diagonal.
+    pub fn new(mut columns: Vec<Vec<usize>>) -> Self {
+        let mut skyline = Self {
+            place: Vec::with_capacity(columns.len()),
+            size: Vec::new(),
+            first: Vec::new(),
+            offset: Vec::new(),
+            coupled: Vec::new(),
+            coupled_of: vec![0],
+            blocks: Vec::new(),
+            x: Vec::new(),
+        };
+        for i in 0..columns.len() {
+            columns[i].sort_unstable();
+            columns[i].dedup();
+            let alike = i > 0 && columns[i].split_last() == Some((&(i - 1), &columns[i - 1][..]));
+            match skyline.size.last_mut() {
+                Some(size) if alike && *size < SIDE => *size += 1,
+                _ => skyline.size.push(1),
+            }
+            let block = skyline.size.len() - 1;
+            skyline.place.push((block, skyline.size[block] - 1));
+        }
+        // A row of the factor fills in along the paths from its entries towards the root of the elimination tree
+        // (Davis, *Direct Methods for Sparse Linear Systems*, 2006, section 4.1).
+        let blocks = skyline.size.len();
+        let mut parent = vec![NONE; blocks];
+        let mut reached = vec![NONE; blocks];
+        let mut row: Vec<usize> = Vec::new();
         let mut total = 0;
-        for (i, &f) in first.iter().enumerate() {
-            offset.push(total);
-            total += i - f + 1;
+        let leading = (0..columns.len()).filter(|&i| skyline.place[i].1 == 0);
+        for (i, columns) in leading.map(|i| &columns[i]).enumerate() {
+            row.clear();
+            reached[i] = i;
+            for &column in columns {
+                let mut j = skyline.place[column].0;
+                while reached[j] != i {
+                    reached[j] = i;
+                    row.push(j);
+                    if parent[j] == NONE {
+                        parent[j] = i;
+                    }
+                    j = parent[j];
+                }
+            }
+            row.sort_unstable();
+            let first = row.first().copied().unwrap_or(i);
+            skyline.first.push(first);
+            skyline.offset.push(total);
+            total += i - first + 1;
+            skyline.coupled.extend(&row);
+            skyline.coupled_of.push(skyline.coupled.len());
         }
-        Self {
-            first,
-            offset,
-            values: vec![0.0; total],
-        }
+        skyline.blocks = vec![Block::default(); total];
+        skyline.x = vec![[0.0; SIDE]; blocks];
+        skyline
     }
 
     /// Number of rows.
     pub fn len(&self) -> usize {
-        self.first.len()
+        self.place.len()
     }
 
     /// Sets all entries to zero.
     pub fn clear(&mut self) {
-        self.values.fill(0.0);
+        self.blocks.fill(Block::default());
     }
 
     /// Adds to entry (i, j), j <= i, inside the envelope.
     #[inline]
     pub fn add(&mut self, i: usize, j: usize, value: f64) {
-        self.values[self.offset[i] + j - self.first[i]] += value;
+        let ((i, row), (j, column)) = (self.place[i], self.place[j]);
+        self.blocks[self.offset[i] + j - self.first[i]][row][column] += value;
+    }
+
+    /// Adds to block (i, j), j <= i, inside the envelope, where every block has its three rows. What is above the diagonal is
+    /// never read.
+    #[inline]
+    pub fn add_block(&mut self, i: usize, j: usize, block: &Block) {
+        debug_assert_eq!(
+            (self.place[SIDE * i], self.place[SIDE * j]),
+            ((i, 0), (j, 0))
+        );
+        let sum = &mut self.blocks[self.offset[i] + j - self.first[i]];
+        for (sum, row) in sum.iter_mut().zip(block) {
+            for (sum, value) in sum.iter_mut().zip(row) {
+                *sum += value;
+            }
+        }
     }
 
     /// Entry (i, j), j <= i, before [`Self::factor`]; 0 outside the envelope.
     pub fn get(&self, i: usize, j: usize) -> f64 {
+        let ((i, row), (j, column)) = (self.place[i], self.place[j]);
         if j < self.first[i] {
             0.0
         } else {
-            self.values[self.offset[i] + j - self.first[i]]
+            self.blocks[self.offset[i] + j - self.first[i]][row][column]
         }
     }
 
     /// Original diagonal entry i and its pivot, after [`Self::factor`].
     pub fn diagonal_and_pivot(&self, i: usize) -> (f64, f64) {
-        let row = &self.values[self.offset[i]..][..=i - self.first[i]];
-        let pivot = self.get(i, i) * self.get(i, i);
-        (row.iter().map(|l| l * l).sum(), pivot)
+        let (i, row) = self.place[i];
+        let (before, own) = self.blocks[self.offset[i]..].split_at(i - self.first[i]);
+        let entries = before.iter().flat_map(|block| &block[row]);
+        let entries = entries.chain(&own[0][row][..=row]);
+        let pivot = own[0][row][row] * own[0][row][row];
+        (entries.map(|l| l * l).sum(), pivot)
+    }
+
+    /// Columns of the row of blocks i before its diagonal that are not zero.
+    #[inline]
+    fn coupled(&self, i: usize) -> &[usize] {
+        &self.coupled[self.coupled_of[i]..self.coupled_of[i + 1]]
     }
 
     /// Factors in place. Returns the smallest ratio of a pivot to its diagonal entry: at rounding level or below, rows are
     /// dependent.
     pub fn factor(&mut self) -> f64 {
+        let mut blocks = std::mem::take(&mut self.blocks);
         let mut least = f64::INFINITY;
-        for i in 0..self.len() {
-            let (fi, oi) = (self.first[i], self.offset[i]);
-            for j in fi..i {
-                let (fj, oj) = (self.first[j], self.offset[j]);
-                let start = fi.max(fj);
-                let mut sum = self.values[oi + j - fi];
-                for k in start..j {
-                    sum -= self.values[oi + k - fi] * self.values[oj + k - fj];
+        for (i, &size) in self.size.iter().enumerate() {
+            let (above, row) = blocks.split_at_mut(self.offset[i]);
+            let (first, coupled) = (self.first[i], self.coupled(i));
+            let row = &mut row[..=i - first];
+            for &j in coupled {
+                let other_first = self.first[j];
+                let other = &above[self.offset[j]..][..=j - other_first];
+                let mut block = row[j - first];
+                for &k in coupled {
+                    if (other_first..j).contains(&k) {
+                        subtract_product(&mut block, &row[k - first], &other[k - other_first]);
+                    }
                 }
-                self.values[oi + j - fi] = sum / self.values[oj + j - fj];
+                divide(&mut block, &other[j - other_first]);
+                row[j - first] = block;
             }
-            let diagonal = self.values[oi + i - fi];
-            let mut pivot = diagonal;
-            for k in fi..i {
-                let l = self.values[oi + k - fi];
-                pivot -= l * l;
+            let mut block = row[i - first];
+            let diagonal = [block[0][0], block[1][1], block[2][2]];
+            for &k in coupled {
+                let left = &row[k - first];
+                subtract_product(&mut block, left, left);
             }
-            least = least.min(pivot / diagonal);
-            self.values[oi + i - fi] = pivot.max(0.0).sqrt();
+            let pivots = factor_block(&mut block, size);
+            for (pivot, diagonal) in pivots.iter().zip(diagonal).take(size) {
+                least = least.min(pivot / diagonal);
+            }
+            row[i - first] = block;
         }
+        self.blocks = blocks;
         least
     }
 
     /// Solves A x = b in place.
-    pub fn solve(&self, x: &mut [f64]) {
-        for i in 0..self.len() {
-            let (fi, oi) = (self.first[i], self.offset[i]);
-            let mut sum = x[i];
-            for k in fi..i {
-                sum -= self.values[oi + k - fi] * x[k];
-            }
-            x[i] = sum / self.values[oi + i - fi];
+    pub fn solve(&mut self, x: &mut [f64]) {
+        let mut by_block = std::mem::take(&mut self.x);
+        for (&(block, row), x) in self.place.iter().zip(&*x) {
+            by_block[block][row] = *x;
         }
-        for i in (0..self.len()).rev() {
-            let (fi, oi) = (self.first[i], self.offset[i]);
-            let xi = x[i] / self.values[oi + i - fi];
-            x[i] = xi;
-            for k in fi..i {
-                x[k] -= self.values[oi + k - fi] * xi;
+        for i in 0..by_block.len() {
+            let row = &self.blocks[self.offset[i]..];
+            let mut b = by_block[i];
+            for &j in self.coupled(i) {
+                let (block, x) = (&row[j - self.first[i]], by_block[j]);
+                for r in 0..SIDE {
+                    for c in 0..SIDE {
+                        b[r] -= block[r][c] * x[c];
+                    }
+                }
+            }
+            let own = &row[i - self.first[i]];
+            for r in 0..SIDE {
+                for c in 0..r {
+                    b[r] -= own[r][c] * b[c];
+                }
+                b[r] /= own[r][r];
+            }
+            by_block[i] = b;
+        }
+        for i in (0..by_block.len()).rev() {
+            let row = &self.blocks[self.offset[i]..];
+            let own = &row[i - self.first[i]];
+            let mut b = by_block[i];
+            for r in (0..SIDE).rev() {
+                b[r] /= own[r][r];
+                for c in 0..r {
+                    b[c] -= own[r][c] * b[r];
+                }
+            }
+            by_block[i] = b;
+            for &j in self.coupled(i) {
+                let (block, x) = (&row[j - self.first[i]], &mut by_block[j]);
+                for r in (0..SIDE).rev() {
+                    for c in 0..SIDE {
+                        x[c] -= block[r][c] * b[r];
+                    }
+                }
+            }
+        }
+        for (&(block, row), x) in self.place.iter().zip(x) {
+            *x = by_block[block][row];
+        }
+        self.x = by_block;
+    }
+}
+
+/// `block` -= L M^T.
+#[inline]
+fn subtract_product(block: &mut Block, l: &Block, m: &Block) {
+    for r in 0..SIDE {
+        for c in 0..SIDE {
+            for k in 0..SIDE {
+                block[r][c] -= l[r][k] * m[c][k];
             }
         }
     }
+}
+
+/// `block` = `block` L^-T for a lower triangle L.
+#[inline]
+fn divide(block: &mut Block, l: &Block) {
+    for row in block {
+        for c in 0..SIDE {
+            for k in 0..c {
+                row[c] -= row[k] * l[c][k];
+            }
+            row[c] /= l[c][c];
+        }
+    }
+}
+
+/// Cholesky factor of a block of `size` rows, in place, and their pivots.
+#[inline]
+fn factor_block(block: &mut Block, size: usize) -> [f64; SIDE] {
+    let mut pivots = [1.0; SIDE];
+    for r in 0..SIDE {
+        if r < size {
+            for c in 0..r {
+                for k in 0..c {
+                    block[r][c] -= block[r][k] * block[c][k];
+                }
+                block[r][c] /= block[c][c];
+            }
+            pivots[r] = block[r][r];
+            for k in 0..r {
+                pivots[r] -= block[r][k] * block[r][k];
+            }
+        }
+        block[r][r] = pivots[r].max(0.0).sqrt();
+    }
+    pivots
 }
 
 #[cfg(test)]
@@ -350,9 +526,58 @@ mod tests {
     }
 
     #[test]
+    fn skyline_fills_in_where_it_must_and_skips_the_rest() {
+        // Four legs of two joints: three rows of the first couple with nothing before, two of the second with those and with
+        // all other second ones.
+        let mut columns: Vec<Vec<usize>> = Vec::new();
+        for leg in 0..4 {
+            let second = (0..leg).flat_map(|other| 5 * other + 3..5 * other + 5);
+            for row in 0..5 {
+                let own = 5 * leg..5 * leg + row;
+                columns.push(if row < 3 {
+                    own.collect()
+                } else {
+                    second.clone().chain(own).collect()
+                });
+            }
+        }
+        let n = columns.len();
+        let mut a = Skyline::new(columns.clone());
+        assert_eq!(a.size, [3, 2, 3, 2, 3, 2, 3, 2]);
+        assert!(a.coupled(6).is_empty());
+        assert_eq!(a.coupled(7), [1, 3, 5, 6]);
+        let mut dense = nalgebra::DMatrix::<f64>::identity(n, n) * 9.0;
+        for i in 0..n {
+            a.add(i, i, 9.0);
+            for &j in &columns[i] {
+                let value = libm::sin((i + 3 * j) as f64);
+                a.add(i, j, value);
+                dense[(i, j)] = value;
+                dense[(j, i)] = value;
+            }
+        }
+        let b = nalgebra::DVector::from_fn(n, |i, _| 1.0 + i as f64);
+        let expected = dense.lu().solve(&b).unwrap();
+        assert!(a.factor() > 0.1);
+        assert!((a.diagonal_and_pivot(n - 1).0 - 9.0).abs() < 1e-14);
+        let mut x = b;
+        a.solve(x.as_mut_slice());
+        assert!((x - expected).norm() < 1e-13);
+        // The first column makes rows 2 and 3 couple, and those fill in the last row between its entries.
+        let star = Skyline::new(vec![vec![], vec![], vec![0], vec![0], vec![1, 2]]);
+        assert_eq!(
+            (star.coupled(3), star.coupled(4)),
+            (&[0, 2][..], &[1, 2, 3][..])
+        );
+    }
+
+    #[test]
     fn skyline_solves_a_banded_system() {
         let n = 12;
-        let mut a = Skyline::new((0..n).map(|i: usize| i.saturating_sub(2)).collect());
+        let columns: Vec<_> = (0..n)
+            .map(|i: usize| (i.saturating_sub(2)..i).collect())
+            .collect();
+        let mut a = Skyline::new(columns);
         let mut dense = nalgebra::DMatrix::<f64>::zeros(n, n);
         for i in 0..n {
             for j in i.saturating_sub(2)..=i {

@@ -3,7 +3,8 @@
 use super::constraints::Constraints;
 use super::equations::Equations;
 use super::kinematics::{Driven, Kinematics, Wrench, spin_of};
-use super::model::{Anchor, Model, Motion};
+use super::model::{Anchor, BallJoint, Model, Motion};
+use super::path::Path;
 use super::power::inverse_dynamics;
 use super::tree::{self, Tree};
 use crate::scene::Vec3;
@@ -76,7 +77,15 @@ impl Equations for Forest {
     }
 
     fn update_kinematics(&mut self, model: &Model, t: f64, y: &[f64]) {
-        self.tree.forward(model, t, y);
+        self.tree.update_kinematics(model, t, y);
+    }
+
+    fn path(&self, model: &Model, joint: &BallJoint) -> Option<Path> {
+        Path::of(model, joint)
+    }
+
+    fn update_along(&mut self, model: &Model, t: f64, y: &[f64], path: &Path) {
+        self.tree.update_along(model, t, y, path);
     }
 
     fn loads(&mut self) -> (&[Kinematics], &mut [Wrench]) {
@@ -161,7 +170,7 @@ impl Equations for Forest {
     }
 
     fn prescribed_motion(&mut self, model: &Model, t: f64, y: &[f64]) -> Option<&[Kinematics]> {
-        self.tree.forward(model, t, y);
+        self.tree.update_kinematics(model, t, y);
         Some(&self.tree.motion)
     }
 

@@ -1,6 +1,8 @@
 //! Motion of bodies: from coordinates to poses, velocities and accelerations of the centroids. World axes.
 
-use super::model::{Anchor, BallJoint, Body, Model, Motion};
+use super::jet::Jet;
+use super::model::{Anchor, BallJoint, Body, BodyIndex, Model, Motion};
+use super::path::Path;
 use super::spcmm::Ideal;
 use crate::scene::{Mat3, Quat, Vec3};
 
@@ -41,6 +43,19 @@ impl Kinematics {
         }
     }
 
+    /// Pose and velocity of a free body at its coordinates: centroid, quaternion (w, x, y, z); velocity, angular velocity.
+    #[inline]
+    pub fn move_freely(
+        &mut self,
+        [x, y, z, turn @ ..]: &[f64; 7],
+        &[vx, vy, vz, wx, wy, wz]: &[f64; 6],
+    ) {
+        self.rotation = rotation_of(turn);
+        self.position = Vec3::new(*x, *y, *z);
+        self.velocity = Vec3::new(vx, vy, vz);
+        self.angular_velocity = Vec3::new(wx, wy, wz);
+    }
+
     /// Velocity of a point fixed to the body at `arm` (world axes) from the centroid.
     #[inline]
     pub fn point_velocity(&self, arm: &Vec3) -> Vec3 {
@@ -56,6 +71,15 @@ impl Kinematics {
                 .angular_velocity
                 .cross(&self.angular_velocity.cross(arm))
     }
+}
+
+/// Components `at..at + N` of a state: one check of bounds for all of them.
+#[inline(always)]
+pub fn part<const N: usize>(of: &[f64], at: usize) -> &[f64; N] {
+    let Some(part) = of[at..].first_chunk() else {
+        unreachable!("coordinates lie within the state");
+    };
+    part
 }
 
 /// omega = 2 vec(q' q*) for a quaternion of about unit length, rad/s.
@@ -126,8 +150,7 @@ impl Wrench {
 
 /// Rotation matrix of a quaternion (w, x, y, z) of any length.
 #[inline]
-pub fn rotation_of(q: &[f64]) -> Mat3 {
-    let (w, x, y, z) = (q[0], q[1], q[2], q[3]);
+fn rotation_of(&[w, x, y, z]: &[f64; 4]) -> Mat3 {
     let s = 2.0 / (w * w + x * x + y * y + z * z);
     let (xs, ys, zs) = (x * s, y * s, z * s);
     let (wx, wy, wz) = (w * xs, w * ys, w * zs);
@@ -146,15 +169,19 @@ pub fn rotation_of(q: &[f64]) -> Mat3 {
     )
 }
 
-/// dq/dt = 1/2 omega q for a world angular velocity.
+/// Position rates of a free body: those of its centroid, and dq/dt = 1/2 omega q for its world angular velocity.
 #[inline]
-pub fn quaternion_rate(q: &[f64], omega: &[f64], out: &mut [f64]) {
-    let (w, x, y, z) = (q[0], q[1], q[2], q[3]);
-    let (a, b, c) = (0.5 * omega[0], 0.5 * omega[1], 0.5 * omega[2]);
-    out[0] = -a * x - b * y - c * z;
-    out[1] = a * w + b * z - c * y;
-    out[2] = b * w + c * x - a * z;
-    out[3] = c * w + a * y - b * x;
+pub fn free_rate(&[.., w, x, y, z]: &[f64; 7], &[vx, vy, vz, wx, wy, wz]: &[f64; 6]) -> [f64; 7] {
+    let (a, b, c) = (0.5 * wx, 0.5 * wy, 0.5 * wz);
+    [
+        vx,
+        vy,
+        vz,
+        -a * x - b * y - c * z,
+        a * w + b * z - c * y,
+        b * w + c * x - a * z,
+        c * w + a * y - b * x,
+    ]
 }
 
 /// Turns the quaternion at `q` by the small world rotation vector `turn` and normalises it.
@@ -182,19 +209,17 @@ pub fn quaternion_of(rotation: &Mat3) -> Quat {
     Quat::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(*rotation))
 }
 
-/// Motion of a child body of `parent` for its joint coordinate (q, rate, acceleration).
+/// Moves body `b`, a child of another, to its joint coordinate `q`.
 #[inline]
-pub fn follow(
-    body: &Body,
-    parent: &Kinematics,
-    revolute: bool,
-    q: f64,
-    rate: f64,
-    acceleration: f64,
-) -> Kinematics {
+pub fn follow(motion: &mut [Kinematics], b: BodyIndex, body: &Body, revolute: bool, q: Jet) {
+    let Ok([child, parent]) = motion.get_disjoint_mut([b, body.parent]) else {
+        unreachable!("a body hangs from another body or from the world");
+    };
+    let (q, rate, acceleration) = (q.value, q.rate, q.acceleration);
     let from_parent = parent.rotation * body.from_parent;
     let axis = parent.rotation * body.axis;
     let wp = parent.angular_velocity;
+    child.axis = axis;
     if revolute {
         let (s, c) = libm::sincos(q);
         let rotation = parent.rotation * (body.fixed + body.cosine * c + body.sine * s);
@@ -202,18 +227,15 @@ pub fn follow(
         let spin = axis * rate;
         let omega = wp + spin;
         let alpha = parent.angular_acceleration + wp.cross(&spin) + axis * acceleration;
-        Kinematics {
-            rotation,
-            position: parent.position + from_parent + arm,
-            velocity: parent.velocity + wp.cross(&from_parent) + omega.cross(&arm),
-            angular_velocity: omega,
-            acceleration: parent.point_acceleration(&from_parent)
-                + alpha.cross(&arm)
-                + omega.cross(&omega.cross(&arm)),
-            angular_acceleration: alpha,
-            axis,
-            arm,
-        }
+        child.rotation = rotation;
+        child.position = parent.position + from_parent + arm;
+        child.velocity = parent.velocity + wp.cross(&from_parent) + omega.cross(&arm);
+        child.angular_velocity = omega;
+        child.acceleration = parent.point_acceleration(&from_parent)
+            + alpha.cross(&arm)
+            + omega.cross(&omega.cross(&arm));
+        child.angular_acceleration = alpha;
+        child.arm = arm;
     } else {
         let rotation = parent.rotation * body.fixed;
         let slide = axis * q;
@@ -221,18 +243,14 @@ pub fn follow(
         let arm = slide + to_centroid;
         let offset = from_parent + arm;
         let velocity = axis * rate;
-        Kinematics {
-            rotation,
-            position: parent.position + offset,
-            velocity: parent.point_velocity(&offset) + velocity,
-            angular_velocity: wp,
-            acceleration: parent.point_acceleration(&offset)
-                + 2.0 * wp.cross(&velocity)
-                + axis * acceleration,
-            angular_acceleration: parent.angular_acceleration,
-            axis,
-            arm,
-        }
+        child.rotation = rotation;
+        child.position = parent.position + offset;
+        child.velocity = parent.point_velocity(&offset) + velocity;
+        child.angular_velocity = wp;
+        child.acceleration =
+            parent.point_acceleration(&offset) + 2.0 * wp.cross(&velocity) + axis * acceleration;
+        child.angular_acceleration = parent.angular_acceleration;
+        child.arm = arm;
     }
 }
 
@@ -269,7 +287,7 @@ pub fn accelerate(
 pub struct Driven {
     time: Option<f64>,
     /// Driven coordinates.
-    pub coordinates: Vec<super::jet::Jet>,
+    pub coordinates: Vec<Jet>,
     /// The paper's ideal mechanism, where the scene follows it.
     pub ideal: Option<Ideal>,
     bodies: Vec<usize>,
@@ -280,7 +298,7 @@ impl Driven {
     pub fn new(model: &Model) -> Self {
         Self {
             time: None,
-            coordinates: vec![super::jet::Jet::default(); model.drives.len()],
+            coordinates: vec![Jet::default(); model.drives.len()],
             ideal: None,
             bodies: (0..model.bodies.len())
                 .filter(|&b| model.bodies[b].driven_only)
@@ -307,32 +325,53 @@ impl Driven {
             self.coordinates[i] = model.drive(i, t, self.ideal.as_ref());
         }
         for &b in &self.bodies {
-            let body = &model.bodies[b];
-            let parent = &motion[body.parent];
-            motion[b] = match body.motion {
-                // A slider on the world moves only along its line.
-                Motion::Driven {
-                    drive,
-                    revolute: false,
-                } if body.parent == model.world() => {
-                    let q = self.coordinates[drive];
-                    let arm = body.axis * q.value + body.fixed * body.to_centroid;
-                    Kinematics {
-                        rotation: body.fixed,
-                        position: body.from_parent + arm,
-                        velocity: body.axis * q.rate,
-                        acceleration: body.axis * q.acceleration,
-                        axis: body.axis,
-                        arm,
-                        ..Kinematics::rest()
-                    }
-                }
-                Motion::Driven { drive, revolute } => {
-                    let q = self.coordinates[drive];
-                    follow(body, parent, revolute, q.value, q.rate, q.acceleration)
-                }
-                _ => follow(body, parent, false, 0.0, 0.0, 0.0),
-            };
+            self.move_body(model, b, motion);
+        }
+    }
+
+    /// The same for the bodies on `path` alone.
+    pub fn update_along(&mut self, model: &Model, t: f64, path: &Path, motion: &mut [Kinematics]) {
+        if self.time == Some(t) || path.drives.is_empty() {
+            return;
+        }
+        if model.trajectory.is_some() {
+            // All its sliders are computed at once.
+            self.update(model, t, motion);
+            return;
+        }
+        // Part of it is at this instant, part of it still at another.
+        self.time = None;
+        for &i in &path.drives {
+            self.coordinates[i] = model.drive(i, t, None);
+        }
+        for &b in &path.driven {
+            self.move_body(model, b, motion);
+        }
+    }
+
+    #[inline]
+    fn move_body(&self, model: &Model, b: BodyIndex, motion: &mut [Kinematics]) {
+        let body = &model.bodies[b];
+        match body.motion {
+            // A slider on the world moves only along its line.
+            Motion::Driven {
+                drive,
+                revolute: false,
+            } if body.parent == model.world() => {
+                let q = self.coordinates[drive];
+                let arm = body.axis * q.value + body.fixed * body.to_centroid;
+                let child = &mut motion[b];
+                child.rotation = body.fixed;
+                child.position = body.from_parent + arm;
+                child.velocity = body.axis * q.rate;
+                child.acceleration = body.axis * q.acceleration;
+                child.axis = body.axis;
+                child.arm = arm;
+            }
+            Motion::Driven { drive, revolute } => {
+                follow(motion, b, body, revolute, self.coordinates[drive]);
+            }
+            _ => follow(motion, b, body, false, Jet::default()),
         }
     }
 }

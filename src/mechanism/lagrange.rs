@@ -4,8 +4,9 @@
 //! The KKT system (55) is solved by its Schur complement J M^-1 J^T. Allocates nothing after `new`.
 
 use super::equations::{Equations, LEAST_PIVOT};
-use super::kinematics::{self, Driven, Kinematics, Wrench};
-use super::model::{BodyIndex, Model, Motion};
+use super::kinematics::{self, Driven, Kinematics, Wrench, part};
+use super::model::{BallJoint, BodyIndex, Model, Motion};
+use super::path::Path;
 use super::rows::RowSystem;
 use super::tree::visit_free;
 use crate::scene::{JointKind, Mat3, Scene, Vec3};
@@ -66,6 +67,18 @@ impl Group {
 struct JacobianRow {
     child: [Vec3; 2],
     parent: [Vec3; 2],
+    /// Inverse inertia of both times their angular parts; zero for the world.
+    turned: [Vec3; 2],
+}
+
+impl JacobianRow {
+    fn new(child: [Vec3; 2], parent: [Vec3; 2]) -> Self {
+        Self {
+            child,
+            parent,
+            turned: [Vec3::zeros(); 2],
+        }
+    }
 }
 
 /// Equations of motion with multipliers.
@@ -228,15 +241,14 @@ impl Lagrange {
             .flat_map(|(g, group)| std::iter::repeat_n(g, group.rows.count()))
             .collect();
         let pairs = pairs_of(&groups, model.world());
-        let mut first: Vec<usize> = (0..rows).collect();
+        let mut columns = vec![Vec::new(); rows];
         for &(i, j) in &pairs {
-            first[i] = first[i].min(j);
+            if j < i {
+                columns[i].push(j);
+            }
         }
         let n = model.bodies.len();
-        let empty = JacobianRow {
-            child: [Vec3::zeros(); 2],
-            parent: [Vec3::zeros(); 2],
-        };
+        let empty = JacobianRow::new([Vec3::zeros(); 2], [Vec3::zeros(); 2]);
         // Bodies that depend on time alone are part of the state here too.
         let mut driven = Driven::new(model);
         driven.only_coordinates();
@@ -250,7 +262,7 @@ impl Lagrange {
             rows: vec![empty; rows],
             group_of,
             pairs,
-            matrix: RowSystem::new(first),
+            matrix: RowSystem::new(columns),
             multipliers: vec![0.0; rows],
             residual: vec![0.0; rows],
             inverse_inertia: vec![Mat3::zeros(); n],
@@ -269,14 +281,17 @@ impl Lagrange {
         );
         let (ri, rj) = (&self.rows[i], &self.rows[j]);
         let mut sum = 0.0;
+        let others = [
+            (gj.child, &rj.child[0], &rj.turned[0]),
+            (gj.parent, &rj.parent[0], &rj.turned[1]),
+        ];
         for (bi, ji) in [(gi.child, &ri.child), (gi.parent, &ri.parent)] {
             if bi == model.bodies.len() {
                 continue;
             }
-            for (bj, jj) in [(gj.child, &rj.child), (gj.parent, &rj.parent)] {
+            for (bj, moved, turned) in others {
                 if bi == bj {
-                    sum += ji[0].dot(&jj[0]) / model.bodies[bi].mass
-                        + ji[1].dot(&(self.inverse_inertia[bi] * jj[1]));
+                    sum += ji[0].dot(moved) / model.bodies[bi].mass + ji[1].dot(turned);
                 }
             }
         }
@@ -300,10 +315,7 @@ impl Lagrange {
                     for i in 0..3 {
                         let mut e = zero;
                         e[i] = 1.0;
-                        self.rows[at + i] = JacobianRow {
-                            child: [e, dc.cross(&e)],
-                            parent: [-e, e.cross(&dp)],
-                        };
+                        self.rows[at + i] = JacobianRow::new([e, dc.cross(&e)], [-e, e.cross(&dp)]);
                         self.residual[at + i] = stabilised(phi[i], rate[i], acceleration[i]);
                         self.drift = self.drift.max(phi[i].abs());
                     }
@@ -317,10 +329,7 @@ impl Lagrange {
                     let acceleration = (c.angular_acceleration - p.angular_acceleration)
                         .dot(&cross)
                         + relative.dot(&turning);
-                    self.rows[at] = JacobianRow {
-                        child: [zero, cross],
-                        parent: [zero, -cross],
-                    };
+                    self.rows[at] = JacobianRow::new([zero, cross], [zero, -cross]);
                     self.residual[at] = stabilised(phi, relative.dot(&cross), acceleration);
                     self.drift = self.drift.max(phi.abs());
                 }
@@ -341,10 +350,8 @@ impl Lagrange {
                     let phi = b.dot(&d) - f.value;
                     let rate = b1.dot(&d) + b.dot(&d1) - f.rate;
                     let acceleration = b2.dot(&d) + 2.0 * b1.dot(&d1) + b.dot(&d2) - f.acceleration;
-                    self.rows[at] = JacobianRow {
-                        child: [b, dc.cross(&b)],
-                        parent: [-b, b.cross(&dp) + b.cross(&d)],
-                    };
+                    self.rows[at] =
+                        JacobianRow::new([b, dc.cross(&b)], [-b, b.cross(&dp) + b.cross(&d)]);
                     self.residual[at] = stabilised(phi, rate, acceleration);
                     self.drift = self.drift.max(phi.abs());
                 }
@@ -368,10 +375,7 @@ impl Lagrange {
                     let acceleration = (c.angular_acceleration - p.angular_acceleration).dot(&x)
                         + relative.dot(&wp.cross(&x))
                         - f.acceleration;
-                    self.rows[at] = JacobianRow {
-                        child: [zero, x],
-                        parent: [zero, -x],
-                    };
+                    self.rows[at] = JacobianRow::new([zero, x], [zero, -x]);
                     self.residual[at] = stabilised(phi, relative.dot(&x) - f.rate, acceleration);
                     self.drift = self.drift.max(phi.abs());
                 }
@@ -428,12 +432,18 @@ impl Equations for Lagrange {
         let n = model.bodies.len();
         let (qs, vs) = y.split_at(7 * n);
         for b in 0..n {
-            let (q, v) = (&qs[7 * b..7 * b + 7], &vs[6 * b..6 * b + 6]);
-            let m = &mut self.motion[b];
-            m.position = Vec3::new(q[0], q[1], q[2]);
-            m.rotation = kinematics::rotation_of(&q[3..7]);
-            m.velocity = Vec3::new(v[0], v[1], v[2]);
-            m.angular_velocity = Vec3::new(v[3], v[4], v[5]);
+            self.motion[b].move_freely(part(qs, 7 * b), part(vs, 6 * b));
+        }
+    }
+
+    fn path(&self, model: &Model, joint: &BallJoint) -> Option<Path> {
+        Some(Path::of_bodies(model, joint))
+    }
+
+    fn update_along(&mut self, model: &Model, _: f64, y: &[f64], path: &Path) {
+        let (qs, vs) = y.split_at(7 * model.bodies.len());
+        for &b in &path.dynamic {
+            self.motion[b].move_freely(part(qs, 7 * b), part(vs, 6 * b));
         }
     }
 
@@ -453,6 +463,17 @@ impl Equations for Lagrange {
             self.inverse_inertia[b] = m.rotation * body.inertia_inverse * m.rotation.transpose();
         }
         self.linearise();
+        for (row, &group) in self.rows.iter_mut().zip(&self.group_of) {
+            let group = &self.groups[group];
+            for (b, turned, j) in [
+                (group.child, 0, row.child[1]),
+                (group.parent, 1, row.parent[1]),
+            ] {
+                if b < model.bodies.len() {
+                    row.turned[turned] = self.inverse_inertia[b] * j;
+                }
+            }
+        }
         self.matrix.clear();
         for &(i, j) in &self.pairs {
             let value = self.mobility(model, i, j);
@@ -485,12 +506,8 @@ impl Equations for Lagrange {
         let n = model.bodies.len();
         let (qs, vs) = y.split_at(7 * n);
         for b in 0..n {
-            dq[7 * b..7 * b + 3].copy_from_slice(&vs[6 * b..6 * b + 3]);
-            kinematics::quaternion_rate(
-                &qs[7 * b + 3..7 * b + 7],
-                &vs[6 * b + 3..6 * b + 6],
-                &mut dq[7 * b + 3..7 * b + 7],
-            );
+            let rate = kinematics::free_rate(part(qs, 7 * b), part(vs, 6 * b));
+            dq[7 * b..7 * b + 7].copy_from_slice(&rate);
         }
     }
 

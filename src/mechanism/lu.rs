@@ -23,32 +23,38 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
     pub fn factor(&mut self, entry: impl Fn(usize, usize, usize) -> X) {
         let n = self.n;
         let a = &mut self.rows;
-        for i in 0..n {
-            for j in 0..n {
-                a[i * n + j] = entry(i, j, n);
+        for (i, row) in a.chunks_exact_mut(n).enumerate() {
+            for (j, a) in row.iter_mut().enumerate() {
+                *a = entry(i, j, n);
             }
         }
         for k in 0..n {
-            let mut best = k;
+            let (mut best, mut largest) = (k, a[k * n + k].norm1());
             for i in k + 1..n {
-                if a[i * n + k].norm1() > a[best * n + k].norm1() {
-                    best = i;
+                let size = a[i * n + k].norm1();
+                if size > largest {
+                    (best, largest) = (i, size);
                 }
             }
             self.pivots[k] = best;
             if best != k {
-                for j in 0..n {
-                    a.swap(k * n + j, best * n + j);
-                }
+                let (top, bottom) = a.split_at_mut(best * n);
+                top[k * n..][..n].swap_with_slice(&mut bottom[..n]);
             }
             let (top, bottom) = a.split_at_mut((k + 1) * n);
             let pivot_row = &top[k * n..];
             let inverse = X::one() / pivot_row[k];
+            // Bodies that are far apart in a mechanism do not couple: most factors are zero, and the row of the pivot ends early.
+            let last = pivot_row.iter().rposition(|a| !a.is_zero());
+            let end = last.map_or(k, |last| last + 1);
             for row in bottom.chunks_exact_mut(n) {
+                if row[k].is_zero() {
+                    continue;
+                }
                 let factor = row[k] * inverse;
                 row[k] = factor;
-                for j in k + 1..n {
-                    row[j] -= factor * pivot_row[j];
+                for (a, pivot) in row[k + 1..end].iter_mut().zip(&pivot_row[k + 1..end]) {
+                    *a -= factor * *pivot;
                 }
             }
         }

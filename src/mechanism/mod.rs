@@ -19,6 +19,7 @@ mod kinematics;
 mod lagrange;
 mod lu;
 mod model;
+mod path;
 mod power;
 mod rows;
 mod spcmm;
@@ -38,6 +39,7 @@ pub use start::{Assembly, Placement};
 pub use summary::Summary;
 pub use systems::Evaluator;
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use crate::scene::{Formulation, Scene, Vec3, format_quantity_digits};
@@ -46,6 +48,7 @@ use equations::{Equations, LEAST_PIVOT};
 use forest::Forest;
 use lagrange::Lagrange;
 use model::Model;
+use path::Path;
 use tree::Tree;
 
 /// Why a scene's equations cannot be set up.
@@ -205,6 +208,8 @@ pub struct Mechanism {
     equations: Box<dyn Equations>,
     /// Ball joints with clearance.
     pub contacts: Contacts,
+    /// What moves the gap of each ball joint; `None` for nearly everything.
+    paths: Vec<Option<Path>>,
     /// The scene's elements in its order, then the pulling hand, if any.
     elements: Vec<Box<dyn SceneElement>>,
     of_scene: usize,
@@ -246,7 +251,9 @@ impl Mechanism {
             Formulation::Tree => Box::new(Forest::new(&model)),
             Formulation::Lagrange => Box::new(Lagrange::new(scene, &model)),
         };
+        let path = |joint| equations.path(&model, joint);
         Self {
+            paths: model.joints.iter().map(path).collect(),
             evaluation_time: bounds::evaluation_time(scene, &model),
             sources: power::Sources::new(&model, &*equations, scene.elements.len()),
             elements: elements_of(scene, &model),
@@ -346,6 +353,21 @@ impl Mechanism {
         self.evaluated = None;
         self.equations.update_kinematics(&self.model, t, y);
         self.contacts.measure(t, self.equations.motion());
+    }
+
+    /// Components of a state that [`Self::measure_one`] reads for ball joint `j`; `None` if it reads all.
+    pub fn measured(&self, j: usize) -> Option<&[Range<usize>]> {
+        self.paths[j].as_ref().map(|path| &path.parts[..])
+    }
+
+    /// Gap of ball joint `j` at (t, y), and the motion of the bodies that decide it.
+    pub fn measure_one(&mut self, j: usize, t: f64, y: &[f64]) {
+        self.evaluated = None;
+        match &self.paths[j] {
+            Some(path) => self.equations.update_along(&self.model, t, y, path),
+            None => self.equations.update_kinematics(&self.model, t, y),
+        }
+        self.contacts.measure_one(j, t, self.equations.motion());
     }
 
     /// Sliding speed of ball joint `j` in the motion last measured, m/s.

@@ -18,10 +18,10 @@ pub struct RowSystem {
 }
 
 impl RowSystem {
-    /// For rows that begin at columns `first`.
-    pub fn new(first: Vec<usize>) -> Self {
+    /// For rows that couple with these `columns` before their own.
+    pub fn new(columns: Vec<Vec<usize>>) -> Self {
         Self {
-            skyline: Skyline::new(first),
+            skyline: Skyline::new(columns),
             dependent: None,
         }
     }
@@ -80,6 +80,12 @@ impl RowSystem {
     #[inline]
     pub fn add(&mut self, i: usize, j: usize, value: f64) {
         self.skyline.add(i, j, value);
+    }
+
+    /// Adds to the entries of rows 3 i.. and columns 3 j.., j <= i, where rows couple by threes.
+    #[inline]
+    pub fn add_block(&mut self, i: usize, j: usize, block: &[[f64; 3]; 3]) {
+        self.skyline.add_block(i, j, block);
     }
 
     /// Factors in place. Returns the smallest pivot ratio, without the rows known to be dependent: near rounding level,
@@ -329,7 +335,7 @@ mod tests {
 
     fn system(a: &DMatrix<f64>) -> RowSystem {
         let n = a.nrows();
-        let mut system = RowSystem::new(vec![0; n]);
+        let mut system = RowSystem::new((0..n).map(|i| (0..i).collect()).collect());
         for i in 0..n {
             for j in 0..=i {
                 system.add(i, j, a[(i, j)]);

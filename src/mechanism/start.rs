@@ -73,10 +73,10 @@ impl Mechanism {
         let closed_form = model.trajectory.as_ref().filter(|_| assembled);
         if let Some(trajectory) = closed_form {
             place_output_body(model, trajectory, &mut y);
-            tree.forward(model, T, &y);
+            tree.update_kinematics(model, T, &y);
             turn_hinges(model, &tree.motion, &mut y);
         }
-        tree.forward(model, T, &y);
+        tree.update_kinematics(model, T, &y);
         let guess = tree.motion.clone();
         let distance = |j: usize| model.joints[j].eccentricity(&guess).norm();
         for j in 0..model.joints.len() {
@@ -112,7 +112,7 @@ impl Mechanism {
             assembly.other_mode = is_other_mode(model, &mut constraints, &mut tree, &guessed, &y);
         }
         Tree::normalise(model, &mut y);
-        tree.forward(model, T, &y);
+        tree.update_kinematics(model, T, &y);
         let bodies = model.bodies.iter().zip(guess.iter().zip(&tree.motion));
         assembly.bodies = bodies.map(|(body, (a, b))| placement(body, a, b)).collect();
         let rank = self.rank_of_ideal_joints(&mut tree, &y)?;
@@ -138,7 +138,7 @@ impl Mechanism {
         let model = &self.model;
         let guess = y.clone();
         let error = constraints.project(model, tree, T, y);
-        tree.forward(model, T, y);
+        tree.update_kinematics(model, T, y);
         if error <= CLOSED && constraints.system().least_joint_pivot(3) >= DEPENDENT_ROWS {
             return Ok(());
         }
@@ -146,7 +146,7 @@ impl Mechanism {
         constraints.treat_as_dependent(constraints.rows());
         y.clone_from(&guess);
         let error = constraints.project(model, tree, T, y);
-        tree.forward(model, T, y);
+        tree.update_kinematics(model, T, y);
         if !(error <= CLOSED) {
             return Err(self.no_closure(constraints, tree, &guess, y));
         }
@@ -160,7 +160,7 @@ impl Mechanism {
     /// Checks that no ideal joint opens at the velocities in `y`: where directions are constrained more than once, for
     /// example by drives, these may contradict one another.
     fn check_speeds(&self, tree: &mut Tree, y: &[f64]) -> Result<(), MechanismError> {
-        tree.forward(&self.model, 0.0, y);
+        tree.update_kinematics(&self.model, 0.0, y);
         for &j in &self.model.ideal_joints {
             let rate = self.model.joints[j].opening_rate(&tree.motion);
             if !(rate.norm() <= HELD) {
@@ -189,7 +189,7 @@ impl Mechanism {
             .all(|moved| moved <= AT_REST);
         let joints = constraints.joints().to_vec();
         let name = |j: usize| self.joint_names[j].clone();
-        tree.forward(model, T, &again);
+        tree.update_kinematics(model, T, &again);
         let open = |&j: &usize| {
             let gap = model.joints[j].eccentricity(&tree.motion);
             (gap.norm() > CLOSED).then(|| (name(j), gap))
@@ -199,7 +199,7 @@ impl Mechanism {
         } else {
             Vec::new()
         };
-        tree.forward(model, T, guess);
+        tree.update_kinematics(model, T, guess);
         let given = |j: usize| model.joints[j].eccentricity(&tree.motion).norm();
         let given = joints.iter().map(|&j| (j, given(j)));
         let (joint, given) = given.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default();
@@ -299,7 +299,7 @@ fn rank_around(
 
 /// Jacobians and J M^-1 J^T at (t, y).
 fn factor_at(model: &Model, constraints: &mut Constraints, tree: &mut Tree, t: f64, y: &[f64]) {
-    tree.forward(model, t, y);
+    tree.update_kinematics(model, t, y);
     constraints.prepare(model, tree, t, &y[..model.nq], &Vec3::zeros());
 }
 

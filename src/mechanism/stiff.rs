@@ -178,10 +178,10 @@ impl Stiff {
         if self.empty {
             return;
         }
-        for column in self.by_position.chunks_exact_mut(self.n) {
-            equations.apply_inverse_mass(model, column);
-        }
-        for column in self.by_velocity.chunks_exact_mut(self.n) {
+        let columns = self.by_position.chunks_exact_mut(self.n);
+        let columns = columns.chain(self.by_velocity.chunks_exact_mut(self.n));
+        // Most coordinates move no touching ball.
+        for column in columns.filter(|column| column.iter().any(|force| *force != 0.0)) {
             equations.apply_inverse_mass(model, column);
         }
         let positions = self.time_derivative.len() - self.n;
@@ -199,7 +199,8 @@ impl Stiff {
                 ..
             } = self;
             lu.factor(|i, j, n| {
-                let entry = -by_velocity[j * n + i] - by_position[j * n + i] / shift;
+                let (d, k) = (by_velocity[j * n + i], by_position[j * n + i]);
+                let entry = if k == 0.0 { -d } else { -d - k / shift };
                 if i == j { shift + entry } else { entry }
             });
         }

@@ -3,8 +3,10 @@
 //! Mass matrix by the composite-rigid-body algorithm, bias by one outward and one inward pass (Featherstone 2008,
 //! chapters 5 and 6), in world axes with each body's own centroid as reference. Allocates nothing after `new`.
 
-use super::kinematics::{self, Driven, Kinematics, Wrench};
-use super::model::{Model, Motion};
+use super::jet::Jet;
+use super::kinematics::{self, Driven, Kinematics, Wrench, part};
+use super::model::{BodyIndex, Model, Motion};
+use super::path::Path;
 use crate::scene::{Mat3, Vec3};
 
 /// Mass, first moment and inertia of a body with all its descendants, about that body's centroid.
@@ -80,7 +82,7 @@ impl Tree {
         tree
     }
 
-    /// For `model`, if only its motion is needed: [`Self::forward`].
+    /// For `model`, if only its motion is needed: [`Self::update_kinematics`].
     pub fn without_masses(model: &Model) -> Self {
         let n = model.bodies.len();
         Self {
@@ -97,40 +99,20 @@ impl Tree {
 
     /// Poses, velocities and bias accelerations (those with zero coordinate accelerations) at (t, y).
     #[inline]
-    pub fn forward(&mut self, model: &Model, t: f64, y: &[f64]) {
+    pub fn update_kinematics(&mut self, model: &Model, t: f64, y: &[f64]) {
         self.driven.update(model, t, &mut self.motion);
-        let (qs, vs) = y.split_at(model.nq);
+        let (motion, coordinates) = (&mut self.motion, &self.driven.coordinates);
         for &b in &self.dynamic {
-            let body = &model.bodies[b];
-            self.motion[b] = match body.motion {
-                Motion::Free { q, v } => Kinematics {
-                    rotation: kinematics::rotation_of(&qs[q + 3..q + 7]),
-                    position: Vec3::new(qs[q], qs[q + 1], qs[q + 2]),
-                    velocity: Vec3::new(vs[v], vs[v + 1], vs[v + 2]),
-                    angular_velocity: Vec3::new(vs[v + 3], vs[v + 4], vs[v + 5]),
-                    ..Kinematics::rest()
-                },
-                Motion::Revolute { q, v } => {
-                    kinematics::follow(body, &self.motion[body.parent], true, qs[q], vs[v], 0.0)
-                }
-                Motion::Prismatic { q, v } => {
-                    kinematics::follow(body, &self.motion[body.parent], false, qs[q], vs[v], 0.0)
-                }
-                Motion::Driven { drive, revolute } => {
-                    let q = self.driven.coordinates[drive];
-                    kinematics::follow(
-                        body,
-                        &self.motion[body.parent],
-                        revolute,
-                        q.value,
-                        q.rate,
-                        q.acceleration,
-                    )
-                }
-                Motion::Fixed => {
-                    kinematics::follow(body, &self.motion[body.parent], false, 0.0, 0.0, 0.0)
-                }
-            };
+            move_body(model, b, y, coordinates, motion);
+        }
+    }
+
+    /// The same for the bodies on `path` alone.
+    pub fn update_along(&mut self, model: &Model, t: f64, y: &[f64], path: &Path) {
+        self.driven.update_along(model, t, path, &mut self.motion);
+        let (motion, coordinates) = (&mut self.motion, &self.driven.coordinates);
+        for &b in &path.dynamic {
+            move_body(model, b, y, coordinates, motion);
         }
     }
 
@@ -151,6 +133,15 @@ impl Tree {
             let inertia = world_inertia(&m.rotation, &body.inertia, body.diagonal);
             let w = m.angular_velocity;
             let load = &wrench[b];
+            let block_index = model.block_of[b];
+            let block = &model.blocks[block_index];
+            if let (Motion::Free { v, .. }, Some(_)) = (body.motion, block.lone) {
+                // It carries nothing, and its bias accelerations are zero.
+                let force = load.force + gravity * body.mass;
+                let torque = load.torque - w.cross(&(inertia * w));
+                out[v..v + 6].copy_from_slice(&six_of(&force, &torque));
+                continue;
+            }
             let mut c = Composite {
                 mass: body.mass,
                 moment: Vec3::zeros(),
@@ -163,8 +154,6 @@ impl Tree {
                 c.add(&composite[b]);
                 composite[b] = Composite::EMPTY;
             }
-            let block_index = model.block_of[b];
-            let block = &model.blocks[block_index];
             let n = block.n;
             match body.motion {
                 Motion::Revolute { v, .. } => {
@@ -189,11 +178,8 @@ impl Tree {
                     fill_row(model, motion, h, n, block.v, row, b, momentum, angular);
                 }
                 Motion::Free { v, .. } => {
-                    out[v..v + 3].copy_from_slice(c.force.as_slice());
-                    out[v + 3..v + 6].copy_from_slice(c.torque.as_slice());
-                    if block.lone.is_none() {
-                        fill_free(&mut mass[mass_offset[block_index]..][..n * n], n, &c);
-                    }
+                    out[v..v + 6].copy_from_slice(&six_of(&c.force, &c.torque));
+                    fill_free(&mut mass[mass_offset[block_index]..][..n * n], n, &c);
                 }
                 Motion::Fixed | Motion::Driven { .. } => {}
             }
@@ -218,12 +204,11 @@ impl Tree {
         if let Some(b) = block.lone {
             let body = &model.bodies[b];
             let rotation = &self.motion[b].rotation;
-            let torque = Vec3::new(x[3], x[4], x[5]);
+            let [fx, fy, fz, tx, ty, tz] = *part(x, 0);
+            let acceleration = Vec3::new(fx, fy, fz) / body.mass;
+            let torque = Vec3::new(tx, ty, tz);
             let alpha = rotation * (body.inertia_inverse * rotation.tr_mul(&torque));
-            for i in 0..3 {
-                x[i] /= body.mass;
-            }
-            x[3..6].copy_from_slice(alpha.as_slice());
+            x.copy_from_slice(&six_of(&acceleration, &alpha));
         } else {
             let h = &self.mass[self.mass_offset[index]..][..block.n * block.n];
             block
@@ -285,12 +270,8 @@ impl Tree {
         for body in &model.bodies {
             match body.motion {
                 Motion::Free { q, v } => {
-                    dq[q..q + 3].copy_from_slice(&vs[v..v + 3]);
-                    kinematics::quaternion_rate(
-                        &qs[q + 3..q + 7],
-                        &vs[v + 3..v + 6],
-                        &mut dq[q + 3..q + 7],
-                    );
+                    let rate = kinematics::free_rate(part(qs, q), part(vs, v));
+                    dq[q..q + 7].copy_from_slice(&rate);
                 }
                 Motion::Revolute { q, v } | Motion::Prismatic { q, v } => dq[q] = vs[v],
                 Motion::Fixed | Motion::Driven { .. } => {}
@@ -324,6 +305,43 @@ impl Tree {
             }
         }
     }
+}
+
+/// Moves body `b` after its parent.
+#[inline(always)]
+fn move_body(model: &Model, b: BodyIndex, y: &[f64], driven: &[Jet], motion: &mut [Kinematics]) {
+    let (qs, vs) = y.split_at(model.nq);
+    let body = &model.bodies[b];
+    match body.motion {
+        Motion::Free { q, v } => {
+            let m = &mut motion[b];
+            m.move_freely(part(qs, q), part(vs, v));
+            m.acceleration = Vec3::zeros();
+            m.angular_acceleration = Vec3::zeros();
+        }
+        Motion::Revolute { q, v } => {
+            let q = Jet::new(qs[q], vs[v], 0.0);
+            kinematics::follow(motion, b, body, true, q);
+        }
+        Motion::Prismatic { q, v } => {
+            let q = Jet::new(qs[q], vs[v], 0.0);
+            kinematics::follow(motion, b, body, false, q);
+        }
+        Motion::Driven { drive, revolute } => {
+            let q = driven[drive];
+            kinematics::follow(motion, b, body, revolute, q);
+        }
+        Motion::Fixed => {
+            kinematics::follow(motion, b, body, false, Jet::default());
+        }
+    }
+}
+
+/// Both vectors, one after the other.
+#[inline(always)]
+fn six_of(linear: &Vec3, angular: &Vec3) -> [f64; 6] {
+    let (l, a) = (linear, angular);
+    [l.x, l.y, l.z, a.x, a.y, a.z]
 }
 
 /// R I R^T.

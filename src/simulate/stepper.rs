@@ -4,6 +4,7 @@ use crate::integrate::{
     ContactSystem, DormandPrince, FrictionSystem, ImexEuler, Method, Polynomial, Radau, Rosenbrock,
     RungeKutta4, SemiImplicitEuler, Stepper, StiffSystem, hermite,
 };
+use std::ops::Range;
 
 pub(super) enum AnyStepper {
     SemiImplicitEuler(SemiImplicitEuler),
@@ -192,8 +193,10 @@ impl AnyStepper {
         matches!(self, Self::ImexEuler(_))
     }
 
+    /// State at fraction `theta` of the latest attempt: the components `part` of it, into those of `out`.
     pub(super) fn interpolate(
         &self,
+        part: Range<usize>,
         theta: f64,
         h: f64,
         y: &[f64],
@@ -211,15 +214,16 @@ impl AnyStepper {
                 member: Member::Friction,
                 ..
             } => {
-                hermite(theta, h, y, k, y_end, k_end, out);
+                let [y, k, y_end, k_end] = [y, k, y_end, k_end].map(|x| &x[part.clone()]);
+                hermite(theta, h, y, k, y_end, k_end, &mut out[part]);
             }
             Self::DormandPrince(s)
             | Self::Automatic {
                 explicit: s,
                 member: Member::Explicit,
                 ..
-            } => s.interpolate(theta, h, y, k, out),
-            Self::Radau(s) | Self::Automatic { stiff: s, .. } => s.interpolate(theta, y, out),
+            } => s.interpolate(part, theta, h, y, k, out),
+            Self::Radau(s) | Self::Automatic { stiff: s, .. } => s.interpolate(part, theta, y, out),
         }
     }
 }

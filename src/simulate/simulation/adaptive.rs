@@ -229,7 +229,7 @@ impl Simulation {
 
     /// Gap of joint `j` on the interpolant of the attempted step, times `sign`.
     fn signed_gap(&mut self, j: usize, theta: f64, h: f64, sign: f64) -> SignedGap {
-        self.measure_at(theta, h);
+        self.measure_at(j, theta, h);
         let gap = self.mechanism.contacts.gap(j);
         SignedGap {
             theta,

@@ -188,23 +188,27 @@ impl Simulation {
 
     /// Penetration rate of joint `j` on the interpolant of the attempted step, m/s.
     fn rate_at(&mut self, j: usize, theta: f64, h: f64) -> f64 {
-        self.measure_at(theta, h);
+        self.measure_at(j, theta, h);
         self.mechanism.contacts.gap(j).separation.rate
     }
 
-    /// Measures the interpolant of the attempted step.
-    pub(super) fn measure_at(&mut self, theta: f64, h: f64) {
-        self.interpolate_attempt(theta, h);
-        let time = self.state.now.t + theta * h;
-        self.mechanism.measure(time, &self.scratch_y);
-    }
-
-    /// State at fraction `theta` of the attempted step, of size `h`, written to the scratch state.
-    fn interpolate_attempt(&mut self, theta: f64, h: f64) {
-        let (now, end) = (&self.state.now, &self.attempt.end);
-        let scratch = &mut self.scratch_y;
-        self.stepper
-            .interpolate(theta, h, &now.y, &now.k, &end.y, &end.k, scratch);
+    /// Measures the gap of joint `j` on the interpolant of the attempted step.
+    pub(super) fn measure_at(&mut self, j: usize, theta: f64, h: f64) {
+        let Self {
+            mechanism,
+            stepper,
+            state,
+            attempt,
+            scratch_y,
+            ..
+        } = self;
+        let (now, end) = (&state.now, &attempt.end);
+        let all = 0..now.y.len();
+        for part in mechanism.measured(j).unwrap_or(std::slice::from_ref(&all)) {
+            let part = part.clone();
+            stepper.interpolate(part, theta, h, &now.y, &now.k, &end.y, &end.k, scratch_y);
+        }
+        mechanism.measure_one(j, now.t + theta * h, scratch_y);
     }
 
     /// Where the sliding speed of joint `j` leaves its piece, as a fraction of the step just attempted, and for which
@@ -242,15 +246,18 @@ impl Simulation {
     /// Ends the step just attempted at a corner. Unlike at the start of a contact the step is not repeated: its end would
     /// miss the corner by the tolerance, which is not small compared with the ramp, and slide back at once.
     pub(super) fn end_at(&mut self, theta: f64, t_end: f64, h: f64) {
-        self.interpolate_attempt(theta, h);
-        self.attempt.end.y.copy_from_slice(&self.scratch_y);
+        let (now, end, scratch) = (&self.state.now, &mut self.attempt.end, &mut self.scratch_y);
+        let all = 0..now.y.len();
+        self.stepper
+            .interpolate(all, theta, h, &now.y, &now.k, &end.y, &end.k, scratch);
+        end.y.copy_from_slice(scratch);
         self.stepper.truncate(theta);
         self.evaluate_end(t_end);
     }
 
     /// How far joint `j` slides beyond its piece on the interpolant of the attempted step, and its sliding speed, m/s.
     fn beyond(&mut self, j: usize, theta: f64, h: f64) -> (f64, f64) {
-        self.measure_at(theta, h);
+        self.measure_at(j, theta, h);
         let speed = self.mechanism.slip_speed(j);
         let slip = self.state.now.memory[j].friction_piece;
         let c = self.mechanism.contacts.coefficients(j);

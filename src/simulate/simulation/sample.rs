@@ -86,7 +86,7 @@ impl Simulation {
         if mechanism.is_kinematic() {
             hermite(theta, h, y0, k0, y, k, scratch_y);
         } else {
-            stepper.interpolate(theta, h, y0, k0, y, k, scratch_y);
+            stepper.interpolate(0..y.len(), theta, h, y0, k0, y, k, scratch_y);
         }
     }
 }
