@@ -1,6 +1,8 @@
 //! Live plots of the recorded channels: one plot per quantity, one line per joint, axis or kind.
 
-use eframe::egui::{self, ComboBox, Pos2, Rangef, RichText, Ui, Vec2b, vec2};
+use eframe::egui::{
+    self, ComboBox, Pos2, Rangef, RichText, Role, Ui, Vec2b, WidgetInfo, vec2,
+};
 use egui_plot::{
     AxisHints, FilledArea, GridInput, GridMark, HoverPosition, Plot, PlotPoint, PlotTransform,
 };
@@ -433,6 +435,10 @@ impl Plots {
                     }
                 }
             });
+            let name = format!("Plot of {}", quantity.label());
+            shown
+                .response
+                .widget_info(|| WidgetInfo::labeled(Role::Image, true, &name));
             let transform = shown.transform;
             let asked = self.pointer(ui, &shown.response, &transform, time_size, player);
             self.places.push((quantity, Place { transform, units }));
@@ -552,6 +558,8 @@ impl Plots {
                         .frame(false)
                         .min_size(vec2(theme::side(ui, 0.0), 0.0)),
                 );
+                ui.ctx()
+                    .accesskit_node_builder(response.id, |node| node.set_toggled(on.into()));
                 if response.on_hover_text("Line shown or hidden").clicked() {
                     if on {
                         self.hidden.push(*channel);

@@ -242,7 +242,7 @@ fn an_interrupted_sweep_goes_on_where_it_stopped_and_a_damaged_part_is_refused()
     refused(&flipped(n - 100), &line("a.npz"), 1, "checksum");
     refused(&flipped(n - 2), &line("a.npz"), 1, "checksum");
     refused(&flipped(100), &line("a.npz"), 1, "checksum");
-    refused(&flipped(0), &line("a.npz"), 1, "no partial sweep");
+    refused(&flipped(0), &line("a.npz"), 1, "not a partial sweep");
     refused(&flipped(7), &line("a.npz"), 1, "another version");
     refused(
         &[&partial[..], &partial[n - 8..]].concat(),

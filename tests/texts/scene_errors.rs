@@ -499,7 +499,7 @@ fn additions_that_contradict_the_scene_are_refused() {
             &format!(
                 "{body}[[joint]]\nname = \"hinge\"\nkind = \"revolute\"\nparent = \"arm\"\nchild = \"arm\"\naxis = [0, 0, 1]\n"
             ),
-            &["joint.hinge.parent", "circle", "[[ball_joint]]"],
+            &["joint.hinge.parent", "cycle", "[[ball_joint]]"],
         ),
         (
             &format!(

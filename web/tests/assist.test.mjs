@@ -111,6 +111,8 @@ test('elements lie where their controls are, have names, and axe finds nothing s
         }));
         const widgets = new Map((await lab.widgets()).map((widget) => [widget.id, widget]));
         assert.ok(places.length > 20, `${places.length} elements`);
+        const nameless = [...widgets.values()].filter(({ label }) => !label.trim());
+        assert.deepEqual(nameless.map(({ role, rect }) => `${role} at ${rect}`), []);
         for (const [id, name, rect] of places) {
             const widget = widgets.get(id);
             rect.forEach((x, side) => assert.ok(Math.abs(x - widget.rect[side]) < 1, `${name}: ${rect} and ${widget.rect}`));

@@ -40,14 +40,6 @@ pub fn reproduce(arguments: &ReproduceArguments) -> Result<(), Failure> {
     print(&summary(&report, &arguments.out, wall))
 }
 
-/// Computes a report of any extent and writes it to `out`, which must be missing or empty.
-///
-/// # Errors
-/// As [`reproduce`].
-pub fn into_folder(out: &Path, extent: Extent, threads: usize) -> Result<(), Failure> {
-    make(Folder::claim(out, false)?, out, extent, threads, true).map(|_| ())
-}
-
 /// Computes a report into `folder`, which becomes `out`.
 fn make(
     folder: Folder,
