@@ -1,8 +1,6 @@
 //! Live plots of the recorded channels: one plot per quantity, one line per joint, axis or kind.
 
-use eframe::egui::{
-    self, ComboBox, Pos2, Rangef, RichText, Role, Ui, Vec2b, WidgetInfo, vec2,
-};
+use eframe::egui::{self, ComboBox, Pos2, Rangef, RichText, Role, Ui, Vec2b, WidgetInfo, vec2};
 use egui_plot::{
     AxisHints, FilledArea, GridInput, GridMark, HoverPosition, Plot, PlotPoint, PlotTransform,
 };
