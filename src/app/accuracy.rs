@@ -333,7 +333,8 @@ fn latest_impact(player: &Player) -> [AccuracyLine; 3] {
             false,
             "Ball joint of the latest impact that is over. Disturbed: another joint was in contact meanwhile, or the parameters of the \
              contact changed, so that the ratio of the speeds is not the law's alone. Slow: it began below the impact speed \
-             floor, so it rebounds higher than asked."
+             floor, so it rebounds higher than asked. Undisturbed: none of these; weight and drives act in every impact, and \
+             take much from a soft one."
                 .to_owned(),
         ),
         row(
@@ -348,11 +349,14 @@ fn latest_impact(player: &Player) -> [AccuracyLine; 3] {
         row(
             "Restitution in it",
             impact.map(ratio),
-            // An undisturbed impact yields the restitution of its law, unless the steps were too long.
+            // It yields the restitution of its law, unless the steps were too long or weight outlasts it.
             impact.is_some_and(|impact| {
                 !impact.disturbed && !impact.floored && (impact.given() - impact.law).abs() > 0.02
             }),
-            format!("Separation speed over approach speed of the latest impact, and what was asked for.{law}"),
+            format!(
+                "Separation speed over approach speed of the latest impact, and what was asked for.{law} Amber: it is \
+                 further than 0.02 from that, by too few steps, or by weight and drives where the impact is soft."
+            ),
         ),
     ]
 }

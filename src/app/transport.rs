@@ -180,7 +180,7 @@ fn scales(ui: &mut Ui, player: &mut Player) {
         .response
         .on_hover_text("Simulated against real time: choose one, or drag to the right for faster")
         .accessible_name("Time scale preset");
-    let drag = ui.interact(list.rect, list.id.with("drag"), Sense::drag());
+    let drag = ui.interact(list.rect, list.id.with("drag"), Sense::DRAG);
     if !drag.dragged() {
         return;
     }
