@@ -37,10 +37,10 @@ pub enum CostOf {
 /// What a limit counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Counted {
-    /// [`Cost::entries`].
+    /// Matrix entries.
     #[error("numbers in its matrices")]
     Entries,
-    /// [`Cost::products`].
+    /// Multiplications in mass matrices and constraint rows.
     #[error("multiplications in one evaluation")]
     Products,
 }

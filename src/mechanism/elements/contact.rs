@@ -15,7 +15,7 @@ pub struct Gap {
     pub eccentricity: Vec3,
     /// de/dt, m/s.
     pub eccentricity_rate: Vec3,
-    /// Where the ball is in its socket: of a ball beyond the wall from every evaluation, of others once [`Contact::finish`]
+    /// Where the ball is in its socket: of a ball beyond the wall from every evaluation, of others once `finish`
     /// has completed it. An ideal joint has no penetration.
     pub separation: Separation,
     /// F_N, N (19).
