@@ -54,8 +54,8 @@ impl Mirror {
     }
 
     /// Asks a control for `action` in the next frame: `Click`, `Focus`, `Increment`, `Decrement`, or `SetValue` with `data`.
-    /// False: there is no such action.
-    pub fn ask(&mut self, id: u64, action: &str, data: Option<accesskit::ActionData>) -> bool {
+    /// Anything else is ignored.
+    pub fn ask(&mut self, id: u64, action: &str, data: Option<accesskit::ActionData>) {
         use accesskit::Action;
         let action = match action {
             "Click" => Action::Click,
@@ -63,7 +63,7 @@ impl Mirror {
             "Increment" => Action::Increment,
             "Decrement" => Action::Decrement,
             "SetValue" => Action::SetValue,
-            _ => return false,
+            _ => return,
         };
         self.requests.push(accesskit::ActionRequest {
             action,
@@ -71,7 +71,6 @@ impl Mirror {
             target_node: accesskit::NodeId(id),
             data,
         });
-        true
     }
 }
 
