@@ -317,7 +317,7 @@ fn latest_impact(player: &Player) -> [AccuracyLine; 3] {
         |impact| format!("{}, {}", joint(player, impact.joint), kind(impact)),
     );
     let ratio = |impact: &Impact| {
-        let [given, asked] = [impact.given(), impact.asked].map(|ratio| value::number(ratio, 3));
+        let [given, asked] = [impact.achieved(), impact.asked].map(|ratio| value::number(ratio, 3));
         format!("{given}, asked {asked}")
     };
     let law = impact.map_or_else(String::new, |impact| {
@@ -351,7 +351,7 @@ fn latest_impact(player: &Player) -> [AccuracyLine; 3] {
             impact.map(ratio),
             // It yields the restitution of its law, unless the steps were too long or weight outlasts it.
             impact.is_some_and(|impact| {
-                !impact.disturbed && !impact.floored && (impact.given() - impact.law).abs() > 0.02
+                !impact.disturbed && !impact.floored && (impact.achieved() - impact.law).abs() > 0.02
             }),
             format!(
                 "Separation speed over approach speed of the latest impact, and what was asked for.{law} Amber: it is \

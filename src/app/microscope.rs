@@ -353,7 +353,7 @@ fn numbers(ui: &mut Ui, player: &Player, sight: &Sight, axes: [Vec3; 2]) {
         ),
         (
             "Given",
-            impact.map_or(NONE.to_owned(), |impact| given(impact.given())),
+            impact.map_or(NONE.to_owned(), |impact| given(impact.achieved())),
             "Speed of separation over speed of approach of the latest impact",
         ),
     ];

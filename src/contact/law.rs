@@ -78,7 +78,7 @@ fn exact_damping_factor(ce: f64) -> f64 {
 }
 
 /// Restitution that an undisturbed impact actually gives with damping factor `chi`, from the closed integral of the law.
-pub fn restitution_given(chi: f64) -> f64 {
+pub fn undisturbed_restitution(chi: f64) -> f64 {
     if chi <= 0.0 {
         return 1.0;
     }
@@ -237,7 +237,7 @@ mod tests {
         for law in LAWS {
             for ce in [0.3, 0.6, 0.9] {
                 let chi = damping_factor(law, ce);
-                let expected = restitution_given(chi);
+                let expected = undisturbed_restitution(chi);
                 let got = simulated_restitution(law, ce);
                 assert!(
                     (got - expected).abs() < 2e-5,
@@ -250,14 +250,14 @@ mod tests {
     #[test]
     fn gonthier_gives_the_restitution_asked_for() {
         for ce in [0.05, 0.2, 0.5, 0.8, 0.99] {
-            let given = restitution_given(damping_factor(NormalLaw::Gonthier, ce));
+            let given = undisturbed_restitution(damping_factor(NormalLaw::Gonthier, ce));
             assert!((given - ce).abs() < 1e-9, "{ce}: {given}");
         }
     }
 
     #[test]
     fn lankarani_nikravesh_asked_for_zero_rebounds_with_two_thirds() {
-        let given = restitution_given(damping_factor(NormalLaw::LankaraniNikravesh, 0.0));
+        let given = undisturbed_restitution(damping_factor(NormalLaw::LankaraniNikravesh, 0.0));
         assert!((given - 0.66).abs() < 5e-3, "{given}");
     }
 

@@ -9,7 +9,7 @@ mod slip;
 pub use approach::ApproachPiece;
 pub use force::{Force, Separation, Slope, Stiffness};
 pub use law::{
-    Coefficients, damping_factor, hertz_stiffness, impact_duration, restitution_given,
+    Coefficients, damping_factor, hertz_stiffness, impact_duration, undisturbed_restitution,
     settled_half_period, settled_penetration,
 };
 pub use memory::Memory;

@@ -3,7 +3,7 @@
 use super::jet::Jet;
 use super::model::{Anchor, BallJoint, Body, BodyIndex, Model, Motion};
 use super::path::Path;
-use super::spcmm::Ideal;
+use super::closed_form::ClosedMotion;
 use crate::scene::{Mat3, Quat, Vec3};
 
 /// Motion of a body's centroid frame. The world is one with everything zero.
@@ -288,8 +288,8 @@ pub struct Driven {
     time: Option<f64>,
     /// Driven coordinates.
     pub coordinates: Vec<Jet>,
-    /// The paper's ideal mechanism, where the scene follows it.
-    pub ideal: Option<Ideal>,
+    /// The motion in closed form, where the scene follows one.
+    pub closed: Option<ClosedMotion>,
     bodies: Vec<usize>,
 }
 
@@ -299,7 +299,7 @@ impl Driven {
         Self {
             time: None,
             coordinates: vec![Jet::default(); model.drives.len()],
-            ideal: None,
+            closed: None,
             bodies: (0..model.bodies.len())
                 .filter(|&b| model.bodies[b].driven_only)
                 .collect(),
@@ -318,11 +318,9 @@ impl Driven {
             return;
         }
         self.time = Some(t);
-        if let Some(trajectory) = &model.trajectory {
-            self.ideal = Some(trajectory.at(t));
-        }
+        self.closed = model.closed_form.as_ref().map(|form| form.at(t));
         for i in 0..self.coordinates.len() {
-            self.coordinates[i] = model.drive(i, t, self.ideal.as_ref());
+            self.coordinates[i] = model.drive(i, t, self.closed.as_ref());
         }
         for &b in &self.bodies {
             self.move_body(model, b, motion);
@@ -334,8 +332,8 @@ impl Driven {
         if self.time == Some(t) || path.drives.is_empty() {
             return;
         }
-        if model.trajectory.is_some() {
-            // All its sliders are computed at once.
+        if model.closed_form.is_some() {
+            // All its coordinates are computed at once.
             self.update(model, t, motion);
             return;
         }

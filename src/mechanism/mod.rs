@@ -5,6 +5,7 @@
 
 mod band;
 mod bounds;
+mod closed_form;
 mod columns;
 mod constraints;
 mod contacts;
@@ -30,11 +31,12 @@ mod systems;
 mod tree;
 
 pub use bounds::{Advice, CostOf, Counted};
+pub use closed_form::ClosedMotion;
 pub use contacts::{Contacts, Ramp};
 pub use elements::{Counts, ElementReport, Gap, Powers, Pull, Touch, Touching};
 pub use jet::Jet;
 pub use kinematics::{Kinematics, Wrench};
-pub use spcmm::{Ideal, Trajectory, Unreachable};
+pub use spcmm::Unreachable;
 pub use start::{Assembly, Placement};
 pub use summary::Summary;
 pub use systems::Evaluator;
@@ -238,8 +240,8 @@ impl Mechanism {
     /// A trajectory that the rods cannot reach; equations that would be too costly.
     pub fn new(scene: &Scene) -> Result<Self, MechanismError> {
         let model = Arc::new(Model::new(scene));
-        if let Some(trajectory) = &model.trajectory {
-            trajectory.check()?;
+        if let Some(form) = &model.closed_form {
+            form.check()?;
         }
         bounds::check(scene, &model)?;
         Ok(Self::with_model(scene, model))
@@ -322,7 +324,7 @@ impl Mechanism {
     /// Where the motion is a function of time alone and known in closed form: distance of the output body from that motion
     /// at the latest evaluation, m. 0 elsewhere.
     pub fn distance_from_ideal(&self) -> f64 {
-        let Some(ideal) = self.ideal().filter(|_| self.is_kinematic()) else {
+        let Some(ideal) = self.closed_motion().filter(|_| self.is_kinematic()) else {
             return 0.0;
         };
         let body = &self.model.bodies[self.model.output_body];
@@ -401,9 +403,14 @@ impl Mechanism {
         self.equations.motion()
     }
 
-    /// The paper's ideal mechanism at the latest instant, if the scene follows it.
-    pub fn ideal(&self) -> Option<&Ideal> {
-        self.equations.driven().ideal.as_ref()
+    /// Whether the scene follows a closed form.
+    pub fn has_closed_form(&self) -> bool {
+        self.model.closed_form.is_some()
+    }
+
+    /// The motion in closed form at the latest instant, if the scene follows one.
+    pub fn closed_motion(&self) -> Option<&ClosedMotion> {
+        self.equations.driven().closed.as_ref()
     }
 
     /// Constraint force on the ball of joint `j` at the latest evaluation, N; `None` if the joint has clearance.

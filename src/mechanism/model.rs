@@ -1,5 +1,8 @@
 //! A scene compiled for the equations of motion: centroid frames, coordinate numbers, trees, drives.
 
+use std::sync::Arc;
+
+use super::closed_form::{ClosedForm, ClosedMotion};
 use super::factor::{NONE, Pattern};
 use super::jet::Jet;
 use super::spcmm::Trajectory;
@@ -115,7 +118,7 @@ pub struct Model {
     pub joints: Vec<BallJoint>,
     pub ideal_joints: Vec<usize>,
     pub drives: Vec<DriveLaw>,
-    pub trajectory: Option<Trajectory>,
+    pub closed_form: Option<Arc<dyn ClosedForm>>,
     pub start: StartRule,
     /// Position and velocity coordinates at t = 0 as the scene gives them.
     pub start_state: Vec<f64>,
@@ -134,7 +137,6 @@ impl Model {
     /// Compiles `scene`.
     pub fn new(scene: &Scene) -> Self {
         let world = scene.bodies.len();
-        let trajectory = scene.spcmm.as_ref().map(Trajectory::new);
         let mut drives = Vec::new();
         let mut bodies: Vec<Body> = Vec::new();
         let mut root = vec![usize::MAX; world];
@@ -219,7 +221,7 @@ impl Model {
             joints: Vec::new(),
             ideal_joints: Vec::new(),
             drives,
-            trajectory,
+            closed_form: closed_form_of(scene),
             start: scene.start,
             start_state: Vec::new(),
             scale: Vec::new(),
@@ -354,12 +356,11 @@ impl Model {
     }
 
     /// Driven coordinate `drive` at `t`.
-    pub fn drive(&self, drive: usize, t: f64, ideal: Option<&super::spcmm::Ideal>) -> Jet {
+    pub fn drive(&self, drive: usize, t: f64, closed: Option<&ClosedMotion>) -> Jet {
         match self.drives[drive].law {
-            Drive::Spcmm { slider } => match ideal {
-                Some(ideal) => ideal.sliders[usize::from(slider) - 1],
-                None => Jet::default(),
-            },
+            Drive::ClosedForm { coordinate } => {
+                closed.map_or_else(Jet::default, |motion| motion.driven[coordinate])
+            }
             Drive::Constant { position, velocity } => {
                 Jet::new(position + velocity * t, velocity, 0.0)
             }
@@ -375,6 +376,12 @@ impl Model {
             }
         }
     }
+}
+
+/// The closed form that `scene` follows, if any.
+fn closed_form_of(scene: &Scene) -> Option<Arc<dyn ClosedForm>> {
+    let spcmm = scene.spcmm.as_ref()?;
+    Some(Arc::new(Trajectory::new(spcmm)))
 }
 
 fn free_start(start: JointStart) -> (Vec3, Quat, Vec3, Vec3) {

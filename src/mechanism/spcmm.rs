@@ -2,24 +2,11 @@
 //!
 //! An imaginary square root means that a rod is too short for the trajectory.
 
+use super::MechanismError;
+use super::closed_form::{ClosedForm, ClosedMotion};
 use super::jet::Jet;
 use crate::scene::{Spcmm, Vec3};
 use nalgebra::Matrix3;
-
-/// The ideal mechanism at one instant: everything a function of time alone.
-#[derive(Clone, Copy, Debug)]
-pub struct Ideal {
-    /// Slider coordinates f1, f2, f3, m, positive outward.
-    pub sliders: [Jet; 3],
-    /// o7, m.
-    pub position: [Jet; 3],
-    /// Rotation of the platform, R = Rx(0) Rz(beta) Ry(gamma).
-    pub rotation: Matrix3<f64>,
-    /// Angular velocity, rad/s: gamma is constant and alpha 0, so it is beta's rate about Z.
-    pub angular_velocity: Vec3,
-    /// Angular acceleration, rad/s^2.
-    pub angular_acceleration: Vec3,
-}
 
 /// A trajectory that a rod cannot follow.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -116,9 +103,12 @@ impl Trajectory {
             },
         )
     }
+}
 
-    /// Sliders, pose and motion of the ideal mechanism at `t`. NaN where a rod is too short.
-    pub fn at(&self, t: f64) -> Ideal {
+impl ClosedForm for Trajectory {
+    /// Sliders f1, f2, f3, positive outward; the platform is turned by R = Rx(0) Rz(beta) Ry(gamma), gamma constant, so that
+    /// it turns at the rate of beta about Z. NaN where a rod is too short.
+    fn at(&self, t: f64) -> ClosedMotion {
         let (left, parts) = self.evaluate(t);
         let Parts {
             x_relative,
@@ -138,8 +128,8 @@ impl Trajectory {
         let f2 = along - z + left[1].sqrt();
         let (cg, sg) = (self.cos_gamma, self.sin_gamma);
         let (s, c) = (sb.value, cb.value);
-        Ideal {
-            sliders: [f1, f2, f3],
+        ClosedMotion {
+            driven: [f1, f2, f3],
             position: [x_relative + Jet::constant(self.socket_plane), y, z],
             rotation: Matrix3::new(c * cg, -s, c * sg, s * cg, c, s * sg, -sg, 0.0, cg),
             angular_velocity: Vec3::new(0.0, 0.0, beta.rate),
@@ -147,11 +137,8 @@ impl Trajectory {
         }
     }
 
-    /// Searches one whole period for a rod that is too short.
-    ///
-    /// # Errors
-    /// The rod that is too short by the most, where it is.
-    pub fn check(&self) -> Result<(), Unreachable> {
+    /// Searches one whole period for a rod that is too short, and names the one that is by the most.
+    fn check(&self) -> Result<(), MechanismError> {
         const SAMPLES: u32 = 4000;
         let period = if self.p.frequency > 0.0 {
             self.period()
@@ -185,7 +172,7 @@ impl Trajectory {
                 }
             }
         }
-        worst.map_or(Ok(()), Err)
+        worst.map_or(Ok(()), |worst| Err(worst.into()))
     }
 }
 
@@ -227,7 +214,7 @@ mod tests {
             (0.2409227735, -0.04964883, -0.0671871),
             (0.1864724056, -0.07282449, -0.08487076),
         ];
-        for (f, (value, rate, acceleration)) in ideal.sliders.iter().zip(expected) {
+        for (f, (value, rate, acceleration)) in ideal.driven.iter().zip(expected) {
             assert!((f.value - value).abs() < 1e-10, "{f:?}");
             assert!((f.rate - rate).abs() < 1e-8, "{f:?}");
             assert!((f.acceleration - acceleration).abs() < 1e-8, "{f:?}");
@@ -270,7 +257,9 @@ mod tests {
             slider_plane: 0.0,
             ..paper()
         };
-        let error = Trajectory::new(&p).check().unwrap_err();
+        let Err(MechanismError::Unreachable(error)) = Trajectory::new(&p).check() else {
+            panic!("the rod is long enough");
+        };
         assert_eq!(error.slider, 1);
         let near = Unreachable {
             needs: 0.200_000_3,

@@ -1,9 +1,9 @@
 //! Start of a mechanism: assembly from the scene's values, how far it moved the bodies, and the rank of the constraints.
 
+use super::closed_form::ClosedForm;
 use super::constraints::Constraints;
 use super::kinematics::{self, Kinematics};
 use super::model::{self, Model, Motion};
-use super::spcmm::Trajectory;
 use super::tree::Tree;
 use super::{Mechanism, MechanismError, OPEN_AS_GIVEN};
 use crate::scene::{StartRule, Vec3};
@@ -20,8 +20,7 @@ const BESIDE: f64 = 0.01;
 /// Assembly has come to rest once it moves by less than this fraction of the scales.
 const AT_REST: f64 = 1e-9;
 
-/// How assembly at the start changed the scene's values. In a scene with the paper's inverse kinematics the guess comes
-/// from their closed form.
+/// How assembly at the start changed the scene's values. In a scene that follows a closed form the guess comes from it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Assembly {
     /// How far each body was moved from the guess.
@@ -70,9 +69,9 @@ impl Mechanism {
             Tree::new(model)
         };
         let mut y = model.start_state.clone();
-        let closed_form = model.trajectory.as_ref().filter(|_| assembled);
-        if let Some(trajectory) = closed_form {
-            place_output_body(model, trajectory, &mut y);
+        let closed_form = model.closed_form.as_deref().filter(|_| assembled);
+        if let Some(form) = closed_form {
+            place_output_body(model, form, &mut y);
             tree.update_kinematics(model, T, &y);
             turn_hinges(model, &tree.motion, &mut y);
         }
@@ -150,8 +149,8 @@ impl Mechanism {
         if !(error <= CLOSED) {
             return Err(self.no_closure(constraints, tree, &guess, y));
         }
-        // In a singular pose of the paper's mechanism the drives do not determine the velocities, with clearance or without.
-        if model.trajectory.is_some() && rank_around(model, constraints, tree, y).is_none() {
+        // In a singular pose of a closed form the drives do not determine the velocities, with clearance or without.
+        if model.closed_form.is_some() && rank_around(model, constraints, tree, y).is_none() {
             return Err(MechanismError::Singular);
         }
         Ok(())
@@ -229,7 +228,7 @@ impl Mechanism {
         constraints.treat_as_dependent(constraints.rows());
         let rank = rank_around(model, &mut constraints, tree, y);
         rank.map(Some).ok_or_else(|| {
-            if model.trajectory.is_some() {
+            if model.closed_form.is_some() {
                 return MechanismError::Singular;
             }
             factor_at(model, &mut constraints, tree, T, y);
@@ -344,8 +343,8 @@ fn placement(body: &model::Body, from: &Kinematics, to: &Kinematics) -> Placemen
 }
 
 /// Places the free output body as in the ideal mechanism at t = 0, so that assembly has little left to do.
-fn place_output_body(model: &Model, trajectory: &Trajectory, y: &mut [f64]) {
-    let ideal = trajectory.at(0.0);
+fn place_output_body(model: &Model, form: &dyn ClosedForm, y: &mut [f64]) {
+    let ideal = form.at(0.0);
     let body = &model.bodies[model.output_body];
     if let Motion::Free { q, v } = body.motion {
         let to_centroid = -(ideal.rotation * body.origin);

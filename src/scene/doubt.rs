@@ -72,7 +72,7 @@ impl fmt::Display for Doubt {
                 "{joints}: restitution {restitution} with {}, which is right only near 1 (asked for 0, it gives about \
                  {:.2}); flores or gonthier suit low restitution.",
                 law.word(),
-                contact::restitution_given(contact::damping_factor(*law, 0.0))
+                contact::undisturbed_restitution(contact::damping_factor(*law, 0.0))
             ),
             Self::Clearance {
                 joints,

@@ -414,10 +414,11 @@ pub enum JointStart {
 /// Law of a driven joint: q(t) with exact first and second derivatives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Drive {
-    /// Slider 1, 2 or 3 of the paper's inverse kinematics (39), (59).
-    Spcmm {
-        /// 1, 2 or 3.
-        slider: u8,
+    /// One of the coordinates that the scene's closed form drives: with `[spcmm]` the sliders of the paper's inverse
+    /// kinematics (39), (59).
+    ClosedForm {
+        /// Counted from 0.
+        coordinate: usize,
     },
     /// q = position + velocity t.
     Constant {
@@ -460,7 +461,7 @@ impl Scene {
             }
         };
         match joint.drive {
-            Some(Drive::Spcmm { .. }) => self.spcmm.map_or(f64::INFINITY, |spcmm| {
+            Some(Drive::ClosedForm { .. }) => self.spcmm.map_or(f64::INFINITY, |spcmm| {
                 swings(&[spcmm.amplitude_x, spcmm.amplitude_beta], spcmm.frequency)
             }),
             Some(Drive::Harmonic {

@@ -305,13 +305,14 @@ fn read_mechanism<'d>(
     for node in list("joint", MOST_BODIES, "joints")? {
         let joint = read_joint(&node, scene, &file_order, &file_places)?;
         joint_names.add(&joint.section, "joint", &joint.name)?;
-        if let Some(Drive::Spcmm { slider }) = joint.joint.drive
+        if let Some(Drive::ClosedForm { coordinate }) = joint.joint.drive
             && let Some(other) = joints
                 .iter()
                 .find(|other| other.joint.drive == joint.joint.drive)
         {
             let message = format!(
-                "slider {slider} already drives joint `{}`; allowed 1, 2, 3, each once",
+                "slider {} already drives joint `{}`; allowed 1, 2, 3, each once",
+                coordinate + 1,
                 other.name
             );
             return Err(joint.section.error("drive", message));

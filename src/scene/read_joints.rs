@@ -160,14 +160,14 @@ fn read_moving(section: &Section<'_>, scene: &Scene, joint: &mut Joint) -> Resul
         let drive = read_drive(&node, joint.kind, scene, place, rate)?;
         joint.drive = Some(drive);
         joint.start = drive_start(drive);
-        if let (Drive::Spcmm { slider }, Some(spcmm)) = (drive, scene.spcmm.as_ref()) {
+        if let (Drive::ClosedForm { coordinate }, Some(spcmm)) = (drive, scene.spcmm.as_ref()) {
             for key in ["axis", "parent_point", "parent", "rotation"] {
                 section.refuse(
                     key,
                     "the law spcmm places this joint: in the slider plane, along its own axis",
                 )?;
             }
-            joint.axis = [Vec3::z(), -Vec3::z(), Vec3::y()][usize::from(slider - 1)];
+            joint.axis = [Vec3::z(), -Vec3::z(), Vec3::y()][coordinate];
             joint.parent_point = Vec3::new(spcmm.slider_plane, 0.0, 0.0);
             return Ok(());
         }
@@ -217,7 +217,9 @@ fn read_drive(
             }
             let slider = section.require("slider", "1")?;
             match slider.scalar()?.parse::<u8>() {
-                Ok(number @ 1..=3) => Drive::Spcmm { slider: number },
+                Ok(number @ 1..=3) => Drive::ClosedForm {
+                    coordinate: number as usize - 1,
+                },
                 _ => {
                     return Err(
                         slider.error("out of range; allowed 1, 2 or 3; a whole number, no unit")
@@ -265,7 +267,7 @@ fn read_drive(
 /// Start of a drive law; that of the spcmm law, 0 here, comes from the inverse kinematics.
 fn drive_start(drive: Drive) -> JointStart {
     let (position, velocity) = match drive {
-        Drive::Spcmm { .. } => (0.0, 0.0),
+        Drive::ClosedForm { .. } => (0.0, 0.0),
         Drive::Constant { position, velocity } => (position, velocity),
         Drive::Harmonic {
             mean,

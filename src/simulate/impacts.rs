@@ -1,7 +1,7 @@
 //! The restitution check: for each impact the restitution asked for, the one its law gives, and the one that resulted.
 
 use super::peaks::PenetrationCubic;
-use crate::contact::{Coefficients, restitution_given};
+use crate::contact::{Coefficients, undisturbed_restitution};
 
 /// How many of the latest impacts are kept.
 const KEPT: usize = 64;
@@ -42,7 +42,7 @@ pub struct Impact {
 
 impl Impact {
     /// Actual restitution: separation speed over approach speed.
-    pub fn given(&self) -> f64 {
+    pub fn achieved(&self) -> f64 {
         self.separation_speed / self.approach_speed
     }
 }
@@ -96,7 +96,7 @@ impl Impacts {
         if law.0 != coefficients.damping {
             *law = (
                 coefficients.damping,
-                restitution_given(coefficients.damping),
+                undisturbed_restitution(coefficients.damping),
             );
         }
         self.under_way[joint] = (speed > 0.0).then_some(Impact {

@@ -132,7 +132,7 @@ pub struct Statistics {
     /// Time of the last separation, if any, per ball joint, s.
     pub last_separation: Vec<Option<f64>>,
     /// Simulated time that an explicit adaptive method spent in steps limited by stability, s.
-    pub held_time: f64,
+    pub stability_limited_time: f64,
     /// Largest ratio of damping to elastic force in any contact, per ball joint.
     pub damping: Vec<f64>,
     /// When it occurred, per ball joint, s.

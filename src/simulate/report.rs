@@ -94,7 +94,7 @@ fn joint_report(
 
 /// Probe tip minus the tip of the ideal mechanism at the same time, m.
 fn probe_error(mechanism: &Mechanism, scene: &Scene, frame: &Frame) -> Option<Vec3> {
-    let (probe, ideal) = (scene.output.probe?, mechanism.ideal()?);
+    let (probe, ideal) = (scene.output.probe?, mechanism.closed_motion()?);
     let body = &frame.bodies[scene.output.body];
     let ideal_tip = Vec3::from_fn(|i, _| ideal.position[i].value) + ideal.rotation * probe;
     Some(body.position + body.rotation * probe - ideal_tip)

@@ -236,7 +236,7 @@ impl Simulation {
         prepare_implicit(&mut mechanism, scene.solver.method)?;
         let state = State::new(scene, &mechanism, y);
         let scene = Arc::new(scene.clone());
-        let reference = Reference::of(&scene);
+        let reference = Reference::of(&scene, mechanism.has_closed_form());
         let mut simulation = Self::assembled(&scene, mechanism, state, reference);
         simulation.begin_contacts_at_start();
         simulation.refresh();

@@ -155,7 +155,7 @@ fn what_is_told_of_an_impact_is_what_the_run_recorded() {
         .impacts()
         .find(|impact| impact.joint == 0);
     let impact = *impact.expect("S1 was hit");
-    let given = format!("{:.4}", impact.given());
+    let given = format!("{:.4}", impact.achieved());
     harness.get_by_label(given.trim_end_matches('0'));
     harness.get_by_label("Restitution asked");
     harness.get_by_label("0.9");

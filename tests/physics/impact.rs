@@ -2,7 +2,7 @@
 
 use crate::common::{frame_now, parse};
 use jointplay::contact::{
-    NormalLaw, damping_factor, hertz_stiffness, restitution_given, settled_penetration,
+    NormalLaw, damping_factor, hertz_stiffness, undisturbed_restitution, settled_penetration,
 };
 use jointplay::scene::Vec3;
 use jointplay::simulate::{ContactState, Frame, Simulation};
@@ -128,7 +128,7 @@ fn head_on_impacts_give_the_restitution_of_their_law() {
                 continue;
             }
             let chi = damping_factor(law, number);
-            let expected = restitution_given(chi);
+            let expected = undisturbed_restitution(chi);
             if chi > 0.0 {
                 let quadrature = restitution_by_quadrature(chi);
                 assert!(

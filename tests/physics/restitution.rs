@@ -1,7 +1,7 @@
 //! The restitution check: each impact says what was asked for, what its law gives, and what it really gave.
 
 use crate::common::{Changes, METHODS, parse, simulation};
-use jointplay::contact::{NormalLaw, damping_factor, restitution_given};
+use jointplay::contact::{NormalLaw, damping_factor, undisturbed_restitution};
 use jointplay::scene::built_in_text;
 use jointplay::simulate::{Doubt, Impact, Simulation};
 
@@ -42,7 +42,7 @@ fn an_undisturbed_impact_gives_what_its_law_gives() {
     ];
     for (word, restitution, law) in laws {
         let asked: f64 = restitution.parse().unwrap();
-        let expected = restitution_given(damping_factor(law, asked));
+        let expected = undisturbed_restitution(damping_factor(law, asked));
         for method in METHODS {
             let changes = [
                 ("contact.normal_law", word),
@@ -60,15 +60,15 @@ fn an_undisturbed_impact_gives_what_its_law_gives() {
             let found = impacts(&mut flung(&changes), 0.02);
             let first = found.first().unwrap();
             let case = format!("{word} {restitution}, {method}: {first:?}");
-            println!("{case}: gave {:.5}, law {expected:.5}", first.given());
+            println!("{case}: gave {:.5}, law {expected:.5}", first.achieved());
             assert_eq!((first.asked, first.joint), (asked, 0), "{case}");
             assert!((first.law - expected).abs() < 1e-12, "{case}");
-            assert!((first.given() - expected).abs() < bound, "{case}");
+            assert!((first.achieved() - expected).abs() < bound, "{case}");
             assert!(!first.disturbed && !first.floored, "{case}");
             assert!(first.end > first.start && first.steps > 5, "{case}");
         }
     }
-    let zero = restitution_given(damping_factor(NormalLaw::LankaraniNikravesh, 0.0));
+    let zero = undisturbed_restitution(damping_factor(NormalLaw::LankaraniNikravesh, 0.0));
     assert!((zero - 0.66).abs() < 5e-3, "{zero}");
 }
 
@@ -99,7 +99,7 @@ fn slow_impacts_are_flagged() {
     let changes = [("contact.impact_speed_floor", "0.5 m/s")];
     let found = impacts(&mut flung(&changes), 0.01);
     assert!(
-        found[0].floored && found[0].given() > found[0].law + 0.01,
+        found[0].floored && found[0].achieved() > found[0].law + 0.01,
         "{:?}",
         found[0]
     );
@@ -129,7 +129,7 @@ fn impacts_among_other_contacts_are_flagged() {
         );
         assert_eq!(impact.asked, 0.9);
         assert!((impact.law - 0.913).abs() < 1e-3);
-        assert!((0.8..0.92).contains(&impact.given()), "{impact:?}");
+        assert!((0.8..0.92).contains(&impact.achieved()), "{impact:?}");
         assert!(impact.steps >= 10, "{impact:?}");
     }
     // No two in contact at once, where nothing is flagged.
@@ -154,9 +154,9 @@ fn methods_agree_about_the_first_impacts() {
         // The implicit Euler method damps by as much as its step is of the impact.
         let loose = if method == "imex-euler" { 10.0 } else { 1.0 };
         for (a, b) in found.iter().zip(&reference).take(2) {
-            println!("{method}: {:.5} against {:.5}", a.given(), b.given());
+            println!("{method}: {:.5} against {:.5}", a.achieved(), b.achieved());
             assert!(
-                (a.given() - b.given()).abs() < 1e-2 * loose,
+                (a.achieved() - b.achieved()).abs() < 1e-2 * loose,
                 "{method}: {a:?} {b:?}"
             );
             assert!(
@@ -332,7 +332,7 @@ fn an_undisturbed_impact_is_the_same_by_the_start_and_by_the_largest_speed() {
         };
         let (start, largest) = (first("start"), first("largest"));
         for (a, b) in [
-            (start.given(), largest.given()),
+            (start.achieved(), largest.achieved()),
             (start.peak, largest.peak),
             (start.end, largest.end),
         ] {

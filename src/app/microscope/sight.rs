@@ -166,7 +166,7 @@ mod tests {
         assert!((ends[0].start - 7.801_422_908e-3).abs() < 1e-6);
         assert!((ends[0].approach_speed - 0.076_909).abs() < 1e-4);
         let given = ends[0].separation_speed / ends[0].approach_speed;
-        assert!((ends[0].given() - given).abs() < 1e-15 && ends[0].asked == 0.9);
+        assert!((ends[0].achieved() - given).abs() < 1e-15 && ends[0].asked == 0.9);
         player.step_back();
         let sight = Sight::of(&player, 0).expect("has a joint");
         assert_eq!(sight.impact, Some(ends[1]));

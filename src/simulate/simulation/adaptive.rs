@@ -1,6 +1,6 @@
 //! Steps whose size follows the error estimate, cut at the first contact start or end inside them.
 
-use super::automatic::HELD_BY_STABILITY;
+use super::automatic::STABILITY_LIMIT;
 use super::corners::Piece;
 use super::{LONGEST_STEP, Simulation};
 use crate::integrate::{Method, find_root};
@@ -46,11 +46,11 @@ impl Simulation {
         let stiffness = self.stepper.stiffness(h, &end.y, &end.k);
         let evaluations = self.attempt.counts.equations;
         self.accept(t_end, h)?;
-        if stiffness > HELD_BY_STABILITY {
-            self.state.record.statistics.held_time += h;
+        if stiffness > STABILITY_LIMIT {
+            self.state.record.statistics.stability_limited_time += h;
         }
         if self.running.solver.method == Method::Automatic {
-            self.vote(h, stiffness, evaluations);
+            self.choose_member(h, stiffness, evaluations);
         }
         Ok(())
     }

@@ -6,11 +6,11 @@ use crate::mechanism::{Mechanism, MechanismError};
 use crate::simulate::stepper::Member;
 
 /// h |lambda| beyond which an explicit step is limited by stability.
-pub(super) const HELD_BY_STABILITY: f64 = 3.0;
+pub(super) const STABILITY_LIMIT: f64 = 3.0;
 /// Steps that must be limited by stability, or taken since the latest contact began, before the implicit method is tried.
-const HELD_STEPS: u32 = 8;
-/// Steps that must be held by stability before friction is tried as what holds them.
-const HELD_BY_FRICTION: u32 = 2;
+const LIMITED_STEPS: u32 = 8;
+/// Steps that must be limited by stability before friction is tried as the cause.
+const LIMITED_BEFORE_FRICTION: u32 = 2;
 const SETTLED_STEPS: u32 = 60;
 /// Over this many implicit steps the progress per cost must be this many times the explicit method's; otherwise the
 /// explicit one gets steps for this many times the cost of the trial, twice as many after each consecutive failed trial, at
@@ -34,7 +34,7 @@ pub const LARGEST_IMPLICIT: usize = 96;
 pub(super) struct Choice {
     /// Explicit steps since the latest contact began, and how many of them were limited by stability.
     pub(super) since_contact: u32,
-    pub(super) held: u32,
+    pub(super) limited: u32,
     /// Explicit steps before the implicit method may be tried again.
     pub(super) wait: u32,
     /// Explicit step size at the latest switch to the implicit method, s.
@@ -49,9 +49,9 @@ pub(super) struct Choice {
 
 impl Simulation {
     /// Which method of the automatic choice takes the next step, after one of size `h` that took so many evaluations.
-    pub(super) fn vote(&mut self, h: f64, stiffness: f64, evaluations: u64) {
+    pub(super) fn choose_member(&mut self, h: f64, stiffness: f64, evaluations: u64) {
         let before = self.state.control.member;
-        let member = self.voted(h, stiffness, evaluations);
+        let member = self.next_member(h, stiffness, evaluations);
         if member != before {
             self.state.control.member = member;
             self.state.control.controller = controller_of(Method::Automatic, member);
@@ -61,7 +61,7 @@ impl Simulation {
         }
     }
 
-    fn voted(&mut self, h: f64, stiffness: f64, evaluations: u64) -> Member {
+    fn next_member(&mut self, h: f64, stiffness: f64, evaluations: u64) -> Member {
         let velocities = self.state.now.y.len() - self.mechanism.positions();
         let algebra = self.mechanism.dense_algebra();
         let state = &mut self.state;
@@ -69,7 +69,7 @@ impl Simulation {
         let choice = &mut state.control.choice;
         if state.control.contact_began {
             choice.since_contact = 0;
-            choice.held = 0;
+            choice.limited = 0;
             // An impact is short and not stiff: the explicit method resolves it at less cost.
             let strikes = state.now.memory.iter().any(|m| m.active && !m.floored);
             return match member {
@@ -105,22 +105,22 @@ impl Simulation {
         let touches = state.now.memory.iter().any(|m| m.active);
         let mut next = member;
         if member == Member::Friction {
-            if self.mechanism.friction_rate() * h < HELD_BY_STABILITY {
-                choice.held = 0;
+            if self.mechanism.friction_rate() * h < STABILITY_LIMIT {
+                choice.limited = 0;
                 next = Member::Explicit;
             } else {
-                choice.held += 1;
+                choice.limited += 1;
             }
         } else {
-            choice.held = if stiffness > HELD_BY_STABILITY {
-                choice.held + 1
+            choice.limited = if stiffness > STABILITY_LIMIT {
+                choice.limited + 1
             } else {
-                choice.held.saturating_sub(1)
+                choice.limited.saturating_sub(1)
             };
             if touches
                 && self.mechanism.has_friction_alone()
-                && choice.held >= HELD_BY_FRICTION
-                && choice.held < HELD_STEPS
+                && choice.limited >= LIMITED_BEFORE_FRICTION
+                && choice.limited < LIMITED_STEPS
             {
                 next = Member::Friction;
             }
@@ -129,8 +129,8 @@ impl Simulation {
             choice.wait -= 1;
             return next;
         }
-        let held = choice.held >= HELD_STEPS && (touches || self.mechanism.has_couplings());
-        let settled = held || (touches && choice.since_contact >= SETTLED_STEPS);
+        let limited = choice.limited >= LIMITED_STEPS && (touches || self.mechanism.has_couplings());
+        let settled = limited || (touches && choice.since_contact >= SETTLED_STEPS);
         if settled && velocities <= LARGEST_IMPLICIT {
             *choice = Choice {
                 h_explicit: h,

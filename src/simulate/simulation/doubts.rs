@@ -123,7 +123,7 @@ impl Simulation {
     /// about how much energy settled contacts lose.
     fn stability_doubt(&self) -> Option<Doubt> {
         let solver = &self.running.solver;
-        let share = self.statistics().held_time / self.state.now.t;
+        let share = self.statistics().stability_limited_time / self.state.now.t;
         let loose = solver.method == Method::DormandPrince5 && solver.tolerance > LOOSEST_HELD;
         (loose && share > MOST_HELD).then_some(Doubt::Held {
             share,

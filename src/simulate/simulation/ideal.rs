@@ -70,9 +70,9 @@ pub(in crate::simulate) struct Kept {
 }
 
 impl Reference {
-    /// For `scene`.
-    pub(super) fn of(scene: &Scene) -> Self {
-        let Some(probe) = scene.output.probe.filter(|_| scene.spcmm.is_none()) else {
+    /// For `scene`, whose mechanism may know its ideal motion in closed form.
+    pub(super) fn of(scene: &Scene, closed_form: bool) -> Self {
+        let Some(probe) = scene.output.probe.filter(|_| !closed_form) else {
             return Self::Elsewhere;
         };
         if scene.ball_joints.iter().all(|j| j.contact.clearance == 0.0) {
