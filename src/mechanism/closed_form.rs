@@ -26,7 +26,7 @@ pub struct ClosedMotion {
 }
 
 /// Drives whose law, and the motion of the output body with it, are known for every instant.
-pub(super) trait ClosedForm: Debug + Send + Sync {
+pub trait ClosedForm: Debug + Send + Sync {
     /// The motion at `t`.
     fn at(&self, t: f64) -> ClosedMotion;
 

@@ -39,6 +39,8 @@ pub struct Contacts {
     ramps: Vec<Option<Ramp>>,
     any_ramp: bool,
     any_contact: bool,
+    /// Evaluations leave out the joints whose balls do not touch: some of their bodies are asleep.
+    pub(super) only_touching: bool,
 }
 
 impl Contacts {
@@ -58,6 +60,7 @@ impl Contacts {
             joints,
             parameters,
             any_ramp: false,
+            only_touching: false,
         }
     }
 
@@ -146,7 +149,20 @@ impl Contacts {
         self.update_ramps(at.t);
         loads.counts.contacts += 1;
         for contact in self.joints.iter_mut().filter(|contact| contact.is_loose()) {
-            contact.load(at, loads);
+            if self.only_touching && !contact.may_press(at.touching) {
+                contact.gap = Gap::default();
+            } else {
+                contact.load(at, loads);
+            }
+        }
+    }
+
+    /// Gaps of the joints that the latest evaluation, with `touching`, left out.
+    pub(super) fn measure_others(&mut self, touching: Touching<'_>, motion: &[Kinematics]) {
+        for contact in &mut self.joints {
+            if !contact.may_press(touching) {
+                contact.measure(motion);
+            }
         }
     }
 

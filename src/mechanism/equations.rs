@@ -1,7 +1,7 @@
 //! Interface of a formulation of the equations of motion. No other module knows more about one.
 
 use super::kinematics::{Driven, Kinematics, Wrench};
-use super::model::{BallJoint, Model};
+use super::model::{BallJoint, BodyIndex, Model};
 use super::path::Path;
 use crate::scene::Vec3;
 
@@ -33,6 +33,19 @@ pub(super) trait Equations: Send {
 
     /// Poses and velocities at (t, y).
     fn update_kinematics(&mut self, model: &Model, t: f64, y: &[f64]);
+
+    /// Lets evaluations leave out the bodies for which `asleep` holds, if [`Self::is_block_diagonal`]: free bodies, each a
+    /// tree of its own. Their derivatives are 0, and their motion that of the latest [`Self::update_kinematics`] or
+    /// [`Self::update_asleep`].
+    fn put_to_sleep(&mut self, _asleep: &dyn Fn(BodyIndex) -> bool) {}
+
+    /// [`Self::update_kinematics`] for the bodies that are awake.
+    fn update_awake(&mut self, model: &Model, t: f64, y: &[f64]) {
+        self.update_kinematics(model, t, y);
+    }
+
+    /// The same for the others, after [`Self::update_awake`] at this instant.
+    fn update_asleep(&mut self, _model: &Model, _y: &[f64]) {}
 
     /// What moves the gap of `joint`, unless it is about as much as [`Self::update_kinematics`] moves.
     fn path(&self, model: &Model, joint: &BallJoint) -> Option<Path>;

@@ -3,7 +3,7 @@
 use super::constraints::Constraints;
 use super::equations::Equations;
 use super::kinematics::{Driven, Kinematics, Wrench, spin_of};
-use super::model::{Anchor, BallJoint, Model, Motion};
+use super::model::{Anchor, BallJoint, BodyIndex, Model, Motion};
 use super::path::Path;
 use super::power::inverse_dynamics;
 use super::tree::{self, Tree};
@@ -80,6 +80,18 @@ impl Equations for Forest {
         self.tree.update_kinematics(model, t, y);
     }
 
+    fn put_to_sleep(&mut self, asleep: &dyn Fn(BodyIndex) -> bool) {
+        self.tree.put_to_sleep(asleep);
+    }
+
+    fn update_awake(&mut self, model: &Model, t: f64, y: &[f64]) {
+        self.tree.update_awake(model, t, y);
+    }
+
+    fn update_asleep(&mut self, model: &Model, y: &[f64]) {
+        self.tree.update_asleep(model, y);
+    }
+
     fn path(&self, model: &Model, joint: &BallJoint) -> Option<Path> {
         Path::of(model, joint)
     }
@@ -105,7 +117,7 @@ impl Equations for Forest {
     }
 
     fn position_rate(&self, model: &Model, y: &[f64], dq: &mut [f64]) {
-        Tree::position_rate(model, y, dq);
+        self.tree.position_rate(model, y, dq);
     }
 
     fn velocities_of(&self, model: &Model, y: &[f64], rate: &[f64], out: &mut [f64]) {

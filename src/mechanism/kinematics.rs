@@ -150,7 +150,7 @@ impl Wrench {
 
 /// Rotation matrix of a quaternion (w, x, y, z) of any length.
 #[inline]
-fn rotation_of(&[w, x, y, z]: &[f64; 4]) -> Mat3 {
+pub fn rotation_of(&[w, x, y, z]: &[f64; 4]) -> Mat3 {
     let s = 2.0 / (w * w + x * x + y * y + z * z);
     let (xs, ys, zs) = (x * s, y * s, z * s);
     let (wx, wy, wz) = (w * xs, w * ys, w * zs);

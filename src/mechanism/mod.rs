@@ -12,6 +12,7 @@ mod contacts;
 mod elements;
 mod equations;
 mod factor;
+mod flight;
 mod forest;
 mod friction;
 mod implicit;
@@ -33,7 +34,9 @@ mod tree;
 pub use bounds::{Advice, CostOf, Counted};
 pub use closed_form::ClosedMotion;
 pub use contacts::{Contacts, Ramp};
+
 pub use elements::{Counts, ElementReport, Gap, Powers, Pull, Touch, Touching};
+pub use flight::{Flight, Flyer};
 pub use jet::Jet;
 pub use kinematics::{Kinematics, Wrench};
 pub use spcmm::Unreachable;
@@ -231,6 +234,7 @@ pub struct Mechanism {
     assembly: Assembly,
     /// ns, as by [`bounds::evaluation_time`].
     evaluation_time: f64,
+    flyers: Vec<Flyer>,
 }
 
 impl Mechanism {
@@ -254,7 +258,7 @@ impl Mechanism {
             Formulation::Lagrange => Box::new(Lagrange::new(scene, &model)),
         };
         let path = |joint| equations.path(&model, joint);
-        Self {
+        let mut mechanism = Self {
             paths: model.joints.iter().map(path).collect(),
             evaluation_time: bounds::evaluation_time(scene, &model),
             sources: power::Sources::new(&model, &*equations, scene.elements.len()),
@@ -272,7 +276,10 @@ impl Mechanism {
             friction: None,
             implicit: None,
             assembly: Assembly::default(),
-        }
+            flyers: Vec::new(),
+        };
+        mechanism.flyers = Flyer::all(&mechanism, scene);
+        mechanism
     }
 
     /// For resuming from a state that belongs to `structure`, without computing a start state. What live changes do not

@@ -223,7 +223,7 @@ mod tests {
         assert!((ideal.position[2].value + 0.0383167345177).abs() < 1e-12);
         let half = Trajectory::new(&paper()).at(0.5);
         for (f, value) in half
-            .sliders
+            .driven
             .iter()
             .zip([0.0902403840, 0.2210909323, 0.1575618239])
         {

@@ -58,7 +58,7 @@ impl Evaluator<'_> {
             ..
         } = &mut *self.mechanism;
         *evaluated = None;
-        equations.update_kinematics(model, t, y);
+        equations.update_awake(model, t, y);
         let (motion, wrench) = equations.loads();
         wrench.fill(Wrench::zero());
         let at = At {

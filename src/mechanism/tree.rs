@@ -59,6 +59,10 @@ pub struct Tree {
     pub driven: Driven,
     composite: Vec<Composite>,
     dynamic: Vec<usize>,
+    /// Of those, the ones that evaluations move and accelerate, and the others.
+    awake: Vec<usize>,
+    asleep: Vec<usize>,
+    sleeps: Vec<bool>,
     /// Mass matrices of the blocks, factored, row-major, one after the other.
     mass: Vec<f64>,
     mass_offset: Vec<usize>,
@@ -85,12 +89,16 @@ impl Tree {
     /// For `model`, if only its motion is needed: [`Self::update_kinematics`].
     pub fn without_masses(model: &Model) -> Self {
         let n = model.bodies.len();
+        let dynamic: Vec<usize> = (0..n).filter(|&b| !model.bodies[b].driven_only).collect();
         Self {
             motion: vec![Kinematics::rest(); n + 1],
             wrench: vec![Wrench::zero(); n + 1],
             driven: Driven::new(model),
             composite: vec![Composite::EMPTY; n],
-            dynamic: (0..n).filter(|&b| !model.bodies[b].driven_only).collect(),
+            awake: dynamic.clone(),
+            asleep: Vec::with_capacity(dynamic.len()),
+            sleeps: vec![false; n],
+            dynamic,
             mass: Vec::new(),
             mass_offset: Vec::new(),
             inverse_diagonal: vec![0.0; model.nv],
@@ -107,6 +115,38 @@ impl Tree {
         }
     }
 
+    /// Lets evaluations leave out the free bodies, each a tree of its own, for which `asleep` holds.
+    pub fn put_to_sleep(&mut self, asleep: impl Fn(BodyIndex) -> bool) {
+        self.awake.clear();
+        self.asleep.clear();
+        for &b in &self.dynamic {
+            self.sleeps[b] = asleep(b);
+            if self.sleeps[b] {
+                self.asleep.push(b);
+            } else {
+                self.awake.push(b);
+            }
+        }
+    }
+
+    /// As [`Self::update_kinematics`] for the bodies that are awake.
+    #[inline]
+    pub fn update_awake(&mut self, model: &Model, t: f64, y: &[f64]) {
+        self.driven.update(model, t, &mut self.motion);
+        let (motion, coordinates) = (&mut self.motion, &self.driven.coordinates);
+        for &b in &self.awake {
+            move_body(model, b, y, coordinates, motion);
+        }
+    }
+
+    /// As [`Self::update_kinematics`] for the others, after [`Self::update_awake`] at this instant.
+    pub fn update_asleep(&mut self, model: &Model, y: &[f64]) {
+        let (motion, coordinates) = (&mut self.motion, &self.driven.coordinates);
+        for &b in &self.asleep {
+            move_body(model, b, y, coordinates, motion);
+        }
+    }
+
     /// The same for the bodies on `path` alone.
     pub fn update_along(&mut self, model: &Model, t: f64, y: &[f64], path: &Path) {
         self.driven.update_along(model, t, path, &mut self.motion);
@@ -116,7 +156,7 @@ impl Tree {
         }
     }
 
-    /// Mass matrices, factored, and generalised forces (loads, gravity, bias) into `out`.
+    /// Mass matrices, factored, and generalised forces (loads, gravity, bias) into `out`, those of sleeping bodies 0.
     #[inline]
     pub fn assemble(&mut self, model: &Model, gravity: &Vec3, out: &mut [f64]) {
         let Self {
@@ -125,9 +165,16 @@ impl Tree {
             composite,
             mass,
             mass_offset,
+            awake,
+            asleep,
             ..
         } = self;
-        for &b in self.dynamic.iter().rev() {
+        for &b in &*asleep {
+            if let Motion::Free { v, .. } = model.bodies[b].motion {
+                out[v..v + 6].fill(0.0);
+            }
+        }
+        for &b in awake.iter().rev() {
             let body = &model.bodies[b];
             let m = &motion[b];
             let inertia = world_inertia(&m.rotation, &body.inertia, body.diagonal);
@@ -217,11 +264,13 @@ impl Tree {
         }
     }
 
-    /// x = M^-1 x for all coordinates.
+    /// x = M^-1 x for all coordinates; those of sleeping bodies stay.
     #[inline]
     pub fn solve(&self, model: &Model, x: &mut [f64]) {
         for (index, block) in model.blocks.iter().enumerate() {
-            self.solve_block(model, index, &mut x[block.v..][..block.n]);
+            if !block.lone.is_some_and(|b| self.sleeps[b]) {
+                self.solve_block(model, index, &mut x[block.v..][..block.n]);
+            }
         }
     }
 
@@ -263,12 +312,17 @@ impl Tree {
         }
     }
 
-    /// dq/dt from the velocities in `y`.
+    /// dq/dt from the velocities in `y`; 0 for sleeping bodies.
     #[inline]
-    pub fn position_rate(model: &Model, y: &[f64], dq: &mut [f64]) {
+    pub fn position_rate(&self, model: &Model, y: &[f64], dq: &mut [f64]) {
         let (qs, vs) = y.split_at(model.nq);
-        for body in &model.bodies {
-            match body.motion {
+        for &b in &self.asleep {
+            if let Motion::Free { q, .. } = model.bodies[b].motion {
+                dq[q..q + 7].fill(0.0);
+            }
+        }
+        for &b in &self.awake {
+            match model.bodies[b].motion {
                 Motion::Free { q, v } => {
                     let rate = kinematics::free_rate(part(qs, q), part(vs, v));
                     dq[q..q + 7].copy_from_slice(&rate);

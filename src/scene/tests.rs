@@ -12,7 +12,7 @@ fn start_poses(scene: &Scene) -> Vec<(Vec3, Quat)> {
             .parent
             .map_or((Vec3::zeros(), Quat::identity()), |parent| poses[parent]);
         let q = match (joint.drive, joint.start) {
-            (Some(Drive::Spcmm { slider }), _) => sliders[usize::from(slider) - 1],
+            (Some(Drive::ClosedForm { coordinate }), _) => sliders[coordinate],
             (_, JointStart::Scalar { position, .. }) => position,
             (
                 _,

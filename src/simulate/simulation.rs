@@ -7,6 +7,7 @@ mod corners;
 mod displace;
 mod doubts;
 mod energy;
+mod flights;
 mod guard;
 pub mod ideal;
 pub(super) mod live;
@@ -24,11 +25,12 @@ use super::stepper::{AnyStepper, Member};
 use super::{Frame, NotUnique, Peak, StartError, Statistics, StopAdvice, StopFault, Stopped, Wear};
 use crate::contact::Memory;
 use crate::integrate::{Controller, System as _};
-use crate::mechanism::{Counts, Mechanism, MechanismError, Pull, Ramp, Touching};
+use crate::mechanism::{Counts, Flight, Mechanism, MechanismError, Pull, Ramp, Touching};
 use crate::scene::Scene;
 use automatic::{Choice, controller_of, prepare_implicit};
 pub use automatic::{LARGEST_DENSE, LARGEST_IMPLICIT};
 use corners::Piece;
+use flights::put_flights;
 use ideal::{ProbeFault, Reference};
 
 /// Speed at which the clearance closes when a jump would put a ball inside its socket wall, m/s: an impact at this speed
@@ -115,6 +117,8 @@ struct Attempt {
     near_peak: bool,
     /// Largest normal force of each joint that was in contact over it, N, and at which fraction of it.
     strongest: Vec<(f64, f64)>,
+    /// Step size times the largest eigenvalue seen; 0 if unknown.
+    stiffness: f64,
     /// Evaluations spent so far.
     counts: Counts,
 }
@@ -130,6 +134,8 @@ pub(super) struct State {
     clearances: Vec<f64>,
     /// The hand's pull, if any.
     pull: Option<Pull>,
+    /// Of the bodies that the latest step left out, by the mechanism's flyers.
+    flights: Vec<Option<Flight>>,
     control: Control,
     record: Record,
 }
@@ -203,6 +209,7 @@ impl State {
                 .map(|j| mechanism.contacts.clearance(j))
                 .collect(),
             pull: None,
+            flights: vec![None; mechanism.flyers().len()],
             control: Control::new(scene),
             record: Record {
                 account: Account::default(),
@@ -273,6 +280,7 @@ impl Simulation {
                 left_piece: false,
                 near_peak: false,
                 strongest: vec![(0.0, 0.0); joints],
+                stiffness: 0.0,
                 counts: Counts::default(),
             },
             scratch_y: vec![0.0; n],
@@ -305,6 +313,7 @@ impl Simulation {
 
     /// Recomputes derivative and gaps after anything but a step changed the state; discards the previous step.
     fn refresh(&mut self) {
+        self.end_flights();
         self.hold_pieces(true);
         let located = self.locates();
         let Self {
@@ -447,6 +456,7 @@ impl Simulation {
         );
         attempt.left_piece = evaluator.left_piece;
         attempt.counts += evaluator.counts;
+        attempt.stiffness = stepper.stiffness(h, &end.y, &end.k);
         error
     }
 
@@ -463,13 +473,16 @@ impl Simulation {
         let mut evaluator = mechanism.evaluator(Touching::by(located, &state.now.memory));
         evaluator.derivative(t_end, &end.y, &mut end.k);
         attempt.counts += evaluator.counts;
-        self.finish_gaps();
+        self.finish_gaps(t_end);
     }
 
-    /// Gaps at the end of the step being taken, from the latest evaluation.
-    fn finish_gaps(&mut self) {
-        self.mechanism.contacts.finish();
-        store_gaps(&self.mechanism, &mut self.attempt.end.gaps);
+    /// What flies, and gaps, at the end `t_end` of the step being taken, after an evaluation there.
+    fn finish_gaps(&mut self, t_end: f64) {
+        let touching = Touching::by(self.locates(), &self.state.now.memory);
+        let end = &mut self.attempt.end;
+        put_flights(&self.mechanism, &self.state.flights, t_end, &mut end.y);
+        self.mechanism.complete_gaps(touching, &end.y);
+        store_gaps(&self.mechanism, &mut end.gaps);
     }
 
     /// A step of a kinematic scene: predict, close the loops, compute the reactions. If that fails it retries with shorter

@@ -1,6 +1,6 @@
 //! Ball joint with clearance: contact between a ball and the wall of its socket, by the laws in `contact`.
 
-use super::{At, Coupling, ForceElement, Loads};
+use super::{At, Coupling, ForceElement, Loads, Touching};
 use crate::contact::{Coefficients, Force, Separation, Slope};
 use crate::mechanism::columns::contact_sides;
 use crate::mechanism::kinematics::Kinematics;
@@ -49,6 +49,12 @@ impl Contact {
     #[inline]
     pub fn is_loose(&self) -> bool {
         self.joint.ideal.is_none()
+    }
+
+    /// Whether it may carry a force.
+    #[inline]
+    pub fn may_press(&self, touching: Touching<'_>) -> bool {
+        touching.memory(self.index).is_some()
     }
 
     /// Power dissipated by friction, W.

@@ -25,6 +25,7 @@ struct SignedGap {
 impl Simulation {
     /// A step whose size follows the error estimate, cut at the first contact start or end inside it.
     pub(super) fn adaptive_step(&mut self, limit: f64) -> Result<(), Stopped> {
+        self.choose_flights(limit);
         self.stepper.choose(self.state.control.member);
         self.attempt.turned = false;
         self.attempt.counts = Counts::default();
@@ -39,11 +40,11 @@ impl Simulation {
                 self.state.control.h_next = self.running.solver.step;
                 let tolerance = self.running.solver.tolerance;
                 let advice = StopAdvice::LooserTolerance { tolerance };
+                self.end_flights();
                 return Err(self.stopped(StopFault::ShortStep, advice));
             }
         };
-        let end = &self.attempt.end;
-        let stiffness = self.stepper.stiffness(h, &end.y, &end.k);
+        let stiffness = self.attempt.stiffness;
         let evaluations = self.attempt.counts.equations;
         self.accept(t_end, h)?;
         if stiffness > STABILITY_LIMIT {
@@ -81,7 +82,7 @@ impl Simulation {
             next
         };
         let contact_began = std::mem::take(&mut state.control.contact_began);
-        self.finish_gaps();
+        self.finish_gaps(t_end);
         let event = self.first_event(h);
         let corner = self.first_corner(h);
         self.attempt.corner = None;
@@ -118,7 +119,7 @@ impl Simulation {
                 self.state.control.contact_began = contact_began;
                 return None;
             }
-            self.finish_gaps();
+            self.finish_gaps(t_end);
         } else if contact_began {
             self.state.control.h_contact = h.max(1e-9);
         }

@@ -208,7 +208,13 @@ impl Simulation {
             let part = part.clone();
             stepper.interpolate(part, theta, h, &now.y, &now.k, &end.y, &end.k, scratch_y);
         }
-        mechanism.measure_one(j, now.t + theta * h, scratch_y);
+        let time = now.t + theta * h;
+        for flyer in mechanism.flyers_of(j) {
+            if let Some(flight) = &state.flights[flyer] {
+                flight.put(&mechanism.flyers()[flyer], time, scratch_y);
+            }
+        }
+        mechanism.measure_one(j, time, scratch_y);
     }
 
     /// Where the sliding speed of joint `j` leaves its piece, as a fraction of the step just attempted, and for which
@@ -252,6 +258,7 @@ impl Simulation {
             .interpolate(all, theta, h, &now.y, &now.k, &end.y, &end.k, scratch);
         end.y.copy_from_slice(scratch);
         self.stepper.truncate(theta);
+        self.attempt.stiffness = 0.0;
         self.evaluate_end(t_end);
     }
 

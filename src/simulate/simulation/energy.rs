@@ -66,7 +66,11 @@ impl Simulation {
             scratch_k.copy_from_slice(&now.k);
             let mut evaluator = mechanism.evaluator(Touching::by(located, &state.before.memory));
             let end = evaluator.powers(now.t, &now.y, scratch_k);
-            self.begin_wear_of_step();
+            if self.state.record.wear.is_some() {
+                let touching = Touching::by(located, &self.state.before.memory);
+                self.mechanism.complete_gaps(touching, &self.state.now.y);
+                self.begin_wear_of_step();
+            }
             self.lay_out_course(h, end);
             let Record { account, wear, .. } = &mut self.state.record;
             account.powers = (!switched).then_some(end);

@@ -1,6 +1,7 @@
 //! Everything at an instant within the latest step.
 
 use super::Simulation;
+use super::flights::put_flights;
 use super::ideal::Reference;
 use crate::integrate::hermite;
 use crate::mechanism::Touching;
@@ -49,6 +50,7 @@ impl Simulation {
         } else {
             self.scratch_y.copy_from_slice(&self.state.now.y);
         }
+        self.look_at_all();
         let located = self.locates();
         let Self {
             mechanism,
@@ -69,6 +71,9 @@ impl Simulation {
         }
         let mut evaluator = mechanism.evaluator(Touching::by(located, scratch_memory));
         evaluator.evaluate_fully(time, scratch_y, scratch_k);
+        if self.any_flight() {
+            self.leave_out_flights();
+        }
     }
 
     /// State at fraction `theta` of the latest step, of size `h`, by the method's interpolant, written to the scratch
@@ -87,6 +92,7 @@ impl Simulation {
             hermite(theta, h, y0, k0, y, k, scratch_y);
         } else {
             stepper.interpolate(0..y.len(), theta, h, y0, k0, y, k, scratch_y);
+            put_flights(mechanism, &state.flights, before.t + theta * h, scratch_y);
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::automatic::prepare_implicit;
 use super::{Simulation, State};
 use crate::integrate::{Method, System as _};
-use crate::mechanism::{Mechanism, Touching};
+use crate::mechanism::{Flight, Mechanism, Touching};
 use crate::simulate::stepper::AnyStepper;
 use crate::simulate::{Snapshot, Wear};
 
@@ -25,7 +25,8 @@ impl State {
         let (coordinates, joints) = (self.now.y.len(), self.now.gaps.len());
         let impacts = std::mem::size_of_val(self.record.impacts.kept());
         let wear = self.record.wear.as_ref().map_or(0, Wear::bytes);
-        FIXED + wear + coordinates * COPIES * size_of::<f64>() + joints * OF_JOINT + impacts
+        let flights = self.flights.len() * size_of::<Option<Flight>>();
+        FIXED + wear + flights + coordinates * COPIES * size_of::<f64>() + joints * OF_JOINT + impacts
     }
 }
 
@@ -81,6 +82,7 @@ impl Simulation {
         }
         self.reference.restore(&snapshot.reference);
         self.put_conditions();
+        self.mechanism.put_to_sleep(|_| false);
         let located = self.locates();
         let Self {
             mechanism,
@@ -95,6 +97,7 @@ impl Simulation {
         let mut evaluator = mechanism.evaluator(Touching::by(located, &now.memory));
         evaluator.derivative(now.t, &now.y, scratch_k);
         mechanism.forget_evaluation();
+        self.leave_out_flights();
     }
 
     /// FNV-1a, 64 bit, over the whole state: little-endian bits of time, coordinates, velocities, then for each ball joint
