@@ -109,7 +109,9 @@ impl Restitution {
     pub fn of(impacts: &[Impact], joint: usize) -> Self {
         let own = || impacts.iter().filter(|impact| impact.joint == joint);
         let clean = own().filter(|impact| !impact.disturbed && !impact.floored);
-        let mut excess: Vec<f64> = clean.map(|impact| impact.achieved() - impact.asked).collect();
+        let mut excess: Vec<f64> = clean
+            .map(|impact| impact.achieved() - impact.asked)
+            .collect();
         excess.sort_by(f64::total_cmp);
         let n = excess.len();
         Self {

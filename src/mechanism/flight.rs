@@ -160,8 +160,14 @@ impl Mechanism {
     /// Of ball and socket of joint `j`, those that may fly.
     pub fn flyers_of(&self, j: usize) -> impl Iterator<Item = usize> + use<> {
         let joint = &self.model.joints[j];
-        let of = |b: BodyIndex| self.flyers.binary_search_by_key(&b, |flyer| flyer.body).ok();
-        [of(joint.ball.body), of(joint.socket.body)].into_iter().flatten()
+        let of = |b: BodyIndex| {
+            self.flyers
+                .binary_search_by_key(&b, |flyer| flyer.body)
+                .ok()
+        };
+        [of(joint.ball.body), of(joint.socket.body)]
+            .into_iter()
+            .flatten()
     }
 
     /// Free flight of `flyer` from the state `y` at `t`.
@@ -189,5 +195,128 @@ impl Mechanism {
             self.contacts.measure_others(touching, motion);
         }
         self.contacts.finish();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::integrate::{DormandPrince, Stepper, System};
+
+    /// A slender body that tumbles about all its axes.
+    fn tumbling() -> (Mechanism, Vec<f64>) {
+        let text = r#"
+            [gravity]
+            y = "-9.81 m/s^2"
+            [[body]]
+            name = "rod"
+            mass = "0.3 kg"
+            inertia = "1e-4 5e-4 5.5e-4 kg m^2"
+            products = "2e-5 -3e-5 1e-5 kg m^2"
+            [[joint]]
+            name = "rod"
+            kind = "free"
+            child = "rod"
+            start = { position = "0.1 0.2 0.3 m", velocity = "1 2 -0.5 m/s", angular_velocity = "3 -7 11 rad/s" }
+            [[body]]
+            name = "post"
+            mass = "1 kg"
+            inertia = "1e-3 1e-3 1e-3 kg m^2"
+            [[joint]]
+            name = "post"
+            kind = "prismatic"
+            child = "post"
+            axis = [0, 0, 1]
+            drive = { law = "constant", position = 0, velocity = 0 }
+        "#;
+        let scene = Scene::parse(text, None, &[]).expect("a scene");
+        let mut mechanism = Mechanism::new(&scene).expect("equations");
+        let y = mechanism.start().expect("a start");
+        (mechanism, y)
+    }
+
+    #[test]
+    fn a_flight_is_the_motion_that_the_equations_give() {
+        let (mut mechanism, mut y) = tumbling();
+        let flyer = mechanism.flyers()[0].clone();
+        let flight = mechanism.flight(&flyer, 0.25, &y);
+        let length = flight.end - flight.start;
+        assert!((1e-3..0.1).contains(&length), "{length}");
+        assert!(flight.lasts_until(0.25 + length) && !flight.lasts_until(0.25 + 1.01 * length));
+        // 400 steps of order 5 leave rounding alone.
+        let (n, mut t) = (400, 0.25);
+        let mut stepper = DormandPrince::new(y.len());
+        let (mut end, mut k) = (y.clone(), y.clone());
+        let mut k_end = y.clone();
+        let h = length / f64::from(n);
+        let mut equations = mechanism.evaluator(Touching::Nothing);
+        equations.derivative(t, &y, &mut k);
+        for _ in 0..n {
+            stepper.attempt(&mut equations, t, h, &y, &k, &mut end, &mut k_end);
+            std::mem::swap(&mut y, &mut end);
+            std::mem::swap(&mut k, &mut k_end);
+            t += h;
+        }
+        let mut flown = vec![f64::NAN; y.len()];
+        flight.put(&flyer, 0.25 + length, &mut flown);
+        for part in flyer.parts() {
+            for i in part {
+                assert!(
+                    (flown[i] - y[i]).abs() < 3e-14 * (1.0 + y[i].abs()),
+                    "{i}: {} {}",
+                    flown[i],
+                    y[i]
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_flight_starts_where_it_is_and_keeps_energy_and_angular_momentum() {
+        let (mechanism, y) = tumbling();
+        let flyer = &mechanism.flyers()[0];
+        let flight = mechanism.flight(flyer, 0.0, &y);
+        let body = &mechanism.model.bodies[flyer.body];
+        let invariants = |y: &[f64]| {
+            let [q, v] = flyer.parts();
+            let turn: &[f64; 4] = part(y, q.start + 3);
+            let r = rotation_of(turn);
+            let w = r.tr_mul(&Vec3::new(y[v.start + 3], y[v.start + 4], y[v.start + 5]));
+            let energy = 0.5 * w.dot(&(body.inertia * w));
+            let length: f64 = turn.iter().map(|c| c * c).sum();
+            (r * (body.inertia * w), energy, length)
+        };
+        let mut flown = y.clone();
+        flight.put(flyer, 0.0, &mut flown);
+        for (a, b) in flown.iter().zip(&y) {
+            assert!((a - b).abs() < 1e-15 * (1.0 + b.abs()), "{a} {b}");
+        }
+        let (momentum, energy, _) = invariants(&y);
+        flight.put(flyer, flight.end, &mut flown);
+        let (momentum_end, energy_end, length) = invariants(&flown);
+        assert!((momentum_end - momentum).norm() < 1e-14 * momentum.norm());
+        assert!((energy_end - energy).abs() < 1e-14 * energy);
+        assert!((length - 1.0).abs() < 1e-15);
+        // A parabola.
+        let s = flight.end;
+        let expected = Vec3::new(0.1 + s, 0.2 + 2.0 * s - 0.5 * 9.81 * s * s, 0.3 - 0.5 * s);
+        let got = Vec3::from_column_slice(&flown[flyer.q..flyer.q + 3]);
+        assert!((got - expected).norm() < 1e-15, "{got}");
+    }
+
+    #[test]
+    fn faster_spin_makes_flights_shorter_and_none_longest() {
+        let (mechanism, mut y) = tumbling();
+        let flyer = &mechanism.flyers()[0];
+        let spin = flyer.v + 3..flyer.v + 6;
+        let length = |factor: f64| {
+            let mut y = y.clone();
+            y[spin.clone()].iter_mut().for_each(|w| *w *= factor);
+            mechanism.flight(flyer, 0.0, &y).end
+        };
+        let (slow, fast) = (length(1.0), length(4.0));
+        assert!((slow / fast - 4.0).abs() < 0.5, "{slow} {fast}");
+        y[spin].fill(0.0);
+        assert_eq!(mechanism.flight(flyer, 0.0, &y).end, LONGEST);
     }
 }

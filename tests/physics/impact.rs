@@ -2,7 +2,7 @@
 
 use crate::common::{frame_now, parse};
 use jointplay::contact::{
-    NormalLaw, damping_factor, hertz_stiffness, undisturbed_restitution, settled_penetration,
+    NormalLaw, damping_factor, hertz_stiffness, settled_penetration, undisturbed_restitution,
 };
 use jointplay::scene::Vec3;
 use jointplay::simulate::{ContactState, Frame, Simulation};

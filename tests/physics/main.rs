@@ -11,6 +11,7 @@ mod elements;
 mod endurance;
 mod energy;
 mod extremes;
+mod flights;
 mod guard;
 mod imex;
 mod impact;

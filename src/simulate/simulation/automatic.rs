@@ -129,7 +129,8 @@ impl Simulation {
             choice.wait -= 1;
             return next;
         }
-        let limited = choice.limited >= LIMITED_STEPS && (touches || self.mechanism.has_couplings());
+        let limited =
+            choice.limited >= LIMITED_STEPS && (touches || self.mechanism.has_couplings());
         let settled = limited || (touches && choice.since_contact >= SETTLED_STEPS);
         if settled && velocities <= LARGEST_IMPLICIT {
             *choice = Choice {

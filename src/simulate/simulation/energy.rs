@@ -139,7 +139,8 @@ impl Simulation {
 
     /// Powers at fraction `theta` of the step just accepted.
     fn powers_within(&mut self, theta: f64, h: f64) -> Powers {
-        self.interpolate(theta, h);
+        // Nothing acts on the others but gravity.
+        self.interpolate_stepped(theta, h);
         let located = self.locates();
         let Self {
             mechanism,

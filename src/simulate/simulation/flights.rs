@@ -30,7 +30,10 @@ impl Simulation {
                 lands |= flight.take().is_some();
                 continue;
             }
-            if flight.as_ref().is_some_and(|flight| flight.lasts_until(until)) {
+            if flight
+                .as_ref()
+                .is_some_and(|flight| flight.lasts_until(until))
+            {
                 continue;
             }
             let flies = flight.is_some();
@@ -68,7 +71,8 @@ impl Simulation {
     /// Lets evaluations leave out what flies.
     pub(super) fn leave_out_flights(&mut self) {
         let flights = &self.state.flights;
-        self.mechanism.put_to_sleep(|flyer| flights[flyer].is_some());
+        self.mechanism
+            .put_to_sleep(|flyer| flights[flyer].is_some());
     }
 
     pub(super) fn any_flight(&self) -> bool {

@@ -79,6 +79,13 @@ impl Simulation {
     /// State at fraction `theta` of the latest step, of size `h`, by the method's interpolant, written to the scratch
     /// state.
     pub(super) fn interpolate(&mut self, theta: f64, h: f64) {
+        self.interpolate_stepped(theta, h);
+        let (state, time) = (&self.state, self.state.before.t + theta * h);
+        put_flights(&self.mechanism, &state.flights, time, &mut self.scratch_y);
+    }
+
+    /// The same but for the bodies in flight.
+    pub(super) fn interpolate_stepped(&mut self, theta: f64, h: f64) {
         let Self {
             mechanism,
             stepper,
@@ -92,7 +99,6 @@ impl Simulation {
             hermite(theta, h, y0, k0, y, k, scratch_y);
         } else {
             stepper.interpolate(0..y.len(), theta, h, y0, k0, y, k, scratch_y);
-            put_flights(mechanism, &state.flights, before.t + theta * h, scratch_y);
         }
     }
 }

@@ -26,7 +26,12 @@ impl State {
         let impacts = std::mem::size_of_val(self.record.impacts.kept());
         let wear = self.record.wear.as_ref().map_or(0, Wear::bytes);
         let flights = self.flights.len() * size_of::<Option<Flight>>();
-        FIXED + wear + flights + coordinates * COPIES * size_of::<f64>() + joints * OF_JOINT + impacts
+        FIXED
+            + wear
+            + flights
+            + coordinates * COPIES * size_of::<f64>()
+            + joints * OF_JOINT
+            + impacts
     }
 }
 

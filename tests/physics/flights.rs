@@ -1,0 +1,100 @@
+//! Free bodies that touch nothing are left out of the evaluations that impacts elsewhere need.
+
+use crate::common::{frame_now, simulation};
+use jointplay::scene::Vec3;
+use jointplay::simulate::{ContactState, Frame, Simulation};
+
+const CHAIN: [(&str, &str); 2] = [("chain.links", "8"), ("solver.tolerance", "1e-5")];
+
+/// Whether any ball or socket of body `b` touches.
+fn touches(simulation: &Simulation, frame: &Frame, b: usize) -> bool {
+    let joints = &simulation.scene().ball_joints;
+    joints.iter().zip(&frame.joints).any(|(joint, report)| {
+        (joint.ball.body == Some(b) || joint.socket.body == Some(b))
+            && report.state != ContactState::Free
+    })
+}
+
+#[test]
+fn what_touches_nothing_is_on_its_parabola_at_every_instant_of_a_step() {
+    let mut simulation = simulation("chain", &CHAIN);
+    let gravity = simulation.scene().gravity;
+    let mut inside = Frame::default();
+    let (mut flew, mut stood) = (0, 0);
+    while simulation.time() < 40e-3 {
+        let before = frame_now(&mut simulation);
+        simulation.step().expect("runs");
+        let after = frame_now(&mut simulation);
+        let h = after.time - before.time;
+        for theta in [0.25, 0.6] {
+            let time = before.time + theta * h;
+            simulation.sample(time, &mut inside);
+            let s = time - before.time;
+            for (b, body) in inside.bodies.iter().enumerate() {
+                let free = [&before, &inside, &after]
+                    .iter()
+                    .all(|frame| !touches(&simulation, frame, b));
+                if !free {
+                    stood += 1;
+                    continue;
+                }
+                flew += 1;
+                let start = &before.bodies[b];
+                let velocity = start.velocity + gravity * s;
+                let position = start.position + (start.velocity + gravity * (0.5 * s)) * s;
+                assert!((body.position - position).norm() < 1e-14, "{b} at {time}");
+                assert!((body.velocity - velocity).norm() < 1e-13, "{b} at {time}");
+                assert!(
+                    (body.acceleration - gravity).norm() < 1e-12,
+                    "{b} at {time}"
+                );
+            }
+        }
+    }
+    assert!(flew > 1000 && stood > 1000, "{flew} {stood}");
+}
+
+#[test]
+fn bodies_in_flight_cost_no_evaluation_and_the_rest_is_as_with_all() {
+    // Dormand-Prince evaluates every body at every stage.
+    let peaks = |method: &str| {
+        let mut simulation = simulation(
+            "chain",
+            &[
+                CHAIN[0],
+                ("solver.tolerance", "1e-8"),
+                ("solver.method", method),
+            ],
+        );
+        while simulation.time() < 14e-3 {
+            simulation.step_until(14e-3).expect("runs");
+        }
+        let frame = frame_now(&mut simulation);
+        let forces: Vec<f64> = (0..5).map(|j| simulation.peak(j).0).collect();
+        (forces, frame)
+    };
+    let ((flown, a), (stepped, b)) = (peaks("automatic"), peaks("dopri5"));
+    assert!(flown[0] > 500.0);
+    for (a, b) in flown.iter().zip(&stepped) {
+        assert!((a - b).abs() <= 1e-5 * b, "{flown:?} {stepped:?}");
+    }
+    for (a, b) in a.bodies.iter().zip(&b.bodies) {
+        assert!((a.position - b.position).norm() < 1e-8);
+    }
+}
+
+#[test]
+fn gravity_that_changes_turns_flights() {
+    let mut simulation = simulation("chain", &CHAIN);
+    simulation.advance_to(5e-3).expect("runs");
+    let before = frame_now(&mut simulation);
+    let gravity = Vec3::new(3.0, 0.0, 1.0);
+    simulation.set_gravity(gravity);
+    simulation.advance_to(6e-3).expect("runs");
+    let after = frame_now(&mut simulation);
+    let s = after.time - before.time;
+    for (a, b) in after.bodies.iter().zip(&before.bodies) {
+        let position = b.position + (b.velocity + gravity * (0.5 * s)) * s;
+        assert!((a.position - position).norm() < 1e-14);
+    }
+}
