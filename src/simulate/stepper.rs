@@ -180,6 +180,18 @@ impl AnyStepper {
         }
     }
 
+    /// Whether a step cut at an event may end on the interpolant: its error is that of the estimate.
+    pub(super) fn ends_on_interpolant(&self) -> bool {
+        matches!(
+            self,
+            Self::DormandPrince(_)
+                | Self::Automatic {
+                    member: Member::Explicit,
+                    ..
+                }
+        )
+    }
+
     /// Whether `attempt` provides the derivative at the end.
     pub(super) fn ends_with_derivative(&self) -> bool {
         !matches!(

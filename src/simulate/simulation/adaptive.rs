@@ -10,6 +10,10 @@ use crate::simulate::{StopAdvice, StopFault, Stopped};
 
 /// Shortest step of an adaptive method, s.
 const SHORTEST_STEP: f64 = 1e-14;
+/// Shortest first step after a contact begins, s.
+const SHORTEST_FIRST: f64 = 1e-9;
+/// An error so many times the allowed one is no matter of accuracy: the step was unstable.
+const BLOWN_UP: f64 = 100.0;
 
 /// A gap at one instant of a step, positive where it contradicts the recorded contact state.
 #[derive(Clone, Copy)]
@@ -72,6 +76,9 @@ impl Simulation {
         let state = &mut self.state;
         if !(error <= 1.0) {
             state.control.h_next = h * state.control.controller.after_reject(error);
+            if error > BLOWN_UP && self.turn_to_friction() {
+                self.state.control.h_next = h;
+            }
             return None;
         }
         let next = h * state.control.controller.after_accept(error);
@@ -103,7 +110,7 @@ impl Simulation {
         if let Some(corner) = corner {
             // The whole step worked; a rate that stops rising soon after the contact began is no evidence against it.
             if contact_began && matches!(corner.next, Piece::Approach(_)) {
-                self.state.control.h_contact = h.max(1e-9);
+                self.state.control.h_contact = next.max(SHORTEST_FIRST);
             }
             self.attempt.located = None;
             self.attempt.corner = Some((corner.joint, corner.next));
@@ -111,8 +118,12 @@ impl Simulation {
             self.end_at(corner.theta, t_end, h);
             h *= corner.theta;
         } else if let Some(theta) = event {
-            // The step is repeated, shortened, so that its end carries the method's error and not the interpolant's.
             t_end = t + theta * h;
+            if self.stepper.ends_on_interpolant() {
+                self.end_at(theta, t_end, h);
+                return Some((t_end, h * theta));
+            }
+            // The step is repeated, shortened, so that its end carries the method's error and not the interpolant's.
             h *= theta;
             if !self.try_step(h).is_finite() {
                 self.state.control.h_next = 0.5 * h;
@@ -121,7 +132,7 @@ impl Simulation {
             }
             self.finish_gaps(t_end);
         } else if contact_began {
-            self.state.control.h_contact = h.max(1e-9);
+            self.state.control.h_contact = next.max(SHORTEST_FIRST);
         }
         Some((t_end, h))
     }

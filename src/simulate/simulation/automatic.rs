@@ -53,12 +53,30 @@ impl Simulation {
         let before = self.state.control.member;
         let member = self.next_member(h, stiffness, evaluations);
         if member != before {
-            self.state.control.member = member;
-            self.state.control.controller = controller_of(Method::Automatic, member);
-            // Corners are located by those that have an interpolant of their own.
-            self.hold_pieces(false);
-            self.stepper.invalidate();
+            self.put_member(member);
         }
+    }
+
+    fn put_member(&mut self, member: Member) {
+        self.state.control.member = member;
+        self.state.control.controller = controller_of(Method::Automatic, member);
+        // Corners are located by those that have an interpolant of their own.
+        self.hold_pieces(false);
+        self.stepper.invalidate();
+    }
+
+    /// After an explicit step that blew up: whether friction on its ramp may be the cause, and now steps implicitly.
+    pub(super) fn turn_to_friction(&mut self) -> bool {
+        let touches = self.state.now.memory.iter().any(|m| m.active);
+        let turns = self.running.solver.method == Method::Automatic
+            && self.state.control.member == Member::Explicit
+            && touches
+            && self.mechanism.has_friction_alone();
+        if turns {
+            self.put_member(Member::Friction);
+            self.stepper.choose(Member::Friction);
+        }
+        turns
     }
 
     fn next_member(&mut self, h: f64, stiffness: f64, evaluations: u64) -> Member {
