@@ -7,8 +7,8 @@ mod statements;
 pub use findings::{Combination, Findings, Report};
 use record::row;
 pub use record::{
-    COLUMNS, Column, SettledCurve, SweepData, Swept, Traced, TracedRow, column_of, derivative,
-    exponents, regime_word,
+    COLUMNS, Column, RecordedRow, RecordedRun, SettledCurve, SettledPoint, SweepData, column_of,
+    derivative, exponents, regime_word,
 };
 pub use statements::Statement;
 
@@ -162,7 +162,7 @@ enum ReportJob {
 /// Result of a job.
 pub enum Outcome {
     /// A run of section 4.2.
-    Run(Box<(Response, Vec<TracedRow>)>),
+    Run(Box<(Response, Vec<RecordedRow>)>),
     /// A settled curve.
     Curve(SettledCurve),
     /// Records of a block.
@@ -378,7 +378,7 @@ impl Agenda {
                 (ReportJob::Run(n), Outcome::Run(found)) => {
                     let (name, case, _) = &self.runs[*n];
                     let (response, rows) = *found;
-                    runs.push(Traced {
+                    runs.push(RecordedRun {
                         name: name.clone(),
                         case: *case,
                         response,

@@ -1,6 +1,6 @@
 //! The results of a report.
 
-use super::record::{SettledCurve, SweepData, Swept, Traced};
+use super::record::{RecordedRun, SettledCurve, SettledPoint, SweepData};
 use super::{Extent, Variant};
 use crate::analysis::paper::{CASES, Case, Comparison, PAPER, Published, Series};
 
@@ -19,7 +19,7 @@ pub struct Combination {
     /// The changes.
     pub variant: Variant,
     /// Runs by clearance.
-    pub runs: Vec<Traced>,
+    pub runs: Vec<RecordedRun>,
     /// Their sections.
     pub sections: SweepData,
 }
@@ -31,11 +31,11 @@ pub struct Findings {
     /// The model.
     pub variant: Variant,
     /// The paper's runs, in the order of [`CASES`].
-    pub runs: Vec<Traced>,
+    pub runs: Vec<RecordedRun>,
     /// The first of them with all bodies and multipliers.
-    pub lagrange: Traced,
+    pub lagrange: RecordedRun,
     /// The run with ideal joints.
-    pub ideal: Traced,
+    pub ideal: RecordedRun,
     /// Settled curves, in the order of [`CASES`].
     pub curves: Vec<SettledCurve>,
     /// Sweeps: [`Findings::sweep`] finds one by name.
@@ -60,7 +60,7 @@ impl Findings {
     }
 
     /// Many sections of each run of a series.
-    pub fn sections(&self, series: Series) -> &[Swept] {
+    pub fn sections(&self, series: Series) -> &[SettledPoint] {
         &self.sweep(&format!("runs_by_{series}")).points
     }
 
@@ -70,12 +70,12 @@ impl Findings {
     }
 
     /// Points of that sweep.
-    pub fn swept(&self, series: Series) -> &[Swept] {
+    pub fn swept(&self, series: Series) -> &[SettledPoint] {
         &self.cold(series).points
     }
 
     /// Points of that sweep, and of those that follow the motion upward and downward.
-    pub fn branches(&self, series: Series) -> [&[Swept]; 3] {
+    pub fn branches(&self, series: Series) -> [&[SettledPoint]; 3] {
         ["cold", "up", "down"].map(|start| &self.sweep(&format!("{series}_{start}")).points[..])
     }
 
@@ -83,7 +83,7 @@ impl Findings {
     ///
     /// # Panics
     /// If it is none of [`CASES`].
-    pub fn run(&self, case: Case) -> &Traced {
+    pub fn run(&self, case: Case) -> &RecordedRun {
         &self.runs[index(case)]
     }
 

@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 
 use super::Findings;
-use super::record::{COLUMNS, Swept, Traced, TracedRow, column_of, derivative, exponents, extent};
+use super::record::{
+    COLUMNS, RecordedRow, RecordedRun, SettledPoint, column_of, derivative, exponents, extent,
+};
 use crate::analysis::paper::{
     Case, Claim, Coordinate, Curves, FigureValue, PAPER, Sections, Series, Test,
 };
@@ -161,7 +163,7 @@ impl Findings {
             } => {
                 let ideal = ideal.then_some(&self.ideal);
                 let curves = self.curves_of(curves).into_iter().chain(ideal);
-                let curves: Vec<Vec<&TracedRow>> = curves.map(Traced::samples).collect();
+                let curves: Vec<Vec<&RecordedRow>> = curves.map(RecordedRun::samples).collect();
                 let columns: Vec<usize> = columns.iter().map(|name| column_of(name)).collect();
                 let shares: Vec<f64> = columns.iter().map(|&c| apart(&curves, c, from)).collect();
                 let when = if from > 0.0 {
@@ -327,7 +329,7 @@ impl Findings {
                 (
                     "all three are of the regime quasi-periodic (exponent not told from 0, regular 0-1 test, no period)".to_owned(),
                     runs.iter().all(|r| r.regime == Some(Regime::QuasiPeriodic)),
-                    each(over, runs, Swept::word),
+                    each(over, runs, SettledPoint::word),
                 )
             }
             Test::AllPeriodic(over) => {
@@ -384,7 +386,7 @@ impl Findings {
         series.cases().map(of)
     }
 
-    fn curves_of(&self, curves: Curves) -> Vec<&Traced> {
+    fn curves_of(&self, curves: Curves) -> Vec<&RecordedRun> {
         let series = |series: Series| series.cases().map(|case| self.run(case)).to_vec();
         match curves {
             Curves::Clearance => series(Series::Clearance),
@@ -418,7 +420,7 @@ fn all_grow(series: Series, before: &[Statement]) -> Judged {
 }
 
 /// Largest distance between any two of `curves` at any instant from `from` (s) on, over the amplitude.
-fn apart(curves: &[Vec<&TracedRow>], column: usize, from: f64) -> f64 {
+fn apart(curves: &[Vec<&RecordedRow>], column: usize, from: f64) -> f64 {
     let coordinate = Coordinate::ALL[(column - 1) / 3];
     let late = curves.iter().map(|c| {
         let late = c.iter().filter(|row| row[0] >= from);
@@ -437,7 +439,7 @@ fn furthest<C: AsRef<[f64]>>(curves: &[C]) -> f64 {
 }
 
 /// Fraction of the sections within half of the largest distance from their mean; `None` if they cannot be told apart.
-fn crowd(run: &Swept, resolution: [f64; 2]) -> Option<f64> {
+fn crowd(run: &SettledPoint, resolution: [f64; 2]) -> Option<f64> {
     let middle = [0, 1].map(|c| {
         let all = &run.sections[c];
         all.iter().sum::<f64>() / all.len() as f64
@@ -456,16 +458,16 @@ fn crowd(run: &Swept, resolution: [f64; 2]) -> Option<f64> {
     (furthest > 0.5).then(|| within as f64 / distances.len() as f64)
 }
 
-fn widest(points: &[Swept], coordinate: Coordinate) -> f64 {
+fn widest(points: &[SettledPoint], coordinate: Coordinate) -> f64 {
     let spreads = points.iter().map(|p| p.spread(coordinate));
     spreads.fold(0.0, f64::max)
 }
 
-fn is_chaotic(point: &Swept) -> bool {
+fn is_chaotic(point: &SettledPoint) -> bool {
     point.regime == Some(Regime::Chaotic)
 }
 
-fn chaotic(points: &[Swept]) -> usize {
+fn chaotic(points: &[SettledPoint]) -> usize {
     points.iter().filter(|p| is_chaotic(p)).count()
 }
 
@@ -474,7 +476,7 @@ fn ascending(values: &[f64]) -> bool {
 }
 
 /// Number of points per regime, and their exponents.
-fn regimes(points: &[Swept]) -> String {
+fn regimes(points: &[SettledPoint]) -> String {
     let mut counts: BTreeMap<String, usize> = BTreeMap::new();
     for point in points {
         *counts.entry(point.word()).or_default() += 1;
@@ -484,7 +486,7 @@ fn regimes(points: &[Swept]) -> String {
     format!("{}; {}", join(listed), measured(points))
 }
 
-fn measured(points: &[Swept]) -> String {
+fn measured(points: &[SettledPoint]) -> String {
     let (least, most) = exponents(points);
     if least > most {
         return "no exponents measured".to_owned();
@@ -581,8 +583,8 @@ mod tests {
         }
     }
 
-    fn point(value: f64, regime: Regime, x: f64, beta: &[f64]) -> Swept {
-        Swept {
+    fn point(value: f64, regime: Regime, x: f64, beta: &[f64]) -> SettledPoint {
+        SettledPoint {
             value,
             regime: Some(regime),
             exponent: (-1.0, 0.1),
@@ -594,7 +596,7 @@ mod tests {
         std::array::from_fn(|k| if k % 2 == 0 { 0.0 } else { width })
     }
 
-    fn put(found: &mut Findings, name: &str, points: Vec<Swept>) {
+    fn put(found: &mut Findings, name: &str, points: Vec<SettledPoint>) {
         let sweep = found.sweeps.iter_mut().find(|s| s.name == name);
         sweep.expect("a sweep").points = points;
     }
@@ -687,7 +689,7 @@ mod tests {
     #[test]
     fn curves_coincide_from_the_instant_that_is_asked_for() {
         // A curve that is off by `early` until 0.35 s and by `late` afterwards, in every coordinate and derivative.
-        let curve = |early: f64, late: f64| -> Vec<TracedRow> {
+        let curve = |early: f64, late: f64| -> Vec<RecordedRow> {
             let instants = (0..=20).map(|k| f64::from(k) * 0.1);
             let row = |t: f64| {
                 let off = if t < 0.35 { early } else { late };

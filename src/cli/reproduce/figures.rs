@@ -3,7 +3,8 @@
 use super::text::{capital, typeset};
 use crate::analysis::paper::{Case, Coordinate, PAPER, Series, Shows};
 use crate::analysis::reproduction::{
-    COLUMNS, Column, Findings, Swept, Traced, Variant, column_of, derivative, regime_word,
+    COLUMNS, Column, Findings, RecordedRun, SettledPoint, Variant, column_of, derivative,
+    regime_word,
 };
 use crate::chart::{
     Axis, Chart, Colour, Level, Map, Marker, PALETTE, Scale, Series as Curve, Sheet,
@@ -132,7 +133,7 @@ fn over_time(title: &str, to: f64, y: Axis, series: Vec<Curve>) -> Chart {
 }
 
 /// Columns of runs over the first `to` seconds, each run in its colour.
-fn columns(runs: &[(String, &Traced, usize)], to: f64, title: &str, colour: usize) -> Chart {
+fn columns(runs: &[(String, &RecordedRun, usize)], to: f64, title: &str, colour: usize) -> Chart {
     let series = runs.iter().enumerate().map(|(n, (name, run, column))| {
         let early = run.curve(*column).take_while(|(time, _)| *time <= to);
         line(name, early.collect(), PALETTE[colour + n])
@@ -140,7 +141,11 @@ fn columns(runs: &[(String, &Traced, usize)], to: f64, title: &str, colour: usiz
     over_time(title, to, of_column(runs[0].2), series.collect())
 }
 
-fn of_series(found: &Findings, series: Series, column: usize) -> [(String, &Traced, usize); 3] {
+fn of_series(
+    found: &Findings,
+    series: Series,
+    column: usize,
+) -> [(String, &RecordedRun, usize); 3] {
     series
         .cases()
         .map(|case| (case_name(series, case), found.run(case), column))
@@ -159,7 +164,7 @@ fn response(found: &Findings, to: Series, whole: &[String], early: &[String]) ->
     .concat()
 }
 
-fn forces(run: &Traced) -> Vec<Chart> {
+fn forces(run: &RecordedRun) -> Vec<Chart> {
     let joints = ["S1", "S2", "S3"];
     let joints = joints.map(|j| (j.to_owned(), run, column_of(&format!("{j}_normal_N"))));
     vec![
@@ -310,7 +315,7 @@ fn bifurcation(found: &Findings, series: Series) -> Vec<Chart> {
         chart(&title, parameter(series), value, dots.collect())
     };
     let differences = |c: Coordinate| {
-        let along = |label: &str, colour: usize, size: &dyn Fn(usize, &Swept) -> f64| {
+        let along = |label: &str, colour: usize, size: &dyn Fn(usize, &SettledPoint) -> f64| {
             let points = all[0].iter().enumerate();
             let points = points.map(|(k, p)| (p.value, size(k, p) * 1e6));
             line(label, points.collect(), PALETTE[colour])

@@ -10,7 +10,7 @@ use crate::analysis::paper::{
     Agreement, Comparison, Coordinate, DURATION, Figure, FigureValue, PAPER, Series, Shows,
 };
 use crate::analysis::reproduction::{
-    CORRECTED, Extent, Findings, PERIOD, Report, Statement, Swept, Variant,
+    CORRECTED, Extent, Findings, PERIOD, Report, SettledPoint, Statement, Variant,
 };
 use crate::analysis::response::Response;
 use crate::cli::output::significant;
@@ -264,7 +264,7 @@ fn runs(found: &Findings, series: Series) -> String {
 
 fn branches(found: &Findings, series: Series) -> String {
     let [cold, up, down] = found.branches(series);
-    let most = |other: &[Swept]| {
+    let most = |other: &[SettledPoint]| {
         Coordinate::ALL.map(|c| {
             let pairs = cold.iter().zip(other);
             pairs

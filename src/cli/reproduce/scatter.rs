@@ -3,7 +3,7 @@
 use super::Score;
 use super::text::{self, escape, shown, typeset};
 use crate::analysis::paper::{Case, Coordinate, FigureValue, PAPER, Series};
-use crate::analysis::reproduction::{Report, Statement, Swept, Traced, exponents};
+use crate::analysis::reproduction::{RecordedRun, Report, SettledPoint, Statement, exponents};
 use crate::cli::output::significant;
 use crate::cli::tables::html;
 
@@ -22,7 +22,7 @@ fn printed(case: Case, quantity: FigureValue) -> Option<f64> {
 /// A model: its title, and its runs by clearance with their sections.
 struct Model<'a> {
     title: &'static str,
-    runs: [(&'a Traced, &'a Swept); 3],
+    runs: [(&'a RecordedRun, &'a SettledPoint); 3],
 }
 
 fn models(report: &Report) -> Vec<Model<'_>> {
@@ -48,7 +48,7 @@ fn models(report: &Report) -> Vec<Model<'_>> {
 /// What is compared: a heading, the value for a run and its sections, and the paper's quantity if it prints one.
 type Measure = (
     &'static str,
-    fn(&Traced, &Swept) -> f64,
+    fn(&RecordedRun, &SettledPoint) -> f64,
     Option<FigureValue>,
 );
 
@@ -111,7 +111,7 @@ fn clearances(models: &[Model]) -> String {
 }
 
 /// Number of points per regime, in order of first occurrence.
-fn regimes(points: &[Swept]) -> String {
+fn regimes(points: &[SettledPoint]) -> String {
     let mut regimes: Vec<(String, usize)> = Vec::new();
     for point in points {
         let of = point.word();
