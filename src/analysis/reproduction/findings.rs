@@ -1,8 +1,8 @@
 //! The results of a report.
 
+use super::Extent;
 use super::record::{RecordedRun, SettledCurve, SettledPoint, SweepData};
-use super::{Extent, Variant};
-use crate::analysis::paper::{CASES, Case, Comparison, PAPER, Published, Series};
+use crate::analysis::paper::{Case, Comparison, PAPER, Published, Series, Variant};
 
 /// The results of a report.
 pub struct Report {
@@ -17,7 +17,7 @@ pub struct Report {
 /// Results of (13) as printed together with a second change.
 pub struct Combination {
     /// The changes.
-    pub variant: Variant,
+    pub variant: &'static Variant,
     /// Runs by clearance.
     pub runs: Vec<RecordedRun>,
     /// Their sections.
@@ -29,14 +29,14 @@ pub struct Findings {
     /// How much was computed.
     pub extent: Extent,
     /// The model.
-    pub variant: Variant,
-    /// The paper's runs, in the order of [`CASES`].
+    pub variant: &'static Variant,
+    /// The paper's runs, in the order of [`PAPER`].
     pub runs: Vec<RecordedRun>,
     /// The first of them with all bodies and multipliers.
     pub lagrange: RecordedRun,
     /// The run with ideal joints.
     pub ideal: RecordedRun,
-    /// Settled curves, in the order of [`CASES`].
+    /// Settled curves, in the order of [`PAPER`].
     pub curves: Vec<SettledCurve>,
     /// Sweeps: [`Findings::sweep`] finds one by name.
     pub sweeps: Vec<SweepData>,
@@ -45,7 +45,7 @@ pub struct Findings {
 }
 
 fn index(case: Case) -> usize {
-    let found = CASES.iter().position(|of| *of == case);
+    let found = PAPER.runs.iter().position(|of| *of == case);
     found.expect("the table names no other run")
 }
 
@@ -82,7 +82,7 @@ impl Findings {
     /// The run of `case`.
     ///
     /// # Panics
-    /// If it is none of [`CASES`].
+    /// If it is none of those in [`PAPER`].
     pub fn run(&self, case: Case) -> &RecordedRun {
         &self.runs[index(case)]
     }

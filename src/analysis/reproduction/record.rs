@@ -1,7 +1,6 @@
 //! Records of the runs, settled curves and sweeps of a report.
 
-use super::Variant;
-use crate::analysis::paper::{Case, Coordinate};
+use crate::analysis::paper::{Case, Coordinate, Variant};
 use crate::analysis::regime::Regime;
 use crate::analysis::response::{Observation, Response};
 use crate::analysis::sweep::Sweep;
@@ -129,9 +128,6 @@ pub struct SettledCurve {
     pub width: [f64; 2],
 }
 
-/// Word for the regime of a point that did not reach its end.
-const NO_REGIME: &str = "none";
-
 /// Settled motion at one value of a parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SettledPoint {
@@ -162,12 +158,6 @@ impl SettledPoint {
     pub fn period(&self) -> usize {
         self.regime.map_or(0, Regime::period)
     }
-
-    /// Regime with its period.
-    pub fn word(&self) -> String {
-        self.regime
-            .map_or_else(|| NO_REGIME.to_owned(), |regime| regime.to_string())
-    }
 }
 
 /// Minimum and maximum.
@@ -193,7 +183,7 @@ pub fn exponents(points: &[SettledPoint]) -> (f64, f64) {
 #[derive(Clone, Debug)]
 pub struct SweepData {
     /// The model.
-    pub variant: Variant,
+    pub variant: &'static Variant,
     /// Name used in file names.
     pub name: &'static str,
     /// The sweep.
@@ -249,9 +239,4 @@ impl SweepData {
         });
         self.points = points.collect();
     }
-}
-
-/// Word for a regime code in files.
-pub fn regime_word(code: i64) -> &'static str {
-    Regime::of_code(code, 1).map_or(NO_REGIME, Regime::word)
 }

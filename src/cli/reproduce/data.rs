@@ -4,6 +4,7 @@ use ndarray::Array1;
 use ndarray_npy::NpzWriter;
 use serde_json::{Map, Value as Json, json};
 
+use super::statements::words;
 use super::text;
 use crate::analysis::paper::Published;
 use crate::analysis::reproduction::{COLUMNS, Column, Findings, RecordedRun, Report, SweepData};
@@ -30,11 +31,11 @@ pub(super) fn write(folder: &Folder, report: &Report) -> Result<(), Failure> {
     };
     put_run(&report.corrected.ideal)?;
     for found in [&report.corrected, &report.printed] {
-        let prefix = found.variant.prefix;
+        let prefix = &found.variant.prefix;
         put(format!("{prefix}numbers.csv"), numbers(found).as_bytes())?;
         put(
             format!("{prefix}statements.csv"),
-            statements(found).as_bytes(),
+            verdicts(found).as_bytes(),
         )?;
         put(
             format!("{prefix}settled_curves.csv"),
@@ -79,16 +80,17 @@ fn numbers(found: &Findings) -> String {
     )
 }
 
-fn statements(found: &Findings) -> String {
+fn verdicts(found: &Findings) -> String {
     csv(
         "place,statement,criterion,verdict,evidence",
-        found.statements().into_iter().map(|s| {
+        found.statements().iter().map(|s| {
+            let (criterion, evidence) = words(s);
             vec![
                 s.claim.place.clone(),
                 s.claim.says.clone(),
-                s.criterion,
+                criterion,
                 text::verdict(s.confirmed).to_owned(),
-                s.evidence,
+                evidence,
             ]
         }),
     )
