@@ -24,7 +24,7 @@ mod setting;
 pub mod source;
 mod stretch;
 pub mod sweep;
-pub mod swept;
+pub mod sweep_task;
 pub mod task;
 mod work_precision;
 

@@ -12,13 +12,6 @@ pub use quantity::{Agreement, Comparison, FigureValue};
 
 use crate::words::words;
 
-/// Simulated time of the paper's runs: one period of trajectory (59), s.
-pub const DURATION: f64 = 2.0;
-/// The paper's output step, s.
-pub const SAMPLING: f64 = 1e-3;
-/// Amplitudes of x (m) and of beta (rad) in trajectory (59).
-const AMPLITUDES: [f64; 2] = [0.025, 0.025];
-
 /// Clearance (mm) and friction coefficient of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(from = "(f64, f64)")]
@@ -31,38 +24,23 @@ pub struct Case {
 
 impl From<(f64, f64)> for Case {
     fn from((clearance, friction): (f64, f64)) -> Self {
-        Self::new(clearance, friction)
-    }
-}
-
-impl Case {
-    const fn new(clearance: f64, friction: f64) -> Self {
         Self {
             clearance,
             friction,
         }
     }
-
-    /// The changes that turn the default scene into this case.
-    pub fn changes(self) -> Vec<(String, String)> {
-        vec![
-            (
-                "contact.clearance".to_owned(),
-                format!("{} mm", self.clearance),
-            ),
-            ("contact.friction".to_owned(), self.friction.to_string()),
-        ]
-    }
 }
 
-/// Every run that the figures need, once each.
-pub const CASES: [Case; 5] = [
-    Case::new(0.3, 0.2),
-    Case::new(0.5, 0.2),
-    Case::new(0.7, 0.2),
-    Case::new(0.3, 0.15),
-    Case::new(0.3, 0.25),
-];
+impl Case {
+    /// The changes that turn the default scene into this case.
+    pub fn changes(self) -> [(String, String); 2] {
+        Series::ALL.map(|series| {
+            let SeriesRow { key, unit, .. } = series.row();
+            let value = format!("{} {unit}", series.of(self));
+            (key.clone(), value.trim_end().to_owned())
+        })
+    }
+}
 
 /// Runs that differ in a single parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
@@ -80,20 +58,24 @@ words!(Series {
 });
 
 impl Series {
-    /// Its runs, in ascending order of the parameter.
-    pub const fn cases(self) -> [Case; 3] {
-        match self {
-            Self::Clearance => [CASES[0], CASES[1], CASES[2]],
-            Self::Friction => [CASES[3], CASES[0], CASES[4]],
-        }
+    /// Its row of the table.
+    pub fn row(self) -> &'static SeriesRow {
+        &PAPER.series[self as usize]
     }
 
-    /// Name of its parameter together with a value, in the unit of [`Case`].
+    /// Its runs, in ascending order of the parameter.
+    pub fn cases(self) -> [Case; 3] {
+        self.row().runs
+    }
+
+    /// A value of its parameter as legends and tables name it.
     pub fn name(self, value: impl std::fmt::Display) -> String {
-        match self {
-            Self::Clearance => format!("{value} mm"),
-            Self::Friction => format!("friction {value}"),
-        }
+        self.row().value.replace("{}", &value.to_string())
+    }
+
+    /// What distinguishes a run from the others of the series.
+    pub fn run_name(self, case: Case) -> String {
+        self.name(self.of(case))
     }
 
     /// Value of its parameter in a run.
@@ -104,13 +86,53 @@ impl Series {
         }
     }
 
-    /// The parameter in the plural.
-    pub fn values(self) -> &'static str {
-        match self {
-            Self::Clearance => "clearances",
-            Self::Friction => "frictions",
-        }
+    /// `count` values between two ends, as `sweep --vary` takes them.
+    pub fn vary(self, [from, to]: [f64; 2], count: usize) -> String {
+        let SeriesRow { key, unit, .. } = self.row();
+        format!("{key}={from}{unit}..{to}{unit}:{count}")
     }
+}
+
+/// Parameter and runs of a [`Series`].
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SeriesRow {
+    /// Key of the parameter.
+    pub key: String,
+    /// Its name on an axis.
+    pub label: String,
+    /// Unit of its values here.
+    pub unit: String,
+    /// How a value, `{}`, is written beside others.
+    pub value: String,
+    /// The runs, in ascending order of the parameter.
+    pub runs: [Case; 3],
+    /// Smallest and largest value of the diagrams over the parameter.
+    pub range: [f64; 2],
+}
+
+/// Changes to the default scene for the paper's runs.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Variant {
+    /// Prefix of its file names.
+    pub prefix: String,
+    /// Title.
+    pub title: String,
+    /// Keys and values.
+    pub changes: Vec<(String, String)>,
+}
+
+/// What the paper's runs are computed with.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Variants {
+    /// The model of this program.
+    pub corrected: Variant,
+    /// Friction uses (13) as printed.
+    pub printed: Variant,
+    /// The latter, each with a second change.
+    pub combinations: Vec<Variant>,
 }
 
 /// One of the two coordinates plotted in the paper.
@@ -134,9 +156,10 @@ impl Coordinate {
         [0, 4][self as usize]
     }
 
-    /// Amplitude of the coordinate (m or rad) or of its `nth` derivative in the ideal motion: the drive turns at pi rad/s.
+    /// Amplitude of the coordinate (m or rad) or of its `nth` derivative in the ideal motion.
     pub fn amplitude(self, nth: usize) -> f64 {
-        AMPLITUDES[self as usize] * [1.0, PI, PI * PI][nth]
+        let rate = 2.0 * PI / PAPER.period;
+        PAPER.amplitudes[self as usize] * [1.0, rate, rate * rate][nth]
     }
 }
 
@@ -262,7 +285,7 @@ pub struct Section {
     pub figures: Vec<Figure>,
 }
 
-/// What must hold here for a statement to count as confirmed; [`super::reproduction::Findings::statements`] words the criteria.
+/// What must hold here for a statement to count as confirmed, as [`super::reproduction::Findings::statements`] judges it.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 #[allow(missing_docs, reason = "fields read as the sentences of the table")]
@@ -354,6 +377,18 @@ pub struct Claim {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Paper {
+    /// Period of trajectory (59), s: simulated time of the runs of section 4.2.
+    pub period: f64,
+    /// Amplitudes of x (m) and of beta (rad) in trajectory (59).
+    pub amplitudes: [f64; 2],
+    /// The paper's output step, s.
+    pub sampling: f64,
+    /// Every run that the figures need, once each; first the nominal one.
+    pub runs: Vec<Case>,
+    /// Runs that differ in a single parameter, in the order of [`Series`].
+    pub series: [SeriesRow; 2],
+    /// What they are computed with.
+    pub variants: Variants,
     /// Numbers from a named run.
     #[serde(rename = "number")]
     pub numbers: Vec<Published>,
@@ -381,12 +416,28 @@ mod tests {
     fn every_number_belongs_to_a_run_and_to_a_figure() {
         let figures = || PAPER.sections.iter().flat_map(|s| &s.figures);
         for published in &PAPER.numbers {
-            assert!(CASES.contains(&published.case), "{published:?}");
+            assert!(PAPER.runs.contains(&published.case), "{published:?}");
             assert!(published.value > 0.0);
             let of = figures().filter(|f| f.contains(&published.figure));
             assert_eq!(of.count(), 1, "{published:?}");
         }
         assert_eq!((PAPER.numbers.len(), PAPER.statements.len()), (51, 52));
+    }
+
+    #[test]
+    fn the_runs_of_a_series_are_equally_spaced_and_among_all_runs() {
+        for series in Series::ALL {
+            let runs = series.cases();
+            assert!(series.row().key.ends_with(series.word()));
+            assert!(runs.iter().all(|run| PAPER.runs.contains(run)), "{series}");
+            let [a, b, c] = runs.map(|run| series.of(run));
+            assert!(a < b && (a + c - 2.0 * b).abs() < 1e-12, "{series}");
+        }
+        assert_eq!(
+            Series::Clearance.vary([0.01, 1.0], 100),
+            "contact.clearance=0.01mm..1mm:100"
+        );
+        assert_eq!(Series::Friction.run_name(PAPER.runs[0]), "friction 0.2");
     }
 
     #[test]

@@ -7,74 +7,21 @@ mod statements;
 pub use findings::{Combination, Findings, Report};
 use record::row;
 pub use record::{
-    COLUMNS, Column, SettledCurve, SweepData, Swept, Traced, TracedRow, column_of, derivative,
-    exponents, regime_word,
+    COLUMNS, Column, RecordedRow, RecordedRun, SettledCurve, SettledPoint, SweepData, column_of,
+    derivative, exponents,
 };
-pub use statements::Statement;
+pub use statements::{Grounds, LITTLE, Statement};
 
 use super::grid::{Grid, ParameterRange, RangeError, Start};
-use super::paper::{CASES, Case, Coordinate, DURATION, SAMPLING, Series};
+use super::paper::{Case, Coordinate, PAPER, Series, Variant};
 use super::point::{Plan, resolution};
 use super::response::{Observation, Response, ResponseError, derivatives, respond};
 use super::sweep::{Sweep, SweepError};
 use crate::scene::{Scene, SceneError};
 use crate::simulate::{Frame, Simulation};
 
-/// Period of trajectory (59), s.
-pub const PERIOD: f64 = 2.0;
 /// Points per period of a settled curve.
 const CURVE_POINTS: usize = 800;
-
-/// Changes to the default scene for the paper's runs.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Variant {
-    /// Prefix of its file names.
-    pub prefix: &'static str,
-    /// Title.
-    pub title: &'static str,
-    /// Keys and values.
-    pub changes: &'static [(&'static str, &'static str)],
-}
-
-const AS_PRINTED: (&str, &str) = ("contact.friction_velocity", "printed");
-
-/// The model of this program: friction uses the velocity of the centres, (15)-(16).
-pub const CORRECTED: Variant = Variant {
-    prefix: "",
-    title: "as corrected",
-    changes: &[],
-};
-
-/// Friction uses the velocities of (13) as printed.
-pub const PRINTED: Variant = Variant {
-    prefix: "printed_",
-    title: "(13) as printed",
-    changes: &[AS_PRINTED],
-};
-
-/// (13) as printed together with other misprints and omissions of the paper. (19) as printed divides the elastic force by four
-/// times the approach speed in m/s: 3.2 times that of a steel ball in the first impacts, and next to no damping.
-pub const COMBINATIONS: [Variant; 3] = [
-    Variant {
-        prefix: "printed_a1_24mm_",
-        title: "and a1 = 24 mm",
-        changes: &[AS_PRINTED, ("spcmm.slider_plane", "24 mm")],
-    },
-    Variant {
-        prefix: "printed_a1_36mm_",
-        title: "and a1 = 36 mm",
-        changes: &[AS_PRINTED, ("spcmm.slider_plane", "36 mm")],
-    },
-    Variant {
-        prefix: "printed_eq19_",
-        title: "and (19) as printed, as its first impacts have it: 3.2 K, no damping",
-        changes: &[
-            AS_PRINTED,
-            ("contact.youngs_modulus", "660 GPa"),
-            ("contact.normal_law", "hertz"),
-        ],
-    },
-];
 
 /// Extent of the computation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -139,10 +86,10 @@ pub enum ReproductionError {
 /// The work of a report.
 pub struct Agenda {
     extent: Extent,
-    /// Runs of section 4.2 by name: for each variant in the order of [`CASES`], then with all bodies and multipliers; for
+    /// Runs of section 4.2 by name: for each variant in the order of [`PAPER`], then with all bodies and multipliers; for
     /// each combination by clearance; with ideal joints.
     runs: Vec<(String, Case, Scene)>,
-    /// Scenes of the settled curves, for each variant in the order of [`CASES`].
+    /// Scenes of the settled curves, for each variant in the order of [`PAPER`].
     curves: Vec<(Case, Scene)>,
     /// [`SWEEPS`] for each variant, one for each combination.
     sweeps: Vec<SweepData>,
@@ -162,7 +109,7 @@ enum ReportJob {
 /// Result of a job.
 pub enum Outcome {
     /// A run of section 4.2.
-    Run(Box<(Response, Vec<TracedRow>)>),
+    Run(Box<(Response, Vec<RecordedRow>)>),
     /// A settled curve.
     Curve(SettledCurve),
     /// Records of a block.
@@ -171,15 +118,15 @@ pub enum Outcome {
 
 const SCENE: &str = "spcmm";
 
-fn scene(variant: Variant, case: Case, more: &[(&str, &str)]) -> Result<Scene, SceneError> {
-    let mut changes = case.changes();
-    let all = variant.changes.iter().chain(more);
-    changes.extend(all.map(|&(k, v)| (k.to_owned(), v.to_owned())));
-    Scene::load(SCENE, &changes)
+fn scene(variant: &Variant, case: Case, more: &[(&str, &str)]) -> Result<Scene, SceneError> {
+    let more = more.iter().map(|&(k, v)| (k.to_owned(), v.to_owned()));
+    let changes = case.changes().into_iter();
+    let changes = changes.chain(variant.changes.iter().cloned()).chain(more);
+    Scene::load(SCENE, &changes.collect::<Vec<_>>())
 }
 
 fn sweep_data(
-    variant: Variant,
+    variant: &'static Variant,
     name: &'static str,
     case: Case,
     vary: &[String],
@@ -211,42 +158,43 @@ impl Agenda {
     /// # Errors
     /// An extent that gives an invalid sweep.
     pub fn new(extent: Extent) -> Result<Self, ReproductionError> {
+        let variants = &PAPER.variants;
+        let both = [&variants.corrected, &variants.printed];
         let mut runs = Vec::new();
-        let mut run = |variant: Variant, name: String, case: Case, more: &[(&str, &str)]| {
+        let mut run = |variant: &Variant, name: String, case: Case, more: &[(&str, &str)]| {
             let name = format!("{}{name}", variant.prefix);
             runs.push((name, case, scene(variant, case, more)?));
             Ok::<_, SceneError>(())
         };
-        let nominal = CASES[0];
-        for variant in [CORRECTED, PRINTED] {
-            for case in CASES {
+        let mut curves = Vec::new();
+        let nominal = PAPER.runs[0];
+        for variant in both {
+            for &case in &PAPER.runs {
                 run(variant, file_name(case), case, &[])?;
+                curves.push((case, scene(variant, case, &[])?));
             }
             let multipliers = [("formulation", "lagrange")];
             run(variant, "lagrange".to_owned(), nominal, &multipliers)?;
         }
-        for variant in COMBINATIONS {
+        for variant in &variants.combinations {
             for case in Series::Clearance.cases() {
                 run(variant, file_name(case), case, &[])?;
             }
         }
         let closed = [("contact.clearance", "0")];
-        run(CORRECTED, "ideal".to_owned(), nominal, &closed)?;
-        let both = [CORRECTED, PRINTED].into_iter();
-        let curves =
-            both.flat_map(|variant| CASES.map(|case| Ok((case, scene(variant, case, &[])?))));
-        let curves = curves.collect::<Result<Vec<_>, SceneError>>()?;
-        let clearance = |n: usize| vec![format!("contact.clearance=0.01mm..1mm:{n}")];
-        let friction = |n: usize| vec![format!("contact.friction=0.01..0.4:{n}")];
-        let [c, f] = extent.values;
+        run(both[0], "ideal".to_owned(), nominal, &closed)?;
+        let over = |series: Series, count: usize| series.vary(series.row().range, count);
+        let [c, f] = Series::ALL.map(|series| vec![over(series, extent.values[series as usize])]);
         let [map_f, map_c] = extent.map;
-        let map = [friction(map_f), clearance(map_c)].concat();
-        let cases = [
-            vec!["contact.clearance=0.3mm..0.7mm:3".to_owned()],
-            vec!["contact.friction=0.15..0.25:3".to_owned()],
+        let map = vec![
+            over(Series::Friction, map_f),
+            over(Series::Clearance, map_c),
         ];
+        let cases = Series::ALL.map(|series| {
+            let [first, _, last] = series.cases().map(|case| series.of(case));
+            vec![series.vary([first, last], 3)]
+        });
         let (up, down, cold) = (Start::FollowUp, Start::FollowDown, Start::Cold);
-        let (c, f) = (clearance(c), friction(f));
         let (runs_of, sweep_of) = (extent.runs, extent.sweep);
         let sweeps: [_; SWEEPS] = [
             ("runs_by_clearance", &cases[0], cold, runs_of, true),
@@ -262,9 +210,10 @@ impl Agenda {
         let of = |variant, &(name, vary, start, periods, exponent): &(_, &Vec<String>, _, _, _)| {
             sweep_data(variant, name, nominal, vary, start, periods, exponent)
         };
-        let both = [CORRECTED, PRINTED].into_iter();
-        let all = both.flat_map(|variant| sweeps.iter().map(move |s| (variant, s)));
-        let all = all.chain(COMBINATIONS.map(|variant| (variant, &sweeps[0])));
+        let all = both.into_iter();
+        let all = all.flat_map(|variant| sweeps.iter().map(move |s| (variant, s)));
+        let combinations = variants.combinations.iter();
+        let all = all.chain(combinations.map(|variant| (variant, &sweeps[0])));
         let sweeps = all
             .map(|(variant, s)| of(variant, s))
             .collect::<Result<Vec<_>, ReproductionError>>()?;
@@ -305,13 +254,13 @@ impl Agenda {
     /// Simulated time of a job, s; a twin counts as a second run.
     pub fn length(&self, job: usize) -> f64 {
         match self.jobs[job] {
-            ReportJob::Run(_) => DURATION,
-            ReportJob::Curve(_) => PERIOD * (self.extent.settle + 2) as f64,
+            ReportJob::Run(_) => PAPER.period,
+            ReportJob::Curve(_) => PAPER.period * (self.extent.settle + 2) as f64,
             ReportJob::Block(s, b) => {
                 let sweep = &self.sweeps[s].sweep;
                 let twin = if sweep.plan().exponent { 2.0 } else { 1.0 };
                 let points = sweep.grid().block(b).len();
-                PERIOD * twin * (sweep.plan().periods * points) as f64
+                PAPER.period * twin * (sweep.plan().periods * points) as f64
             }
         }
     }
@@ -334,7 +283,7 @@ impl Agenda {
                 let (name, _, scene) = &self.runs[n];
                 let mut rows = Vec::new();
                 let observe = |look: &Observation| rows.push(row(look));
-                let response = respond(scene, DURATION, SAMPLING, observe, go_on);
+                let response = respond(scene, PAPER.period, PAPER.sampling, observe, go_on);
                 let response = response.map_err(|e| failed(name, e))?;
                 Ok(Outcome::Run(Box::new((response, rows))))
             }
@@ -378,7 +327,7 @@ impl Agenda {
                 (ReportJob::Run(n), Outcome::Run(found)) => {
                     let (name, case, _) = &self.runs[*n];
                     let (response, rows) = *found;
-                    runs.push(Traced {
+                    runs.push(RecordedRun {
                         name: name.clone(),
                         case: *case,
                         response,
@@ -400,18 +349,19 @@ impl Agenda {
         let ideal = runs.pop().expect("the last run is the ideal one");
         let (mut runs, mut curves) = (runs.into_iter(), curves.into_iter());
         let mut sweeps = self.sweeps.into_iter();
-        let mut findings = |variant: Variant| Findings {
+        let mut findings = |variant| Findings {
             extent: self.extent,
             variant,
-            runs: runs.by_ref().take(CASES.len()).collect(),
+            runs: runs.by_ref().take(PAPER.runs.len()).collect(),
             lagrange: runs.next().expect("then one with multipliers"),
             ideal: ideal.clone(),
-            curves: curves.by_ref().take(CASES.len()).collect(),
+            curves: curves.by_ref().take(PAPER.runs.len()).collect(),
             sweeps: sweeps.by_ref().take(SWEEPS).collect(),
             resolution,
         };
-        let (corrected, printed) = (findings(CORRECTED), findings(PRINTED));
-        let combination = |variant: Variant| Combination {
+        let variants = &PAPER.variants;
+        let (corrected, printed) = (findings(&variants.corrected), findings(&variants.printed));
+        let combination = |variant| Combination {
             variant,
             runs: runs.by_ref().take(3).collect(),
             sections: sweeps.next().expect("one a combination"),
@@ -419,7 +369,7 @@ impl Agenda {
         Report {
             corrected,
             printed,
-            combinations: COMBINATIONS.map(combination).into(),
+            combinations: variants.combinations.iter().map(combination).collect(),
         }
     }
 }
@@ -445,7 +395,7 @@ fn curve(
         width: [0.0; 2],
     };
     for n in 0..=2 * CURVE_POINTS {
-        let time = PERIOD * (settle as f64 + n as f64 / CURVE_POINTS as f64);
+        let time = PAPER.period * (settle as f64 + n as f64 / CURVE_POINTS as f64);
         while simulation.time() < time {
             if !go_on(simulation.time()) {
                 return Err(ResponseError::Cancelled);

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::RunContext;
 use super::presets::{self, Measured};
 use super::source::{SceneSource, TaskFault};
-use super::swept::{self, Range, SweepMessage, SweepTask, SweptPoint};
+use super::sweep_task::{self, Range, SweepMessage, SweepTask, SweptPoint};
 use crate::scene::Preset;
 
 /// What to compute.
@@ -60,7 +60,7 @@ pub fn perform(
 ) {
     let outcome = match job {
         Job::Presets { scene, presets } => measure_presets(scene, presets, clock, tell),
-        Job::Sweep(task) => swept::run(task, &mut |message| tell(message.into())),
+        Job::Sweep(task) => sweep_task::run(task, &mut |message| tell(message.into())),
     };
     let last = match outcome {
         Ok(()) => Message::Done,

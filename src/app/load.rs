@@ -3,7 +3,7 @@
 use super::player::Player;
 use crate::analysis::section::Schedule;
 use crate::analysis::source::SceneSource;
-use crate::analysis::swept::SweptPoint;
+use crate::analysis::sweep_task::SweptPoint;
 
 /// One sweep point on the way: its settings, and when its steps end.
 #[derive(Clone, Debug, PartialEq)]
@@ -118,7 +118,7 @@ mod tests {
     use super::*;
     use crate::analysis::drive::observed;
     use crate::analysis::grid::Start;
-    use crate::analysis::swept::SweepTask;
+    use crate::analysis::sweep_task::SweepTask;
     use crate::analysis::task::{Job, Message, perform};
     use crate::scene::Scene;
     use std::ops::ControlFlow;

@@ -39,10 +39,10 @@ pub fn measure<T>(
         ),
         (AnalysisError::Start(error), Some(scene)) => error.located(scene).into(),
         (AnalysisError::Setting(ChangeError::Scene(error)), _) => error.into(),
-        (error @ (AnalysisError::Start(_) | AnalysisError::Setting(_)), _) => {
-            Failure::usage(error.to_string())
+        (error @ AnalysisError::Stopped(_), _) => {
+            Failure::new(Failure::DIVERGED, error.to_string())
         }
-        (error, _) => Failure::new(Failure::DIVERGED, error.to_string()),
+        (error, _) => Failure::usage(error.to_string()),
     })
 }
 
@@ -61,4 +61,23 @@ fn clock() -> impl FnMut() -> f64 {
 fn clock() -> impl FnMut() -> f64 {
     let started = std::time::Instant::now();
     move || started.elapsed().as_secs_f64()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::{StopAdvice, StopFault, Stopped};
+
+    #[test]
+    fn only_a_run_that_was_stopped_counts_as_diverged() {
+        let code = |error| measure::<()>(true, None, |_| Err(error)).map_err(|f| f.code);
+        let stopped = Stopped {
+            time: 0.1,
+            fault: StopFault::SingularLoops,
+            advice: StopAdvice::Dependent,
+        };
+        assert_eq!(code(stopped.into()), Err(Failure::DIVERGED));
+        let too_long = AnalysisError::TooLong { evaluations: 1 };
+        assert_eq!(code(too_long), Err(Failure::USAGE));
+    }
 }

@@ -1,8 +1,8 @@
 //! The results of a report.
 
-use super::record::{SettledCurve, SweepData, Swept, Traced};
-use super::{Extent, Variant};
-use crate::analysis::paper::{CASES, Case, Comparison, PAPER, Published, Series};
+use super::Extent;
+use super::record::{RecordedRun, SettledCurve, SettledPoint, SweepData};
+use crate::analysis::paper::{Case, Comparison, PAPER, Published, Series, Variant};
 
 /// The results of a report.
 pub struct Report {
@@ -17,9 +17,9 @@ pub struct Report {
 /// Results of (13) as printed together with a second change.
 pub struct Combination {
     /// The changes.
-    pub variant: Variant,
+    pub variant: &'static Variant,
     /// Runs by clearance.
-    pub runs: Vec<Traced>,
+    pub runs: Vec<RecordedRun>,
     /// Their sections.
     pub sections: SweepData,
 }
@@ -29,14 +29,14 @@ pub struct Findings {
     /// How much was computed.
     pub extent: Extent,
     /// The model.
-    pub variant: Variant,
-    /// The paper's runs, in the order of [`CASES`].
-    pub runs: Vec<Traced>,
+    pub variant: &'static Variant,
+    /// The paper's runs, in the order of [`PAPER`].
+    pub runs: Vec<RecordedRun>,
     /// The first of them with all bodies and multipliers.
-    pub lagrange: Traced,
+    pub lagrange: RecordedRun,
     /// The run with ideal joints.
-    pub ideal: Traced,
-    /// Settled curves, in the order of [`CASES`].
+    pub ideal: RecordedRun,
+    /// Settled curves, in the order of [`PAPER`].
     pub curves: Vec<SettledCurve>,
     /// Sweeps: [`Findings::sweep`] finds one by name.
     pub sweeps: Vec<SweepData>,
@@ -45,7 +45,7 @@ pub struct Findings {
 }
 
 fn index(case: Case) -> usize {
-    let found = CASES.iter().position(|of| *of == case);
+    let found = PAPER.runs.iter().position(|of| *of == case);
     found.expect("the table names no other run")
 }
 
@@ -60,7 +60,7 @@ impl Findings {
     }
 
     /// Many sections of each run of a series.
-    pub fn sections(&self, series: Series) -> &[Swept] {
+    pub fn sections(&self, series: Series) -> &[SettledPoint] {
         &self.sweep(&format!("runs_by_{series}")).points
     }
 
@@ -70,20 +70,20 @@ impl Findings {
     }
 
     /// Points of that sweep.
-    pub fn swept(&self, series: Series) -> &[Swept] {
+    pub fn swept(&self, series: Series) -> &[SettledPoint] {
         &self.cold(series).points
     }
 
     /// Points of that sweep, and of those that follow the motion upward and downward.
-    pub fn branches(&self, series: Series) -> [&[Swept]; 3] {
+    pub fn branches(&self, series: Series) -> [&[SettledPoint]; 3] {
         ["cold", "up", "down"].map(|start| &self.sweep(&format!("{series}_{start}")).points[..])
     }
 
     /// The run of `case`.
     ///
     /// # Panics
-    /// If it is none of [`CASES`].
-    pub fn run(&self, case: Case) -> &Traced {
+    /// If it is none of those in [`PAPER`].
+    pub fn run(&self, case: Case) -> &RecordedRun {
         &self.runs[index(case)]
     }
 

@@ -1,12 +1,11 @@
 //! Records of the runs, settled curves and sweeps of a report.
 
-use super::Variant;
-use crate::analysis::paper::{Case, Coordinate};
+use crate::analysis::paper::{Case, Coordinate, Variant};
 use crate::analysis::regime::Regime;
 use crate::analysis::response::{Observation, Response};
 use crate::analysis::sweep::Sweep;
 
-/// A column of a [`TracedRow`].
+/// A column of a [`RecordedRow`].
 pub struct Column {
     /// Name in files.
     pub name: &'static str,
@@ -27,7 +26,7 @@ const fn column(name: &'static str, label: &'static str, unit: &'static str, one
     }
 }
 
-/// Columns of a [`TracedRow`]; each coordinate is followed by its derivatives.
+/// Columns of a [`RecordedRow`]; each coordinate is followed by its derivatives.
 pub const COLUMNS: [Column; 15] = [
     column("t_s", "time", "s", 1.0),
     column("x_m", "x", "mm", 1e-3),
@@ -61,9 +60,9 @@ pub fn derivative(coordinate: Coordinate, nth: usize) -> usize {
 }
 
 /// One instant of a run, in the order of [`COLUMNS`]; the last is 1 at whole multiples of the paper's output step.
-pub type TracedRow = [f64; COLUMNS.len()];
+pub type RecordedRow = [f64; COLUMNS.len()];
 
-pub(super) fn row(look: &Observation) -> TracedRow {
+pub(super) fn row(look: &Observation) -> RecordedRow {
     let [c, r, a] = look.derivatives();
     let deviation = look.deviation();
     let joints = &look.frame.joints;
@@ -90,7 +89,7 @@ pub(super) fn row(look: &Observation) -> TracedRow {
 
 /// A run of section 4.2 with everything that its figures show.
 #[derive(Clone, Debug)]
-pub struct Traced {
+pub struct RecordedRun {
     /// Name in files.
     pub name: String,
     /// Clearance and friction.
@@ -98,12 +97,12 @@ pub struct Traced {
     /// Peaks and separations.
     pub response: Response,
     /// All instants, in order of time.
-    pub rows: Vec<TracedRow>,
+    pub rows: Vec<RecordedRow>,
 }
 
-impl Traced {
+impl RecordedRun {
     /// The instants at the paper's output step.
-    pub fn samples(&self) -> Vec<&TracedRow> {
+    pub fn samples(&self) -> Vec<&RecordedRow> {
         let last = COLUMNS.len() - 1;
         self.rows.iter().filter(|row| row[last] == 1.0).collect()
     }
@@ -129,12 +128,9 @@ pub struct SettledCurve {
     pub width: [f64; 2],
 }
 
-/// Word for the regime of a point that did not reach its end.
-const NO_REGIME: &str = "none";
-
-/// One value of a swept parameter.
+/// Settled motion at one value of a parameter.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Swept {
+pub struct SettledPoint {
     /// Value: clearance in mm, or friction.
     pub value: f64,
     /// Regime; `None` if the point did not reach its end.
@@ -145,7 +141,7 @@ pub struct Swept {
     pub sections: [Vec<f64>; 2],
 }
 
-impl Swept {
+impl SettledPoint {
     /// Latest section in a coordinate.
     pub fn latest(&self, coordinate: Coordinate) -> f64 {
         let last = self.sections[coordinate as usize].last();
@@ -161,12 +157,6 @@ impl Swept {
     /// Drive periods after which it repeats; 0 if it does not.
     pub fn period(&self) -> usize {
         self.regime.map_or(0, Regime::period)
-    }
-
-    /// Regime with its period.
-    pub fn word(&self) -> String {
-        self.regime
-            .map_or_else(|| NO_REGIME.to_owned(), |regime| regime.to_string())
     }
 }
 
@@ -184,7 +174,7 @@ pub(super) fn extent(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// Smallest and largest measured exponent, 1/s.
-pub fn exponents(points: &[Swept]) -> (f64, f64) {
+pub fn exponents(points: &[SettledPoint]) -> (f64, f64) {
     let measured = points.iter().map(|p| p.exponent.0);
     range(measured.filter(|e| e.is_finite()))
 }
@@ -193,7 +183,7 @@ pub fn exponents(points: &[Swept]) -> (f64, f64) {
 #[derive(Clone, Debug)]
 pub struct SweepData {
     /// The model.
-    pub variant: Variant,
+    pub variant: &'static Variant,
     /// Name used in file names.
     pub name: &'static str,
     /// The sweep.
@@ -201,7 +191,7 @@ pub struct SweepData {
     /// One record per point, concatenated; empty until its blocks are added.
     pub records: Vec<f64>,
     /// Points along its axis; empty for a map, and while there are no records.
-    pub points: Vec<Swept>,
+    pub points: Vec<SettledPoint>,
 }
 
 impl SweepData {
@@ -241,7 +231,7 @@ impl SweepData {
         let errors = column("exponent_standard_error_per_s");
         let (x, beta) = (column("section_x_m"), column("section_beta_rad"));
         let part = |all: &[f64], k: usize| all[k * kept..(k + 1) * kept].to_vec();
-        let points = axis.values().enumerate().map(|(k, value)| Swept {
+        let points = axis.values().enumerate().map(|(k, value)| SettledPoint {
             value: value * factor,
             regime: Regime::of_code(regimes[k] as i64, periods[k] as usize),
             exponent: (exponents[k], errors[k]),
@@ -249,9 +239,4 @@ impl SweepData {
         });
         self.points = points.collect();
     }
-}
-
-/// Word for a regime code in files.
-pub fn regime_word(code: i64) -> &'static str {
-    Regime::of_code(code, 1).map_or(NO_REGIME, Regime::word)
 }

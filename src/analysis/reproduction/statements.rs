@@ -1,157 +1,116 @@
-//! Whether the paper's statements hold here: one criterion for each kind of statement in [`paper::PAPER`].
-
-use std::collections::BTreeMap;
+//! Whether the paper's statements hold here: a verdict by the test of each one in [`PAPER`], with its numbers.
 
 use super::Findings;
-use super::record::{COLUMNS, Swept, Traced, TracedRow, column_of, derivative, exponents, extent};
+use super::record::{
+    RecordedRow, RecordedRun, SettledPoint, column_of, derivative, exponents, extent,
+};
 use crate::analysis::paper::{
     Case, Claim, Coordinate, Curves, FigureValue, PAPER, Sections, Series, Test,
 };
 use crate::analysis::regime::Regime;
 
 /// A change below this fraction of the amplitude counts as none.
-const LITTLE: f64 = 0.05;
+pub const LITTLE: f64 = 0.05;
 
 /// A statement of the paper and this program's verdict.
 #[derive(Clone, Debug)]
 pub struct Statement {
     /// Where the paper makes it, what it says, and its test.
     pub claim: &'static Claim,
-    /// What must hold here for it to count as confirmed.
-    pub criterion: String,
-    /// Whether that holds here.
+    /// Whether that test is met here.
     pub confirmed: bool,
     /// The numbers behind the verdict.
-    pub evidence: String,
+    pub grounds: Grounds,
 }
 
-/// A criterion in words, whether it is met, and the numbers behind that.
-type Judged = (String, bool, String);
+/// The numbers behind a verdict, in SI units; shares are fractions of 1. The test says what they measure, and in which order.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Grounds {
+    /// A number for each run, or for each thing that the test names.
+    Values(Vec<f64>),
+    /// Two such numbers, or a distance and what share it is.
+    Pairs(Vec<(f64, f64)>),
+    /// A length or angle for each run or point, and the smallest one that counts.
+    Resolved(Vec<f64>, f64),
+    /// For each run the share of its sections that lie near their middle; `None` if they cannot be told apart.
+    Crowds(Vec<Option<f64>>),
+    /// The joints and their largest forces.
+    Joints(Vec<(String, f64)>),
+    /// The regime of every run or point, `None` where it did not reach its end; the smallest and the largest exponent, 1/s.
+    Regimes(Vec<Option<Regime>>, (f64, f64)),
+    /// Number of chaotic points and the largest spread of beta, in either half of the range.
+    Halves([(usize, f64); 2]),
+    /// How many quantities grow, and of how many.
+    Count(usize, usize),
+}
 
 impl Findings {
     /// Every statement of the paper, in its order.
     pub fn statements(&self) -> Vec<Statement> {
-        let mut out: Vec<Statement> = Vec::new();
-        for claim in &PAPER.statements {
-            let (criterion, confirmed, evidence) = match claim.test {
-                Test::AllGrow(with) => all_grow(with, &out),
-                _ => self.judge(&claim.test),
-            };
-            out.push(Statement {
+        let of = |claim: &'static Claim| {
+            let (confirmed, grounds) = self.judge(&claim.test);
+            Statement {
                 claim,
-                criterion,
                 confirmed,
-                evidence,
-            });
-        }
-        out
+                grounds,
+            }
+        };
+        PAPER.statements.iter().map(of).collect()
     }
 
-    fn judge(&self, test: &Test) -> Judged {
-        let little = LITTLE * 100.0;
+    fn judge(&self, test: &Test) -> (bool, Grounds) {
+        use Grounds::{Count, Crowds, Halves, Joints, Pairs, Resolved, Values};
         match *test {
             Test::StaysNearIdeal { coordinate, run } => {
                 let most = self.run(run).response.full.deviation[coordinate.index()];
                 let share = most / coordinate.amplitude(0);
-                let at = Series::Clearance.name(run.clearance);
-                (
-                    format!(
-                        "at {at}, {coordinate} leaves the ideal motion by less than {little} % of its amplitude"
-                    ),
-                    share < LITTLE,
-                    format!(
-                        "{at}: at most {:.3} {}, {:.1} % of the amplitude",
-                        most * 1e3,
-                        ["mm", "mrad"][coordinate as usize],
-                        share * 100.0
-                    ),
-                )
+                (share < LITTLE, Pairs(vec![(most, share)]))
             }
             Test::Grows { of, with } => {
                 let values = self.values(of, with);
-                (
-                    "larger at each of the three values than at the one before, in continuous time"
-                        .to_owned(),
-                    ascending(&values),
-                    each(with, &values, |v| {
-                        format!("{} {}", digits(*v, 6), of.unit())
-                    }),
-                )
+                (ascending(&values), Values(values))
             }
-            Test::AllGrow(_) => unreachable!("judged by the statements before it"),
+            Test::AllGrow(series) => {
+                let tests = PAPER.statements.iter().map(|claim| &claim.test);
+                let own =
+                    |test: &&Test| matches!(test, Test::Grows { with, .. } if *with == series);
+                let grown: Vec<bool> = tests.filter(own).map(|test| self.judge(test).0).collect();
+                let held = grown.iter().filter(|held| **held).count();
+                (held == grown.len(), Count(held, grown.len()))
+            }
             Test::Exceeds { of, that, over } => {
-                let (large, small) = (self.values(of, over), self.values(that, over));
-                let pairs = [0, 1, 2].map(|k| (large[k], small[k]));
-                let (unit, other) = (of.unit(), that.unit());
-                (
-                    format!(
-                        "its peak is the larger number, {unit} against {other}, at all three {}",
-                        over.values()
-                    ),
-                    pairs.iter().all(|(large, small)| large > small),
-                    each(over, &pairs, |(large, small)| {
-                        format!("{large:.0} {unit} and {small:.0} {other}")
-                    }),
-                )
+                let pairs = self.values(of, over).into_iter();
+                let pairs: Vec<(f64, f64)> = pairs.zip(self.values(that, over)).collect();
+                let larger = pairs.iter().all(|(large, small)| large > small);
+                (larger, Pairs(pairs))
             }
             Test::NoRule { of, with } => {
                 let v = self.values(of, with);
-                (
-                    format!("the middle {with} has the largest or the smallest of the three peaks"),
-                    (v[1] - v[0]) * (v[2] - v[1]) < 0.0,
-                    each(with, &v, |v| format!("{v:.0} {}", of.unit())),
-                )
+                ((v[1] - v[0]) * (v[2] - v[1]) < 0.0, Values(v))
             }
             Test::DiffersMore { of, than, with } => {
                 let [this, other] = [of, than].map(|quantity| {
-                    let values = self.values(quantity, with);
-                    extent(values.into_iter()) / (values.iter().sum::<f64>() / 3.0)
+                    let values = self.values(quantity, with).into_iter();
+                    extent(values.clone()) / (values.sum::<f64>() / 3.0)
                 });
-                (
-                    format!(
-                        "over the three {} the {of} differs by a larger share of its mean than the {than}",
-                        with.values()
-                    ),
-                    this > other,
-                    format!(
-                        "{of}: {:.1} %, {than}: {:.1} %",
-                        this * 100.0,
-                        other * 100.0
-                    ),
-                )
+                (this > other, Values(vec![this, other]))
             }
             Test::ChangesMoreWith { of, with, than } => {
                 let [this, other] =
                     [with, than].map(|series| extent(self.values(of, series).into_iter()));
-                let (with, than, unit) = (with.values(), than.values(), of.unit());
-                (
-                    format!(
-                        "the {of} changes more over the three {with} than over the three {than}"
-                    ),
-                    this > other,
-                    format!(
-                        "by {this:.0} {unit} over the {with}, by {other:.0} {unit} over the {than}"
-                    ),
-                )
+                (this > other, Values(vec![this, other]))
             }
             Test::Steady { after, over } => {
                 let last = self.values(FigureValue::LastSeparation, over);
-                (
-                    format!("no ball leaves its socket after {after} s"),
-                    last.iter().all(|t| *t <= after),
-                    each(over, &last, |t| format!("last separation {t:.4} s")),
-                )
+                (last.iter().all(|t| *t <= after), Values(last))
             }
             Test::Hardest { joint, run } => {
                 let response = &self.run(run).response;
                 let forces = &response.full.normal;
-                let listed = response.joints.iter().zip(forces);
-                let listed = listed.map(|(name, force)| format!("{name}: {force:.1} N"));
-                (
-                    "that joint has the largest peak force, in continuous time".to_owned(),
-                    forces.get(joint - 1).copied() == forces.iter().copied().reduce(f64::max),
-                    join(listed),
-                )
+                let hardest = forces.iter().copied().reduce(f64::max);
+                let holds = forces.get(joint - 1).copied() == hardest;
+                let joints = response.joints.iter().cloned().zip(forces.iter().copied());
+                (holds, Joints(joints.collect()))
             }
             Test::Coincide {
                 curves,
@@ -161,230 +120,106 @@ impl Findings {
             } => {
                 let ideal = ideal.then_some(&self.ideal);
                 let curves = self.curves_of(curves).into_iter().chain(ideal);
-                let curves: Vec<Vec<&TracedRow>> = curves.map(Traced::samples).collect();
-                let columns: Vec<usize> = columns.iter().map(|name| column_of(name)).collect();
-                let shares: Vec<f64> = columns.iter().map(|&c| apart(&curves, c, from)).collect();
-                let when = if from > 0.0 {
-                    format!("from {from} s on")
-                } else {
-                    "over the whole period".to_owned()
-                };
-                let listed = columns.iter().zip(&shares);
-                (
-                    format!(
-                        "{when} no two of the curves are further apart than {little} % of the amplitude of the ideal motion"
-                    ),
-                    shares.iter().all(|share| *share < LITTLE),
-                    join(
-                        listed.map(|(&c, share)| {
-                            format!("{}: {}", COLUMNS[c].label, percent(*share))
-                        }),
-                    ),
-                )
+                let curves: Vec<Vec<&RecordedRow>> = curves.map(RecordedRun::samples).collect();
+                little(columns.iter().map(|c| apart(&curves, column_of(c), from)))
             }
             Test::FormulationsAgree(ref coordinates) => {
                 let tree = &self.runs[0].response.full;
                 let found = coordinates.iter().map(|&c| {
                     let apart = self.formulations_apart(c);
-                    (c, apart, apart / tree.deviation[c.index()])
+                    (apart, apart / tree.deviation[c.index()])
                 });
-                let found: Vec<(Coordinate, f64, f64)> = found.collect();
-                let listed = found.iter().map(|(c, apart, share)| {
-                    let unit = ["mm", "mrad"][*c as usize];
-                    format!("{c}: {:.3e} {unit}, {}", apart * 1e3, percent(*share))
-                });
-                (
-                    format!(
-                        "x and beta of the tree and the lagrange formulation stay within {little} % of their largest deviation \
-                         from the ideal motion"
-                    ),
-                    found.iter().all(|(_, _, share)| *share < LITTLE),
-                    listed.collect::<Vec<_>>().join("; "),
-                )
+                let found: Vec<(f64, f64)> = found.collect();
+                let near = found.iter().all(|(_, share)| *share < LITTLE);
+                (near, Pairs(found))
             }
             Test::PortraitsCoincide { of, over } => {
-                let c = of as usize;
-                let loops = self.loops(over);
-                let [values, rates] = [
-                    loops.map(|l| &l.coordinates[c][..]),
-                    loops.map(|l| &l.rates[c][..]),
-                ];
-                let share =
-                    (furthest(&values) / of.amplitude(0)).max(furthest(&rates) / of.amplitude(1));
-                (
-                    format!(
-                        "in settled motion no two of the three differ by more than {little} % of the amplitude at equal phases"
-                    ),
-                    share < LITTLE,
-                    format!("at most {}", percent(share)),
-                )
+                let (c, loops) = (of as usize, self.loops(over));
+                let values = furthest(&loops.map(|l| &l.coordinates[c])) / of.amplitude(0);
+                let rates = furthest(&loops.map(|l| &l.rates[c])) / of.amplitude(1);
+                little([values.max(rates)])
             }
             Test::PortraitsWide { of, over, growing } => {
                 let resolution = self.resolution[of as usize];
-                let widths = self.loops(over).map(|l| l.width[of as usize]);
-                let resolved = size(resolution, of);
-                let more = if growing {
-                    format!("its resolution of {resolved}, and more the larger the {over}")
-                } else {
-                    format!("{resolved} at all three")
-                };
-                (
-                    format!(
-                        "{of} differs between two successive settled periods by more than {more}"
-                    ),
-                    widths.iter().all(|w| *w > resolution) && (!growing || ascending(&widths)),
-                    each(over, &widths, |w| size(*w, of)),
-                )
+                let widths = self.loops(over).map(|l| l.width[of as usize]).to_vec();
+                let wide = widths.iter().all(|w| *w > resolution);
+                let holds = wide && (!growing || ascending(&widths));
+                (holds, Resolved(widths, resolution))
             }
             Test::SectionsAscend { of, over } => {
                 let resolution = self.resolution[of as usize];
                 let latest: Vec<f64> = self.sections(over).iter().map(|r| r.latest(of)).collect();
-                (
-                    format!(
-                        "{of} of the section grows with the {over} by more than the resolution"
-                    ),
-                    latest.windows(2).all(|pair| pair[1] - pair[0] > resolution),
-                    each(over, &latest, |v| format!("{:.4} mm", v * 1e3)),
-                )
+                let further = |pair: &[f64]| pair[1] - pair[0] > resolution;
+                (latest.windows(2).all(further), Resolved(latest, resolution))
             }
             Test::SectionsSpread { of, over } => {
                 let resolution = self.resolution[of as usize];
-                let spreads: Vec<f64> = self.sections(over).iter().map(|r| r.spread(of)).collect();
-                (
-                    format!(
-                        "their spread is above the resolution of {} and grows",
-                        size(resolution, of)
-                    ),
-                    spreads.iter().all(|s| *s > resolution) && ascending(&spreads),
-                    each(over, &spreads, |s| size(*s, of)),
-                )
+                let spreads = spreads(self.sections(over), of);
+                let wide = spreads.iter().all(|spread| *spread > resolution);
+                (wide && ascending(&spreads), Resolved(spreads, resolution))
             }
             Test::SectionsCrowd(over) => {
-                let crowds: Vec<Option<f64>> = self
-                    .sections(over)
-                    .iter()
-                    .map(|run| crowd(run, self.resolution))
-                    .collect();
-                (
-                    format!(
-                        "at all three {} they can be told apart, and more than half of them lie within half of the largest \
-                         distance from their mean, in units of the resolution",
-                        over.values()
-                    ),
-                    crowds.iter().all(|share| share.is_some_and(|s| s > 0.5)),
-                    each(over, &crowds, |share| match share {
-                        Some(share) => format!("{:.0} %", share * 100.0),
-                        None => "all within the resolution".to_owned(),
-                    }),
-                )
+                let runs = self.sections(over).iter();
+                let crowds = runs.map(|run| crowd(run, self.resolution));
+                let crowds: Vec<Option<f64>> = crowds.collect();
+                let dense = crowds.iter().all(|share| share.is_some_and(|s| s > 0.5));
+                (dense, Crowds(crowds))
             }
             Test::SectionsStay { of, over } => {
-                let (points, criterion) = match of {
-                    Sections::Runs => (
-                        self.sections(over),
-                        format!("they lie within {little} % of the amplitude of each other"),
-                    ),
-                    Sections::Sweep => (
-                        self.swept(over),
-                        format!(
-                            "over the whole range the sections move by less than {little} % of the amplitude"
-                        ),
-                    ),
+                let points = match of {
+                    Sections::Runs => self.sections(over),
+                    Sections::Sweep => self.swept(over),
                 };
-                let shares = Coordinate::ALL.map(|c| {
+                little(Coordinate::ALL.map(|c| {
                     let latest = points.iter().map(|p| p.latest(c));
-                    (c, extent(latest) / c.amplitude(0))
-                });
-                (
-                    criterion,
-                    shares.iter().all(|(_, share)| *share < LITTLE),
-                    join(
-                        shares
-                            .iter()
-                            .map(|(c, share)| format!("{c}: {}", percent(*share))),
-                    ),
-                )
+                    extent(latest) / c.amplitude(0)
+                }))
             }
             Test::SectionsRepeat { of, over } => {
-                let (points, resolution) = (self.swept(over), self.resolution[of as usize]);
-                let widest = widest(points, of);
-                (
-                    format!(
-                        "at every point the latest half of the sections in {of} agree within {}",
-                        size(resolution, of)
-                    ),
-                    widest <= resolution,
-                    format!(
-                        "largest spread {} over {} {}",
-                        size(widest, of),
-                        points.len(),
-                        over.values()
-                    ),
-                )
+                let resolution = self.resolution[of as usize];
+                let spreads = spreads(self.swept(over), of);
+                let narrow = spreads.iter().all(|spread| *spread <= resolution);
+                (narrow, Resolved(spreads, resolution))
             }
             Test::QuasiPeriodic(over) => {
                 let runs = self.sections(over);
-                (
-                    "all three are of the regime quasi-periodic (exponent not told from 0, regular 0-1 test, no period)".to_owned(),
-                    runs.iter().all(|r| r.regime == Some(Regime::QuasiPeriodic)),
-                    each(over, runs, Swept::word),
-                )
+                let regular = runs.iter().all(|r| r.regime == Some(Regime::QuasiPeriodic));
+                (regular, regimes(runs))
             }
             Test::AllPeriodic(over) => {
                 let points = self.swept(over);
-                (
-                    "every point is periodic 1".to_owned(),
-                    points.iter().all(|p| p.period() == 1),
-                    regimes(points),
-                )
+                (points.iter().all(|p| p.period() == 1), regimes(points))
             }
             Test::PeriodicToChaotic(over) => {
                 let points = self.swept(over);
                 let regular = points.first().is_some_and(|p| p.period() > 0);
-                (
-                    format!(
-                        "the smallest {over} is periodic, the largest chaotic (exponent above 0 by more than its uncertainty)"
-                    ),
-                    regular && points.last().is_some_and(is_chaotic),
-                    regimes(points),
-                )
+                let chaotic = points.last().is_some_and(is_chaotic);
+                (regular && chaotic, regimes(points))
             }
             Test::ChaosGrows(over) => {
                 let points = self.swept(over);
                 let (lower, upper) = points.split_at(points.len() / 2);
-                let [below, above] = [lower, upper].map(chaotic);
-                let [narrow, wide] = [lower, upper]
-                    .map(|half| size(widest(half, Coordinate::Beta), Coordinate::Beta));
-                (
-                    format!(
-                        "more chaotic points in the upper half of the {} than in the lower half",
-                        over.values()
-                    ),
-                    above > below,
-                    format!(
-                        "{below} chaotic points below, {above} above; largest spread of beta {narrow} below, {wide} above"
-                    ),
-                )
+                let halves = [lower, upper].map(|half| {
+                    let spreads = spreads(half, Coordinate::Beta);
+                    (chaotic(half), spreads.into_iter().fold(0.0, f64::max))
+                });
+                (halves[1].0 > halves[0].0, Halves(halves))
             }
             Test::ChaosAllOrNone(over) => {
                 let points = self.swept(over);
-                let (chaotic, all) = (chaotic(points), points.len());
-                (
-                    format!("either every {over} is chaotic or none is"),
-                    chaotic == 0 || chaotic == all,
-                    format!("{chaotic} of {all} points chaotic; {}", measured(points)),
-                )
+                let chaotic = chaotic(points);
+                (chaotic == 0 || chaotic == points.len(), regimes(points))
             }
         }
     }
 
     /// A quantity in continuous time, per run.
-    fn values(&self, quantity: FigureValue, series: Series) -> [f64; 3] {
+    fn values(&self, quantity: FigureValue, series: Series) -> Vec<f64> {
         let of = |case: Case| quantity.of(&self.run(case).response);
-        series.cases().map(of)
+        series.cases().map(of).to_vec()
     }
 
-    fn curves_of(&self, curves: Curves) -> Vec<&Traced> {
+    fn curves_of(&self, curves: Curves) -> Vec<&RecordedRun> {
         let series = |series: Series| series.cases().map(|case| self.run(case)).to_vec();
         match curves {
             Curves::Clearance => series(Series::Clearance),
@@ -404,21 +239,8 @@ impl Findings {
     }
 }
 
-/// The growth statements of section 4.2 taken together.
-fn all_grow(series: Series, before: &[Statement]) -> Judged {
-    let parts = before
-        .iter()
-        .filter(|s| matches!(s.claim.test, Test::Grows { with, .. } if with == series));
-    let (all, held) = (parts.clone().count(), parts.filter(|s| s.confirmed).count());
-    (
-        "every measured quantity of section 4.2 grows at both steps".to_owned(),
-        held == all,
-        format!("{held} of {all} quantities do"),
-    )
-}
-
 /// Largest distance between any two of `curves` at any instant from `from` (s) on, over the amplitude.
-fn apart(curves: &[Vec<&TracedRow>], column: usize, from: f64) -> f64 {
+fn apart(curves: &[Vec<&RecordedRow>], column: usize, from: f64) -> f64 {
     let coordinate = Coordinate::ALL[(column - 1) / 3];
     let late = curves.iter().map(|c| {
         let late = c.iter().filter(|row| row[0] >= from);
@@ -437,7 +259,7 @@ fn furthest<C: AsRef<[f64]>>(curves: &[C]) -> f64 {
 }
 
 /// Fraction of the sections within half of the largest distance from their mean; `None` if they cannot be told apart.
-fn crowd(run: &Swept, resolution: [f64; 2]) -> Option<f64> {
+fn crowd(run: &SettledPoint, resolution: [f64; 2]) -> Option<f64> {
     let middle = [0, 1].map(|c| {
         let all = &run.sections[c];
         all.iter().sum::<f64>() / all.len() as f64
@@ -456,16 +278,22 @@ fn crowd(run: &Swept, resolution: [f64; 2]) -> Option<f64> {
     (furthest > 0.5).then(|| within as f64 / distances.len() as f64)
 }
 
-fn widest(points: &[Swept], coordinate: Coordinate) -> f64 {
-    let spreads = points.iter().map(|p| p.spread(coordinate));
-    spreads.fold(0.0, f64::max)
+/// Whether none of `shares` counts.
+fn little(shares: impl IntoIterator<Item = f64>) -> (bool, Grounds) {
+    let shares: Vec<f64> = shares.into_iter().collect();
+    let little = shares.iter().all(|share| *share < LITTLE);
+    (little, Grounds::Values(shares))
 }
 
-fn is_chaotic(point: &Swept) -> bool {
+fn spreads(points: &[SettledPoint], coordinate: Coordinate) -> Vec<f64> {
+    points.iter().map(|p| p.spread(coordinate)).collect()
+}
+
+fn is_chaotic(point: &SettledPoint) -> bool {
     point.regime == Some(Regime::Chaotic)
 }
 
-fn chaotic(points: &[Swept]) -> usize {
+fn chaotic(points: &[SettledPoint]) -> usize {
     points.iter().filter(|p| is_chaotic(p)).count()
 }
 
@@ -473,63 +301,17 @@ fn ascending(values: &[f64]) -> bool {
     values.windows(2).all(|pair| pair[0] < pair[1])
 }
 
-/// Number of points per regime, and their exponents.
-fn regimes(points: &[Swept]) -> String {
-    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
-    for point in points {
-        *counts.entry(point.word()).or_default() += 1;
-    }
-    let total = points.len();
-    let listed = counts.iter().map(|(w, n)| format!("{n} of {total} {w}"));
-    format!("{}; {}", join(listed), measured(points))
-}
-
-fn measured(points: &[Swept]) -> String {
-    let (least, most) = exponents(points);
-    if least > most {
-        return "no exponents measured".to_owned();
-    }
-    format!("largest Lyapunov exponents from {least:.2} to {most:.2} 1/s")
-}
-
-/// `text` of the value of each run in a series.
-fn each<T>(series: Series, values: &[T], text: impl Fn(&T) -> String) -> String {
-    let runs = series.cases().into_iter().zip(values);
-    join(runs.map(|(case, value)| format!("{}: {}", series.name(series.of(case)), text(value))))
-}
-
-fn join(parts: impl Iterator<Item = String>) -> String {
-    parts.collect::<Vec<_>>().join(", ")
-}
-
-fn percent(share: f64) -> String {
-    format!("{:.2} %", share * 100.0)
-}
-
-/// A small distance in a coordinate.
-fn size(value: f64, coordinate: Coordinate) -> String {
-    let unit = ["µm", "µrad"][coordinate as usize];
-    format!("{} {unit}", digits(value / 1e-6, 2))
-}
-
-/// `value` with `n` significant digits.
-fn digits(value: f64, n: usize) -> String {
-    let size = value.abs();
-    if size == 0.0 {
-        "0".to_owned()
-    } else if (1e-3..1e6).contains(&size) {
-        let whole = libm::floor(libm::log10(size)) as i32;
-        format!("{value:.*}", (n as i32 - 1 - whole).max(0) as usize)
-    } else {
-        format!("{value:.*e}", n - 1)
-    }
+fn regimes(points: &[SettledPoint]) -> Grounds {
+    let regimes = points.iter().map(|p| p.regime).collect();
+    Grounds::Regimes(regimes, exponents(points))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::paper::CASES;
-    use crate::analysis::reproduction::{Agenda, Extent, Outcome, ReportJob, SettledCurve};
+    use crate::analysis::reproduction::{
+        Agenda, COLUMNS, Extent, Outcome, ReportJob, SettledCurve,
+    };
     use crate::analysis::response::respond;
     use crate::scene::Scene;
 
@@ -581,8 +363,8 @@ mod tests {
         }
     }
 
-    fn point(value: f64, regime: Regime, x: f64, beta: &[f64]) -> Swept {
-        Swept {
+    fn point(value: f64, regime: Regime, x: f64, beta: &[f64]) -> SettledPoint {
+        SettledPoint {
             value,
             regime: Some(regime),
             exponent: (-1.0, 0.1),
@@ -594,7 +376,7 @@ mod tests {
         std::array::from_fn(|k| if k % 2 == 0 { 0.0 } else { width })
     }
 
-    fn put(found: &mut Findings, name: &str, points: Vec<Swept>) {
+    fn put(found: &mut Findings, name: &str, points: Vec<SettledPoint>) {
         let sweep = found.sweeps.iter_mut().find(|s| s.name == name);
         sweep.expect("a sweep").points = points;
     }
@@ -687,7 +469,7 @@ mod tests {
     #[test]
     fn curves_coincide_from_the_instant_that_is_asked_for() {
         // A curve that is off by `early` until 0.35 s and by `late` afterwards, in every coordinate and derivative.
-        let curve = |early: f64, late: f64| -> Vec<TracedRow> {
+        let curve = |early: f64, late: f64| -> Vec<RecordedRow> {
             let instants = (0..=20).map(|k| f64::from(k) * 0.1);
             let row = |t: f64| {
                 let off = if t < 0.35 { early } else { late };
@@ -857,19 +639,6 @@ mod tests {
             &found,
             &[("Figure 18b", "width", false), ("Figure 21b", "wide", true)],
         );
-        assert_eq!(found.loops(Series::Friction)[0].case, CASES[3]);
-    }
-
-    #[test]
-    fn numbers_have_as_many_digits_as_asked() {
-        for (value, text) in [
-            (0.154_943_9, "0.154944"),
-            (827.324_51, "827.325"),
-            (-1.0, "-1.00000"),
-            (3e-9, "3.00000e-9"),
-        ] {
-            assert_eq!(digits(value, 6), text);
-        }
-        assert_eq!(digits(1.0, 1), "1");
+        assert_eq!(found.loops(Series::Friction)[0].case, PAPER.runs[3]);
     }
 }

@@ -8,7 +8,7 @@ use super::plane::{AxisLabel, plane};
 use super::portrait::title;
 use super::swept::Swept;
 use crate::analysis::regime::Regime;
-use crate::analysis::swept::SweptPoint;
+use crate::analysis::sweep_task::SweptPoint;
 use crate::app::{theme, value};
 use crate::scene::{table, to_display};
 

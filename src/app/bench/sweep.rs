@@ -8,7 +8,7 @@ use super::swept::{Swept, start_word};
 use crate::analysis::grid::Start;
 use crate::analysis::point::LOOSEST_FOR_EXPONENT;
 use crate::analysis::source::SceneSource;
-use crate::analysis::swept::SweepTask;
+use crate::analysis::sweep_task::SweepTask;
 use crate::analysis::task::{Job, Message};
 use crate::app::host::{Host, Running};
 use crate::app::layout::reserved;

@@ -1,7 +1,7 @@
 //! A sweep of the bench and its results.
 
 use crate::analysis::grid::Start;
-use crate::analysis::swept::{Range, SweepTask, SweptPoint};
+use crate::analysis::sweep_task::{Range, SweepTask, SweptPoint};
 use crate::app::player::Player;
 use crate::app::value;
 use crate::scene::{Kind, Scene, Value, table};

@@ -4,9 +4,10 @@ use ndarray::Array1;
 use ndarray_npy::NpzWriter;
 use serde_json::{Map, Value as Json, json};
 
+use super::statements::words;
 use super::text;
 use crate::analysis::paper::Published;
-use crate::analysis::reproduction::{COLUMNS, Column, Findings, Report, SweepData, Traced};
+use crate::analysis::reproduction::{COLUMNS, Column, Findings, RecordedRun, Report, SweepData};
 use crate::cli::Failure;
 use crate::cli::sweep::{Archive, Source, meta};
 use crate::cli::tables::{csv, number};
@@ -20,7 +21,7 @@ pub(super) fn write(folder: &Folder, report: &Report) -> Result<(), Failure> {
     let put = |name: String, content: &[u8]| -> Result<(), Failure> {
         Ok(folder.write(&format!("data/{name}"), content)?)
     };
-    let put_run = |run: &Traced| {
+    let put_run = |run: &RecordedRun| {
         put(format!("{}.csv", run.name), samples(run).as_bytes())?;
         put(format!("{}.npz", run.name), &rows(run, report)?)
     };
@@ -30,11 +31,11 @@ pub(super) fn write(folder: &Folder, report: &Report) -> Result<(), Failure> {
     };
     put_run(&report.corrected.ideal)?;
     for found in [&report.corrected, &report.printed] {
-        let prefix = found.variant.prefix;
+        let prefix = &found.variant.prefix;
         put(format!("{prefix}numbers.csv"), numbers(found).as_bytes())?;
         put(
             format!("{prefix}statements.csv"),
-            statements(found).as_bytes(),
+            verdicts(found).as_bytes(),
         )?;
         put(
             format!("{prefix}settled_curves.csv"),
@@ -79,23 +80,24 @@ fn numbers(found: &Findings) -> String {
     )
 }
 
-fn statements(found: &Findings) -> String {
+fn verdicts(found: &Findings) -> String {
     csv(
         "place,statement,criterion,verdict,evidence",
-        found.statements().into_iter().map(|s| {
+        found.statements().iter().map(|s| {
+            let (criterion, evidence) = words(s);
             vec![
                 s.claim.place.clone(),
                 s.claim.says.clone(),
-                s.criterion,
+                criterion,
                 text::verdict(s.confirmed).to_owned(),
-                s.evidence,
+                evidence,
             ]
         }),
     )
 }
 
 /// A run at the paper's output step, which the last column marks.
-fn samples(run: &Traced) -> String {
+fn samples(run: &RecordedRun) -> String {
     let columns = COLUMNS.len() - 1;
     let names = COLUMNS.map(|c| c.name);
     let rows = run.samples().into_iter();
@@ -106,7 +108,7 @@ fn samples(run: &Traced) -> String {
 }
 
 /// A run at every examined instant.
-fn rows(run: &Traced, report: &Report) -> Result<Vec<u8>, Failure> {
+fn rows(run: &RecordedRun, report: &Report) -> Result<Vec<u8>, Failure> {
     let mut meta = super::meta(report);
     meta.insert("run".into(), json!(run.name));
     meta.insert("clearance_mm".into(), json!(run.case.clearance));

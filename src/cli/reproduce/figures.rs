@@ -1,9 +1,10 @@
 //! The figures of the paper and the additional ones, as sheets.
 
-use super::text::{capital, typeset};
-use crate::analysis::paper::{Case, Coordinate, PAPER, Series, Shows};
+use super::text::{NO_REGIME, capital, typeset};
+use crate::analysis::paper::{Case, Coordinate, PAPER, Series, SeriesRow, Shows, Variant};
+use crate::analysis::regime::Regime;
 use crate::analysis::reproduction::{
-    COLUMNS, Column, Findings, Swept, Traced, Variant, column_of, derivative, regime_word,
+    COLUMNS, Column, Findings, RecordedRun, SettledPoint, column_of, derivative,
 };
 use crate::chart::{
     Axis, Chart, Colour, Level, Map, Marker, PALETTE, Scale, Series as Curve, Sheet,
@@ -46,7 +47,7 @@ pub(super) fn all(found: &Findings) -> Vec<(String, Sheet)> {
 }
 
 /// Name of a figure's picture in files and on the page.
-pub(super) fn picture_name(variant: Variant, name: &str) -> String {
+pub(super) fn picture_name(variant: &Variant, name: &str) -> String {
     format!("{}{name}", variant.prefix.replace('_', "-"))
 }
 
@@ -60,11 +61,6 @@ fn sheet(charts: Vec<Chart>) -> Sheet {
         size: (WIDTH, ROW * rows + 34),
         note: String::new(),
     }
-}
-
-/// What distinguishes a run from the others of its series.
-fn case_name(series: Series, case: Case) -> String {
-    series.name(series.of(case))
 }
 
 fn axis(label: &str, unit: &str) -> Axis {
@@ -88,10 +84,8 @@ fn of_column(column: usize) -> Axis {
 }
 
 fn parameter(series: Series) -> Axis {
-    match series {
-        Series::Clearance => axis("Clearance", "mm"),
-        Series::Friction => axis("Friction coefficient", ""),
-    }
+    let SeriesRow { label, unit, .. } = series.row();
+    axis(label, unit)
 }
 
 fn line(label: &str, points: Points, colour: Colour) -> Curve {
@@ -132,7 +126,7 @@ fn over_time(title: &str, to: f64, y: Axis, series: Vec<Curve>) -> Chart {
 }
 
 /// Columns of runs over the first `to` seconds, each run in its colour.
-fn columns(runs: &[(String, &Traced, usize)], to: f64, title: &str, colour: usize) -> Chart {
+fn columns(runs: &[(String, &RecordedRun, usize)], to: f64, title: &str, colour: usize) -> Chart {
     let series = runs.iter().enumerate().map(|(n, (name, run, column))| {
         let early = run.curve(*column).take_while(|(time, _)| *time <= to);
         line(name, early.collect(), PALETTE[colour + n])
@@ -140,10 +134,14 @@ fn columns(runs: &[(String, &Traced, usize)], to: f64, title: &str, colour: usiz
     over_time(title, to, of_column(runs[0].2), series.collect())
 }
 
-fn of_series(found: &Findings, series: Series, column: usize) -> [(String, &Traced, usize); 3] {
+fn of_series(
+    found: &Findings,
+    series: Series,
+    column: usize,
+) -> [(String, &RecordedRun, usize); 3] {
     series
         .cases()
-        .map(|case| (case_name(series, case), found.run(case), column))
+        .map(|case| (series.run_name(case), found.run(case), column))
 }
 
 /// The whole run above, its beginning below.
@@ -153,17 +151,17 @@ fn response(found: &Findings, to: Series, whole: &[String], early: &[String]) ->
         names.iter().map(chart).collect()
     };
     [
-        row(whole, 2.0, "One period"),
+        row(whole, PAPER.period, "One period"),
         row(early, EARLY, "While the balls bounce"),
     ]
     .concat()
 }
 
-fn forces(run: &Traced) -> Vec<Chart> {
+fn forces(run: &RecordedRun) -> Vec<Chart> {
     let joints = ["S1", "S2", "S3"];
     let joints = joints.map(|j| (j.to_owned(), run, column_of(&format!("{j}_normal_N"))));
     vec![
-        columns(&joints, 2.0, "One period", 1),
+        columns(&joints, PAPER.period, "One period", 1),
         columns(&joints, EARLY, "While the balls bounce", 1),
     ]
 }
@@ -197,13 +195,13 @@ fn drift(found: &Findings) -> Vec<Chart> {
     vec![
         over_time(
             "Difference of the formulations",
-            2.0,
+            PAPER.period,
             logarithmic("|tree − lagrange|", unit),
             Coordinate::ALL.map(apart).to_vec(),
         ),
         over_time(
             "Drift of the lagrange formulation",
-            2.0,
+            PAPER.period,
             logarithmic("Largest violation so far", unit),
             vec![line("constraints", violation, PALETTE[3])],
         ),
@@ -229,7 +227,7 @@ fn portraits(found: &Findings, series: Series) -> Vec<Chart> {
     let each = |points: &dyn Fn(usize, Case) -> Points| {
         let cases = series.cases().into_iter().enumerate();
         cases
-            .map(|(n, case)| line(&case_name(series, case), points(n, case), PALETTE[n + 1]))
+            .map(|(n, case)| line(&series.run_name(case), points(n, case), PALETTE[n + 1]))
             .collect()
     };
     let settled = Coordinate::ALL.map(|c| {
@@ -270,7 +268,7 @@ fn sections(found: &Findings, series: Series) -> Vec<Chart> {
         let dots = looks.zip(series.cases()).map(|((n, marker), case)| {
             let part = n * kept..(n + 1) * kept;
             let points = seen(pairs(&values[part.clone()], &rates[part]));
-            dots(&case_name(series, case), points, PALETTE[n + 1], marker)
+            dots(&series.run_name(case), points, PALETTE[n + 1], marker)
         });
         phases(c, &format!("{kept} sections each"), dots.collect())
     });
@@ -310,7 +308,7 @@ fn bifurcation(found: &Findings, series: Series) -> Vec<Chart> {
         chart(&title, parameter(series), value, dots.collect())
     };
     let differences = |c: Coordinate| {
-        let along = |label: &str, colour: usize, size: &dyn Fn(usize, &Swept) -> f64| {
+        let along = |label: &str, colour: usize, size: &dyn Fn(usize, &SettledPoint) -> f64| {
             let points = all[0].iter().enumerate();
             let points = points.map(|(k, p)| (p.value, size(k, p) * 1e6));
             line(label, points.collect(), PALETTE[colour])
@@ -411,7 +409,8 @@ fn map(found: &Findings) -> Vec<Chart> {
     let mut codes: Vec<i64> = regimes.iter().map(|r| *r as i64).collect();
     codes.sort_unstable();
     codes.dedup();
-    let names = codes.iter().map(|&c| (c as f64, regime_word(c).to_owned()));
+    let word = |code| Regime::of_code(code, 1).map_or(NO_REGIME, Regime::word);
+    let names = codes.iter().map(|&c| (c as f64, word(c).to_owned()));
     let joints = &found.runs[0].response.joints;
     let peaks = joints.iter().map(|j| data.values(&format!("{j}_peak_N")));
     let peaks: Vec<Vec<f64>> = peaks.collect();
@@ -459,6 +458,6 @@ fn probe(found: &Findings) -> Vec<Chart> {
             of_column(error),
             settled,
         ),
-        columns(&first, 2.0, "The first period", 1),
+        columns(&first, PAPER.period, "The first period", 1),
     ]
 }

@@ -6,6 +6,7 @@ mod figures;
 mod kept;
 mod page;
 mod scatter;
+mod statements;
 mod text;
 
 use std::path::Path;

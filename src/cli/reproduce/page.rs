@@ -4,14 +4,13 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use super::figures::picture_name;
+use super::statements::words;
 use super::text::{self, NONE, capital, escape, shown, typeset};
 use super::{Score, command, meta, scatter};
 use crate::analysis::paper::{
-    Agreement, Comparison, Coordinate, DURATION, Figure, FigureValue, PAPER, Series, Shows,
+    Agreement, Comparison, Coordinate, Figure, FigureValue, PAPER, Series, Shows, Variant,
 };
-use crate::analysis::reproduction::{
-    CORRECTED, Extent, Findings, PERIOD, Report, Statement, Swept, Variant,
-};
+use crate::analysis::reproduction::{Extent, Findings, Report, SettledPoint, Statement};
 use crate::analysis::response::Response;
 use crate::cli::output::significant;
 use crate::cli::tables::{fill, html};
@@ -69,7 +68,7 @@ fn contents() -> String {
 /// Every figure of a model, section by section, with the tables that belong to it.
 fn figures(found: &Findings, pictures: &Pictures) -> String {
     let comparisons = found.comparisons();
-    let (level, of) = if found.variant == CORRECTED {
+    let (level, of) = if *found.variant == PAPER.variants.corrected {
         (2, "")
     } else {
         (3, ", (13) as printed")
@@ -86,7 +85,7 @@ fn figures(found: &Findings, pictures: &Pictures) -> String {
     out
 }
 
-fn figure(entry: &Figure, variant: Variant, pictures: &Pictures) -> String {
+fn figure(entry: &Figure, variant: &Variant, pictures: &Pictures) -> String {
     let name = picture_name(variant, &entry.name);
     let Figure {
         heading, caption, ..
@@ -250,7 +249,7 @@ fn runs(found: &Findings, series: Series) -> String {
             let (exponent, error) = run.exponent;
             let mut row = vec![
                 shown(run.value),
-                run.word(),
+                text::regime(run.regime),
                 format!("{} ± {}", shown(exponent), two(error)),
             ];
             for c in Coordinate::ALL {
@@ -264,7 +263,7 @@ fn runs(found: &Findings, series: Series) -> String {
 
 fn branches(found: &Findings, series: Series) -> String {
     let [cold, up, down] = found.branches(series);
-    let most = |other: &[Swept]| {
+    let most = |other: &[SettledPoint]| {
         Coordinate::ALL.map(|c| {
             let pairs = cold.iter().zip(other);
             pairs
@@ -317,13 +316,14 @@ fn statement_table(statements: &[Statement]) -> String {
         "Place | Statement and criterion | Verdict .verdict",
         statements.iter().map(|s| {
             let class = if s.confirmed { "ok" } else { "off" };
+            let (criterion, evidence) = words(s);
             vec![
                 escape(&s.claim.place),
                 format!(
                     "<b>{}.</b> Criterion: {}.<br><span class=\"evidence\">{}</span>",
                     escape(&typeset(&capital(&s.claim.says))),
-                    escape(&typeset(&s.criterion)),
-                    escape(&typeset(&s.evidence))
+                    escape(&typeset(&criterion)),
+                    escape(&typeset(&evidence))
                 ),
                 format!(
                     "<span class=\"{class}\">{}</span>",
@@ -347,8 +347,8 @@ fn provenance(report: &Report) -> Vec<(&'static str, String)> {
     gaps.extend([
         ("command", command(report).to_owned()),
         ("simulated", text::simulated(report).to_string()),
-        ("duration", DURATION.to_string()),
-        ("period", PERIOD.to_string()),
+        ("duration", PAPER.period.to_string()),
+        ("period", PAPER.period.to_string()),
     ]);
     let counts = [
         ("settle", e.settle),
@@ -371,6 +371,7 @@ fn provenance(report: &Report) -> Vec<(&'static str, String)> {
 mod tests {
     use super::*;
     use crate::analysis::paper::{Claim, Test};
+    use crate::analysis::reproduction::Grounds;
 
     #[test]
     fn words_stay_words() {
@@ -378,16 +379,18 @@ mod tests {
         let claim = Claim {
             place: hostile.clone(),
             says: hostile.clone(),
-            test: Test::AllPeriodic(Series::Friction),
+            test: Test::Hardest {
+                joint: 1,
+                run: PAPER.runs[0],
+            },
         };
         let statement = Statement {
             claim: Box::leak(Box::new(claim)),
-            criterion: hostile.clone(),
             confirmed: true,
-            evidence: hostile,
+            grounds: Grounds::Joints(vec![(hostile, 1.0)]),
         };
         let out = statement_table(&[statement]);
         assert!(!out.contains("<script>") && !out.contains(" & "), "{out}");
-        assert_eq!(out.matches("&lt;script&gt;").count(), 4, "{out}");
+        assert_eq!(out.matches("&lt;script&gt;").count(), 3, "{out}");
     }
 }

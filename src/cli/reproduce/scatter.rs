@@ -1,9 +1,10 @@
 //! The page's section on the scatter in the paper: whether friction that uses equation (13) as printed explains it.
 
 use super::Score;
-use super::text::{self, escape, shown, typeset};
+use super::statements::words;
+use super::text::{self, escape, join, shown, typeset};
 use crate::analysis::paper::{Case, Coordinate, FigureValue, PAPER, Series};
-use crate::analysis::reproduction::{Report, Statement, Swept, Traced, exponents};
+use crate::analysis::reproduction::{RecordedRun, Report, SettledPoint, Statement, exponents};
 use crate::cli::output::significant;
 use crate::cli::tables::html;
 
@@ -22,7 +23,7 @@ fn printed(case: Case, quantity: FigureValue) -> Option<f64> {
 /// A model: its title, and its runs by clearance with their sections.
 struct Model<'a> {
     title: &'static str,
-    runs: [(&'a Traced, &'a Swept); 3],
+    runs: [(&'a RecordedRun, &'a SettledPoint); 3],
 }
 
 fn models(report: &Report) -> Vec<Model<'_>> {
@@ -39,7 +40,7 @@ fn models(report: &Report) -> Vec<Model<'_>> {
     let combined = combined.map(|c| (c.variant, c.runs.iter().collect(), &c.sections.points[..]));
     both.chain(combined)
         .map(|(variant, runs, sections)| Model {
-            title: variant.title,
+            title: &variant.title,
             runs: std::array::from_fn(|k| (runs[k], &sections[k])),
         })
         .collect()
@@ -48,7 +49,7 @@ fn models(report: &Report) -> Vec<Model<'_>> {
 /// What is compared: a heading, the value for a run and its sections, and the paper's quantity if it prints one.
 type Measure = (
     &'static str,
-    fn(&Traced, &Swept) -> f64,
+    fn(&RecordedRun, &SettledPoint) -> f64,
     Option<FigureValue>,
 );
 
@@ -104,43 +105,32 @@ fn clearances(models: &[Model]) -> String {
             rows.push(row(what, model.title, values));
         }
     }
+    let heads = Series::Clearance
+        .cases()
+        .map(|case| Series::Clearance.run_name(case));
     html(
-        "Quantity .what | Model | 0.3 mm .n | 0.5 mm .n | 0.7 mm .n",
+        &format!("Quantity .what | Model | {} .n", heads.join(" .n | ")),
         rows,
     )
 }
 
-/// Number of points per regime, in order of first occurrence.
-fn regimes(points: &[Swept]) -> String {
-    let mut regimes: Vec<(String, usize)> = Vec::new();
-    for point in points {
-        let of = point.word();
-        match regimes.iter_mut().find(|(word, _)| *word == of) {
-            Some((_, count)) => *count += 1,
-            None => regimes.push((of, 1)),
-        }
-    }
-    let regimes: Vec<String> = regimes.iter().map(|(w, n)| format!("{n} {w}")).collect();
-    regimes.join(", ")
-}
-
 fn sweeps(report: &Report) -> String {
     let mut rows = Vec::new();
-    for (series, title) in [
-        (Series::Clearance, "clearance, 0.01 to 1 mm"),
-        (Series::Friction, "friction, 0.01 to 0.4"),
-    ] {
+    for series in Series::ALL {
+        let ([from, to], unit) = (series.row().range, &series.row().unit);
+        let title = format!("{series}, {from} to {to} {unit}");
         for found in [&report.corrected, &report.printed] {
             let points = found.swept(series);
             let (least, most) = exponents(points);
+            let counts = text::regimes(points.iter().map(|p| p.regime)).into_iter();
             let widest = |c: Coordinate| {
                 let spreads = points.iter().map(|p| p.spread(c));
                 shown(spreads.fold(0.0, f64::max) * 1e6)
             };
             rows.push(vec![
-                title.to_owned(),
-                escape(found.variant.title),
-                regimes(points),
+                title.trim_end().to_owned(),
+                escape(&found.variant.title),
+                join(counts.map(|(w, n)| format!("{n} {w}"))),
                 format!("{} to {}", shown(least), shown(most)),
                 widest(Coordinate::X),
                 widest(Coordinate::Beta),
@@ -166,7 +156,7 @@ fn turned_table(turned: &[Both]) -> String {
         format!(
             "{}<br><span class=\"evidence\">{}</span>",
             text::verdict(s.confirmed),
-            escape(&typeset(&s.evidence))
+            escape(&typeset(&words(s).1))
         )
     };
     format!(

@@ -1,7 +1,8 @@
 //! Texts of page, pictures and data files.
 
-use crate::analysis::paper::DURATION;
-use crate::analysis::reproduction::{Findings, PERIOD, Report, SweepData};
+use crate::analysis::paper::PAPER;
+use crate::analysis::regime::Regime;
+use crate::analysis::reproduction::{Findings, Report, SweepData};
 use crate::cli::output::significant;
 
 pub(super) fn escape(text: &str) -> String {
@@ -88,21 +89,45 @@ pub(super) fn verdict(confirmed: bool) -> &'static str {
     }
 }
 
+/// Word for the regime of a motion that did not reach its end.
+pub(super) const NO_REGIME: &str = "none";
+
+/// A regime with its period.
+pub(super) fn regime(regime: Option<Regime>) -> String {
+    regime.map_or_else(|| NO_REGIME.to_owned(), |regime| regime.to_string())
+}
+
+/// Number of motions per regime, in order of first occurrence.
+pub(super) fn regimes(motions: impl Iterator<Item = Option<Regime>>) -> Vec<(String, usize)> {
+    let mut counts: Vec<(String, usize)> = Vec::new();
+    for word in motions.map(regime) {
+        match counts.iter_mut().find(|(of, _)| *of == word) {
+            Some((_, count)) => *count += 1,
+            None => counts.push((word, 1)),
+        }
+    }
+    counts
+}
+
+pub(super) fn join(parts: impl Iterator<Item = String>) -> String {
+    parts.collect::<Vec<_>>().join(", ")
+}
+
 /// Total simulated time of all runs, without twins, s.
 pub(super) fn simulated(report: &Report) -> f64 {
-    let of_runs = |count: usize| count as f64 * DURATION;
-    let of_sweep =
-        |data: &SweepData| PERIOD * (data.sweep.plan().periods * data.sweep.grid().points()) as f64;
+    let of_sweep = |data: &SweepData| data.sweep.plan().periods * data.sweep.grid().points();
     let of_findings = |found: &Findings| {
-        let curves = found.curves.len() as f64 * PERIOD * (found.extent.settle + 2) as f64;
-        of_runs(found.runs.len() + 1) + curves + found.sweeps.iter().map(of_sweep).sum::<f64>()
+        let curves = found.curves.len() * (found.extent.settle + 2);
+        let sweeps = found.sweeps.iter().map(of_sweep);
+        found.runs.len() + 1 + curves + sweeps.sum::<usize>()
     };
     let combinations = report.combinations.iter();
-    let combinations = combinations.map(|c| of_runs(c.runs.len()) + of_sweep(&c.sections));
-    of_runs(1)
+    let combinations = combinations.map(|c| c.runs.len() + of_sweep(&c.sections));
+    let periods = 1
         + of_findings(&report.corrected)
         + of_findings(&report.printed)
-        + combinations.sum::<f64>()
+        + combinations.sum::<usize>();
+    PAPER.period * periods as f64
 }
 
 #[cfg(test)]
