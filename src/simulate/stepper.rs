@@ -180,7 +180,7 @@ impl AnyStepper {
         }
     }
 
-    /// Whether a step cut at an event may end on the interpolant: its error is that of the estimate.
+    /// Whether the interpolant is about as accurate as the step's error estimate.
     pub(super) fn ends_on_interpolant(&self) -> bool {
         matches!(
             self,

@@ -2,26 +2,28 @@
 //! explicit pair's evaluations and with the same forces.
 
 use jointplay::scene::Scene;
-use jointplay::simulate::Simulation;
+use jointplay::simulate::{Impact, Simulation};
 
-/// Time and peak force of the first six impacts to begin, s and N, and the evaluations of the whole run.
-fn run(scene: &str, method: &str, tolerance: &str, end: f64) -> (Vec<(f64, f64)>, u64) {
+/// An impact: its joint, how many the joint had before, its start (s) and its peak force (N).
+type Hit = (usize, usize, f64, f64);
+
+/// The impacts in the order in which they began, and the evaluations of the whole run.
+fn run(scene: &str, method: &str, tolerance: &str, end: f64) -> (Vec<Hit>, u64) {
     let changes = [("solver.method", method), ("solver.tolerance", tolerance)];
     let changes = changes.map(|(key, value)| (key.to_owned(), value.to_owned()));
     let scene = Scene::load(scene, &changes).unwrap();
     let mut simulation = Simulation::new(&scene).unwrap();
-    let mut impacts: Vec<(f64, f64)> = Vec::new();
+    let (mut impacts, mut hits): (Vec<Impact>, Vec<Hit>) = (Vec::new(), Vec::new());
     while simulation.time() < end {
         simulation.step().unwrap();
-        for impact in simulation.impacts() {
-            if !impacts.contains(&(impact.start, impact.peak)) {
-                impacts.push((impact.start, impact.peak));
-            }
-        }
+        simulation.take_impacts(&mut impacts);
     }
-    impacts.sort_by(|a, b| a.0.total_cmp(&b.0));
-    impacts.truncate(6);
-    (impacts, simulation.statistics().evaluations)
+    impacts.sort_by(|a, b| a.start.total_cmp(&b.start));
+    for impact in impacts {
+        let before = hits.iter().filter(|hit| hit.0 == impact.joint).count();
+        hits.push((impact.joint, before, impact.start, impact.peak));
+    }
+    (hits, simulation.statistics().evaluations)
 }
 
 #[test]
@@ -34,22 +36,15 @@ fn friction_is_stepped_implicitly_where_it_holds_explicit_steps_back() {
     ] {
         let (reference, _) = run(&scene, "dopri5", "1e-8", end);
         let (found, _) = run(&scene, "automatic", "1e-6", end);
-        assert_eq!(reference.len(), 6);
-        for (found, expected) in found.iter().zip(&reference) {
-            let off = (found.0 - expected.0).abs();
-            assert!(
-                off < 1e-5,
-                "{scene}: at {} instead of {}",
-                found.0,
-                expected.0
-            );
-            let off = (found.1 / expected.1 - 1.0).abs();
-            assert!(
-                off < 0.01,
-                "{scene}: {} N instead of {} N",
-                found.1,
-                expected.1
-            );
+        assert!(reference.len() >= 6);
+        // Two joints may be hit within a few nanoseconds, in either order.
+        for &(joint, before, start, peak) in &reference[..6] {
+            let same = |hit: &&Hit| (hit.0, hit.1) == (joint, before);
+            let &(.., at, force) = found.iter().find(same).expect("that impact");
+            let off = (at - start).abs();
+            assert!(off < 1e-5, "{scene}: at {at} instead of {start}");
+            let off = (force / peak - 1.0).abs();
+            assert!(off < 0.01, "{scene}: {force} N instead of {peak} N");
         }
         let (_, explicit) = run(&scene, "dopri5", "1e-5", end);
         let (_, evaluations) = run(&scene, "automatic", "1e-5", end);

@@ -12,6 +12,9 @@ use crate::simulate::{StopAdvice, StopFault, Stopped};
 const SHORTEST_STEP: f64 = 1e-14;
 /// Shortest first step after a contact begins, s.
 const SHORTEST_FIRST: f64 = 1e-9;
+/// From this tolerance on a step that is cut at an event ends on the interpolant, whose error is about the estimate; with
+/// tighter ones it is repeated, which costs little beside their many steps.
+const END_ON_INTERPOLANT: f64 = 1e-5;
 /// An error so many times the allowed one is no matter of accuracy: the step was unstable.
 const BLOWN_UP: f64 = 100.0;
 
@@ -119,11 +122,11 @@ impl Simulation {
             h *= corner.theta;
         } else if let Some(theta) = event {
             t_end = t + theta * h;
-            if self.stepper.ends_on_interpolant() {
+            if tolerance >= END_ON_INTERPOLANT && self.stepper.ends_on_interpolant() {
                 self.end_at(theta, t_end, h);
                 return Some((t_end, h * theta));
             }
-            // The step is repeated, shortened, so that its end carries the method's error and not the interpolant's.
+            // Repeated, shortened, so that its end carries the method's error and not the interpolant's.
             h *= theta;
             if !self.try_step(h).is_finite() {
                 self.state.control.h_next = 0.5 * h;
