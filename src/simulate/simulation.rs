@@ -398,7 +398,11 @@ impl Simulation {
         if self.mechanism.is_kinematic() {
             self.kinematic_step(limit)?;
         } else if self.running.solver.method.is_adaptive() {
-            self.adaptive_step(limit)?;
+            let step = self.adaptive_step(limit);
+            if step.is_err() {
+                self.forget_flown();
+            }
+            step?;
         } else {
             self.fixed_step(limit)?;
         }

@@ -47,7 +47,6 @@ impl Simulation {
                 self.state.control.h_next = self.running.solver.step;
                 let tolerance = self.running.solver.tolerance;
                 let advice = StopAdvice::LooserTolerance { tolerance };
-                self.end_flights();
                 return Err(self.stopped(StopFault::ShortStep, advice));
             }
         };

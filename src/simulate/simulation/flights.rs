@@ -1,64 +1,61 @@
 //! Bodies in free flight: while nothing touches a free body its motion is known in advance, and the steps that impacts
-//! elsewhere need do not evaluate it.
+//! elsewhere need leave it out.
 
-use super::Simulation;
+use super::{LONGEST_STEP, Simulation, StepEnd};
 use crate::integrate::{Method, System as _};
-use crate::mechanism::{Flight, Touching};
+use crate::mechanism::{Flight, Mechanism, Touching};
 
 /// With fewer free bodies than this, leaving some out saves less than it costs.
 const FEWEST_FLYERS: usize = 3;
 
 impl Simulation {
-    /// Decides before a step which bodies it leaves out: free ones that touch nothing and whose flight is known until well
-    /// after it.
+    /// Decides, before a step that ends by `limit`, which bodies it leaves out: those that touch nothing and whose motion is
+    /// known until then.
     pub(super) fn choose_flights(&mut self, limit: f64) {
         let flyers = self.mechanism.flyers().len();
         if self.running.solver.method != Method::Automatic || flyers < FEWEST_FLYERS {
             return;
         }
-        let (mut lands, mut starts) = (false, false);
         let Self {
             mechanism, state, ..
         } = self;
         let now = &mut state.now;
-        let longest = super::LONGEST_STEP;
-        let until = limit.min(now.t + state.control.h_next.min(longest));
+        let until = limit.min(now.t + state.control.h_next.min(LONGEST_STEP));
+        let (mut some_land, mut some_start) = (false, false);
         for (flyer, flight) in mechanism.flyers().iter().zip(&mut state.flights) {
+            let flew = flight.is_some();
             let held = state.pull.is_some_and(|pull| pull.body == flyer.body);
-            let touches = flyer.joints.iter().any(|&j| now.memory[j].active);
-            if held || touches {
-                lands |= flight.take().is_some();
+            if held || flyer.joints.iter().any(|&j| now.memory[j].active) {
+                *flight = None;
+                some_land |= flew;
                 continue;
             }
-            if flight
-                .as_ref()
-                .is_some_and(|flight| flight.lasts_until(until))
-            {
+            if flight.as_ref().is_some_and(|f| f.lasts_until(until)) {
                 continue;
             }
-            let flies = flight.is_some();
             let next = mechanism.flight(flyer, now.t, &now.y);
             *flight = next.lasts_until(until).then_some(next);
-            if flight.is_some() {
+            let flies = flight.is_some();
+            if flies {
                 for part in flyer.parts() {
                     now.k[part].fill(0.0);
                 }
-                starts |= !flies;
-            } else {
-                lands |= flies;
             }
+            some_start |= flies && !flew;
+            some_land |= flew && !flies;
         }
-        if !lands && !starts {
+        if !some_land && !some_start {
             return;
         }
         self.leave_out_flights();
         self.stepper.invalidate();
-        if lands {
+        if some_land {
+            // The derivative of what landed is still that of a flight.
             let located = self.locates();
             let Self {
                 mechanism, state, ..
             } = self;
-            let super::StepEnd {
+            let StepEnd {
                 t, y, k, memory, ..
             } = &mut state.now;
             let mut evaluator = mechanism.evaluator(Touching::by(located, memory));
@@ -75,27 +72,32 @@ impl Simulation {
             .put_to_sleep(|flyer| flights[flyer].is_some());
     }
 
-    pub(super) fn any_flight(&self) -> bool {
-        self.state.flights.iter().any(Option::is_some)
+    /// Lets evaluations see everything for a while, if anything flies; whether it does.
+    pub(super) fn look_at_all(&mut self) -> bool {
+        let any = self.state.flights.iter().any(Option::is_some);
+        if any {
+            self.mechanism.put_to_sleep(|_| false);
+        }
+        any
     }
 
-    /// Lets nothing fly any more: the state is no longer the one that the flights continue.
+    /// After a step that failed: samples within the step before it would miss the flights that ended with that.
+    pub(super) fn forget_flown(&mut self) {
+        if self.state.flights.iter().any(Option::is_some) {
+            self.state.discard_previous_step();
+        }
+    }
+
+    /// Ends all flights: the state is no longer the one that they continue.
     pub(super) fn end_flights(&mut self) {
         self.look_at_all();
         self.state.flights.fill(None);
-    }
-
-    /// Lets evaluations look at everything, for reading the mechanism; [`Self::leave_out_flights`] goes back.
-    pub(super) fn look_at_all(&mut self) {
-        if self.any_flight() {
-            self.mechanism.put_to_sleep(|_| false);
-        }
     }
 }
 
 /// Writes the bodies in flight at `t` to the state `y`.
 pub(super) fn put_flights(
-    mechanism: &crate::mechanism::Mechanism,
+    mechanism: &Mechanism,
     flights: &[Option<Flight>],
     t: f64,
     y: &mut [f64],

@@ -50,7 +50,7 @@ impl Simulation {
         } else {
             self.scratch_y.copy_from_slice(&self.state.now.y);
         }
-        self.look_at_all();
+        let flies = self.look_at_all();
         let located = self.locates();
         let Self {
             mechanism,
@@ -71,7 +71,7 @@ impl Simulation {
         }
         let mut evaluator = mechanism.evaluator(Touching::by(located, scratch_memory));
         evaluator.evaluate_fully(time, scratch_y, scratch_k);
-        if self.any_flight() {
+        if flies {
             self.leave_out_flights();
         }
     }
