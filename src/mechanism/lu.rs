@@ -1,32 +1,54 @@
-//! Dense linear systems of a size known beforehand. Allocates nothing after `new`.
+//! Linear systems that are mostly zero, of a size known beforehand at most. Allocates nothing after `new`.
 
 use nalgebra::ComplexField;
 
-/// Dense LU factorisation with partial pivoting, for real and complex numbers.
+/// With fewer rows, telling zeros apart costs more than multiplying them.
+const LEAST_SPARSE: usize = 16;
+
+/// LU factorisation with partial pivoting, for real and complex numbers, that skips zeros: its cost follows the order of the
+/// rows, and is linear along a band or a border.
 pub struct Lu<X> {
+    /// Rows in use.
     n: usize,
     rows: Vec<X>,
     pivots: Vec<usize>,
+    /// Nonzero factors left and right of the diagonal, row by row: where those of each row start, their columns and values.
+    starts: Vec<usize>,
+    columns: Vec<usize>,
+    factors: Vec<X>,
+    /// Nonzero columns of a pivot row.
+    filled: Vec<usize>,
 }
 
 impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
-    /// For `n` rows.
+    /// For at most `n` rows.
     pub fn new(n: usize) -> Self {
         Self {
-            n,
+            n: 0,
             rows: vec![X::zero(); n * n],
             pivots: vec![0; n],
+            starts: Vec::with_capacity(2 * n + 1),
+            columns: Vec::with_capacity(n * n),
+            factors: Vec::with_capacity(n * n),
+            filled: Vec::with_capacity(n),
         }
     }
 
-    /// Factors the matrix with these entries (row, column, n).
-    pub fn factor(&mut self, entry: impl Fn(usize, usize, usize) -> X) {
-        let n = self.n;
-        let a = &mut self.rows;
-        for (i, row) in a.chunks_exact_mut(n).enumerate() {
-            for (j, a) in row.iter_mut().enumerate() {
-                *a = entry(i, j, n);
-            }
+    /// Factors the matrix of `n` rows with these entries (row, column), and `diagonal` added to its diagonal.
+    pub fn factor(
+        &mut self,
+        n: usize,
+        entries: impl Iterator<Item = (usize, usize, X)>,
+        diagonal: X,
+    ) {
+        self.n = n;
+        let a = &mut self.rows[..n * n];
+        a.fill(X::zero());
+        for (i, j, entry) in entries {
+            a[i * n + j] = entry;
+        }
+        for i in 0..n {
+            a[i * n + i] += diagonal;
         }
         for k in 0..n {
             let (mut best, mut largest) = (k, a[k * n + k].norm1());
@@ -44,20 +66,74 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
             let (top, bottom) = a.split_at_mut((k + 1) * n);
             let pivot_row = &top[k * n..];
             let inverse = X::one() / pivot_row[k];
-            // Bodies that are far apart in a mechanism do not couple: most factors are zero, and the row of the pivot ends early.
             let last = pivot_row.iter().rposition(|a| !a.is_zero());
             let end = last.map_or(k, |last| last + 1);
+            let span = k + 1..end.max(k + 1);
+            self.filled.clear();
+            if n >= LEAST_SPARSE {
+                let filled = span.clone().filter(|&j| !pivot_row[j].is_zero());
+                self.filled.extend(filled);
+            }
+            // What lies side by side is taken several at a time.
+            let together = n < LEAST_SPARSE || span.len() < 2 * self.filled.len();
             for row in bottom.chunks_exact_mut(n) {
                 if row[k].is_zero() {
                     continue;
                 }
                 let factor = row[k] * inverse;
                 row[k] = factor;
-                for (a, pivot) in row[k + 1..end].iter_mut().zip(&pivot_row[k + 1..end]) {
-                    *a -= factor * *pivot;
+                if together {
+                    let pairs = row[span.clone()].iter_mut().zip(&pivot_row[span.clone()]);
+                    pairs.for_each(|(a, pivot)| *a -= factor * *pivot);
+                } else {
+                    for &j in &self.filled {
+                        row[j] -= factor * pivot_row[j];
+                    }
                 }
             }
         }
+        if n >= LEAST_SPARSE {
+            self.pack();
+        }
+    }
+
+    /// Collects the nonzero factors.
+    fn pack(&mut self) {
+        let n = self.n;
+        self.starts.clear();
+        self.columns.clear();
+        self.factors.clear();
+        for (i, row) in self.rows[..n * n].chunks_exact(n).enumerate() {
+            for part in [0..i, i + 1..n] {
+                self.starts.push(self.columns.len());
+                for j in part {
+                    if !row[j].is_zero() {
+                        self.columns.push(j);
+                        self.factors.push(row[j]);
+                    }
+                }
+            }
+        }
+        self.starts.push(self.columns.len());
+    }
+
+    /// b[i] less the products of the factors left (`right` 0) or right (1) of the diagonal in row `i`.
+    #[inline]
+    fn reduced(&self, i: usize, right: usize, b: &[X]) -> X {
+        let mut x = b[i];
+        if self.n < LEAST_SPARSE {
+            let part = [0..i, i + 1..self.n][right].clone();
+            let row = &self.rows[i * self.n..][..self.n];
+            for (a, b) in row[part.clone()].iter().zip(&b[part]) {
+                x -= *a * *b;
+            }
+        } else {
+            let part = self.starts[2 * i + right]..self.starts[2 * i + right + 1];
+            for (a, &j) in self.factors[part.clone()].iter().zip(&self.columns[part]) {
+                x -= *a * b[j];
+            }
+        }
+        x
     }
 
     /// Solves with the factors in place.
@@ -67,19 +143,60 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
             b.swap(k, self.pivots[k]);
         }
         for i in 1..n {
-            let mut x = b[i];
-            for (a, x_j) in self.rows[i * n..i * n + i].iter().zip(&*b) {
-                x -= *a * *x_j;
-            }
-            b[i] = x;
+            b[i] = self.reduced(i, 0, b);
         }
         for i in (0..n).rev() {
-            let row = &self.rows[i * n..(i + 1) * n];
-            let mut x = b[i];
-            for (a, x_j) in row[i + 1..].iter().zip(&b[i + 1..]) {
-                x -= *a * *x_j;
-            }
-            b[i] = x / row[i];
+            b[i] = self.reduced(i, 1, b) / self.rows[i * n + i];
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Blocks of three along the diagonal, each coupled to a border, which is the first or the last block.
+    fn arrow(blocks: usize, border: usize) -> Vec<(usize, usize, f64)> {
+        let mut entries = Vec::new();
+        let mut seed = 7_u32;
+        for p in 0..blocks {
+            for q in 0..blocks {
+                if p != q && p != border && q != border {
+                    continue;
+                }
+                for i in 0..3 {
+                    for j in 0..3 {
+                        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                        let entry = f64::from(seed >> 8) / f64::from(1 << 24) - 0.5;
+                        entries.push((3 * p + i, 3 * q + j, entry));
+                    }
+                }
+            }
+        }
+        entries
+    }
+
+    #[test]
+    fn solutions_solve_and_a_border_in_the_end_stays_a_border() {
+        let mut filled = Vec::new();
+        for (blocks, border) in [(3, 2), (8, 7), (16, 15), (16, 0)] {
+            let n = 3 * blocks;
+            let entries = arrow(blocks, border);
+            let mut lu = Lu::new(n + 4);
+            lu.factor(n, entries.iter().copied(), 5.0);
+            let x: Vec<f64> = (0..n).map(|i| i as f64 - 3.5).collect();
+            let mut b: Vec<f64> = x.iter().map(|x| 5.0 * x).collect();
+            for &(i, j, entry) in &entries {
+                b[i] += entry * x[j];
+            }
+            lu.solve(&mut b);
+            for (b, x) in b.iter().zip(&x) {
+                assert!((b - x).abs() < 1e-12, "{b} {x}");
+            }
+            filled.push(lu.factors.len());
+        }
+        // A block of 3, its row and its column of the border, and the last block, off the diagonal.
+        let border = |blocks: usize| (blocks - 1) * (6 + 18) + 6;
+        assert_eq!(filled, [0, border(8), border(16), 48 * 47]);
     }
 }

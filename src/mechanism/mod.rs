@@ -530,9 +530,11 @@ impl Mechanism {
             let (dimension, positions) = (self.dimension(), self.positions());
             let couplings = self.contacts.len() + self.elements.len();
             self.stiff = Some(Box::new(stiff::Stiff::new(
+                &self.model,
                 dimension - positions,
                 dimension,
                 couplings,
+                self.equations.is_block_diagonal(),
             )));
         }
     }

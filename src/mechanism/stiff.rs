@@ -16,6 +16,7 @@ use super::lu::Lu;
 use super::model::{BallJoint, Model};
 use crate::scene::Vec3;
 use nalgebra::Complex;
+use std::ops::Range;
 
 /// Partial time derivatives of the motion of one point relative to another at fixed coordinates.
 #[derive(Clone, Copy, Default)]
@@ -27,6 +28,17 @@ struct Drift {
 /// The linearisation and its factors.
 pub struct Stiff {
     n: usize,
+    /// Velocity coordinates of each tree, those with many joints last: eliminated first, they would couple all their
+    /// neighbours.
+    trees: Vec<Range<usize>>,
+    /// Tree of each coordinate, in that order, and whether a coupling acts on it.
+    tree_of: Vec<usize>,
+    coupled: Vec<bool>,
+    /// Coordinates that couplings act on, in the order of elimination; the place of each coordinate there.
+    coordinates: Vec<usize>,
+    places: Vec<usize>,
+    /// Where M^-1 K or M^-1 D have an entry: row and column, as places, and where it stands.
+    entries: Vec<(usize, usize, usize)>,
     /// M^-1 K and M^-1 D, column-major n x n.
     by_position: Vec<f64>,
     by_velocity: Vec<f64>,
@@ -47,17 +59,41 @@ pub struct Stiff {
     scratch_im: Vec<f64>,
     rate: Vec<f64>,
     rate_im: Vec<f64>,
+    packed: Vec<f64>,
     pair: Vec<Complex<f64>>,
+    moved: Vec<Complex<f64>>,
     /// No contact or element carries a force: J is taken as zero except for q' = T v.
     empty: bool,
 }
 
 impl Stiff {
-    /// For `velocities` velocity coordinates in a state of `dimension`, with `couplings` ball joints and elements.
-    pub fn new(velocities: usize, dimension: usize, couplings: usize) -> Self {
+    /// For `velocities` velocity coordinates in a state of `dimension`, with `couplings` ball joints and elements. With
+    /// `separate`, a force accelerates only the coordinates of the trees that it acts on.
+    pub fn new(
+        model: &Model,
+        velocities: usize,
+        dimension: usize,
+        couplings: usize,
+        separate: bool,
+    ) -> Self {
         let n = velocities;
+        let trees = if separate {
+            trees_of(model)
+        } else {
+            vec![0..n]
+        };
+        let mut tree_of = vec![0; n];
+        for (place, tree) in trees.iter().enumerate() {
+            tree_of[tree.clone()].fill(place);
+        }
         Self {
             n,
+            coupled: vec![false; trees.len()],
+            trees,
+            tree_of,
+            coordinates: Vec::with_capacity(n),
+            places: vec![0; n],
+            entries: Vec::with_capacity(n * n),
             by_position: vec![0.0; n * n],
             by_velocity: vec![0.0; n * n],
             lu: Lu::new(n),
@@ -73,7 +109,9 @@ impl Stiff {
             scratch_im: vec![0.0; n],
             rate: vec![0.0; dimension - n],
             rate_im: vec![0.0; dimension - n],
-            pair: vec![Complex::new(0.0, 0.0); n],
+            packed: Vec::with_capacity(n),
+            pair: Vec::with_capacity(n),
+            moved: Vec::with_capacity(n),
             empty: true,
         }
     }
@@ -91,9 +129,11 @@ impl Stiff {
     ) {
         let motion = equations.motion();
         self.y.copy_from_slice(y);
-        self.by_position.fill(0.0);
-        self.by_velocity.fill(0.0);
+        for &(.., at) in &self.entries {
+            (self.by_position[at], self.by_velocity[at]) = (0.0, 0.0);
+        }
         self.time_derivative.fill(0.0);
+        self.coupled.fill(false);
         self.empty = true;
         let at = At {
             t,
@@ -111,6 +151,18 @@ impl Stiff {
             collect_columns(&mut self.columns, model, equations, sides, n);
             self.add(&coupling);
             self.add_drift(&coupling, i);
+            for column in &self.columns {
+                self.coupled[self.tree_of[column.coordinate]] = true;
+            }
+        }
+        self.coordinates.clear();
+        for (tree, coupled) in self.trees.iter().zip(&self.coupled) {
+            if *coupled {
+                self.coordinates.extend(tree.clone());
+            }
+        }
+        for (place, &coordinate) in self.coordinates.iter().enumerate() {
+            self.places[coordinate] = place;
         }
     }
 
@@ -178,50 +230,61 @@ impl Stiff {
         if self.empty {
             return;
         }
-        let columns = self.by_position.chunks_exact_mut(self.n);
-        let columns = columns.chain(self.by_velocity.chunks_exact_mut(self.n));
-        // Most coordinates move no touching ball.
-        for column in columns.filter(|column| column.iter().any(|force| *force != 0.0)) {
-            equations.apply_inverse_mass(model, column);
+        let n = self.n;
+        let separate = self.trees.len() > 1;
+        for matrix in [&mut self.by_position, &mut self.by_velocity] {
+            for &c in &self.coordinates {
+                let column = &mut matrix[c * n..][..n];
+                if !separate {
+                    if column.iter().any(|force| *force != 0.0) {
+                        equations.apply_inverse_mass(model, column);
+                    }
+                    continue;
+                }
+                for (tree, _) in self.trees.iter().zip(&self.coupled).filter(|(_, c)| **c) {
+                    if column[tree.clone()].iter().any(|force| *force != 0.0) {
+                        let range = (tree.start, tree.end);
+                        equations.apply_inverse_mass_within(model, range, column);
+                    }
+                }
+            }
         }
-        let positions = self.time_derivative.len() - self.n;
+        let positions = self.time_derivative.len() - n;
         equations.apply_inverse_mass(model, &mut self.time_derivative[positions..]);
+        self.entries.clear();
+        for (j, &column) in self.coordinates.iter().enumerate() {
+            for (i, &row) in self.coordinates.iter().enumerate() {
+                let at = column * n + row;
+                if self.by_position[at] != 0.0 || self.by_velocity[at] != 0.0 {
+                    self.entries.push((i, j, at));
+                }
+            }
+        }
     }
 
     /// Prepares to solve with a real shift s: factors s I - M^-1 D - M^-1 K / s.
     pub fn factor(&mut self, shift: f64) {
         self.shift = shift;
-        if !self.empty {
-            let Self {
-                by_position,
-                by_velocity,
-                lu,
-                ..
-            } = self;
-            lu.factor(|i, j, n| {
-                let (d, k) = (by_velocity[j * n + i], by_position[j * n + i]);
-                let entry = if k == 0.0 { -d } else { -d - k / shift };
-                if i == j { shift + entry } else { entry }
-            });
+        if self.empty {
+            return;
         }
+        let (k, d) = (&self.by_position, &self.by_velocity);
+        let entries = self.entries.iter();
+        let entries = entries.map(|&(i, j, at)| (i, j, -d[at] - k[at] / shift));
+        self.lu.factor(self.coordinates.len(), entries, shift);
     }
 
     /// Prepares to solve with a complex shift.
     pub fn factor_pair(&mut self, shift: Complex<f64>) {
         self.shift_pair = shift;
-        if !self.empty {
-            let Self {
-                by_position,
-                by_velocity,
-                lu_pair,
-                ..
-            } = self;
-            let inverse = shift.inv();
-            lu_pair.factor(|i, j, n| {
-                let entry = -inverse * by_position[j * n + i] - by_velocity[j * n + i];
-                if i == j { shift + entry } else { entry }
-            });
+        if self.empty {
+            return;
         }
+        let (k, d) = (&self.by_position, &self.by_velocity);
+        let inverse = shift.inv();
+        let entries = self.entries.iter();
+        let entries = entries.map(|&(i, j, at)| (i, j, -inverse * k[at] - d[at]));
+        self.lu_pair.factor(self.coordinates.len(), entries, shift);
     }
 
     /// Solves (s I - J) x = b in place.
@@ -233,13 +296,21 @@ impl Stiff {
             b_v.iter_mut().for_each(|x| *x /= s);
         } else {
             equations.velocities_of(model, &self.y, b_q, &mut self.scratch);
-            for (column, x) in self.by_position.chunks_exact(self.n).zip(&self.scratch) {
-                let x = x / s;
-                for (b, a) in b_v.iter_mut().zip(column) {
-                    *b += a * x;
-                }
+            self.packed.clear();
+            self.packed.extend(self.coordinates.iter().map(|&c| b_v[c]));
+            for &c in &self.coordinates {
+                self.scratch[c] /= s;
             }
-            self.lu.solve(b_v);
+            for &(i, j, at) in &self.entries {
+                self.packed[i] += self.by_position[at] * self.scratch[self.coordinates[j]];
+            }
+            self.lu.solve(&mut self.packed);
+            if self.coordinates.len() < self.n {
+                b_v.iter_mut().for_each(|x| *x /= s);
+            }
+            for (&c, x) in self.coordinates.iter().zip(&self.packed) {
+                b_v[c] = *x;
+            }
         }
         self.y[positions..].copy_from_slice(b_v);
         equations.position_rate(model, &self.y, &mut self.rate);
@@ -260,24 +331,33 @@ impl Stiff {
         let inverse = self.shift_pair.inv();
         let (re_q, re_v) = re.split_at_mut(positions);
         let (im_q, im_v) = im.split_at_mut(positions);
-        for i in 0..n {
-            self.pair[i] = Complex::new(re_v[i], im_v[i]);
-        }
-        if self.empty {
-            self.pair.iter_mut().for_each(|x| *x *= inverse);
-        } else {
+        if !self.empty {
             equations.velocities_of(model, &self.y, re_q, &mut self.scratch);
             equations.velocities_of(model, &self.y, im_q, &mut self.scratch_im);
-            for (j, column) in self.by_position.chunks_exact(n).enumerate() {
-                let x = inverse * Complex::new(self.scratch[j], self.scratch_im[j]);
-                for (b, a) in self.pair.iter_mut().zip(column) {
-                    *b += x * *a;
-                }
+            self.pair.clear();
+            let coupled = self.coordinates.iter();
+            self.pair
+                .extend(coupled.map(|&c| Complex::new(re_v[c], im_v[c])));
+            self.moved.clear();
+            let (re, im) = (&self.scratch, &self.scratch_im);
+            let coupled = self.coordinates.iter();
+            self.moved
+                .extend(coupled.map(|&c| inverse * Complex::new(re[c], im[c])));
+            for &(i, j, at) in &self.entries {
+                self.pair[i] += self.moved[j] * self.by_position[at];
             }
             self.lu_pair.solve(&mut self.pair);
         }
-        for i in 0..n {
-            (re_v[i], im_v[i]) = (self.pair[i].re, self.pair[i].im);
+        if self.empty || self.coordinates.len() < n {
+            for i in 0..n {
+                let x = inverse * Complex::new(re_v[i], im_v[i]);
+                (re_v[i], im_v[i]) = (x.re, x.im);
+            }
+        }
+        if !self.empty {
+            for (&c, x) in self.coordinates.iter().zip(&self.pair) {
+                (re_v[c], im_v[c]) = (x.re, x.im);
+            }
         }
         self.y[positions..].copy_from_slice(re_v);
         equations.position_rate(model, &self.y, &mut self.rate);
@@ -288,6 +368,22 @@ impl Stiff {
             (re_q[i], im_q[i]) = (x.re, x.im);
         }
     }
+}
+
+/// Velocity coordinates of the trees of `model`, those with more joints than two after the others.
+fn trees_of(model: &Model) -> Vec<Range<usize>> {
+    let mut joints = vec![0; model.blocks.len()];
+    for joint in &model.joints {
+        for anchor in [&joint.ball, &joint.socket] {
+            if anchor.body < model.bodies.len() && !model.bodies[anchor.body].driven_only {
+                joints[model.block_of[anchor.body]] += 1;
+            }
+        }
+    }
+    let mut order: Vec<usize> = (0..model.blocks.len()).collect();
+    order.sort_by_key(|&block| joints[block].max(2));
+    let range = |block: usize| model.blocks[block].v..model.blocks[block].v + model.blocks[block].n;
+    order.into_iter().map(range).collect()
 }
 
 #[cfg(test)]
