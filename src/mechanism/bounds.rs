@@ -227,17 +227,17 @@ impl Cost {
     }
 }
 
-/// Approximate time of one evaluation and its part of a step, ns on one core of a server, as measured on chains, the paper's mechanism and machines
-/// with ideal joints: fixed, per velocity coordinate, per loose joint, and per multiplication in mass matrices and constraint
-/// rows. Only its ratio to the time of algebra counts.
+/// Approximate time of one evaluation with its part of a step, ns on one core of a server, as measured on chains, the paper's
+/// mechanism and machines with ideal joints: fixed, per velocity coordinate, per loose joint, and per multiplication in mass
+/// matrices and constraint rows. Only its ratio to the time of algebra counts.
 pub fn evaluation_time(scene: &Scene, model: &Model) -> f64 {
     let cost = Cost::of(scene.formulation, scene, model, &model.ideal_joints);
     let loose = model.joints.len() - model.ideal_joints.len();
     1200.0 + 12.0 * model.nv as f64 + 120.0 * loose as f64 + 1.6 * cost.products as f64
 }
 
-/// The same of the dense algebra of an implicit step with `velocities` velocity coordinates.
-pub fn dense_algebra_time(velocities: usize) -> f64 {
+/// The same of the linear algebra of an implicit step with `velocities` velocity coordinates.
+pub fn algebra_time(velocities: usize) -> f64 {
     let n = velocities as f64;
     500.0 + n * n * (3.0 + 0.16 * n)
 }

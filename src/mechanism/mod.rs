@@ -565,10 +565,10 @@ impl Mechanism {
         self.friction.as_ref().map_or(0.0, |f| f.fastest())
     }
 
-    /// Approximate cost of an implicit step's dense algebra, in evaluations.
-    pub fn dense_algebra(&self) -> f64 {
+    /// Approximate cost of an implicit step's linear algebra, in evaluations.
+    pub fn implicit_algebra(&self) -> f64 {
         let velocities = self.dimension() - self.positions();
-        bounds::dense_algebra_time(velocities) / self.evaluation_time
+        bounds::algebra_time(velocities) / self.evaluation_time
     }
 
     /// Allocates what [`ContactSystem`](crate::integrate::ContactSystem) needs, so that no step does.

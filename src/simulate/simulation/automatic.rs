@@ -81,7 +81,7 @@ impl Simulation {
 
     fn next_member(&mut self, h: f64, stiffness: f64, evaluations: u64) -> Member {
         let velocities = self.state.now.y.len() - self.mechanism.positions();
-        let algebra = self.mechanism.dense_algebra();
+        let algebra = self.mechanism.implicit_algebra();
         let state = &mut self.state;
         let member = state.control.member;
         let choice = &mut state.control.choice;
