@@ -14,7 +14,7 @@ pub struct Lu<X> {
     pivots: Vec<usize>,
     /// Nonzero factors left and right of the diagonal, row by row: where those of each row start, their columns and values.
     starts: Vec<usize>,
-    columns: Vec<usize>,
+    columns: Vec<u32>,
     factors: Vec<X>,
     /// Nonzero columns of a pivot row.
     filled: Vec<usize>,
@@ -108,7 +108,7 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
                 self.starts.push(self.columns.len());
                 for j in part {
                     if !row[j].is_zero() {
-                        self.columns.push(j);
+                        self.columns.push(j as u32);
                         self.factors.push(row[j]);
                     }
                 }
@@ -130,7 +130,7 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
         } else {
             let part = self.starts[2 * i + right]..self.starts[2 * i + right + 1];
             for (a, &j) in self.factors[part.clone()].iter().zip(&self.columns[part]) {
-                x -= *a * b[j];
+                x -= *a * b[j as usize];
             }
         }
         x

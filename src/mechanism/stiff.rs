@@ -34,11 +34,10 @@ pub struct Stiff {
     /// Tree of each coordinate, in that order, and whether a coupling acts on it.
     tree_of: Vec<usize>,
     coupled: Vec<bool>,
-    /// Coordinates that couplings act on, in the order of elimination; the place of each coordinate there.
+    /// Coordinates that couplings act on, in the order of elimination.
     coordinates: Vec<usize>,
-    places: Vec<usize>,
-    /// Where M^-1 K or M^-1 D have an entry: row and column, as places, and where it stands.
-    entries: Vec<(usize, usize, usize)>,
+    /// Where M^-1 K or M^-1 D have an entry: row and column in that order, and its index in both.
+    entries: Vec<[u32; 3]>,
     /// M^-1 K and M^-1 D, column-major n x n.
     by_position: Vec<f64>,
     by_velocity: Vec<f64>,
@@ -92,7 +91,6 @@ impl Stiff {
             trees,
             tree_of,
             coordinates: Vec::with_capacity(n),
-            places: vec![0; n],
             entries: Vec::with_capacity(n * n),
             by_position: vec![0.0; n * n],
             by_velocity: vec![0.0; n * n],
@@ -129,7 +127,7 @@ impl Stiff {
     ) {
         let motion = equations.motion();
         self.y.copy_from_slice(y);
-        for &(.., at) in &self.entries {
+        for [.., at] in self.entries.iter().map(|entry| entry.map(|x| x as usize)) {
             (self.by_position[at], self.by_velocity[at]) = (0.0, 0.0);
         }
         self.time_derivative.fill(0.0);
@@ -160,9 +158,6 @@ impl Stiff {
             if *coupled {
                 self.coordinates.extend(tree.clone());
             }
-        }
-        for (place, &coordinate) in self.coordinates.iter().enumerate() {
-            self.places[coordinate] = place;
         }
     }
 
@@ -256,7 +251,7 @@ impl Stiff {
             for (i, &row) in self.coordinates.iter().enumerate() {
                 let at = column * n + row;
                 if self.by_position[at] != 0.0 || self.by_velocity[at] != 0.0 {
-                    self.entries.push((i, j, at));
+                    self.entries.push([i, j, at].map(|x| x as u32));
                 }
             }
         }
@@ -269,8 +264,10 @@ impl Stiff {
             return;
         }
         let (k, d) = (&self.by_position, &self.by_velocity);
-        let entries = self.entries.iter();
-        let entries = entries.map(|&(i, j, at)| (i, j, -d[at] - k[at] / shift));
+        let entries = self.entries.iter().map(|entry| {
+            let [i, j, at] = entry.map(|x| x as usize);
+            (i, j, -d[at] - k[at] / shift)
+        });
         self.lu.factor(self.coordinates.len(), entries, shift);
     }
 
@@ -282,8 +279,10 @@ impl Stiff {
         }
         let (k, d) = (&self.by_position, &self.by_velocity);
         let inverse = shift.inv();
-        let entries = self.entries.iter();
-        let entries = entries.map(|&(i, j, at)| (i, j, -inverse * k[at] - d[at]));
+        let entries = self.entries.iter().map(|entry| {
+            let [i, j, at] = entry.map(|x| x as usize);
+            (i, j, -inverse * k[at] - d[at])
+        });
         self.lu_pair.factor(self.coordinates.len(), entries, shift);
     }
 
@@ -301,7 +300,7 @@ impl Stiff {
             for &c in &self.coordinates {
                 self.scratch[c] /= s;
             }
-            for &(i, j, at) in &self.entries {
+            for [i, j, at] in self.entries.iter().map(|entry| entry.map(|x| x as usize)) {
                 self.packed[i] += self.by_position[at] * self.scratch[self.coordinates[j]];
             }
             self.lu.solve(&mut self.packed);
@@ -343,7 +342,7 @@ impl Stiff {
             let coupled = self.coordinates.iter();
             self.moved
                 .extend(coupled.map(|&c| inverse * Complex::new(re[c], im[c])));
-            for &(i, j, at) in &self.entries {
+            for [i, j, at] in self.entries.iter().map(|entry| entry.map(|x| x as usize)) {
                 self.pair[i] += self.moved[j] * self.by_position[at];
             }
             self.lu_pair.solve(&mut self.pair);

@@ -23,7 +23,7 @@ const EXPLICIT_TURN: f64 = 2.0;
 const MOST_DOUBLINGS: u32 = 3;
 /// Evaluations of one explicit step.
 const EXPLICIT_EVALUATIONS: f64 = 6.0;
-/// The implicit methods, whose matrices are dense, refuse more velocity coordinates than this.
+/// The implicit methods, which hold matrices over all coordinates, refuse more velocity coordinates than this.
 pub const LARGEST_DENSE: usize = 1024;
 /// With more velocity coordinates than this a dense factorisation costs more than many explicit steps: the automatic pair
 /// stays explicit.
