@@ -79,7 +79,7 @@ impl Stiff {
         let trees = if separate {
             trees_of(model)
         } else {
-            vec![0..n]
+            std::iter::once(0..n).collect()
         };
         let mut tree_of = vec![0; n];
         for (place, tree) in trees.iter().enumerate() {
