@@ -34,27 +34,30 @@ impl Flyer {
         if !separate || scene.formulation != Formulation::Tree {
             return Vec::new();
         }
-        let loaded = |b: BodyIndex| {
-            let mut points = scene.elements.iter().flat_map(|element| &element.points);
-            points.any(|point| point.body == Some(b))
-        };
-        let lone = model.blocks.iter().filter_map(|block| block.lone);
+        let mut loaded = vec![false; model.bodies.len()];
+        let points = scene.elements.iter().flat_map(|element| &element.points);
+        for body in points.filter_map(|point| point.body) {
+            loaded[body] = true;
+        }
+        let mut joints = vec![Vec::new(); model.bodies.len() + 1];
+        for (j, joint) in model.joints.iter().enumerate() {
+            joints[joint.ball.body].push(j);
+            if joint.socket.body != joint.ball.body {
+                joints[joint.socket.body].push(j);
+            }
+        }
         // In the order of their bodies, as blocks are.
-        let flyer = |body: BodyIndex| {
-            let Motion::Free { q, v } = model.bodies[body].motion else {
-                return None;
-            };
-            let joints = model.joints.iter().enumerate().filter_map(|(j, joint)| {
-                (joint.ball.body == body || joint.socket.body == body).then_some(j)
-            });
-            Some(Self {
+        let lone = model.blocks.iter().filter_map(|block| block.lone);
+        let flyer = |body: BodyIndex| match model.bodies[body].motion {
+            Motion::Free { q, v } => Some(Self {
                 body,
-                joints: joints.collect(),
+                joints: std::mem::take(&mut joints[body]),
                 q,
                 v: model.nq + v,
-            })
+            }),
+            _ => None,
         };
-        lone.filter(|&b| !loaded(b)).filter_map(flyer).collect()
+        lone.filter(|&b| !loaded[b]).filter_map(flyer).collect()
     }
 
     /// Its components of a state: positions, then velocities.

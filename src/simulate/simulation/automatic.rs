@@ -25,7 +25,7 @@ const MOST_DOUBLINGS: u32 = 3;
 const EXPLICIT_EVALUATIONS: f64 = 6.0;
 /// The implicit methods, which hold matrices over all coordinates, refuse more velocity coordinates than this.
 pub const LARGEST_DENSE: usize = 1024;
-/// With more velocity coordinates than this a dense factorisation costs more than many explicit steps: the automatic pair
+/// With more velocity coordinates than this an implicit step costs more than many explicit ones: the automatic choice
 /// stays explicit.
 pub const LARGEST_IMPLICIT: usize = 96;
 
