@@ -108,11 +108,9 @@ impl Tree {
     /// Poses, velocities and bias accelerations (those with zero coordinate accelerations) at (t, y).
     #[inline]
     pub fn update_kinematics(&mut self, model: &Model, t: f64, y: &[f64]) {
-        self.driven.update(model, t, &mut self.motion);
-        let (motion, coordinates) = (&mut self.motion, &self.driven.coordinates);
-        for &b in &self.dynamic {
-            move_body(model, b, y, coordinates, motion);
-        }
+        self.update_awake(model, t, y);
+        // They carry nothing, so that they may come last.
+        self.update_asleep(model, y);
     }
 
     /// Lets evaluations leave out the free bodies, each a tree of its own, for which `asleep` holds.
