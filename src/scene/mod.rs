@@ -13,7 +13,10 @@ mod expression;
 mod field;
 mod load;
 mod model;
+mod numbers;
 mod parameters;
+mod pattern;
+mod quantity;
 mod read;
 mod read_bodies;
 mod read_joints;
@@ -34,6 +37,7 @@ pub use expression::{
 };
 pub use load::*;
 pub use model::*;
+pub use numbers::FileNumber;
 pub use parameters::*;
 pub use table::{reference_page, table};
 pub use units::*;

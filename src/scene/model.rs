@@ -2,7 +2,10 @@
 
 use crate::words::{Words, words};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
+use super::numbers::FileNumber;
+use super::parameters::Parameter;
 use super::units::Dimension;
 use crate::contact;
 use crate::integrate::Method;
@@ -86,6 +89,10 @@ pub struct Source {
     /// Byte offsets in the text of what errors found after reading point to: each parameter given in the text, by key;
     /// `spcmm`, its section; `joint.<name>`, each ball joint (a chain's: its section).
     pub places: BTreeMap<String, usize>,
+    /// Numbers from which the scene was built, by key.
+    pub numbers: Arc<BTreeMap<String, FileNumber>>,
+    /// Rows of the scene's own parameters, in the order of the file.
+    pub own: Vec<&'static Parameter>,
 }
 
 /// Formulation of the equations of motion.

@@ -496,7 +496,7 @@ pub(super) fn find(key: &str) -> Option<&'static Parameter> {
 pub(super) fn contact_part(parameter: &'static Parameter) -> Option<&'static str> {
     match parameter.access {
         Access::Contact(_) => parameter.key.strip_prefix("contact."),
-        Access::Scene(_) => None,
+        Access::Scene(_) | Access::Number => None,
     }
 }
 
@@ -504,6 +504,6 @@ pub(super) fn contact_part(parameter: &'static Parameter) -> Option<&'static str
 pub(super) fn contact_rows() -> impl Iterator<Item = (&'static str, Field<contact::Parameters>)> {
     TABLE.iter().filter_map(|parameter| match parameter.access {
         Access::Contact(field) => Some((parameter.key.strip_prefix("contact.")?, field)),
-        Access::Scene(_) => None,
+        Access::Scene(_) | Access::Number => None,
     })
 }
