@@ -27,7 +27,7 @@ pub(super) fn file_only(key: &str) -> bool {
         // The file's bodies are built to these.
         "spcmm" => SPCMM_DIMENSIONS.contains(&rest),
         "output" => rest == "body",
-        "name" | "title" | "description" | "start" => rest.is_empty(),
+        "name" | "title" | "description" => rest.is_empty(),
         _ => false,
     }
 }

@@ -72,11 +72,15 @@ pub enum StartRule {
     /// Initial guesses: the mechanism is assembled with every ball concentric with its socket at t = 0, and velocities that
     /// follow from the drives.
     Ideal,
+    /// As [`Self::Ideal`], and then every ball lies on the wall of its socket where the mechanism without play would press it,
+    /// as deep as that force needs.
+    Settled,
 }
 
 words!(StartRule {
     AsGiven => "as-given",
     Ideal => "ideal",
+    Settled => "settled",
 });
 
 /// Where a scene's text came from.

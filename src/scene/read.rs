@@ -146,8 +146,6 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
         Some(node) => node.name()?.into_owned(),
         None => visible_line(stem.unwrap_or("scene")).into_owned(),
     };
-    let start = top.get("start").map(|node| node.word()).transpose()?;
-    let start: StartRule = start.unwrap_or_default();
     let spcmm = match top.get("spcmm") {
         None => None,
         Some(node) => {
@@ -215,7 +213,7 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
             body: 0,
             probe: None,
         },
-        start,
+        start: StartRule::default(),
         bodies: Vec::new(),
         joints: Vec::new(),
         ball_joints: Vec::new(),

@@ -223,7 +223,7 @@ fn explicit_solver_settings_beat_a_preset_in_either_order() {
 
 #[test]
 fn a_key_of_the_file_alone_says_so() {
-    for key in ["spcmm.gamma", "output.body", "name", "start"] {
+    for key in ["spcmm.gamma", "output.body", "name", "title"] {
         let error = Scene::load("spcmm", &[(key.to_owned(), "1".to_owned())]).unwrap_err();
         assert!(
             error.message.starts_with("only in the scene file"),
