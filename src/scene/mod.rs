@@ -9,6 +9,7 @@ mod document;
 mod doubt;
 mod elements;
 mod error;
+mod expression;
 mod field;
 mod load;
 mod model;
@@ -28,6 +29,9 @@ pub use check::least_impact_steps;
 pub use doubt::{Doubt, Warning, WarningKind};
 pub use elements::ELEMENT_KINDS;
 pub use error::SceneError;
+pub use expression::{
+    Binary, ExpressionError, Fault, LONGEST_EXPRESSION, Number, Program, Unary, smooth_step,
+};
 pub use load::*;
 pub use model::*;
 pub use parameters::*;
