@@ -1,5 +1,6 @@
 //! TOML with positions: every value knows its key, line and column, so that every error can name them.
 
+use super::beside::Beside;
 use super::error::{brief, line_text, nearest, place_of};
 use super::units::{QuantityError, parse_quantity};
 use super::{Dimension, SceneError, Vec3, find};
@@ -9,13 +10,15 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// Largest length, speed, angle, … in SI units that a file may give.
-const MAX_SI: f64 = 1e6;
+pub(super) const MAX_SI: f64 = 1e6;
 
 /// The text being read, and its name in errors.
 #[derive(Clone, Copy)]
 pub(super) struct Document<'d> {
     pub file: Option<&'d str>,
     pub text: &'d str,
+    /// Files that it names.
+    pub beside: &'d Beside<'d>,
 }
 
 /// A table with the path of its keys.
@@ -358,16 +361,17 @@ impl<'d> Node<'d> {
     /// Checks the word that the key `name` of a table selects, if present: it determines which other keys are allowed, so a
     /// wrong word must be reported before any of those.
     pub fn check_word<T: Words>(&self, path: &str, name: &str) -> Result<(), SceneError> {
-        let table = self.value.get_ref().as_table();
-        let Some(value) = table.and_then(|table| table.get(name)) else {
-            return Ok(());
-        };
-        let node = Node {
+        let node = self.peek(path, name);
+        node.map_or(Ok(()), |node| node.word::<T>().map(|_| ()))
+    }
+
+    /// Value of the key `name` of a table whose keys have the path `path`, if it is a table with such a key.
+    pub fn peek(&self, path: &str, name: &str) -> Option<Node<'d>> {
+        Some(Node {
             document: self.document,
             key: format!("{path}.{name}"),
-            value,
-        };
-        node.word::<T>().map(|_| ())
+            value: self.value.get_ref().as_table()?.get(name)?,
+        })
     }
 
     /// Value of the table's `name` key, for the paths of its keys; the array index if there is none yet.

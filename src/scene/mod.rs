@@ -3,17 +3,21 @@
 #![doc = include_str!("../../docs/scene-format.md")]
 
 mod access;
+mod beside;
 mod chain;
 mod check;
 mod document;
 mod doubt;
+mod drives;
 mod elements;
 mod error;
 mod expression;
 mod field;
+mod formula;
 mod load;
 mod model;
 mod parameters;
+mod points;
 mod read;
 mod read_bodies;
 mod read_joints;
@@ -25,8 +29,10 @@ mod value;
 mod visible;
 mod write;
 
+pub use beside::LARGEST_FILE;
 pub use check::least_impact_steps;
 pub use doubt::{Doubt, Warning, WarningKind};
+pub use drives::DRIVE_KINDS;
 pub use elements::ELEMENT_KINDS;
 pub use error::SceneError;
 pub use expression::{

@@ -1,5 +1,6 @@
 //! Reads a scene from TOML: settings first, then bodies, joints and ball joints.
 
+use super::beside::Beside;
 use super::document::{Document, Node, Section};
 use super::elements::read_element;
 use super::error::{no_body, place_of};
@@ -57,7 +58,44 @@ impl Scene {
         file: Option<&str>,
         changes: &[(String, String)],
     ) -> Result<Self, SceneError> {
-        let document = Document { file, text };
+        Self::parse_beside(text, file, Beside::default(), changes)
+    }
+
+    /// As [`Self::parse`] for a text that names the files `beside` it.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn parse_with(
+        text: &str,
+        file: Option<&str>,
+        beside: &Texts,
+        changes: &[(String, String)],
+    ) -> Result<Self, SceneError> {
+        Self::parse_beside(text, file, Beside::known(beside), changes)
+    }
+
+    /// Parses a scene that finds the files it names in `beside`.
+    pub(super) fn parse_beside(
+        text: &str,
+        file: Option<&str>,
+        beside: Beside<'_>,
+        changes: &[(String, String)],
+    ) -> Result<Self, SceneError> {
+        let document = Document {
+            file,
+            text,
+            beside: &beside,
+        };
+        let mut scene = Self::read_document(document, changes)?;
+        scene.source.beside = beside.into_texts();
+        Ok(scene)
+    }
+
+    fn read_document(
+        document: Document<'_>,
+        changes: &[(String, String)],
+    ) -> Result<Self, SceneError> {
+        let Document { file, text, .. } = document;
         if text.trim().is_empty() {
             return Err(document.error(
                 0..0,
@@ -210,6 +248,7 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
             file: document.file.map(str::to_owned),
             text: document.text.to_owned(),
             places: BTreeMap::new(),
+            beside: Texts::new(),
         },
         changes: Vec::new(),
     })
@@ -305,10 +344,11 @@ fn read_mechanism<'d>(
     for node in list("joint", MOST_BODIES, "joints")? {
         let joint = read_joint(&node, scene, &file_order, &file_places)?;
         joint_names.add(&joint.section, "joint", &joint.name)?;
-        if let Some(Drive::ClosedForm { coordinate }) = joint.joint.drive
+        let slider = |of: &JointText<'_>| of.joint.drive.as_ref()?.slider();
+        if let Some(coordinate) = slider(&joint)
             && let Some(other) = joints
                 .iter()
-                .find(|other| other.joint.drive == joint.joint.drive)
+                .find(|other| slider(other) == Some(coordinate))
         {
             let message = format!(
                 "slider {} already drives joint `{}`; allowed 1, 2, 3, each once",

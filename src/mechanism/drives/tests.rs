@@ -1,0 +1,1 @@
+//! Laws of drives against finite differences and closed solutions.
