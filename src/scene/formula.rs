@@ -135,3 +135,66 @@ fn within(node: &Node<'_>, text: &str, at: usize, message: &str) -> SceneError {
     node.document
         .error(start..span.end, &node.key, Some(&excerpt), message)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_operation_carries_its_derivatives() {
+        for text in [
+            "t + 1/t",
+            "-t*t - 3",
+            "sin(2*t)",
+            "cos(t^2)",
+            "tan(t/2)",
+            "asin(t/3)",
+            "acos(t*t/4)",
+            "atan(3*t)",
+            "sinh(t)*cosh(t)",
+            "tanh(t*t)",
+            "exp(-t*t)",
+            "ln(1 + t)",
+            "sqrt(t + t*t)",
+            "smoothstep(t - 0.3)",
+            "t^3",
+            "(t - 2)^3",
+            "(t - 2)^-2",
+            "t^1.5",
+            "2^t",
+            "t^t",
+            "(1 + t)^sin(t)",
+            "pow(t, 2.5)",
+            "atan2(sin(t), 2 + t)",
+        ] {
+            let program = Program::parse(text, |name| (name == "t").then_some(0), &[]).expect(text);
+            let at = |t: f64| program.eval(&[Jet::new(t, 1.0, 0.0)]);
+            for t in [0.2, 0.7, 1.1] {
+                let (now, h) = (at(t), 1e-5);
+                assert_eq!(now.value, program.eval(&[t]), "{text}");
+                let rate = (at(t + h).value - at(t - h).value) / (2.0 * h);
+                let acceleration = (at(t + h).rate - at(t - h).rate) / (2.0 * h);
+                assert!(
+                    (now.rate - rate).abs() < 1e-7 * (1.0 + rate.abs()),
+                    "{text} at {t}"
+                );
+                let off = (now.acceleration - acceleration).abs();
+                assert!(off < 1e-6 * (1.0 + acceleration.abs()), "{text} at {t}");
+            }
+        }
+    }
+
+    #[test]
+    fn whole_powers_have_derivatives_at_zero() {
+        let zero = Jet::new(0.0, 1.0, 0.0);
+        for (exponent, expected) in [
+            (0.0, Jet::constant(1.0)),
+            (1.0, zero),
+            (2.0, Jet::new(0.0, 0.0, 2.0)),
+            (3.0, Jet::default()),
+        ] {
+            let found = zero.binary(Binary::Power, Jet::constant(exponent));
+            assert_eq!(found, expected, "{exponent}");
+        }
+    }
+}
