@@ -9,6 +9,7 @@ mod closed_form;
 mod columns;
 mod constraints;
 mod contacts;
+mod drives;
 mod elements;
 mod equations;
 mod factor;
@@ -16,7 +17,6 @@ mod flight;
 mod forest;
 mod friction;
 mod implicit;
-mod jet;
 mod kinematics;
 mod lagrange;
 mod lu;
@@ -32,13 +32,13 @@ mod summary;
 mod systems;
 mod tree;
 
+pub use crate::jet::Jet;
 pub use bounds::{Advice, CostOf, Counted};
 pub use closed_form::ClosedMotion;
 pub use contacts::{Contacts, Ramp};
-
+pub use drives::period_of;
 pub use elements::{Counts, ElementReport, Gap, Powers, Pull, Touch, Touching};
 pub use flight::{Flight, Flyer};
-pub use jet::Jet;
 pub use kinematics::{Kinematics, Wrench};
 pub use spcmm::Unreachable;
 pub use start::{Assembly, Placement};
@@ -329,6 +329,11 @@ impl Mechanism {
     pub fn kinematic_step(&self) -> f64 {
         let loads = self.elements.iter().map(|element| element.period());
         loads.fold(self.model.shortest_period, f64::min) / 50.0
+    }
+
+    /// Latest end of an adaptive step that starts at `t`, s.
+    pub fn step_end(&self, t: f64) -> f64 {
+        self.model.step_end(t)
     }
 
     /// Where the motion is a function of time alone: the determinant of the loops' Jacobian, whose sign tells the side of a

@@ -259,7 +259,13 @@ impl Scene {
                 }
             });
         }
-        Self::parse(&self.source.text, self.source.file.as_deref(), &changes)
+        let source = &self.source;
+        Self::parse_with(
+            &source.text,
+            source.file.as_deref(),
+            &source.beside,
+            &changes,
+        )
     }
 
     /// Applies and records one change, without the checks across parameters.

@@ -1,5 +1,6 @@
 //! TOML with positions: every value knows its key, line and column, so that every error can name them.
 
+use super::beside::Beside;
 use super::error::{brief, line_text, nearest, place_of};
 use super::numbers::{FileNumber, Place, Reading};
 use super::pattern::Copy as PatternCopy;
@@ -11,7 +12,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// Largest length, speed, angle, … in SI units that a file may give.
-const MAX_SI: f64 = 1e6;
+pub(super) const MAX_SI: f64 = 1e6;
 
 /// The text being read, its name in errors, and what its values may refer to.
 #[derive(Clone, Copy)]
@@ -21,6 +22,8 @@ pub(super) struct Document<'d> {
     pub reading: &'d Reading<'d>,
     /// The copy of a pattern that the values belong to.
     pub copy: Option<&'d PatternCopy>,
+    /// Files that it names.
+    pub beside: &'d Beside<'d>,
 }
 
 /// A table with the path of its keys.
@@ -419,18 +422,19 @@ impl<'d> Node<'d> {
     /// Checks the word that the key `name` of a table selects, if present: it determines which other keys are allowed, so a
     /// wrong word must be reported before any of those.
     pub fn check_word<T: Words>(&self, path: &str, name: &str) -> Result<(), SceneError> {
-        let table = self.value.get_ref().as_table();
-        let Some(value) = table.and_then(|table| table.get(name)) else {
-            return Ok(());
-        };
-        let node = Node {
+        let node = self.peek(path, name);
+        node.map_or(Ok(()), |node| node.word::<T>().map(|_| ()))
+    }
+
+    /// Value of the key `name` of a table whose keys have the path `path`, if it is a table with such a key.
+    pub fn peek(&self, path: &str, name: &str) -> Option<Node<'d>> {
+        Some(Node {
             document: self.document,
             key: format!("{path}.{name}"),
-            value,
+            value: self.value.get_ref().as_table()?.get(name)?,
             written: None,
             changed: false,
-        };
-        node.word::<T>().map(|_| ())
+        })
     }
 
     /// Value of the table's `name` key, for the paths of its keys; the array index if there is none yet.

@@ -4,8 +4,9 @@
 use std::collections::BTreeMap;
 
 use super::document::{Node, Section};
+use super::drives::FASTEST_DRIVE;
 use super::error::nearest;
-use super::read_joints::{FASTEST_DRIVE, read_attachment};
+use super::read_joints::read_attachment;
 use super::*;
 use crate::words::Words;
 

@@ -677,7 +677,7 @@ mod tests {
             ("3 * é", 4, "no variable `é`"),
             ("3 $ t", 2, "`$` where an operator should stand"),
             ("sin t", 0, "`sin` is a function"),
-            ("sn(t)", 0, "no function `sn` (did you mean `sin`?)"),
+            ("sqr(t)", 0, "no function `sqr` (did you mean `sqrt`?)"),
             (
                 "2 * arm.lenght",
                 4,

@@ -1,5 +1,6 @@
 //! Reads a scene from TOML: settings first, then bodies, joints and ball joints.
 
+use super::beside::Beside;
 use super::document::{Document, Node, Section};
 use super::elements::read_element;
 use super::error::{no_body, place_of};
@@ -62,13 +63,47 @@ impl Scene {
         file: Option<&str>,
         changes: &[(String, String)],
     ) -> Result<Self, SceneError> {
+        Self::parse_beside(text, file, Beside::default(), changes)
+    }
+
+    /// As [`Self::parse`] for a text that names the files `beside` it.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn parse_with(
+        text: &str,
+        file: Option<&str>,
+        beside: &Texts,
+        changes: &[(String, String)],
+    ) -> Result<Self, SceneError> {
+        Self::parse_beside(text, file, Beside::known(beside), changes)
+    }
+
+    /// Parses a scene that finds the files it names in `beside`.
+    pub(super) fn parse_beside(
+        text: &str,
+        file: Option<&str>,
+        beside: Beside<'_>,
+        changes: &[(String, String)],
+    ) -> Result<Self, SceneError> {
         let reading = Reading::new(changes);
         let document = Document {
             file,
             text,
             reading: &reading,
+            beside: &beside,
             copy: None,
         };
+        let mut scene = Self::read_document(document, changes)?;
+        scene.source.beside = beside.into_texts();
+        Ok(scene)
+    }
+
+    fn read_document(
+        document: Document<'_>,
+        changes: &[(String, String)],
+    ) -> Result<Self, SceneError> {
+        let Document { file, text, .. } = document;
         if text.trim().is_empty() {
             return Err(document.error(
                 0..0,
@@ -107,7 +142,7 @@ impl Scene {
             }
         }
         read_mechanism(&top, &patterns, &mut scene, &mut places)?;
-        scene.source.numbers = Arc::new(reading.numbers());
+        scene.source.numbers = Arc::new(document.reading.numbers());
         scene.source.own = own;
         for (key, value) in changes {
             scene.change(key, value)?;
@@ -329,10 +364,11 @@ fn read_mechanism<'d>(
     for node in list("joint", MOST_BODIES, "joints")? {
         let joint = read_joint(&node, scene, &file_order, &file_places)?;
         joint_names.add(&joint.section, "joint", &joint.name)?;
-        if let Some(Drive::ClosedForm { coordinate }) = joint.joint.drive
+        let slider = |of: &JointText<'_>| of.joint.drive.as_ref()?.slider();
+        if let Some(coordinate) = slider(&joint)
             && let Some(other) = joints
                 .iter()
-                .find(|other| other.joint.drive == joint.joint.drive)
+                .find(|other| slider(other) == Some(coordinate))
         {
             let message = format!(
                 "slider {} already drives joint `{}`; allowed 1, 2, 3, each once",

@@ -1,30 +1,12 @@
 //! Tree joints and ball joints of a scene file, and the forest they make.
 
 use super::document::{Node, Section};
+use super::drives::read_drive;
 use super::error::no_body;
 use super::pattern::Copy;
 use super::table::contact_rows;
 use super::*;
-use crate::words::words;
 use std::collections::{BTreeMap, BTreeSet};
-use std::f64::consts::TAU;
-
-/// Laws of a drive.
-#[derive(Clone, Copy)]
-enum Law {
-    Spcmm,
-    Constant,
-    Harmonic,
-}
-
-words!(Law {
-    Spcmm => "spcmm",
-    Constant => "constant",
-    Harmonic => "harmonic",
-});
-
-/// Highest frequency of a harmonic drive, Hz.
-pub(super) const FASTEST_DRIVE: f64 = 1e4;
 
 /// A tree joint whose bodies are still indices in file order.
 pub(super) struct JointText<'d> {
@@ -184,10 +166,10 @@ fn read_moving(section: &Section<'_>, scene: &Scene, joint: &mut Joint) -> Resul
     };
     if let Some(node) = section.get("drive") {
         section.refuse("start", "the drive says where the joint starts")?;
-        let drive = read_drive(&node, joint.kind, scene, place, rate)?;
+        let drive = read_drive(&node, joint.kind, scene)?;
+        let slider = drive.slider();
         joint.drive = Some(drive);
-        joint.start = drive_start(drive);
-        if let (Drive::ClosedForm { coordinate }, Some(spcmm)) = (drive, scene.spcmm.as_ref()) {
+        if let (Some(coordinate), Some(spcmm)) = (slider, scene.spcmm.as_ref()) {
             for key in ["axis", "parent_point", "parent", "rotation"] {
                 section.refuse(
                     key,
@@ -212,101 +194,6 @@ fn read_moving(section: &Section<'_>, scene: &Scene, joint: &mut Joint) -> Resul
     }
     joint.axis = section.require("axis", "[0, 0, 1]")?.direction()?;
     Ok(())
-}
-
-fn read_drive(
-    node: &Node<'_>,
-    kind: JointKind,
-    scene: &Scene,
-    place: Dimension,
-    rate: Dimension,
-) -> Result<Drive, SceneError> {
-    let all = [
-        "law",
-        "slider",
-        "position",
-        "velocity",
-        "mean",
-        "amplitude",
-        "frequency",
-        "phase",
-    ];
-    node.check_word::<Law>(&node.key, "law")?;
-    let law = node.section(&all)?.require("law", "\"constant\"")?;
-    Ok(match law.word::<Law>()? {
-        Law::Spcmm => {
-            let section = node.section(&["law", "slider"])?;
-            if kind != JointKind::Prismatic {
-                return Err(law.error("the law spcmm drives prismatic joints only"));
-            }
-            if scene.spcmm.is_none() {
-                return Err(law.error("the law spcmm needs a section [spcmm] in the file"));
-            }
-            let slider = section.require("slider", "1")?;
-            match slider.scalar()?.parse::<u8>() {
-                Ok(number @ 1..=3) => Drive::ClosedForm {
-                    coordinate: number as usize - 1,
-                },
-                _ => {
-                    return Err(
-                        slider.error("out of range; allowed 1, 2 or 3; a whole number, no unit")
-                    );
-                }
-            }
-        }
-        Law::Constant => {
-            let section = node.section(&["law", "position", "velocity"])?;
-            let like = match kind {
-                JointKind::Revolute => "\"6 rad/s\"",
-                _ => "\"10 mm/s\"",
-            };
-            Drive::Constant {
-                position: section
-                    .get("position")
-                    .map_or(Ok(0.0), |node| node.quantity(place))?,
-                velocity: section.require("velocity", like)?.quantity(rate)?,
-            }
-        }
-        Law::Harmonic => {
-            let section = node.section(&["law", "mean", "amplitude", "frequency", "phase"])?;
-            let like = match kind {
-                JointKind::Revolute => "\"10 deg\"",
-                _ => "\"10 mm\"",
-            };
-            Drive::Harmonic {
-                mean: section
-                    .get("mean")
-                    .map_or(Ok(0.0), |node| node.quantity(place))?,
-                amplitude: section.require("amplitude", like)?.quantity(place)?,
-                frequency: section.require("frequency", "\"1 Hz\"")?.positive(
-                    Dimension::Frequency,
-                    FASTEST_DRIVE,
-                    "Hz",
-                )?,
-                phase: section
-                    .get("phase")
-                    .map_or(Ok(0.0), |node| node.quantity(Dimension::Angle))?,
-            }
-        }
-    })
-}
-
-/// Start of a drive law; that of the spcmm law, 0 here, comes from the inverse kinematics.
-fn drive_start(drive: Drive) -> JointStart {
-    let (position, velocity) = match drive {
-        Drive::ClosedForm { .. } => (0.0, 0.0),
-        Drive::Constant { position, velocity } => (position, velocity),
-        Drive::Harmonic {
-            mean,
-            amplitude,
-            frequency,
-            phase,
-        } => (
-            mean + amplitude * libm::sin(phase),
-            amplitude * TAU * frequency * libm::cos(phase),
-        ),
-    };
-    JointStart::Scalar { position, velocity }
 }
 
 /// An orientation in one of four forms:

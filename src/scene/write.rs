@@ -35,7 +35,8 @@ impl Scene {
         }
         let text = document.to_string();
         // Return the text only if it reads back as intended.
-        let read = Self::parse(&text, self.source.file.as_deref(), &[])?;
+        let source = &self.source;
+        let read = Self::parse_with(&text, source.file.as_deref(), &source.beside, &[])?;
         for (key, _) in &self.changes {
             if read.get(key)? != self.get(key)? {
                 return Err(lost(key, "cannot be written to a scene file".to_owned()));
