@@ -24,6 +24,7 @@ mod model;
 mod path;
 mod power;
 mod rows;
+mod settled;
 mod spcmm;
 mod start;
 mod stiff;
@@ -47,13 +48,14 @@ pub use systems::Evaluator;
 use std::ops::Range;
 use std::sync::Arc;
 
-use crate::scene::{Formulation, Scene, Vec3, format_quantity_digits};
+use crate::scene::{Formulation, Scene, StartRule, Vec3, format_quantity_digits};
 use elements::{ForceElement, SceneElement, elements_of};
 use equations::{Equations, LEAST_PIVOT};
 use forest::Forest;
 use lagrange::Lagrange;
 use model::Model;
 use path::Path;
+use settled::Settled;
 use tree::Tree;
 
 /// Why a scene's equations cannot be set up.
@@ -232,6 +234,7 @@ pub struct Mechanism {
     /// Allocated if only the contacts are stepped implicitly.
     implicit: Option<Box<implicit::ImplicitContacts>>,
     assembly: Assembly,
+    settled: Option<Settled>,
     /// ns, as by [`bounds::evaluation_time`].
     evaluation_time: f64,
     flyers: Vec<Flyer>,
@@ -241,14 +244,19 @@ impl Mechanism {
     /// Sets up the equations of `scene`.
     ///
     /// # Errors
-    /// A trajectory that the rods cannot reach; equations that would be too costly.
+    /// A trajectory that the rods cannot reach; equations that would be too costly; for a settled start, a machine that does not
+    /// start without play.
     pub fn new(scene: &Scene) -> Result<Self, MechanismError> {
         let model = Arc::new(Model::new(scene));
         if let Some(form) = &model.closed_form {
             form.check()?;
         }
         bounds::check(scene, &model)?;
-        Ok(Self::with_model(scene, model))
+        let mut mechanism = Self::with_model(scene, model);
+        if scene.start == StartRule::Settled {
+            mechanism.settled = Some(settled::settle(scene)?);
+        }
+        Ok(mechanism)
     }
 
     fn with_model(scene: &Scene, model: Arc<Model>) -> Self {
@@ -276,6 +284,7 @@ impl Mechanism {
             friction: None,
             implicit: None,
             assembly: Assembly::default(),
+            settled: None,
             flyers: Vec::new(),
         };
         mechanism.flyers = Flyer::all(&mechanism, scene);

@@ -117,7 +117,7 @@ pub(super) fn read_element<'d>(
     bodies: &BTreeMap<String, usize>,
 ) -> Result<(Element, Section<'d>), SceneError> {
     let section = node.section_as(node.title(kind.section), &kind.keys())?;
-    let name = section.require("name", "\"s1\"")?.name()?.to_owned();
+    let name = section.require("name", "\"s1\"")?.name()?.into_owned();
     let point = |key: &&str| read_attachment(&section, key, scene, bodies);
     let points = kind
         .points
@@ -165,13 +165,21 @@ pub(super) fn read_element<'d>(
         }
     };
     let numbers = kind.numbers.iter().map(number).collect::<Result<_, _>>()?;
+    // A vector in axes that do not belong to the pattern turns with its copies.
+    let turns = section.document.copy.filter(|copy| {
+        let body = points.first().and_then(|point| point.body);
+        let own = body.is_some_and(|body| copy.made(&scene.bodies[body].name));
+        !own || section
+            .get("axes")
+            .is_none_or(|axes| axes.text() != Ok(LoadAxes::Body.word()))
+    });
     let vector = |&(key, dimension, _): &(&str, Dimension, &str)| {
         let Some(node) = section.get(key) else {
             return Ok(Vec3::zeros());
         };
         let value = node.vector(dimension)?;
         if value.amax() <= LARGEST_FORCE {
-            return Ok(value);
+            return Ok(turns.map_or(value, |copy| copy.direction(value)));
         }
         let most = format_quantity(LARGEST_FORCE, si_unit(dimension));
         Err(node.error(format!("out of range; allowed -{most} to {most}")))

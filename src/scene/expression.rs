@@ -183,6 +183,20 @@ impl Program {
         variable: impl Fn(&str) -> Option<usize>,
         names: &[&str],
     ) -> Result<Self, ExpressionError> {
+        Self::parse_with_units(text, variable, names, |_| None)
+    }
+
+    /// As [`Self::parse`]; a number may be followed by a unit, by which it is multiplied. `unit` gives the length of the unit with
+    /// which a text begins, and the index of its size among the variables.
+    ///
+    /// # Errors
+    /// As [`Self::parse`], and a power of a number with its unit, which could be meant for the unit alone.
+    pub fn parse_with_units(
+        text: &str,
+        variable: impl Fn(&str) -> Option<usize>,
+        names: &[&str],
+        unit: impl Fn(&str) -> Option<(usize, usize)>,
+    ) -> Result<Self, ExpressionError> {
         if text.len() > LONGEST_EXPRESSION {
             return Err(ExpressionError {
                 at: 0,
@@ -198,6 +212,7 @@ impl Program {
             kink: None,
             variable: &variable,
             names,
+            unit: &unit,
         };
         parser.sum()?;
         match parser.peek() {
@@ -239,6 +254,11 @@ impl Program {
     /// A function in it whose derivatives jump.
     pub fn kink(&self) -> Option<&'static str> {
         self.kink
+    }
+
+    /// Number of its steps: constants, variables and operations.
+    pub fn length(&self) -> usize {
+        self.steps.len()
     }
 
     /// Whether it names variable `index`.
@@ -343,6 +363,7 @@ struct Parser<'t> {
     kink: Option<&'static str>,
     variable: &'t dyn Fn(&str) -> Option<usize>,
     names: &'t [&'t str],
+    unit: &'t dyn Fn(&str) -> Option<(usize, usize)>,
 }
 
 type Parsed = Result<(), ExpressionError>;
@@ -492,9 +513,25 @@ impl<'t> Parser<'t> {
         match rest[..end].parse::<f64>() {
             Ok(value) if value.is_finite() => {
                 self.at += end;
-                self.push(Step::Constant(value))
+                self.push(Step::Constant(value))?;
+                self.unit()
             }
             _ => Err(self.error(self.at, Fault::NoNumber)),
+        }
+    }
+
+    /// The unit of the number before, if there is one.
+    fn unit(&mut self) -> Parsed {
+        self.peek();
+        let Some((length, size)) = (self.unit)(&self.text[self.at..]) else {
+            return Ok(());
+        };
+        self.at += length;
+        self.push(Step::Variable(size))?;
+        self.push(Step::Binary(Binary::Multiply))?;
+        match self.peek() {
+            Some('^') => Err(self.unexpected("an operator other than a power")),
+            _ => Ok(()),
         }
     }
 

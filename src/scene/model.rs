@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::expression::Program;
+use super::numbers::FileNumber;
+use super::parameters::Parameter;
 use super::units::Dimension;
 use crate::contact;
 use crate::integrate::Method;
@@ -71,11 +73,15 @@ pub enum StartRule {
     /// Initial guesses: the mechanism is assembled with every ball concentric with its socket at t = 0, and velocities that
     /// follow from the drives.
     Ideal,
+    /// As [`Self::Ideal`], and then every ball lies on the wall of its socket where the mechanism without play would press it,
+    /// as deep as that force needs.
+    Settled,
 }
 
 words!(StartRule {
     AsGiven => "as-given",
     Ideal => "ideal",
+    Settled => "settled",
 });
 
 /// Texts of files by the names that a scene gives them.
@@ -91,6 +97,10 @@ pub struct Source {
     /// Byte offsets in the text of what errors found after reading point to: each parameter given in the text, by key;
     /// `spcmm`, its section; `joint.<name>`, each ball joint (a chain's: its section).
     pub places: BTreeMap<String, usize>,
+    /// Numbers from which the scene was built, by key.
+    pub numbers: Arc<BTreeMap<String, FileNumber>>,
+    /// Rows of the scene's own parameters, in the order of the file.
+    pub own: Vec<&'static Parameter>,
     /// Texts of the files beside the scene that it names, as they were when it was loaded.
     pub beside: Texts,
 }

@@ -50,7 +50,7 @@ pub(super) fn read_file(
     let file = Document {
         file: Some(name),
         text: &text,
-        beside,
+        ..node.document
     };
     let mut columns = None;
     let mut points = Points::new();

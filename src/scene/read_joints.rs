@@ -3,6 +3,7 @@
 use super::document::{Node, Section};
 use super::drives::read_drive;
 use super::error::no_body;
+use super::pattern::Copy;
 use super::table::contact_rows;
 use super::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -44,18 +45,19 @@ pub(super) fn read_joint<'d>(
     let title = node.title("joint");
     node.check_word::<JointKind>(&title, "kind")?;
     let section = node.section_as(title, &known)?;
-    let name = section.require("name", "\"P1\"")?.name()?.to_owned();
+    let name = section.require("name", "\"P1\"")?.name()?.into_owned();
     let kind: JointKind = section.require("kind", "\"revolute\"")?.word()?;
     let child_node = section.require("child", "\"rod\"")?;
     let place = |node: &Node<'_>, also| {
-        let wanted = node.text()?;
+        let wanted = &*node.reference()?;
         let names = || Option::into_iter(also).chain(bodies.iter().map(String::as_str));
         let place = places.get(wanted).copied();
         place.ok_or_else(|| node.error(no_body(wanted, names())))
     };
     let child = place(&child_node, None)?;
-    let parent = match section.get("parent") {
-        Some(node) if node.text()? != "world" => Some(place(&node, Some("world"))?),
+    let parent_node = section.get("parent");
+    let parent = match &parent_node {
+        Some(node) if node.text()? != "world" => Some(place(node, Some("world"))?),
         _ => None,
     };
     let point = |name| {
@@ -89,11 +91,36 @@ pub(super) fn read_joint<'d>(
         }
         JointKind::Prismatic | JointKind::Revolute => read_moving(&section, scene, &mut joint)?,
     }
+    let own = |copy: &Copy| parent.is_some_and(|parent| copy.made(&bodies[parent]));
+    if let Some(copy) = node.document.copy.filter(|copy| !own(copy)) {
+        joint.follow(copy);
+    }
     Ok(JointText {
         name,
         section,
         joint,
     })
+}
+
+impl Joint {
+    /// Follows a copy of a pattern that its parent does not belong to.
+    fn follow(&mut self, copy: &Copy) {
+        self.parent_point = copy.point(self.parent_point);
+        self.axis = copy.direction(self.axis);
+        self.rotation = copy.rotation(self.rotation);
+        if let JointStart::Pose {
+            position,
+            rotation,
+            velocity,
+            angular_velocity,
+        } = &mut self.start
+        {
+            *position = copy.point(*position);
+            *rotation = copy.rotation(*rotation);
+            *velocity = copy.direction(*velocity);
+            *angular_velocity = copy.direction(*angular_velocity);
+        }
+    }
 }
 
 /// A free body: its initial pose and velocity.
@@ -357,7 +384,7 @@ pub(super) fn read_attachment(
         .require(key, "{ body = \"rod\", at = \"0 0 100 mm\" }")?
         .section(&["body", "at"])?;
     let body_node = part.require("body", "\"rod\"")?;
-    let wanted = body_node.text()?;
+    let wanted = &*body_node.reference()?;
     let body = match (wanted, bodies.get(wanted)) {
         ("world", _) => None,
         (_, Some(&index)) => Some(index),
@@ -366,9 +393,12 @@ pub(super) fn read_attachment(
             return Err(body_node.error(no_body(wanted, std::iter::once("world").chain(names))));
         }
     };
-    let point = part
+    let mut point = part
         .get("at")
         .map_or(Ok(Vec3::zeros()), |node| node.vector(Dimension::Length))?;
+    if let Some(copy) = section.document.copy.filter(|copy| !copy.made(wanted)) {
+        point = copy.point(point);
+    }
     Ok(Attachment { body, point })
 }
 
@@ -383,7 +413,7 @@ pub(super) fn read_ball_joint<'d>(
         .chain(contact_parts())
         .collect();
     let section = node.section_as(node.title("joint"), &known)?;
-    let name = section.require("name", "\"S1\"")?.name()?.to_owned();
+    let name = section.require("name", "\"S1\"")?.name()?.into_owned();
     let attachment = |key: &str| read_attachment(&section, key, scene, bodies);
     let (socket, ball) = (attachment("socket")?, attachment("ball")?);
     if socket.body == ball.body {
@@ -392,9 +422,17 @@ pub(super) fn read_ball_joint<'d>(
             "socket and ball are on the same body: a ball joint needs two",
         ));
     }
-    let opening = section
+    let mut opening = section
         .get("opening")
         .map_or(Ok(scene.view.down.unit()), |node| node.direction())?;
+    let own = |copy: &Copy| {
+        socket
+            .body
+            .is_some_and(|body| copy.made(&scene.bodies[body].name))
+    };
+    if let Some(copy) = node.document.copy.filter(|copy| !own(copy)) {
+        opening = copy.direction(opening);
+    }
     let mut joint = BallJoint {
         name,
         socket,

@@ -28,5 +28,6 @@ mod properties;
 mod reference;
 mod restitution;
 mod settled;
+mod settled_start;
 mod twin;
 mod wear;
