@@ -7,6 +7,7 @@ mod corners;
 mod determinism;
 mod double_crossing;
 mod doubts;
+mod drives;
 mod elements;
 mod endurance;
 mod energy;
