@@ -26,7 +26,7 @@ pub enum Command {
     /// List the built-in scenes.
     Scenes,
     /// Say what a scene contains, what will be computed and what will not.
-    Check(SceneArguments),
+    Check(CheckArguments),
     /// Simulate without a window and write rows at equal intervals.
     Run(RunArguments),
     /// Draw frames without a window.
@@ -53,6 +53,17 @@ pub struct SceneArguments {
     /// Change a parameter, e.g. `contact.clearance=0.5mm`; may be repeated, the last wins.
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = change)]
     pub changes: Vec<(String, String)>,
+}
+
+/// `check`.
+#[derive(Debug, Args)]
+pub struct CheckArguments {
+    /// Scene.
+    #[command(flatten)]
+    pub scene: SceneArguments,
+    /// List instead every channel that `run --channels` can write: name, unit, column, and what it is.
+    #[arg(long)]
+    pub channels: bool,
 }
 
 /// `view`.
@@ -94,6 +105,16 @@ pub struct RunArguments {
     /// File to write; its ending chooses the format: .csv, .json or .npz.
     #[arg(long, value_name = "FILE", requires = "every")]
     pub out: Option<PathBuf>,
+    /// Write the time and these channels alone, e.g. `S1.force,rod1.pose,*.actuator`; `*` stands for any characters, `?` for
+    /// one, and a name without its last parts for all that begin with it; may be repeated. `jointplay check SCENE
+    /// --channels` lists them.
+    #[arg(
+        long,
+        value_name = "PATTERN,…",
+        value_delimiter = ',',
+        requires = "out"
+    )]
+    pub channels: Vec<String>,
     /// File for one row per finished impact, with its effective restitution: .csv, .json or .npz.
     #[arg(long, value_name = "FILE")]
     pub impacts: Option<PathBuf>,

@@ -110,7 +110,16 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     if wear.is_some() {
         simulation.keep_wear();
     }
-    let mut table = Table::new(&scene, &frame);
+    let mut table = if arguments.channels.is_empty() {
+        Table::new(&scene, &frame)
+    } else {
+        Table::of_channels(&scene, &frame, &arguments.channels).map_err(|error| {
+            Failure::usage(format!(
+                "--channels: {error}; `jointplay check {} --channels` lists them",
+                PathBuf::from(&arguments.scene.scene).display()
+            ))
+        })?
+    };
     if let (Some(times), Some(file)) = (&times, &file) {
         check_size(times.last.saturating_add(1), table.names().len())?;
         table.spool_beside(file.target())?;
@@ -180,6 +189,9 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         let path = file.target().path().to_owned();
         let mut meta = meta.clone();
         meta.insert("every_s".into(), json!(times.every));
+        if !arguments.channels.is_empty() {
+            meta.insert("channels".into(), json!(arguments.channels));
+        }
         meta.insert(
             "contact_states".into(),
             json!({"0": "free", "1": "stick", "2": "slip", "3": "ideal"}),
