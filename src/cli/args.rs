@@ -91,7 +91,7 @@ pub struct RunArguments {
     /// Scene.
     #[command(flatten)]
     pub scene: SceneArguments,
-    /// Simulated time, e.g. `20ms`.
+    /// Simulated time at the end, e.g. `20ms`, counted from the start of the run also with --from-state.
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     pub duration: String,
     /// Interval between rows, e.g. `0.1ms`; the first row is at 0.
@@ -122,6 +122,12 @@ pub struct RunArguments {
     /// impulse and the friction work: .csv, .json or .npz.
     #[arg(long, value_name = "FILE")]
     pub wear: Option<PathBuf>,
+    /// File for the state at the end, from which --from-state goes on, with the same bits as a run without a break.
+    #[arg(long, value_name = "FILE")]
+    pub save_state: Option<PathBuf>,
+    /// Go on from a state that --save-state wrote, in the same scene with the same --set. Rows begin at its time.
+    #[arg(long, value_name = "FILE")]
+    pub from_state: Option<PathBuf>,
     /// Form of the summary on standard output.
     #[arg(long, value_enum, value_name = "FORM", default_value = "text")]
     pub summary: SummaryForm,

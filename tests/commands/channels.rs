@@ -19,7 +19,7 @@ fn chosen_columns_are_those_of_the_whole_run() {
         jointplay(folder.path(), &line).expect(0);
     };
     run("--out whole.csv");
-    run("--out chosen.csv --channels time,S2.force,platform.pose --channels energy.res*");
+    run("--out chosen.csv --channels time,S2.force,platform.pose --channels energy.resid*");
     run("--out other.csv --channels rod1.pose.x,P1.position,P1.rate,S?.gap,R1.angle");
     let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
     let (whole, chosen) = (read("whole.csv"), read("chosen.csv"));
@@ -45,7 +45,7 @@ fn chosen_columns_are_those_of_the_whole_run() {
         assert_eq!(a, -b);
     }
     let meta: Json = serde_json::from_str(&read("chosen.csv.meta.json")).expect("metadata is JSON");
-    let asked = ["time", "S2.force", "platform.pose", "energy.res*"];
+    let asked = ["time", "S2.force", "platform.pose", "energy.resid*"];
     assert_eq!(meta["channels"], serde_json::json!(asked));
 }
 

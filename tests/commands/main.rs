@@ -10,5 +10,6 @@ mod command_line;
 mod ledger_files;
 mod program;
 mod reproduce;
+mod states;
 mod sweep;
 mod tradeoff;
