@@ -477,6 +477,12 @@ impl Mechanism {
         self.equations.actuators(&self.model, &self.gravity, out);
     }
 
+    /// Coordinate and rate of every sliding or turning joint, in the order of the scene, after an evaluation at `y`.
+    pub fn coordinates(&self, y: &[f64]) -> impl Iterator<Item = [f64; 2]> {
+        let all = 0..self.model.bodies.len();
+        all.filter_map(move |b| self.equations.coordinate(&self.model, y, b))
+    }
+
     /// Kinetic energy and gravitational potential (zero at the world origin) at the latest evaluation, J.
     pub fn energies(&self) -> (f64, f64) {
         let (mut kinetic, mut potential) = (0.0, 0.0);

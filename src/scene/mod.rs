@@ -58,3 +58,8 @@ pub fn suggest_parameter(wrong: &str, words: &[&'static str]) -> String {
     let keys = table().iter().map(|parameter| parameter.key);
     error::nearest_parameter(wrong, keys, words)
 }
+
+/// The one of `names` nearest to `wrong`, as errors quote it: in brackets, or empty.
+pub fn suggest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> String {
+    error::nearest(wrong, names)
+}

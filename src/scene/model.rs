@@ -385,6 +385,13 @@ pub struct Joint {
     pub start: JointStart,
 }
 
+impl Joint {
+    /// Whether one coordinate, driven or not, gives its position.
+    pub fn has_coordinate(&self) -> bool {
+        matches!(self.kind, JointKind::Prismatic | JointKind::Revolute)
+    }
+}
+
 /// Kind of a tree joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JointKind {

@@ -1,7 +1,10 @@
 //! The ideal motion that a probe is compared with: where it has no closed form, a simulation of the same scene with every
 //! ball joint ideal, run alongside.
 
+use serde::{Deserialize, Serialize};
+
 use super::Simulation;
+use super::saved::{Misfit, SavedState};
 use crate::integrate::Method;
 use crate::scene::{Formulation, Scene, StartRule, Vec3};
 use crate::simulate::{Frame, Snapshot, StartError, Stopped};
@@ -38,7 +41,7 @@ pub(in crate::simulate) enum Reference<M = IdealMotion> {
 }
 
 /// Tip at the end of a step: position, velocity and acceleration.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Mark {
     time: f64,
     tip: [Vec3; 3],
@@ -54,12 +57,20 @@ pub(in crate::simulate) struct IdealMotion {
 }
 
 /// The latest step ends, and whether more will follow.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Marks {
-    ring: [Mark; MARKS],
+    /// As many as are kept.
+    ring: Vec<Mark>,
     count: usize,
     /// Why it stopped.
     stopped: Option<Stopped>,
+}
+
+/// The part of it that a file keeps.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct SavedIdeal {
+    state: SavedState,
+    marks: Marks,
 }
 
 /// The part of it that a snapshot keeps.
@@ -118,6 +129,30 @@ impl Reference {
             snapshot: motion.simulation.snapshot(),
             marks: motion.marks.clone(),
         })
+    }
+
+    /// For a file.
+    pub(super) fn saved(&self) -> Option<Box<SavedIdeal>> {
+        let Self::Alongside(motion) = self else {
+            return None;
+        };
+        Some(Box::new(SavedIdeal {
+            state: motion.simulation.saved(),
+            marks: motion.marks.clone(),
+        }))
+    }
+
+    /// From a file, to a reference of the same scene.
+    pub(super) fn go_on_from(&mut self, saved: Option<&SavedIdeal>) -> Result<(), Misfit> {
+        match (self, saved) {
+            (Self::Alongside(motion), Some(saved)) if saved.marks.ring.len() == MARKS => {
+                motion.simulation.go_on_from(&saved.state)?;
+                motion.marks = saved.marks.clone();
+                Ok(())
+            }
+            (Self::Elsewhere | Self::Itself | Self::None(_), None) => Ok(()),
+            _ => Err(Misfit),
+        }
     }
 
     /// To the state of a reference of the same equations.
@@ -180,7 +215,7 @@ impl IdealMotion {
             probe,
             frame: Frame::default(),
             marks: Marks {
-                ring: [Mark::default(); MARKS],
+                ring: vec![Mark::default(); MARKS],
                 count: 0,
                 stopped: None,
             },
