@@ -331,6 +331,11 @@ impl Mechanism {
         loads.fold(self.model.shortest_period, f64::min) / 50.0
     }
 
+    /// Whether derivatives of the motion that drives prescribe jump at ends of steps.
+    pub fn has_broken_drives(&self) -> bool {
+        !self.model.bounding.is_empty()
+    }
+
     /// Latest end of an adaptive step that starts at `t`, s.
     pub fn step_end(&self, t: f64) -> f64 {
         self.model.step_end(t)

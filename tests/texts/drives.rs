@@ -59,6 +59,28 @@ fn every_law_is_read_on_slides_and_hinges() {
 }
 
 #[test]
+fn numbers_of_a_law_are_keys_and_may_be_expressions() {
+    let own = "[[parameter]]\nname = \"bump\"\nvalue = \"4 mm\"\n";
+    let drive = "law = \"pulse\", height = \"bump / 2\", start = \"1 s\", duration = \"10 ms\"";
+    let text = format!("{own}{}", text("prismatic", drive));
+    let mut scene = Scene::parse(&text, None, &[]).unwrap();
+    let height = |scene: &Scene| scene.joints[0].drive.as_ref().unwrap().number("height");
+    assert_eq!(height(&scene), 2e-3);
+    scene.set("parameter.bump", "6 mm").unwrap();
+    assert_eq!(height(&scene), 3e-3);
+    scene.set("joint.P.drive.height", "1 mm").unwrap();
+    assert_eq!(height(&scene), 1e-3);
+    let saved = Scene::parse(&scene.to_toml().unwrap(), None, &[]).unwrap();
+    assert_eq!(height(&saved), 1e-3);
+    let error = scene.set("joint.P.drive.duration", "0 s").unwrap_err();
+    holds(
+        "no duration",
+        &error,
+        &["joint.P.drive.duration", "allowed 1e-6 s to"],
+    );
+}
+
+#[test]
 fn what_is_wrong_with_a_law_is_named() {
     let cases: &[(&str, &[&str])] = &[
         (
@@ -264,6 +286,7 @@ fn a_file_beside_the_scene_is_read_once() {
         let saved = scene.to_toml().unwrap();
         assert!(saved.contains("lagrange") && saved.contains("bump.csv"));
         scene.undo_change("formulation").unwrap();
+        scene.set("body.a.mass", "2 kg").unwrap();
         assert_eq!(points(&scene), given);
         assert_eq!(&*scene.source.beside["bump.csv"], csv);
     }
