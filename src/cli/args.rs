@@ -69,7 +69,7 @@ pub struct CheckArguments {
 /// `view`.
 #[derive(Debug, Args)]
 pub struct ViewArguments {
-    /// Name of a built-in scene, or a file (contains `/` or ends in `.toml`).
+    /// Name of a built-in scene, or a file (contains `/` or ends in `.toml`), which is shown again whenever it is saved.
     #[arg(default_value = super::DEFAULT_SCENE)]
     pub scene: OsString,
     /// Change a parameter, e.g. `contact.clearance=0.5mm`; may be repeated, the last wins.

@@ -264,9 +264,9 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     if let (Some(state), Some(path)) = (state, &arguments.save_state) {
         // A run that was stopped would be stopped again.
         if end.status != Status::Diverged {
-            match state.fill(&simulation) {
-                Ok(file) => {
-                    files.push(file);
+            match state.text(&simulation) {
+                Ok(content) => {
+                    files.push(state.fill(&content)?);
                     facts.insert("state_out".into(), json!(path.display().to_string()));
                     summary::line(&mut text, "State", &path.display().to_string());
                 }

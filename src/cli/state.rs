@@ -42,13 +42,15 @@ impl StateFile {
         }
     }
 
-    /// Writes the state; nothing has its final name yet.
+    /// The state as the text of a file.
     ///
     /// # Errors
-    /// A state with a value that is not a number; whatever the file system reports.
-    pub fn fill(self, simulation: &Simulation) -> Result<PendingFile, Failure> {
-        let Self { file, saved } = self;
-        let saved = saved.unwrap_or_else(|| simulation.saved());
+    /// A value that is not a number, for which JSON has no word.
+    pub fn text(&self, simulation: &Simulation) -> Result<String, Failure> {
+        let saved = match &self.saved {
+            Some(saved) => saved,
+            None => &simulation.saved(),
+        };
         let scene = simulation.scene();
         let mut meta = provenance::meta(scene);
         meta.insert("state_format".into(), json!(FORMAT));
@@ -56,18 +58,24 @@ impl StateFile {
         meta.insert("time_s".into(), json!(simulation.time()));
         meta.insert("step_end_s".into(), json!(saved.time()));
         meta.insert("scene_text".into(), json!(scene.source.text));
-        let unsound = |why: &dyn std::fmt::Display| FileError::cannot(file.path(), why);
-        let state = serde_json::to_value(&saved).map_err(|error| unsound(&error))?;
-        // JSON has no word for what is not a number.
-        if serde_json::from_value(state.clone()).ok() != Some(saved) {
-            return Err(unsound(&"the state holds a value that is not finite").into());
+        let state = serde_json::to_value(saved).unwrap_or_default();
+        if SavedState::deserialize(&state).ok().as_ref() != Some(saved) {
+            let why = "the state holds a value that is not a number";
+            return Err(FileError::cannot(self.file.path(), why).into());
         }
         let mut content = Map::new();
         content.insert("meta".into(), Json::Object(meta));
         content.insert("state".into(), state);
         content.insert("crc32".into(), json!(checksum(&content)));
-        let text = Json::Object(content).to_string();
-        Ok(file.fill(|out| out.write_all(text.as_bytes()))?)
+        Ok(Json::Object(content).to_string())
+    }
+
+    /// Writes that text; nothing has its final name yet.
+    ///
+    /// # Errors
+    /// Whatever the file system reports.
+    pub fn fill(self, text: &str) -> Result<PendingFile, Failure> {
+        Ok(self.file.fill(|out| out.write_all(text.as_bytes()))?)
     }
 }
 

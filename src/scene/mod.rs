@@ -14,6 +14,7 @@ mod error;
 mod expression;
 mod field;
 mod formula;
+mod include;
 mod load;
 mod model;
 mod numbers;

@@ -4,7 +4,6 @@
 use serde::{Deserialize, Serialize};
 
 use super::Simulation;
-use super::saved::{Misfit, SavedState};
 use crate::integrate::Method;
 use crate::scene::{Formulation, Scene, StartRule, Vec3};
 use crate::simulate::{Frame, Snapshot, StartError, Stopped};
@@ -49,28 +48,21 @@ struct Mark {
 
 /// The ideal scene in motion, and past positions of its tip.
 pub(in crate::simulate) struct IdealMotion {
-    simulation: Simulation,
+    pub(super) simulation: Simulation,
     body: usize,
     probe: Vec3,
     frame: Frame,
-    marks: Marks,
+    pub(super) marks: Marks,
 }
 
 /// The latest step ends, and whether more will follow.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-struct Marks {
+pub(super) struct Marks {
     /// As many as are kept.
     ring: Vec<Mark>,
     count: usize,
     /// Why it stopped.
     stopped: Option<Stopped>,
-}
-
-/// The part of it that a file keeps.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct SavedIdeal {
-    state: SavedState,
-    marks: Marks,
 }
 
 /// The part of it that a snapshot keeps.
@@ -129,30 +121,6 @@ impl Reference {
             snapshot: motion.simulation.snapshot(),
             marks: motion.marks.clone(),
         })
-    }
-
-    /// For a file.
-    pub(super) fn saved(&self) -> Option<Box<SavedIdeal>> {
-        let Self::Alongside(motion) = self else {
-            return None;
-        };
-        Some(Box::new(SavedIdeal {
-            state: motion.simulation.saved(),
-            marks: motion.marks.clone(),
-        }))
-    }
-
-    /// From a file, to a reference of the same scene.
-    pub(super) fn go_on_from(&mut self, saved: Option<&SavedIdeal>) -> Result<(), Misfit> {
-        match (self, saved) {
-            (Self::Alongside(motion), Some(saved)) if saved.marks.ring.len() == MARKS => {
-                motion.simulation.go_on_from(&saved.state)?;
-                motion.marks = saved.marks.clone();
-                Ok(())
-            }
-            (Self::Elsewhere | Self::Itself | Self::None(_), None) => Ok(()),
-            _ => Err(Misfit),
-        }
     }
 
     /// To the state of a reference of the same equations.
@@ -262,6 +230,11 @@ impl IdealMotion {
 }
 
 impl Marks {
+    /// Whether there are as many as are kept.
+    pub(super) fn fits(&self) -> bool {
+        self.ring.len() == MARKS
+    }
+
     fn tip(&self, time: f64) -> Option<Vec3> {
         let oldest = self.count.saturating_sub(MARKS);
         let at = |k: usize| &self.ring[k % MARKS];

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::ideal::SavedIdeal;
+use super::ideal::{Marks, Reference};
 use super::{Simulation, State, StepEnd};
 use crate::integrate::Polynomial;
 use crate::simulate::Snapshot;
@@ -18,6 +18,13 @@ pub struct SavedState {
     ideal: Option<Box<SavedIdeal>>,
     /// Largest force seen by a sample, N, and when, s, by joint.
     sampled: Vec<(f64, f64)>,
+}
+
+/// The state of the ideal motion alongside.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct SavedIdeal {
+    state: SavedState,
+    marks: Marks,
 }
 
 /// A state of another scene, or one that no run of this scene can have.
@@ -68,7 +75,13 @@ impl Simulation {
         SavedState {
             state: self.state.clone(),
             polynomial: self.stepper.polynomial().cloned(),
-            ideal: self.reference.saved(),
+            ideal: match &self.reference {
+                Reference::Alongside(motion) => Some(Box::new(SavedIdeal {
+                    state: motion.simulation.saved(),
+                    marks: motion.marks.clone(),
+                })),
+                Reference::Elsewhere | Reference::Itself | Reference::None(_) => None,
+            },
             sampled: self.sampled.clone(),
         }
     }
@@ -89,7 +102,14 @@ impl Simulation {
         if !fits {
             return Err(Misfit);
         }
-        self.reference.go_on_from(saved.ideal.as_deref())?;
+        match (&mut self.reference, &saved.ideal) {
+            (Reference::Alongside(motion), Some(ideal)) if ideal.marks.fits() => {
+                motion.simulation.go_on_from(&ideal.state)?;
+                motion.marks = ideal.marks.clone();
+            }
+            (Reference::Elsewhere | Reference::Itself | Reference::None(_), None) => {}
+            _ => return Err(Misfit),
+        }
         let snapshot = Snapshot {
             scene: self.scene.clone(),
             running: self.running.clone(),
