@@ -2,7 +2,8 @@
 
 use super::error::{brief, nearest, nearest_parameter};
 use super::field::Access;
-use super::read::{REBUILDS, SPCMM_DIMENSIONS};
+use super::numbers::{row_of_number, row_of_own};
+use super::read::{REBUILDS, file_only};
 use super::table::{contact_part, contact_rows, find};
 use super::*;
 
@@ -18,18 +19,6 @@ impl BallJoint {
 struct Resolved {
     parameter: &'static Parameter,
     joint: Option<usize>,
-}
-
-/// Whether a key belongs in a scene file although it can never be changed from outside.
-pub(super) fn file_only(key: &str) -> bool {
-    let (section, rest) = key.split_once('.').unwrap_or((key, ""));
-    match section {
-        // The file's bodies are built to these.
-        "spcmm" => SPCMM_DIMENSIONS.contains(&rest),
-        "output" => rest == "body",
-        "name" | "title" | "description" => rest.is_empty(),
-        _ => false,
-    }
 }
 
 impl Scene {
@@ -48,7 +37,7 @@ impl Scene {
         table()
             .iter()
             .filter(|parameter| self.has(parameter))
-            .chain(self.source.own.iter().copied())
+            .chain(self.source.own.iter().map(row_of_own))
             .collect()
     }
 
@@ -59,7 +48,7 @@ impl Scene {
             return None;
         }
         let own = self.source.own.iter().find(|row| row.key == key);
-        Some(own.copied().unwrap_or_else(|| number.row(key)))
+        Some(own.map_or_else(|| row_of_number(key, number), row_of_own))
     }
 
     fn resolve(&self, key: &str) -> Result<Resolved, SceneError> {

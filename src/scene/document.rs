@@ -1,9 +1,10 @@
 //! TOML with positions: every value knows its key, line and column, so that every error can name them.
 
 use super::beside::Beside;
+use super::copy::Copy as PatternCopy;
 use super::error::{brief, line_text, nearest, place_of};
-use super::numbers::{FileNumber, Place, Reading};
-use super::pattern::Copy as PatternCopy;
+use super::given::{FileNumber, Place};
+use super::reading::Reading;
 use super::{Dimension, SceneError, Vec3, find};
 use crate::words::Words;
 use std::borrow::Cow;

@@ -5,8 +5,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::expression::Program;
-use super::numbers::FileNumber;
-use super::parameters::Parameter;
+use super::given::{FileNumber, OwnParameter};
 use super::units::Dimension;
 use crate::contact;
 use crate::integrate::Method;
@@ -99,8 +98,8 @@ pub struct Source {
     pub places: BTreeMap<String, usize>,
     /// Numbers from which the scene was built, by key.
     pub numbers: Arc<BTreeMap<String, FileNumber>>,
-    /// Rows of the scene's own parameters, in the order of the file.
-    pub own: Vec<&'static Parameter>,
+    /// The scene's own parameters, in the order of the file.
+    pub own: Vec<OwnParameter>,
     /// Texts of the files beside the scene that it names, as they were when it was loaded.
     pub beside: Texts,
 }

@@ -5,10 +5,11 @@ use super::document::{Document, Node, Section, lists};
 use super::elements::read_element;
 use super::error::{no_body, place_of};
 use super::include::{self, included_texts};
-use super::numbers::{Reading, read_own};
+use super::own::read_own;
 use super::pattern::{Pattern, read_patterns};
 use super::read_bodies::{read_body, read_shape};
 use super::read_joints::{BallJointText, JointText, read_ball_joint, read_joint, sort_forest};
+use super::reading::Reading;
 use super::*;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -87,7 +88,8 @@ impl Scene {
         beside: Beside<'_>,
         changes: &[(String, String)],
     ) -> Result<Self, SceneError> {
-        let reading = Reading::new(changes);
+        let of_text = changes.iter().filter(|(key, _)| is_of_text(key));
+        let reading = Reading::new(of_text);
         let document = Document {
             file,
             text,
@@ -171,6 +173,27 @@ impl Scene {
                 .unwrap_or_else(message)
         })?;
         Ok(scene)
+    }
+}
+
+/// Whether a key may be one of the numbers that the text gives, and not a parameter of the table.
+fn is_of_text(key: &str) -> bool {
+    let of_joint = key
+        .strip_prefix("joint.")
+        .and_then(|key| key.rsplit_once('.'));
+    let in_table = |part: &str| find(&format!("contact.{part}")).is_some();
+    find(key).is_none() && !of_joint.is_some_and(|(_, part)| in_table(part)) && !file_only(key)
+}
+
+/// Whether a key belongs in a scene file although it can never be changed from outside.
+pub(super) fn file_only(key: &str) -> bool {
+    let (section, rest) = key.split_once('.').unwrap_or((key, ""));
+    match section {
+        // The file's bodies are built to these.
+        "spcmm" => SPCMM_DIMENSIONS.contains(&rest),
+        "output" => rest == "body",
+        "name" | "title" | "description" => rest.is_empty(),
+        _ => false,
     }
 }
 

@@ -1,7 +1,7 @@
 //! Bodies and shapes of a scene file.
 
+use super::copy::Copy;
 use super::document::{Node, Section};
-use super::pattern::Copy;
 use super::solid::Solid;
 use super::*;
 use crate::words::words;

@@ -1,9 +1,9 @@
 //! Tree joints and ball joints of a scene file, and the forest they make.
 
+use super::copy::Copy;
 use super::document::{Node, Section};
 use super::drives::read_drive;
 use super::error::no_body;
-use super::pattern::Copy;
 use super::table::contact_rows;
 use super::*;
 use std::collections::{BTreeMap, BTreeSet};

@@ -714,7 +714,7 @@ role = \"frame\"
     let near = |a: Vec3, b: Vec3| assert!((a - b).norm() < 1e-15, "{a} {b}");
     for copy in 0..3 {
         let angle = std::f64::consts::TAU / 3.0 * copy as f64;
-        let radial = Vec3::new(angle.cos(), angle.sin(), 0.0);
+        let radial = Vec3::new(libm::cos(angle), libm::sin(angle), 0.0);
         let place = Vec3::new(0.01, 0.0, 0.005 * copy as f64) + 0.01 * radial;
         let joint = &scene.ball_joints[copy];
         assert_eq!(joint.name, format!("S{}", copy + 1));

@@ -6,7 +6,7 @@ use toml_edit::{
 
 use std::collections::BTreeMap;
 
-use super::numbers::{FileNumber, Place};
+use super::given::{FileNumber, Place};
 use super::units::exact_quantity;
 use super::{Kind, Scene, SceneError, Value};
 

@@ -352,7 +352,7 @@ fn every_broken_line_is_named_with_its_remedy() {
             "start = { position = [0, 0, \"-100 s\"] }",
             &[
                 "my.toml:15:29",
-                "joint.free.start.position[2]",
+                "joint.free.start.position.z",
                 "wrong unit `s`",
             ],
         ),

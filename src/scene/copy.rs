@@ -1,0 +1,62 @@
+//! One copy of a pattern: what its names become, and where it lies.
+
+use std::borrow::Cow;
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use super::model::{Quat, Vec3};
+
+/// One copy of a pattern: what its names become, and where what it leaves to the outside lies.
+#[derive(Clone, Debug)]
+pub(super) struct Copy {
+    /// Counted from 1.
+    pub number: u32,
+    /// A point on the axis, m, about which copies are turned.
+    pub centre: Vec3,
+    pub turn: Quat,
+    pub shift: Vec3,
+    /// Names of the bodies, joints and elements that the pattern has.
+    pub members: Arc<BTreeSet<String>>,
+}
+
+impl Copy {
+    /// `name` with the copy's number if it is the pattern's own.
+    pub fn name<'a>(&self, name: &'a str) -> Cow<'a, str> {
+        if self.has(name) {
+            Cow::Owned(format!("{name}{}", self.number))
+        } else {
+            Cow::Borrowed(name)
+        }
+    }
+
+    /// Whether `name` is the pattern's own.
+    pub fn has(&self, name: &str) -> bool {
+        self.members.contains(name)
+    }
+
+    /// Whether `name` is that of a body in this copy.
+    pub fn made(&self, name: &str) -> bool {
+        let own = name.strip_suffix(&self.number.to_string());
+        own.is_some_and(|own| self.has(own))
+    }
+
+    /// Where a point of the first copy lies in this one, m.
+    pub fn point(&self, point: Vec3) -> Vec3 {
+        self.centre + self.turn * (point - self.centre) + self.shift
+    }
+
+    /// Where a direction of the first copy points in this one.
+    pub fn direction(&self, direction: Vec3) -> Vec3 {
+        self.turn * direction
+    }
+
+    /// How an orientation of the first copy is turned in this one.
+    pub fn rotation(&self, rotation: Quat) -> Quat {
+        self.turn * rotation
+    }
+
+    /// Whether the copy is only shifted: a box, whose edges keep to the axes, can follow.
+    pub fn keeps_axes(&self) -> bool {
+        self.turn.angle() == 0.0
+    }
+}

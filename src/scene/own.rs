@@ -1,0 +1,94 @@
+//! Parameters that a scene file defines.
+
+use super::document::{Node, Section, lists};
+use super::given::OwnParameter;
+use super::numbers::row_of_own;
+use super::units::{all_units, same_unit, split_unit};
+use super::*;
+
+/// Reads `[[parameter]]`: the scene's own parameters, in the order of the files, in which one may be made of those before it.
+///
+/// # Errors
+/// Anything wrong in one.
+pub(super) fn read_own(files: &[Section<'_>]) -> Result<Vec<OwnParameter>, SceneError> {
+    let mut all: Vec<OwnParameter> = Vec::new();
+    for node in lists(files, "parameter", MOST_OWN, "parameters")? {
+        let own = read_parameter(&node)?;
+        if all.iter().any(|other| other.key == own.key) {
+            let name = node.section(&OWN_KEYS)?.require("name", "\"stroke\"")?;
+            return Err(name.error("there is already a parameter of this name; names must differ"));
+        }
+        all.push(own);
+    }
+    // What follows from others, in no range of its own, is a number like any other.
+    all.retain(|own| own.default.is_some() || own.range.is_some());
+    Ok(all)
+}
+
+/// Most parameters that a file may define.
+const MOST_OWN: usize = 1000;
+const OWN_KEYS: [&str; 6] = ["name", "label", "value", "unit", "range", "help"];
+
+fn read_parameter(node: &Node<'_>) -> Result<OwnParameter, SceneError> {
+    let title = node.title("parameter");
+    let section = node.section_as(title.clone(), &OWN_KEYS)?;
+    let name_node = section.require("name", "\"stroke\"")?;
+    let name = name_node.name()?;
+    let letters = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    let reserved =
+        ["i", "pi", "e"].contains(&&*name) || name.starts_with(|c: char| c.is_ascii_digit());
+    if reserved || !name.chars().all(letters) {
+        return Err(name_node.error(
+            "cannot name a parameter, as expressions use it; allowed letters (a to z), digits and `_`, a letter first, but not i, pi or e",
+        ));
+    }
+    let value_node = section.require("value", "\"20 mm\"")?;
+    let text = value_node.scalar()?;
+    let unit = section.get("unit").map(|node| node.text()).transpose()?;
+    // The unit's dimension; without one, that of the value as it is written.
+    let wanted = unit.unwrap_or_else(|| split_unit(text));
+    let found = all_units().find(|(of, ..)| same_unit(of, wanted));
+    let (unit, dimension) = match found {
+        Some((unit, dimension, _)) => (unit, dimension),
+        None if wanted.is_empty() => ("", Dimension::None),
+        None => {
+            let (at, key) = match section.get("unit") {
+                Some(node) => (node, "unknown unit"),
+                None => (
+                    value_node,
+                    "its unit is not to be seen here: give it with `unit`, for example `unit = \"mm\"`",
+                ),
+            };
+            return Err(at.error(key));
+        }
+    };
+    let value_node = value_node.retitled(title);
+    let value = value_node.quantity(dimension)?;
+    let words = |key: &str| section.get(key).map(|node| node.text()).transpose();
+    let label = words("label")?.unwrap_or(&name);
+    let help = words("help")?.unwrap_or("A parameter of this scene.");
+    let range = match section.get("range") {
+        None => None,
+        Some(node) => {
+            let [least, most] = node.quantities::<2>(dimension)?;
+            if least >= most {
+                return Err(node.error("the first value must be below the second"));
+            }
+            Some((least, most))
+        }
+    };
+    let own = OwnParameter {
+        key: format!("parameter.{name}"),
+        label: visible_line(label).into_owned(),
+        help: visible_line(help).into_owned(),
+        dimension,
+        unit,
+        range,
+        default: parse_quantity(text, dimension).ok(),
+    };
+    let row = row_of_own(&own);
+    let checked = row.check(&Value::Number(value));
+    checked.map_err(|error| value_node.error(error.to_string()))?;
+    section.document.reading.own(&name, value, dimension);
+    Ok(own)
+}
