@@ -516,7 +516,8 @@ impl Mechanism {
 
     /// Whether any element's force depends on motion in a way that can be stiff.
     pub fn has_couplings(&self) -> bool {
-        self.elements.iter().any(|e| e.ends().is_some())
+        let motion = self.equations.motion();
+        self.elements.iter().any(|e| e.ends(motion).is_some())
     }
 
     /// Origin of body `b`'s scene frame from its centroid, body axes, m.

@@ -357,23 +357,25 @@ impl Model {
 
     /// Driven coordinate `drive` at `t`.
     pub fn drive(&self, drive: usize, t: f64, closed: Option<&ClosedMotion>) -> Jet {
-        match self.drives[drive].law {
-            Drive::ClosedForm { coordinate } => {
-                closed.map_or_else(Jet::default, |motion| motion.driven[coordinate])
-            }
-            Drive::Constant { position, velocity } => {
-                Jet::new(position + velocity * t, velocity, 0.0)
-            }
-            Drive::Harmonic {
-                mean,
-                amplitude,
-                frequency,
-                phase,
-            } => {
-                let omega = std::f64::consts::TAU * frequency;
-                Jet::constant(mean)
-                    + amplitude * Jet::new(omega * t + phase, omega, 0.0).sin_cos().0
-            }
+        value_of(&self.drives[drive].law, t, closed)
+    }
+}
+
+/// Value of a law at `t`.
+pub fn value_of(law: &Drive, t: f64, closed: Option<&ClosedMotion>) -> Jet {
+    match *law {
+        Drive::ClosedForm { coordinate } => {
+            closed.map_or_else(Jet::default, |motion| motion.driven[coordinate])
+        }
+        Drive::Constant { position, velocity } => Jet::new(position + velocity * t, velocity, 0.0),
+        Drive::Harmonic {
+            mean,
+            amplitude,
+            frequency,
+            phase,
+        } => {
+            let omega = std::f64::consts::TAU * frequency;
+            Jet::constant(mean) + amplitude * Jet::new(omega * t + phase, omega, 0.0).sin_cos().0
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Tree joints and ball joints of a scene file, and the forest they make.
 
 use super::document::{Node, Section};
-use super::error::no_body;
+use super::error::{nearest, no_body};
 use super::table::contact_rows;
 use super::*;
 use crate::words::words;
@@ -149,12 +149,17 @@ fn read_free(section: &Section<'_>, joint: &mut Joint) -> Result<(), SceneError>
     Ok(())
 }
 
+/// Dimensions of the coordinate of a hinge or else a slide, and of its rate.
+pub(super) fn coordinate_of(kind: JointKind) -> [Dimension; 2] {
+    match kind {
+        JointKind::Revolute => [Dimension::Angle, Dimension::AngularSpeed],
+        _ => [Dimension::Length, Dimension::Speed],
+    }
+}
+
 /// A slide or a hinge: axis, and either a drive or start values.
 fn read_moving(section: &Section<'_>, scene: &Scene, joint: &mut Joint) -> Result<(), SceneError> {
-    let (place, rate) = match joint.kind {
-        JointKind::Revolute => (Dimension::Angle, Dimension::AngularSpeed),
-        _ => (Dimension::Length, Dimension::Speed),
-    };
+    let [place, rate] = coordinate_of(joint.kind);
     if let Some(node) = section.get("drive") {
         section.refuse("start", "the drive says where the joint starts")?;
         let drive = read_drive(&node, joint.kind, scene, place, rate)?;
@@ -187,7 +192,8 @@ fn read_moving(section: &Section<'_>, scene: &Scene, joint: &mut Joint) -> Resul
     Ok(())
 }
 
-fn read_drive(
+/// A law of time, q(t), of a joint of `kind`: `place` and `rate` are the dimensions of q and dq/dt.
+pub(super) fn read_drive(
     node: &Node<'_>,
     kind: JointKind,
     scene: &Scene,
@@ -483,6 +489,45 @@ pub(super) fn read_attachment(
         .get("at")
         .map_or(Ok(Vec3::zeros()), |node| node.vector(Dimension::Length))?;
     Ok(Attachment { body, point })
+}
+
+/// The slide or hinge that the key `joint` names; `joints` maps names to indices in the sorted scene.
+pub(super) fn read_one_degree_joint(
+    section: &Section<'_>,
+    scene: &Scene,
+    joints: &BTreeMap<String, usize>,
+) -> Result<usize, SceneError> {
+    const LISTED: usize = 12;
+    let node = section.require("joint", "\"crank\"")?;
+    let wanted = node.text()?;
+    let moves = |joint: &&Joint| matches!(joint.kind, JointKind::Prismatic | JointKind::Revolute);
+    match joints.get(wanted) {
+        Some(&index) if moves(&&scene.joints[index]) => Ok(index),
+        found => {
+            let wrong = match found {
+                Some(&index) => format!(
+                    "a {} joint is neither a slide nor a hinge",
+                    scene.joints[index].kind
+                ),
+                None => "no such tree joint".to_owned(),
+            };
+            let names = scene
+                .joints
+                .iter()
+                .filter(moves)
+                .map(|joint| joint.name.as_str());
+            let near = nearest(wanted, names.clone());
+            let mut listed: Vec<&str> = names.take(LISTED + 1).collect();
+            if listed.len() > LISTED {
+                listed[LISTED] = "…";
+            }
+            let allowed = match listed.is_empty() {
+                true => "the scene has no prismatic or revolute joint".to_owned(),
+                false => format!("allowed {}", listed.join(", ")),
+            };
+            Err(node.error(format!("{wrong}{near}; {allowed}")))
+        }
+    }
 }
 
 /// One `[[ball_joint]]`; `bodies` maps names to indices in the sorted scene.

@@ -38,6 +38,10 @@ pub enum Dimension {
     Stiffness,
     /// N s/m
     Damping,
+    /// N m/rad
+    TurningStiffness,
+    /// N m s/rad
+    TurningDamping,
 }
 
 /// Why a text is not a quantity of the required dimension.
@@ -80,7 +84,7 @@ use Scale::{Decimal, Ratio};
 type Unit = (&'static str, Scale);
 
 /// Every dimension with its name and its units; the first unit is the SI one.
-const UNITS: [(Dimension, &str, &[Unit]); 15] = [
+const UNITS: [(Dimension, &str, &[Unit]); 17] = [
     (
         Dimension::Length,
         "length",
@@ -222,6 +226,26 @@ const UNITS: [(Dimension, &str, &[Unit]); 15] = [
             ("N s/m", Decimal(0)),
             ("N s/mm", Decimal(3)),
             ("kN s/m", Decimal(3)),
+        ],
+    ),
+    (
+        Dimension::TurningStiffness,
+        "turning stiffness",
+        &[
+            ("N m/rad", Decimal(0)),
+            ("N mm/rad", Decimal(-3)),
+            ("kN m/rad", Decimal(3)),
+            ("N m/deg", Ratio(180.0, PI)),
+        ],
+    ),
+    (
+        Dimension::TurningDamping,
+        "turning damping",
+        &[
+            ("N m s/rad", Decimal(0)),
+            ("N mm s/rad", Decimal(-3)),
+            ("kN m s/rad", Decimal(3)),
+            ("N m s/deg", Ratio(180.0, PI)),
         ],
     ),
     (Dimension::None, "pure number", &[]),

@@ -402,7 +402,7 @@ pub(super) const TABLE: &[Signal] = &[
     plotted("tip_error_m", Q::TipError, Whole("distance", |_| f64::NAN)),
     both("probe_error_#_m", Q::ProbeError, 9, ProbeError),
 
-    listed("@_force_#_N", 12, Element(|element| Some(element.force))),
+    listed("@_force_#_N", 12, Element(ElementReport::own_force)),
     listed("@_torque_#_Nm", 12, Element(|element| element.torque)),
 ];
 
