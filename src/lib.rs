@@ -19,6 +19,7 @@ pub mod contact;
 #[cfg(not(target_arch = "wasm32"))]
 pub mod files;
 pub mod integrate;
+pub mod jet;
 pub mod mechanism;
 #[cfg(feature = "gui")]
 pub mod render;

@@ -1,6 +1,7 @@
 //! The period of a scene's drives, and a running scene as an [`Orbit`].
 
 use super::orbit::Orbit;
+use crate::mechanism::period_of;
 use crate::scene::Scene;
 use crate::simulate::{Frame, Pose, Simulation, StartError, Stopped};
 
@@ -36,7 +37,7 @@ pub enum NoPeriod {
 pub fn drive_period(scene: &Scene) -> Result<f64, NoPeriod> {
     let mut period: Option<f64> = None;
     for joint in &scene.joints {
-        let own = scene.period_of(joint);
+        let own = period_of(scene, joint);
         if !own.is_finite() {
             continue;
         }

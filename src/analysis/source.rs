@@ -1,5 +1,7 @@
 //! A scene in transferable form for a thread or worker, and why a task has no result.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
 use super::AnalysisError;
@@ -16,15 +18,21 @@ pub struct SceneSource {
     pub file: Option<String>,
     /// Changed parameters, as a user writes them.
     pub changes: Vec<(String, String)>,
+    /// Texts of the files that it names.
+    pub beside: BTreeMap<String, String>,
 }
 
 impl SceneSource {
     /// The source of `scene`.
     pub fn of(scene: &Scene) -> Self {
+        let texts = scene.source.beside.iter();
         Self {
             text: scene.source.text.clone(),
             file: scene.source.file.clone(),
             changes: scene.changes.clone(),
+            beside: texts
+                .map(|(name, text)| (name.clone(), text.to_string()))
+                .collect(),
         }
     }
 
@@ -33,7 +41,11 @@ impl SceneSource {
     /// # Errors
     /// As [`Scene::parse`].
     pub fn scene(&self) -> Result<Scene, SceneError> {
-        Scene::parse(&self.text, self.file.as_deref(), &self.changes)
+        let texts = self.beside.iter();
+        let beside = texts
+            .map(|(name, text)| (name.clone(), text.as_str().into()))
+            .collect();
+        Scene::parse_with(&self.text, self.file.as_deref(), &beside, &self.changes)
     }
 }
 

@@ -80,6 +80,11 @@ impl Controls {
                 ui.add_space(4.0);
             }
         }
+        // What the scene's author chose to be changed.
+        for parameter in table.iter().filter(|p| p.scope == Scope::Own) {
+            self.control(ui, player, parameter, parameter.key);
+            ui.add_space(4.0);
+        }
         ui.separator();
         self.accuracy_ui(ui, player, accuracy, &table);
         self.one_joint(ui, player, &table);
@@ -91,9 +96,10 @@ impl Controls {
         }
         for group in groups {
             let rest = || {
-                table
-                    .iter()
-                    .filter(|p| p.group == group && !FIRST.contains(&p.key) && p.key != PRESET)
+                let apart = |p: &Parameter| {
+                    FIRST.contains(&p.key) || p.key == PRESET || p.scope == Scope::Own
+                };
+                table.iter().filter(move |p| p.group == group && !apart(p))
             };
             if rest().next().is_none() {
                 continue;

@@ -114,8 +114,13 @@ impl Player {
     pub fn new(scene: &Scene) -> Result<Self, StartError> {
         let simulation = Simulation::new(scene)?;
         // The text has been parsed before; should that fail now, a control's default is its present value.
-        let original = Scene::parse(&scene.source.text, scene.source.file.as_deref(), &[])
-            .unwrap_or_else(|_| scene.clone());
+        let original = Scene::parse_with(
+            &scene.source.text,
+            scene.source.file.as_deref(),
+            &scene.source.beside,
+            &[],
+        )
+        .unwrap_or_else(|_| scene.clone());
         let channels = Channels::of(scene);
         let mut player = Self {
             pacer: Pacer::default(),

@@ -248,7 +248,7 @@ pub fn algebra_time(velocities: usize) -> f64 {
 /// As [`Cost::check`]; the advice is the other formulation if that one is within the limits.
 pub fn check(scene: &Scene, model: &Model) -> Result<(), MechanismError> {
     let closed = match model.start {
-        StartRule::AsGiven => model.ideal_joints.clone(),
+        StartRule::AsGiven | StartRule::Settled => model.ideal_joints.clone(),
         StartRule::Ideal => (0..model.joints.len()).collect(),
     };
     let cost = |form| Cost::of(form, scene, model, &closed);

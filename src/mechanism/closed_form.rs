@@ -4,7 +4,7 @@
 use std::fmt::Debug;
 
 use super::MechanismError;
-use super::jet::Jet;
+use crate::jet::Jet;
 use crate::scene::{Mat3, Vec3};
 
 /// Most coordinates that one closed form drives.

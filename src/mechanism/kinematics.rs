@@ -1,9 +1,9 @@
 //! Motion of bodies: from coordinates to poses, velocities and accelerations of the centroids. World axes.
 
 use super::closed_form::ClosedMotion;
-use super::jet::Jet;
 use super::model::{Anchor, BallJoint, Body, BodyIndex, Model, Motion};
 use super::path::Path;
+use crate::jet::Jet;
 use crate::scene::{Mat3, Quat, Vec3};
 
 /// Motion of a body's centroid frame. The world is one with everything zero.

@@ -9,6 +9,7 @@ use super::model::{BallJoint, BodyIndex, Model, Motion};
 use super::path::Path;
 use super::rows::RowSystem;
 use super::tree::visit_free;
+use crate::jet::Jet;
 use crate::scene::{JointKind, Mat3, Scene, Vec3};
 
 /// Baumgarte parameters of the paper: Phi'' + 2 alpha Phi' + beta^2 Phi = 0, 1/s.
@@ -340,8 +341,7 @@ impl Lagrange {
                     drive,
                 } => {
                     let (dc, dp, b) = (c.rotation * child, p.rotation * parent, p.rotation * along);
-                    let f =
-                        drive.map_or(super::jet::Jet::default(), |d| self.driven.coordinates[d]);
+                    let f = drive.map_or(Jet::default(), |d| self.driven.coordinates[d]);
                     let d = (c.position + dc) - (p.position + dp);
                     let d1 = c.point_velocity(&dc) - p.point_velocity(&dp);
                     let d2 = c.point_acceleration(&dc) - p.point_acceleration(&dp);

@@ -9,6 +9,7 @@ mod closed_form;
 mod columns;
 mod constraints;
 mod contacts;
+mod drives;
 mod elements;
 mod equations;
 mod factor;
@@ -16,7 +17,6 @@ mod flight;
 mod forest;
 mod friction;
 mod implicit;
-mod jet;
 mod kinematics;
 mod lagrange;
 mod lu;
@@ -24,6 +24,7 @@ mod model;
 mod path;
 mod power;
 mod rows;
+mod settled;
 mod spcmm;
 mod start;
 mod stiff;
@@ -31,13 +32,13 @@ mod summary;
 mod systems;
 mod tree;
 
+pub use crate::jet::Jet;
 pub use bounds::{Advice, CostOf, Counted};
 pub use closed_form::ClosedMotion;
 pub use contacts::{Contacts, Ramp};
-
+pub use drives::period_of;
 pub use elements::{Counts, ElementReport, Gap, Powers, Pull, Touch, Touching};
 pub use flight::{Flight, Flyer};
-pub use jet::Jet;
 pub use kinematics::{Kinematics, Wrench};
 pub use spcmm::Unreachable;
 pub use start::{Assembly, Placement};
@@ -47,13 +48,14 @@ pub use systems::Evaluator;
 use std::ops::Range;
 use std::sync::Arc;
 
-use crate::scene::{Formulation, Scene, Vec3, format_quantity_digits};
+use crate::scene::{Formulation, Scene, StartRule, Vec3, format_quantity_digits};
 use elements::{ForceElement, SceneElement, elements_of};
 use equations::{Equations, LEAST_PIVOT};
 use forest::Forest;
 use lagrange::Lagrange;
 use model::Model;
 use path::Path;
+use settled::Settled;
 use tree::Tree;
 
 /// Why a scene's equations cannot be set up.
@@ -232,6 +234,7 @@ pub struct Mechanism {
     /// Allocated if only the contacts are stepped implicitly.
     implicit: Option<Box<implicit::ImplicitContacts>>,
     assembly: Assembly,
+    settled: Option<Settled>,
     /// ns, as by [`bounds::evaluation_time`].
     evaluation_time: f64,
     flyers: Vec<Flyer>,
@@ -241,14 +244,19 @@ impl Mechanism {
     /// Sets up the equations of `scene`.
     ///
     /// # Errors
-    /// A trajectory that the rods cannot reach; equations that would be too costly.
+    /// A trajectory that the rods cannot reach; equations that would be too costly; for a settled start, a machine that does not
+    /// start without play.
     pub fn new(scene: &Scene) -> Result<Self, MechanismError> {
         let model = Arc::new(Model::new(scene));
         if let Some(form) = &model.closed_form {
             form.check()?;
         }
         bounds::check(scene, &model)?;
-        Ok(Self::with_model(scene, model))
+        let mut mechanism = Self::with_model(scene, model);
+        if scene.start == StartRule::Settled {
+            mechanism.settled = Some(settled::settle(scene)?);
+        }
+        Ok(mechanism)
     }
 
     fn with_model(scene: &Scene, model: Arc<Model>) -> Self {
@@ -276,6 +284,7 @@ impl Mechanism {
             friction: None,
             implicit: None,
             assembly: Assembly::default(),
+            settled: None,
             flyers: Vec::new(),
         };
         mechanism.flyers = Flyer::all(&mechanism, scene);
@@ -320,6 +329,12 @@ impl Mechanism {
     pub fn kinematic_step(&self) -> f64 {
         let loads = self.elements.iter().map(|element| element.period());
         loads.fold(self.model.shortest_period, f64::min) / 50.0
+    }
+
+    /// Latest end of an adaptive step that starts at `t`, s.
+    pub fn step_end(&self, t: f64) -> f64 {
+        let of_elements = self.elements.iter().map(|element| element.step_end(t));
+        of_elements.fold(self.model.step_end(t), f64::min)
     }
 
     /// Where the motion is a function of time alone: the determinant of the loops' Jacobian, whose sign tells the side of a

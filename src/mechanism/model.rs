@@ -3,10 +3,11 @@
 use std::sync::Arc;
 
 use super::closed_form::{ClosedForm, ClosedMotion};
+use super::drives::{Course, Law, course_of};
 use super::factor::{NONE, Pattern};
-use super::jet::Jet;
 use super::spcmm::Trajectory;
-use crate::scene::{Attachment, Drive, JointKind, JointStart, Mat3, Quat, Scene, StartRule, Vec3};
+use crate::jet::Jet;
+use crate::scene::{Attachment, JointKind, JointStart, Mat3, Quat, Scene, StartRule, Vec3};
 
 /// Index of a body; one past the last stands for the world.
 pub type BodyIndex = usize;
@@ -98,9 +99,9 @@ pub struct BallJoint {
 }
 
 /// A driven coordinate.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct DriveLaw {
-    pub law: Drive,
+    pub course: Course,
     pub body: BodyIndex,
 }
 
@@ -129,8 +130,10 @@ pub struct Model {
     pub output_body: BodyIndex,
     /// Probe tip from the output body's centroid, body axes.
     pub probe: Option<Vec3>,
-    /// Shortest period of a drive, s; infinite where nothing is driven periodically.
+    /// Shortest swing of a drive, s; infinite where none swings.
     pub shortest_period: f64,
+    /// Laws that bound steps.
+    pub bounding: Vec<Arc<dyn Law>>,
 }
 
 impl Model {
@@ -145,10 +148,13 @@ impl Model {
             let parent_centre = joint
                 .parent
                 .map_or(Vec3::zeros(), |p| scene.bodies[p].centre);
-            let motion = match (joint.kind, joint.drive) {
+            let motion = match (joint.kind, &joint.drive) {
                 (JointKind::Fixed, _) => Motion::Fixed,
-                (JointKind::Prismatic | JointKind::Revolute, Some(law)) => {
-                    drives.push(DriveLaw { law, body: index });
+                (JointKind::Prismatic | JointKind::Revolute, Some(drive)) => {
+                    drives.push(DriveLaw {
+                        course: course_of(drive, joint.kind),
+                        body: index,
+                    });
                     Motion::Driven {
                         drive: drives.len() - 1,
                         revolute: joint.kind == JointKind::Revolute,
@@ -211,7 +217,10 @@ impl Model {
             }
         }
 
-        let periods = scene.joints.iter().map(|joint| scene.period_of(joint));
+        let swings = drives.iter().map(|driven| driven.course.swing(scene));
+        let shortest_period = swings.fold(f64::INFINITY, f64::min);
+        let laws = drives.iter().filter_map(|driven| driven.course.law());
+        let bounding = laws.filter(|law| law.bounds_steps()).cloned().collect();
         let mut model = Self {
             bodies,
             nq: 0,
@@ -231,7 +240,8 @@ impl Model {
                 .output
                 .probe
                 .map(|p| p - scene.bodies[scene.output.body].centre),
-            shortest_period: periods.fold(f64::INFINITY, f64::min),
+            shortest_period,
+            bounding,
         };
         model.number_coordinates(scene, &root);
         for (index, joint) in scene.ball_joints.iter().enumerate() {
@@ -357,26 +367,18 @@ impl Model {
 
     /// Driven coordinate `drive` at `t`.
     pub fn drive(&self, drive: usize, t: f64, closed: Option<&ClosedMotion>) -> Jet {
-        value_of(&self.drives[drive].law, t, closed)
+        match &self.drives[drive].course {
+            Course::ClosedForm(coordinate) => {
+                closed.map_or_else(Jet::default, |motion| motion.driven[*coordinate])
+            }
+            Course::Own(law) => law.at(t),
+        }
     }
-}
 
-/// Value of a law at `t`.
-pub fn value_of(law: &Drive, t: f64, closed: Option<&ClosedMotion>) -> Jet {
-    match *law {
-        Drive::ClosedForm { coordinate } => {
-            closed.map_or_else(Jet::default, |motion| motion.driven[coordinate])
-        }
-        Drive::Constant { position, velocity } => Jet::new(position + velocity * t, velocity, 0.0),
-        Drive::Harmonic {
-            mean,
-            amplitude,
-            frequency,
-            phase,
-        } => {
-            let omega = std::f64::consts::TAU * frequency;
-            Jet::constant(mean) + amplitude * Jet::new(omega * t + phase, omega, 0.0).sin_cos().0
-        }
+    /// Latest end of an adaptive step that starts at `t`, s: none passes over what a drive only begins within it.
+    pub fn step_end(&self, t: f64) -> f64 {
+        let ends = self.bounding.iter().map(|law| law.step_end(t));
+        ends.fold(f64::INFINITY, f64::min)
     }
 }
 

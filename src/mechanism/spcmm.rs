@@ -4,7 +4,7 @@
 
 use super::MechanismError;
 use super::closed_form::{ClosedForm, ClosedMotion};
-use super::jet::Jet;
+use crate::jet::Jet;
 use crate::scene::{Spcmm, Vec3};
 use nalgebra::Matrix3;
 

@@ -68,7 +68,8 @@ impl Mechanism {
         } else {
             Tree::new(model)
         };
-        let mut y = model.start_state.clone();
+        let settled = self.settled.as_ref().map(|settled| &settled.state);
+        let mut y = settled.unwrap_or(&model.start_state).clone();
         let closed_form = model.closed_form.as_deref().filter(|_| assembled);
         if let Some(form) = closed_form {
             place_output_body(model, form, &mut y);
@@ -118,7 +119,10 @@ impl Mechanism {
         if rank.is_some() {
             self.check_speeds(&mut tree, &y)?;
         }
-        self.assembly = assembly;
+        self.assembly = match &self.settled {
+            Some(settled) => settled.assembly.clone(),
+            None => assembly,
+        };
         self.rank = rank;
         if let Some(rank) = rank {
             self.equations.treat_as_dependent(rank);

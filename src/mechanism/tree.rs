@@ -3,10 +3,10 @@
 //! Mass matrix by the composite-rigid-body algorithm, bias by one outward and one inward pass (Featherstone 2008,
 //! chapters 5 and 6), in world axes with each body's own centroid as reference. Allocates nothing after `new`.
 
-use super::jet::Jet;
 use super::kinematics::{self, Driven, Kinematics, Wrench, part};
 use super::model::{BodyIndex, Model, Motion};
 use super::path::Path;
+use crate::jet::Jet;
 use crate::scene::{Mat3, Vec3};
 
 /// Mass, first moment and inertia of a body with all its descendants, about that body's centroid.

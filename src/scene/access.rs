@@ -2,7 +2,7 @@
 
 use super::error::{brief, nearest, nearest_parameter};
 use super::field::Access;
-use super::read::{REBUILDS, SPCMM_DIMENSIONS, VIEW_SETTINGS};
+use super::read::{REBUILDS, SPCMM_DIMENSIONS};
 use super::table::{contact_part, contact_rows, find};
 use super::*;
 
@@ -20,15 +20,14 @@ struct Resolved {
     joint: Option<usize>,
 }
 
-/// Whether a key belongs in a scene file although it is not a parameter.
-fn file_only(key: &str) -> bool {
+/// Whether a key belongs in a scene file although it can never be changed from outside.
+pub(super) fn file_only(key: &str) -> bool {
     let (section, rest) = key.split_once('.').unwrap_or((key, ""));
     match section {
+        // The file's bodies are built to these.
         "spcmm" => SPCMM_DIMENSIONS.contains(&rest),
-        "view" => VIEW_SETTINGS.contains(&rest),
-        "chain" => ["hang", "rotation"].contains(&rest) || rest.starts_with("link."),
-        "output" => ["body", "probe"].contains(&rest),
-        "name" | "title" | "description" | "start" => rest.is_empty(),
+        "output" => rest == "body",
+        "name" | "title" | "description" => rest.is_empty(),
         _ => false,
     }
 }
@@ -40,18 +39,36 @@ impl Scene {
             Scope::Every | Scope::Contact => true,
             Scope::Spcmm => self.spcmm.is_some(),
             Scope::Chain => self.chain.is_some(),
+            Scope::Own => self.source.numbers.contains_key(parameter.key),
         }
     }
 
-    /// Parameters this scene has, in table order; a contact row also stands for `joint.<name>.<key>`.
+    /// Parameters this scene has, in table order and then its own; a contact row also stands for `joint.<name>.<key>`.
     pub fn parameters(&self) -> Vec<&'static Parameter> {
         table()
             .iter()
             .filter(|parameter| self.has(parameter))
+            .chain(self.source.own.iter().copied())
             .collect()
     }
 
+    /// Row of a number of the file, by its key.
+    fn number(&self, key: &str) -> Option<&'static Parameter> {
+        let number = self.source.numbers.get(key)?;
+        if file_only(key) {
+            return None;
+        }
+        let own = self.source.own.iter().find(|row| row.key == key);
+        Some(own.copied().unwrap_or_else(|| number.row(key)))
+    }
+
     fn resolve(&self, key: &str) -> Result<Resolved, SceneError> {
+        if let Some(parameter) = self.number(key) {
+            return Ok(Resolved {
+                parameter,
+                joint: None,
+            });
+        }
         let Some((name, part)) = key
             .strip_prefix("joint.")
             .and_then(|rest| rest.rsplit_once('.'))
@@ -79,8 +96,15 @@ impl Scene {
                 )),
                 None => {
                     let here = self.parameters();
-                    let near =
-                        nearest_parameter(key, here.iter().map(|parameter| parameter.key), &[]);
+                    let table = here.iter().map(|parameter| parameter.key);
+                    // Beyond this many the search takes longer than it helps.
+                    let numbers = self
+                        .source
+                        .numbers
+                        .keys()
+                        .map(String::as_str)
+                        .take(MOST_CHANGES);
+                    let near = nearest_parameter(key, table.chain(numbers), &[]);
                     Err(SceneError::about(key, None, format!("unknown key{near}")))
                 }
             };
@@ -99,10 +123,20 @@ impl Scene {
             let first = name.split('.').next().unwrap_or(name);
             let hinge = self.joints.iter().any(|joint| joint.name == first);
             let message = if hinge {
+                // Its numbers are keys where the file gives them.
+                let own = format!("joint.{first}.");
+                let numbers = self.source.numbers.keys().map(String::as_str);
+                let given: Vec<&str> = numbers.filter(|key| key.starts_with(&own)).collect();
+                let near = nearest(key, given.iter().copied());
                 let parts: Vec<&str> = table().iter().filter_map(contact_part).collect();
                 format!(
-                    "`{first}` is not a ball joint: its drive, start, axis and points can be set only in the scene file. Such keys \
-                     are joint.<ball joint>.<key>; ball joints: {listed}; keys: {}",
+                    "`{first}` is not a ball joint, and the file gives no such number of it{near}; its numbers: {}. Ball joints, \
+                     {listed}, have joint.<ball joint>.<key>; keys: {}",
+                    if given.is_empty() {
+                        "none".to_owned()
+                    } else {
+                        given.join(", ")
+                    },
                     parts.join(", ")
                 )
             } else {
@@ -142,6 +176,10 @@ impl Scene {
                 (field.get)(own.unwrap_or(&self.contact))
             }
             Access::Scene(field) => (field.get)(self),
+            Access::Number => {
+                let number = self.source.numbers.get(key);
+                number.map_or(Value::Unset, |number| Value::Number(number.value))
+            }
         })
     }
 
@@ -161,7 +199,7 @@ impl Scene {
     pub fn set(&mut self, key: &str, value: &str) -> Result<&'static Parameter, SceneError> {
         let mut next = self.clone();
         let parameter = next.change(key, value)?;
-        if REBUILDS.contains(&key) {
+        if REBUILDS.contains(&key) || matches!(parameter.access, Access::Number) {
             next = next.rebuilt()?;
         }
         next.check_contacts()
@@ -221,7 +259,13 @@ impl Scene {
                 }
             });
         }
-        Self::parse(&self.source.text, self.source.file.as_deref(), &changes)
+        let source = &self.source;
+        Self::parse_with(
+            &source.text,
+            source.file.as_deref(),
+            &source.beside,
+            &changes,
+        )
     }
 
     /// Applies and records one change, without the checks across parameters.
@@ -275,6 +319,8 @@ impl Scene {
                 }
             }
             Access::Scene(field) => (field.set)(self, value),
+            // Read with the text.
+            Access::Number => {}
         }
     }
 

@@ -1,21 +1,29 @@
 //! TOML with positions: every value knows its key, line and column, so that every error can name them.
 
+use super::beside::Beside;
 use super::error::{brief, line_text, nearest, place_of};
-use super::units::{QuantityError, parse_quantity};
+use super::numbers::{FileNumber, Place, Reading};
+use super::pattern::Copy as PatternCopy;
 use super::{Dimension, SceneError, Vec3, find};
 use crate::words::Words;
+use std::borrow::Cow;
 use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// Largest length, speed, angle, … in SI units that a file may give.
-const MAX_SI: f64 = 1e6;
+pub(super) const MAX_SI: f64 = 1e6;
 
-/// The text being read, and its name in errors.
+/// The text being read, its name in errors, and what its values may refer to.
 #[derive(Clone, Copy)]
 pub(super) struct Document<'d> {
     pub file: Option<&'d str>,
     pub text: &'d str,
+    pub reading: &'d Reading<'d>,
+    /// The copy of a pattern that the values belong to.
+    pub copy: Option<&'d PatternCopy>,
+    /// Files that it names.
+    pub beside: &'d Beside<'d>,
 }
 
 /// A table with the path of its keys.
@@ -33,6 +41,9 @@ pub(super) struct Node<'d> {
     pub document: Document<'d>,
     pub key: String,
     pub value: &'d Spanned<DeValue<'d>>,
+    /// Where the text gives a value, and whether it is not this one: a change came after it.
+    written: Option<Range<usize>>,
+    changed: bool,
 }
 
 impl<'d> Document<'d> {
@@ -101,12 +112,7 @@ impl<'d> Section<'d> {
 
     /// An optional value.
     pub fn get(&self, name: &str) -> Option<Node<'d>> {
-        let value = self.table.get(name)?;
-        Some(Node {
-            document: self.document,
-            key: self.key(name),
-            value,
-        })
+        Node::new(self.document, self.key(name), self.table.get(name))
     }
 
     /// A required value; `like` is an example of one.
@@ -143,6 +149,28 @@ impl<'d> Section<'d> {
 }
 
 impl<'d> Node<'d> {
+    /// What `key` stands for: its change if there is one, else the value in the text, if any.
+    fn new(
+        document: Document<'d>,
+        key: String,
+        written: Option<&'d Spanned<DeValue<'d>>>,
+    ) -> Option<Self> {
+        let change = document.reading.change(&key);
+        Some(Self {
+            document,
+            key,
+            value: change.or(written)?,
+            written: written.map(Spanned::span),
+            changed: change.is_some(),
+        })
+    }
+
+    /// The same value under another key.
+    pub fn retitled(&self, key: String) -> Self {
+        let written = self.written.is_some().then_some(self.value);
+        Self::new(self.document, key, written).unwrap_or_else(|| self.clone())
+    }
+
     /// Byte offset of this value in the text.
     pub fn place(&self) -> usize {
         self.value.span().start
@@ -150,6 +178,10 @@ impl<'d> Node<'d> {
 
     /// An error about this value.
     pub fn error(&self, message: impl Into<String>) -> SceneError {
+        if self.changed {
+            let value = self.scalar().unwrap_or_default();
+            return SceneError::about(&self.key, Some(&brief(value)), message);
+        }
         let span = self.value.span();
         self.document.error(
             span.clone(),
@@ -193,18 +225,25 @@ impl<'d> Node<'d> {
             .ok_or_else(|| self.wrong_type("true or false"))
     }
 
-    /// A finite quantity, SI.
+    /// A finite quantity, SI: a number with its unit, or an expression. From now on it is a number of the scene, under this key.
     pub fn quantity(&self, dimension: Dimension) -> Result<f64, SceneError> {
-        self.limited(parse_quantity(self.scalar()?, dimension), dimension)
+        let place = self.written.clone().map_or(Place::Absent, Place::Value);
+        self.number(self.scalar()?, dimension, place)
+    }
+
+    /// The quantity `text`, at `place`, as [`Self::quantity`].
+    fn number(&self, text: &str, dimension: Dimension, place: Place) -> Result<f64, SceneError> {
+        let reading = self.document.reading;
+        let value = reading
+            .evaluate(text, dimension, self.document.copy)
+            .map_err(|message| self.error(message))?;
+        self.limit(value, dimension)?;
+        reading.record(&self.key, FileNumber::new(value, dimension, place, text));
+        Ok(value)
     }
 
     /// Rejects values beyond any mechanism, before their squares overflow in the equations of motion.
-    fn limited(
-        &self,
-        read: Result<f64, QuantityError>,
-        dimension: Dimension,
-    ) -> Result<f64, SceneError> {
-        let value = read.map_err(|error| self.error(error.to_string()))?;
+    fn limit(&self, value: f64, dimension: Dimension) -> Result<(), SceneError> {
         let moves = !matches!(
             dimension,
             Dimension::Mass
@@ -221,7 +260,7 @@ impl<'d> Node<'d> {
             let limit = super::format_quantity(MAX_SI, super::si_unit(dimension));
             return Err(self.error(format!("out of range; allowed -{limit} to {limit}")));
         }
-        Ok(value)
+        Ok(())
     }
 
     /// A quantity above 0 and at most `max` (SI, shown in `unit`).
@@ -249,14 +288,26 @@ impl<'d> Node<'d> {
         })
     }
 
-    /// A name: letters, digits, `_` and `-`, as keys and column names are built from it.
-    pub fn name(&self) -> Result<&'d str, SceneError> {
+    /// A name: letters, digits, `_` and `-`, as keys and column names are built from it; in a copy of a pattern, numbered.
+    pub fn name(&self) -> Result<Cow<'d, str>, SceneError> {
         let name = self.text()?;
         let fine = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-');
         if !name.is_empty() && name.len() <= 40 && name.chars().all(fine) {
-            return Ok(name);
+            return Ok(self.numbered(name));
         }
         Err(self.error("is not a name; allowed 1 to 40 letters (a to z), digits, `_` and `-`"))
+    }
+
+    /// The name of something else: in a copy of a pattern, what belongs to the pattern is that of the same copy.
+    pub fn reference(&self) -> Result<Cow<'d, str>, SceneError> {
+        self.text().map(|name| self.numbered(name))
+    }
+
+    fn numbered(&self, name: &'d str) -> Cow<'d, str> {
+        match self.document.copy {
+            Some(copy) => copy.name(name),
+            None => Cow::Borrowed(name),
+        }
     }
 
     /// The elements of an array of at most `most`; `what` names them in errors. As [`Self::elements`].
@@ -283,16 +334,24 @@ impl<'d> Node<'d> {
             .get_ref()
             .as_array()
             .ok_or_else(|| self.wrong_type("an array"))?;
-        let node = |(index, value)| Node {
-            document: self.document,
-            key: format!("{}[{index}]", self.key),
-            value,
+        let node = |(index, value)| {
+            Node::new(self.document, format!("{}[{index}]", self.key), Some(value))
         };
-        Ok(array.iter().enumerate().map(node).collect())
+        Ok(array.iter().enumerate().filter_map(node).collect())
     }
 
-    /// N quantities: `["1 mm", 0, "3 mm"]`, or with a common unit, `"1 0 3 mm"`.
+    /// N quantities: `["1 mm", 0, "3 mm"]`, or with a common unit, `"1 0 3 mm"`. Each is a number of the scene, with the letter
+    /// of its component for its key where there are three or four.
     pub fn quantities<const N: usize>(&self, dimension: Dimension) -> Result<[f64; N], SceneError> {
+        let letters = match N {
+            3 => "xyz",
+            4 => "wxyz",
+            _ => "",
+        };
+        let key = |index: usize| match letters.get(index..=index) {
+            Some(letter) => format!("{}.{letter}", self.key),
+            None => format!("{}[{index}]", self.key),
+        };
         let mut values = [0.0; N];
         if let Some(text) = self.value.get_ref().as_str() {
             let words: Vec<&str> = text.split_whitespace().collect();
@@ -307,11 +366,15 @@ impl<'d> Node<'d> {
             }
             let (numbers, unit) = words.split_at(N);
             let unit = unit.join(" ");
-            for (value, number) in values.iter_mut().zip(numbers) {
-                *value = self.limited(
-                    parse_quantity(&format!("{number} {unit}"), dimension),
-                    dimension,
-                )?;
+            for (index, (value, number)) in values.iter_mut().zip(numbers).enumerate() {
+                let part = Node::new(self.document, key(index), Some(self.value));
+                let part = part.expect("there is a value");
+                let place = Place::Part(self.value.span());
+                *value = if part.changed {
+                    part.number(part.scalar()?, dimension, place)?
+                } else {
+                    part.number(&format!("{number} {unit}"), dimension, place)?
+                };
             }
             return Ok(values);
         }
@@ -319,8 +382,9 @@ impl<'d> Node<'d> {
         if elements.len() != N {
             return Err(self.error(format!("needs {N} values, has {}", elements.len())));
         }
-        for (value, element) in values.iter_mut().zip(&elements) {
-            *value = element.quantity(dimension)?;
+        for (index, (value, element)) in values.iter_mut().zip(&elements).enumerate() {
+            let part = Node::new(self.document, key(index), Some(element.value));
+            *value = part.expect("there is a value").quantity(dimension)?;
         }
         Ok(values)
     }
@@ -360,16 +424,19 @@ impl<'d> Node<'d> {
     /// Checks the word that the key `name` of a table selects, if present: it determines which other keys are allowed, so a
     /// wrong word must be reported before any of those.
     pub fn check_word<T: Words>(&self, path: &str, name: &str) -> Result<(), SceneError> {
-        let table = self.value.get_ref().as_table();
-        let Some(value) = table.and_then(|table| table.get(name)) else {
-            return Ok(());
-        };
-        let node = Node {
+        let node = self.peek(path, name);
+        node.map_or(Ok(()), |node| node.word::<T>().map(|_| ()))
+    }
+
+    /// Value of the key `name` of a table whose keys have the path `path`, if it is a table with such a key.
+    pub fn peek(&self, path: &str, name: &str) -> Option<Node<'d>> {
+        Some(Node {
             document: self.document,
             key: format!("{path}.{name}"),
-            value,
-        };
-        node.word::<T>().map(|_| ())
+            value: self.value.get_ref().as_table()?.get(name)?,
+            written: None,
+            changed: false,
+        })
     }
 
     /// Value of the table's `name` key, for the paths of its keys; the array index if there is none yet.
@@ -379,7 +446,8 @@ impl<'d> Node<'d> {
             .get_ref()
             .get("name")
             .and_then(|name| name.get_ref().as_str());
-        name.map_or_else(|| self.key.clone(), |name| format!("{prefix}.{name}"))
+        let title = |name| format!("{prefix}.{}", self.numbered(name));
+        name.map_or_else(|| self.key.clone(), title)
     }
 
     /// A parameter's value, read and checked against its row of the table.

@@ -5,10 +5,9 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use super::document::{Node, Section};
+use super::drives::{FASTEST_DRIVE, read_drive};
 use super::error::nearest;
-use super::read_joints::{
-    FASTEST_DRIVE, coordinate_of, read_attachment, read_drive, read_one_degree_joint, read_rotation,
-};
+use super::read_joints::{read_attachment, read_one_degree_joint, read_rotation};
 use super::*;
 use crate::words::Words;
 
@@ -45,6 +44,7 @@ const fn stiff(key: &'static str, dimension: Dimension, help: &'static str) -> E
         key,
         dimension,
         range: (0.0, LARGEST_FORCE),
+        direction: false,
         help,
     }
 }
@@ -127,12 +127,14 @@ pub static ELEMENT_KINDS: [ElementKind; 6] = [
                 key: "force",
                 dimension: Dimension::Force,
                 range: (-LARGEST_FORCE, LARGEST_FORCE),
+                direction: true,
                 help: "force at the point",
             },
             ElementVector {
                 key: "torque",
                 dimension: Dimension::Torque,
                 range: (-LARGEST_FORCE, LARGEST_FORCE),
+                direction: true,
                 help: "torque",
             },
         ],
@@ -386,10 +388,10 @@ fn motor_fault(motor: &Element) -> Option<(&'static str, String)> {
     let follows = ["stiffness", "damping"]
         .map(|key| motor.number(key) > 0.0)
         .contains(&true);
-    let why = match (follows, motor.law) {
+    let why = match (follows, &motor.law) {
         (true, None) => "missing; stiffness and damping pull towards it",
         (false, Some(_)) => "has no effect: stiffness and damping, which pull towards it, are 0",
-        (_, Some(Drive::ClosedForm { .. })) => {
+        (_, Some(law)) if law.slider().is_some() => {
             "a motor follows a law of its own, not that of the scene's sliders"
         }
         _ => return None,
@@ -416,7 +418,7 @@ pub(super) fn read_element<'d>(
     joints: &BTreeMap<String, usize>,
 ) -> Result<(Element, Section<'d>), SceneError> {
     let section = node.section_as(node.title(kind.section), &kind.keys())?;
-    let name = section.require("name", "\"s1\"")?.name()?.to_owned();
+    let name = section.require("name", "\"s1\"")?.name()?.into_owned();
     let point = |key: &&str| read_attachment(&section, key, scene, bodies);
     let mut points = kind
         .points
@@ -494,6 +496,14 @@ pub(super) fn read_element<'d>(
         Err(node.error(allowed))
     };
     let numbers = kind.numbers.iter().map(number).collect::<Result<_, _>>()?;
+    // A vector in axes that do not belong to the pattern turns with its copies.
+    let turns = section.document.copy.filter(|copy| {
+        let body = points.first().and_then(|point| point.body);
+        let own = body.is_some_and(|body| copy.made(&scene.bodies[body].name));
+        !own || section
+            .get("axes")
+            .is_none_or(|axes| axes.text() != Ok(LoadAxes::Body.word()))
+    });
     let vector = |row: &ElementVector| {
         let Some(node) = section.get(row.key) else {
             return Ok(Vec3::zeros());
@@ -501,7 +511,8 @@ pub(super) fn read_element<'d>(
         let value = node.vector(row.dimension)?;
         let (least, most) = row.range;
         if value.min() >= least && value.max() <= most {
-            return Ok(value);
+            let turns = turns.filter(|_| row.direction);
+            return Ok(turns.map_or(value, |copy| copy.direction(value)));
         }
         let [least, most] = [least, most].map(|at| format_quantity(at, si_unit(row.dimension)));
         Err(node.error(format!("out of range; allowed {least} to {most}")))
@@ -525,20 +536,31 @@ pub(super) fn read_element<'d>(
             })
     };
     let choices = kind.choices.iter().map(choice).collect::<Result<_, _>>()?;
+    // Whether the first and second point are on bodies of the pattern's copy that is read; all are of a copy that does not turn.
+    let owned = |place: usize| {
+        let copy = section.document.copy.filter(|copy| !copy.keeps_axes());
+        let body = points.get(place).and_then(|point| point.body);
+        copy.is_none_or(|copy| body.is_some_and(|body| copy.made(&scene.bodies[body].name)))
+    };
+    // What an orientation in a body outside a pattern is to, turns with the pattern's copies.
+    let turned = section.document.copy.filter(|_| !owned(0));
     let rotation = |&(key, _): &(&str, &str)| {
         let node = section.get(key);
-        node.map_or(Ok(Quat::identity()), |node| read_rotation(&node))
+        let rotation = node.map_or(Ok(Quat::identity()), |node| read_rotation(&node))?;
+        Ok(turned.map_or(rotation, |copy| copy.rotation(rotation)))
     };
+    if !kind.rotations.is_empty() && owned(0) && !owned(1) {
+        let why =
+            "a body outside the pattern does not turn with its copies: make it that of `from`";
+        return Err(section.error(kind.points[1], why));
+    }
     let rotations = kind
         .rotations
         .iter()
         .map(rotation)
-        .collect::<Result<_, _>>()?;
+        .collect::<Result<_, SceneError>>()?;
     let law = kind.law.and_then(|(key, _)| section.get(key)).zip(joint);
-    let law = law.map(|(node, joint)| {
-        let [place, rate] = coordinate_of(joint.kind);
-        read_drive(&node, joint.kind, scene, place, rate)
-    });
+    let law = law.map(|(node, joint)| read_drive(&node, joint.kind, scene));
     let element = Element {
         name,
         kind,

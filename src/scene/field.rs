@@ -28,6 +28,8 @@ pub enum Access {
     Contact(Field<contact::Parameters>),
     /// In the scene itself.
     Scene(Field<Scene>),
+    /// In the scene's text: changing it reads the scene again.
+    Number,
 }
 
 /// A type that a field can hold.

@@ -1,5 +1,6 @@
 //! Where scenes come from: the built-in ones, and files.
 
+use super::beside::{Beside, LARGEST_FILE};
 use super::error::{brief, line_and_column, nearest};
 use super::{Scene, SceneError, visible_line};
 use std::ffi::OsStr;
@@ -17,9 +18,6 @@ pub const BUILT_IN: [&str; 5] = [
 
 /// The scene that opens if none is named.
 pub const DEFAULT_SCENE: &str = BUILT_IN[0];
-
-/// Largest file that is read, bytes: a scene is a few kilobytes.
-pub const LARGEST_FILE: u64 = 4 << 20;
 
 /// Most bodies of a scene, including a chain's links.
 pub const MOST_BODIES: usize = 10_000;
@@ -69,7 +67,8 @@ impl Scene {
         let argument = &*path.to_string_lossy();
         if argument.contains('/') || argument.ends_with(".toml") {
             let text = read_file(Path::new(path), argument)?;
-            return Self::parse(&text, Some(argument), changes);
+            let folder = Path::new(path).parent().unwrap_or(Path::new(""));
+            return Self::parse_beside(&text, Some(argument), Beside::in_folder(folder), changes);
         }
         match built_in_text(argument) {
             Some(text) => Self::parse(text, None, changes),

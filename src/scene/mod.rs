@@ -3,16 +3,24 @@
 #![doc = include_str!("../../docs/scene-format.md")]
 
 mod access;
+mod beside;
 mod chain;
 mod check;
 mod document;
 mod doubt;
+mod drives;
 mod elements;
 mod error;
+mod expression;
 mod field;
+mod formula;
 mod load;
 mod model;
+mod numbers;
 mod parameters;
+mod pattern;
+mod points;
+mod quantity;
 mod read;
 mod read_bodies;
 mod read_joints;
@@ -24,12 +32,18 @@ mod value;
 mod visible;
 mod write;
 
+pub use beside::LARGEST_FILE;
 pub use check::least_impact_steps;
 pub use doubt::{Doubt, Warning, WarningKind};
+pub use drives::DRIVE_KINDS;
 pub use elements::ELEMENT_KINDS;
 pub use error::SceneError;
+pub use expression::{
+    Binary, ExpressionError, Fault, LONGEST_EXPRESSION, Number, Program, Unary, smooth_step,
+};
 pub use load::*;
 pub use model::*;
+pub use numbers::FileNumber;
 pub use parameters::*;
 pub use table::{reference_page, table};
 pub use units::*;

@@ -2,7 +2,11 @@
 
 use crate::words::{Words, words};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
+use super::expression::Program;
+use super::numbers::FileNumber;
+use super::parameters::Parameter;
 use super::units::Dimension;
 use crate::contact;
 use crate::integrate::Method;
@@ -69,12 +73,19 @@ pub enum StartRule {
     /// Initial guesses: the mechanism is assembled with every ball concentric with its socket at t = 0, and velocities that
     /// follow from the drives.
     Ideal,
+    /// As [`Self::Ideal`], and then every ball lies on the wall of its socket where the mechanism without play would press it,
+    /// as deep as that force needs.
+    Settled,
 }
 
 words!(StartRule {
     AsGiven => "as-given",
     Ideal => "ideal",
+    Settled => "settled",
 });
+
+/// Texts of files by the names that a scene gives them.
+pub type Texts = BTreeMap<String, Arc<str>>;
 
 /// Where a scene's text came from.
 #[derive(Clone, Debug, Default)]
@@ -86,6 +97,12 @@ pub struct Source {
     /// Byte offsets in the text of what errors found after reading point to: each parameter given in the text, by key;
     /// `spcmm`, its section; `joint.<name>`, each ball joint (a chain's: its section).
     pub places: BTreeMap<String, usize>,
+    /// Numbers from which the scene was built, by key.
+    pub numbers: Arc<BTreeMap<String, FileNumber>>,
+    /// Rows of the scene's own parameters, in the order of the file.
+    pub own: Vec<&'static Parameter>,
+    /// Texts of the files beside the scene that it names, as they were when it was loaded.
+    pub beside: Texts,
 }
 
 /// Formulation of the equations of motion.
@@ -364,7 +381,7 @@ pub struct Joint {
     pub rotation: Quat,
     /// Prescribes q(t); `None` leaves it to the dynamics.
     pub drive: Option<Drive>,
-    /// Its start values.
+    /// Its start values; without meaning where a drive prescribes its motion.
     pub start: JointStart,
 }
 
@@ -426,35 +443,6 @@ pub enum JointStart {
     },
 }
 
-/// Law of a driven joint: q(t) with exact first and second derivatives.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Drive {
-    /// One of the coordinates that the scene's closed form drives: with `[spcmm]` the sliders of the paper's inverse
-    /// kinematics (39), (59).
-    ClosedForm {
-        /// Counted from 0.
-        coordinate: usize,
-    },
-    /// q = position + velocity t.
-    Constant {
-        /// q at t = 0, m or rad.
-        position: f64,
-        /// dq/dt, m/s or rad/s.
-        velocity: f64,
-    },
-    /// q = mean + amplitude sin(2 pi frequency t + phase).
-    Harmonic {
-        /// Mean, m or rad.
-        mean: f64,
-        /// Amplitude, m or rad.
-        amplitude: f64,
-        /// Frequency, Hz.
-        frequency: f64,
-        /// Phase, rad.
-        phase: f64,
-    },
-}
-
 /// A point on a body, or fixed in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Attachment {
@@ -462,34 +450,6 @@ pub struct Attachment {
     pub body: Option<usize>,
     /// Point in that body's frame, m.
     pub point: Vec3,
-}
-
-impl Scene {
-    /// Period of the motion that the drive of `joint` prescribes, s; infinite where it does not repeat or nothing moves.
-    pub fn period_of(&self, joint: &Joint) -> f64 {
-        let swings = |amplitudes: &[f64], frequency: f64| {
-            let moves = amplitudes.iter().any(|amplitude| *amplitude != 0.0);
-            if moves {
-                1.0 / frequency
-            } else {
-                f64::INFINITY
-            }
-        };
-        match joint.drive {
-            Some(Drive::ClosedForm { .. }) => self.spcmm.map_or(f64::INFINITY, |spcmm| {
-                swings(&[spcmm.amplitude_x, spcmm.amplitude_beta], spcmm.frequency)
-            }),
-            Some(Drive::Harmonic {
-                frequency,
-                amplitude,
-                ..
-            }) => swings(&[amplitude], frequency),
-            Some(Drive::Constant { velocity, .. }) if joint.kind == JointKind::Revolute => {
-                std::f64::consts::TAU / velocity.abs()
-            }
-            Some(Drive::Constant { .. }) | None => f64::INFINITY,
-        }
-    }
 }
 
 /// A ball-and-socket joint: ideal if its clearance is 0, otherwise a contact.
@@ -524,8 +484,8 @@ words!(LoadAxes {
     Body => "body",
 });
 
-/// A numeric key of an element.
-#[derive(Debug)]
+/// A numeric key of an element or a drive.
+#[derive(Clone, Copy, Debug)]
 pub struct ElementNumber {
     /// Key.
     pub key: &'static str,
@@ -544,7 +504,7 @@ pub struct ElementNumber {
 }
 
 /// A number of an element that acts on a hinge, where it would otherwise be that of a slide.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct OnHinge {
     /// Key.
     pub key: &'static str,
@@ -573,6 +533,8 @@ pub struct ElementVector {
     pub dimension: Dimension,
     /// Closed range of its components, SI.
     pub range: (f64, f64),
+    /// Whether it points somewhere; else its components belong to three axes.
+    pub direction: bool,
     /// What it is.
     pub help: &'static str,
 }
@@ -595,6 +557,75 @@ pub enum ElementLook {
     Arrow,
     /// Nothing.
     Hidden,
+}
+
+/// A law of driven joints. Adding one takes a row here, and a file in `mechanism/drives` with its row there.
+#[derive(Debug)]
+pub struct DriveKind {
+    /// Word of the file: `law = "harmonic"`.
+    pub word: &'static str,
+    /// What it is.
+    pub help: &'static str,
+    /// Its numbers. On a hinge a length stands for an angle, a speed for an angular speed.
+    pub numbers: &'static [ElementNumber],
+    /// Its other keys: key, help.
+    pub others: &'static [(&'static str, &'static str)],
+}
+
+impl PartialEq for DriveKind {
+    fn eq(&self, other: &Self) -> bool {
+        self.word == other.word
+    }
+}
+
+/// Law of a driven joint, q(t) with exact first and second derivatives, according to its row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Drive {
+    /// Row.
+    pub kind: &'static DriveKind,
+    pub(super) numbers: Vec<f64>,
+    /// What it has besides numbers.
+    pub data: DriveData,
+}
+
+/// What a law has besides its numbers.
+#[derive(Clone, Debug, PartialEq)]
+pub enum DriveData {
+    /// Nothing.
+    Numbers,
+    /// The coordinate, from 0, that the scene's closed form drives: with `[spcmm]` a slider of the paper's inverse
+    /// kinematics (39), (59).
+    Slider(usize),
+    /// Harmonic terms: amplitude (m or rad), frequency (Hz), phase (rad).
+    Terms(Vec<[f64; 3]>),
+    /// Instants and coordinates, s and m or rad.
+    Points {
+        /// In the order of time.
+        points: Vec<[f64; 2]>,
+        /// Whether they are one period of the motion.
+        repeats: bool,
+    },
+    /// An expression of t, s, and one of its units in SI.
+    Formula(Program, f64),
+}
+
+impl Drive {
+    /// A number of its row, SI.
+    ///
+    /// # Panics
+    /// If the row has no such key.
+    pub fn number(&self, key: &str) -> f64 {
+        let at = self.kind.numbers.iter().position(|of| of.key == key);
+        self.numbers[at.expect("a number of the row")]
+    }
+
+    /// The coordinate, from 0, of the scene's closed form, if it follows that.
+    pub fn slider(&self) -> Option<usize> {
+        match self.data {
+            DriveData::Slider(coordinate) => Some(coordinate),
+            _ => None,
+        }
+    }
 }
 
 /// A kind of force element. Adding one takes a row here, and a file in `mechanism/elements` with its row there.

@@ -47,6 +47,8 @@ pub enum Scope {
     Spcmm,
     /// Only in chains.
     Chain,
+    /// In the scene whose file gives it.
+    Own,
 }
 
 impl Scope {
@@ -57,6 +59,7 @@ impl Scope {
             Self::Contact => "every scene; also `joint.<name>.<key>` for one ball joint",
             Self::Spcmm => "scenes with the paper's inverse kinematics",
             Self::Chain => "chains",
+            Self::Own => "scenes whose file gives it",
         }
     }
 }

@@ -1,17 +1,21 @@
 //! Reads a scene from TOML: settings first, then bodies, joints and ball joints.
 
+use super::beside::Beside;
 use super::document::{Document, Node, Section};
 use super::elements::read_element;
 use super::error::{no_body, place_of};
+use super::numbers::{Reading, read_own};
+use super::pattern::{Pattern, read_patterns};
 use super::read_bodies::{read_body, read_shape};
 use super::read_joints::{BallJointText, JointText, read_ball_joint, read_joint, sort_forest};
 use super::*;
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 use toml::de::DeTable;
 
 /// Top-level keys of a file, besides the sections of [`ELEMENT_KINDS`].
-const TOP: [&str; 16] = [
+const TOP: [&str; 18] = [
     "name",
     "title",
     "description",
@@ -28,6 +32,8 @@ const TOP: [&str; 16] = [
     "joint",
     "ball_joint",
     "fixed_shape",
+    "parameter",
+    "pattern",
 ];
 
 /// Parameters that determine the bodies: changing one reads the file again.
@@ -57,7 +63,47 @@ impl Scene {
         file: Option<&str>,
         changes: &[(String, String)],
     ) -> Result<Self, SceneError> {
-        let document = Document { file, text };
+        Self::parse_beside(text, file, Beside::default(), changes)
+    }
+
+    /// As [`Self::parse`] for a text that names the files `beside` it.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn parse_with(
+        text: &str,
+        file: Option<&str>,
+        beside: &Texts,
+        changes: &[(String, String)],
+    ) -> Result<Self, SceneError> {
+        Self::parse_beside(text, file, Beside::known(beside), changes)
+    }
+
+    /// Parses a scene that finds the files it names in `beside`.
+    pub(super) fn parse_beside(
+        text: &str,
+        file: Option<&str>,
+        beside: Beside<'_>,
+        changes: &[(String, String)],
+    ) -> Result<Self, SceneError> {
+        let reading = Reading::new(changes);
+        let document = Document {
+            file,
+            text,
+            reading: &reading,
+            beside: &beside,
+            copy: None,
+        };
+        let mut scene = Self::read_document(document, changes)?;
+        scene.source.beside = beside.into_texts();
+        Ok(scene)
+    }
+
+    fn read_document(
+        document: Document<'_>,
+        changes: &[(String, String)],
+    ) -> Result<Self, SceneError> {
+        let Document { file, text, .. } = document;
         if text.trim().is_empty() {
             return Err(document.error(
                 0..0,
@@ -78,6 +124,8 @@ impl Scene {
         let elements = ELEMENT_KINDS.iter().map(|kind| kind.section);
         let keys: Vec<&str> = TOP.into_iter().chain(elements).collect();
         let top = Section::new(document, String::new(), parsed.get_ref(), 0..0, &keys)?;
+        let own = read_own(&top)?;
+        let patterns = read_patterns(&top)?;
         let mut scene = read_settings(&top)?;
         let mut places = read_parameters(&top, &mut scene)?;
         scene.source.places = places
@@ -93,7 +141,9 @@ impl Scene {
                 scene.change(key, value)?;
             }
         }
-        read_mechanism(&top, &mut scene, &mut places)?;
+        read_mechanism(&top, &patterns, &mut scene, &mut places)?;
+        scene.source.numbers = Arc::new(document.reading.numbers());
+        scene.source.own = own;
         for (key, value) in changes {
             scene.change(key, value)?;
         }
@@ -128,11 +178,9 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
         .and_then(|file| Path::new(file).file_stem())
         .and_then(|stem| stem.to_str());
     let name = match top.get("name") {
-        Some(node) => node.name()?.to_owned(),
+        Some(node) => node.name()?.into_owned(),
         None => visible_line(stem.unwrap_or("scene")).into_owned(),
     };
-    let start = top.get("start").map(|node| node.word()).transpose()?;
-    let start: StartRule = start.unwrap_or_default();
     let spcmm = match top.get("spcmm") {
         None => None,
         Some(node) => {
@@ -200,7 +248,7 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
             body: 0,
             probe: None,
         },
-        start,
+        start: StartRule::default(),
         bodies: Vec::new(),
         joints: Vec::new(),
         ball_joints: Vec::new(),
@@ -209,7 +257,7 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
         source: Source {
             file: document.file.map(str::to_owned),
             text: document.text.to_owned(),
-            places: BTreeMap::new(),
+            ..Source::default()
         },
         changes: Vec::new(),
     })
@@ -277,12 +325,23 @@ fn default_of(parameter: &Parameter, sections: &BTreeMap<&str, Section<'_>>) -> 
 /// Bodies, joints, ball joints, fixed shapes and what is reported.
 fn read_mechanism<'d>(
     top: &Section<'d>,
+    patterns: &'d [Pattern<'d>],
     scene: &mut Scene,
     places: &mut Places<'d>,
 ) -> Result<(), SceneError> {
     let list = |name: &str, most: usize, what: &str| {
-        top.get(name)
-            .map_or(Ok(Vec::new()), |node| node.elements_up_to(most, what))
+        let alone = top.get(name);
+        let mut nodes = alone.map_or(Ok(Vec::new()), |node| node.elements_up_to(most, what))?;
+        for pattern in patterns {
+            nodes.extend(pattern.nodes(name)?);
+        }
+        match nodes.get(most) {
+            None => Ok(nodes),
+            Some(first) => Err(first.error(format!(
+                "too many: {} {what} with those of patterns; allowed at most {most}",
+                nodes.len()
+            ))),
+        }
     };
     let mut names = Names::default();
 
@@ -305,10 +364,11 @@ fn read_mechanism<'d>(
     for node in list("joint", MOST_BODIES, "joints")? {
         let joint = read_joint(&node, scene, &file_order, &file_places)?;
         joint_names.add(&joint.section, "joint", &joint.name)?;
-        if let Some(Drive::ClosedForm { coordinate }) = joint.joint.drive
+        let slider = |of: &JointText<'_>| of.joint.drive.as_ref()?.slider();
+        if let Some(coordinate) = slider(&joint)
             && let Some(other) = joints
                 .iter()
-                .find(|other| other.joint.drive == joint.joint.drive)
+                .find(|other| slider(other) == Some(coordinate))
         {
             let message = format!(
                 "slider {} already drives joint `{}`; allowed 1, 2, 3, each once",
@@ -334,7 +394,7 @@ fn read_mechanism<'d>(
         places.extend(own);
     }
     for node in list("fixed_shape", MOST_SHAPES, "shapes")? {
-        let shape = read_shape(&node, scene.spcmm.as_ref())?;
+        let shape = read_shape(&node, true, scene.spcmm.as_ref())?;
         scene.fixed_shapes.push(shape);
     }
     if let Some(node) = top.get("chain") {

@@ -1,6 +1,7 @@
 //! Bodies and shapes of a scene file.
 
 use super::document::{Node, Section};
+use super::pattern::Copy;
 use super::*;
 use crate::words::words;
 
@@ -38,7 +39,7 @@ pub(super) const BODY_KEYS: [&str; 5] = ["mass", "centre", "inertia", "products"
 pub(super) fn read_body<'d>(node: &Node<'d>) -> Result<(Body, Section<'d>), SceneError> {
     let known: Vec<&str> = ["name"].into_iter().chain(BODY_KEYS).collect();
     let section = node.section_as(node.title("body"), &known)?;
-    let name = section.require("name", "\"rod\"")?.name()?.to_owned();
+    let name = section.require("name", "\"rod\"")?.name()?.into_owned();
     if name == "world" {
         return Err(section
             .require("name", "")?
@@ -62,7 +63,7 @@ pub(super) fn read_rigid_body(section: &Section<'_>, name: String) -> Result<Bod
         Some(node) => node
             .elements_up_to(MOST_SHAPES, "shapes")?
             .iter()
-            .map(|shape| read_shape(shape, None))
+            .map(|shape| read_shape(shape, false, None))
             .collect::<Result<_, _>>()?,
         None => Vec::new(),
     };
@@ -109,8 +110,12 @@ fn read_inertia(section: &Section<'_>) -> Result<Mat3, SceneError> {
     Ok(inertia)
 }
 
-/// One shape. With `spcmm` it is a fixed shape, which may follow the slider plane.
-pub(super) fn read_shape(node: &Node<'_>, spcmm: Option<&Spcmm>) -> Result<Shape, SceneError> {
+/// One shape; a `fixed` one may follow the slider plane of `spcmm`.
+pub(super) fn read_shape(
+    node: &Node<'_>,
+    fixed: bool,
+    spcmm: Option<&Spcmm>,
+) -> Result<Shape, SceneError> {
     let mut known = vec![
         "form",
         "role",
@@ -218,5 +223,37 @@ pub(super) fn read_shape(node: &Node<'_>, spcmm: Option<&Spcmm>) -> Result<Shape
             }
         }
     };
-    Ok(Shape { geometry, role })
+    let mut shape = Shape { geometry, role };
+    // A body's shapes move with it.
+    if let Some(copy) = node.document.copy.filter(|_| fixed) {
+        shape.follow(copy, &form_node)?;
+    }
+    Ok(shape)
+}
+
+impl Shape {
+    /// Follows a copy of a pattern.
+    fn follow(&mut self, copy: &Copy, form: &Node<'_>) -> Result<(), SceneError> {
+        match &mut self.geometry {
+            Geometry::Capsule { from, to, .. }
+            | Geometry::Cylinder { from, to, .. }
+            | Geometry::Cone { from, to, .. } => {
+                *from = copy.point(*from);
+                *to = copy.point(*to);
+            }
+            Geometry::Sphere { centre, .. } => *centre = copy.point(*centre),
+            Geometry::Plate { corners, .. } => {
+                for corner in corners {
+                    *corner = copy.point(*corner);
+                }
+            }
+            Geometry::Box { centre, .. } if copy.keeps_axes() => *centre = copy.point(*centre),
+            Geometry::Box { .. } => {
+                return Err(form.error(
+                    "a fixed box keeps to the world's axes and cannot turn with a pattern; allowed here: capsule, cylinder, cone, sphere, plate",
+                ));
+            }
+        }
+        Ok(())
+    }
 }

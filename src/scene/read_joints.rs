@@ -1,29 +1,12 @@
 //! Tree joints and ball joints of a scene file, and the forest they make.
 
 use super::document::{Node, Section};
+use super::drives::read_drive;
 use super::error::{nearest, no_body};
+use super::pattern::Copy;
 use super::table::contact_rows;
 use super::*;
-use crate::words::words;
 use std::collections::{BTreeMap, BTreeSet};
-use std::f64::consts::TAU;
-
-/// Laws of a drive.
-#[derive(Clone, Copy)]
-enum Law {
-    Spcmm,
-    Constant,
-    Harmonic,
-}
-
-words!(Law {
-    Spcmm => "spcmm",
-    Constant => "constant",
-    Harmonic => "harmonic",
-});
-
-/// Highest frequency of a harmonic drive, Hz.
-pub(super) const FASTEST_DRIVE: f64 = 1e4;
 
 /// A tree joint whose bodies are still indices in file order.
 pub(super) struct JointText<'d> {
@@ -62,18 +45,19 @@ pub(super) fn read_joint<'d>(
     let title = node.title("joint");
     node.check_word::<JointKind>(&title, "kind")?;
     let section = node.section_as(title, &known)?;
-    let name = section.require("name", "\"P1\"")?.name()?.to_owned();
+    let name = section.require("name", "\"P1\"")?.name()?.into_owned();
     let kind: JointKind = section.require("kind", "\"revolute\"")?.word()?;
     let child_node = section.require("child", "\"rod\"")?;
     let place = |node: &Node<'_>, also| {
-        let wanted = node.text()?;
+        let wanted = &*node.reference()?;
         let names = || Option::into_iter(also).chain(bodies.iter().map(String::as_str));
         let place = places.get(wanted).copied();
         place.ok_or_else(|| node.error(no_body(wanted, names())))
     };
     let child = place(&child_node, None)?;
-    let parent = match section.get("parent") {
-        Some(node) if node.text()? != "world" => Some(place(&node, Some("world"))?),
+    let parent_node = section.get("parent");
+    let parent = match &parent_node {
+        Some(node) if node.text()? != "world" => Some(place(node, Some("world"))?),
         _ => None,
     };
     let point = |name| {
@@ -107,11 +91,36 @@ pub(super) fn read_joint<'d>(
         }
         JointKind::Prismatic | JointKind::Revolute => read_moving(&section, scene, &mut joint)?,
     }
+    let own = |copy: &Copy| parent.is_some_and(|parent| copy.made(&bodies[parent]));
+    if let Some(copy) = node.document.copy.filter(|copy| !own(copy)) {
+        joint.follow(copy);
+    }
     Ok(JointText {
         name,
         section,
         joint,
     })
+}
+
+impl Joint {
+    /// Follows a copy of a pattern that its parent does not belong to.
+    fn follow(&mut self, copy: &Copy) {
+        self.parent_point = copy.point(self.parent_point);
+        self.axis = copy.direction(self.axis);
+        self.rotation = copy.rotation(self.rotation);
+        if let JointStart::Pose {
+            position,
+            rotation,
+            velocity,
+            angular_velocity,
+        } = &mut self.start
+        {
+            *position = copy.point(*position);
+            *rotation = copy.rotation(*rotation);
+            *velocity = copy.direction(*velocity);
+            *angular_velocity = copy.direction(*angular_velocity);
+        }
+    }
 }
 
 /// A free body: its initial pose and velocity.
@@ -149,23 +158,18 @@ fn read_free(section: &Section<'_>, joint: &mut Joint) -> Result<(), SceneError>
     Ok(())
 }
 
-/// Dimensions of the coordinate of a hinge or else a slide, and of its rate.
-pub(super) fn coordinate_of(kind: JointKind) -> [Dimension; 2] {
-    match kind {
-        JointKind::Revolute => [Dimension::Angle, Dimension::AngularSpeed],
-        _ => [Dimension::Length, Dimension::Speed],
-    }
-}
-
 /// A slide or a hinge: axis, and either a drive or start values.
 fn read_moving(section: &Section<'_>, scene: &Scene, joint: &mut Joint) -> Result<(), SceneError> {
-    let [place, rate] = coordinate_of(joint.kind);
+    let (place, rate) = match joint.kind {
+        JointKind::Revolute => (Dimension::Angle, Dimension::AngularSpeed),
+        _ => (Dimension::Length, Dimension::Speed),
+    };
     if let Some(node) = section.get("drive") {
         section.refuse("start", "the drive says where the joint starts")?;
-        let drive = read_drive(&node, joint.kind, scene, place, rate)?;
+        let drive = read_drive(&node, joint.kind, scene)?;
+        let slider = drive.slider();
         joint.drive = Some(drive);
-        joint.start = drive_start(drive);
-        if let (Drive::ClosedForm { coordinate }, Some(spcmm)) = (drive, scene.spcmm.as_ref()) {
+        if let (Some(coordinate), Some(spcmm)) = (slider, scene.spcmm.as_ref()) {
             for key in ["axis", "parent_point", "parent", "rotation"] {
                 section.refuse(
                     key,
@@ -190,102 +194,6 @@ fn read_moving(section: &Section<'_>, scene: &Scene, joint: &mut Joint) -> Resul
     }
     joint.axis = section.require("axis", "[0, 0, 1]")?.direction()?;
     Ok(())
-}
-
-/// A law of time, q(t), of a joint of `kind`: `place` and `rate` are the dimensions of q and dq/dt.
-pub(super) fn read_drive(
-    node: &Node<'_>,
-    kind: JointKind,
-    scene: &Scene,
-    place: Dimension,
-    rate: Dimension,
-) -> Result<Drive, SceneError> {
-    let all = [
-        "law",
-        "slider",
-        "position",
-        "velocity",
-        "mean",
-        "amplitude",
-        "frequency",
-        "phase",
-    ];
-    node.check_word::<Law>(&node.key, "law")?;
-    let law = node.section(&all)?.require("law", "\"constant\"")?;
-    Ok(match law.word::<Law>()? {
-        Law::Spcmm => {
-            let section = node.section(&["law", "slider"])?;
-            if kind != JointKind::Prismatic {
-                return Err(law.error("the law spcmm drives prismatic joints only"));
-            }
-            if scene.spcmm.is_none() {
-                return Err(law.error("the law spcmm needs a section [spcmm] in the file"));
-            }
-            let slider = section.require("slider", "1")?;
-            match slider.scalar()?.parse::<u8>() {
-                Ok(number @ 1..=3) => Drive::ClosedForm {
-                    coordinate: number as usize - 1,
-                },
-                _ => {
-                    return Err(
-                        slider.error("out of range; allowed 1, 2 or 3; a whole number, no unit")
-                    );
-                }
-            }
-        }
-        Law::Constant => {
-            let section = node.section(&["law", "position", "velocity"])?;
-            let like = match kind {
-                JointKind::Revolute => "\"6 rad/s\"",
-                _ => "\"10 mm/s\"",
-            };
-            Drive::Constant {
-                position: section
-                    .get("position")
-                    .map_or(Ok(0.0), |node| node.quantity(place))?,
-                velocity: section.require("velocity", like)?.quantity(rate)?,
-            }
-        }
-        Law::Harmonic => {
-            let section = node.section(&["law", "mean", "amplitude", "frequency", "phase"])?;
-            let like = match kind {
-                JointKind::Revolute => "\"10 deg\"",
-                _ => "\"10 mm\"",
-            };
-            Drive::Harmonic {
-                mean: section
-                    .get("mean")
-                    .map_or(Ok(0.0), |node| node.quantity(place))?,
-                amplitude: section.require("amplitude", like)?.quantity(place)?,
-                frequency: section.require("frequency", "\"1 Hz\"")?.positive(
-                    Dimension::Frequency,
-                    FASTEST_DRIVE,
-                    "Hz",
-                )?,
-                phase: section
-                    .get("phase")
-                    .map_or(Ok(0.0), |node| node.quantity(Dimension::Angle))?,
-            }
-        }
-    })
-}
-
-/// Start of a drive law; that of the spcmm law, 0 here, comes from the inverse kinematics.
-fn drive_start(drive: Drive) -> JointStart {
-    let (position, velocity) = match drive {
-        Drive::ClosedForm { .. } => (0.0, 0.0),
-        Drive::Constant { position, velocity } => (position, velocity),
-        Drive::Harmonic {
-            mean,
-            amplitude,
-            frequency,
-            phase,
-        } => (
-            mean + amplitude * libm::sin(phase),
-            amplitude * TAU * frequency * libm::cos(phase),
-        ),
-    };
-    JointStart::Scalar { position, velocity }
 }
 
 /// An orientation in one of four forms:
@@ -476,7 +384,7 @@ pub(super) fn read_attachment(
         .require(key, "{ body = \"rod\", at = \"0 0 100 mm\" }")?
         .section(&["body", "at"])?;
     let body_node = part.require("body", "\"rod\"")?;
-    let wanted = body_node.text()?;
+    let wanted = &*body_node.reference()?;
     let body = match (wanted, bodies.get(wanted)) {
         ("world", _) => None,
         (_, Some(&index)) => Some(index),
@@ -485,9 +393,12 @@ pub(super) fn read_attachment(
             return Err(body_node.error(no_body(wanted, std::iter::once("world").chain(names))));
         }
     };
-    let point = part
+    let mut point = part
         .get("at")
         .map_or(Ok(Vec3::zeros()), |node| node.vector(Dimension::Length))?;
+    if let Some(copy) = section.document.copy.filter(|copy| !copy.made(wanted)) {
+        point = copy.point(point);
+    }
     Ok(Attachment { body, point })
 }
 
@@ -499,7 +410,7 @@ pub(super) fn read_one_degree_joint(
 ) -> Result<usize, SceneError> {
     const LISTED: usize = 12;
     let node = section.require("joint", "\"crank\"")?;
-    let wanted = node.text()?;
+    let wanted = &*node.reference()?;
     let moves = |joint: &&Joint| matches!(joint.kind, JointKind::Prismatic | JointKind::Revolute);
     match joints.get(wanted) {
         Some(&index) if moves(&&scene.joints[index]) => Ok(index),
@@ -541,7 +452,7 @@ pub(super) fn read_ball_joint<'d>(
         .chain(contact_parts())
         .collect();
     let section = node.section_as(node.title("joint"), &known)?;
-    let name = section.require("name", "\"S1\"")?.name()?.to_owned();
+    let name = section.require("name", "\"S1\"")?.name()?.into_owned();
     let attachment = |key: &str| read_attachment(&section, key, scene, bodies);
     let (socket, ball) = (attachment("socket")?, attachment("ball")?);
     if socket.body == ball.body {
@@ -550,9 +461,17 @@ pub(super) fn read_ball_joint<'d>(
             "socket and ball are on the same body: a ball joint needs two",
         ));
     }
-    let opening = section
+    let mut opening = section
         .get("opening")
         .map_or(Ok(scene.view.down.unit()), |node| node.direction())?;
+    let own = |copy: &Copy| {
+        socket
+            .body
+            .is_some_and(|body| copy.made(&scene.bodies[body].name))
+    };
+    if let Some(copy) = node.document.copy.filter(|copy| !own(copy)) {
+        opening = copy.direction(opening);
+    }
     let mut joint = BallJoint {
         name,
         socket,

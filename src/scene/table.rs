@@ -1,7 +1,9 @@
 //! The single table of scene parameters: files, `--set`, sliders, tooltips and the reference page are derived from it.
 
 use super::field::{Access, Field, Held, SWITCH, field, optional_field};
-use super::{Dimension, Formulation, Kind, Parameter, Preset, Scene, Scope, SignedAxis, Value};
+use super::{
+    Dimension, Formulation, Kind, Parameter, Preset, Scene, Scope, SignedAxis, StartRule, Value,
+};
 use crate::contact::{self, ApproachSpeed, FrictionLaw, FrictionVelocity, NormalLaw};
 use crate::integrate::Method;
 use crate::words::Words;
@@ -144,7 +146,7 @@ const fn gravity(
     )
 }
 
-static TABLE: [Parameter; 28] = [
+static TABLE: [Parameter; 29] = [
     contact(
         "contact.clearance",
         field!(clearance),
@@ -378,6 +380,19 @@ static TABLE: [Parameter; 28] = [
          Baumgarte. Both give the same motion; tree is faster.",
         "Paper eqs. (44) to (58) for lagrange",
     )),
+    at_reset(row(
+        "start",
+        Access::Scene(field!(start)),
+        "Start",
+        "Solver",
+        Kind::Choice(StartRule::WORDS),
+        Value::Choice("as-given"),
+        Scope::Every,
+        "Where a run begins. as-given takes the start values of the joints. ideal takes them as guesses and closes every ball \
+         joint, with the balls in the middle of their sockets: they drop first. settled lays each ball on the wall of its \
+         socket where the mechanism without play presses it, as deep as that force needs.",
+        "Constraints of paper eq. (45); (19) at rest for settled",
+    )),
     row(
         "solver.method",
         Access::Scene(field!(solver.method)),
@@ -496,7 +511,7 @@ pub(super) fn find(key: &str) -> Option<&'static Parameter> {
 pub(super) fn contact_part(parameter: &'static Parameter) -> Option<&'static str> {
     match parameter.access {
         Access::Contact(_) => parameter.key.strip_prefix("contact."),
-        Access::Scene(_) => None,
+        Access::Scene(_) | Access::Number => None,
     }
 }
 
@@ -504,6 +519,6 @@ pub(super) fn contact_part(parameter: &'static Parameter) -> Option<&'static str
 pub(super) fn contact_rows() -> impl Iterator<Item = (&'static str, Field<contact::Parameters>)> {
     TABLE.iter().filter_map(|parameter| match parameter.access {
         Access::Contact(field) => Some((parameter.key.strip_prefix("contact.")?, field)),
-        Access::Scene(_) => None,
+        Access::Scene(_) | Access::Number => None,
     })
 }

@@ -11,8 +11,9 @@ fn start_poses(scene: &Scene) -> Vec<(Vec3, Quat)> {
         let (origin, frame) = joint
             .parent
             .map_or((Vec3::zeros(), Quat::identity()), |parent| poses[parent]);
-        let q = match (joint.drive, joint.start) {
-            (Some(Drive::ClosedForm { coordinate }), _) => sliders[coordinate],
+        let slider = joint.drive.as_ref().and_then(Drive::slider);
+        let q = match (slider, joint.start) {
+            (Some(coordinate), _) => sliders[coordinate],
             (_, JointStart::Scalar { position, .. }) => position,
             (
                 _,
@@ -223,7 +224,7 @@ fn explicit_solver_settings_beat_a_preset_in_either_order() {
 
 #[test]
 fn a_key_of_the_file_alone_says_so() {
-    for key in ["spcmm.gamma", "view.floor", "output.body", "start"] {
+    for key in ["spcmm.gamma", "output.body", "name", "title"] {
         let error = Scene::load("spcmm", &[(key.to_owned(), "1".to_owned())]).unwrap_err();
         assert!(
             error.message.starts_with("only in the scene file"),
@@ -404,15 +405,14 @@ fn the_slider_crank_starts_with_velocities_that_fit_together() {
     assert!((end(0.15) - Vec3::new(0.24, 0.0, 0.0)).norm() < 1e-15);
     assert!(angular_velocity.dot(&(rotation * Vec3::x())).abs() < 1e-15);
     let driven = changed("slider-crank-driven", &[]);
-    let constant = Drive::Constant {
-        position: 0.0,
-        velocity: 6.0,
-    };
-    assert!(
-        driven
-            .joints
-            .iter()
-            .any(|joint| joint.name == "crank" && joint.drive == Some(constant))
+    let crank = driven.joints.iter().find(|joint| joint.name == "crank");
+    let law = crank
+        .and_then(|joint| joint.drive.as_ref())
+        .expect("driven");
+    assert_eq!(law.kind.word, "constant");
+    assert_eq!(
+        ["position", "velocity"].map(|key| law.number(key)),
+        [0.0, 6.0]
     );
     // Otherwise they are the same mechanism.
     assert_eq!(driven.bodies, scene.bodies);
@@ -458,4 +458,313 @@ fn all_forms_of_a_rotation_agree() {
         (r[(1, 1)] - libm::cos(10.0_f64.to_radians()) * libm::cos(20.0_f64.to_radians())).abs()
             < 1e-15
     );
+}
+
+/// A rod on a slide, with a parameter of its own.
+const OWN: &str = "
+[[parameter]]
+name = \"stroke\"
+label = \"Stroke\"
+value = \"20 mm\"
+range = [\"10 mm\", \"50 mm\"]
+
+[[parameter]]
+name = \"speed\"
+value = \"2 * stroke / 1 s\"
+unit = \"mm/s\"
+
+[[body]]
+name = \"rod\"
+mass = \"1 kg\" # a comment
+centre = \"1 2 3 mm\"
+inertia = \"1 1 1 kg m^2\"
+
+[[joint]]
+name = \"slide\"
+kind = \"prismatic\"
+child = \"rod\"
+axis = [0, 0, 1]
+parent_point = [\"stroke / 2\", 0, \"-(stroke + 1 cm)\"]
+start = { position = \"0.5 * stroke\", velocity = \"speed\" }
+";
+
+#[test]
+fn every_number_of_a_file_is_a_key() {
+    let scene = Scene::parse(OWN, None, &[]).expect("reads");
+    let joint = |scene: &Scene| (scene.joints[0].parent_point, scene.joints[0].start);
+    let start = |position, velocity| JointStart::Scalar { position, velocity };
+    assert_eq!(
+        joint(&scene),
+        (Vec3::new(0.01, 0.0, -0.03), start(0.01, 0.04))
+    );
+    let mut changed = scene.clone();
+    for (key, value) in [
+        ("parameter.stroke", "40 mm"),
+        ("body.rod.mass", "3 kg"),
+        ("body.rod.centre.y", "7 mm"),
+        ("joint.slide.parent_point.x", "1 mm"),
+        ("joint.slide.start.velocity", "5 mm/s"),
+    ] {
+        changed
+            .set(key, value)
+            .unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(
+            changed.get(key),
+            Ok(Value::Number(
+                parse_quantity(value, changed.source.numbers[key].dimension).unwrap()
+            ))
+        );
+    }
+    assert_eq!(
+        joint(&changed),
+        (Vec3::new(0.001, 0.0, -0.05), start(0.02, 0.005))
+    );
+    assert_eq!(
+        (changed.bodies[0].mass, changed.bodies[0].centre.y),
+        (3.0, 0.007)
+    );
+    assert_eq!(changed.get("parameter.speed"), Ok(Value::Number(0.08)));
+    // Written to the places where the text has them, and nowhere else.
+    let text = changed.to_toml().expect("has its places");
+    for line in [
+        "value = \"40 mm\"",
+        "mass = \"3 kg\" # a comment",
+        "centre = [\"1 mm\", \"7 mm\", \"3 mm\"]",
+        "parent_point = [\"1 mm\", 0, \"-(stroke + 1 cm)\"]",
+        "velocity = \"5 mm/s\"",
+    ] {
+        assert!(text.contains(line), "{line}\n{text}");
+    }
+    let read = Scene::parse(&text, None, &[]).expect("reads");
+    assert_eq!(joint(&read), joint(&changed));
+    changed
+        .undo_change("parameter.stroke")
+        .expect("was changed");
+    assert_eq!(changed.joints[0].parent_point.z, -0.03);
+}
+
+#[test]
+fn a_parameter_of_the_file_is_a_row_like_the_others() {
+    let scene = Scene::parse(OWN, None, &[]).expect("reads");
+    let rows = scene.parameters();
+    let row = rows.iter().find(|row| row.key == "parameter.stroke");
+    let row = row.expect("listed");
+    assert_eq!(
+        (row.label, row.display_unit(), row.at_reset),
+        ("Stroke", "mm", true)
+    );
+    assert_eq!(row.range(), "10 mm to 50 mm");
+    let speed = scene.parameter("parameter.speed").expect("known");
+    assert_eq!((speed.label, speed.display_unit()), ("speed", "mm/s"));
+}
+
+#[test]
+fn wrong_numbers_and_expressions_say_what_is_wrong() {
+    let error = |from: &str, to: &str| {
+        let text = OWN.replace(from, to);
+        assert_ne!(text, OWN);
+        Scene::parse(&text, Some("own.toml"), &[])
+            .expect_err(to)
+            .to_string()
+    };
+    for (from, to, wanted) in [
+        (
+            "\"stroke / 2\"",
+            "\"strok / 2\"",
+            "no variable `strok` (did you mean `stroke`?)",
+        ),
+        (
+            "\"stroke / 2\"",
+            "\"stroke * stroke\"",
+            "gives 0.0004 m^2, which is not in m; units m, cm",
+        ),
+        (
+            "\"stroke / 2\"",
+            "\"stroke + speed\"",
+            "adds or compares quantities of different dimensions",
+        ),
+        (
+            "\"stroke / 2\"",
+            "\"sin(stroke) * 1 m\"",
+            "takes a function of a quantity that is not a pure number",
+        ),
+        ("\"stroke / 2\"", "\"10\"", "needs a unit"),
+        ("\"stroke / 2\"", "\"2 * 5\"", "gives 10, which is not in m"),
+        (
+            "\"1 kg\"",
+            "\"stroke * 1 kg\"",
+            "gives 0.02 kg m, which is not in kg",
+        ),
+        (
+            "value = \"20 mm\"",
+            "value = \"60 mm\"",
+            "parameter.stroke = \"60 mm\": out of range; allowed 10 mm to 50 mm",
+        ),
+        (
+            "[\"10 mm\", \"50 mm\"]",
+            "[\"60 mm\", \"50 mm\"]",
+            "the first value must be below the second",
+        ),
+        ("\"stroke\"\n", "\"i\"\n", "cannot name a parameter"),
+        (
+            "\"speed\"\nvalue",
+            "\"stroke\"\nvalue",
+            "there is already a parameter of this name",
+        ),
+        ("unit = \"mm/s\"", "unit = \"mph\"", "unknown unit"),
+        ("unit = \"mm/s\"\n", "", "its unit is not to be seen here"),
+    ] {
+        let error = error(from, to);
+        assert!(
+            error.contains(wanted) && error.starts_with("own.toml:"),
+            "{error}"
+        );
+    }
+    let change = |key: &str, value: &str| {
+        let change = (key.to_owned(), value.to_owned());
+        Scene::parse(OWN, None, &[change])
+            .expect_err(key)
+            .to_string()
+    };
+    for (key, value, wanted) in [
+        (
+            "parameter.stroke",
+            "5 mm",
+            "parameter.stroke = 5 mm: out of range; allowed 10 mm to 50 mm",
+        ),
+        (
+            "body.rod.mass",
+            "-1 kg",
+            "body.rod.mass = -1 kg: out of range; allowed above 0",
+        ),
+        ("body.rod.mass", "1", "body.rod.mass = 1: needs a unit"),
+        (
+            "body.rod.maas",
+            "1 kg",
+            "unknown key (did you mean `body.rod.mass`?)",
+        ),
+        (
+            "joint.slide.start.velocit",
+            "1 m/s",
+            "did you mean `joint.slide.start.velocity`?",
+        ),
+        (
+            "body.rod.centre",
+            "0 0 0 mm",
+            "body.rod.centre = 0 0 0 mm: unknown key",
+        ),
+    ] {
+        let error = change(key, value);
+        assert!(error.contains(wanted), "{error}");
+    }
+}
+
+#[test]
+fn a_pattern_repeats_about_an_axis_and_along_a_line() {
+    let text = "
+[[body]]
+name = \"table\"
+mass = \"1 kg\"
+inertia = \"1 1 1 kg m^2\"
+
+[[joint]]
+name = \"table\"
+kind = \"fixed\"
+child = \"table\"
+
+[[pattern]]
+name = \"leg\"
+count = 3
+about = { point = \"10 0 0 mm\", axis = [0, 0, 1] }
+along = \"0 0 5 mm\"
+
+[[pattern.body]]
+name = \"rod\"
+mass = \"i * 2 kg\"
+inertia = \"1 1 1 kg m^2\"
+
+[[pattern.joint]]
+name = \"free\"
+kind = \"free\"
+child = \"rod\"
+start = { position = \"20 0 0 mm\", velocity = \"1 0 0 m/s\" }
+
+[[pattern.ball_joint]]
+name = \"S\"
+socket = { body = \"table\", at = \"20 0 0 mm\" }
+ball = { body = \"rod\", at = \"0 0 1 mm\" }
+opening = [1, 0, 0]
+
+[[pattern.load]]
+name = \"push\"
+on = { body = \"rod\" }
+force = \"1 0 0 N\"
+
+[[pattern.fixed_shape]]
+form = \"sphere\"
+centre = \"20 0 0 mm\"
+radius = \"1 mm\"
+role = \"frame\"
+";
+    let scene = Scene::parse(text, None, &[]).expect("reads");
+    let names: Vec<&str> = scene.bodies.iter().map(|body| body.name.as_str()).collect();
+    assert_eq!(names, ["table", "rod1", "rod2", "rod3"]);
+    let near = |a: Vec3, b: Vec3| assert!((a - b).norm() < 1e-15, "{a} {b}");
+    for copy in 0..3 {
+        let angle = std::f64::consts::TAU / 3.0 * copy as f64;
+        let radial = Vec3::new(angle.cos(), angle.sin(), 0.0);
+        let place = Vec3::new(0.01, 0.0, 0.005 * copy as f64) + 0.01 * radial;
+        let joint = &scene.ball_joints[copy];
+        assert_eq!(joint.name, format!("S{}", copy + 1));
+        near(joint.socket.point, place);
+        // In the rod's own frame nothing moves.
+        near(joint.ball.point, Vec3::new(0.0, 0.0, 0.001));
+        near(joint.opening, radial);
+        assert_eq!(joint.ball.body, Some(copy + 1));
+        let JointStart::Pose {
+            position,
+            velocity,
+            rotation,
+            ..
+        } = scene.joints[copy + 1].start
+        else {
+            panic!("free");
+        };
+        near(position, place);
+        near(velocity, radial);
+        near(rotation * Vec3::x(), radial);
+        near(scene.elements[copy].vector("force"), radial);
+        assert_eq!(scene.bodies[copy + 1].mass, 2.0 * (copy + 1) as f64);
+        let Geometry::Sphere { centre, .. } = scene.fixed_shapes[copy].geometry else {
+            panic!("sphere");
+        };
+        near(centre, place);
+    }
+    // One copy alone can be changed, but not written back.
+    let mut changed = scene.clone();
+    changed.set("body.rod2.mass", "9 kg").expect("a key");
+    assert_eq!(changed.bodies[2].mass, 9.0);
+    let error = changed.to_toml().expect_err("has no place of its own");
+    assert!(
+        error.message.contains("every copy of a pattern has it"),
+        "{error}"
+    );
+    for (from, to, wanted) in [
+        ("count = 3", "count = 0", "out of range; allowed 1 to 10000"),
+        (
+            "about = { point = \"10 0 0 mm\", axis = [0, 0, 1] }\nalong = \"0 0 5 mm\"\n",
+            "",
+            "missing `about` or `along`",
+        ),
+        (
+            "form = \"sphere\"\ncentre = \"20 0 0 mm\"\nradius = \"1 mm\"",
+            "form = \"box\"\ncentre = \"20 0 0 mm\"\nsize = \"1 1 1 mm\"",
+            "a fixed box keeps to the world's axes",
+        ),
+        ("child = \"rod\"", "child = \"rot\"", "no body `rot`"),
+        ("count = 3", "count = 3\nsize = 2", "unknown key"),
+    ] {
+        let error = Scene::parse(&text.replace(from, to), None, &[]).expect_err(to);
+        assert!(error.message.contains(wanted), "{error}");
+    }
 }

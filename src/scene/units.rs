@@ -321,6 +321,66 @@ pub fn parse_quantity(text: &str, dimension: Dimension) -> Result<f64, QuantityE
     Ok(value + 0.0)
 }
 
+/// Powers of kg, m, s and rad in a dimension.
+pub(super) fn powers(dimension: Dimension) -> [i8; 4] {
+    match dimension {
+        Dimension::None => [0, 0, 0, 0],
+        Dimension::Length => [0, 1, 0, 0],
+        Dimension::Time => [0, 0, 1, 0],
+        Dimension::Mass => [1, 0, 0, 0],
+        Dimension::Inertia => [1, 2, 0, 0],
+        Dimension::Stress => [1, -1, -2, 0],
+        Dimension::Angle => [0, 0, 0, 1],
+        Dimension::Speed => [0, 1, -1, 0],
+        Dimension::AngularSpeed => [0, 0, -1, 1],
+        Dimension::Acceleration => [0, 1, -2, 0],
+        Dimension::Frequency => [0, 0, -1, 0],
+        Dimension::Force => [1, 1, -2, 0],
+        Dimension::Torque => [1, 2, -2, 0],
+        Dimension::Stiffness => [1, 0, -2, 0],
+        Dimension::Damping => [1, 0, -1, 0],
+        Dimension::TurningStiffness => [1, 2, -2, -1],
+        Dimension::TurningDamping => [1, 2, -1, -1],
+    }
+}
+
+/// Every unit with its dimension and its size in SI units.
+pub(super) fn all_units() -> impl Iterator<Item = (&'static str, Dimension, f64)> {
+    UNITS.iter().flat_map(|(dimension, _, units)| {
+        let size = |&(name, scale): &Unit| (name, *dimension, apply("1", 1.0, scale));
+        units.iter().map(size)
+    })
+}
+
+/// Length in bytes of the longest unit with which `text` begins, and its place in [`all_units`].
+pub(super) fn unit_at_start(text: &str) -> Option<(usize, usize)> {
+    let ends =
+        |length: usize| !text[length..].starts_with(|c: char| c.is_alphanumeric() || c == '_');
+    let begins = |(place, (name, ..)): (usize, (&str, Dimension, f64))| {
+        (text.starts_with(name) && ends(name.len())).then_some((name.len(), place))
+    };
+    all_units()
+        .enumerate()
+        .filter_map(begins)
+        .max_by_key(|(length, _)| *length)
+}
+
+/// What follows the number with which `text` begins; empty if it does not begin with one.
+pub(super) fn split_unit(text: &str) -> &str {
+    split_number(text.trim()).1
+}
+
+/// Whether a unit is written so, too.
+pub(super) fn same_unit(unit: &str, written: &str) -> bool {
+    normalise(unit) == normalise(written)
+}
+
+/// The unit of `dimension` that a quantity is written in.
+pub(super) fn unit_within(text: &str, dimension: Dimension) -> Option<&'static str> {
+    let same = |(name, _): &&Unit| same_unit(name, split_unit(text));
+    units(dimension).iter().find(same).map(|(name, _)| *name)
+}
+
 /// An SI value in `unit`; unchanged if `unit` is unknown or "".
 pub fn to_display(si: f64, unit: &str) -> f64 {
     match scale_of(unit) {

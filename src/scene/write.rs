@@ -4,7 +4,14 @@ use toml_edit::{
     Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value as Toml, value,
 };
 
+use std::collections::BTreeMap;
+
+use super::numbers::{FileNumber, Place};
+use super::units::exact_quantity;
 use super::{Kind, Scene, SceneError, Value};
+
+/// Most numbers in one vector.
+const MOST_PARTS: usize = 4;
 
 impl Scene {
     /// The text of a scene file that reads back to this scene, changes included.
@@ -18,22 +25,63 @@ impl Scene {
             ..SceneError::default()
         };
         let mut document: DocumentMut = self
-            .source
-            .text
+            .numbers_in_place()?
             .parse()
             .map_err(|error: toml_edit::TomlError| lost("", error.message().to_owned()))?;
         for (key, _) in &self.changes {
-            self.write_change(&mut document, key)?;
+            if !self.source.numbers.contains_key(key) {
+                self.write_change(&mut document, key)?;
+            }
         }
         let text = document.to_string();
         // Return the text only if it reads back as intended.
-        let read = Self::parse(&text, self.source.file.as_deref(), &[])?;
+        let source = &self.source;
+        let read = Self::parse_with(&text, source.file.as_deref(), &source.beside, &[])?;
         for (key, _) in &self.changes {
             if read.get(key)? != self.get(key)? {
                 return Err(lost(key, "cannot be written to a scene file".to_owned()));
             }
         }
         Ok(text)
+    }
+
+    /// The scene's text with the changed numbers in the places of the old ones.
+    fn numbers_in_place(&self) -> Result<String, SceneError> {
+        let numbers = &self.source.numbers;
+        let mut edits: BTreeMap<usize, (usize, String)> = BTreeMap::new();
+        for (key, value) in &self.changes {
+            let Some(number) = numbers.get(key) else {
+                continue;
+            };
+            let refuse = |why: &str| {
+                let message = format!("cannot be written to a scene file: {why}");
+                SceneError::about(key, Some(value), message)
+            };
+            let text = |number: &FileNumber| {
+                let text = exact_quantity(number.value, number.unit, number.dimension);
+                format!("\"{text}\"")
+            };
+            let here = |other: &&FileNumber| other.place == number.place;
+            let same: Vec<&FileNumber> = numbers.values().filter(here).collect();
+            let (span, text) = match &number.place {
+                Place::Absent => {
+                    return Err(refuse("the text does not give it; write it there first"));
+                }
+                Place::Value(span) if same.len() == 1 => (span, text(number)),
+                // In the order of their keys, x, y, z.
+                Place::Part(span) if same.len() <= MOST_PARTS => {
+                    let parts: Vec<String> = same.into_iter().map(text).collect();
+                    (span, format!("[{}]", parts.join(", ")))
+                }
+                _ => return Err(refuse("every copy of a pattern has it")),
+            };
+            edits.insert(span.start, (span.end, text));
+        }
+        let mut written = self.source.text.clone();
+        for (start, (end, text)) in edits.into_iter().rev() {
+            written.replace_range(start..end, &text);
+        }
+        Ok(written)
     }
 
     fn write_change(&self, document: &mut DocumentMut, key: &str) -> Result<(), SceneError> {

@@ -395,10 +395,12 @@ impl Simulation {
         // Not at the end of the previous step: samples inside it still see the clearance moving.
         self.finish_ramps();
         let limit = end.min(self.ramp_end());
+        // A fixed step is the user's choice.
+        let follows_drives = limit.min(self.mechanism.step_end(self.state.now.t));
         if self.mechanism.is_kinematic() {
-            self.kinematic_step(limit)?;
+            self.kinematic_step(follows_drives)?;
         } else if self.running.solver.method.is_adaptive() {
-            let step = self.adaptive_step(limit);
+            let step = self.adaptive_step(follows_drives);
             if step.is_err() {
                 self.forget_flown();
             }

@@ -611,6 +611,32 @@ fn a_motor_gives_no_more_than_its_limit() {
 }
 
 #[test]
+fn a_motor_does_not_sleep_through_a_pulse_of_its_target() {
+    // Nothing moves before: an adaptive step would grow beyond the pulse, which is there and back.
+    let m = Slide.inertia();
+    let motor = format!(
+        "[[motor]]\nname = \"m\"\njoint = \"j\"\nstiffness = \"{:e} N/m\"\ndamping = \"{:e} N s/m\"\n\
+         target = {{ law = \"pulse\", height = \"10 mm\", start = \"1 s\", duration = \"5 ms\" }}\n",
+        1e4 * m,
+        20.0 * m
+    );
+    let end = |method: &str| {
+        let changes = [("solver.method", method), ("solver.tolerance", "1e-9")];
+        let mut simulation = Slide.starts([0.0, 0.0], &motor, &changes);
+        Slide.coordinate(&at(&mut simulation, 1.03))
+    };
+    let expected = end("rk4");
+    assert!(expected.abs() > 1e-4, "{expected:e}");
+    for method in ["dopri5", "radau5", "rosenbrock", "automatic"] {
+        let found = end(method);
+        assert!(
+            (found - expected).abs() < 1e-7,
+            "{method}: {found:e} {expected:e}"
+        );
+    }
+}
+
+#[test]
 fn columns_and_pictures_follow_what_the_joint_is() {
     let columns = |on: On| {
         let text = on.text([0.13, 0.0], &on.spring(200.0, 0.0));

@@ -29,5 +29,6 @@ mod properties;
 mod reference;
 mod restitution;
 mod settled;
+mod settled_start;
 mod twin;
 mod wear;

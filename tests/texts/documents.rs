@@ -25,14 +25,32 @@ fn the_page_of_parameters_is_what_the_program_prints() {
     );
 }
 
-/// The `number`-th block of TOML of the page about scenes.
-fn example(number: usize) -> String {
+/// The blocks of TOML of the page about scenes.
+fn examples() -> Vec<String> {
     let page = read("docs/scene-format.md");
-    let block = page
-        .split("```toml\n")
-        .nth(number)
-        .and_then(|rest| rest.split("```").next());
-    block.expect("a block of TOML").to_owned()
+    let blocks = page.split("```toml\n").skip(1);
+    blocks
+        .filter_map(|rest| rest.split("```").next().map(str::to_owned))
+        .collect()
+}
+
+/// The first of them that contains `line`.
+fn example(line: &str) -> String {
+    let blocks = examples();
+    let found = blocks.into_iter().find(|block| block.contains(line));
+    found.expect("a block of TOML")
+}
+
+#[test]
+fn every_example_of_the_page_of_scenes_runs() {
+    let examples = examples();
+    assert!(examples.len() > 4);
+    for text in examples {
+        let scene = Scene::parse(&text, None, &[]).unwrap_or_else(|error| panic!("{error}"));
+        let mut simulation = Simulation::new(&scene).unwrap_or_else(|error| panic!("{error}"));
+        let end = simulation.advance_to(0.05);
+        end.unwrap_or_else(|error| panic!("{error}\n{text}"));
+    }
 }
 
 /// The sections of all kinds as table rows for the file-format page.
@@ -111,7 +129,7 @@ fn the_page_of_scenes_lists_the_units_that_are_read() {
 
 #[test]
 fn hinges_that_are_not_parallel_stand_where_the_page_says() {
-    let scene = Scene::parse(&example(2), None, &[]).expect("the example loads");
+    let scene = Scene::parse(&example("name = \"turn\""), None, &[]).expect("the example loads");
     let mut simulation = Simulation::new(&scene).expect("the example starts");
     let mut frame = Frame::default();
     simulation.sample(0.0, &mut frame);
@@ -140,7 +158,7 @@ fn hinges_that_are_not_parallel_stand_where_the_page_says() {
 
 #[test]
 fn the_example_of_the_scene_format_runs() {
-    let example = &example(3);
+    let example = &example("name = \"rod\"\nmass = \"0.384 kg\"");
     let scene = Scene::parse(example, None, &[]).expect("the example loads");
     let mut simulation = Simulation::new(&scene).expect("the example starts");
     simulation.advance_to(0.02).expect("the example runs");
@@ -207,7 +225,7 @@ fn documents_name_files_that_exist() {
 
 #[test]
 fn the_mass_on_a_spring_of_the_page_swings_about_its_rest() {
-    let scene = Scene::parse(&example(1), None, &[]).expect("the example loads");
+    let scene = Scene::parse(&example("name = \"s1\""), None, &[]).expect("the example loads");
     let mut simulation = Simulation::new(&scene).expect("the example starts");
     let mut frame = Frame::default();
     simulation.sample(0.0, &mut frame);
@@ -226,7 +244,7 @@ fn the_mass_on_a_spring_of_the_page_swings_about_its_rest() {
 
 #[test]
 fn the_flap_of_the_page_opens_against_its_stop_and_shuts() {
-    let scene = Scene::parse(&example(4), None, &[]).expect("the example loads");
+    let scene = Scene::parse(&example("name = \"flap\""), None, &[]).expect("the example loads");
     let mut simulation = Simulation::new(&scene).expect("the example starts");
     let mut frame = Frame::default();
     let (mut widest, mut deepest, mut most) = (0.0_f64, 0.0_f64, 0.0_f64);

@@ -15,7 +15,11 @@ const MUTATIONS: u64 = 40;
 const MUTATIONS_OF_BUILT_IN: u64 = 200;
 
 /// Changes that a mutated text comes with now and then, some of them right.
-const CHANGES: [&str; 16] = [
+const CHANGES: [&str; 20] = [
+    "parameter.stroke=12 mm",
+    "parameter.stroke=1",
+    "body.rod.mass=2 kg",
+    "body.rod1.mass=0 kg",
     "contact.clearance=0",
     "contact.clearance=0.5mm",
     "contact.clearance=1e400 mm",

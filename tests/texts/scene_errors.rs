@@ -618,12 +618,11 @@ fn changes_are_refused_with_key_value_and_range() {
         ),
         (
             "slider-crank-driven",
-            "joint.crank.drive.velocity",
+            "joint.crank.drive.velocit",
             "7 rad/s",
             &[
-                "`crank` is not a ball joint",
-                "only in the scene file",
-                "joint.<ball joint>.<key>; ball joints: B, C; keys: clearance, friction,",
+                "`crank` is not a ball joint, and the file gives no such number of it (did you mean `joint.crank.drive.velocity`?)",
+                "Ball joints, B, C, have joint.<ball joint>.<key>; keys: clearance, friction,",
             ],
         ),
         (

@@ -238,6 +238,11 @@ pub(super) trait SceneElement: ForceElement {
         f64::INFINITY
     }
 
+    /// Latest end of an adaptive step that starts at `t`, s: none passes over what its law only begins within it.
+    fn step_end(&self, _t: f64) -> f64 {
+        f64::INFINITY
+    }
+
     /// Its report at `t`.
     fn report(&self, t: f64, motion: &[Kinematics]) -> ElementReport;
 }

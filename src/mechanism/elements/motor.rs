@@ -3,11 +3,13 @@
 
 use super::coordinate::{Coordinate, Place, Slopes};
 use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, Site};
+use crate::jet::Jet;
 use crate::mechanism::Powers;
-use crate::mechanism::jet::Jet;
+use crate::mechanism::drives::{Law, course_of};
 use crate::mechanism::kinematics::Kinematics;
-use crate::mechanism::model::{Anchor, value_of};
-use crate::scene::{Drive, Element};
+use crate::mechanism::model::Anchor;
+use crate::scene::{Element, JointKind};
+use std::sync::Arc;
 
 struct Motor {
     on: Coordinate,
@@ -15,7 +17,7 @@ struct Motor {
     stiffness: f64,
     damping: f64,
     limit: f64,
-    target: Option<Drive>,
+    target: Option<Arc<dyn Law>>,
 }
 
 pub(super) fn make(element: &Element, site: &Site<'_>) -> Box<dyn SceneElement> {
@@ -25,14 +27,25 @@ pub(super) fn make(element: &Element, site: &Site<'_>) -> Box<dyn SceneElement> 
         stiffness: element.number("stiffness"),
         damping: element.number("damping"),
         limit: element.number("limit"),
-        target: element.law,
+        target: law_of(element),
     })
+}
+
+/// The law that its target follows.
+fn law_of(element: &Element) -> Option<Arc<dyn Law>> {
+    let kind = if element.on_hinge {
+        JointKind::Revolute
+    } else {
+        JointKind::Prismatic
+    };
+    let course = course_of(element.law.as_ref()?, kind);
+    course.law().cloned()
 }
 
 impl Motor {
     /// The motion that it is to follow.
     fn target(&self, t: f64) -> Jet {
-        let value = |law: &Drive| value_of(law, t, None);
+        let value = |law: &Arc<dyn Law>| law.at(t);
         self.target.as_ref().map_or_else(Jet::default, value)
     }
 
@@ -84,10 +97,13 @@ impl ForceElement for Motor {
 
 impl SceneElement for Motor {
     fn period(&self) -> f64 {
-        match self.target {
-            Some(Drive::Harmonic { frequency, .. }) => 1.0 / frequency,
-            _ => f64::INFINITY,
-        }
+        let swing = |law: &Arc<dyn Law>| law.swing();
+        self.target.as_ref().map_or(f64::INFINITY, swing)
+    }
+
+    fn step_end(&self, t: f64) -> f64 {
+        let end = |law: &Arc<dyn Law>| law.step_end(t);
+        self.target.as_ref().map_or(f64::INFINITY, end)
     }
 
     fn report(&self, t: f64, motion: &[Kinematics]) -> ElementReport {

@@ -2,7 +2,7 @@
 //!
 //! Written here because dual-number crates call std's elementary functions, whose bits differ between native and wasm.
 
-use std::ops::{Add, Mul, Neg, Sub};
+use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// f, df/dt and d2f/dt2 at one instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -35,7 +35,7 @@ impl Jet {
     }
 
     /// g(self) from g, g', g'' at the value.
-    fn chain(self, g: f64, g1: f64, g2: f64) -> Self {
+    pub fn chain(self, g: f64, g1: f64, g2: f64) -> Self {
         Self {
             value: g,
             rate: g1 * self.rate,
@@ -100,6 +100,17 @@ impl Mul for Jet {
             self.rate * o.value + self.value * o.rate,
             self.acceleration * o.value + 2.0 * self.rate * o.rate + self.value * o.acceleration,
         )
+    }
+}
+
+impl Div for Jet {
+    type Output = Self;
+    fn div(self, o: Self) -> Self {
+        let value = self.value / o.value;
+        let rate = (self.rate - value * o.rate) / o.value;
+        let acceleration =
+            (self.acceleration - 2.0 * rate * o.rate - value * o.acceleration) / o.value;
+        Self::new(value, rate, acceleration)
     }
 }
 

@@ -1,0 +1,79 @@
+//! Motions that begin and end: a ramp from one position to another, and a pulse that returns. Rate and acceleration are 0 at
+//! both ends. A ramp of constant rate, or a pulse that is half a sine, would ask for an infinite force at its corners.
+
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use super::{Law, step_end_within};
+use crate::jet::Jet;
+use crate::scene::{Drive, smooth_step};
+
+#[derive(Debug)]
+struct Ramp {
+    from: f64,
+    rise: f64,
+    start: f64,
+    duration: f64,
+}
+
+pub(super) fn make_ramp(drive: &Drive, _turns: bool) -> Arc<dyn Law> {
+    let from = drive.number("from");
+    Arc::new(Ramp {
+        from,
+        rise: drive.number("to") - from,
+        start: drive.number("start"),
+        duration: drive.number("duration"),
+    })
+}
+
+impl Law for Ramp {
+    fn at(&self, t: f64) -> Jet {
+        let (value, rate, acceleration) = smooth_step((t - self.start) / self.duration);
+        let d = self.duration;
+        Jet::constant(self.from) + self.rise * Jet::new(value, rate / d, acceleration / (d * d))
+    }
+
+    fn step_end(&self, t: f64) -> f64 {
+        step_end_within(self.start, self.start + self.duration, t)
+    }
+
+    fn bounds_steps(&self) -> bool {
+        true
+    }
+}
+
+#[derive(Debug)]
+struct Pulse {
+    base: f64,
+    height: f64,
+    start: f64,
+    duration: f64,
+}
+
+pub(super) fn make_pulse(drive: &Drive, _turns: bool) -> Arc<dyn Law> {
+    Arc::new(Pulse {
+        base: drive.number("base"),
+        height: drive.number("height"),
+        start: drive.number("start"),
+        duration: drive.number("duration"),
+    })
+}
+
+impl Law for Pulse {
+    fn at(&self, t: f64) -> Jet {
+        let s = (t - self.start) / self.duration;
+        if !(0.0..=1.0).contains(&s) {
+            return Jet::constant(self.base);
+        }
+        let (sine, _) = Jet::new(PI * s, PI / self.duration, 0.0).sin_cos();
+        Jet::constant(self.base) + self.height * (sine * sine * sine)
+    }
+
+    fn step_end(&self, t: f64) -> f64 {
+        step_end_within(self.start, self.start + self.duration, t)
+    }
+
+    fn bounds_steps(&self) -> bool {
+        true
+    }
+}

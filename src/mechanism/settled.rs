@@ -1,0 +1,69 @@
+//! The settled start: every ball rests on the wall of its socket where the same machine without play presses it, so that a run
+//! does not begin with a drop.
+
+use super::start::Assembly;
+use super::{Mechanism, MechanismError, Touching};
+use crate::contact::{Coefficients, Parameters, settled_penetration};
+use crate::scene::{Formulation, Scene, StartRule, Vec3};
+
+/// Times that reactions and places of the balls are found from each other. The places move reactions by the clearance over the
+/// size of the machine, a thousandth or so, and each time leaves that share of what was wrong before.
+const ROUNDS: usize = 4;
+
+/// A settled start.
+pub(super) struct Settled {
+    /// Positions and velocities in the coordinates of the tree.
+    pub state: Vec<f64>,
+    /// How the machine without play was assembled before balls were moved by their play.
+    pub assembly: Assembly,
+}
+
+/// Of `scene` at t = 0. Velocities are those of the machine without play.
+///
+/// # Errors
+/// That machine does not start.
+pub(super) fn settle(scene: &Scene) -> Result<Settled, MechanismError> {
+    let mut twin = scene.clone();
+    for joint in &mut twin.ball_joints {
+        joint.contact.clearance = 0.0;
+    }
+    twin.start = StartRule::Ideal;
+    twin.formulation = Formulation::Tree;
+    let mut mechanism = Mechanism::new(&twin)?;
+    let mut state = mechanism.start()?;
+    let assembly = mechanism.assembly().clone();
+    for _ in 0..ROUNDS {
+        let mut rate = vec![0.0; state.len()];
+        mechanism
+            .evaluator(Touching::Nothing)
+            .evaluate_fully(0.0, &state, &mut rate);
+        for (j, joint) in scene.ball_joints.iter().enumerate() {
+            if joint.contact.clearance == 0.0 {
+                continue;
+            }
+            let force = mechanism.reaction(j).unwrap_or_default();
+            let eccentricity = resting_place(&joint.contact, force);
+            let turned_back = match joint.ball.body {
+                Some(body) => mechanism.motion()[body].rotation.tr_mul(&eccentricity),
+                None => eccentricity,
+            };
+            // Without play, the point of the ball that lies in the socket's centre.
+            twin.ball_joints[j].ball.point = joint.ball.point - turned_back;
+        }
+        mechanism = Mechanism::new(&twin)?;
+        state = mechanism.start()?;
+    }
+    Ok(Settled { state, assembly })
+}
+
+/// Ball centre from the socket's, m, where the wall pushes the ball with `force`, N. A ball without a load stays in the middle.
+fn resting_place(contact: &Parameters, force: Vec3) -> Vec3 {
+    let (size, clearance) = (force.norm(), contact.clearance);
+    if size > 0.0 {
+        let stiffness = Coefficients::new(contact, clearance).stiffness;
+        let depth = settled_penetration(stiffness, size);
+        force * (-(clearance + depth) / size)
+    } else {
+        Vec3::zeros()
+    }
+}

@@ -1,0 +1,711 @@
+//! Expressions such as `10 * sin(2*pi*3*t) * exp(-t/2)`: parsed once into a postfix program, which any kind of number runs
+//! through without allocating.
+//!
+//! Written here because the crates for this call std's elementary functions, whose bits differ between native and wasm, or
+//! bring a regex engine, and do not say at which byte an expression is wrong.
+
+use super::error::{brief, did_you_mean, nearest_name};
+use std::fmt;
+
+/// Longest expression, bytes.
+pub const LONGEST_EXPRESSION: usize = 4000;
+/// Deepest nesting of parentheses, calls, signs and powers.
+const DEEPEST: usize = 60;
+/// Most intermediate results at a time.
+const STACK: usize = 32;
+
+/// An operation on one number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(
+    missing_docs,
+    reason = "each is what its name says in the table of functions"
+)]
+pub enum Unary {
+    Negate,
+    Sin,
+    Cos,
+    Tan,
+    Asin,
+    Acos,
+    Atan,
+    Sinh,
+    Cosh,
+    Tanh,
+    Exp,
+    Ln,
+    Sqrt,
+    /// 0 below 0, 1 above 1, between them 10 x^3 - 15 x^4 + 6 x^5: twice continuously differentiable.
+    SmoothStep,
+    Abs,
+}
+
+/// An operation on two numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(
+    missing_docs,
+    reason = "each is what its name says in the table of functions"
+)]
+pub enum Binary {
+    Add,
+    Subtract,
+    Multiply,
+    Divide,
+    Power,
+    Atan2,
+    Min,
+    Max,
+}
+
+/// What an expression computes with: f64, or a number that carries more (derivatives, a dimension).
+///
+/// An operation on constants must give the constant that f64 gives: the parser evaluates them beforehand.
+pub trait Number: Copy {
+    /// A number of the text.
+    fn constant(value: f64) -> Self;
+    /// The result of `operation`.
+    fn unary(self, operation: Unary) -> Self;
+    /// The result of `operation` with `self` on the left, or as the first argument.
+    fn binary(self, operation: Binary, other: Self) -> Self;
+}
+
+impl Number for f64 {
+    fn constant(value: f64) -> Self {
+        value
+    }
+
+    fn unary(self, operation: Unary) -> Self {
+        match operation {
+            Unary::Negate => -self,
+            Unary::Sin => libm::sin(self),
+            Unary::Cos => libm::cos(self),
+            Unary::Tan => libm::tan(self),
+            Unary::Asin => libm::asin(self),
+            Unary::Acos => libm::acos(self),
+            Unary::Atan => libm::atan(self),
+            Unary::Sinh => libm::sinh(self),
+            Unary::Cosh => libm::cosh(self),
+            Unary::Tanh => libm::tanh(self),
+            Unary::Exp => libm::exp(self),
+            Unary::Ln => libm::log(self),
+            Unary::Sqrt => self.sqrt(),
+            Unary::SmoothStep => smooth_step(self).0,
+            Unary::Abs => self.abs(),
+        }
+    }
+
+    fn binary(self, operation: Binary, other: Self) -> Self {
+        match operation {
+            Binary::Add => self + other,
+            Binary::Subtract => self - other,
+            Binary::Multiply => self * other,
+            Binary::Divide => self / other,
+            Binary::Power => libm::pow(self, other),
+            Binary::Atan2 => libm::atan2(self, other),
+            Binary::Min => self.min(other),
+            Binary::Max => self.max(other),
+        }
+    }
+}
+
+/// 10 x^3 - 15 x^4 + 6 x^5 between 0 and 1, constant outside, with its first two derivatives: all three are continuous.
+pub fn smooth_step(x: f64) -> (f64, f64, f64) {
+    if x <= 0.0 {
+        return (0.0, 0.0, 0.0);
+    }
+    if x >= 1.0 {
+        return (1.0, 0.0, 0.0);
+    }
+    let y = 1.0 - x;
+    (
+        x * x * x * (10.0 + x * (6.0 * x - 15.0)),
+        30.0 * (x * y) * (x * y),
+        60.0 * x * y * (y - x),
+    )
+}
+
+/// What a name before `(` stands for.
+#[derive(Clone, Copy)]
+enum Call {
+    One(Unary),
+    Two(Binary),
+}
+
+/// Functions: name, operation, and whether its first two derivatives are continuous wherever it has a value.
+const FUNCTIONS: [(&str, Call, bool); 18] = [
+    ("sin", Call::One(Unary::Sin), true),
+    ("cos", Call::One(Unary::Cos), true),
+    ("tan", Call::One(Unary::Tan), true),
+    ("asin", Call::One(Unary::Asin), true),
+    ("acos", Call::One(Unary::Acos), true),
+    ("atan", Call::One(Unary::Atan), true),
+    ("sinh", Call::One(Unary::Sinh), true),
+    ("cosh", Call::One(Unary::Cosh), true),
+    ("tanh", Call::One(Unary::Tanh), true),
+    ("exp", Call::One(Unary::Exp), true),
+    ("ln", Call::One(Unary::Ln), true),
+    ("sqrt", Call::One(Unary::Sqrt), true),
+    ("smoothstep", Call::One(Unary::SmoothStep), true),
+    ("abs", Call::One(Unary::Abs), false),
+    ("pow", Call::Two(Binary::Power), true),
+    // The jump at the negative x axis apart.
+    ("atan2", Call::Two(Binary::Atan2), true),
+    ("min", Call::Two(Binary::Min), false),
+    ("max", Call::Two(Binary::Max), false),
+];
+
+/// Constants; a variable of the same name goes before.
+const CONSTANTS: [(&str, f64); 2] = [("pi", std::f64::consts::PI), ("e", std::f64::consts::E)];
+
+/// One step of a program.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Step {
+    Constant(f64),
+    Variable(usize),
+    Unary(Unary),
+    Binary(Binary),
+}
+
+/// A parsed expression.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Program {
+    steps: Vec<Step>,
+    kink: Option<&'static str>,
+}
+
+impl Program {
+    /// Parses `text`. `variable` gives the index of a variable, by which [`Self::eval`] finds its value; `names` are those
+    /// that an error may suggest.
+    ///
+    /// # Errors
+    /// Where the text is wrong, and why.
+    pub fn parse(
+        text: &str,
+        variable: impl Fn(&str) -> Option<usize>,
+        names: &[&str],
+    ) -> Result<Self, ExpressionError> {
+        Self::parse_with_units(text, variable, names, |_| None)
+    }
+
+    /// As [`Self::parse`]; a number may be followed by a unit, by which it is multiplied. `unit` gives the length of the unit with
+    /// which a text begins, and the index of its size among the variables.
+    ///
+    /// # Errors
+    /// As [`Self::parse`], and a power of a number with its unit, which could be meant for the unit alone.
+    pub fn parse_with_units(
+        text: &str,
+        variable: impl Fn(&str) -> Option<usize>,
+        names: &[&str],
+        unit: impl Fn(&str) -> Option<(usize, usize)>,
+    ) -> Result<Self, ExpressionError> {
+        if text.len() > LONGEST_EXPRESSION {
+            return Err(ExpressionError {
+                at: 0,
+                fault: Fault::TooLong,
+            });
+        }
+        let mut parser = Parser {
+            text,
+            at: 0,
+            steps: Vec::new(),
+            held: 0,
+            depth: 0,
+            kink: None,
+            variable: &variable,
+            names,
+            unit: &unit,
+        };
+        parser.sum()?;
+        match parser.peek() {
+            None => Ok(Self {
+                steps: parser.steps,
+                kink: parser.kink,
+            }),
+            Some(_) => Err(parser.unexpected("an operator")),
+        }
+    }
+
+    /// Value for these variables.
+    ///
+    /// # Panics
+    /// If `variables` lacks one that the text names.
+    pub fn eval<N: Number>(&self, variables: &[N]) -> N {
+        let mut stack = [N::constant(0.0); STACK];
+        let mut top = 0;
+        for step in &self.steps {
+            match *step {
+                Step::Constant(value) => {
+                    stack[top] = N::constant(value);
+                    top += 1;
+                }
+                Step::Variable(index) => {
+                    stack[top] = variables[index];
+                    top += 1;
+                }
+                Step::Unary(operation) => stack[top - 1] = stack[top - 1].unary(operation),
+                Step::Binary(operation) => {
+                    top -= 1;
+                    stack[top - 1] = stack[top - 1].binary(operation, stack[top]);
+                }
+            }
+        }
+        stack[0]
+    }
+
+    /// A function in it whose derivatives jump.
+    pub fn kink(&self) -> Option<&'static str> {
+        self.kink
+    }
+
+    /// Number of its steps: constants, variables and operations.
+    pub fn length(&self) -> usize {
+        self.steps.len()
+    }
+
+    /// Whether it names variable `index`.
+    pub fn uses(&self, index: usize) -> bool {
+        self.steps.contains(&Step::Variable(index))
+    }
+}
+
+/// What is wrong with an expression.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExpressionError {
+    /// Byte of the text.
+    pub at: usize,
+    /// What is wrong there.
+    pub fault: Fault,
+}
+
+/// Ways in which an expression is wrong.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Fault {
+    /// Something else should stand here.
+    Expected {
+        /// What should.
+        wanted: &'static str,
+        /// What does; `None` at the end.
+        found: Option<char>,
+    },
+    /// No variable, constant or function has this name.
+    Unknown {
+        /// The name.
+        name: String,
+        /// One like it.
+        near: Option<String>,
+        /// It is called like a function.
+        called: bool,
+    },
+    /// A function has another number of arguments.
+    Arguments {
+        /// The function.
+        function: &'static str,
+        /// What it needs.
+        wanted: usize,
+    },
+    /// A function without its arguments.
+    NotCalled(&'static str),
+    /// No finite number of f64.
+    NoNumber,
+    /// Nested too deeply.
+    TooDeep,
+    /// Longer than [`LONGEST_EXPRESSION`].
+    TooLong,
+}
+
+impl std::error::Error for ExpressionError {}
+
+impl fmt::Display for ExpressionError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.fault {
+            Fault::Expected {
+                wanted,
+                found: None,
+            } => write!(f, "ends where {wanted} should follow"),
+            Fault::Expected {
+                wanted,
+                found: Some(found),
+            } => write!(f, "`{found}` where {wanted} should stand"),
+            Fault::Unknown { name, near, called } => {
+                let what = if *called { "function" } else { "variable" };
+                let near = did_you_mean(near.as_deref());
+                write!(f, "no {what} `{}`{near}", brief(name))?;
+                if *called {
+                    write!(f, "; functions: {}", FUNCTIONS.map(|row| row.0).join(", "))?;
+                }
+                Ok(())
+            }
+            Fault::Arguments { function, wanted } => match wanted {
+                1 => write!(f, "`{function}` takes one argument"),
+                _ => write!(f, "`{function}` takes {wanted} arguments"),
+            },
+            Fault::NotCalled(function) => {
+                write!(
+                    f,
+                    "`{function}` is a function: its argument follows in parentheses"
+                )
+            }
+            Fault::NoNumber => f.write_str("no finite number"),
+            Fault::TooDeep => f.write_str("nested too deeply"),
+            Fault::TooLong => {
+                write!(f, "too long; allowed at most {LONGEST_EXPRESSION} bytes")
+            }
+        }
+    }
+}
+
+struct Parser<'t> {
+    text: &'t str,
+    at: usize,
+    steps: Vec<Step>,
+    /// Results on the stack after `steps`.
+    held: usize,
+    depth: usize,
+    kink: Option<&'static str>,
+    variable: &'t dyn Fn(&str) -> Option<usize>,
+    names: &'t [&'t str],
+    unit: &'t dyn Fn(&str) -> Option<(usize, usize)>,
+}
+
+type Parsed = Result<(), ExpressionError>;
+
+impl<'t> Parser<'t> {
+    /// Next character that is not a space.
+    fn peek(&mut self) -> Option<char> {
+        let rest = &self.text[self.at..];
+        self.at += rest.len() - rest.trim_start().len();
+        self.text[self.at..].chars().next()
+    }
+
+    /// Skips `wanted` if it is next.
+    fn take(&mut self, wanted: &str) -> bool {
+        self.peek();
+        let found = self.text[self.at..].starts_with(wanted);
+        if found {
+            self.at += wanted.len();
+        }
+        found
+    }
+
+    fn error(&self, at: usize, fault: Fault) -> ExpressionError {
+        ExpressionError { at, fault }
+    }
+
+    fn unexpected(&mut self, wanted: &'static str) -> ExpressionError {
+        let found = self.peek();
+        self.error(self.at, Fault::Expected { wanted, found })
+    }
+
+    /// Adds a step, or its result if it is constant.
+    fn push(&mut self, step: Step) -> Parsed {
+        match (step, &mut self.steps[..]) {
+            (Step::Unary(operation), [.., Step::Constant(x)]) => *x = x.unary(operation),
+            (Step::Binary(operation), [.., Step::Constant(x), Step::Constant(y)]) => {
+                *x = x.binary(operation, *y);
+                self.steps.pop();
+                self.held -= 1;
+            }
+            _ => {
+                match step {
+                    Step::Constant(_) | Step::Variable(_) => self.held += 1,
+                    Step::Unary(_) => {}
+                    Step::Binary(_) => self.held -= 1,
+                }
+                self.steps.push(step);
+            }
+        }
+        if self.held > STACK {
+            return Err(self.error(self.at, Fault::TooDeep));
+        }
+        Ok(())
+    }
+
+    /// Terms with `+` and `-` between them.
+    fn sum(&mut self) -> Parsed {
+        self.product()?;
+        loop {
+            let operation = match self.peek() {
+                Some('+') => Binary::Add,
+                Some('-') => Binary::Subtract,
+                _ => return Ok(()),
+            };
+            self.at += 1;
+            self.product()?;
+            self.push(Step::Binary(operation))?;
+        }
+    }
+
+    /// Factors with `*` and `/` between them.
+    fn product(&mut self) -> Parsed {
+        self.signed()?;
+        loop {
+            let operation = match self.peek() {
+                Some('*') => Binary::Multiply,
+                Some('/') => Binary::Divide,
+                _ => return Ok(()),
+            };
+            self.at += 1;
+            self.signed()?;
+            self.push(Step::Binary(operation))?;
+        }
+    }
+
+    /// A power with its sign, which applies last: -x^2 = -(x^2). Every nesting passes here.
+    fn signed(&mut self) -> Parsed {
+        self.depth += 1;
+        if self.depth > DEEPEST {
+            return Err(self.error(self.at, Fault::TooDeep));
+        }
+        if self.take("-") {
+            self.signed()?;
+            self.push(Step::Unary(Unary::Negate))?;
+        } else if self.take("+") {
+            self.signed()?;
+        } else {
+            self.atom()?;
+            // To the right first: x^y^z = x^(y^z).
+            if self.take("^") || self.take("**") {
+                self.signed()?;
+                self.push(Step::Binary(Binary::Power))?;
+            }
+        }
+        self.depth -= 1;
+        Ok(())
+    }
+
+    fn atom(&mut self) -> Parsed {
+        match self.peek() {
+            Some('(') => {
+                self.at += 1;
+                self.sum()?;
+                self.close()
+            }
+            Some(c) if c.is_ascii_digit() || c == '.' => self.number(),
+            Some(c) if c.is_alphabetic() || c == '_' => self.name(),
+            _ => Err(self.unexpected("a number, a name or `(`")),
+        }
+    }
+
+    fn close(&mut self) -> Parsed {
+        match self.take(")") {
+            true => Ok(()),
+            false => Err(self.unexpected("an operator or `)`")),
+        }
+    }
+
+    fn number(&mut self) -> Parsed {
+        let rest = &self.text[self.at..];
+        let digits = |from: usize| {
+            let tail = rest[from..].bytes();
+            from + tail.take_while(u8::is_ascii_digit).count()
+        };
+        let mut end = digits(0);
+        if rest[end..].starts_with('.') {
+            end = digits(end + 1);
+        }
+        if rest[end..].starts_with(['e', 'E']) {
+            let sign = usize::from(rest[end + 1..].starts_with(['+', '-']));
+            let exponent = digits(end + 1 + sign);
+            // Without digits it is no exponent.
+            if exponent > end + 1 + sign {
+                end = exponent;
+            }
+        }
+        match rest[..end].parse::<f64>() {
+            Ok(value) if value.is_finite() => {
+                self.at += end;
+                self.push(Step::Constant(value))?;
+                self.unit()
+            }
+            _ => Err(self.error(self.at, Fault::NoNumber)),
+        }
+    }
+
+    /// The unit of the number before, if there is one.
+    fn unit(&mut self) -> Parsed {
+        self.peek();
+        let Some((length, size)) = (self.unit)(&self.text[self.at..]) else {
+            return Ok(());
+        };
+        self.at += length;
+        self.push(Step::Variable(size))?;
+        self.push(Step::Binary(Binary::Multiply))?;
+        match self.peek() {
+            Some('^') => Err(self.unexpected("an operator other than a power")),
+            _ => Ok(()),
+        }
+    }
+
+    /// A variable, a constant or a call. A name may contain dots.
+    fn name(&mut self) -> Parsed {
+        let (start, rest) = (self.at, &self.text[self.at..]);
+        let end = rest
+            .find(|c: char| !(c.is_alphanumeric() || c == '_' || c == '.'))
+            .unwrap_or(rest.len());
+        let name = &rest[..end];
+        self.at += end;
+        let row = FUNCTIONS.iter().find(|row| row.0 == name);
+        if self.take("(") {
+            let Some(&(function, call, smooth)) = row else {
+                return Err(self.unknown(start, name, true));
+            };
+            if !smooth {
+                self.kink = Some(function);
+            }
+            return self.arguments(start, function, call);
+        }
+        if let Some(index) = (self.variable)(name) {
+            return self.push(Step::Variable(index));
+        }
+        match (CONSTANTS.iter().find(|row| row.0 == name), row) {
+            (Some(&(_, value)), _) => self.push(Step::Constant(value)),
+            (None, Some(&(function, ..))) => Err(self.error(start, Fault::NotCalled(function))),
+            (None, None) => Err(self.unknown(start, name, false)),
+        }
+    }
+
+    fn unknown(&self, at: usize, name: &str, called: bool) -> ExpressionError {
+        let functions = FUNCTIONS.iter().map(|row| row.0);
+        let near = if called {
+            nearest_name(name, functions)
+        } else {
+            let constants = CONSTANTS.iter().map(|row| row.0);
+            nearest_name(name, self.names.iter().copied().chain(constants))
+        };
+        let (name, near) = (name.to_owned(), near.map(str::to_owned));
+        self.error(at, Fault::Unknown { name, near, called })
+    }
+
+    fn arguments(&mut self, start: usize, function: &'static str, call: Call) -> Parsed {
+        let (wanted, step) = match call {
+            Call::One(operation) => (1, Step::Unary(operation)),
+            Call::Two(operation) => (2, Step::Binary(operation)),
+        };
+        let wrong = self.error(start, Fault::Arguments { function, wanted });
+        if self.peek() == Some(')') {
+            return Err(wrong);
+        }
+        self.sum()?;
+        for _ in 1..wanted {
+            if !self.take(",") {
+                return Err(match self.peek() {
+                    Some(')') => wrong,
+                    _ => self.unexpected("an operator or `,`"),
+                });
+            }
+            self.sum()?;
+        }
+        if self.peek() == Some(',') {
+            return Err(wrong);
+        }
+        self.close()?;
+        self.push(step)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<Program, ExpressionError> {
+        let names = ["t", "arm.length"];
+        Program::parse(
+            text,
+            |name| names.iter().position(|known| *known == name),
+            &names,
+        )
+    }
+
+    fn value(text: &str) -> f64 {
+        parse(text).expect(text).eval(&[0.5, 3.0])
+    }
+
+    #[test]
+    fn precedence_and_association_are_those_of_mathematics() {
+        for (text, expected) in [
+            ("1 + 2 * 3", 7.0),
+            ("7 - 2 - 1", 4.0),
+            ("8 / 4 / 2", 1.0),
+            ("2 ^ 3 ^ 2", 512.0),
+            ("2 ** 3", 8.0),
+            ("2 * 3 ** 2", 18.0),
+            ("-2 ^ 2", -4.0),
+            ("2 ^ -1", 0.5),
+            ("2 - -3", 5.0),
+            ("-(1 + t) * 2", -3.0),
+            ("arm.length * t", 1.5),
+            ("1.5e+1 + .5 + 2.", 17.5),
+            ("2e3", 2000.0),
+            ("atan2(1, 1) * 4", std::f64::consts::PI),
+            ("max(min(1, 2), pow(2, 3))", 8.0),
+            ("sin(pi / 2) + ln(e)", 2.0),
+            ("smoothstep(t)", 0.5),
+            ("abs(-t)", 0.5),
+        ] {
+            assert_eq!(value(text), expected, "{text}");
+        }
+        let by_hand = 10.0 * libm::sin(2.0 * std::f64::consts::PI * 3.0 * 0.5) * libm::exp(-0.25);
+        assert_eq!(value("10 * sin(2*pi*3*t) * exp(-t/2)"), by_hand);
+    }
+
+    #[test]
+    fn constants_are_evaluated_beforehand() {
+        assert_eq!(parse("2*pi*3 * t").unwrap().steps.len(), 3);
+        assert!(parse("t").unwrap().uses(0) && !parse("1 + arm.length").unwrap().uses(0));
+    }
+
+    #[test]
+    fn every_function_runs_and_kinks_are_known() {
+        for (name, call, smooth) in FUNCTIONS {
+            let text = match call {
+                Call::One(_) => format!("{name}(t)"),
+                Call::Two(_) => format!("{name}(t, 2)"),
+            };
+            let program = parse(&text).expect(&text);
+            assert!(program.eval(&[0.5, 3.0]).is_finite(), "{text}");
+            assert_eq!(program.kink().is_none(), smooth, "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_wrong_is_named_with_its_byte() {
+        for (text, at, message) in [
+            ("", 0, "ends where a number, a name or `(` should follow"),
+            ("1 +", 3, "ends where a number, a name or `(` should follow"),
+            ("(1 + t", 6, "ends where an operator or `)` should follow"),
+            ("1 2", 2, "`2` where an operator should stand"),
+            ("2t", 1, "`t` where an operator should stand"),
+            ("3 * é", 4, "no variable `é`"),
+            ("3 $ t", 2, "`$` where an operator should stand"),
+            ("sin t", 0, "`sin` is a function"),
+            ("sqr(t)", 0, "no function `sqr` (did you mean `sqrt`?)"),
+            (
+                "2 * arm.lenght",
+                4,
+                "no variable `arm.lenght` (did you mean `arm.length`?)",
+            ),
+            ("1 + sin(t, 2)", 4, "`sin` takes one argument"),
+            ("atan2(t)", 0, "`atan2` takes 2 arguments"),
+            ("cos()", 0, "`cos` takes one argument"),
+            ("1e999", 0, "no finite number"),
+            (".", 0, "no finite number"),
+        ] {
+            let error = parse(text).expect_err(text);
+            assert_eq!(error.at, at, "{text}: {error}");
+            assert!(error.to_string().starts_with(message), "{text}: {error}");
+        }
+    }
+
+    #[test]
+    fn depth_and_length_are_bounded() {
+        let fault = |text: String| parse(&text).expect_err("refused").fault;
+        assert_eq!(fault("(".repeat(3000)), Fault::TooDeep);
+        assert_eq!(fault("-".repeat(3000)), Fault::TooDeep);
+        assert_eq!(fault("t^".repeat(1500)), Fault::TooDeep);
+        assert_eq!(fault("t+(".repeat(40)), Fault::TooDeep);
+        assert_eq!(fault(" ".repeat(5000)), Fault::TooLong);
+        // A long sum is not deep.
+        assert_eq!(value(&vec!["t"; 1900].join("+")), 950.0);
+        let nested = format!("{}t{}", "(t+".repeat(30), ")".repeat(30));
+        assert_eq!(value(&nested), 15.5);
+    }
+}

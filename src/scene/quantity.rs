@@ -1,0 +1,160 @@
+//! Numbers with a dimension, as expressions of a scene file compute with them.
+
+use super::expression::{Binary, Number, Unary};
+use super::units::powers;
+use super::{Dimension, format_quantity, si_unit, unit_names};
+
+/// A number with its dimension, or the reason why it has none.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Quantity {
+    value: f64,
+    /// Powers of kg, m, s and rad.
+    powers: Result<[i8; 4], Fault>,
+}
+
+/// Why an operation makes no sense.
+#[derive(Clone, Copy, Debug)]
+enum Fault {
+    /// Sum or comparison of different dimensions.
+    Mixed,
+    /// A function of something that is not a pure number.
+    NotPure,
+    /// A root or power that leaves no whole powers of the units.
+    Power,
+}
+
+impl Quantity {
+    /// `value` in SI units.
+    pub fn new(value: f64, dimension: Dimension) -> Self {
+        Self {
+            value,
+            powers: Ok(powers(dimension)),
+        }
+    }
+
+    /// Its SI value if it has this dimension.
+    ///
+    /// # Errors
+    /// Why it has not, or that it is not finite.
+    pub fn of(self, dimension: Dimension) -> Result<f64, String> {
+        let found = self.powers.map_err(|fault| {
+            match fault {
+                Fault::Mixed => "adds or compares quantities of different dimensions",
+                Fault::NotPure => "takes a function of a quantity that is not a pure number",
+                Fault::Power => "takes a root or a power that no unit has",
+            }
+            .to_owned()
+        })?;
+        if !self.value.is_finite() {
+            return Err("is not a finite number".to_owned());
+        }
+        let wanted = powers(dimension);
+        // Radians come and go in products (omega r, 2 pi f); a bare number for an angle would be a slip.
+        let angle = wanted[..3] != [0; 3] || wanted[3] == found[3] || self.value == 0.0;
+        if found[..3] == wanted[..3] && angle {
+            return Ok(self.value + 0.0);
+        }
+        let unit = unit_of(found);
+        let value = format_quantity(self.value, "");
+        Err(match unit_names(dimension).as_slice() {
+            [] => format!("gives {value} {unit}, but must be a pure number"),
+            units => format!(
+                "gives {value}{}{unit}, which is not in {}; units {}",
+                if unit.is_empty() { "" } else { " " },
+                si_unit(dimension),
+                units.join(", ")
+            ),
+        })
+    }
+}
+
+/// Powers of the base units in words: `kg m s^-2`.
+fn unit_of(powers: [i8; 4]) -> String {
+    let part = |(unit, power): (&str, i8)| match power {
+        0 => None,
+        1 => Some(unit.to_owned()),
+        _ => Some(format!("{unit}^{power}")),
+    };
+    let parts: Vec<String> = ["kg", "m", "s", "rad"]
+        .into_iter()
+        .zip(powers)
+        .filter_map(part)
+        .collect();
+    parts.join(" ")
+}
+
+/// Powers of a sum. Beside other units, radians do not count.
+fn common(a: Quantity, b: Quantity) -> Result<[i8; 4], Fault> {
+    let (of_a, of_b) = (a.powers?, b.powers?);
+    let zero = |q: Quantity, powers: [i8; 4]| q.value == 0.0 && powers == [0; 4];
+    if zero(a, of_a) {
+        return Ok(of_b);
+    }
+    let same = of_a == of_b || of_a[..3] == of_b[..3] && of_a[..3] != [0; 3];
+    (same || zero(b, of_b)).then_some(of_a).ok_or(Fault::Mixed)
+}
+
+/// Powers times `factor`, if whole and small.
+fn scaled(powers: [i8; 4], factor: f64) -> Result<[i8; 4], Fault> {
+    let mut scaled = [0; 4];
+    for (to, power) in scaled.iter_mut().zip(powers) {
+        let value = f64::from(power) * factor;
+        if value != libm::trunc(value) || value.abs() > 100.0 {
+            return Err(Fault::Power);
+        }
+        *to = value as i8;
+    }
+    Ok(scaled)
+}
+
+impl Number for Quantity {
+    fn constant(value: f64) -> Self {
+        Self {
+            value,
+            powers: Ok([0; 4]),
+        }
+    }
+
+    fn unary(self, operation: Unary) -> Self {
+        let pure = |powers: [i8; 4]| match powers[..3] == [0; 3] {
+            true => Ok([0; 4]),
+            false => Err(Fault::NotPure),
+        };
+        let powers = self.powers.and_then(|powers| match operation {
+            Unary::Negate | Unary::Abs => Ok(powers),
+            Unary::Sqrt => scaled(powers, 0.5),
+            Unary::Asin | Unary::Acos | Unary::Atan => pure(powers).map(|_| [0, 0, 0, 1]),
+            _ => pure(powers),
+        });
+        Self {
+            value: self.value.unary(operation),
+            powers,
+        }
+    }
+
+    fn binary(self, operation: Binary, other: Self) -> Self {
+        let each = |combine: fn(i8, i8) -> Option<i8>| {
+            let (a, b) = (self.powers?, other.powers?);
+            let mut powers = [0; 4];
+            for (to, (a, b)) in powers.iter_mut().zip(a.into_iter().zip(b)) {
+                *to = combine(a, b).ok_or(Fault::Power)?;
+            }
+            Ok(powers)
+        };
+        let powers = match operation {
+            Binary::Add | Binary::Subtract | Binary::Min | Binary::Max => common(self, other),
+            Binary::Multiply => each(i8::checked_add),
+            Binary::Divide => each(i8::checked_sub),
+            Binary::Atan2 => common(self, other).map(|_| [0, 0, 0, 1]),
+            Binary::Power => match (self.powers, other.powers) {
+                (Ok(base), Ok([0, 0, 0, 0])) => scaled(base, other.value),
+                (Ok(_), Ok(_)) => Err(Fault::NotPure),
+                (Err(fault), _) | (_, Err(fault)) => Err(fault),
+            },
+        };
+        Self {
+            value: self.value.binary(operation, other.value),
+            powers,
+        }
+    }
+}
