@@ -66,6 +66,19 @@ fn the_counter_counts() {
 }
 
 #[test]
+fn laws_of_drives_allocate_nothing() {
+    let text = include_str!("fuzz/corpus/good-laws.toml");
+    for form in ["tree", "lagrange"] {
+        let changes = [("formulation".to_owned(), form.to_owned())];
+        let scene = Scene::parse(text, None, &changes).unwrap();
+        let mut simulation = Simulation::new(&scene).unwrap();
+        simulation.step().unwrap();
+        let made = allocations(|| simulation.advance_to(0.05).unwrap());
+        assert_eq!(made, 0, "{form}");
+    }
+}
+
+#[test]
 fn steps_samples_and_peaks_allocate_nothing() {
     for name in SCENES {
         for method in METHODS {

@@ -9,6 +9,7 @@ use eframe::egui;
 
 use super::background::Thread;
 use super::host::{Host, OpenedFile, Running, SaveFile};
+use super::saved::Watcher;
 use crate::analysis::task::Job;
 use crate::files::{FileError, OutputFile, publish};
 use crate::scene::{LARGEST_FILE, too_large};
@@ -17,6 +18,7 @@ use crate::scene::{LARGEST_FILE, too_large};
 #[derive(Debug, Default)]
 pub struct DesktopHost {
     opened: VecDeque<OpenedFile>,
+    watcher: Option<Watcher>,
     page: String,
 }
 
@@ -78,6 +80,17 @@ impl Host for DesktopHost {
 
     fn opened(&mut self) -> Option<OpenedFile> {
         self.opened.pop_front()
+    }
+
+    fn watch(&mut self, ctx: &egui::Context, name: Option<&str>) {
+        self.watcher = name.and_then(|name| {
+            let ctx = ctx.clone();
+            Watcher::start(name, move || ctx.request_repaint())
+        });
+    }
+
+    fn saved_elsewhere(&mut self) -> Option<OpenedFile> {
+        self.watcher.as_ref()?.poll()
     }
 
     fn start(&mut self, job: Job) -> Option<Box<dyn Running>> {

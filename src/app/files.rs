@@ -8,6 +8,7 @@ use serde_json::{Map, json};
 use super::dialogs::Dialog;
 use super::host::{Host, SaveFile};
 use super::player::Player;
+use super::reload::SceneFile;
 use super::replay::Verdict;
 use super::share::shown::Instruments;
 use super::share::{Link, SceneText, is_link, shown};
@@ -140,7 +141,11 @@ impl App {
         while let Some(file) = self.host.opened() {
             match file.content {
                 // The reason is shown.
-                Ok(bytes) => drop(self.open_bytes(&file.name, bytes)),
+                Ok(bytes) => {
+                    if self.open_bytes(&file.name, bytes).is_ok() {
+                        self.scene_file = SceneFile::named(Some(file.name));
+                    }
+                }
                 Err(reason) => self.problem = Some(format!("{}: {reason}", file.name)),
             }
         }

@@ -84,6 +84,15 @@ pub trait Host {
     /// The next file that was chosen, or dropped and read.
     fn opened(&mut self) -> Option<OpenedFile>;
 
+    /// Watches the scene file `name` from now on, instead of any other; `None` for none. `ctx` is asked for a repaint when it
+    /// is saved.
+    fn watch(&mut self, _ctx: &egui::Context, _name: Option<&str>) {}
+
+    /// The next content of the watched file. The first may be as it was when the watch began.
+    fn saved_elsewhere(&mut self) -> Option<OpenedFile> {
+        None
+    }
+
     /// Starts a long background computation; `None` if that is not possible.
     fn start(&mut self, _job: Job) -> Option<Box<dyn Running>> {
         None

@@ -32,7 +32,10 @@ mod picture;
 mod player;
 mod plots;
 mod pull;
+mod reload;
 mod replay;
+#[cfg(not(target_arch = "wasm32"))]
+mod saved;
 mod settled;
 mod share;
 mod stack;
@@ -74,6 +77,7 @@ pub use overlay::{force_notes, plate};
 use picture::Picture;
 pub use player::Player;
 pub use plots::{Plots, Window};
+use reload::SceneFile;
 pub use replay::{Replay, Verdict};
 pub use share::{CameraPose, LONGEST_LINK, Link, LinkError, SceneText};
 use timeline::Timeline;
@@ -213,6 +217,8 @@ pub struct App {
     /// Whether the controls are sized for fingers; `None` before the first pass.
     fingers: Option<bool>,
     host: Box<dyn Host>,
+    /// Of a scene that came by a link it is none: a link must not make the program read a file.
+    scene_file: SceneFile,
     replay: Option<Replay>,
     /// A run in progress to a section of a sweep, and whether a twin is to start there.
     load: Option<(Load, bool)>,
@@ -268,6 +274,14 @@ impl App {
             touched: false,
             fingers: None,
             host: Box::new(NoHost),
+            scene_file: SceneFile::named(
+                options
+                    .scene
+                    .source
+                    .file
+                    .clone()
+                    .filter(|_| options.link.is_none()),
+            ),
             replay: None,
             load: None,
             verdict: None,
@@ -401,6 +415,7 @@ impl App {
         let twin = self.player.twin().is_some();
         let pose = self.viewport.pose();
         let same = load.scene.text == self.player.wanted().source.text;
+        let file = self.scene_file.name().map(str::to_owned).filter(|_| same);
         let scene = load.scene.scene().map_err(|error| error.to_string());
         self.problem = scene.and_then(|scene| self.show_scene(&scene)).err();
         if self.problem.is_none() {
@@ -409,6 +424,7 @@ impl App {
             if let Some(pose) = pose.filter(|_| same) {
                 self.viewport.set_pose(pose);
             }
+            self.scene_file = SceneFile::named(file);
             self.load = Some((load, twin));
         }
     }
@@ -436,7 +452,9 @@ impl App {
     /// Opens a built-in scene or a file; on an error the running scene stays and the reason is shown.
     pub fn open(&mut self, argument: &str) -> Result<(), String> {
         let scene = Scene::load(argument, &[]).map_err(|error| error.to_string())?;
-        self.show_scene(&scene)
+        self.show_scene(&scene)?;
+        self.scene_file = SceneFile::named(scene.source.file);
+        Ok(())
     }
 
     /// Opens a link in any of its forms, a built-in scene or a file; on an error the running scene stays.
@@ -557,6 +575,7 @@ impl App {
         player.set_playing(self.player.is_playing() || self.player.stopped().is_some());
         player.set_ideal(self.player.ideal().is_some());
         self.player = player;
+        self.scene_file = SceneFile::default();
         self.viewport.show_scene(&self.player);
         self.timeline.reset();
         self.plots.reset();
@@ -732,6 +751,7 @@ impl eframe::App for App {
             self.act(ctx, action);
         }
         self.receive_files(ctx);
+        self.receive_saved_scene(ctx);
         self.receive_links(ctx);
         self.receive_picture(ctx);
         let measuring = self.accuracy.update(self.host.as_mut());

@@ -401,12 +401,22 @@ impl Player {
 
     /// Pauses and runs on until `time`, s, however long that takes: the start of a headless frame.
     pub fn run_to(&mut self, time: f64) {
+        self.run_towards(time, || true);
+    }
+
+    /// The same while `may_step`; whether it went so far, or as far as the run goes.
+    pub fn run_towards(&mut self, time: f64, mut may_step: impl FnMut() -> bool) -> bool {
         self.set_playing(false);
         self.go_on();
-        while self.simulation.time() < time && self.stopped.is_none() {
-            self.step();
+        let mut goes = true;
+        while goes && self.simulation.time() < time && self.stopped.is_none() {
+            goes = may_step();
+            if goes {
+                self.step();
+            }
         }
         self.show(time);
+        goes
     }
 
     /// Displays `time`, s, limited to what is left of the latest step: this never goes back.

@@ -358,8 +358,15 @@ impl Link {
     /// As [`Self::format`], short enough to pass on; with a note where something had to be left out.
     ///
     /// # Errors
-    /// A scene file that is too large to travel in a link, in words.
+    /// A scene file that is too large to travel in a link, or that names other files, in words.
     pub fn format_short(&self, wanted: &Scene) -> Result<(String, Option<String>), String> {
+        if let Some(name) = wanted.source.beside.keys().next() {
+            return Err(format!(
+                "The scene reads the file {}, which a link does not carry. Write what it holds into the scene file, or pass \
+                 both files on instead",
+                visible_line(name)
+            ));
+        }
         let whole = self.format();
         if whole.len() <= LONGEST_LINK {
             return Ok((whole, None));

@@ -26,7 +26,7 @@ pub enum Command {
     /// List the built-in scenes.
     Scenes,
     /// Say what a scene contains, what will be computed and what will not.
-    Check(SceneArguments),
+    Check(CheckArguments),
     /// Simulate without a window and write rows at equal intervals.
     Run(RunArguments),
     /// Draw frames without a window.
@@ -55,10 +55,21 @@ pub struct SceneArguments {
     pub changes: Vec<(String, String)>,
 }
 
+/// `check`.
+#[derive(Debug, Args)]
+pub struct CheckArguments {
+    /// Scene.
+    #[command(flatten)]
+    pub scene: SceneArguments,
+    /// List instead every channel that `run --channels` can write: name, unit, column, and what it is.
+    #[arg(long)]
+    pub channels: bool,
+}
+
 /// `view`.
 #[derive(Debug, Args)]
 pub struct ViewArguments {
-    /// Name of a built-in scene, or a file (contains `/` or ends in `.toml`).
+    /// Name of a built-in scene, or a file (contains `/` or ends in `.toml`), which is shown again whenever it is saved.
     #[arg(default_value = super::DEFAULT_SCENE)]
     pub scene: OsString,
     /// Change a parameter, e.g. `contact.clearance=0.5mm`; may be repeated, the last wins.
@@ -80,7 +91,7 @@ pub struct RunArguments {
     /// Scene.
     #[command(flatten)]
     pub scene: SceneArguments,
-    /// Simulated time, e.g. `20ms`.
+    /// Simulated time at the end, e.g. `20ms`, counted from the start of the run also with --from-state.
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     pub duration: String,
     /// Interval between rows, e.g. `0.1ms`; the first row is at 0.
@@ -94,6 +105,16 @@ pub struct RunArguments {
     /// File to write; its ending chooses the format: .csv, .json or .npz.
     #[arg(long, value_name = "FILE", requires = "every")]
     pub out: Option<PathBuf>,
+    /// Write the time and these channels alone, e.g. `S1.force,rod1.pose,*.actuator`; `*` stands for any characters, `?` for
+    /// one, and a name without its last parts for all that begin with it; may be repeated. `jointplay check SCENE
+    /// --channels` lists them.
+    #[arg(
+        long,
+        value_name = "PATTERN,…",
+        value_delimiter = ',',
+        requires = "out"
+    )]
+    pub channels: Vec<String>,
     /// File for one row per finished impact, with its effective restitution: .csv, .json or .npz.
     #[arg(long, value_name = "FILE")]
     pub impacts: Option<PathBuf>,
@@ -101,6 +122,12 @@ pub struct RunArguments {
     /// impulse and the friction work: .csv, .json or .npz.
     #[arg(long, value_name = "FILE")]
     pub wear: Option<PathBuf>,
+    /// File for the state at the end, from which --from-state goes on, with the same bits as a run without a break.
+    #[arg(long, value_name = "FILE")]
+    pub save_state: Option<PathBuf>,
+    /// Go on from a state that --save-state wrote, in the same scene with the same --set. Rows begin at its time.
+    #[arg(long, value_name = "FILE")]
+    pub from_state: Option<PathBuf>,
     /// Form of the summary on standard output.
     #[arg(long, value_enum, value_name = "FORM", default_value = "text")]
     pub summary: SummaryForm,

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::args::SceneArguments;
+use super::args::CheckArguments;
 use super::assembly::Start;
 use super::output::significant;
 use super::summary::count;
@@ -11,21 +11,48 @@ use crate::contact::FrictionLaw;
 use crate::integrate::Method;
 use crate::mechanism::Summary;
 use crate::scene::{BallJoint, Formulation, JointKind, Scene};
-use crate::simulate::{Frame, LARGEST_IMPLICIT, Simulation};
+use crate::simulate::{Frame, LARGEST_IMPLICIT, Listed, Simulation, channels_of};
 
 /// Runs `check`.
 ///
 /// # Errors
 /// Anything wrong with the scene, a start that does not close included.
-pub fn check(arguments: &SceneArguments) -> Result<(), Failure> {
-    let scene = load(arguments)?;
+pub fn check(arguments: &CheckArguments) -> Result<(), Failure> {
+    let scene = load(&arguments.scene)?;
     // Starting the scene finds what parsing cannot: joints that do not close, rods that do not reach.
     let mut simulation = start(&scene)?;
     let begun = Start::of(&mut simulation);
     let mut frame = Frame::default();
     simulation.sample(0.0, &mut frame);
+    if arguments.channels {
+        return print(&channels(&channels_of(&scene, &frame)));
+    }
     let contents = simulation.mechanism().summary();
     print(&report(&scene, &contents, &begun, &frame)?)
+}
+
+/// The channels of a scene, a line each: name, unit, column, what it is.
+fn channels(all: &[Listed]) -> String {
+    let width = |of: fn(&Listed) -> usize| all.iter().map(of).max().unwrap_or_default();
+    let name = width(|channel| channel.name.len());
+    let column = width(|channel| channel.column.len());
+    let mut out = String::new();
+    for (unasked, title) in [
+        (true, "Written without --channels"),
+        (false, "Written if asked for"),
+    ] {
+        // Writing to a String cannot fail.
+        let _ = writeln!(out, "{title}:");
+        for channel in all.iter().filter(|channel| channel.unasked == unasked) {
+            let Listed { unit, help, .. } = channel;
+            let _ = writeln!(
+                out,
+                "  {:<name$}  {unit:<6}  {:<column$}  {help}",
+                channel.name, channel.column
+            );
+        }
+    }
+    out
 }
 
 fn is_ideal(joint: &BallJoint) -> bool {

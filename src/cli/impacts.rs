@@ -31,6 +31,10 @@ const COLUMNS: [&str; 14] = [
 pub struct ImpactsFile {
     file: RowsFile,
     impacts: Vec<Impact>,
+    /// Those that ended before this time, s, are another run's.
+    since: f64,
+    /// Of the latest step.
+    latest: Vec<Impact>,
 }
 
 impl ImpactsFile {
@@ -42,12 +46,22 @@ impl ImpactsFile {
         Ok(Self {
             file: RowsFile::claim(path, force)?,
             impacts: Vec::new(),
+            since: 0.0,
+            latest: Vec::new(),
         })
+    }
+
+    /// Collects only impacts that end at `time`, s, or later.
+    pub fn begin_at(&mut self, time: f64) {
+        self.since = time;
     }
 
     /// Collects the impacts finished since the last call; to be called after every step.
     pub fn collect(&mut self, simulation: &mut Simulation) {
-        simulation.take_impacts(&mut self.impacts);
+        self.latest.clear();
+        simulation.take_impacts(&mut self.latest);
+        let own = self.latest.iter().filter(|impact| impact.end >= self.since);
+        self.impacts.extend(own);
     }
 
     /// All impacts so far, in the order in which they finished.

@@ -21,6 +21,7 @@ mod quantity;
 mod render;
 pub mod reproduce;
 mod run;
+mod state;
 mod summary;
 #[cfg(test)]
 mod survival;

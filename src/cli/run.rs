@@ -1,7 +1,7 @@
 //! `run`: simulate without a window and write rows at equal intervals.
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use indicatif::ProgressBar;
@@ -10,10 +10,12 @@ use serde_json::{Value as Json, json};
 use super::args::{RunArguments, SummaryForm};
 use super::assembly::Start;
 use super::impacts::ImpactsFile;
-use super::output::{NoRow, RowsFile, Table, check_distinct, check_size};
-use super::summary::{self, Status};
+use super::output::{NoRow, RowsFile, Table, check_distinct, check_size, significant};
+use super::state::{self, Begun, StateFile};
+use super::summary::{self, Status, Stepping};
 use super::{Failure, interrupt, load, print, progress, quantity, start, warn, wear};
 use crate::files::{FileError, publish};
+use crate::scene::Scene;
 use crate::simulate::{Frame, Simulation};
 
 /// Steps between two checks of the clock, the progress bar and Ctrl-C.
@@ -56,6 +58,20 @@ impl Times {
         (k as f64 * self.every).min(self.duration)
     }
 
+    /// The first row at `from`, s, or later, and not before the state at `time`.
+    fn first(&self, from: f64, time: f64) -> u64 {
+        let from = time.max(from * (1.0 - 1e-9));
+        let mut k = (from / self.every) as u64;
+        // The division rounds.
+        while k > 0 && self.at(k - 1) >= from {
+            k -= 1;
+        }
+        while k <= self.last && self.at(k) < from {
+            k += 1;
+        }
+        k
+    }
+
     /// Whether the last row lies at the end of the run.
     fn reach_the_end(&self) -> bool {
         self.duration - self.at(self.last) <= 1e-9 * self.duration
@@ -89,6 +105,12 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     ] {
         names.extend(path.iter().flat_map(|path| RowsFile::names(option, path)));
     }
+    for (option, path) in [
+        ("--save-state", &arguments.save_state),
+        ("--from-state", &arguments.from_state),
+    ] {
+        names.extend(path.iter().map(|path| (option.to_owned(), path.clone())));
+    }
     check_distinct(&names)?;
     let file = match &arguments.out {
         Some(path) => Some(RowsFile::claim(path, arguments.force)?),
@@ -102,15 +124,37 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         Some(path) => Some(RowsFile::claim(path, arguments.force)?),
         None => None,
     };
+    let mut state = match &arguments.save_state {
+        Some(path) => Some(StateFile::claim(path, arguments.force)?),
+        None => None,
+    };
     let scene = load(&arguments.scene)?;
     let mut simulation = start(&scene)?;
     let begun = Start::of(&mut simulation);
     let mut frame = Frame::default();
+    // The columns are those of the start, also of a run that goes on.
     simulation.sample(0.0, &mut frame);
-    if wear.is_some() {
+    let from = match &arguments.from_state {
+        Some(path) => go_on(&mut simulation, path, &scene, duration)?,
+        None => 0.0,
+    };
+    if let Some(impacts) = &mut impacts {
+        impacts.begin_at(from);
+    }
+    let wear_begins = wear.is_some() && simulation.wear().is_none();
+    if wear_begins {
         simulation.keep_wear();
     }
-    let mut table = Table::new(&scene, &frame);
+    let mut table = if arguments.channels.is_empty() {
+        Table::new(&scene, &frame)
+    } else {
+        Table::of_channels(&scene, &frame, &arguments.channels).map_err(|error| {
+            Failure::usage(format!(
+                "--channels: {error}; `jointplay check {} --channels` lists them",
+                PathBuf::from(&arguments.scene.scene).display()
+            ))
+        })?
+    };
     if let (Some(times), Some(file)) = (&times, &file) {
         check_size(times.last.saturating_add(1), table.names().len())?;
         table.spool_beside(file.target())?;
@@ -120,6 +164,9 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
             warn(
                 "the duration is not a whole number of intervals: the last row lies before the end",
             );
+        }
+        if wear_begins && arguments.from_state.is_some() {
+            warn("the wear map begins at the saved state, which has none");
         }
         let warnings = scene.warnings().into_iter().map(|w| w.to_string());
         warnings
@@ -132,10 +179,13 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     let mut stopwatch = Duration::ZERO;
     let end = simulate(
         &mut simulation,
-        duration,
+        (from, duration),
         times,
         &mut table,
-        impacts.as_mut(),
+        &mut Keepers {
+            impacts: impacts.as_mut(),
+            state: state.as_mut(),
+        },
         &mut frame,
         &mut stopwatch,
         &progress,
@@ -149,10 +199,11 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         (Err(error), None) => return Err(Failure::io(error.to_string())),
     };
     let wall = stopwatch.as_secs_f64();
+    let stepping = Stepping { from, wall };
 
     let found = impacts.as_ref().map(ImpactsFile::impacts);
-    let mut facts = summary::json(&simulation, end.status, wall, found);
-    let mut text = summary::text(&simulation, end.status, wall, found);
+    let mut facts = summary::json(&simulation, end.status, stepping, found);
+    let mut text = summary::text(&simulation, end.status, stepping, found);
     begun.describe(&mut facts, &mut text);
     let fault = simulation.probe_fault();
     if let Some(fault) = &fault {
@@ -167,6 +218,11 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         json!(fault.map(|fault| fault.to_string())),
     );
     facts.insert("rows".into(), json!(table.len()));
+    if let Some(path) = &arguments.from_state {
+        let words = format!("{} s, from {}", significant(from, 9), path.display());
+        summary::line(&mut text, "Went on at", &words);
+        facts.insert("from_time_s".into(), json!(from));
+    }
     let mut meta = facts.clone();
     // Files of the same run are the same, byte for byte: the machine's speed is left out.
     meta.shift_remove("wall_s");
@@ -180,6 +236,9 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         let path = file.target().path().to_owned();
         let mut meta = meta.clone();
         meta.insert("every_s".into(), json!(times.every));
+        if !arguments.channels.is_empty() {
+            meta.insert("channels".into(), json!(arguments.channels));
+        }
         meta.insert(
             "contact_states".into(),
             json!({"0": "free", "1": "stick", "2": "slip", "3": "ideal"}),
@@ -201,29 +260,73 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         facts.insert("wear_out".into(), json!(path.display().to_string()));
         summary::written(&mut text, rows, "cell", path);
     }
+    let mut failure = end.failure;
+    if let (Some(state), Some(path)) = (state, &arguments.save_state) {
+        // A run that was stopped would be stopped again.
+        if end.status != Status::Diverged {
+            match state.text(&simulation) {
+                Ok(content) => {
+                    files.push(state.fill(&content)?);
+                    facts.insert("state_out".into(), json!(path.display().to_string()));
+                    summary::line(&mut text, "State", &path.display().to_string());
+                }
+                // The rows are worth having without it.
+                Err(error) => failure = failure.or(Some(error)),
+            }
+        }
+    }
     publish(files)?;
     match arguments.summary {
         SummaryForm::Text => print(&text)?,
         SummaryForm::Json => print(&format!("{:#}\n", Json::Object(facts)))?,
     }
-    end.failure.map_or(Ok(()), Err)
+    failure.map_or(Ok(()), Err)
 }
 
-/// Steps to `duration` and fills `table`; `stopwatch` runs only while the simulation steps.
+/// Puts `simulation`, which has just started, into the state of the file `path`; returns the time from which it goes on, s.
+///
+/// # Errors
+/// As [`state::read`]; a `duration`, s, that is over by then.
+fn go_on(
+    simulation: &mut Simulation,
+    path: &Path,
+    scene: &Scene,
+    duration: f64,
+) -> Result<f64, Failure> {
+    let Begun { state, time } = state::read(path, scene)?;
+    if duration < time {
+        return Err(Failure::usage(format!(
+            "--duration {duration} s lies before the {time} s of --from-state {}: it counts from the start of the run",
+            path.display()
+        )));
+    }
+    simulation
+        .go_on_from(&state)
+        .map_err(|misfit| Failure::usage(format!("--from-state {}: {misfit}", path.display())))?;
+    Ok(time)
+}
+
+/// What looks at the simulation around every step.
+struct Keepers<'a> {
+    impacts: Option<&'a mut ImpactsFile>,
+    state: Option<&'a mut StateFile>,
+}
+
+/// Steps to `duration` and fills `table` with the rows at `from` and later; `stopwatch` runs only while the simulation steps.
 ///
 /// # Errors
 /// The disk that takes the rows.
 fn simulate(
     simulation: &mut Simulation,
-    duration: f64,
+    (from, duration): (f64, f64),
     times: Option<Times>,
     table: &mut Table,
-    mut impacts: Option<&mut ImpactsFile>,
+    keepers: &mut Keepers<'_>,
     frame: &mut Frame,
     stopwatch: &mut Duration,
     progress: &ProgressBar,
 ) -> io::Result<End> {
-    let mut next = 0;
+    let mut next = times.map_or(0, |times| times.first(from, simulation.time()));
     loop {
         // Rows that lie in the latest step (initially: the row at 0).
         if let Some(times) = times {
@@ -270,7 +373,7 @@ fn simulate(
             .filter(|times| next <= times.last)
             .map_or(duration, |times| times.at(next));
         let started = Instant::now();
-        let outcome = step_some(simulation, row, duration, impacts.as_deref_mut());
+        let outcome = step_some(simulation, row, duration, keepers);
         *stopwatch += started.elapsed();
         if let Err(stopped) = outcome {
             return Ok(End {
@@ -286,14 +389,17 @@ fn step_some(
     simulation: &mut Simulation,
     row: f64,
     duration: f64,
-    mut impacts: Option<&mut ImpactsFile>,
+    keepers: &mut Keepers<'_>,
 ) -> Result<(), crate::simulate::Stopped> {
     for _ in 0..STEPS_BETWEEN_LOOKS {
         if simulation.time() >= row {
             break;
         }
+        if let Some(state) = &mut keepers.state {
+            state.watch(simulation, duration);
+        }
         simulation.step_until(duration)?;
-        if let Some(impacts) = &mut impacts {
+        if let Some(impacts) = &mut keepers.impacts {
             impacts.collect(simulation);
         }
     }
@@ -324,6 +430,15 @@ mod tests {
             assert_eq!(times.last + 1, rows, "{duration} by {every}");
             assert!(times.at(times.last) <= duration, "{duration} by {every}");
         }
+        let times = Times::new(0.7, 0.1).unwrap();
+        assert_eq!(
+            [0.0, 0.05, 0.1, 0.3, 0.7].map(|from| times.first(from, 0.0)),
+            [0, 1, 1, 3, 7]
+        );
+        assert_eq!(
+            [0.3, 0.35, 0.71].map(|time| times.first(0.3, time)),
+            [3, 4, 8]
+        );
         assert!(Times::new(0.7, 0.1).unwrap().reach_the_end());
         assert!(Times::new(0.0, 0.1).unwrap().reach_the_end());
         assert!(!Times::new(1.0, 0.3).unwrap().reach_the_end());

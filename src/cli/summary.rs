@@ -25,11 +25,27 @@ pub enum Status {
 
 words! { Status { Done => "done", Interrupted => "interrupted", Diverged => "diverged" } }
 
+/// What the stepping took.
+#[derive(Clone, Copy, Debug)]
+pub struct Stepping {
+    /// Simulated time at which it began, s.
+    pub from: f64,
+    /// Seconds of it.
+    pub wall: f64,
+}
+
+impl Stepping {
+    /// Simulated seconds per second up to the simulated time `time`; `None` if no time was spent.
+    fn ratio(self, time: f64) -> Option<f64> {
+        (self.wall > 0.0).then(|| (time - self.from) / self.wall)
+    }
+}
+
 /// The summary as JSON: provenance, then results; `impacts` if all of them were collected.
 pub fn json(
     simulation: &Simulation,
     status: Status,
-    wall: f64,
+    stepping: Stepping,
     impacts: Option<&[Impact]>,
 ) -> Map<String, Json> {
     let scene = simulation.scene();
@@ -56,9 +72,9 @@ pub fn json(
         "peak_time_s": by_joint(&|i| json!(simulation.peak(i).1)),
         "constraint_drift_m": statistics.constraint_drift,
         "doubts": simulation.doubts().iter().map(ToString::to_string).collect::<Vec<_>>(),
-        "wall_s": wall,
-        "ratio": ratio(time, wall),
-        "slower_than_asked": slower_than_asked(scene, ratio(time, wall)),
+        "wall_s": stepping.wall,
+        "ratio": stepping.ratio(time),
+        "slower_than_asked": slower_than_asked(scene, stepping.ratio(time)),
         "state_hash": hash_text(simulation.state_hash()),
     });
     if let Json::Object(own) = own {
@@ -97,7 +113,7 @@ fn energy(ledger: &Ledger) -> Json {
 pub fn text(
     simulation: &Simulation,
     status: Status,
-    wall: f64,
+    stepping: Stepping,
     impacts: Option<&[Impact]>,
 ) -> String {
     let scene = simulation.scene();
@@ -187,8 +203,8 @@ pub fn text(
     for doubt in simulation.doubts() {
         line("Not trusted", doubt.to_string());
     }
-    let ratio = ratio(time, wall);
-    let mut speed = format!("{wall:.3} s of stepping");
+    let ratio = stepping.ratio(time);
+    let mut speed = format!("{:.3} s of stepping", stepping.wall);
     if let Some(ratio) = ratio {
         speed += &format!(", {} times real time", significant(ratio, 3));
     }
@@ -219,11 +235,6 @@ pub fn count(number: u64, what: &str) -> String {
     format!("{number} {what}{plural}")
 }
 
-/// Simulated seconds per second; `None` if no time was spent.
-fn ratio(time: f64, wall: f64) -> Option<f64> {
-    (wall > 0.0).then(|| time / wall)
-}
-
 /// Whether real time was requested, by the preset of that name, and not reached.
 fn slower_than_asked(scene: &Scene, ratio: Option<f64>) -> bool {
     scene.solver.preset == Some(Preset::RealTime) && ratio.is_some_and(|ratio| ratio < 1.0)
@@ -249,9 +260,10 @@ mod tests {
             let mut simulation = Simulation::new(&scene).unwrap();
             simulation.advance_to(1e-3).unwrap();
             for (wall, said) in [(1.0, slow), (1e-9, false)] {
-                let text = text(&simulation, Status::Done, wall, None);
+                let stepping = Stepping { from: 0.0, wall };
+                let text = text(&simulation, Status::Done, stepping, None);
                 assert_eq!(text.contains("slower than"), said, "{text}");
-                let facts = json(&simulation, Status::Done, wall, None);
+                let facts = json(&simulation, Status::Done, stepping, None);
                 assert_eq!(facts["slower_than_asked"], said);
             }
         }

@@ -58,7 +58,7 @@ fn check(before: &[&str], line: &str) {
 #[test]
 fn rows_and_impacts_survive_in_every_format() {
     let run = "run pendulum --duration 30ms --every 3ms --quiet";
-    let all = "--out @/a.csv --impacts @/b.csv --wear @/c.csv";
+    let all = "--out @/a.csv --impacts @/b.csv --wear @/c.csv --save-state @/d";
     check(&[], &format!("{run} {all}"));
     let old = format!("{run} --set contact.friction=0.3 --out @/a.csv --impacts @/b.csv");
     check(

@@ -4,10 +4,12 @@
 //! the damping term is chi itself; once it falls, the maximum stays. A step across an instant at which the rate passes the
 //! maximum is only of order 1, so a stepper that locates corners keeps to one piece over a whole step.
 
+use serde::{Deserialize, Serialize};
+
 use super::Coefficients;
 
 /// Active piece of that rule.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ApproachPiece {
     /// The whole rule: for the approach speed at the start, and for steppers that do not locate corners.
     #[default]

@@ -1,9 +1,11 @@
 //! What a contact remembers between steps: part of the state.
 
+use serde::{Deserialize, Serialize};
+
 use super::{ApproachPiece, Coefficients, FrictionPiece};
 
 /// Contact memory of one joint.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Memory {
     /// In contact.
     pub active: bool,

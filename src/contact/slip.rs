@@ -3,10 +3,12 @@
 //! A step across a corner is only of order 1. A stepper that locates corners keeps to one piece over a whole step, finds
 //! where the sliding speed leaves it, and continues from there with the next.
 
+use serde::{Deserialize, Serialize};
+
 use super::Coefficients;
 
 /// Active piece of the friction law (21).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum FrictionPiece {
     /// The whole law, corners included: for steppers that do not locate them.
     #[default]

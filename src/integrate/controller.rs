@@ -1,7 +1,9 @@
 //! Step-size control (Hairer, Nørsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed., II.4).
 
+use serde::{Deserialize, Serialize};
+
 /// Proportional-integral controller of an adaptive stepper.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Controller {
     /// Order of the error estimate plus one.
     exponent: f64,

@@ -4,6 +4,8 @@
 //! Unlike a linearly implicit method it iterates: with a stiff contact on a curved path, a linearised step ends off the
 //! contact by (h v)^2 / (2 L), which is more than a settled penetration at steps of a millisecond.
 
+use serde::{Deserialize, Serialize};
+
 use super::StiffSystem;
 use std::ops::Range;
 
@@ -53,7 +55,7 @@ const MOST_ITERATIONS: u32 = 7;
 
 /// The latest step's collocation polynomial: the interpolant of that step and the starting guess for the next, so it is
 /// part of what a snapshot needs.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Polynomial {
     /// Step size, s; 0 if there is none.
     h: f64,
@@ -63,6 +65,13 @@ pub struct Polynomial {
     z: [Vec<f64>; 3],
     /// theta / (1 - theta) of the latest iteration that gave an estimate of its contraction rate theta.
     contraction: f64,
+}
+
+impl Polynomial {
+    /// Whether it is one of `dimension` components.
+    pub fn fits(&self, dimension: usize) -> bool {
+        self.z.iter().all(|z| z.len() == dimension)
+    }
 }
 
 /// Radau IIA(5).

@@ -1,6 +1,8 @@
 //! The ball joints of a scene: which of them carry a force, their clearance ramps, their gaps. Allocates nothing. The force
 //! of a single joint is in `elements/contact.rs`.
 
+use serde::{Deserialize, Serialize};
+
 use super::elements::{At, Contact, ForceElement, Gap, Loads, Touching};
 use super::kinematics::Kinematics;
 use super::model::Model;
@@ -8,7 +10,7 @@ use crate::contact::{Coefficients, Parameters};
 use crate::scene::{Scene, Vec3};
 
 /// A clearance that ramps to a new value.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ramp {
     /// Time at which it started, s.
     pub start: f64,

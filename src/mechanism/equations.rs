@@ -31,6 +31,10 @@ pub(super) trait Equations: Send {
     /// Motion prescribed by time.
     fn driven(&self) -> &Driven;
 
+    /// Coordinate of the joint above body `b` and its rate, after an evaluation at `y`: m and m/s, or rad and rad/s; `None`
+    /// if the joint does not slide or turn.
+    fn coordinate(&self, model: &Model, y: &[f64], b: BodyIndex) -> Option<[f64; 2]>;
+
     /// Poses and velocities at (t, y).
     fn update_kinematics(&mut self, model: &Model, t: f64, y: &[f64]);
 

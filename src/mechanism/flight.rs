@@ -1,6 +1,8 @@
 //! Free flight: a free body that nothing but gravity acts on, by the Taylor series of its motion. Between two contacts the
 //! whole motion is then known at the cost of one evaluation, to rounding.
 
+use serde::{Deserialize, Serialize};
+
 use super::kinematics::{part, rotation_of};
 use super::model::{Body, BodyIndex, Motion};
 use super::{Mechanism, Touching};
@@ -67,7 +69,7 @@ impl Flyer {
 }
 
 /// A free body in free flight.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Flight {
     /// When it began and until when the series hold, s.
     start: f64,

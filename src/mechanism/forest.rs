@@ -76,6 +76,14 @@ impl Equations for Forest {
         &self.tree.driven
     }
 
+    fn coordinate(&self, model: &Model, y: &[f64], b: BodyIndex) -> Option<[f64; 2]> {
+        match model.bodies[b].motion {
+            Motion::Driven { drive, .. } => Some(self.tree.driven.coordinate(drive)),
+            Motion::Revolute { q, v } | Motion::Prismatic { q, v } => Some([y[q], y[model.nq + v]]),
+            Motion::Fixed | Motion::Free { .. } => None,
+        }
+    }
+
     fn update_kinematics(&mut self, model: &Model, t: f64, y: &[f64]) {
         self.tree.update_kinematics(model, t, y);
     }

@@ -306,6 +306,12 @@ impl Driven {
         }
     }
 
+    /// Driven coordinate `drive` and its rate at the latest instant.
+    pub fn coordinate(&self, drive: usize) -> [f64; 2] {
+        let Jet { value, rate, .. } = self.coordinates[drive];
+        [value, rate]
+    }
+
     /// Stops moving bodies from now on: their motion is part of the state.
     pub fn only_coordinates(&mut self) {
         self.bodies.clear();

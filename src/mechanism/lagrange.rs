@@ -427,6 +427,17 @@ impl Equations for Lagrange {
         &self.driven
     }
 
+    fn coordinate(&self, model: &Model, _: &[f64], b: BodyIndex) -> Option<[f64; 2]> {
+        match model.bodies[b].motion {
+            Motion::Driven { drive, .. } => Some(self.driven.coordinate(drive)),
+            Motion::Revolute { .. } | Motion::Prismatic { .. } => Some([
+                position_of(model, &self.motion, b),
+                rate_of(model, &self.motion, b),
+            ]),
+            Motion::Fixed | Motion::Free { .. } => None,
+        }
+    }
+
     fn update_kinematics(&mut self, model: &Model, t: f64, y: &[f64]) {
         self.driven.update(model, t, &mut self.motion);
         let n = model.bodies.len();
@@ -652,13 +663,31 @@ impl Equations for Lagrange {
     }
 }
 
-/// Rate of a driven joint from the motion of the two bodies it connects.
+/// Angle, rad, or displacement, m, of a joint from the poses of the two bodies it connects.
+fn position_of(model: &Model, motion: &[Kinematics], b: usize) -> f64 {
+    let body = &model.bodies[b];
+    let (child, parent) = (&motion[b], &motion[body.parent]);
+    match body.motion {
+        Motion::Revolute { .. } => {
+            // The three parts of the relative rotation are orthogonal matrices.
+            let turn = parent.rotation.transpose() * child.rotation;
+            libm::atan2(turn.dot(&body.sine), turn.dot(&body.cosine))
+        }
+        _ => {
+            let at = child.position - child.rotation * body.to_centroid;
+            let from = parent.position + parent.rotation * body.from_parent;
+            (parent.rotation * body.axis).dot(&(at - from))
+        }
+    }
+}
+
+/// Rate of a joint from the motion of the two bodies it connects.
 fn rate_of(model: &Model, motion: &[Kinematics], b: usize) -> f64 {
     let body = &model.bodies[b];
     let (child, parent) = (&motion[b], &motion[body.parent]);
     let axis = parent.rotation * body.axis;
     match body.motion {
-        Motion::Driven { revolute: true, .. } => {
+        Motion::Revolute { .. } | Motion::Driven { revolute: true, .. } => {
             axis.dot(&(child.angular_velocity - parent.angular_velocity))
         }
         _ => {

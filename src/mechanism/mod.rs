@@ -331,6 +331,11 @@ impl Mechanism {
         loads.fold(self.model.shortest_period, f64::min) / 50.0
     }
 
+    /// Whether derivatives of the motion that drives prescribe jump at ends of steps.
+    pub fn has_broken_drives(&self) -> bool {
+        !self.model.bounding.is_empty()
+    }
+
     /// Latest end of an adaptive step that starts at `t`, s.
     pub fn step_end(&self, t: f64) -> f64 {
         let of_elements = self.elements.iter().map(|element| element.step_end(t));
@@ -476,6 +481,12 @@ impl Mechanism {
     /// Force (N) or torque (N m) of every actuator after [`Evaluator::evaluate_fully`], positive along the joint's axis.
     pub fn actuators(&mut self, out: &mut [f64]) {
         self.equations.actuators(&self.model, &self.gravity, out);
+    }
+
+    /// Coordinate and rate of every sliding or turning joint, in the order of the scene, after an evaluation at `y`.
+    pub fn coordinates(&self, y: &[f64]) -> impl Iterator<Item = [f64; 2]> {
+        let all = 0..self.model.bodies.len();
+        all.filter_map(move |b| self.equations.coordinate(&self.model, y, b))
     }
 
     /// Kinetic energy and gravitational potential (zero at the world origin) at the latest evaluation, J.

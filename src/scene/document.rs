@@ -20,6 +20,8 @@ pub(super) struct Document<'d> {
     pub file: Option<&'d str>,
     pub text: &'d str,
     pub reading: &'d Reading<'d>,
+    /// Whether another file includes it.
+    pub included: bool,
     /// The copy of a pattern that the values belong to.
     pub copy: Option<&'d PatternCopy>,
     /// Files that it names.
@@ -47,6 +49,18 @@ pub(super) struct Node<'d> {
 }
 
 impl<'d> Document<'d> {
+    /// Its text as TOML.
+    ///
+    /// # Errors
+    /// Where it is none.
+    pub fn parse(&self) -> Result<Spanned<DeTable<'d>>, SceneError> {
+        DeTable::parse(self.text).map_err(|error| {
+            let span = error.span().unwrap_or(0..0);
+            let message = format!("not valid TOML: {}", error.message());
+            self.error(span, "", None, message)
+        })
+    }
+
     /// An error at a position in the text.
     pub fn error(
         &self,
@@ -227,8 +241,17 @@ impl<'d> Node<'d> {
 
     /// A finite quantity, SI: a number with its unit, or an expression. From now on it is a number of the scene, under this key.
     pub fn quantity(&self, dimension: Dimension) -> Result<f64, SceneError> {
-        let place = self.written.clone().map_or(Place::Absent, Place::Value);
+        let place = self.place_of(Place::Value);
         self.number(self.scalar()?, dimension, place)
+    }
+
+    /// Where the scene's text gives this value.
+    fn place_of(&self, here: fn(Range<usize>) -> Place) -> Place {
+        match &self.written {
+            _ if self.document.included => Place::Included,
+            Some(written) => here(written.clone()),
+            None => Place::Absent,
+        }
     }
 
     /// The quantity `text`, at `place`, as [`Self::quantity`].
@@ -369,7 +392,7 @@ impl<'d> Node<'d> {
             for (index, (value, number)) in values.iter_mut().zip(numbers).enumerate() {
                 let part = Node::new(self.document, key(index), Some(self.value));
                 let part = part.expect("there is a value");
-                let place = Place::Part(self.value.span());
+                let place = self.place_of(Place::Part);
                 *value = if part.changed {
                     part.number(part.scalar()?, dimension, place)?
                 } else {
@@ -457,6 +480,31 @@ impl<'d> Node<'d> {
         parameter
             .read(self.scalar()?)
             .map_err(|error| self.error(error.to_string()))
+    }
+}
+
+/// Entries of the list `name` of all `files`, at most `most`; `what` names them in errors.
+///
+/// # Errors
+/// No list, or too many entries.
+pub(super) fn lists<'d>(
+    files: &[Section<'d>],
+    name: &str,
+    most: usize,
+    what: &str,
+) -> Result<Vec<Node<'d>>, SceneError> {
+    let mut nodes = Vec::new();
+    for file in files {
+        if let Some(list) = file.get(name) {
+            nodes.extend(list.elements_up_to(most, what)?);
+        }
+    }
+    match nodes.get(most) {
+        None => Ok(nodes),
+        Some(first) => Err(first.error(format!(
+            "too many: {} {what} in all files; allowed at most {most}",
+            nodes.len()
+        ))),
     }
 }
 

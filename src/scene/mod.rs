@@ -14,6 +14,7 @@ mod error;
 mod expression;
 mod field;
 mod formula;
+mod include;
 mod load;
 mod model;
 mod numbers;
@@ -57,4 +58,9 @@ use table::find;
 pub fn suggest_parameter(wrong: &str, words: &[&'static str]) -> String {
     let keys = table().iter().map(|parameter| parameter.key);
     error::nearest_parameter(wrong, keys, words)
+}
+
+/// The one of `names` nearest to `wrong`, as errors quote it: in brackets, or empty.
+pub fn suggest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> String {
+    error::nearest(wrong, names)
 }

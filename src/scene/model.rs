@@ -398,6 +398,11 @@ impl Joint {
         };
         [parent, child]
     }
+
+    /// Whether one coordinate, driven or not, gives its position.
+    pub fn has_coordinate(&self) -> bool {
+        matches!(self.kind, JointKind::Prismatic | JointKind::Revolute)
+    }
 }
 
 /// Kind of a tree joint.

@@ -8,7 +8,7 @@ use toml::Spanned;
 use toml::de::DeValue;
 
 use super::access::file_only;
-use super::document::{Node, Section};
+use super::document::{Node, Section, lists};
 use super::expression::{self, Program};
 use super::field::Access;
 use super::pattern::Copy;
@@ -36,6 +36,8 @@ pub(super) enum Place {
     Value(Range<usize>),
     /// A vector in one text.
     Part(Range<usize>),
+    /// In a file that the scene includes.
+    Included,
     /// Nowhere: it has a default, and was changed.
     Absent,
 }
@@ -145,15 +147,13 @@ impl<'d> Reading<'d> {
     }
 }
 
-/// Reads `[[parameter]]`: the scene's own parameters, in the order of the file, in which one may be made of those before it.
+/// Reads `[[parameter]]`: the scene's own parameters, in the order of the files, in which one may be made of those before it.
 ///
 /// # Errors
 /// Anything wrong in one.
-pub(super) fn read_own(top: &Section<'_>) -> Result<Vec<&'static Parameter>, SceneError> {
-    let list = top.get("parameter");
-    let list = list.map(|node| node.elements_up_to(MOST_OWN, "parameters"));
+pub(super) fn read_own(files: &[Section<'_>]) -> Result<Vec<&'static Parameter>, SceneError> {
     let mut rows: Vec<&'static Parameter> = Vec::new();
-    for node in list.transpose()?.unwrap_or_default() {
+    for node in lists(files, "parameter", MOST_OWN, "parameters")? {
         let row = read_row(&node)?;
         if rows.iter().any(|other| other.key == row.key) {
             let name = node.section(&OWN_KEYS)?.require("name", "\"stroke\"")?;

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use super::document::{Node, Section};
+use super::document::{Node, Section, lists};
 use super::*;
 
 /// Lists that a pattern may have, besides the sections of [`ELEMENT_KINDS`].
@@ -71,15 +71,12 @@ pub(super) struct Pattern<'d> {
     copies: Vec<Copy>,
 }
 
-/// The patterns of a file.
+/// The patterns of a scene's files.
 ///
 /// # Errors
 /// Anything wrong in their own keys, or too many copies.
-pub(super) fn read_patterns<'d>(top: &Section<'d>) -> Result<Vec<Pattern<'d>>, SceneError> {
-    let Some(list) = top.get("pattern") else {
-        return Ok(Vec::new());
-    };
-    list.elements_up_to(MOST_BODIES, "patterns")?
+pub(super) fn read_patterns<'d>(files: &[Section<'d>]) -> Result<Vec<Pattern<'d>>, SceneError> {
+    lists(files, "pattern", MOST_BODIES, "patterns")?
         .iter()
         .map(read_pattern)
         .collect()

@@ -52,7 +52,7 @@ pub(super) fn read_file(
         text: &text,
         ..node.document
     };
-    let mut units = None;
+    let mut columns = None;
     let mut points = Points::new();
     let mut start = 0;
     for line in text.split_inclusive('\n') {
@@ -70,26 +70,21 @@ pub(super) fn read_file(
             );
             return Err(file.error(span, "", None, message));
         };
-        let Some((of_time, of_place)) = units else {
-            let unit = |cell: &Range<usize>, dimension| {
+        let Some((of_time, of_place)) = columns else {
+            let column = |cell: &Range<usize>, dimension| {
                 let header = text[cell.clone()].trim_start_matches('\u{feff}');
-                unit_of(header, dimension).map_err(|why| file.error(cell.clone(), "", None, why))
+                let column = Column::new(header, dimension);
+                column.map_err(|why| file.error(cell.clone(), "", None, why))
             };
-            units = Some((unit(time, Dimension::Time)?, unit(place, dimension)?));
+            columns = Some((column(time, Dimension::Time)?, column(place, dimension)?));
             continue;
         };
-        let value = |cell: &Range<usize>, unit: &str, dimension| {
+        let value = |cell: &Range<usize>, column: Column<'_>| {
             let number = &text[cell.clone()];
-            number
-                .parse::<f64>()
-                .map_err(|_| "is not a number; the unit stands in the header".to_owned())
-                .and_then(|_| quantity(number, unit, dimension))
-                .map_err(|why| file.error(cell.clone(), "", Some(number), why))
+            let fault = |why| file.error(cell.clone(), column.header, Some(number), why);
+            column.read(number).map_err(fault)
         };
-        points.push([
-            value(time, of_time, Dimension::Time)?,
-            value(place, of_place, dimension)?,
-        ]);
+        points.push([value(time, of_time)?, value(place, of_place)?]);
         if points.len() > MOST_POINTS {
             let message = format!("too many points; allowed at most {MOST_POINTS}");
             return Err(file.error(span, "", None, message));
@@ -98,18 +93,6 @@ pub(super) fn read_file(
     }
     close(&mut points, repeats).map_err(|why| node.error(why))?;
     Ok(points)
-}
-
-/// A number of a file in its column's unit, SI.
-fn quantity(number: &str, unit: &str, dimension: Dimension) -> Result<f64, String> {
-    match parse_quantity(&format!("{number} {unit}"), dimension) {
-        Ok(value) if value.abs() <= MAX_SI => Ok(value),
-        Ok(_) => {
-            let limit = format_quantity(MAX_SI, si_unit(dimension));
-            Err(format!("out of range; allowed -{limit} to {limit}"))
-        }
-        Err(error) => Err(error.to_string()),
-    }
 }
 
 /// Ranges of the cells of a line.
@@ -125,28 +108,57 @@ fn cells(text: &str, line: Range<usize>) -> Vec<Range<usize>> {
     text[line].split([',', ';', '\t']).map(cell).collect()
 }
 
-/// The unit in a header: in brackets, or after the last underscore.
-fn unit_of(header: &str, dimension: Dimension) -> Result<&str, String> {
-    let bracketed = |open: char, close: char| {
-        let inner = header.strip_suffix(close)?;
-        Some(inner.rsplit_once(open)?.1.trim())
-    };
-    let unit = bracketed('[', ']')
-        .or_else(|| bracketed('(', ')'))
-        .or_else(|| Some(header.rsplit_once('_')?.1));
-    let units = unit_names(dimension);
-    match unit {
-        Some(unit) if parse_quantity(&format!("1 {unit}"), dimension).is_ok() => Ok(unit),
-        _ => {
-            let example = match dimension {
-                Dimension::Time => "time_s",
-                Dimension::Angle => "angle_deg",
-                _ => "position_mm",
-            };
-            Err(format!(
-                "the first line names the columns with their units, as `{example}`; units {}",
-                units.join(", ")
-            ))
+/// A column of a file.
+#[derive(Clone, Copy)]
+struct Column<'t> {
+    header: &'t str,
+    unit: &'t str,
+    dimension: Dimension,
+}
+
+impl<'t> Column<'t> {
+    /// With the unit in its header: in brackets, or after the last underscore.
+    fn new(header: &'t str, dimension: Dimension) -> Result<Self, String> {
+        let bracketed = |open: char, close: char| {
+            let inner = header.strip_suffix(close)?;
+            Some(inner.rsplit_once(open)?.1.trim())
+        };
+        let unit = bracketed('[', ']')
+            .or_else(|| bracketed('(', ')'))
+            .or_else(|| Some(header.rsplit_once('_')?.1));
+        let known = |unit: &&str| parse_quantity(&format!("1 {unit}"), dimension).is_ok();
+        match unit.filter(known) {
+            Some(unit) => Ok(Self {
+                header,
+                unit,
+                dimension,
+            }),
+            None => {
+                let example = match dimension {
+                    Dimension::Time => "time_s",
+                    Dimension::Angle => "angle_deg",
+                    _ => "position_mm",
+                };
+                Err(format!(
+                    "the first line names the columns with their units, as `{example}`; units {}",
+                    unit_names(dimension).join(", ")
+                ))
+            }
+        }
+    }
+
+    /// A number of this column, SI.
+    fn read(&self, number: &str) -> Result<f64, String> {
+        if number.parse::<f64>().is_err() {
+            return Err("is not a number; its unit stands in the header".to_owned());
+        }
+        match parse_quantity(&format!("{number} {}", self.unit), self.dimension) {
+            Ok(value) if value.abs() <= MAX_SI => Ok(value),
+            Ok(_) => {
+                let limit = format_quantity(MAX_SI, si_unit(self.dimension));
+                Err(format!("out of range; allowed -{limit} to {limit}"))
+            }
+            Err(error) => Err(error.to_string()),
         }
     }
 }

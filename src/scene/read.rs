@@ -1,9 +1,10 @@
 //! Reads a scene from TOML: settings first, then bodies, joints and ball joints.
 
 use super::beside::Beside;
-use super::document::{Document, Node, Section};
+use super::document::{Document, Node, Section, lists};
 use super::elements::read_element;
 use super::error::{no_body, place_of};
+use super::include::{self, included_texts};
 use super::numbers::{Reading, read_own};
 use super::pattern::{Pattern, read_patterns};
 use super::read_bodies::{read_body, read_shape};
@@ -12,10 +13,9 @@ use super::*;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
-use toml::de::DeTable;
 
 /// Top-level keys of a file, besides the sections of [`ELEMENT_KINDS`].
-const TOP: [&str; 18] = [
+const TOP: [&str; 19] = [
     "name",
     "title",
     "description",
@@ -34,6 +34,7 @@ const TOP: [&str; 18] = [
     "fixed_shape",
     "parameter",
     "pattern",
+    "include",
 ];
 
 /// Parameters that determine the bodies: changing one reads the file again.
@@ -92,6 +93,7 @@ impl Scene {
             text,
             reading: &reading,
             beside: &beside,
+            included: false,
             copy: None,
         };
         let mut scene = Self::read_document(document, changes)?;
@@ -112,20 +114,23 @@ impl Scene {
                 "the file is empty; a scene needs at least one body",
             ));
         }
-        let parsed = DeTable::parse(text).map_err(|error| {
-            let span = error.span().unwrap_or(0..0);
-            document.error(
-                span,
-                "",
-                None,
-                format!("not valid TOML: {}", error.message()),
-            )
-        })?;
+        let parsed = document.parse()?;
         let elements = ELEMENT_KINDS.iter().map(|kind| kind.section);
         let keys: Vec<&str> = TOP.into_iter().chain(elements).collect();
         let top = Section::new(document, String::new(), parsed.get_ref(), 0..0, &keys)?;
-        let own = read_own(&top)?;
-        let patterns = read_patterns(&top)?;
+        let texts = included_texts(&top)?;
+        let documents = texts
+            .iter()
+            .map(|(name, text)| include::document(document, name, text));
+        let documents: Vec<Document<'_>> = documents.collect();
+        let tables = documents.iter().map(Document::parse);
+        let tables = tables.collect::<Result<Vec<_>, _>>()?;
+        let included = documents.iter().zip(&tables);
+        let included = included.map(|(document, table)| include::section(*document, table));
+        let files = std::iter::once(Ok(top.clone())).chain(included);
+        let files = files.collect::<Result<Vec<_>, _>>()?;
+        let own = read_own(&files)?;
+        let patterns = read_patterns(&files)?;
         let mut scene = read_settings(&top)?;
         let mut places = read_parameters(&top, &mut scene)?;
         scene.source.places = places
@@ -141,7 +146,7 @@ impl Scene {
                 scene.change(key, value)?;
             }
         }
-        read_mechanism(&top, &patterns, &mut scene, &mut places)?;
+        read_mechanism(&files, &patterns, &mut scene, &mut places)?;
         scene.source.numbers = Arc::new(document.reading.numbers());
         scene.source.own = own;
         for (key, value) in changes {
@@ -324,14 +329,13 @@ fn default_of(parameter: &Parameter, sections: &BTreeMap<&str, Section<'_>>) -> 
 
 /// Bodies, joints, ball joints, fixed shapes and what is reported.
 fn read_mechanism<'d>(
-    top: &Section<'d>,
+    files: &[Section<'d>],
     patterns: &'d [Pattern<'d>],
     scene: &mut Scene,
     places: &mut Places<'d>,
 ) -> Result<(), SceneError> {
     let list = |name: &str, most: usize, what: &str| {
-        let alone = top.get(name);
-        let mut nodes = alone.map_or(Ok(Vec::new()), |node| node.elements_up_to(most, what))?;
+        let mut nodes = lists(files, name, most, what)?;
         for pattern in patterns {
             nodes.extend(pattern.nodes(name)?);
         }
@@ -343,6 +347,7 @@ fn read_mechanism<'d>(
             ))),
         }
     };
+    let top = &files[0];
     let mut names = Names::default();
 
     let mut bodies = Vec::new();
@@ -389,7 +394,9 @@ fn read_mechanism<'d>(
         } = read_ball_joint(&node, scene, &by_name)?;
         joint_names.add(&section, "joint", &joint.name)?;
         let title = format!("joint.{}", joint.name);
-        scene.source.places.insert(title, section.place());
+        if !section.document.included {
+            scene.source.places.insert(title, section.place());
+        }
         scene.ball_joints.push(joint);
         places.extend(own);
     }
@@ -405,7 +412,7 @@ fn read_mechanism<'d>(
         }
         let joints = scene.joints.iter().map(|joint| &joint.name);
         for name in joints.chain(scene.ball_joints.iter().map(|joint| &joint.name)) {
-            joint_names.taken(name, node.place());
+            joint_names.taken(name, &node);
         }
     }
     // After the chain: they may be attached to its links.
@@ -483,25 +490,36 @@ fn read_output(
 /// Names seen so far, with their positions in the text: they must be unique.
 #[derive(Default)]
 struct Names {
-    places: BTreeMap<String, usize>,
+    /// Line of each, and the included file in which it is.
+    places: BTreeMap<String, (u32, Option<String>)>,
 }
 
 impl Names {
-    /// Reserves `name` for the item at `place`, unless already taken.
-    fn taken(&mut self, name: &str, place: usize) {
-        self.places.entry(name.to_owned()).or_insert(place);
+    /// Reserves `name` for the item at `node`, unless already taken.
+    fn taken(&mut self, name: &str, node: &Node<'_>) {
+        self.places
+            .entry(name.to_owned())
+            .or_insert_with(|| line_of(node));
     }
 
     fn add(&mut self, section: &Section<'_>, what: &str, name: &str) -> Result<(), SceneError> {
         let node = section.require("name", "\"rod\"")?;
-        match self.places.insert(name.to_owned(), node.place()) {
+        match self.places.insert(name.to_owned(), line_of(&node)) {
             None => Ok(()),
-            Some(first) => {
-                let (line, _) = place_of(node.document.text, first);
+            Some((line, file)) => {
+                let of_file =
+                    file.map_or_else(String::new, |file| format!(" of {}", visible_line(&file)));
                 Err(node.error(format!(
-                    "there is already a {what} of this name, in line {line}; names must differ, for example `{name}2`"
+                    "there is already a {what} of this name, in line {line}{of_file}; names must differ, for example `{name}2`"
                 )))
             }
         }
     }
+}
+
+fn line_of(node: &Node<'_>) -> (u32, Option<String>) {
+    let document = &node.document;
+    let (line, _) = place_of(document.text, node.place());
+    let file = document.file.filter(|_| document.included);
+    (line, file.map(str::to_owned))
 }

@@ -411,9 +411,8 @@ pub(super) fn read_one_degree_joint(
     const LISTED: usize = 12;
     let node = section.require("joint", "\"crank\"")?;
     let wanted = &*node.reference()?;
-    let moves = |joint: &&Joint| matches!(joint.kind, JointKind::Prismatic | JointKind::Revolute);
     match joints.get(wanted) {
-        Some(&index) if moves(&&scene.joints[index]) => Ok(index),
+        Some(&index) if scene.joints[index].has_coordinate() => Ok(index),
         found => {
             let wrong = match found {
                 Some(&index) => format!(
@@ -425,7 +424,7 @@ pub(super) fn read_one_degree_joint(
             let names = scene
                 .joints
                 .iter()
-                .filter(moves)
+                .filter(|joint| joint.has_coordinate())
                 .map(|joint| joint.name.as_str());
             let near = nearest(wanted, names.clone());
             let mut listed: Vec<&str> = names.take(LISTED + 1).collect();

@@ -1,5 +1,7 @@
 //! The built-in scenes as a whole: they load, and their loops close.
 
+use std::sync::Arc;
+
 use super::*;
 
 /// World poses of all bodies at the file's start; slider coordinates of the spcmm law as derived by `physics`.
@@ -766,5 +768,95 @@ role = \"frame\"
     ] {
         let error = Scene::parse(&text.replace(from, to), None, &[]).expect_err(to);
         assert!(error.message.contains(wanted), "{error}");
+    }
+}
+
+#[test]
+fn a_file_takes_its_parts_from_others() {
+    let leg = "
+[[parameter]]
+name = \"reach\"
+value = \"30 mm\"
+
+[[body]]
+name = \"leg\"
+mass = \"2 kg\"
+inertia = \"1 1 1 kg m^2\"
+
+[[joint]]
+name = \"leg\"
+kind = \"free\"
+child = \"leg\"
+start = { position = [\"reach\", 0, 0] }
+";
+    let text = "
+include = [\"leg.toml\"]
+
+[[ball_joint]]
+name = \"S\"
+socket = { body = \"world\", at = [\"reach\", 0, 0] }
+ball = { body = \"leg\" }
+";
+    let with = |leg: &str, text: &str, changes: &[(&str, &str)]| {
+        let beside = Texts::from([("leg.toml".to_owned(), Arc::from(leg))]);
+        let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
+        let changes: Vec<(String, String)> = changes.iter().map(own).collect();
+        Scene::parse_with(text, Some("scene.toml"), &beside, &changes)
+    };
+    let mut scene = with(leg, text, &[("body.leg.mass", "3 kg")]).expect("reads");
+    assert_eq!(scene.bodies[0].mass, 3.0);
+    assert_eq!(scene.ball_joints[0].socket.point.x, 0.03);
+    // Read again from what was read before.
+    scene.set("parameter.reach", "40 mm").expect("a key");
+    assert_eq!(scene.ball_joints[0].socket.point.x, 0.04);
+    assert_eq!(scene.bodies[0].mass, 3.0);
+    let error = scene.to_toml().expect_err("two files").to_string();
+    assert!(
+        error.contains("another file, which this one includes"),
+        "{error}"
+    );
+    for (leg, text, place, wanted) in [
+        (
+            leg.replace("2 kg", "2"),
+            text.to_owned(),
+            "leg.toml:8:8: body.leg.mass",
+            "needs a unit",
+        ),
+        (
+            leg.replace("[[body]]", "[[body"),
+            text.to_owned(),
+            "leg.toml:6:7: ",
+            "not valid TOML",
+        ),
+        (
+            format!("start = \"ideal\"\n{leg}"),
+            text.to_owned(),
+            "leg.toml:1:1: start",
+            "unknown key",
+        ),
+        (
+            leg.to_owned(),
+            text.replace("leg.toml", "arm.toml"),
+            "scene.toml:2:12: include[0]",
+            "has no folder",
+        ),
+        (
+            leg.to_owned(),
+            text.replace("\"leg.toml\"", "\"leg.toml\", \"leg.toml\""),
+            "scene.toml:2:24: include[1]",
+            "included already",
+        ),
+        (
+            leg.to_owned(),
+            text.replace("name = \"S\"", "name = \"leg\""),
+            "scene.toml:5:8: joint.leg.name",
+            "in line 12 of leg.toml",
+        ),
+    ] {
+        let error = with(&leg, &text, &[]).expect_err(wanted).to_string();
+        assert!(
+            error.starts_with(place) && error.contains(wanted),
+            "{error}"
+        );
     }
 }

@@ -64,6 +64,9 @@ impl Scene {
             let here = |other: &&FileNumber| other.place == number.place;
             let same: Vec<&FileNumber> = numbers.values().filter(here).collect();
             let (span, text) = match &number.place {
+                Place::Included => {
+                    return Err(refuse("it stands in another file, which this one includes"));
+                }
                 Place::Absent => {
                     return Err(refuse("the text does not give it; write it there first"));
                 }

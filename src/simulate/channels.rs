@@ -1,7 +1,9 @@
 //! Which values of a frame are recorded for a scene: plot channels and columns of `run`, all laid out from one table.
 
+mod choice;
 mod table;
 
+pub use choice::{Listed, NoChannel, channels_of, chosen_columns};
 pub use table::{PlotKind, Quantity};
 
 use super::Frame;
@@ -125,6 +127,7 @@ pub fn run_columns(scene: &Scene, first: &Frame) -> (Vec<String>, Vec<Reading>) 
 struct Found<'a> {
     signal: &'a Signal,
     member: &'a str,
+    name: String,
     column: String,
     reading: Reading,
 }
@@ -149,13 +152,15 @@ fn lay_out(
                 let take = signal.take;
                 for (component, &(symbol, word)) in take.components().iter().enumerate() {
                     let members = [take.member(), symbol, name];
+                    let named = |pattern: &str| pattern.replace('#', word).replace('@', name);
                     add(Found {
                         signal,
+                        name: named(signal.name),
                         member: members
                             .into_iter()
                             .find(|m| !m.is_empty())
                             .unwrap_or_default(),
-                        column: signal.column.replace('#', word).replace('@', name),
+                        column: named(signal.column),
                         reading: Reading {
                             take,
                             part,
@@ -168,13 +173,18 @@ fn lay_out(
     }
 }
 
-/// Names of the parts a signal is repeated for; for a driven joint also its kind.
+/// Names of the parts a signal is repeated for; for a joint that slides or turns also its kind.
 fn parts_of(scene: &Scene, each: Each) -> Vec<(&str, Option<JointKind>)> {
     let joints = scene.ball_joints.iter().map(|joint| joint.name.as_str());
     let elements = scene.elements.iter().map(|element| element.name.as_str());
     let driven = scene.joints.iter().filter(|joint| joint.drive.is_some());
+    let moving = scene.joints.iter().filter(|joint| joint.has_coordinate());
+    let bodies = scene.bodies.iter().map(|body| body.name.as_str());
     match each {
         Each::Once => vec![("", None)],
+        Each::Output => vec![(scene.bodies[scene.output.body].name.as_str(), None)],
+        Each::Body => bodies.map(|name| (name, None)).collect(),
+        Each::Coordinate => moving.map(|j| (j.name.as_str(), Some(j.kind))).collect(),
         Each::Joint => joints.map(|name| (name, None)).collect(),
         Each::Drive => driven.map(|j| (j.name.as_str(), Some(j.kind))).collect(),
         Each::Element => elements.map(|name| (name, None)).collect(),
@@ -192,13 +202,15 @@ fn has(
     let take = signal.take;
     let known = |may_have: bool| first.map_or(may_have, |f| take.value(f, part, 0).is_some());
     match take {
-        Take::Slide => kind != Some(JointKind::Revolute),
-        Take::Hinge => kind == Some(JointKind::Revolute),
+        Take::Slide | Take::SlideCoordinate(_) => kind != Some(JointKind::Revolute),
+        Take::Hinge | Take::HingeCoordinate(_) => kind == Some(JointKind::Revolute),
+        Take::OtherAxes(_) | Take::OtherAngles(_) => part != scene.output.body,
         Take::Given(..) | Take::Taken(..) => {
             known(scene.solver.energy_ledger) && (!signal.of_elements || !scene.elements.is_empty())
         }
         Take::ProbeError => known(scene.output.probe.is_some()),
         Take::Element(_) => known(true),
+        Take::ElementValue(_) => scene.elements[part].kind.points.len() == 2,
         _ => true,
     }
 }

@@ -1,5 +1,7 @@
 //! One instant of a simulation as plain data: what the outputs write and the view draws.
 
+use serde::{Deserialize, Serialize};
+
 use super::Ledger;
 pub use crate::mechanism::ElementReport;
 use crate::scene::{Mat3, Vec3};
@@ -17,6 +19,9 @@ pub struct Frame {
     pub elements: Vec<ElementReport>,
     /// The hand that pulls, if any: force from the hand on the grasped point. Only set in the displayed frame.
     pub pull: Option<ElementReport>,
+    /// Sliding and turning joints in scene order: coordinate, m or rad, and its rate. In the `lagrange` form the angle of a
+    /// joint that is not driven lies between -pi and pi.
+    pub coordinates: Vec<[f64; 2]>,
     /// Driven joints in scene order: actuator force, N (or torque, N m), positive along the joint axis's positive sense.
     pub actuators: Vec<f64>,
     /// The output body.
@@ -110,7 +115,7 @@ pub struct JointReport {
 }
 
 /// The largest force on a ball joint since the peaks were last taken.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Peak {
     /// Largest |F_N| in continuous time, N.
     pub normal: f64,

@@ -1,5 +1,7 @@
 //! The restitution check: for each impact the restitution asked for, the one its law gives, and the one that resulted.
 
+use serde::{Deserialize, Serialize};
+
 use super::peaks::PenetrationCubic;
 use crate::contact::{Coefficients, undisturbed_restitution};
 
@@ -8,7 +10,7 @@ const KEPT: usize = 64;
 
 /// A finished impact of one ball joint, from the start of an approaching contact to its end. A contact that existed at the
 /// start, or that a live change ended, does not count.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Impact {
     /// Ball joint, by its index in the scene.
     pub joint: usize,
@@ -48,7 +50,7 @@ impl Impact {
 }
 
 /// Impacts under way and the latest finished ones: part of a simulation's state. Allocates nothing after `new`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Impacts {
     /// By joint.
     under_way: Vec<Option<Impact>>,
@@ -77,6 +79,17 @@ impl Impacts {
             count: 0,
             handed_out: 0,
         }
+    }
+
+    /// Whether they are of a scene with `joints` ball joints.
+    pub(super) fn fits(&self, joints: usize) -> bool {
+        let own = Self::new(joints);
+        let mut known = self.under_way.iter().flatten().chain(&self.finished);
+        self.under_way.len() == joints
+            && self.laws.len() == joints
+            && self.finished.len() == own.finished.len()
+            && self.handed_out <= self.count
+            && known.all(|impact| impact.joint < joints.max(1))
     }
 
     /// A contact of `joint` begins at `time` with the penetration rate `speed`; `touching`: another joint is in contact.

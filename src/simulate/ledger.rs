@@ -1,10 +1,12 @@
 //! Where the energy came from and where it went: works by quadrature of powers, compared with the change in energy.
 
+use serde::{Deserialize, Serialize};
+
 use crate::mechanism::Powers;
 
 /// Energy exchanged since the start, J. Each work is computed from the forces that do it, never from energies, so that the
 /// imbalance is the integration error: [`Self::residual`].
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Ledger {
     /// Supplied by the drives: actuator force times rate.
     pub drive_work: f64,
@@ -55,7 +57,7 @@ impl Ledger {
 }
 
 /// Energies at one instant, J.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Energies {
     pub kinetic: f64,
     pub gravitational: f64,
@@ -78,7 +80,7 @@ const EVEN: [f64; NODES] = [
 const EVENLY: f64 = 1e-9;
 
 /// Powers at some instants, and the polynomial through them.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct PowerInterpolant {
     times: [f64; NODES],
     powers: [Powers; NODES],
@@ -168,7 +170,7 @@ pub(super) fn weights(nodes: &[f64], end: f64) -> [f64; NODES] {
 }
 
 /// The ledger of a running simulation, at both ends of the latest step: part of its state.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Account {
     /// Whether the ledger is kept.
     pub on: bool,
@@ -193,6 +195,11 @@ impl Account {
             now: entry,
             ..Self::default()
         }
+    }
+
+    /// Whether it holds no more than it can.
+    pub(super) fn fits(&self) -> bool {
+        self.course.count <= NODES && self.past.count <= NODES
     }
 
     /// Books a step of size `h` that ends with `energies`, by the powers in `course`.

@@ -25,9 +25,12 @@ pub use ledger::Ledger;
 pub use pace::{LARGEST_BUDGET, LONGEST_FRAME, Pacer, SCALE_RANGE};
 pub use simulation::ideal::{ProbeFault, closed};
 pub use simulation::live::ChangeError;
+pub use simulation::saved::{Misfit, SavedState};
 pub use simulation::{CLEARANCE_SPEED, LARGEST_DENSE, LARGEST_IMPLICIT, Simulation};
 pub use stopped::{StopAdvice, StopFault, Stopped};
 pub use wear::{Cell, Edges, Grid, Wear};
+
+use serde::{Deserialize, Serialize};
 
 use std::sync::Arc;
 
@@ -104,7 +107,7 @@ pub struct NotUnique {
 }
 
 /// Counters since the last reset.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Statistics {
     /// Accepted steps.
     pub steps: u64,
@@ -154,6 +157,18 @@ impl Statistics {
             damping_time: vec![0.0; joints],
             ..Self::default()
         }
+    }
+
+    /// Whether they are of a scene with `joints` ball joints.
+    fn fits(&self, joints: usize) -> bool {
+        self.impacts.len() == joints
+            && self.floored.len() == joints
+            && self.coarse.len() == joints
+            && self.peak_normal.len() == joints
+            && self.peak_time.len() == joints
+            && self.last_separation.len() == joints
+            && self.damping.len() == joints
+            && self.damping_time.len() == joints
     }
 
     fn count(&mut self, counts: Counts) {

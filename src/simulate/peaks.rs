@@ -1,9 +1,11 @@
 //! Peaks in continuous time: the largest force between two steps, from the cubic through penetration and rate at both ends.
 
+use serde::{Deserialize, Serialize};
+
 use crate::contact::{Coefficients, Memory};
 
 /// Penetration and its rate at one instant.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Approach {
     pub penetration: f64,
     pub rate: f64,
@@ -12,7 +14,7 @@ pub(super) struct Approach {
 }
 
 /// A quantity at the latest two instants.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Recent {
     /// (time, value), the older first; a value of 0 means none yet.
     before: [(f64, f64); 2],

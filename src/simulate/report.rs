@@ -6,13 +6,13 @@ use crate::contact::Memory;
 use crate::mechanism::Mechanism;
 use crate::scene::{Scene, Vec3};
 
-/// Fills `out` after [`Evaluator::evaluate_fully`](crate::mechanism::Evaluator::evaluate_fully) at `time`, with the contact
-/// memory `memory`.
+/// Fills `out` after [`Evaluator::evaluate_fully`](crate::mechanism::Evaluator::evaluate_fully) at (`time`, `y`), with the
+/// contact memory `memory`.
 pub(super) fn fill(
     mechanism: &mut Mechanism,
     scene: &Scene,
     memory: &[Memory],
-    time: f64,
+    (time, y): (f64, &[f64]),
     out: &mut Frame,
 ) {
     out.time = time;
@@ -41,6 +41,8 @@ pub(super) fn fill(
     out.kinetic = kinetic;
     out.potential = gravitational + out.elastic;
     out.probe_error = probe_error(mechanism, scene, out);
+    out.coordinates.clear();
+    out.coordinates.extend(mechanism.coordinates(y));
     out.actuators.resize(mechanism.drives(), 0.0);
     mechanism.actuators(&mut out.actuators);
 }

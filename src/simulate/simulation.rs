@@ -12,9 +12,12 @@ mod guard;
 pub mod ideal;
 pub(super) mod live;
 mod sample;
+pub(super) mod saved;
 mod search;
 mod snapshot;
 mod wear;
+
+use serde::{Deserialize, Serialize};
 
 use std::sync::Arc;
 
@@ -38,6 +41,8 @@ use ideal::{ProbeFault, Reference};
 pub const CLEARANCE_SPEED: f64 = 2e-3;
 /// Longest step of an adaptive method, s.
 const LONGEST_STEP: f64 = 10e-3;
+/// A step that ends this much of its length before a limit ends at the limit.
+const NEARLY: f64 = 1e-6;
 /// An ideal motion farther than this from its closed form has changed to another branch of it, m.
 const OTHER_BRANCH: f64 = 1e-6;
 /// How closely a kinematic scene approaches a pose that it cannot pass, s.
@@ -69,7 +74,7 @@ pub struct Simulation {
 }
 
 /// The end of a step, and the data that belong to it.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct StepEnd {
     t: f64,
     /// Coordinates, then velocities.
@@ -124,7 +129,7 @@ struct Attempt {
 }
 
 /// What a snapshot copies.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct State {
     /// The physical state, and the start of the latest step, between which samples lie.
     now: StepEnd,
@@ -141,7 +146,7 @@ pub(super) struct State {
 }
 
 /// How the next step is chosen: not part of the physical state.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Control {
     /// Next step of an adaptive method.
     h_next: f64,
@@ -163,7 +168,7 @@ struct Control {
 }
 
 /// What is known of the run so far.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Record {
     account: Account,
     wear: Option<Wear>,
@@ -411,11 +416,28 @@ impl Simulation {
         Ok(())
     }
 
+    /// Whether the next step is another one if it must end by `end`.
+    pub fn is_cut_by(&self, end: f64) -> bool {
+        let (t, control) = (self.state.now.t, &self.state.control);
+        let (t_end, h) = if self.mechanism.is_kinematic() {
+            let h = self.mechanism.kinematic_step().min(LONGEST_STEP);
+            (t + h, h)
+        } else if self.running.solver.method.is_adaptive() {
+            let h = control.h_next.min(LONGEST_STEP);
+            (t + h, h)
+        } else {
+            let step = self.running.solver.step;
+            let next = (control.grid_count + 1) as f64;
+            (control.grid_origin + next * step, step)
+        };
+        t_end >= end - NEARLY * h
+    }
+
     fn fixed_step(&mut self, limit: f64) -> Result<(), Stopped> {
         let step = self.running.solver.step;
         let control = &self.state.control;
         let mut t_end = control.grid_origin + (control.grid_count + 1) as f64 * step;
-        if t_end >= limit - 1e-6 * step {
+        if t_end >= limit - NEARLY * step {
             t_end = limit;
         }
         let h = t_end - self.state.now.t;
@@ -497,7 +519,7 @@ impl Simulation {
         let t = self.state.now.t;
         let mut step = self.mechanism.kinematic_step().min(LONGEST_STEP);
         loop {
-            let t_end = if t + step >= limit - 1e-6 * step {
+            let t_end = if t + step >= limit - NEARLY * step {
                 limit
             } else {
                 t + step

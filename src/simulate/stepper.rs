@@ -1,5 +1,7 @@
 //! The stepping methods behind one type, so that the method can change while the simulation runs.
 
+use serde::{Deserialize, Serialize};
+
 use crate::integrate::{
     ContactSystem, DormandPrince, FrictionSystem, ImexEuler, Method, Polynomial, Radau, Rosenbrock,
     RungeKutta4, SemiImplicitEuler, Stepper, StiffSystem, hermite,
@@ -23,7 +25,7 @@ pub(super) enum AnyStepper {
 }
 
 /// Which method steps where the choice is automatic.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Member {
     /// Dormand-Prince.
     #[default]

@@ -1,7 +1,9 @@
 //! Why a simulation stopped, in numbers; the wording is formed on display.
 
+use serde::{Deserialize, Serialize};
+
 /// Why the divergence guard stopped a simulation. The state is the last good one.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, Serialize, Deserialize)]
 #[error("stopped at t = {time:.6e} s: {fault}; {advice}")]
 pub struct Stopped {
     /// Time of the last good state, s.
@@ -13,7 +15,7 @@ pub struct Stopped {
 }
 
 /// What no accepted step may show.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error, Serialize, Deserialize)]
 pub enum StopFault {
     /// An ideal motion at a pose beyond which its loops could close on another branch.
     #[error("the loops through the ideal ball joints pass a singular pose")]
@@ -75,7 +77,7 @@ pub enum StopFault {
 }
 
 /// What to try where a simulation stopped.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, Serialize, Deserialize)]
 pub enum StopAdvice {
     /// Closed loops cannot stay closed here.
     #[error(

@@ -1,5 +1,7 @@
 //! Wear maps: where balls struck and rubbed the inner faces of their sockets, how hard, and the friction work done there.
 
+use serde::{Deserialize, Serialize};
+
 use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 use std::ops::Range;
 use std::sync::Arc;
@@ -104,7 +106,7 @@ impl Grid {
 }
 
 /// What happened to a cell of a socket's inner face.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Cell {
     /// Contacts that began there.
     pub contacts: u64,
@@ -122,18 +124,19 @@ impl Cell {
     }
 }
 
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Socket {
     /// From the socket body's axes to the grid's.
     grid_from_body: Mat3,
     /// Radius r + c of the inner face, m.
     radius: f64,
     /// Empty for an ideal joint. Copies of the map share what has not changed since.
+    #[serde(with = "shared")]
     cells: Arc<[Cell]>,
 }
 
 /// A ball in contact at a quadrature node of a step.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Press {
     /// Index among the quadrature nodes.
     instant: usize,
@@ -146,14 +149,36 @@ struct Press {
 }
 
 /// What the contacts of a run did to the inner faces of its sockets, in cells of equal area.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Wear {
+    #[serde(skip, default = "grid_of_sockets")]
     grid: Arc<Grid>,
     sockets: Vec<Socket>,
     /// Of the step being booked; afterwards those at its end, which may begin the next.
     presses: Vec<Press>,
     /// What the latest step did, by joint and cell: not yet added to the cells.
     latest: Vec<(usize, usize, Cell)>,
+}
+
+fn grid_of_sockets() -> Arc<Grid> {
+    Arc::new(Grid::of_sockets())
+}
+
+/// Cells in files: without the sharing.
+mod shared {
+    use std::sync::Arc;
+
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    use super::Cell;
+
+    pub(super) fn serialize<S: Serializer>(cells: &Arc<[Cell]>, to: S) -> Result<S::Ok, S::Error> {
+        cells[..].serialize(to)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Arc<[Cell]>, D::Error> {
+        Vec::deserialize(from).map(Arc::from)
+    }
 }
 
 /// Most entries of a joint in one step: its nodes, and a contact that begins.
@@ -168,7 +193,7 @@ impl Wear {
 
     /// An empty one.
     pub(super) fn new(scene: &Scene) -> Self {
-        let grid = Arc::new(Grid::of_sockets());
+        let grid = grid_of_sockets();
         let socket = |joint: &BallJoint| {
             let contact = &joint.contact;
             let ideal = contact.clearance == 0.0;
@@ -187,6 +212,27 @@ impl Wear {
             sockets,
             grid,
         }
+    }
+
+    /// Whether it is one of `scene`: nothing in it points elsewhere.
+    pub(super) fn fits(&self, scene: &Scene) -> bool {
+        let own = Self::new(scene);
+        let cells = |wear: &Self| {
+            wear.sockets
+                .iter()
+                .map(|s| s.cells.len())
+                .collect::<Vec<_>>()
+        };
+        let has = |joint: usize, cell: usize| {
+            let socket = self.sockets.get(joint);
+            socket.is_some_and(|socket| cell < socket.cells.len())
+        };
+        cells(self) == cells(&own)
+            && self
+                .presses
+                .iter()
+                .all(|p| p.instant == 0 && has(p.joint, p.cell))
+            && self.latest.iter().all(|&(joint, cell, _)| has(joint, cell))
     }
 
     /// The cell division of every socket.

@@ -585,7 +585,7 @@ fn a_stopped_run_keeps_its_rows_and_says_why() {
 
 /// Starts `command` and waits until signal 15, the last that the program asks for, is among those it catches.
 #[cfg(target_os = "linux")]
-fn start_and_listen(command: &mut Command) -> std::process::Child {
+pub fn start_and_listen(command: &mut Command) -> std::process::Child {
     let child = command
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
@@ -608,7 +608,7 @@ fn start_and_listen(command: &mut Command) -> std::process::Child {
 }
 
 #[cfg(target_os = "linux")]
-fn signal(child: &std::process::Child, name: &str) {
+pub fn signal(child: &std::process::Child, name: &str) {
     let id = child.id().to_string();
     let told = Command::new("kill").args([name, &id]).status().unwrap();
     assert!(told.success());

@@ -3,11 +3,13 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod channels;
 mod chart;
 mod cluster;
 mod command_line;
 mod ledger_files;
 mod program;
 mod reproduce;
+mod states;
 mod sweep;
 mod tradeoff;

@@ -11,4 +11,5 @@ mod headless_window;
 mod instruments;
 mod lecture;
 mod page;
+mod reload;
 mod window;

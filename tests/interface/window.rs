@@ -347,6 +347,38 @@ fn a_value_that_waits_for_the_reset_says_so() {
 }
 
 #[test]
+fn a_parameter_of_the_file_is_a_slider_at_once_and_moves_the_machine_at_the_reset() {
+    let text = include_str!("../../docs/scene-format.md");
+    let blocks = text.split("```toml\n").skip(1);
+    let example = blocks
+        .filter_map(|rest| rest.split("```").next())
+        .find(|block| block.contains("name = \"my-crank\""))
+        .expect("the machine of the guide");
+    let mut harness = window("pendulum");
+    let bytes = example.as_bytes().to_vec();
+    harness
+        .state_mut()
+        .open_bytes("my-crank.toml", bytes)
+        .expect("starts");
+    harness.run();
+    let length = |harness: &Harness<'_, App>| {
+        let player = harness.state().player();
+        player.simulation().scene().ball_joints[0].socket.point.x
+    };
+    // In sight without opening a group, with its unit.
+    harness.get_by_label("Crank radius");
+    harness.state_mut().player_mut().run_to(1e-3);
+    type_into(&mut harness, "Crank radius", "30 mm");
+    harness.run();
+    harness.get_by_label("Applies at the next reset");
+    click(&mut harness, "Reset");
+    assert!((length(&harness) - 0.03).abs() < 1e-15);
+    type_into(&mut harness, "Crank radius", "90 mm");
+    harness.run();
+    harness.get_by_label_contains("allowed 20 mm to 80 mm");
+}
+
+#[test]
 fn low_restitution_with_the_papers_law_is_commented_on() {
     let mut harness = window("spcmm");
     assert!(

@@ -8,6 +8,7 @@ mod corners;
 mod determinism;
 mod double_crossing;
 mod doubts;
+mod drives;
 mod elements;
 mod endurance;
 mod energy;

@@ -4,7 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use jointplay::scene::{
-    ELEMENT_KINDS, ElementJoint, Scene, Vec3, format_quantity, reference_page, si_unit, unit_table,
+    DRIVE_KINDS, ELEMENT_KINDS, ElementJoint, ElementNumber, Scene, Vec3, format_quantity,
+    reference_page, si_unit, unit_table,
 };
 use jointplay::simulate::{Frame, Simulation};
 
@@ -117,11 +118,41 @@ fn element_table() -> String {
     out
 }
 
+/// The laws of drives as a table for the file-format page.
+fn drive_table() -> String {
+    let mut out = "| law | motion | keys |\n|---|---|---|\n".to_owned();
+    for kind in &DRIVE_KINDS {
+        let number = |number: &ElementNumber| {
+            let default = match number.default {
+                None => "must be given".to_owned(),
+                Some(0.0) => "0 if left out".to_owned(),
+                Some(value) => {
+                    let text = format_quantity(value, si_unit(number.dimension));
+                    format!("{text} if left out")
+                }
+            };
+            format!("`{}`: {} ({default})", number.key, number.help)
+        };
+        let numbers = kind.numbers.iter().map(number);
+        let others = kind.others.iter();
+        let others = others.map(|(key, help)| format!("`{key}`: {help}"));
+        let keys: Vec<String> = others.chain(numbers).collect();
+        out += &format!(
+            "| `{}` | {} | {} |\n",
+            kind.word,
+            kind.help,
+            keys.join("; ")
+        );
+    }
+    out
+}
+
 #[test]
 fn the_page_of_scenes_lists_the_units_that_are_read() {
     let page = read("docs/scene-format.md");
     assert!(page.contains(&unit_table()), "{}", unit_table());
     assert!(page.contains(&element_table()), "{}", element_table());
+    assert!(page.contains(&drive_table()), "{}", drive_table());
     for unit in ["µm", "kg·m²", "60 rpm", "15°"] {
         assert!(page.contains(unit), "{unit}");
     }

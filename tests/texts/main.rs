@@ -1,6 +1,7 @@
 //! What is read: scene files, documents, the sources themselves.
 
 mod documents;
+mod drives;
 mod house;
 mod scene_corpus;
 mod scene_errors;

@@ -5,7 +5,7 @@ use std::io;
 use super::rows::Rows;
 use crate::files::OutputFile;
 use crate::scene::Scene;
-use crate::simulate::{Frame, Reading, run_columns};
+use crate::simulate::{Frame, NoChannel, Reading, chosen_columns, run_columns};
 
 /// Rows of one run, row after row.
 #[derive(Debug)]
@@ -39,7 +39,22 @@ pub enum NoRow {
 impl Table {
     /// An empty table with the columns of `scene`; `first` shows whether it has a probe error and a ledger.
     pub fn new(scene: &Scene, first: &Frame) -> Self {
-        let (names, readings) = run_columns(scene, first);
+        Self::of_columns(run_columns(scene, first))
+    }
+
+    /// An empty table with the time and the channels that match `patterns`.
+    ///
+    /// # Errors
+    /// A pattern without a match.
+    pub fn of_channels(
+        scene: &Scene,
+        first: &Frame,
+        patterns: &[String],
+    ) -> Result<Self, NoChannel> {
+        chosen_columns(scene, first, patterns).map(Self::of_columns)
+    }
+
+    fn of_columns((names, readings): (Vec<String>, Vec<Reading>)) -> Self {
         Self {
             rows: Rows::new(names.len()),
             names,

@@ -7,6 +7,10 @@ use super::{Law, NEAR};
 use crate::jet::Jet;
 use crate::scene::{Drive, DriveData};
 
+/// Parts into which an interval is stepped, at least, as long as they are not shorter than `FINE`, s.
+const PARTS: f64 = 4.0;
+const FINE: f64 = 1e-3;
+
 #[derive(Debug)]
 struct Table {
     /// Instants of the points, s.
@@ -101,19 +105,29 @@ impl Law for Table {
         }
     }
 
-    /// At the next point, where the third derivative jumps.
+    /// At the next point, where the third derivative jumps, and at some instants on the way there.
     fn step_end(&self, t: f64) -> f64 {
         let now = self.within(t);
-        match self.times.get(self.next(now + NEAR)) {
-            Some(next) => t + (next - now),
-            None if self.repeats => t + (self.times[1] - self.times[0]),
-            None => f64::INFINITY,
+        let next = match self.next(now + NEAR) {
+            next if next < self.times.len() => next,
+            _ if self.repeats => return t + part(self.times[1] - self.times[0]),
+            _ => return f64::INFINITY,
+        };
+        let left = self.times[next] - now;
+        t + match next {
+            0 => left,
+            _ => left.min(part(self.times[next] - self.times[next - 1])),
         }
     }
 
     fn bounds_steps(&self) -> bool {
         true
     }
+}
+
+/// Longest step within an interval of this width, s.
+fn part(width: f64) -> f64 {
+    (width / PARTS).max(FINE).min(width)
 }
 
 /// Second derivatives of the spline at the points: continuous first and second derivatives at all inner ones, and at the ends

@@ -14,6 +14,8 @@ mod stop;
 pub(super) use contact::Contact;
 pub use contact::Gap;
 
+use serde::{Deserialize, Serialize};
+
 use super::kinematics::{Kinematics, Wrench};
 use super::model::{Anchor, Model};
 use crate::contact::{Memory, Stiffness};
@@ -167,7 +169,7 @@ impl ElementReport {
 }
 
 /// Powers at one instant, or their integrals over time (then in J).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Powers {
     /// Supplied by the drives: actuator force times rate, W.
     pub drive: f64,

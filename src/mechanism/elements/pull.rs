@@ -1,6 +1,8 @@
 //! A hand that pulls on a body: a spring and a damper between a point of the body and the hand. It is external to the
 //! scene, so all its work is external.
 
+use serde::{Deserialize, Serialize};
+
 use super::{At, ElementReport, ForceElement, Loads, Powers, SceneElement, point_of, push};
 use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::model::Anchor;
@@ -13,7 +15,7 @@ const FREQUENCY: f64 = 3.0;
 const DAMPING: f64 = 0.3;
 
 /// Where the hand pulls, and how.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pull {
     /// Body, by its index in the scene.
     pub body: usize,

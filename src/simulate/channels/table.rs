@@ -3,11 +3,13 @@
 
 use Quantity as Q;
 use Take::{
-    Angles, Axes, Element, Given, Hinge, Joint, JointAxes, ProbeError, Slide, Taken, Whole,
+    Angles, Axes, BodyAxes, Element, ElementValue, Given, Hinge, HingeCoordinate, Joint, JointAxes,
+    OtherAngles, OtherAxes, ProbeError, Slide, SlideCoordinate, Taken, Whole,
 };
 
 use crate::scene::Vec3;
-use crate::simulate::{ContactState, ElementReport, Frame, JointReport, Ledger, Pose};
+use crate::simulate::angles::pose_of;
+use crate::simulate::{BodyMotion, ContactState, ElementReport, Frame, JointReport, Ledger, Pose};
 
 /// A physical quantity that a plot shows; its channels share one axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -228,6 +230,16 @@ pub(super) enum Take {
     Axes(fn(&Pose) -> Vec3),
     /// Of the output body, by alpha, beta, gamma.
     Angles(fn(&Pose) -> Vec3),
+    /// Of each body, along x, y, z.
+    BodyAxes(fn(&BodyMotion) -> Vec3),
+    /// The same of each but the output body.
+    OtherAxes(fn(&BodyMotion) -> Vec3),
+    /// Of each body but the output body, by alpha, beta, gamma.
+    OtherAngles(fn(&Pose) -> Vec3),
+    /// Of each sliding joint: its coordinate, or the rate of that.
+    SlideCoordinate(usize),
+    /// The same of each turning joint.
+    HingeCoordinate(usize),
     /// Of each ball joint.
     Joint(fn(&JointReport) -> f64),
     /// Of each ball joint, along x, y, z.
@@ -244,6 +256,8 @@ pub(super) enum Take {
     ProbeError,
     /// Of each force element that reports it, along x, y, z.
     Element(fn(&ElementReport) -> Option<Vec3>),
+    /// Of each force element between two points.
+    ElementValue(fn(&ElementReport) -> f64),
 }
 
 /// What a signal is repeated for.
@@ -251,6 +265,12 @@ pub(super) enum Take {
 pub(super) enum Each {
     /// Nothing: there is one.
     Once,
+    /// The output body alone.
+    Output,
+    /// Bodies.
+    Body,
+    /// Joints that slide or turn.
+    Coordinate,
     /// Ball joints.
     Joint,
     /// Driven joints.
@@ -267,18 +287,21 @@ impl Take {
         match self {
             Joint(_) | JointAxes(_) => Each::Joint,
             Slide | Hinge => Each::Drive,
-            Element(_) => Each::Element,
-            Whole(..) | Axes(_) | Angles(_) | Given(..) | Taken(..) | ProbeError => Each::Once,
+            Element(_) | ElementValue(_) => Each::Element,
+            Axes(_) | Angles(_) => Each::Output,
+            BodyAxes(_) | OtherAxes(_) | OtherAngles(_) => Each::Body,
+            SlideCoordinate(_) | HingeCoordinate(_) => Each::Coordinate,
+            Whole(..) | Given(..) | Taken(..) | ProbeError => Each::Once,
         }
     }
 
     pub(super) fn components(&self) -> Components {
         match self {
-            Axes(_) | JointAxes(_) | ProbeError | Element(_) => {
+            Axes(_) | BodyAxes(_) | OtherAxes(_) | JointAxes(_) | ProbeError | Element(_) => {
                 &[("x", "x"), ("y", "y"), ("z", "z")]
             }
-            Angles(_) => &[("α", "alpha"), ("β", "beta"), ("γ", "gamma")],
-            Whole(..) | Joint(_) | Slide | Hinge | Given(..) | Taken(..) => &[("", "")],
+            Angles(_) | OtherAngles(_) => &[("α", "alpha"), ("β", "beta"), ("γ", "gamma")],
+            _ => &[("", "")],
         }
     }
 
@@ -296,12 +319,21 @@ impl Take {
         match self {
             Whole(_, of) => Some(of(frame)),
             Axes(of) | Angles(of) => Some(of(&frame.pose)[component]),
+            BodyAxes(of) | OtherAxes(of) => frame.bodies.get(part).map(|body| of(body)[component]),
+            OtherAngles(of) => {
+                let body = frame.bodies.get(part);
+                body.map(|body| of(&pose_of(body))[component])
+            }
+            SlideCoordinate(order) | HingeCoordinate(order) => {
+                frame.coordinates.get(part).map(|c| c[*order])
+            }
             Joint(of) => frame.joints.get(part).map(of),
             JointAxes(of) => frame.joints.get(part).map(|joint| of(joint)[component]),
             Slide | Hinge => frame.actuators.get(part).copied(),
             Given(_, of) | Taken(_, of) => frame.ledger.as_ref().map(of),
             ProbeError => frame.probe_error.map(|error| error[component]),
             Element(of) => frame.elements.get(part).and_then(of).map(|v| v[component]),
+            ElementValue(of) => frame.elements.get(part).map(of),
         }
     }
 }
@@ -309,12 +341,18 @@ impl Take {
 /// One recorded quantity.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Signal {
-    /// Column name in files, with the SI unit: `@` stands for the name of the part, `#` for that of the component.
+    /// Name of the channel: `@` stands for the name of the part, `#` for that of the component. Empty if frames do not
+    /// contain it.
+    pub name: &'static str,
+    /// Column name in files, with the SI unit, by the same rule.
     pub column: &'static str,
+    /// What it is.
+    pub help: &'static str,
     /// Plot that shows it.
     pub plot: Option<Quantity>,
-    /// Place in the rows of `run`, lowest first. Signals of the same place keep the order of the table, part by part where
-    /// they are repeated. Readers also rely on column positions: append new columns at the end.
+    /// Place in the rows of `run`, lowest first; without one it is written only if asked for. Signals of the same place
+    /// keep the order of the table, part by part where they are repeated. Readers also rely on column positions: append new
+    /// columns at the end.
     pub run: Option<u8>,
     /// How it is read.
     pub take: Take,
@@ -322,31 +360,37 @@ pub(super) struct Signal {
     pub of_elements: bool,
 }
 
-/// A signal in both a plot and `run`.
-const fn both(column: &'static str, plot: Quantity, run: u8, take: Take) -> Signal {
+/// A signal in neither plots nor the rows that `run` writes unasked.
+const fn asked(name: &'static str, column: &'static str, take: Take, help: &'static str) -> Signal {
     Signal {
+        name,
         column,
-        plot: Some(plot),
-        run: Some(run),
+        help,
+        plot: None,
+        run: None,
         take,
         of_elements: false,
     }
 }
 
-/// A signal in a plot only.
-const fn plotted(column: &'static str, plot: Quantity, take: Take) -> Signal {
+/// The same shown in a plot.
+const fn plotted(plot: Quantity, signal: Signal) -> Signal {
     Signal {
-        run: None,
-        ..both(column, plot, 0, take)
+        plot: Some(plot),
+        ..signal
     }
 }
 
-/// A signal in `run` only.
-const fn listed(column: &'static str, run: u8, take: Take) -> Signal {
+/// The same among the columns of `run`.
+const fn listed(place: u8, signal: Signal) -> Signal {
     Signal {
-        plot: None,
-        ..both(column, Q::NormalForce, run, take)
+        run: Some(place),
+        ..signal
     }
+}
+
+const fn both(plot: Quantity, place: u8, signal: Signal) -> Signal {
+    plotted(plot, listed(place, signal))
 }
 
 const fn of_elements(signal: Signal) -> Signal {
@@ -359,52 +403,75 @@ const fn of_elements(signal: Signal) -> Signal {
 /// Every signal, in the order of saved records and of the members of a plot.
 #[rustfmt::skip]
 pub(super) const TABLE: &[Signal] = &[
-    both("@_normal_N", Q::NormalForce, 2, Joint(|joint| joint.normal_force.norm())),
-    plotted("@_friction_N", Q::FrictionForce, Joint(|joint| joint.friction_force.norm())),
-    both("@_eccentricity_m", Q::Eccentricity, 1, Joint(|joint| joint.eccentricity.norm())),
-    listed("@_e#_m", 5, JointAxes(|joint| joint.eccentricity)),
-    both("@_penetration_m", Q::Penetration, 5, Joint(|joint| joint.penetration)),
-    listed("@_penetration_rate_m_s", 5, Joint(|joint| joint.penetration_rate)),
-    listed("@_force_#_N", 5, JointAxes(|joint| joint.normal_force + joint.friction_force)),
-    listed("@_friction_#_N", 5, JointAxes(|joint| joint.friction_force)),
-    listed("@_state", 5, Joint(|joint| state_code(joint.state))),
+    both(Q::NormalForce, 2, asked("@.normal", "@_normal_N", Joint(|joint| joint.normal_force.norm()), "size of the normal force on the ball; of an ideal joint, of its reaction")),
+    plotted(Q::FrictionForce, asked("@.friction.size", "@_friction_N", Joint(|joint| joint.friction_force.norm()), "size of the friction force on the ball")),
+    both(Q::Eccentricity, 1, asked("@.eccentricity.size", "@_eccentricity_m", Joint(|joint| joint.eccentricity.norm()), "distance of the ball's centre from the socket's")),
+    listed(5, asked("@.eccentricity.#", "@_e#_m", JointAxes(|joint| joint.eccentricity), "ball's centre from the socket's")),
+    both(Q::Penetration, 5, asked("@.penetration", "@_penetration_m", Joint(|joint| joint.penetration), "depth of the ball in the socket wall; negative where there is a gap")),
+    listed(5, asked("@.penetration_rate", "@_penetration_rate_m_s", Joint(|joint| joint.penetration_rate), "rate of the penetration")),
+    listed(5, asked("@.force.#", "@_force_#_N", JointAxes(|joint| joint.normal_force + joint.friction_force), "force on the ball; of an ideal joint, its reaction")),
+    listed(5, asked("@.friction.#", "@_friction_#_N", JointAxes(|joint| joint.friction_force), "friction force on the ball")),
+    listed(5, asked("@.state", "@_state", Joint(|joint| state_code(joint.state)), "0 free, 1 stick, 2 slip, 3 ideal")),
 
-    listed("t_s", 0, Whole("time", |frame| frame.time)),
-    both("#_m", Q::Position, 0, Axes(|pose| pose.position)),
-    both("#_rad", Q::Angles, 0, Angles(|pose| pose.angles)),
-    both("v#_m_s", Q::Velocity, 0, Axes(|pose| pose.velocity)),
-    both("#_rate_rad_s", Q::AngleRates, 4, Angles(|pose| pose.angle_rates)),
-    both("a#_m_s2", Q::Acceleration, 3, Axes(|pose| pose.acceleration)),
-    both("#_accel_rad_s2", Q::AngleAccelerations, 8, Angles(|pose| pose.angle_accelerations)),
+    listed(0, asked(TIME, "t_s", Whole("time", |frame| frame.time), "simulated time")),
+    both(Q::Position, 0, asked("@.pose.#", "#_m", Axes(|pose| pose.position), "origin of the output body")),
+    both(Q::Angles, 0, asked("@.pose.#", "#_rad", Angles(|pose| pose.angles), "orientation of the output body, Rx(alpha) Rz(beta) Ry(gamma)")),
+    both(Q::Velocity, 0, asked("@.velocity.#", "v#_m_s", Axes(|pose| pose.velocity), "velocity of the output body's origin")),
+    both(Q::AngleRates, 4, asked("@.velocity.#", "#_rate_rad_s", Angles(|pose| pose.angle_rates), "rate of the output body's angle")),
+    both(Q::Acceleration, 3, asked("@.acceleration.#", "a#_m_s2", Axes(|pose| pose.acceleration), "acceleration of the output body's origin")),
+    both(Q::AngleAccelerations, 8, asked("@.acceleration.#", "#_accel_rad_s2", Angles(|pose| pose.angle_accelerations), "second derivative of the output body's angle")),
 
-    both("kinetic_J", Q::Energy, 7, Whole("kinetic", |frame| frame.kinetic)),
-    both("potential_J", Q::Energy, 7, Whole("potential", |frame| frame.potential)),
-    both("elastic_J", Q::Energy, 7, Whole("elastic", |frame| frame.elastic)),
+    both(Q::Energy, 7, asked("energy.kinetic", "kinetic_J", Whole("kinetic", |frame| frame.kinetic), "kinetic energy of all bodies")),
+    both(Q::Energy, 7, asked("energy.potential", "potential_J", Whole("potential", |frame| frame.potential), "energy in gravity, 0 at the world's origin, and in contacts and springs")),
+    both(Q::Energy, 7, asked("energy.elastic", "elastic_J", Whole("elastic", |frame| frame.elastic), "energy in contacts and springs")),
 
-    both("@_actuator_N", Q::ActuatorForce, 6, Slide),
-    both("@_actuator_Nm", Q::ActuatorTorque, 6, Hinge),
+    both(Q::ActuatorForce, 6, asked("@.actuator", "@_actuator_N", Slide, "force of the drive, positive along the joint's axis")),
+    both(Q::ActuatorTorque, 6, asked("@.actuator", "@_actuator_Nm", Hinge, "torque of the drive, positive about the joint's axis")),
 
-    both("drive_work_J", Q::EnergyBalance, 10, Given("drives", |ledger| ledger.drive_work)),
-    both("gravity_work_J", Q::EnergyBalance, 10, Given("gravity", |ledger| ledger.gravity_work)),
-    both("clearance_work_J", Q::EnergyBalance, 11, Given("clearance", |ledger| ledger.clearance_work)),
-    plotted("change_work_J", Q::EnergyBalance, Given("changes", |ledger| ledger.change_work)),
+    both(Q::EnergyBalance, 10, asked("energy.drive_work", "drive_work_J", Given("drives", |ledger| ledger.drive_work), "supplied by the drives since the start")),
+    both(Q::EnergyBalance, 10, asked("energy.gravity_work", "gravity_work_J", Given("gravity", |ledger| ledger.gravity_work), "supplied by gravity since the start")),
+    both(Q::EnergyBalance, 11, asked("energy.clearance_work", "clearance_work_J", Given("clearance", |ledger| ledger.clearance_work), "supplied by moving clearances since the start")),
+    plotted(Q::EnergyBalance, asked("energy.change_work", "change_work_J", Given("changes", |ledger| ledger.change_work), "supplied by changed parameters since the start")),
     // Any scene can be pulled by hand.
-    plotted("external_work_J", Q::EnergyBalance, Given("external", |ledger| ledger.external_work)),
-    of_elements(listed("external_work_J", 14, Given("external", |ledger| ledger.external_work))),
-    both("restitution_loss_J", Q::EnergyBalance, 10, Taken("restitution", |ledger| ledger.restitution_loss)),
-    both("friction_loss_J", Q::EnergyBalance, 10, Taken("friction", |ledger| ledger.friction_loss)),
-    of_elements(both("damping_loss_J", Q::EnergyBalance, 13, Taken("damping", |ledger| ledger.damping_loss))),
-    plotted("kinetic_change_J", Q::EnergyBalance, Taken("kinetic", |ledger| ledger.kinetic_change)),
-    plotted("elastic_change_J", Q::EnergyBalance, Taken("elastic", |ledger| ledger.elastic_change)),
-    both("energy_residual_J", Q::EnergyBalance, 11, Given("residual", Ledger::residual)),
+    plotted(Q::EnergyBalance, asked("energy.external_work", "external_work_J", Given("external", |ledger| ledger.external_work), "supplied by external loads since the start")),
+    of_elements(listed(14, asked("energy.external_work", "external_work_J", Given("external", |ledger| ledger.external_work), "supplied by external loads since the start"))),
+    both(Q::EnergyBalance, 10, asked("energy.restitution_loss", "restitution_loss_J", Taken("restitution", |ledger| ledger.restitution_loss), "lost to restitution since the start")),
+    both(Q::EnergyBalance, 10, asked("energy.friction_loss", "friction_loss_J", Taken("friction", |ledger| ledger.friction_loss), "lost to friction since the start")),
+    of_elements(both(Q::EnergyBalance, 13, asked("energy.damping_loss", "damping_loss_J", Taken("damping", |ledger| ledger.damping_loss), "lost to dampers since the start"))),
+    plotted(Q::EnergyBalance, asked("energy.kinetic_change", "kinetic_change_J", Taken("kinetic", |ledger| ledger.kinetic_change), "change of the kinetic energy since the start")),
+    plotted(Q::EnergyBalance, asked("energy.elastic_change", "elastic_change_J", Taken("elastic", |ledger| ledger.elastic_change), "change of the elastic energy since the start")),
+    both(Q::EnergyBalance, 11, asked("energy.residual", "energy_residual_J", Given("residual", Ledger::residual), "error of the integration: energy that came from nowhere since the start")),
 
     // Supplied by whoever computes the ideal motion alongside the run.
-    plotted("tip_error_m", Q::TipError, Whole("distance", |_| f64::NAN)),
-    both("probe_error_#_m", Q::ProbeError, 9, ProbeError),
+    plotted(Q::TipError, asked("", "tip_error_m", Whole("distance", |_| f64::NAN), "")),
+    both(Q::ProbeError, 9, asked("probe_error.#", "probe_error_#_m", ProbeError, "probe tip from where the ideal mechanism has it")),
 
-    listed("@_force_#_N", 12, Element(ElementReport::own_force)),
-    listed("@_torque_#_Nm", 12, Element(|element| element.torque)),
+    listed(12, asked("@.force.#", "@_force_#_N", Element(ElementReport::own_force), "force of the element on its second, or only, point")),
+    listed(12, asked("@.torque.#", "@_torque_#_Nm", Element(|element| element.torque), "torque of the element on the body")),
+
+    asked("@.pose.#", "@_#_m", OtherAxes(|body| body.position), "origin of the body"),
+    asked("@.pose.#", "@_#_rad", OtherAngles(|pose| pose.angles), "orientation of the body, Rx(alpha) Rz(beta) Ry(gamma)"),
+    asked("@.velocity.#", "@_v#_m_s", OtherAxes(|body| body.velocity), "velocity of the body's origin"),
+    asked("@.velocity.#", "@_#_rate_rad_s", OtherAngles(|pose| pose.angle_rates), "rate of the body's angle"),
+    asked("@.acceleration.#", "@_a#_m_s2", OtherAxes(|body| body.acceleration), "acceleration of the body's origin"),
+    asked("@.acceleration.#", "@_#_accel_rad_s2", OtherAngles(|pose| pose.angle_accelerations), "second derivative of the body's angle"),
+    asked("@.angular_velocity.#", "@_omega_#_rad_s", BodyAxes(|body| body.angular_velocity), "angular velocity of the body"),
+    asked("@.angular_acceleration.#", "@_omega_rate_#_rad_s2", BodyAxes(|body| body.angular_acceleration), "angular acceleration of the body"),
+
+    asked("@.position", "@_position_m", SlideCoordinate(0), "coordinate of the joint along its axis"),
+    asked("@.rate", "@_rate_m_s", SlideCoordinate(1), "rate of the joint's coordinate"),
+    asked("@.angle", "@_angle_rad", HingeCoordinate(0), "angle of the joint about its axis"),
+    asked("@.rate", "@_rate_rad_s", HingeCoordinate(1), "rate of the joint's angle"),
+
+    asked("@.gap", "@_gap_m", Joint(|joint| -joint.penetration), "gap between ball and socket wall; negative in contact"),
+    asked("@.clearance", "@_clearance_m", Joint(|joint| joint.clearance), "radial clearance in force"),
+    asked("@.slip_speed", "@_slip_speed_m_s", Joint(|joint| joint.slip_speed), "sliding speed that the friction law uses"),
+
+    asked("@.length", "@_length_m", ElementValue(|element| (element.points[1] - element.points[0]).norm()), "distance of the element's points"),
 ];
+
+/// Name of the time, which every row begins with.
+pub(super) const TIME: &str = "time";
 
 /// Code of a contact state in files.
 fn state_code(state: ContactState) -> f64 {

@@ -2,7 +2,7 @@
 
 use super::automatic::STABILITY_LIMIT;
 use super::corners::Piece;
-use super::{LONGEST_STEP, Simulation};
+use super::{LONGEST_STEP, NEARLY, Simulation};
 use crate::integrate::{Method, find_root};
 use crate::mechanism::Counts;
 use crate::simulate::peaks::Approach;
@@ -69,7 +69,7 @@ impl Simulation {
         let asked = self.state.control.h_next;
         let mut h = asked.min(LONGEST_STEP);
         let mut t_end = t + h;
-        let cut = t_end >= limit - 1e-6 * h;
+        let cut = t_end >= limit - NEARLY * h;
         if cut {
             t_end = limit;
             h = limit - t;

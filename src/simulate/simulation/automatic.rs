@@ -1,5 +1,7 @@
 //! Which member of the automatic choice steps: the explicit one through impacts, the implicit one once contacts have settled.
 
+use serde::{Deserialize, Serialize};
+
 use super::Simulation;
 use crate::integrate::{Controller, Method};
 use crate::mechanism::{Mechanism, MechanismError};
@@ -30,7 +32,7 @@ pub const LARGEST_DENSE: usize = 1024;
 pub const LARGEST_IMPLICIT: usize = 96;
 
 /// State of the automatic pair.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Choice {
     /// Explicit steps since the latest contact began, and how many of them were limited by stability.
     pub(super) since_contact: u32,

@@ -110,7 +110,8 @@ impl Simulation {
     fn lay_out_course(&mut self, h: f64, end: Powers) {
         let (from, to) = (self.state.before.t, self.state.now.t);
         let kinematic = self.mechanism.is_kinematic();
-        if kinematic {
+        // Over a jump of a derivative past ends tell nothing.
+        if kinematic && !self.mechanism.has_broken_drives() {
             let past = &mut self.state.record.account.past;
             past.push_apart(to, end, SHORTEST_PAST * h);
             if past.len() > PAST_ENDS {

@@ -1,6 +1,8 @@
 //! The ideal motion that a probe is compared with: where it has no closed form, a simulation of the same scene with every
 //! ball joint ideal, run alongside.
 
+use serde::{Deserialize, Serialize};
+
 use super::Simulation;
 use crate::integrate::Method;
 use crate::scene::{Formulation, Scene, StartRule, Vec3};
@@ -38,7 +40,7 @@ pub(in crate::simulate) enum Reference<M = IdealMotion> {
 }
 
 /// Tip at the end of a step: position, velocity and acceleration.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Mark {
     time: f64,
     tip: [Vec3; 3],
@@ -46,17 +48,18 @@ struct Mark {
 
 /// The ideal scene in motion, and past positions of its tip.
 pub(in crate::simulate) struct IdealMotion {
-    simulation: Simulation,
+    pub(super) simulation: Simulation,
     body: usize,
     probe: Vec3,
     frame: Frame,
-    marks: Marks,
+    pub(super) marks: Marks,
 }
 
 /// The latest step ends, and whether more will follow.
-#[derive(Clone, Debug)]
-struct Marks {
-    ring: [Mark; MARKS],
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Marks {
+    /// As many as are kept.
+    ring: Vec<Mark>,
     count: usize,
     /// Why it stopped.
     stopped: Option<Stopped>,
@@ -180,7 +183,7 @@ impl IdealMotion {
             probe,
             frame: Frame::default(),
             marks: Marks {
-                ring: [Mark::default(); MARKS],
+                ring: vec![Mark::default(); MARKS],
                 count: 0,
                 stopped: None,
             },
@@ -227,6 +230,11 @@ impl IdealMotion {
 }
 
 impl Marks {
+    /// Whether there are as many as are kept.
+    pub(super) fn fits(&self) -> bool {
+        self.ring.len() == MARKS
+    }
+
     fn tip(&self, time: f64) -> Option<Vec3> {
         let oldest = self.count.saturating_sub(MARKS);
         let at = |k: usize| &self.ring[k % MARKS];

@@ -1,0 +1,122 @@
+//! The scene file that is shown is loaded again when it is saved elsewhere.
+
+use eframe::egui;
+
+use super::App;
+use super::host::OpenedFile;
+use crate::scene::Scene;
+
+/// Stepping time within which the instant shown before must be reached again, s; otherwise the run begins at 0.
+const QUICK: f64 = 0.4;
+
+/// The file that the shown scene was read from, if any.
+#[derive(Debug, Default)]
+pub(super) struct SceneFile {
+    name: Option<String>,
+    /// Whether the host was told.
+    told: bool,
+}
+
+impl SceneFile {
+    /// The file `name`, as the user named it; the host is to be told.
+    pub(super) fn named(name: Option<String>) -> Self {
+        Self { name, told: false }
+    }
+
+    /// The file.
+    pub(super) fn name(&self) -> Option<&str> {
+        self.name.as_deref()
+    }
+}
+
+impl App {
+    /// Lets the host watch the file of the scene, and loads it again if it was saved.
+    pub(super) fn receive_saved_scene(&mut self, ctx: &egui::Context) {
+        if !std::mem::replace(&mut self.scene_file.told, true) {
+            self.host.watch(ctx, self.scene_file.name());
+        }
+        while let Some(file) = self.host.saved_elsewhere() {
+            // The latest message may come from a file that is no longer shown.
+            if self.scene_file.name() == Some(&file.name)
+                && let Err(reason) = self.reload(file)
+            {
+                self.problem = Some(reason);
+            }
+        }
+    }
+
+    /// Shows the scene of `file`, with what was changed here unless the file now says something else. View, plots and, if that
+    /// is quick, the instant stay. On an error the running scene stays.
+    fn reload(&mut self, file: OpenedFile) -> Result<(), String> {
+        let name = file.name;
+        let bytes = file.content.map_err(|reason| format!("{name}: {reason}"))?;
+        let text = String::from_utf8(bytes).map_err(|_| format!("{name}: not a text file"))?;
+        if text == self.player.wanted().source.text {
+            // Saved as it was, or back to it after an error.
+            self.problem = None;
+            return Ok(());
+        }
+        let parse = |text: &str, changes: &[(String, String)]| {
+            Scene::parse(text, Some(&name), changes).map_err(|error| error.to_string())
+        };
+        let (before, after) = (
+            parse(&self.player.wanted().source.text, &[]),
+            parse(&text, &[])?,
+        );
+        let stays = |key: &str| {
+            let before = before.as_ref().ok().and_then(|scene| scene.get(key).ok());
+            before.is_some() && before == after.get(key).ok()
+        };
+        let mut changes = self.player.wanted().changes.clone();
+        changes.retain(|(key, _)| stays(key));
+        let scene = parse(&text, &changes)?;
+
+        let link = self.link();
+        let (playing, twin) = (self.player.is_playing(), self.player.twin().is_some());
+        let (phase, time) = (self.player.watch().phase(), self.player.pacer.shown());
+        self.show_scene(&scene)?;
+        self.scene_file = SceneFile {
+            name: Some(name),
+            told: true,
+        };
+        self.player.set_phase(phase);
+        let reached = self.reach(time);
+        self.player.set_twin(twin);
+        self.player.set_playing(playing);
+        if let Some(pose) = link.camera {
+            self.viewport.set_pose(pose);
+        }
+        let followed = link.followed(&scene).ok().flatten();
+        self.viewport.follow(followed);
+        match link.under_microscope(&scene) {
+            Ok(Some(joint)) => self.microscope.focus(joint),
+            _ => self.microscope.set_open(false),
+        }
+        self.viewport.arrive(&self.player);
+        let at = if reached && time > 0.0 {
+            format!("at {:.3} ms", self.player.pacer.shown() * 1e3)
+        } else {
+            "from the start".to_owned()
+        };
+        let kept = match changes.len() {
+            0 => String::new(),
+            1 => ", keeping 1 change".to_owned(),
+            more => format!(", keeping {more} changes"),
+        };
+        self.say(format!("Reloaded {at}{kept}"));
+        Ok(())
+    }
+
+    /// Runs to `time`, s, if that is quick; otherwise the run is at its start afterwards. Whether it went there, or as far as
+    /// the run goes.
+    fn reach(&mut self, time: f64) -> bool {
+        let clock = self.player.clock;
+        let start = clock();
+        let reached = self.player.run_towards(time, || clock() - start < QUICK);
+        if !reached {
+            // It has just started from there: it does so again.
+            self.reset();
+        }
+        reached
+    }
+}

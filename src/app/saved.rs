@@ -1,0 +1,118 @@
+//! Notices that a file was saved, by looking at it twice a second on a thread of its own: a window at rest stays at rest.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, SystemTime};
+
+use super::host::OpenedFile;
+use crate::scene::{LARGEST_FILE, too_large};
+
+/// Between two looks.
+const PERIOD: Duration = Duration::from_millis(500);
+/// A file that does not change for so long is written completely.
+const SETTLED: Duration = Duration::from_millis(50);
+
+/// A file that is watched until this is dropped.
+#[derive(Debug)]
+pub(super) struct Watcher {
+    changes: Receiver<OpenedFile>,
+    over: Arc<AtomicBool>,
+}
+
+impl Watcher {
+    /// Watches the file `name`, and calls `changed` whenever there is something to [`Self::poll`]: first its content as it
+    /// is. `None` if the system provides no thread.
+    pub(super) fn start(name: &str, changed: impl Fn() + Send + 'static) -> Option<Self> {
+        let (sender, changes) = channel();
+        let over = Arc::new(AtomicBool::new(false));
+        let asked = Arc::clone(&over);
+        let (name, path) = (name.to_owned(), PathBuf::from(name));
+        let look = move || {
+            let mut seen = None;
+            while !asked.load(Ordering::Relaxed) {
+                let now = stamp(&path);
+                if now != seen {
+                    std::thread::sleep(SETTLED);
+                    if stamp(&path) != now {
+                        continue;
+                    }
+                    seen = now;
+                    // Some editors replace a file: for a moment there is none.
+                    if now.is_some() {
+                        let (name, content) = (name.clone(), read(&path));
+                        if sender.send(OpenedFile { name, content }).is_err() {
+                            return;
+                        }
+                        changed();
+                    }
+                }
+                std::thread::sleep(PERIOD);
+            }
+        };
+        let builder = std::thread::Builder::new().name("scene file".to_owned());
+        builder.spawn(look).ok()?;
+        Some(Self { changes, over })
+    }
+
+    /// The next content of the file.
+    pub(super) fn poll(&self) -> Option<OpenedFile> {
+        self.changes.try_recv().ok()
+    }
+}
+
+impl Drop for Watcher {
+    fn drop(&mut self) {
+        self.over.store(true, Ordering::Relaxed);
+    }
+}
+
+/// What changes when a file is saved; `None` if there is no such file.
+fn stamp(path: &Path) -> Option<(SystemTime, u64)> {
+    let file = path.metadata().ok().filter(std::fs::Metadata::is_file)?;
+    Some((file.modified().ok()?, file.len()))
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, String> {
+    let large = path.metadata().is_ok_and(|file| file.len() > LARGEST_FILE);
+    if large {
+        return Err(too_large());
+    }
+    std::fs::read(path).map_err(|cause| format!("cannot read this file: {cause}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_saved_content_arrives_also_of_a_replaced_file() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.toml");
+        std::fs::write(&path, "first").expect("writes");
+        let (sender, told) = channel();
+        let watcher = Watcher::start(&path.display().to_string(), move || {
+            // Nobody listens at the end.
+            let _ = sender.send(());
+        });
+        let watcher = watcher.expect("a thread");
+        let next = || {
+            told.recv_timeout(Duration::from_secs(30))
+                .expect("a change");
+            let file = watcher.poll().expect("its content");
+            assert_eq!(file.name, path.display().to_string());
+            String::from_utf8(file.content.expect("readable")).expect("text")
+        };
+        assert_eq!(next(), "first");
+        std::fs::write(&path, "second, longer").expect("writes");
+        assert_eq!(next(), "second, longer");
+        let beside = folder.path().join("b");
+        std::fs::write(&beside, "3").expect("writes");
+        std::fs::remove_file(&path).expect("removes");
+        std::thread::sleep(2 * PERIOD);
+        std::fs::rename(&beside, &path).expect("renames");
+        assert_eq!(next(), "3");
+        assert!(told.try_recv().is_err() && watcher.poll().is_none());
+    }
+}

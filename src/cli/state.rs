@@ -1,0 +1,194 @@
+//! `run --save-state` and `--from-state`: the state at the end of a run in a file, from which a later run goes on with the
+//! same bits.
+
+use std::fs::File;
+use std::io::{Read as _, Write as _};
+use std::path::Path;
+
+use serde::Deserialize as _;
+use serde_json::{Map, Value as Json, json};
+
+use super::{Failure, provenance};
+use crate::files::{FileError, OutputFile, PROGRAM, PendingFile};
+use crate::scene::Scene;
+use crate::simulate::{SavedState, Simulation};
+
+/// Counts the versions of the file's layout.
+const FORMAT: u64 = 1;
+/// Largest file that is read, bytes.
+const LARGEST: u64 = 1 << 30;
+
+/// Where the state of a run goes: claimed, and known to be writable, before the run starts.
+pub struct StateFile {
+    file: OutputFile,
+    saved: Option<SavedState>,
+}
+
+impl StateFile {
+    /// Checks that `path` can be written.
+    ///
+    /// # Errors
+    /// As [`OutputFile::claim`].
+    pub fn claim(path: &Path, force: bool) -> Result<Self, Failure> {
+        let file = OutputFile::claim(path, force)?;
+        Ok(Self { file, saved: None })
+    }
+
+    /// To be called before every step of a run that ends at `end`, s: the state kept is that before the first step that the
+    /// end of the run cuts short, as a longer run would not.
+    pub fn watch(&mut self, simulation: &Simulation, end: f64) {
+        if self.saved.is_none() && simulation.is_cut_by(end) {
+            self.saved = Some(simulation.saved());
+        }
+    }
+
+    /// The state as the text of a file.
+    ///
+    /// # Errors
+    /// A value that is not a number, for which JSON has no word.
+    pub fn text(&self, simulation: &Simulation) -> Result<String, Failure> {
+        let saved = match &self.saved {
+            Some(saved) => saved,
+            None => &simulation.saved(),
+        };
+        let scene = simulation.scene();
+        let mut meta = provenance::meta(scene);
+        meta.insert("state_format".into(), json!(FORMAT));
+        // Rows of a run that goes on begin here.
+        meta.insert("time_s".into(), json!(simulation.time()));
+        meta.insert("step_end_s".into(), json!(saved.time()));
+        meta.insert("scene_text".into(), json!(scene.source.text));
+        let state = serde_json::to_value(saved).unwrap_or_default();
+        if SavedState::deserialize(&state).ok().as_ref() != Some(saved) {
+            let why = "the state holds a value that is not a number";
+            return Err(FileError::cannot(self.file.path(), why).into());
+        }
+        let mut content = Map::new();
+        content.insert("meta".into(), Json::Object(meta));
+        content.insert("state".into(), state);
+        content.insert("crc32".into(), json!(checksum(&content)));
+        Ok(Json::Object(content).to_string())
+    }
+
+    /// Writes that text; nothing has its final name yet.
+    ///
+    /// # Errors
+    /// Whatever the file system reports.
+    pub fn fill(self, text: &str) -> Result<PendingFile, Failure> {
+        Ok(self.file.fill(|out| out.write_all(text.as_bytes()))?)
+    }
+}
+
+/// A state from which a run goes on.
+pub struct Begun {
+    /// The state.
+    pub state: SavedState,
+    /// Time at which the run that saved it ended, s.
+    pub time: f64,
+}
+
+/// Reads the state of a run of `scene`.
+///
+/// # Errors
+/// An unreadable or damaged file; a state of another scene, other parameters or another version of the program.
+pub fn read(path: &Path, scene: &Scene) -> Result<Begun, Failure> {
+    let name = path.display();
+    let mut text = Vec::new();
+    File::open(path)
+        .and_then(|file| file.take(LARGEST + 1).read_to_end(&mut text))
+        .map_err(|cause| Failure::io(format!("--from-state: cannot read {name}: {cause}")))?;
+    let refuse = |why: String| Failure::usage(format!("--from-state {name}: {why}"));
+    if text.len() as u64 > LARGEST {
+        return Err(refuse(format!(
+            "larger than {} GiB: not a state that `run --save-state` wrote",
+            LARGEST >> 30
+        )));
+    }
+    let mut content: Map<String, Json> = serde_json::from_slice(&text).map_err(|cause| {
+        refuse(format!(
+            "not a state that `run --save-state` wrote, or a damaged one: {cause}"
+        ))
+    })?;
+    let told = content.shift_remove("crc32");
+    let meta = |key: &str| &content.get("meta").unwrap_or(&Json::Null)[key];
+    if meta("program") != PROGRAM || meta("state_format").is_null() {
+        return Err(refuse(
+            "not a state that `run --save-state` wrote".to_owned(),
+        ));
+    }
+    if *meta("version") != crate::VERSION || *meta("state_format") != FORMAT {
+        return Err(refuse(format!(
+            "written by version {} of the program, in format {}; this is version {}, format {FORMAT}, and only the same \
+             version goes on with the same bits",
+            word(meta("version")),
+            word(meta("state_format")),
+            crate::VERSION,
+        )));
+    }
+    let found = checksum(&content);
+    if told != Some(json!(found)) {
+        return Err(refuse(format!(
+            "damaged: its content has the checksum {found}, and it says {}",
+            word(&told.unwrap_or_default())
+        )));
+    }
+    check_scene(
+        meta("scene"),
+        meta("scene_text"),
+        meta("changed_parameters"),
+        scene,
+    )
+    .map_err(&refuse)?;
+    let time = meta("time_s").as_f64();
+    let state = content.get("state").map(SavedState::deserialize);
+    let (Some(time), Some(state)) = (time, state) else {
+        return Err(refuse("without a state, or its time".to_owned()));
+    };
+    let state = state.map_err(|cause| refuse(format!("not a state: {cause}")))?;
+    Ok(Begun { state, time })
+}
+
+/// Refuses the state of another scene than `scene`, in words.
+fn check_scene(name: &Json, text: &Json, changed: &Json, scene: &Scene) -> Result<(), String> {
+    if *text != *scene.source.text {
+        return Err(format!(
+            "a state of the scene `{}`, whose text is not that of the scene given here, `{}`: a run goes on only in the \
+             scene in which it began",
+            word(name),
+            scene.name
+        ));
+    }
+    let now = &provenance::meta(scene)["changed_parameters"];
+    if changed == now {
+        return Ok(());
+    }
+    let options = |changes: &Json| {
+        let changes = changes.as_object().into_iter().flatten();
+        let options: Vec<String> = changes
+            .map(|(key, value)| format!("--set {key}={}", word(value)))
+            .collect();
+        if options.is_empty() {
+            "no --set".to_owned()
+        } else {
+            options.join(" ")
+        }
+    };
+    Err(format!(
+        "saved with {}, and here the scene has {}: a run goes on only with the parameters with which it began",
+        options(changed),
+        options(now)
+    ))
+}
+
+/// A value as messages quote it.
+fn word(value: &Json) -> String {
+    value
+        .as_str()
+        .map_or_else(|| value.to_string(), str::to_owned)
+}
+
+/// CRC-32 of the content in the shortest form, which does not depend on how a file was laid out: eight hexadecimal digits.
+fn checksum(content: &Map<String, Json>) -> String {
+    let text = serde_json::to_string(content).unwrap_or_default();
+    format!("{:08x}", crc32fast::hash(text.as_bytes()))
+}

@@ -1,0 +1,66 @@
+//! Other files that a scene file takes its parts from: `include = ["leg.toml"]`.
+
+use std::sync::Arc;
+use toml::Spanned;
+use toml::de::DeTable;
+
+use super::document::{Document, Section};
+use super::*;
+
+/// Most files that a scene may include.
+const MOST_FILES: usize = 100;
+
+/// Lists that an included file may have, besides the sections of [`ELEMENT_KINDS`].
+const LISTS: [&str; 6] = [
+    "parameter",
+    "pattern",
+    "body",
+    "joint",
+    "ball_joint",
+    "fixed_shape",
+];
+
+/// Names and texts of the files that `top` includes, in its order.
+///
+/// # Errors
+/// No list of names, a name that is there twice, or a file that cannot be read.
+pub(super) fn included_texts<'d>(
+    top: &Section<'d>,
+) -> Result<Vec<(&'d str, Arc<str>)>, SceneError> {
+    let mut texts: Vec<(&str, Arc<str>)> = Vec::new();
+    let nodes = top
+        .get("include")
+        .map(|node| node.elements_up_to(MOST_FILES, "files"));
+    for node in nodes.transpose()?.unwrap_or_default() {
+        let name = node.text()?;
+        if texts.iter().any(|(other, _)| *other == name) {
+            return Err(node.error("this file is included already"));
+        }
+        let text = node.document.beside.text(name);
+        texts.push((name, text.map_err(|why| node.error(why))?));
+    }
+    Ok(texts)
+}
+
+/// The document of an included file.
+pub(super) fn document<'d>(of: Document<'d>, name: &'d str, text: &'d str) -> Document<'d> {
+    Document {
+        file: Some(name),
+        text,
+        included: true,
+        ..of
+    }
+}
+
+/// What an included file holds.
+///
+/// # Errors
+/// A key that only the scene's own file may have.
+pub(super) fn section<'d>(
+    document: Document<'d>,
+    parsed: &'d Spanned<DeTable<'d>>,
+) -> Result<Section<'d>, SceneError> {
+    let elements = ELEMENT_KINDS.iter().map(|kind| kind.section);
+    let keys: Vec<&str> = LISTS.into_iter().chain(elements).collect();
+    Section::new(document, String::new(), parsed.get_ref(), 0..0, &keys)
+}

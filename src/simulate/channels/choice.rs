@@ -1,0 +1,266 @@
+//! Choosing what is recorded, by name.
+
+use std::collections::BTreeSet;
+
+use super::table::TIME;
+use super::{Reading, lay_out};
+use crate::scene::{Scene, suggest};
+use crate::simulate::Frame;
+
+/// Place of the signals that `run` writes only if asked for: behind all others.
+const ASKED: u8 = u8::MAX;
+
+/// A channel that rows of a scene can have.
+#[derive(Clone, Debug)]
+pub struct Listed {
+    /// Its name: parts separated by dots, such as `S1.force.x`.
+    pub name: String,
+    /// Name of its column in a file, with the SI unit.
+    pub column: String,
+    /// SI unit; empty for a code.
+    pub unit: &'static str,
+    /// What it is.
+    pub help: &'static str,
+    /// Whether `run` writes it unasked.
+    pub unasked: bool,
+    reading: Reading,
+}
+
+impl Listed {
+    /// Whether `pattern` matches its name, the beginning of that up to a dot, or its column.
+    fn is_chosen_by(&self, pattern: &str) -> bool {
+        self.names().any(|name| matches(pattern, name)) || matches(pattern, &self.column)
+    }
+
+    /// Its name, then without its last part, and so on.
+    fn names(&self) -> impl Iterator<Item = &str> {
+        let cuts = self.name.rmatch_indices('.').map(|(dot, _)| dot);
+        [self.name.len()]
+            .into_iter()
+            .chain(cuts)
+            .map(|end| &self.name[..end])
+    }
+}
+
+/// A pattern that no channel matches.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("`{pattern}` is none of the scene's channels{near}")]
+pub struct NoChannel {
+    /// The pattern.
+    pub pattern: String,
+    /// The nearest name, in brackets; or empty.
+    near: String,
+}
+
+/// Every channel of `scene` in order: the columns that `run` writes unasked, then the others. `first` as in
+/// [`run_columns`](super::run_columns).
+pub fn channels_of(scene: &Scene, first: &Frame) -> Vec<Listed> {
+    let (mut list, mut columns) = (Vec::new(), BTreeSet::new());
+    let place = |signal: &super::Signal| {
+        let known = !signal.name.is_empty();
+        known.then(|| signal.run.unwrap_or(ASKED))
+    };
+    lay_out(scene, Some(first), usize::MAX, place, |found| {
+        // A term that plots always show and rows only of some scenes has two signals.
+        if columns.insert(found.column.clone()) {
+            list.push(Listed {
+                name: found.name,
+                unit: unit_of(found.signal.column),
+                column: found.column,
+                help: found.signal.help,
+                unasked: found.signal.run.is_some(),
+                reading: found.reading,
+            });
+        }
+    });
+    list
+}
+
+/// Columns of the rows of `run` with the time and the channels that match one of `patterns`, in the order of
+/// [`channels_of`], each with its name and where it is read. In patterns `*` stands for any characters, `?` for one.
+///
+/// # Errors
+/// A pattern without a match.
+pub fn chosen_columns(
+    scene: &Scene,
+    first: &Frame,
+    patterns: &[String],
+) -> Result<(Vec<String>, Vec<Reading>), NoChannel> {
+    let list = channels_of(scene, first);
+    for pattern in patterns {
+        if !list.iter().any(|channel| channel.is_chosen_by(pattern)) {
+            return Err(NoChannel {
+                near: suggest(pattern, list.iter().flat_map(Listed::names)),
+                pattern: pattern.clone(),
+            });
+        }
+    }
+    let chosen = |channel: &&Listed| {
+        channel.name == TIME || patterns.iter().any(|p| channel.is_chosen_by(p))
+    };
+    Ok(list
+        .iter()
+        .filter(chosen)
+        .map(|channel| (channel.column.clone(), channel.reading))
+        .unzip())
+}
+
+/// Units by the ends of column names, the longer first.
+const UNITS: [(&str, &str); 10] = [
+    ("_rad_s2", "rad/s2"),
+    ("_rad_s", "rad/s"),
+    ("_m_s2", "m/s2"),
+    ("_m_s", "m/s"),
+    ("_rad", "rad"),
+    ("_Nm", "N m"),
+    ("_N", "N"),
+    ("_J", "J"),
+    ("_m", "m"),
+    ("_s", "s"),
+];
+
+/// Unit of a column in the table.
+fn unit_of(column: &str) -> &'static str {
+    let found = UNITS.iter().find(|(end, _)| column.ends_with(end));
+    found.map_or("", |(_, unit)| unit)
+}
+
+/// Whether `pattern`, in which `*` stands for any characters and `?` for one, matches all of `name`.
+fn matches(pattern: &str, name: &str) -> bool {
+    let (pattern, name) = (pattern.as_bytes(), name.as_bytes());
+    let (mut p, mut n) = (0, 0);
+    // Behind the latest `*`: where the pattern goes on, and the end of what the `*` stands for.
+    let mut star = None;
+    while n < name.len() {
+        match pattern.get(p) {
+            Some(b'*') => {
+                p += 1;
+                star = Some((p, n));
+            }
+            Some(c) if *c == b'?' || *c == name[n] => (p, n) = (p + 1, n + 1),
+            _ => {
+                let Some((behind, end)) = star else {
+                    return false;
+                };
+                star = Some((behind, end + 1));
+                (p, n) = (behind, end + 1);
+            }
+        }
+    }
+    pattern[p..].iter().all(|c| *c == b'*')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::run_columns;
+    use super::super::table::TABLE;
+    use super::*;
+    use crate::scene::built_in_text;
+    use crate::simulate::Simulation;
+
+    fn scene(changes: &str) -> Scene {
+        let text = built_in_text("slider-crank-driven").expect("built in");
+        Scene::parse(&format!("{text}\n{changes}"), None, &[]).expect("reads")
+    }
+
+    const SPRING: &str = "[[spring]]\nname = \"s\"\nfrom = { body = \"rod\" }\nto = { body = \"world\", at = \"1 0 0 m\" }\n\
+                          length = \"1 m\"\nstiffness = \"1 N/m\"\n";
+
+    fn first(scene: &Scene) -> Frame {
+        let mut frame = Frame::default();
+        let mut simulation = Simulation::new(scene).expect("starts");
+        simulation.sample(0.0, &mut frame);
+        frame
+    }
+
+    #[test]
+    fn patterns_have_two_wildcards() {
+        for (pattern, name, matching) in [
+            ("S1.force", "S1.force", true),
+            ("S1.force", "S1.force.x", false),
+            ("S?.force", "S1.force", true),
+            ("S?.force", "S12.force", false),
+            ("*.force", "S12.force", true),
+            ("*", "", true),
+            ("?", "", false),
+            ("", "", true),
+            ("", "a", false),
+            ("a*b*c", "a-b-b-cc", true),
+            ("a*b*c", "a-b-b-cd", false),
+            ("**x", "x", true),
+            ("*ab", "aab", true),
+            ("*.?", "rod.pose.x", true),
+        ] {
+            assert_eq!(matches(pattern, name), matching, "{pattern} {name}");
+        }
+    }
+
+    #[test]
+    fn channels_begin_with_the_columns_of_a_run_and_differ() {
+        for text in ["", SPRING] {
+            let scene = scene(text);
+            let first = first(&scene);
+            let list = channels_of(&scene, &first);
+            let unasked = list.iter().filter(|channel| channel.unasked);
+            let unasked: Vec<&str> = unasked.map(|channel| &channel.column[..]).collect();
+            assert_eq!(unasked, run_columns(&scene, &first).0);
+            assert!(list[..unasked.len()].iter().all(|channel| channel.unasked));
+            let names: BTreeSet<&str> = list.iter().map(|channel| &channel.name[..]).collect();
+            assert_eq!(names.len(), list.len());
+            for channel in &list {
+                let value = channel.reading.read(&first);
+                assert!(value.is_some_and(f64::is_finite), "{channel:?}");
+                assert_eq!(channel.unit.is_empty(), channel.name.ends_with(".state"));
+                assert!(!channel.help.is_empty(), "{channel:?}");
+            }
+            let all = chosen_columns(&scene, &first, &["*".to_owned()]).expect("matches");
+            assert_eq!(all.0.len(), list.len());
+        }
+        let nameless = TABLE.iter().filter(|signal| signal.name.is_empty());
+        assert_eq!(nameless.count(), 1, "only what frames do not contain");
+    }
+
+    #[test]
+    fn names_choose_in_the_order_of_the_scene() {
+        let scene = scene(SPRING);
+        let first = first(&scene);
+        let columns = |patterns: &[&str]| {
+            let patterns: Vec<String> = patterns.iter().map(|&p| p.to_owned()).collect();
+            chosen_columns(&scene, &first, &patterns).map(|found| found.0.join(","))
+        };
+        for (patterns, found) in [
+            (
+                &["B.force", "time"][..],
+                "t_s,B_force_x_N,B_force_y_N,B_force_z_N",
+            ),
+            (
+                &["crank.angle", "B.force.z"],
+                "t_s,B_force_z_N,crank_angle_rad",
+            ),
+            (
+                &["crank.rate", "slider.rate"],
+                "t_s,crank_rate_rad_s,slider_rate_m_s",
+            ),
+            (
+                &["s.length", "*.actuator"],
+                "t_s,crank_actuator_Nm,s_length_m",
+            ),
+            (&["energy.k*"], "t_s,kinetic_J,kinetic_change_J"),
+            (&["rod_?_m"], "t_s,rod_x_m,rod_y_m,rod_z_m"),
+            (
+                &["rod.pose"],
+                "t_s,rod_x_m,rod_y_m,rod_z_m,rod_alpha_rad,rod_beta_rad,rod_gamma_rad",
+            ),
+        ] {
+            assert_eq!(columns(patterns).expect("matches"), found, "{patterns:?}");
+        }
+        let output = &scene.bodies[scene.output.body].name;
+        let pose = columns(&[&format!("{output}.pose")]).expect("matches");
+        assert_eq!(pose, "t_s,x_m,y_m,z_m,alpha_rad,beta_rad,gamma_rad");
+        let wrong = columns(&["B.force", "B.froce"]).expect_err("no such channel");
+        assert_eq!(
+            wrong.to_string(),
+            "`B.froce` is none of the scene's channels (did you mean `B.force`?)"
+        );
+    }
+}

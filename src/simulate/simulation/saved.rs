@@ -1,0 +1,125 @@
+//! The state of a run for a file: in a later process the run goes on from it with the same bits.
+
+use serde::{Deserialize, Serialize};
+
+use super::ideal::{Marks, Reference};
+use super::{Simulation, State, StepEnd};
+use crate::integrate::Polynomial;
+use crate::simulate::Snapshot;
+
+/// Everything of a running simulation that its scene does not determine. It says nothing about the scene: whoever stores it
+/// stores that, too.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SavedState {
+    state: State,
+    polynomial: Option<Polynomial>,
+    /// Of the ideal motion alongside.
+    ideal: Option<Box<SavedIdeal>>,
+    /// Largest force seen by a sample, N, and when, s, by joint.
+    sampled: Vec<(f64, f64)>,
+}
+
+/// The state of the ideal motion alongside.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct SavedIdeal {
+    state: SavedState,
+    marks: Marks,
+}
+
+/// A state of another scene, or one that no run of this scene can have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the numbers are not those of a run of this scene")]
+pub struct Misfit;
+
+impl SavedState {
+    /// Time of the state, s.
+    pub fn time(&self) -> f64 {
+        self.state.now.t
+    }
+}
+
+impl State {
+    /// Whether it has the shape of `own`, a state of `simulation`'s scene: nothing in it points elsewhere.
+    fn fits(&self, simulation: &Simulation) -> bool {
+        let own = &simulation.state;
+        let joints = own.now.gaps.len();
+        let alike = |end: &StepEnd| {
+            end.y.len() == own.now.y.len()
+                && end.k.len() == own.now.k.len()
+                && end.gaps.len() == joints
+                && end.memory.len() == joints
+        };
+        let record = &self.record;
+        let worn = record.wear.as_ref();
+        alike(&self.now)
+            && alike(&self.before)
+            && self.ramps.len() == joints
+            && self.clearances.len() == joints
+            && self.flights.len() == own.flights.len()
+            // Only a window has a hand.
+            && self.pull.is_none()
+            && record.account.fits()
+            && record.impacts.fits(joints)
+            && record.statistics.fits(joints)
+            && worn.is_none_or(|wear| wear.fits(&simulation.running))
+            && record.reactions.len() == joints
+            && record.contact_steps.len() == joints
+            && record.peaks.len() == joints
+    }
+}
+
+impl Simulation {
+    /// The whole state, for a file.
+    pub fn saved(&self) -> SavedState {
+        SavedState {
+            state: self.state.clone(),
+            polynomial: self.stepper.polynomial().cloned(),
+            ideal: match &self.reference {
+                Reference::Alongside(motion) => Some(Box::new(SavedIdeal {
+                    state: motion.simulation.saved(),
+                    marks: motion.marks.clone(),
+                })),
+                Reference::Elsewhere | Reference::Itself | Reference::None(_) => None,
+            },
+            sampled: self.sampled.clone(),
+        }
+    }
+
+    /// Puts a simulation of the same scene into the state `saved`; going on gives the same bits as where it was saved.
+    ///
+    /// # Errors
+    /// A state that cannot be one of this scene; the simulation is then of no use.
+    pub fn go_on_from(&mut self, saved: &SavedState) -> Result<(), Misfit> {
+        let polynomial = self.stepper.polynomial();
+        let fits = saved.state.fits(self)
+            && saved.sampled.len() == self.sampled.len()
+            && saved.polynomial.is_some() == polynomial.is_some()
+            && saved
+                .polynomial
+                .iter()
+                .all(|p| p.fits(self.state.now.y.len()));
+        if !fits {
+            return Err(Misfit);
+        }
+        match (&mut self.reference, &saved.ideal) {
+            (Reference::Alongside(motion), Some(ideal)) if ideal.marks.fits() => {
+                motion.simulation.go_on_from(&ideal.state)?;
+                motion.marks = ideal.marks.clone();
+            }
+            (Reference::Elsewhere | Reference::Itself | Reference::None(_), None) => {}
+            _ => return Err(Misfit),
+        }
+        let snapshot = Snapshot {
+            scene: self.scene.clone(),
+            running: self.running.clone(),
+            structure: self.mechanism.structure(),
+            state: saved.state.clone(),
+            polynomial: saved.polynomial.clone(),
+            reference: self.reference.kept(),
+        };
+        self.restore(&snapshot);
+        self.sampled.copy_from_slice(&saved.sampled);
+        Ok(())
+    }
+}

@@ -1,0 +1,254 @@
+//! `run --save-state` and `--from-state`: a run that goes on in another process is the run without a break.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value as Json;
+
+use crate::program::{command, folder, jointplay, names};
+
+const MACHINES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/machines");
+
+/// Header and rows of a CSV file.
+fn rows(folder: &Path, name: &str) -> Vec<String> {
+    let text = fs::read_to_string(folder.join(name)).unwrap();
+    text.lines().map(str::to_owned).collect()
+}
+
+/// Runs `scene` to 10 ms and on to 20 ms, and in one go, and compares rows and summaries.
+fn check(scene: &str, options: &str) {
+    let folder = folder();
+    let run = |more: &str| {
+        let line = format!("run {scene} {options} --quiet --summary json --every 0.25ms {more}");
+        jointplay(folder.path(), &line).expect(0).json()
+    };
+    let whole = run("--duration 20ms --out whole.csv --impacts whole-impacts.json");
+    let first = run("--duration 10ms --out a.csv --save-state a --impacts a-impacts.json");
+    assert_eq!(first["state_out"], "a");
+    let second = run("--duration 20ms --out b.csv --from-state a --impacts b-impacts.json");
+    let what = format!("{scene} {options}");
+    let (all, later) = (
+        rows(folder.path(), "whole.csv"),
+        rows(folder.path(), "b.csv"),
+    );
+    assert_eq!((all.len(), later.len()), (82, 42), "{what}");
+    assert_eq!(all[0], later[0], "{what}");
+    assert_eq!(all[41..], later[1..], "{what}");
+    // Everything in the summary is that of the whole run: steps, peaks, energies, doubts, state hash.
+    let without = [
+        "wall_s",
+        "ratio",
+        "slower_than_asked",
+        "from_time_s",
+        "rows",
+        "out",
+        "impacts_out",
+        "restitution",
+    ];
+    let kept = |summary: &Json| {
+        let mut kept = summary.as_object().unwrap().clone();
+        kept.retain(|key, _| !without.contains(&key.as_str()));
+        kept
+    };
+    assert_eq!(kept(&whole), kept(&second), "{what}");
+    assert_eq!(second["from_time_s"], 0.01);
+    // No impact is lost or told twice.
+    let ends = |name: &str| {
+        let text = fs::read_to_string(folder.path().join(name)).unwrap();
+        let json: Json = serde_json::from_str(&text).unwrap();
+        json["columns"]["end_s"].as_array().unwrap().len()
+    };
+    assert_eq!(
+        ends("a-impacts.json") + ends("b-impacts.json"),
+        ends("whole-impacts.json"),
+        "{what}"
+    );
+}
+
+#[test]
+fn built_in_scenes_go_on_with_the_same_bits_by_every_method() {
+    for scene in [
+        "spcmm",
+        "pendulum",
+        "slider-crank",
+        "slider-crank-driven",
+        "chain",
+    ] {
+        for method in [
+            "automatic",
+            "dopri5",
+            "radau5",
+            "rosenbrock",
+            "rk4",
+            "imex-euler",
+        ] {
+            let lagrange = method == "dopri5";
+            // Implicit contacts need the tree form.
+            let form = if lagrange {
+                "--set formulation=lagrange"
+            } else {
+                ""
+            };
+            check(scene, &format!("--set solver.method={method} {form}"));
+        }
+    }
+    check("spcmm", "--set contact.clearance=0");
+    check(
+        "spcmm",
+        "--set joint.S2.clearance=0 --set contact.friction=0.3",
+    );
+    check(
+        "pendulum",
+        "--set contact.approach_speed=largest --set solver.tolerance=1e-7",
+    );
+}
+
+#[test]
+fn machines_go_on_with_the_same_bits() {
+    for name in names(Path::new(MACHINES)) {
+        for method in ["automatic", "semi-implicit-euler"] {
+            check(
+                &format!("{MACHINES}/{name}"),
+                &format!("--set solver.method={method} --set solver.tolerance=1e-4"),
+            );
+        }
+    }
+}
+
+#[test]
+fn a_chain_of_states_and_a_wear_map_are_the_run_without_a_break() {
+    let folder = folder();
+    let run = |more: &str| {
+        let line = format!("run spcmm --quiet --force --summary json {more}");
+        jointplay(folder.path(), &line).expect(0).json()
+    };
+    let whole = run("--duration 40ms --wear whole.csv");
+    run("--duration 7ms --save-state s1 --wear w.csv");
+    run("--duration 7ms --from-state s1 --save-state s2");
+    run("--duration 23.3ms --from-state s2 --save-state s3 --wear w.csv");
+    let last = run("--duration 40ms --from-state s3 --wear last.csv");
+    assert_eq!(whole["state_hash"], last["state_hash"]);
+    assert_eq!(whole["energy_J"], last["energy_J"]);
+    assert_eq!(
+        rows(folder.path(), "whole.csv"),
+        rows(folder.path(), "last.csv")
+    );
+    // From the start, and with a map that begins late.
+    run("--duration 0s --save-state s0");
+    let line = "run spcmm --duration 40ms --from-state s0 --wear late.csv --summary json";
+    let late = jointplay(folder.path(), line).expect(0);
+    assert!(late.stderr.contains("wear map begins"), "{}", late.stderr);
+    assert_eq!(whole["state_hash"], late.json()["state_hash"]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn an_interrupted_run_leaves_a_state_to_go_on_from() {
+    use crate::command_line::{signal, start_and_listen};
+    let folder = folder();
+    let line = "run spcmm --duration 1000000s --save-state s --summary json";
+    let child = start_and_listen(&mut command(folder.path(), line));
+    signal(&child, "-INT");
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130));
+    let summary: Json = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(summary["state_out"], "s");
+    let end = summary["time_s"].as_f64().unwrap() + 0.05;
+    let hash = |more: &str| {
+        let line = format!("run spcmm --duration {end}s --quiet --summary json {more}");
+        jointplay(folder.path(), &line).expect(0).json()["state_hash"].clone()
+    };
+    assert_eq!(hash("--from-state s"), hash(""));
+}
+
+#[test]
+fn a_state_that_does_not_belong_is_refused_in_words() {
+    let folder = folder();
+    let path = folder.path().join("s");
+    let save = "run pendulum --duration 3ms --set contact.friction=0.2 --save-state s --quiet";
+    jointplay(folder.path(), save).expect(0);
+    let good = fs::read_to_string(&path).unwrap();
+    let refused = |line: &str, code: i32, words: &[&str]| {
+        let run = jointplay(folder.path(), &format!("run {line} --from-state s")).expect(code);
+        assert_eq!(run.stdout, "");
+        assert_eq!(run.stderr.lines().count(), 1, "{}", run.stderr);
+        for word in words {
+            assert!(run.stderr.contains(word), "{word}: {}", run.stderr);
+        }
+    };
+    let same = "pendulum --duration 6ms --set contact.friction=0.2";
+    refused("spcmm --duration 6ms", 2, &["`pendulum`", "`spcmm`"]);
+    refused(
+        "pendulum --duration 6ms",
+        2,
+        &["--set contact.friction=0.2", "no --set"],
+    );
+    let other = "pendulum --duration 6ms --set contact.friction=0.2 --set solver.method=rk4";
+    refused(other, 2, &["--set solver.method=rk4"]);
+    let short = "pendulum --duration 1ms --set contact.friction=0.2";
+    refused(short, 2, &["--duration", "0.003 s"]);
+    refused(&format!("{same} --save-state s"), 2, &["same file"]);
+    jointplay(folder.path(), &format!("{save} --force")).expect(0);
+    assert_eq!(fs::read_to_string(&path).unwrap(), good, "the same bytes");
+    jointplay(folder.path(), save).expect(1);
+
+    // Cut off anywhere, or with any digit changed.
+    for n in (0..good.len()).step_by(good.len() / 40) {
+        fs::write(&path, &good[..n]).unwrap();
+        refused(same, 2, &["not a state"]);
+    }
+    let digits: Vec<usize> = good
+        .match_indices(|c: char| c.is_ascii_digit())
+        .map(|m| m.0)
+        .collect();
+    for at in digits.iter().step_by(digits.len() / 40) {
+        let mut bytes = good.clone().into_bytes();
+        bytes[*at] = if bytes[*at] == b'7' { b'8' } else { b'7' };
+        fs::write(&path, &bytes).unwrap();
+        refused(same, 2, &["--from-state s: "]);
+    }
+    for (text, words) in [
+        (
+            good.replace("\"state_format\":1", "\"state_format\":2"),
+            "format 2",
+        ),
+        ("{}".to_owned(), "not a state"),
+        ("[1, 2]".to_owned(), "not a state"),
+        ("\u{0}\u{1b}[31m".to_owned(), "not a state"),
+    ] {
+        fs::write(&path, text).unwrap();
+        refused(same, 2, &[words]);
+    }
+    // Right in itself, and not a state of this scene.
+    let mut json: Json = serde_json::from_str(&good).unwrap();
+    for (pointer, value, words) in [
+        (
+            "/state/state/now/y",
+            serde_json::json!([1.0]),
+            "not those of a run",
+        ),
+        (
+            "/state/state/flights",
+            serde_json::json!([null, null]),
+            "not those of a run",
+        ),
+        (
+            "/state/sampled",
+            serde_json::json!([]),
+            "not those of a run",
+        ),
+        ("/state/state", serde_json::json!({}), "not a state"),
+    ] {
+        *json.pointer_mut(pointer).unwrap() = value;
+        let content = json.as_object_mut().unwrap();
+        content.shift_remove("crc32");
+        let text = serde_json::to_string(content).unwrap();
+        let checksum = format!("{:08x}", crc32fast::hash(text.as_bytes()));
+        content.insert("crc32".to_owned(), checksum.into());
+        fs::write(&path, json.to_string()).unwrap();
+        refused(same, 2, &[words]);
+        json = serde_json::from_str(&good).unwrap();
+    }
+    fs::remove_file(&path).unwrap();
+    refused(same, 1, &["cannot read s"]);
+}

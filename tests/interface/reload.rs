@@ -1,0 +1,240 @@
+//! A scene file that is saved while the window shows it.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::path::PathBuf;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use eframe::egui::{self, accesskit::Role};
+use egui_kittest::{
+    Harness,
+    kittest::{NodeT as _, Queryable as _},
+};
+use jointplay::app::{App, AppOptions, Clock, DesktopHost, Host, OpenedFile};
+use jointplay::scene::{Scene, built_in_text};
+
+/// What a host was asked for, and what it has to tell.
+#[derive(Default)]
+struct Calls {
+    watched: Vec<Option<String>>,
+    saved: VecDeque<OpenedFile>,
+}
+
+/// A desktop without files.
+struct Desk(Rc<RefCell<Calls>>);
+
+impl Host for Desk {
+    fn read_dropped(&mut self, _file: Arc<dyn egui::DroppedFile + Send + Sync>) {}
+
+    fn opened(&mut self) -> Option<OpenedFile> {
+        None
+    }
+
+    fn watch(&mut self, _ctx: &egui::Context, name: Option<&str>) {
+        self.0.borrow_mut().watched.push(name.map(str::to_owned));
+    }
+
+    fn saved_elsewhere(&mut self) -> Option<OpenedFile> {
+        self.0.borrow_mut().saved.pop_front()
+    }
+}
+
+const NAME: &str = "./mine.toml";
+
+fn text() -> String {
+    built_in_text("pendulum").expect("built in").to_owned()
+}
+
+fn still() -> f64 {
+    0.0
+}
+
+/// A second passes between two looks.
+fn slow() -> f64 {
+    static LOOKS: AtomicU64 = AtomicU64::new(0);
+    LOOKS.fetch_add(1, Ordering::Relaxed) as f64
+}
+
+/// The window on the file [`NAME`] with `changes`, paused at t = 0.
+fn window(changes: &[(&str, &str)], clock: Clock) -> (Harness<'static, App>, Rc<RefCell<Calls>>) {
+    let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
+    let changes: Vec<_> = changes.iter().map(own).collect();
+    let scene = Scene::parse(&text(), Some(NAME), &changes).expect("a scene");
+    let calls = Rc::new(RefCell::new(Calls::default()));
+    let desk = Box::new(Desk(calls.clone()));
+    (shown(scene, clock, desk), calls)
+}
+
+fn shown(scene: Scene, clock: Clock, host: Box<dyn Host>) -> Harness<'static, App> {
+    let mut options = AppOptions::new(scene);
+    options.playing = false;
+    options.theme = egui::Theme::Light.into();
+    options.clock = clock;
+    let mut harness = Harness::builder()
+        .with_size([1280.0, 800.0])
+        .with_theme(egui::Theme::Light)
+        .with_step_dt(1.0 / 60.0)
+        .with_max_steps(60)
+        .wgpu()
+        .build_eframe(move |cc| {
+            let mut app = App::new(cc, options).expect("the scene starts");
+            app.set_host(host);
+            app
+        });
+    harness.run_steps(3);
+    harness
+}
+
+fn save(harness: &mut Harness<'_, App>, calls: &RefCell<Calls>, name: &str, text: &str) {
+    calls.borrow_mut().saved.push_back(OpenedFile {
+        name: name.to_owned(),
+        content: Ok(text.as_bytes().to_vec()),
+    });
+    harness.run_steps(2);
+}
+
+/// Whether the window says `words`, to those who see it and to those who do not.
+fn says(harness: &Harness<'_, App>, words: &str) -> bool {
+    harness.state().announcement().contains(words)
+}
+
+fn friction(harness: &Harness<'_, App>) -> f64 {
+    harness.state().player().wanted().contact.friction
+}
+
+/// The text with another friction.
+fn rougher() -> String {
+    let text = text().replace("friction = 0.15", "friction = 0.25");
+    assert_ne!(text, self::text());
+    text
+}
+
+#[test]
+fn a_saved_file_is_shown_at_the_same_instant_by_the_same_camera() {
+    let (mut harness, calls) = window(&[], still);
+    assert_eq!(calls.borrow().watched, [Some(NAME.to_owned())]);
+    // What the file already holds is no news.
+    save(&mut harness, &calls, NAME, &text());
+    assert!(!says(&harness, "Reloaded"));
+    harness.state_mut().run_to(12.5e-3);
+    harness.key_press(egui::Key::Num2);
+    harness.run();
+    let before = harness.state().link().camera;
+    assert!(before.is_some_and(|pose| pose.fitted.is_none()));
+
+    save(&mut harness, &calls, NAME, &rougher());
+    assert_eq!(friction(&harness), 0.25);
+    let player = harness.state().player();
+    assert_eq!(player.pacer.shown(), 12.5e-3);
+    assert!(!player.is_playing());
+    assert_eq!(player.wanted().source.file.as_deref(), Some(NAME));
+    assert_eq!(harness.state().link().camera, before);
+    assert!(
+        says(&harness, "Reloaded at 12.500 ms"),
+        "{}",
+        harness.state().announcement()
+    );
+    // The run is that of the new file from its start.
+    let scene = Scene::parse(&rougher(), Some(NAME), &[]).expect("a scene");
+    let mut simulation = jointplay::simulate::Simulation::new(&scene).expect("starts");
+    simulation.advance_to(12.5e-3).expect("runs");
+    assert_eq!(player.simulation().state_hash(), simulation.state_hash());
+    // Still watched, without asking again.
+    assert_eq!(calls.borrow().watched.len(), 1);
+}
+
+#[test]
+fn an_instant_that_takes_long_to_reach_is_not_waited_for() {
+    let (mut harness, calls) = window(&[], slow);
+    harness.state_mut().run_to(12.5e-3);
+    save(&mut harness, &calls, NAME, &rougher());
+    assert_eq!(friction(&harness), 0.25);
+    assert_eq!(harness.state().player().pacer.shown(), 0.0);
+    assert!(says(&harness, "Reloaded from the start"));
+}
+
+#[test]
+fn an_error_in_the_file_is_shown_with_its_line_beside_the_running_scene() {
+    let (mut harness, calls) = window(&[], still);
+    harness.state_mut().run_to(12.5e-3);
+    let wrong = text().replace("friction = 0.15", "friction = -0.15");
+    let line = wrong
+        .lines()
+        .position(|line| line.starts_with("friction = -"));
+    let place = format!("{NAME}:{}:", line.expect("a line") + 1);
+    for (text, words) in [(wrong.as_str(), place.as_str()), ("[[[", NAME)] {
+        save(&mut harness, &calls, NAME, text);
+        let shown = harness.query_all_by_label_contains(words);
+        assert!(shown.count() > 0, "{words}");
+        assert_eq!(friction(&harness), 0.15);
+        assert_eq!(harness.state().player().pacer.shown(), 12.5e-3);
+    }
+    // Back to what runs: the message goes, the run stays as it is.
+    let steps = harness.state().player().steps();
+    save(&mut harness, &calls, NAME, &text());
+    assert_eq!(harness.query_all_by_label_contains(NAME).count(), 0);
+    assert_eq!(harness.state().player().steps(), steps);
+    calls.borrow_mut().saved.push_back(OpenedFile {
+        name: NAME.to_owned(),
+        content: Err("cannot read this file: gone".to_owned()),
+    });
+    harness.run_steps(2);
+    assert!(harness.query_all_by_label_contains("gone").count() > 0);
+}
+
+#[test]
+fn changes_made_here_stay_unless_the_file_says_something_else() {
+    let changes = [("contact.friction", "0.4"), ("contact.restitution", "0.7")];
+    let (mut harness, calls) = window(&changes, still);
+    save(&mut harness, &calls, NAME, &rougher());
+    let contact = harness.state().player().wanted().contact;
+    assert_eq!((contact.friction, contact.restitution), (0.25, 0.7));
+    assert!(says(&harness, "Reloaded from the start, keeping 1 change"));
+}
+
+#[test]
+fn only_the_file_of_the_shown_scene_is_watched() {
+    let (mut harness, calls) = window(&[], still);
+    harness.state_mut().open("spcmm").expect("a scene");
+    harness.run_steps(2);
+    save(&mut harness, &calls, NAME, &rougher());
+    assert_eq!(harness.state().player().wanted().name, "spcmm");
+    let link = {
+        let scene = Scene::parse(&rougher(), Some(NAME), &[]).expect("a scene");
+        let other = shown(scene, still, Box::new(DesktopHost::default()));
+        other.state().share_state()
+    };
+    let ctx = harness.ctx.clone();
+    harness.state_mut().open_link(&ctx, &link).expect("a link");
+    harness.run_steps(2);
+    // The scene has the file's name, but a link makes the program read no file.
+    let scene = harness.state().player().wanted();
+    assert_eq!(scene.source.file.as_deref(), Some("mine.toml"));
+    assert_eq!(calls.borrow().watched, [Some(NAME.to_owned()), None, None]);
+}
+
+#[test]
+fn a_file_on_the_disk_is_noticed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path: PathBuf = folder.path().join("mine.toml");
+    std::fs::write(&path, text()).expect("writes");
+    let scene = Scene::load(&path, &[]).expect("a scene");
+    let mut harness = shown(scene, still, Box::new(DesktopHost::default()));
+    std::fs::write(&path, rougher()).expect("writes");
+    let started = std::time::Instant::now();
+    while friction(&harness) != 0.25 {
+        assert!(started.elapsed().as_secs() < 30);
+        std::thread::sleep(std::time::Duration::from_millis(50));
+        harness.run_steps(1);
+    }
+    assert!(says(&harness, "Reloaded"));
+    let labels = harness.query_all_by_label_contains("Reloaded");
+    assert!(
+        labels
+            .filter(|node| node.accesskit_node().role() == Role::Status)
+            .count()
+            > 0
+    );
+}
