@@ -10,7 +10,7 @@ use super::{Failure, load, print, start};
 use crate::contact::FrictionLaw;
 use crate::integrate::Method;
 use crate::mechanism::Summary;
-use crate::scene::{BallJoint, Formulation, JointKind, Scene};
+use crate::scene::{BallJoint, Body, Formulation, JointKind, Scene, format_quantity, to_display};
 use crate::simulate::{Frame, LARGEST_IMPLICIT, Listed, Simulation, channels_of};
 
 /// Runs `check`.
@@ -82,6 +82,9 @@ fn report(
             names(scene.bodies.iter().map(|body| &body.name))
         ),
     );
+    for body in scene.bodies.iter().filter(|body| body.density.is_some()) {
+        line(&format!("  {}", body.name), &of_its_shapes(body));
+    }
     line("Joints", &tree_joints(scene));
     line(
         "Ball joints",
@@ -131,6 +134,22 @@ fn report(
 
 fn names<'a>(names: impl Iterator<Item = &'a String>) -> String {
     names.map(String::as_str).collect::<Vec<_>>().join(", ")
+}
+
+/// Mass properties of a body that has them from its shapes.
+fn of_its_shapes(body: &Body) -> String {
+    let each = |values: [f64; 3], unit: &str| {
+        let numbers = values.map(|value| significant(to_display(value, unit) + 0.0, 4));
+        format!("{} {unit}", numbers.join(" "))
+    };
+    let i = &body.inertia;
+    format!(
+        "of its shapes: mass {}, centre {}, inertia {}, products {}",
+        format_quantity(body.mass, "kg"),
+        each(body.centre.into(), "mm"),
+        each([i.m11, i.m22, i.m33], "kg mm^2"),
+        each([-i.m12, -i.m13, -i.m23], "kg mm^2"),
+    )
 }
 
 fn tree_joints(scene: &Scene) -> String {

@@ -270,6 +270,7 @@ impl<'d> Node<'d> {
         let moves = !matches!(
             dimension,
             Dimension::Mass
+                | Dimension::Density
                 | Dimension::Inertia
                 | Dimension::Stress
                 | Dimension::Force

@@ -25,6 +25,7 @@ mod quantity;
 mod read;
 mod read_bodies;
 mod read_joints;
+mod solid;
 mod table;
 #[cfg(test)]
 mod tests;

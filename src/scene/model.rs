@@ -267,6 +267,8 @@ pub struct Body {
     pub inertia: Mat3,
     /// What to draw, body frame.
     pub shapes: Vec<Shape>,
+    /// Density of the shapes from which mass, centroid and inertia were computed, kg/m^3; `None` where the file gives those.
+    pub density: Option<f64>,
 }
 
 /// What a shape represents: the view picks its colour and material.

@@ -2,6 +2,7 @@
 
 use super::document::{Node, Section};
 use super::pattern::Copy;
+use super::solid::Solid;
 use super::*;
 use crate::words::words;
 
@@ -33,7 +34,11 @@ const MAX_INERTIA: f64 = 1e12;
 const TRIANGLE_SLACK: f64 = 1e-9;
 
 /// Keys of mass and shape, for bodies and links.
-pub(super) const BODY_KEYS: [&str; 5] = ["mass", "centre", "inertia", "products", "shapes"];
+pub(super) const BODY_KEYS: [&str; 6] =
+    ["mass", "centre", "inertia", "products", "shapes", "density"];
+
+/// Largest density, kg/m^3: five times that of osmium.
+const MAX_DENSITY: f64 = 1e5;
 
 /// One `[[body]]`.
 pub(super) fn read_body<'d>(node: &Node<'d>) -> Result<(Body, Section<'d>), SceneError> {
@@ -50,6 +55,17 @@ pub(super) fn read_body<'d>(node: &Node<'d>) -> Result<(Body, Section<'d>), Scen
 
 /// Mass, centroid, inertia and shapes.
 pub(super) fn read_rigid_body(section: &Section<'_>, name: String) -> Result<Body, SceneError> {
+    let shapes = match section.get("shapes") {
+        Some(node) => node
+            .elements_up_to(MOST_SHAPES, "shapes")?
+            .iter()
+            .map(|shape| read_shape(shape, false, None))
+            .collect::<Result<_, _>>()?,
+        None => Vec::new(),
+    };
+    if let Some(node) = section.get("density") {
+        return read_solid(section, &node, name, shapes);
+    }
     let mass =
         section
             .require("mass", "\"0.384 kg\"")?
@@ -59,20 +75,45 @@ pub(super) fn read_rigid_body(section: &Section<'_>, name: String) -> Result<Bod
         None => Vec3::zeros(),
     };
     let inertia = read_inertia(section)?;
-    let shapes = match section.get("shapes") {
-        Some(node) => node
-            .elements_up_to(MOST_SHAPES, "shapes")?
-            .iter()
-            .map(|shape| read_shape(shape, false, None))
-            .collect::<Result<_, _>>()?,
-        None => Vec::new(),
-    };
     Ok(Body {
         name,
         mass,
         centre,
         inertia,
         shapes,
+        density: None,
+    })
+}
+
+/// A body whose mass, centroid and inertia follow from its shapes and the density in `node`.
+fn read_solid(
+    section: &Section<'_>,
+    node: &Node<'_>,
+    name: String,
+    shapes: Vec<Shape>,
+) -> Result<Body, SceneError> {
+    for key in ["mass", "centre", "inertia", "products"] {
+        section.refuse(key, "it follows from `density` and `shapes`")?;
+    }
+    let density = node.positive(Dimension::Density, MAX_DENSITY, "kg/m^3")?;
+    let solid = Solid::of_shapes(&shapes);
+    let (mass, inertia) = (density * solid.volume, solid.inertia() * density);
+    let heaviest = inertia.amax() <= MAX_INERTIA && mass <= MAX_MASS;
+    // Rounding must not leave a body that no motion could turn.
+    if !(solid.volume > 0.0 && heaviest && inertia.symmetric_eigenvalues().min() > 0.0) {
+        return Err(node.error(format!(
+            "needs `shapes` with a volume that this program can weigh; these weigh {}, allowed above 0 up to {}",
+            format_quantity(mass, "kg"),
+            format_quantity(MAX_MASS, "kg"),
+        )));
+    }
+    Ok(Body {
+        name,
+        mass,
+        centre: solid.centre,
+        inertia,
+        shapes,
+        density: Some(density),
     })
 }
 

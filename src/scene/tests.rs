@@ -860,3 +860,44 @@ ball = { body = \"leg\" }
         );
     }
 }
+
+#[test]
+fn a_body_of_a_density_weighs_what_its_shapes_do() {
+    let text = |body: &str| {
+        format!(
+            "[[body]]\nname = \"bar\"\n{body}\n[[joint]]\nname = \"free\"\nkind = \"free\"\nchild = \"bar\"\nstart = {{ position = [0, 0, 0] }}\n"
+        )
+    };
+    let bar = "shapes = [{ form = \"box\", centre = \"50 0 0 mm\", size = \"100 20 10 mm\", role = \"frame\" }]";
+    let read = |body: String| Scene::parse(&text(&body), Some("bar.toml"), &[]);
+    let scene = read(format!("density = \"7.85 g/cm^3\"\n{bar}")).expect("reads");
+    let body = &scene.bodies[0];
+    assert!(
+        (body.mass - 0.157).abs() < 1e-15
+            && (body.centre - Vec3::new(0.05, 0.0, 0.0)).norm() < 1e-17
+    );
+    let moments = Vec3::new(
+        0.01 * 0.01 + 0.02 * 0.02,
+        0.1 * 0.1 + 0.01 * 0.01,
+        0.1 * 0.1 + 0.02 * 0.02,
+    );
+    let expected = Mat3::from_diagonal(&(moments * (0.157 / 12.0)));
+    assert!((body.inertia - expected).amax() < 1e-18);
+    for (body, wanted) in [
+        (
+            format!("density = \"7850 kg/m^3\"\nmass = \"1 kg\"\n{bar}"),
+            "bar.toml:4:8: body.bar.mass = \"1 kg\": not allowed here: it follows",
+        ),
+        (
+            "density = \"7850 kg/m^3\"".to_owned(),
+            "needs `shapes` with a volume",
+        ),
+        (
+            format!("density = \"0 kg/m^3\"\n{bar}"),
+            "out of range; allowed above 0 up to 100000 kg/m^3; units kg/m^3, g/cm^3",
+        ),
+    ] {
+        let error = read(body).expect_err(wanted).to_string();
+        assert!(error.contains(wanted), "{error}");
+    }
+}

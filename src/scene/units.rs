@@ -16,6 +16,8 @@ pub enum Dimension {
     Time,
     /// kg
     Mass,
+    /// kg/m^3
+    Density,
     /// kg m^2
     Inertia,
     /// Pa
@@ -84,7 +86,7 @@ use Scale::{Decimal, Ratio};
 type Unit = (&'static str, Scale);
 
 /// Every dimension with its name and its units; the first unit is the SI one.
-const UNITS: [(Dimension, &str, &[Unit]); 17] = [
+const UNITS: [(Dimension, &str, &[Unit]); 18] = [
     (
         Dimension::Length,
         "length",
@@ -117,6 +119,11 @@ const UNITS: [(Dimension, &str, &[Unit]); 17] = [
             ("mg", Decimal(-6)),
             ("t", Decimal(3)),
         ],
+    ),
+    (
+        Dimension::Density,
+        "density",
+        &[("kg/m^3", Decimal(0)), ("g/cm^3", Decimal(3))],
     ),
     (
         Dimension::Inertia,
@@ -328,6 +335,7 @@ pub(super) fn powers(dimension: Dimension) -> [i8; 4] {
         Dimension::Length => [0, 1, 0, 0],
         Dimension::Time => [0, 0, 1, 0],
         Dimension::Mass => [1, 0, 0, 0],
+        Dimension::Density => [1, -3, 0, 0],
         Dimension::Inertia => [1, 2, 0, 0],
         Dimension::Stress => [1, -1, -2, 0],
         Dimension::Angle => [0, 0, 0, 1],

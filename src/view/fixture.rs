@@ -25,6 +25,7 @@ fn body(name: &str, shapes: Vec<Shape>) -> Body {
         centre: Vec3::zeros(),
         inertia: Mat3::identity() * 1e-3,
         shapes,
+        density: None,
     }
 }
 

@@ -116,6 +116,29 @@ fn machines_go_on_with_the_same_bits() {
 }
 
 #[test]
+fn the_ideal_motion_beside_a_probe_goes_on_too() {
+    let folder = folder();
+    for (name, body) in [("pendulum", "rod"), ("slider-crank", "slider")] {
+        let text = jointplay::scene::built_in_text(name).unwrap();
+        let output = format!("body = \"{body}\"\n");
+        let with = text.replacen(&output, &format!("{output}probe = \"0 0 -10 mm\"\n"), 1);
+        assert_ne!(with, text);
+        let path = folder.path().join(format!("{name}.toml"));
+        fs::write(&path, with).unwrap();
+        let header = jointplay(
+            folder.path(),
+            &format!(
+                "run {} --duration 0s --every 1s --out {name}.csv",
+                path.display()
+            ),
+        );
+        header.expect(0);
+        assert!(rows(folder.path(), &format!("{name}.csv"))[0].contains("probe_error_x_m"));
+        check(&path.display().to_string(), "");
+    }
+}
+
+#[test]
 fn a_chain_of_states_and_a_wear_map_are_the_run_without_a_break() {
     let folder = folder();
     let run = |more: &str| {

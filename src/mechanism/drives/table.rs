@@ -8,7 +8,7 @@ use crate::jet::Jet;
 use crate::scene::{Drive, DriveData};
 
 /// Parts into which an interval is stepped, at least, as long as they are not shorter than `FINE`, s.
-const PARTS: f64 = 4.0;
+const PARTS: f64 = 8.0;
 const FINE: f64 = 1e-3;
 
 #[derive(Debug)]
