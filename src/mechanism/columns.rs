@@ -14,7 +14,7 @@ pub struct Column {
     pub centre: Vec3,
     /// Ball's contact point relative to the socket's.
     pub surface: Vec3,
-    /// r omega_ball - R omega_socket.
+    /// r omega_ball - R omega_socket, with r and R the lengths of the sides.
     pub turn: Vec3,
 }
 
@@ -64,4 +64,44 @@ pub fn collect_columns(
             },
         );
     }
+}
+
+/// The same for two points that coincide, without the coordinates that move both bodies as one.
+pub fn collect_relative_columns(
+    columns: &mut Vec<Column>,
+    model: &Model,
+    equations: &dyn Equations,
+    sides: &[(Anchor, f64); 2],
+) {
+    const SHARED: usize = usize::MAX;
+    columns.clear();
+    let mut shared = 0;
+    for ((anchor, radius), sign) in sides.iter().zip([1.0, -1.0]) {
+        let m = &equations.motion()[anchor.body];
+        let point = m.position + m.rotation * anchor.offset;
+        let of_first = columns.len();
+        equations.visit_columns(
+            model,
+            anchor.body,
+            &point,
+            &mut |coordinate, velocity, omega| {
+                // Both walks go down to the root: what they share comes in the same order.
+                let own = columns[shared..of_first]
+                    .iter()
+                    .position(|c| c.coordinate == coordinate);
+                if let Some(at) = own {
+                    columns[shared + at].coordinate = SHARED;
+                    shared += at + 1;
+                    return;
+                }
+                columns.push(Column {
+                    coordinate,
+                    centre: velocity * sign,
+                    surface: velocity * sign,
+                    turn: omega * (*radius * sign),
+                });
+            },
+        );
+    }
+    columns.retain(|column| column.coordinate != SHARED);
 }

@@ -338,7 +338,8 @@ impl Mechanism {
 
     /// Latest end of an adaptive step that starts at `t`, s.
     pub fn step_end(&self, t: f64) -> f64 {
-        self.model.step_end(t)
+        let of_elements = self.elements.iter().map(|element| element.step_end(t));
+        of_elements.fold(self.model.step_end(t), f64::min)
     }
 
     /// Where the motion is a function of time alone: the determinant of the loops' Jacobian, whose sign tells the side of a
@@ -541,7 +542,8 @@ impl Mechanism {
 
     /// Whether any element's force depends on motion in a way that can be stiff.
     pub fn has_couplings(&self) -> bool {
-        self.elements.iter().any(|e| e.ends().is_some())
+        let motion = self.equations.motion();
+        self.elements.iter().any(|e| e.ends(motion).is_some())
     }
 
     /// Origin of body `b`'s scene frame from its centroid, body axes, m.

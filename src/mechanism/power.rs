@@ -67,7 +67,7 @@ impl Mechanism {
             let dv = &dy[self.positions()..];
             let all = !self.sources.forces_suffice;
             let (model, gravity) = (&self.model, &self.gravity);
-            powers.drive = self.equations.drive_power(model, gravity, y, dv, all);
+            powers.drive += self.equations.drive_power(model, gravity, y, dv, all);
             // The loads were changed, and the accelerations may have been.
             self.evaluated = None;
         }

@@ -6,10 +6,9 @@
 //! (s I - J) (x_q, x_v) = (b_q, b_v) becomes (s I - M^-1 D - M^-1 K / s) x_v = b_v + M^-1 K T^+ b_q / s,
 //! x_q = (b_q + T x_v) / s, where T maps velocities to position rates.
 
-use super::columns::{Column, collect_columns};
+use super::columns::{Column, collect_columns, collect_relative_columns};
 use super::contacts::Contacts;
-use super::elements::Touching;
-use super::elements::{At, Coupling, ForceElement, SceneElement};
+use super::elements::{At, Coupling, ForceElement, SceneElement, Touching, Turning};
 use super::equations::Equations;
 use super::kinematics::Kinematics;
 use super::lu::Lu;
@@ -18,11 +17,14 @@ use crate::scene::Vec3;
 use nalgebra::Complex;
 use std::ops::Range;
 
-/// Partial time derivatives of the motion of one point relative to another at fixed coordinates.
+/// Partial time derivatives of the motion of one point relative to another, and of their bodies, at fixed coordinates.
 #[derive(Clone, Copy, Default)]
 struct Drift {
     eccentricity: Vec3,
     rate: Vec3,
+    /// Relative angular velocity and its rate.
+    turn: Vec3,
+    spin: Vec3,
 }
 
 /// The linearisation and its factors.
@@ -146,7 +148,12 @@ impl Stiff {
             };
             self.empty = false;
             let (sides, n) = (&coupling.sides, &coupling.normal);
-            collect_columns(&mut self.columns, model, equations, sides, n);
+            if let Some(turning) = &coupling.turning {
+                collect_relative_columns(&mut self.columns, model, equations, sides);
+                self.add_turning(turning, i);
+            } else {
+                collect_columns(&mut self.columns, model, equations, sides, n);
+            }
             self.add(&coupling);
             self.add_drift(&coupling, i);
             for column in &self.columns {
@@ -168,8 +175,8 @@ impl Stiff {
         elements: &[Box<dyn SceneElement>],
         motion: &[Kinematics],
     ) {
-        let of_contacts = contacts.loose().map(|contact| contact.ends());
-        let of_elements = elements.iter().map(|element| element.ends());
+        let of_contacts = contacts.loose().map(|contact| contact.ends(motion));
+        let of_elements = elements.iter().map(|element| element.ends(motion));
         for (drift, ends) in self.drift.iter_mut().zip(of_contacts.chain(of_elements)) {
             *drift = ends.map_or_else(Drift::default, |[socket, ball]| {
                 let joint = BallJoint {
@@ -177,9 +184,12 @@ impl Stiff {
                     ball,
                     ideal: None,
                 };
+                let (b, s) = (&motion[ball.body], &motion[socket.body]);
                 Drift {
                     eccentricity: joint.opening_rate(motion),
                     rate: joint.opening_acceleration(motion),
+                    turn: b.angular_velocity - s.angular_velocity,
+                    spin: b.angular_acceleration - s.angular_acceleration,
                 }
             });
         }
@@ -196,6 +206,26 @@ impl Stiff {
         for k in &self.columns {
             self.time_derivative[positions + k.coordinate] +=
                 k.surface.dot(&force) + k.turn.dot(&lever);
+        }
+    }
+
+    /// Adds the torque of one coupling: dQ_k = turn_k . dT, and dQ_k/dt.
+    fn add_turning(&mut self, turning: &Turning, i: usize) {
+        let n = self.n;
+        for l in &self.columns {
+            let torque_q = turning.by_turn * l.turn;
+            let torque_v = turning.by_spin * l.turn;
+            for k in &self.columns {
+                let at = l.coordinate * n + k.coordinate;
+                self.by_position[at] += k.turn.dot(&torque_q);
+                self.by_velocity[at] += k.turn.dot(&torque_v);
+            }
+        }
+        let drift = self.drift[i];
+        let torque = turning.by_turn * drift.turn + turning.by_spin * drift.spin + turning.by_time;
+        let positions = self.time_derivative.len() - n;
+        for k in &self.columns {
+            self.time_derivative[positions + k.coordinate] += k.turn.dot(&torque);
         }
     }
 
@@ -390,7 +420,7 @@ mod tests {
     use crate::contact::Memory;
     use crate::integrate::{StiffSystem, System};
     use crate::mechanism::{Mechanism, Touching};
-    use crate::scene::Scene;
+    use crate::scene::{Scene, Vec3};
 
     /// The default scene with its platform lowered until every ball rests 0.2 um deep in its wall and creeps along it.
     /// The memory of each contact holds `remembered`, m/s.
@@ -506,4 +536,171 @@ mod tests {
             );
         }
     }
+
+    /// Bodies in a row from a free one: a hinge, a slide and a fixed joint, and a hinge on a slide that is driven; moving, and
+    /// loaded by `elements`.
+    fn linked(elements: &str, formulation: &str) -> (Mechanism, Vec<f64>) {
+        let body = |name: &str| {
+            format!(
+                "[[body]]\nname = \"{name}\"\nmass = \"1 kg\"\ninertia = \"2e-2 3e-2 4e-2 kg m^2\"\n"
+            )
+        };
+        let joint = |kind: &str, parent: &str, child: &str, more: &str| {
+            format!(
+                "[[joint]]\nname = \"{child}\"\nkind = \"{kind}\"\nparent = \"{parent}\"\nchild = \"{child}\"\n{more}\n"
+            )
+        };
+        let at = "parent_point = \"100 20 -30 mm\"\nchild_point = \"-80 10 20 mm\"\n\
+                  rotation = { axis = [1, 2, 3], angle = \"40 deg\" }";
+        let slow = "start = { position = \"0.3 mm\", velocity = \"0.2 mm/s\" }";
+        let turns = "start = { position = \"0.3 mrad\", velocity = \"1 mrad/s\" }";
+        let bodies = ["base", "arm", "rod", "table", "wheel"].map(body).concat();
+        let free = "start = { position = \"0 0 1 m\", rotation = { axis = [3, 1, 2], angle = \"50 deg\" } }";
+        let driven = "axis = [0, 1, 0]\ndrive = { law = \"harmonic\", amplitude = \"1 mm\", frequency = \"1 Hz\" }";
+        let text = bodies
+            + &joint("free", "world", "base", free)
+            + &joint(
+                "revolute",
+                "base",
+                "arm",
+                &format!("axis = [1, 0, 2]\n{at}\n{turns}"),
+            )
+            + &joint(
+                "prismatic",
+                "arm",
+                "rod",
+                &format!("axis = [0, 1, 1]\n{at}\n{slow}"),
+            )
+            + &joint("prismatic", "world", "table", driven)
+            + &joint(
+                "revolute",
+                "table",
+                "wheel",
+                &format!("axis = [0, 1, 2]\n{at}\n{turns}"),
+            )
+            + elements;
+        let changes = [("formulation".to_owned(), formulation.to_owned())];
+        let scene = Scene::parse(&text, None, &changes).unwrap();
+        let mut mechanism = Mechanism::new(&scene).unwrap();
+        let y = mechanism.start().unwrap();
+        (mechanism, y)
+    }
+
+    /// Moves the positions in `y` by `by` along velocity coordinate `l`.
+    fn displace(m: &Mechanism, formulation: &str, y: &mut [f64], l: usize, by: f64) {
+        if formulation == "tree" {
+            let mut step = vec![0.0; m.model.nv];
+            step[l] = by;
+            crate::mechanism::Tree::displace(&m.model, y, &step);
+            return;
+        }
+        let (at, i) = (7 * (l / 6), l % 6);
+        if i < 3 {
+            y[at + i] += by;
+        } else {
+            let turn = Vec3::ith(i - 3, by);
+            crate::mechanism::kinematics::turn_quaternion(&mut y[at + 3..at + 7], &turn);
+        }
+    }
+
+    #[test]
+    fn elements_are_linearised_as_by_central_differences_in_both_forms() {
+        for (name, elements) in LINKED {
+            for formulation in ["tree", "lagrange"] {
+                let (mut m, y) = linked(elements, formulation);
+                let (t, nq) = (0.1, m.positions());
+                m.evaluator(Touching::Nothing).linearise(t, &y);
+                let stiff = m.stiff.take().unwrap();
+                let n = stiff.n;
+                let largest = |x: &[f64]| x.iter().map(|x| x.abs()).fold(0.0, f64::max);
+                let (stiffest, dampest) =
+                    (largest(&stiff.by_position), largest(&stiff.by_velocity));
+                assert!(
+                    stiffest > 1e5 && dampest > 1e2,
+                    "{name}: {stiffest:e} {dampest:e}"
+                );
+                let (mut plus, mut minus) = (vec![0.0; y.len()], vec![0.0; y.len()]);
+                let check = |what: String, got: &[f64], plus: &[f64], minus: &[f64], scale: f64| {
+                    for k in 0..n {
+                        let want = plus[nq + k] - minus[nq + k];
+                        assert!(
+                            (got[k] - want / 2e-6).abs() < 2e-3 * scale,
+                            "{name} {formulation} {what}[{k}]: {:e} against {:e}",
+                            got[k],
+                            want / 2e-6
+                        );
+                    }
+                };
+                for l in 0..n {
+                    for (of, sign) in [(&mut plus, 1e-6), (&mut minus, -1e-6)] {
+                        let mut z = y.clone();
+                        displace(&m, formulation, &mut z, l, sign);
+                        m.evaluator(Touching::Nothing).derivative(t, &z, of);
+                    }
+                    let column = &stiff.by_position[l * n..][..n];
+                    check(format!("K{l}"), column, &plus, &minus, stiffest);
+                    for (of, sign) in [(&mut plus, 1e-6), (&mut minus, -1e-6)] {
+                        let mut z = y.clone();
+                        z[nq + l] += sign;
+                        m.evaluator(Touching::Nothing).derivative(t, &z, of);
+                    }
+                    let column = &stiff.by_velocity[l * n..][..n];
+                    check(format!("D{l}"), column, &plus, &minus, dampest);
+                }
+                m.evaluator(Touching::Nothing)
+                    .derivative(t + 1e-6, &y, &mut plus);
+                m.evaluator(Touching::Nothing)
+                    .derivative(t - 1e-6, &y, &mut minus);
+                // Speeds are some mm/s.
+                let rates = 1e-2 * stiffest;
+                check(
+                    "ft".to_owned(),
+                    &stiff.time_derivative[nq..],
+                    &plus,
+                    &minus,
+                    rates,
+                );
+            }
+        }
+    }
+
+    const LINKED: [(&str, &str); 4] = [
+        (
+            "joint springs",
+            "[[joint_spring]]\nname = \"t\"\njoint = \"arm\"\nstiffness = \"20 kN m/rad\"\ndamping = \"200 N m s/rad\"\n\
+             [[joint_spring]]\nname = \"u\"\njoint = \"rod\"\nstiffness = \"900 N/mm\"\ndamping = \"7 kN s/m\"\n\
+             [[joint_spring]]\nname = \"v\"\njoint = \"table\"\nstiffness = \"900 N/mm\"\ndamping = \"7 kN s/m\"\n\
+             [[joint_spring]]\nname = \"w\"\njoint = \"wheel\"\nstiffness = \"20 kN m/rad\"\ndamping = \"200 N m s/rad\"\n",
+        ),
+        (
+            "stops",
+            "[[stop]]\nname = \"t\"\njoint = \"arm\"\nupper = 0\ntorque = \"6 N m\"\ndepth = \"0.3 mrad\"\nrestitution = 0.5\nspeed = \"10 mrad/s\"\n\
+             [[stop]]\nname = \"u\"\njoint = \"rod\"\nlower = \"0.6 mm\"\nforce = \"300 N\"\ndepth = \"0.3 mm\"\nrestitution = 0.5\nspeed = \"10 mm/s\"\n\
+             [[stop]]\nname = \"w\"\njoint = \"wheel\"\nlower = \"0.5 mrad\"\nupper = \"0.7 mrad\"\ntorque = \"4 N m\"\ndepth = \"0.3 mrad\"\n\
+             restitution = 0.5\nspeed = \"10 mrad/s\"\n",
+        ),
+        (
+            "bushings",
+            "[[bushing]]\nname = \"t\"\nfrom = { body = \"base\", at = \"100 20 -30 mm\" }\nto = { body = \"arm\", at = \"-80 10 20 mm\" }\n\
+             rotation = { axis = [1, 2, 3], angle = \"40 deg\" }\naxes = { axis = [0, 2, 1], angle = \"20 deg\" }\n\
+             stiffness = \"900 500 300 N/mm\"\ndamping = \"7 5 9 kN s/m\"\n\
+             turning_stiffness = \"20 30 40 kN m/rad\"\nturning_damping = \"200 300 100 N m s/rad\"\n\
+             [[bushing]]\nname = \"u\"\nfrom = { body = \"table\", at = \"0 0 1000 mm\" }\nto = { body = \"base\" }\n\
+             rotation = { axis = [3, 1, 2], angle = \"50 deg\" }\naxes = { axis = [1, 2, 1], angle = \"70 deg\" }\n\
+             stiffness = \"900 500 300 N/mm\"\ndamping = \"7 5 9 kN s/m\"\n\
+             turning_stiffness = \"20 30 40 kN m/rad\"\nturning_damping = \"200 300 100 N m s/rad\"\n\
+             [[bushing]]\nname = \"w\"\nfrom = { body = \"wheel\", at = \"-80 10 20 mm\" }\nto = { body = \"table\", at = \"100 20 -30 mm\" }\n\
+             rotation = { axis = [1, 2, 3], angle = \"-40 deg\" }\n\
+             stiffness = \"900 500 300 N/mm\"\nturning_stiffness = \"20 30 40 kN m/rad\"\n",
+        ),
+        (
+            "motors",
+            "[[motor]]\nname = \"t\"\njoint = \"arm\"\nstiffness = \"20 kN m/rad\"\ndamping = \"200 N m s/rad\"\n\
+             target = { law = \"harmonic\", amplitude = \"0.5 mrad\", frequency = \"1 Hz\" }\n\
+             [[motor]]\nname = \"u\"\njoint = \"rod\"\nstiffness = \"900 N/mm\"\ndamping = \"7 kN s/m\"\nlimit = \"5 kN\"\n\
+             target = { law = \"constant\", position = \"0.25 mm\", velocity = \"0.5 mm/s\" }\n\
+             [[motor]]\nname = \"w\"\njoint = \"wheel\"\nstiffness = \"20 kN m/rad\"\ntorque = \"3 N m\"\n\
+             target = { law = \"harmonic\", mean = \"0.1 mrad\", amplitude = \"0.5 mrad\", frequency = \"1 Hz\" }\n",
+        ),
+    ];
 }

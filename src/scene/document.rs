@@ -278,6 +278,8 @@ impl<'d> Node<'d> {
                 | Dimension::Torque
                 | Dimension::Stiffness
                 | Dimension::Damping
+                | Dimension::TurningStiffness
+                | Dimension::TurningDamping
         );
         if moves && value.abs() > MAX_SI {
             let limit = super::format_quantity(MAX_SI, super::si_unit(dimension));

@@ -38,6 +38,7 @@ const fn number(
         default,
         like,
         help,
+        on_hinge: None,
     }
 }
 

@@ -387,6 +387,19 @@ pub struct Joint {
 }
 
 impl Joint {
+    /// The points that it connects: the parent's, then the child's.
+    pub fn points(&self) -> [Attachment; 2] {
+        let parent = Attachment {
+            body: self.parent,
+            point: self.parent_point,
+        };
+        let child = Attachment {
+            body: Some(self.child),
+            point: self.child_point,
+        };
+        [parent, child]
+    }
+
     /// Whether one coordinate, driven or not, gives its position.
     pub fn has_coordinate(&self) -> bool {
         matches!(self.kind, JointKind::Prismatic | JointKind::Revolute)
@@ -486,12 +499,70 @@ pub struct ElementNumber {
     pub dimension: Dimension,
     /// Closed range, SI.
     pub range: (f64, f64),
-    /// Value if the file gives none; `None` if it is required.
+    /// Value if the file gives none, infinite for no limit; `None` if it is required.
     pub default: Option<f64>,
     /// An example.
     pub like: &'static str,
     /// What it is.
     pub help: &'static str,
+    /// What is different where the element acts on a hinge.
+    pub on_hinge: Option<OnHinge>,
+}
+
+/// A number of an element that acts on a hinge, where it would otherwise be that of a slide.
+#[derive(Clone, Copy, Debug)]
+pub struct OnHinge {
+    /// Key.
+    pub key: &'static str,
+    /// Its dimension.
+    pub dimension: Dimension,
+    /// An example.
+    pub like: &'static str,
+}
+
+impl ElementNumber {
+    /// Key, dimension and example, on a hinge or else.
+    pub fn on(&self, hinge: bool) -> (&'static str, Dimension, &'static str) {
+        match &self.on_hinge {
+            Some(own) if hinge => (own.key, own.dimension, own.like),
+            _ => (self.key, self.dimension, self.like),
+        }
+    }
+}
+
+/// A vector of an element.
+#[derive(Debug)]
+pub struct ElementVector {
+    /// Key.
+    pub key: &'static str,
+    /// Its dimension.
+    pub dimension: Dimension,
+    /// Closed range of its components, SI.
+    pub range: (f64, f64),
+    /// Whether it points somewhere; else its components belong to three axes.
+    pub direction: bool,
+    /// What it is.
+    pub help: &'static str,
+}
+
+/// Joints that an element may act on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ElementJoint {
+    /// Any slide or hinge.
+    Any,
+    /// One without a drive.
+    Undriven,
+}
+
+/// What an element looks like.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ElementLook {
+    /// A coil between its points, where they differ.
+    Coil,
+    /// An arrow for its force.
+    Arrow,
+    /// Nothing.
+    Hidden,
 }
 
 /// A law of driven joints. Adding one takes a row here, and a file in `mechanism/drives` with its row there.
@@ -572,16 +643,26 @@ pub struct ElementKind {
     pub help: &'static str,
     /// Points on bodies or the world, each `{ body, at }`.
     pub points: &'static [&'static str],
+    /// Of one that acts on a slide or a hinge, named by `joint`, instead of at points: which.
+    pub joint: Option<ElementJoint>,
     /// Its numbers.
     pub numbers: &'static [ElementNumber],
-    /// Its vectors, 0 if the file gives none: key, dimension, help.
-    pub vectors: &'static [(&'static str, Dimension, &'static str)],
+    /// Its vectors, 0 if the file gives none.
+    pub vectors: &'static [ElementVector],
+    /// Its orientations, none if the file gives none: key, help.
+    pub rotations: &'static [(&'static str, &'static str)],
+    /// A law of time for its joint's coordinate, as of a drive, if it may have one: key, help.
+    pub law: Option<(&'static str, &'static str)>,
     /// Numbers and vectors of which at least one is needed for it to have any effect.
     pub acts_by: &'static [&'static str],
     /// Its choices: key, words with the default first, help.
     pub choices: &'static [(&'static str, &'static [&'static str], &'static str)],
     /// Largest force at its points that its own values give, N: without what the motion adds.
     pub force: fn(&Element) -> f64,
+    /// What else its values must satisfy: the key at fault and why.
+    pub fault: fn(&Element) -> Option<(&'static str, String)>,
+    /// What it looks like.
+    pub look: ElementLook,
 }
 
 /// A force element of a scene, according to its row.
@@ -591,10 +672,17 @@ pub struct Element {
     pub name: String,
     /// Row.
     pub kind: &'static ElementKind,
-    /// In the order of the row.
+    /// In the order of the row; of one that acts on a joint, the points of parent and child that the joint connects.
     pub points: Vec<Attachment>,
+    /// The slide or hinge that it acts on, by its index among the tree joints.
+    pub joint: Option<usize>,
+    /// Whether that is a hinge.
+    pub on_hinge: bool,
     pub(super) numbers: Vec<f64>,
     pub(super) vectors: Vec<Vec3>,
+    pub(super) rotations: Vec<Quat>,
+    /// The law of its row.
+    pub law: Option<Drive>,
     pub(super) choices: Vec<&'static str>,
 }
 
@@ -613,8 +701,17 @@ impl Element {
     /// # Panics
     /// If the row has no such key.
     pub fn vector(&self, key: &str) -> Vec3 {
-        let at = self.kind.vectors.iter().position(|of| of.0 == key);
+        let at = self.kind.vectors.iter().position(|of| of.key == key);
         self.vectors[at.expect("a vector of the row")]
+    }
+
+    /// An orientation of its row.
+    ///
+    /// # Panics
+    /// If the row has no such key.
+    pub fn rotation(&self, key: &str) -> Quat {
+        let at = self.kind.rotations.iter().position(|of| of.0 == key);
+        self.rotations[at.expect("an orientation of the row")]
     }
 
     /// A choice of its row.

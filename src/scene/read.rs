@@ -440,9 +440,12 @@ fn read_mechanism<'d>(
     }
     // After the chain: they may be attached to its links.
     let by_name = indices_by_name(&scene.bodies);
+    let tree_joints = scene.joints.iter().zip(0..);
+    let tree_joints = tree_joints.map(|(joint, index)| (joint.name.clone(), index));
+    let tree_joints: BTreeMap<String, usize> = tree_joints.collect();
     for kind in &ELEMENT_KINDS {
         for node in list(kind.section, MOST_ELEMENTS, "force elements")? {
-            let (element, section) = read_element(&node, kind, scene, &by_name)?;
+            let (element, section) = read_element(&node, kind, scene, &by_name, &tree_joints)?;
             // Joints and elements share one table of column names.
             joint_names.add(&section, "joint or force element", &element.name)?;
             scene.elements.push(element);

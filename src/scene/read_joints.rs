@@ -3,7 +3,7 @@
 use super::copy::Copy;
 use super::document::{Node, Section};
 use super::drives::read_drive;
-use super::error::no_body;
+use super::error::{nearest, no_body};
 use super::table::contact_rows;
 use super::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -400,6 +400,44 @@ pub(super) fn read_attachment(
         point = copy.point(point);
     }
     Ok(Attachment { body, point })
+}
+
+/// The slide or hinge that the key `joint` names; `joints` maps names to indices in the sorted scene.
+pub(super) fn read_one_degree_joint(
+    section: &Section<'_>,
+    scene: &Scene,
+    joints: &BTreeMap<String, usize>,
+) -> Result<usize, SceneError> {
+    const LISTED: usize = 12;
+    let node = section.require("joint", "\"crank\"")?;
+    let wanted = &*node.reference()?;
+    match joints.get(wanted) {
+        Some(&index) if scene.joints[index].has_coordinate() => Ok(index),
+        found => {
+            let wrong = match found {
+                Some(&index) => format!(
+                    "a {} joint is neither a slide nor a hinge",
+                    scene.joints[index].kind
+                ),
+                None => "no such tree joint".to_owned(),
+            };
+            let names = scene
+                .joints
+                .iter()
+                .filter(|joint| joint.has_coordinate())
+                .map(|joint| joint.name.as_str());
+            let near = nearest(wanted, names.clone());
+            let mut listed: Vec<&str> = names.take(LISTED + 1).collect();
+            if listed.len() > LISTED {
+                listed[LISTED] = "…";
+            }
+            let allowed = match listed.is_empty() {
+                true => "the scene has no prismatic or revolute joint".to_owned(),
+                false => format!("allowed {}", listed.join(", ")),
+            };
+            Err(node.error(format!("{wrong}{near}; {allowed}")))
+        }
+    }
 }
 
 /// One `[[ball_joint]]`; `bodies` maps names to indices in the sorted scene.

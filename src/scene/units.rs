@@ -40,6 +40,10 @@ pub enum Dimension {
     Stiffness,
     /// N s/m
     Damping,
+    /// N m/rad
+    TurningStiffness,
+    /// N m s/rad
+    TurningDamping,
 }
 
 /// Why a text is not a quantity of the required dimension.
@@ -82,7 +86,7 @@ use Scale::{Decimal, Ratio};
 type Unit = (&'static str, Scale);
 
 /// Every dimension with its name and its units; the first unit is the SI one.
-const UNITS: [(Dimension, &str, &[Unit]); 16] = [
+const UNITS: [(Dimension, &str, &[Unit]); 18] = [
     (
         Dimension::Length,
         "length",
@@ -231,6 +235,26 @@ const UNITS: [(Dimension, &str, &[Unit]); 16] = [
             ("kN s/m", Decimal(3)),
         ],
     ),
+    (
+        Dimension::TurningStiffness,
+        "turning stiffness",
+        &[
+            ("N m/rad", Decimal(0)),
+            ("N mm/rad", Decimal(-3)),
+            ("kN m/rad", Decimal(3)),
+            ("N m/deg", Ratio(180.0, PI)),
+        ],
+    ),
+    (
+        Dimension::TurningDamping,
+        "turning damping",
+        &[
+            ("N m s/rad", Decimal(0)),
+            ("N mm s/rad", Decimal(-3)),
+            ("kN m s/rad", Decimal(3)),
+            ("N m s/deg", Ratio(180.0, PI)),
+        ],
+    ),
     (Dimension::None, "pure number", &[]),
 ];
 
@@ -323,6 +347,8 @@ pub(super) fn powers(dimension: Dimension) -> [i8; 4] {
         Dimension::Torque => [1, 2, -2, 0],
         Dimension::Stiffness => [1, 0, -2, 0],
         Dimension::Damping => [1, 0, -1, 0],
+        Dimension::TurningStiffness => [1, 2, -2, -1],
+        Dimension::TurningDamping => [1, 2, -1, -1],
     }
 }
 

@@ -9,7 +9,7 @@ use super::{
     Camera, Colour, DrawList, LabelKind, Layer, Legend, Line, Mark, Mesh, Palette, Scaling, Shot,
     Tick, to_f32,
 };
-use crate::scene::format_quantity_digits;
+use crate::scene::{ElementLook, format_quantity_digits};
 
 /// Reference length of arrows, as a fraction of the picture height.
 pub(super) const ARROW_LENGTH: f32 = 0.22;
@@ -163,11 +163,10 @@ pub(super) fn push_forces(
 ) {
     let options = &shot.options.arrows;
     let at_joints = (options.normal || options.friction) && !joints.is_empty();
-    let loads = shot.frame.elements.iter().filter(|_| options.normal);
-    let mut outside = loads
-        .filter(|report| report.torque.is_some())
-        .chain(&shot.frame.pull)
-        .peekable();
+    let elements = shot.scene.elements.iter().zip(&shot.frame.elements);
+    let loads = elements.filter(|(of, _)| options.normal && of.kind.look == ElementLook::Arrow);
+    let loads = loads.map(|(_, report)| report);
+    let mut outside = loads.chain(&shot.frame.pull).peekable();
     if !at_joints && outside.peek().is_none() {
         return;
     }

@@ -15,7 +15,7 @@ use super::{
     Background, Bounds, Camera, DrawList, Floor, Instance, LabelKind, Layer, Light, Line, Mesh,
     MeshData, Palette, Shot, ViewOptions, WearMap, to_f32,
 };
-use crate::scene::{Role, Scene, SignedAxis};
+use crate::scene::{ElementLook, Role, Scene, SignedAxis};
 use crate::simulate::Frame;
 
 /// What the view precomputes for a scene: built once per scene, and again when its bodies or shapes change.
@@ -270,7 +270,7 @@ impl SceneView {
             .sort_by(|a, b| distance(b).total_cmp(&distance(a)));
 
         for (element, report) in scene.elements.iter().zip(&frame.elements) {
-            if element.points.len() == 2 {
+            if element.kind.look == ElementLook::Coil {
                 let [from, to] = report.points.map(|point| to_f32(&point));
                 let (radius, width) = (COIL * self.bounds.radius, 2.2 * shot.pixels_per_point);
                 let colour = palette.material(Role::Pin).colour;

@@ -366,7 +366,7 @@ fn a_parameter_of_the_file_is_a_slider_at_once_and_moves_the_machine_at_the_rese
         player.simulation().scene().ball_joints[0].socket.point.x
     };
     // In sight without opening a group, with its unit.
-    harness.get_by_label("Crank radius");
+    assert!(harness.query_all_by_label("Crank radius").count() > 1);
     harness.state_mut().player_mut().run_to(1e-3);
     type_into(&mut harness, "Crank radius", "30 mm");
     harness.run();

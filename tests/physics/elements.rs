@@ -18,7 +18,8 @@ fn floating(more: &str, changes: &[(&str, &str)]) -> Simulation {
     Simulation::new(&Scene::parse(&text, None, &changes).unwrap()).unwrap()
 }
 
-fn at(simulation: &mut Simulation, time: f64) -> Frame {
+/// The frame at `time`, s.
+pub fn at(simulation: &mut Simulation, time: f64) -> Frame {
     while simulation.time() < time {
         simulation.step_until(time).unwrap();
     }
@@ -32,7 +33,7 @@ const SPRING: &str = "[[spring]]\nname = \"s\"\nfrom = { body = \"world\" }\nto 
                       length = \"100 mm\"\nstiffness = \"200 N/m\"\n";
 
 /// A step that suits the method's order, and how close it then comes, m.
-fn settings(method: &str) -> (&'static str, f64) {
+pub fn settings(method: &str) -> (&'static str, f64) {
     match method {
         "semi-implicit-euler" | "imex-euler" => ("1 us", 2e-6),
         "rk4" => ("100 us", 1e-9),

@@ -3,6 +3,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod bushings;
 mod corners;
 mod determinism;
 mod double_crossing;
@@ -17,6 +18,7 @@ mod guard;
 mod imex;
 mod impact;
 mod independent;
+mod joint_elements;
 mod known_systems;
 mod ledger;
 mod live_changes;

@@ -4,8 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use jointplay::scene::{
-    DRIVE_KINDS, ELEMENT_KINDS, ElementNumber, Scene, Vec3, format_quantity, reference_page,
-    si_unit, unit_table,
+    DRIVE_KINDS, ELEMENT_KINDS, ElementJoint, ElementNumber, Scene, Vec3, format_quantity,
+    reference_page, si_unit, unit_table,
 };
 use jointplay::simulate::{Frame, Simulation};
 
@@ -59,24 +59,47 @@ fn element_table() -> String {
     let mut out = String::new();
     for kind in &ELEMENT_KINDS {
         let points = kind.points.iter();
-        let mut keys: Vec<String> = points
-            .map(|key| format!("`{key}` (`{{ body, at }}`)"))
-            .collect();
+        let joint = kind.joint.map(|which| match which {
+            ElementJoint::Any => "`joint` (a slide or a hinge)".to_owned(),
+            ElementJoint::Undriven => "`joint` (a slide or a hinge without a drive)".to_owned(),
+        });
+        let mut keys: Vec<String> = joint.into_iter().collect();
+        keys.extend(points.map(|key| format!("`{key}` (`{{ body, at }}`)")));
         for number in kind.numbers {
+            let ([key, own_key], [unit, own_unit]) = {
+                let [slide, hinge] = [false, true].map(|hinge| number.on(hinge));
+                ([slide.0, hinge.0], [slide.1, hinge.1].map(si_unit))
+            };
             let default = match number.default {
                 None => "must be given".to_owned(),
+                Some(value) if value.is_infinite() => "no limit if left out".to_owned(),
+                Some(value) if unit == own_unit => {
+                    format!("{} if left out", format_quantity(value, unit))
+                }
                 Some(value) => format!(
-                    "{} if left out",
-                    format_quantity(value, si_unit(number.dimension))
+                    "{}, on a hinge {}, if left out",
+                    format_quantity(value, unit),
+                    format_quantity(value, own_unit)
                 ),
             };
-            keys.push(format!("`{}`: {} ({default})", number.key, number.help));
+            let hinge = if own_key == key {
+                String::new()
+            } else {
+                format!(" (on a hinge `{own_key}`)")
+            };
+            keys.push(format!("`{key}`{hinge}: {} ({default})", number.help));
         }
-        for (key, dimension, help) in kind.vectors {
+        for vector in kind.vectors {
+            let (key, help, unit) = (vector.key, vector.help, si_unit(vector.dimension));
             keys.push(format!(
-                "`{key}`: {help}, a vector in {} (0 if left out)",
-                si_unit(*dimension)
+                "`{key}`: {help}, a vector in {unit} (0 if left out)"
             ));
+        }
+        for (key, help) in kind.rotations {
+            keys.push(format!("`{key}`: {help}, a rotation (none if left out)"));
+        }
+        if let Some((key, help)) = kind.law {
+            keys.push(format!("`{key}`: {help}, a law as of a drive"));
         }
         for (key, words, help) in kind.choices {
             keys.push(format!(
@@ -248,4 +271,24 @@ fn the_mass_on_a_spring_of_the_page_swings_about_its_rest() {
     let ledger = simulation.ledger().expect("is kept");
     assert!(ledger.damping_loss > 0.0 && ledger.external_work != 0.0);
     assert!(ledger.relative_residual().abs() < 1e-5, "{ledger:?}");
+}
+
+#[test]
+fn the_flap_of_the_page_opens_against_its_stop_and_shuts() {
+    let scene = Scene::parse(&example("name = \"flap\""), None, &[]).expect("the example loads");
+    let mut simulation = Simulation::new(&scene).expect("the example starts");
+    let mut frame = Frame::default();
+    let (mut widest, mut deepest, mut most) = (0.0_f64, 0.0_f64, 0.0_f64);
+    while simulation.time() < 1.0 {
+        let next = simulation.time() + 2e-3;
+        simulation.step_until(next).expect("it runs");
+        simulation.sample(simulation.time(), &mut frame);
+        let rotation = &frame.bodies[0].rotation;
+        let angle = libm::atan2(rotation[(0, 2)], rotation[(0, 0)]).to_degrees();
+        (widest, deepest) = (widest.max(angle), deepest.min(angle));
+        most = most.max(frame.elements[2].torque.expect("a torque").norm());
+    }
+    assert!((30.0..70.0).contains(&widest), "{widest}");
+    assert!((-2.0..-0.05).contains(&deepest), "{deepest}");
+    assert!((0.3..=0.6 + 1e-12).contains(&most), "{most}");
 }

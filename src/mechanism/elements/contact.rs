@@ -173,7 +173,7 @@ impl ForceElement for Contact {
         socket.torque -= (arm_socket + n * (radius + clearance)).cross(&on_ball);
     }
 
-    fn ends(&self) -> Option<[Anchor; 2]> {
+    fn ends(&self, _: &[Kinematics]) -> Option<[Anchor; 2]> {
         Some([self.joint.socket, self.joint.ball])
     }
 
@@ -202,6 +202,7 @@ impl ForceElement for Contact {
             force: n * -gap.normal_force + gap.friction,
             stiffness,
             uses_surface_velocity: self.law.uses_surface_velocity(),
+            turning: None,
         })
     }
 

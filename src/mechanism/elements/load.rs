@@ -1,6 +1,6 @@
 //! External force and torque on a body, constant or harmonic, in world or body axes.
 
-use super::{At, ElementReport, ForceElement, Loads, SceneElement, point_of, push};
+use super::{At, ElementReport, ForceElement, Loads, SceneElement, Site, point_of, push};
 use crate::mechanism::Powers;
 use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::model::Anchor;
@@ -16,9 +16,9 @@ struct Load {
     phase: f64,
 }
 
-pub(super) fn make(element: &Element, anchors: &[Anchor]) -> Box<dyn SceneElement> {
+pub(super) fn make(element: &Element, site: &Site<'_>) -> Box<dyn SceneElement> {
     Box::new(Load {
-        on: anchors[0],
+        on: site.anchors[0],
         force: element.vector("force"),
         torque: element.vector("torque"),
         turns: element.choice::<LoadAxes>("axes") == LoadAxes::Body,
@@ -74,6 +74,7 @@ impl SceneElement for Load {
             points: [point; 2],
             force,
             torque: Some(torque),
+            ..ElementReport::default()
         }
     }
 }

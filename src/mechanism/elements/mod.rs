@@ -1,10 +1,15 @@
 //! Force elements: whatever loads bodies without a constraint. One file per kind. Ball joints with clearance are among them;
 //! the others come from the scene's own list, each kind with an entry below.
 
+mod bushing;
 mod contact;
+mod coordinate;
+mod joint_spring;
 mod load;
+mod motor;
 mod pull;
 mod spring;
+mod stop;
 
 pub(super) use contact::Contact;
 pub use contact::Gap;
@@ -15,6 +20,7 @@ use super::kinematics::{Kinematics, Wrench};
 use super::model::{Anchor, Model};
 use crate::contact::{Memory, Stiffness};
 use crate::scene::{Attachment, Element, Mat3, Scene, Vec3};
+use coordinate::Coordinate;
 pub use pull::Pull;
 
 /// What decides which contacts carry a force.
@@ -98,6 +104,19 @@ pub(super) struct Coupling {
     pub stiffness: Stiffness,
     /// Whether its slip-dependent part follows the surfaces rather than the points.
     pub uses_surface_velocity: bool,
+    /// Of an element between points of two bodies that coincide, in axes that follow the bodies: how its torque depends on
+    /// their relative rotation. What moves both bodies as one then leaves force and torque as they are.
+    pub turning: Option<Turning>,
+}
+
+/// How the torque on the first of two bodies, and its opposite on the second, depend on their relative motion.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Turning {
+    /// Derivatives by relative rotation, N m/rad, and by relative angular velocity, N m s/rad.
+    pub by_turn: Mat3,
+    pub by_spin: Mat3,
+    /// At fixed motion, N m/s.
+    pub by_time: Vec3,
 }
 
 impl Coupling {
@@ -109,7 +128,23 @@ impl Coupling {
             force: Vec3::zeros(),
             stiffness: Stiffness::between_points(by_displacement, by_rate),
             uses_surface_velocity: false,
+            turning: None,
         }
+    }
+
+    /// For a force on the second of two points that coincide, N/m, N s/m and N/s, and a torque on its body.
+    fn at_one_point(
+        [from, to]: [Anchor; 2],
+        [by_displacement, by_rate]: [Mat3; 2],
+        by_time: Vec3,
+        turning: Turning,
+    ) -> Self {
+        let mut coupling = Self::between_points([from, to], by_displacement, by_rate);
+        coupling.stiffness.by_clearance = by_time;
+        // With these lengths what a coordinate turns is the relative angular velocity itself.
+        coupling.sides = [(to, 1.0), (from, 1.0)];
+        coupling.turning = Some(turning);
+        coupling
     }
 }
 
@@ -120,8 +155,17 @@ pub struct ElementReport {
     pub points: [Vec3; 2],
     /// Force on the second, N.
     pub force: Vec3,
-    /// Torque on the body, N m, if the kind has one.
+    /// Torque on the body, N m, if it has one; of an element on a hinge, on the child.
     pub torque: Option<Vec3>,
+    /// Whether it is a pair of torques, without any force.
+    pub only_turns: bool,
+}
+
+impl ElementReport {
+    /// [`Self::force`], unless it is a pair of torques.
+    pub fn own_force(&self) -> Option<Vec3> {
+        (!self.only_turns).then_some(self.force)
+    }
 }
 
 /// Powers at one instant, or their integrals over time (then in J).
@@ -169,8 +213,9 @@ pub(super) trait ForceElement: Send {
     /// Adds its loads.
     fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>);
 
-    /// The two points on whose relative motion it depends; `None` if nothing about it is stiff.
-    fn ends(&self) -> Option<[Anchor; 2]> {
+    /// The two points on whose relative motion, and on that of whose bodies, it depends in `motion`; `None` if nothing about it
+    /// is stiff.
+    fn ends(&self, _motion: &[Kinematics]) -> Option<[Anchor; 2]> {
         None
     }
 
@@ -195,15 +240,41 @@ pub(super) trait SceneElement: ForceElement {
         f64::INFINITY
     }
 
+    /// Latest end of an adaptive step that starts at `t`, s: none passes over what its law only begins within it.
+    fn step_end(&self, _t: f64) -> f64 {
+        f64::INFINITY
+    }
+
     /// Its report at `t`.
     fn report(&self, t: f64, motion: &[Kinematics]) -> ElementReport;
 }
 
-/// Makes an element of one kind, with its points as anchors.
-type Make = fn(&Element, &[Anchor]) -> Box<dyn SceneElement>;
+/// Where an element of the scene acts.
+struct Site<'a> {
+    /// Its points.
+    anchors: &'a [Anchor],
+    coordinate: Option<Coordinate>,
+}
+
+impl Site<'_> {
+    /// That of the joint it acts on: only for kinds that do.
+    fn coordinate(&self) -> Coordinate {
+        self.coordinate.expect("a kind that acts on a joint")
+    }
+}
+
+/// Makes an element of one kind.
+type Make = fn(&Element, &Site<'_>) -> Box<dyn SceneElement>;
 
 /// All kinds by section.
-const KINDS: [(&str, Make); 2] = [("spring", spring::make), ("load", load::make)];
+const KINDS: [(&str, Make); 6] = [
+    ("spring", spring::make),
+    ("load", load::make),
+    ("joint_spring", joint_spring::make),
+    ("stop", stop::make),
+    ("bushing", bushing::make),
+    ("motor", motor::make),
+];
 
 /// The force elements of `scene`, in its order.
 pub(super) fn elements_of(scene: &Scene, model: &Model) -> Vec<Box<dyn SceneElement>> {
@@ -217,7 +288,11 @@ pub(super) fn elements_of(scene: &Scene, model: &Model) -> Vec<Box<dyn SceneElem
             .iter()
             .find(|(section, _)| *section == element.kind.section)
             .expect("every kind of the scene format has its element");
-        make(element, &anchors)
+        let site = Site {
+            coordinate: Coordinate::of(scene, model, element, &anchors),
+            anchors: &anchors,
+        };
+        make(element, &site)
     };
     scene.elements.iter().map(make).collect()
 }

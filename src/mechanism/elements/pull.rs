@@ -53,7 +53,7 @@ impl Pull {
         ElementReport {
             points: [self.hand, point],
             force: self.stiffness * (self.hand - point) - self.damping * velocity,
-            torque: None,
+            ..ElementReport::default()
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Spring with a damper along the line between two points: tension T = preload + stiffness (l - length) + damping dl/dt.
 
-use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, point_of, push};
+use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, Site, point_of, push};
 use crate::mechanism::Powers;
 use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::model::Anchor;
@@ -29,10 +29,10 @@ struct State {
     tension: f64,
 }
 
-pub(super) fn make(element: &Element, anchors: &[Anchor]) -> Box<dyn SceneElement> {
+pub(super) fn make(element: &Element, site: &Site<'_>) -> Box<dyn SceneElement> {
     Box::new(Spring {
-        from: anchors[0],
-        to: anchors[1],
+        from: site.anchors[0],
+        to: site.anchors[1],
         length: element.number("length"),
         stiffness: element.number("stiffness"),
         damping: element.number("damping"),
@@ -74,7 +74,7 @@ impl ForceElement for Spring {
         push(&mut loads.wrench[self.to.body], &s.arms[1], &-pull);
     }
 
-    fn ends(&self) -> Option<[Anchor; 2]> {
+    fn ends(&self, _: &[Kinematics]) -> Option<[Anchor; 2]> {
         Some([self.from, self.to])
     }
 
@@ -112,7 +112,7 @@ impl SceneElement for Spring {
         ElementReport {
             points: s.points,
             force: s.along * -s.tension,
-            torque: None,
+            ..ElementReport::default()
         }
     }
 }

@@ -446,7 +446,7 @@ pub(super) const TABLE: &[Signal] = &[
     plotted(Q::TipError, asked("", "tip_error_m", Whole("distance", |_| f64::NAN), "")),
     both(Q::ProbeError, 9, asked("probe_error.#", "probe_error_#_m", ProbeError, "probe tip from where the ideal mechanism has it")),
 
-    listed(12, asked("@.force.#", "@_force_#_N", Element(|element| Some(element.force)), "force of the element on its second, or only, point")),
+    listed(12, asked("@.force.#", "@_force_#_N", Element(ElementReport::own_force), "force of the element on its second, or only, point")),
     listed(12, asked("@.torque.#", "@_torque_#_Nm", Element(|element| element.torque), "torque of the element on the body")),
 
     asked("@.pose.#", "@_#_m", OtherAxes(|body| body.position), "origin of the body"),

@@ -1,0 +1,222 @@
+//! Bushing between two bodies: three springs along and three about axes fixed in the first, each with a damper.
+//!
+//! With x the second point from the first in those axes and theta the rotation vector of the second body from its rest
+//! orientation in the first, the energy stored is (x' K x + theta' L theta) / 2. Force and torque follow from it exactly, for
+//! rotations up to half a turn: both forces act at the second point, and the torque is -J^-T L theta, J the matrix that makes
+//! the relative angular velocity of the rate of theta. About one axis that is -L theta.
+
+use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, Site, Turning, push};
+use crate::mechanism::Powers;
+use crate::mechanism::kinematics::{Kinematics, quaternion_of};
+use crate::mechanism::model::Anchor;
+use crate::scene::{Element, Mat3, Vec3};
+
+struct Bushing {
+    from: Anchor,
+    to: Anchor,
+    /// Its axes as columns, and the rest orientation of the second body, both in the axes of the first.
+    axes: Mat3,
+    rest: Mat3,
+    /// Diagonals of K, its damping, L and its damping.
+    stiffness: Vec3,
+    damping: Vec3,
+    turning_stiffness: Vec3,
+    turning_damping: Vec3,
+}
+
+/// State at one instant, along its axes where nothing else is said.
+struct State {
+    /// World.
+    axes: Mat3,
+    points: [Vec3; 2],
+    /// The second point from both centroids, world.
+    arms: [Vec3; 2],
+    /// x, m, and its rate.
+    offset: Vec3,
+    rate: Vec3,
+    /// theta, rad, and relative angular velocity.
+    turn: Vec3,
+    spin: Vec3,
+}
+
+pub(super) fn make(element: &Element, site: &Site<'_>) -> Box<dyn SceneElement> {
+    let matrix = |key| element.rotation(key).to_rotation_matrix().into_inner();
+    Box::new(Bushing {
+        from: site.anchors[0],
+        to: site.anchors[1],
+        axes: matrix("axes"),
+        rest: matrix("rotation"),
+        stiffness: element.vector("stiffness"),
+        damping: element.vector("damping"),
+        turning_stiffness: element.vector("turning_stiffness"),
+        turning_damping: element.vector("turning_damping"),
+    })
+}
+
+/// Rotation vector of a rotation matrix.
+fn rotation_vector(rotation: &Mat3) -> Vec3 {
+    let q = quaternion_of(rotation);
+    let (sign, vector) = (q.w.signum(), q.imag());
+    let (sin, cos) = (vector.norm(), q.w.abs());
+    let factor = if sin > 1e-9 {
+        2.0 * libm::atan2(sin, cos) / sin
+    } else {
+        2.0
+    };
+    vector * (sign * factor)
+}
+
+/// J^-T: makes the torque of the derivatives of an energy by the components of the rotation vector `turn`.
+fn torque_matrix(turn: &Vec3) -> Mat3 {
+    let square = turn.norm_squared();
+    // (1 - h cot h) / 4 h^2, h half the angle.
+    let factor = if square < 1e-3 {
+        1.0 / 12.0 + square * (1.0 / 720.0 + square * (1.0 / 30240.0 + square / 1_209_600.0))
+    } else {
+        let half = 0.5 * square.sqrt();
+        (1.0 - half / libm::tan(half)) / square
+    };
+    let cross = turn.cross_matrix();
+    Mat3::identity() + cross * 0.5 + cross * cross * factor
+}
+
+impl Bushing {
+    fn state(&self, motion: &[Kinematics]) -> State {
+        let (first, second) = (&motion[self.from.body], &motion[self.to.body]);
+        let axes = first.rotation * self.axes;
+        let from = first.position + first.rotation * self.from.offset;
+        let arm = second.rotation * self.to.offset;
+        let to = second.position + arm;
+        let arms = [to - first.position, arm];
+        let relative = first.rotation.tr_mul(&second.rotation) * self.rest.transpose();
+        State {
+            axes,
+            points: [from, to],
+            offset: axes.tr_mul(&(to - from)),
+            rate: axes.tr_mul(&(second.point_velocity(&arms[1]) - first.point_velocity(&arms[0]))),
+            turn: self.axes.tr_mul(&rotation_vector(&relative)),
+            spin: axes.tr_mul(&(second.angular_velocity - first.angular_velocity)),
+            arms,
+        }
+    }
+
+    /// Force on the second point and torque on its body, world.
+    fn loads(&self, s: &State) -> [Vec3; 2] {
+        let force = self.stiffness.component_mul(&s.offset) + self.damping.component_mul(&s.rate);
+        let torque = torque_matrix(&s.turn) * self.turning_stiffness.component_mul(&s.turn)
+            + self.turning_damping.component_mul(&s.spin);
+        [force, torque].map(|along| s.axes * -along)
+    }
+
+    fn ends_in(&self, s: &State, motion: &[Kinematics]) -> [Anchor; 2] {
+        let from = Anchor {
+            body: self.from.body,
+            offset: motion[self.from.body].rotation.tr_mul(&s.arms[0]),
+        };
+        [from, self.to]
+    }
+}
+
+impl ForceElement for Bushing {
+    fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
+        let s = self.state(at.motion);
+        let [force, torque] = self.loads(&s);
+        let first = &mut loads.wrench[self.from.body];
+        push(first, &s.arms[0], &-force);
+        first.torque -= torque;
+        let second = &mut loads.wrench[self.to.body];
+        push(second, &s.arms[1], &force);
+        second.torque += torque;
+    }
+
+    fn ends(&self, motion: &[Kinematics]) -> Option<[Anchor; 2]> {
+        Some(self.ends_in(&self.state(motion), motion))
+    }
+
+    fn coupling(&self, at: &At<'_>) -> Option<Coupling> {
+        let s = self.state(at.motion);
+        let world = |along: Mat3| s.axes * -along * s.axes.transpose();
+        let across = |diagonal: &Vec3| world(Mat3::from_diagonal(diagonal));
+        let to_torque = torque_matrix(&s.turn);
+        let turning = Turning {
+            by_turn: world(
+                to_torque * Mat3::from_diagonal(&self.turning_stiffness) * to_torque.transpose(),
+            ),
+            by_spin: across(&self.turning_damping),
+            by_time: Vec3::zeros(),
+        };
+        let along = [across(&self.stiffness), across(&self.damping)];
+        let ends = self.ends_in(&s, at.motion);
+        Some(Coupling::at_one_point(ends, along, Vec3::zeros(), turning))
+    }
+
+    fn stored(&self, motion: &[Kinematics]) -> f64 {
+        let s = self.state(motion);
+        let twice = |stiffness: &Vec3, x: &Vec3| stiffness.component_mul(x).dot(x);
+        0.5 * (twice(&self.stiffness, &s.offset) + twice(&self.turning_stiffness, &s.turn))
+    }
+
+    fn add_powers(&self, _: f64, motion: &[Kinematics], powers: &mut Powers) {
+        let s = self.state(motion);
+        powers.damping += self.damping.component_mul(&s.rate).dot(&s.rate)
+            + self.turning_damping.component_mul(&s.spin).dot(&s.spin);
+    }
+}
+
+impl SceneElement for Bushing {
+    fn report(&self, _: f64, motion: &[Kinematics]) -> ElementReport {
+        let s = self.state(motion);
+        let [force, torque] = self.loads(&s);
+        ElementReport {
+            points: s.points,
+            force,
+            torque: Some(torque),
+            ..ElementReport::default()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Rotation3;
+
+    #[test]
+    fn rotation_vectors_go_there_and_back() {
+        for turn in [
+            Vec3::new(0.3, -0.2, 0.9),
+            Vec3::new(1e-11, 2e-11, -1e-11),
+            Vec3::new(0.0, -3.1, 0.1),
+            Vec3::zeros(),
+        ] {
+            let back = rotation_vector(Rotation3::new(turn).matrix());
+            assert!((back - turn).norm() < 1e-14 * (1.0 + turn.norm()), "{back}");
+        }
+    }
+
+    #[test]
+    fn the_torque_is_the_slope_of_the_energy() {
+        let stiffness = Vec3::new(3.0, 7.0, 20.0);
+        let energy = |rotation: &Rotation3<f64>| {
+            let turn = rotation_vector(rotation.matrix());
+            0.5 * stiffness.component_mul(&turn).dot(&turn)
+        };
+        for turn in [
+            Vec3::new(0.4, -1.1, 0.7),
+            Vec3::new(0.02, 0.01, -0.015),
+            Vec3::new(0.0, 0.0, 2.9),
+        ] {
+            let at = Rotation3::new(turn);
+            let torque = torque_matrix(&turn) * stiffness.component_mul(&turn);
+            for i in 0..3 {
+                let moved = |by: f64| energy(&(Rotation3::new(Vec3::ith(i, by)) * at));
+                let slope = (moved(1e-5) - moved(-1e-5)) / 2e-5;
+                assert!(
+                    (torque[i] - slope).abs() < 1e-7,
+                    "{turn} {i}: {} {slope}",
+                    torque[i]
+                );
+            }
+        }
+    }
+}

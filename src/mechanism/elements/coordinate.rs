@@ -1,0 +1,152 @@
+//! Coordinate of a slide or a hinge from the motion of the two bodies that it connects, and a force along it. The same in
+//! every formulation: a force on the child and the opposite one on the parent at the same point, or a pair of torques.
+
+use std::f64::consts::TAU;
+
+use super::{Coupling, ElementReport, Turning, push};
+use crate::mechanism::kinematics::{Kinematics, Wrench};
+use crate::mechanism::model::{Anchor, Model};
+use crate::scene::{Element, JointKind, Mat3, Scene, Vec3};
+
+/// A slide or a hinge.
+#[derive(Clone, Copy)]
+pub(super) struct Coordinate {
+    parent: Anchor,
+    child: Anchor,
+    hinge: bool,
+    /// Axis, in the parent's axes.
+    axis: Vec3,
+    /// On a hinge: a direction across the axis, in the parent's axes; and in the child's, the one that coincides with it at
+    /// coordinate 0.
+    across: Vec3,
+    seen: Vec3,
+}
+
+/// A coordinate at one instant.
+#[derive(Clone, Copy)]
+pub(super) struct Place {
+    /// From the position asked about, m or rad; on a hinge within half a turn.
+    pub off: f64,
+    /// m/s or rad/s.
+    pub rate: f64,
+    /// The axis, world.
+    along: Vec3,
+    /// The child's joint point, m, and its arms from the centroids of parent and child.
+    point: Vec3,
+    arms: [Vec3; 2],
+}
+
+/// Derivatives of a force along a coordinate: by the coordinate, by its rate, by time.
+pub(super) struct Slopes {
+    pub by_position: f64,
+    pub by_rate: f64,
+    pub by_time: f64,
+}
+
+impl Coordinate {
+    /// That of the joint on which `element` of `scene` acts; `ends` are the points that the joint connects.
+    pub fn of(scene: &Scene, model: &Model, element: &Element, ends: &[Anchor]) -> Option<Self> {
+        let joint = &scene.joints[element.joint?];
+        let axis = model.bodies[joint.child].axis;
+        let least = axis.iamin();
+        let across = axis.cross(&Vec3::ith(least, 1.0)).normalize();
+        Some(Self {
+            parent: ends[0],
+            child: ends[1],
+            hinge: joint.kind == JointKind::Revolute,
+            axis,
+            across,
+            seen: joint.rotation.inverse() * across,
+        })
+    }
+
+    /// The coordinate from `position`, and its rate.
+    pub fn place(&self, position: f64, motion: &[Kinematics]) -> Place {
+        let (parent, child) = (&motion[self.parent.body], &motion[self.child.body]);
+        let along = parent.rotation * self.axis;
+        let arm = child.rotation * self.child.offset;
+        let point = child.position + arm;
+        let from_parent = point - parent.position;
+        let (off, rate) = if self.hinge {
+            let (zero, now) = (parent.rotation * self.across, child.rotation * self.seen);
+            let angle = libm::atan2(zero.cross(&now).dot(&along), zero.dot(&now));
+            let off = angle - position;
+            let spin = child.angular_velocity - parent.angular_velocity;
+            (off - TAU * libm::round(off / TAU), along.dot(&spin))
+        } else {
+            let slid = from_parent - parent.rotation * self.parent.offset;
+            let velocity = child.point_velocity(&arm) - parent.point_velocity(&from_parent);
+            (along.dot(&slid) - position, along.dot(&velocity))
+        };
+        Place {
+            off,
+            rate,
+            along,
+            point,
+            arms: [from_parent, arm],
+        }
+    }
+
+    /// Adds `force` (N or N m) along the axis to the child, and its opposite to the parent.
+    pub fn press(&self, place: &Place, force: f64, wrench: &mut [Wrench]) {
+        let force = place.along * force;
+        let [from_parent, arm] = &place.arms;
+        if self.hinge {
+            wrench[self.child.body].torque += force;
+            wrench[self.parent.body].torque -= force;
+        } else {
+            push(&mut wrench[self.child.body], arm, &force);
+            push(&mut wrench[self.parent.body], from_parent, &-force);
+        }
+    }
+
+    /// The child's joint point as one of the parent, and as one of the child: what separates them is the joint's motion.
+    pub fn ends(&self, motion: &[Kinematics]) -> [Anchor; 2] {
+        let (parent, child) = (&motion[self.parent.body], &motion[self.child.body]);
+        let point = child.position + child.rotation * self.child.offset;
+        let parent = Anchor {
+            body: self.parent.body,
+            offset: parent.rotation.tr_mul(&(point - parent.position)),
+        };
+        [parent, self.child]
+    }
+
+    /// Linearisation of a force along the axis.
+    pub fn coupling(&self, place: &Place, slopes: &Slopes, motion: &[Kinematics]) -> Coupling {
+        let along = place.along * place.along.transpose();
+        let (stiffness, damping) = (along * slopes.by_position, along * slopes.by_rate);
+        let by_time = place.along * slopes.by_time;
+        let ends = self.ends(motion);
+        if self.hinge {
+            let turning = Turning {
+                by_turn: stiffness,
+                by_spin: damping,
+                by_time,
+            };
+            return Coupling::at_one_point(ends, [Mat3::zeros(); 2], Vec3::zeros(), turning);
+        }
+        Coupling::at_one_point(ends, [stiffness, damping], by_time, Turning::default())
+    }
+
+    /// Report of a force along the axis.
+    pub fn report(&self, place: &Place, force: f64, motion: &[Kinematics]) -> ElementReport {
+        let force = place.along * force;
+        if self.hinge {
+            return ElementReport {
+                points: [place.point; 2],
+                force: Vec3::zeros(),
+                torque: Some(force),
+                only_turns: true,
+            };
+        }
+        let parent = &motion[self.parent.body];
+        ElementReport {
+            points: [
+                parent.position + parent.rotation * self.parent.offset,
+                place.point,
+            ],
+            force,
+            ..ElementReport::default()
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! Spring with a damper on a slide or a hinge: force or torque -(preload + stiffness s + damping ds/dt) on the child, s the
+//! joint's coordinate from `position`.
+
+use super::coordinate::{Coordinate, Place, Slopes};
+use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, Site};
+use crate::mechanism::Powers;
+use crate::mechanism::kinematics::Kinematics;
+use crate::mechanism::model::Anchor;
+use crate::scene::Element;
+
+struct JointSpring {
+    on: Coordinate,
+    position: f64,
+    stiffness: f64,
+    damping: f64,
+    preload: f64,
+}
+
+pub(super) fn make(element: &Element, site: &Site<'_>) -> Box<dyn SceneElement> {
+    Box::new(JointSpring {
+        on: site.coordinate(),
+        position: element.number("position"),
+        stiffness: element.number("stiffness"),
+        damping: element.number("damping"),
+        preload: element.number("preload"),
+    })
+}
+
+impl JointSpring {
+    /// The coordinate, and the force or torque on the child.
+    fn at(&self, motion: &[Kinematics]) -> (Place, f64) {
+        let place = self.on.place(self.position, motion);
+        let back = self.preload + self.stiffness * place.off + self.damping * place.rate;
+        (place, -back)
+    }
+}
+
+impl ForceElement for JointSpring {
+    fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
+        let (place, force) = self.at(at.motion);
+        self.on.press(&place, force, loads.wrench);
+    }
+
+    fn ends(&self, motion: &[Kinematics]) -> Option<[Anchor; 2]> {
+        Some(self.on.ends(motion))
+    }
+
+    fn coupling(&self, at: &At<'_>) -> Option<Coupling> {
+        let (place, _) = self.at(at.motion);
+        let slopes = Slopes {
+            by_position: -self.stiffness,
+            by_rate: -self.damping,
+            by_time: 0.0,
+        };
+        Some(self.on.coupling(&place, &slopes, at.motion))
+    }
+
+    fn stored(&self, motion: &[Kinematics]) -> f64 {
+        let off = self.on.place(self.position, motion).off;
+        off * (self.preload + 0.5 * self.stiffness * off)
+    }
+
+    fn add_powers(&self, _: f64, motion: &[Kinematics], powers: &mut Powers) {
+        let rate = self.on.place(self.position, motion).rate;
+        powers.damping += self.damping * rate * rate;
+    }
+}
+
+impl SceneElement for JointSpring {
+    fn report(&self, _: f64, motion: &[Kinematics]) -> ElementReport {
+        let (place, force) = self.at(motion);
+        self.on.report(&place, force, motion)
+    }
+}

@@ -1,0 +1,113 @@
+//! Motor on a slide or a hinge: force or torque clamped to a limit of F + k (target - q) + d (target' - q'), q the joint's
+//! coordinate. Its work is a drive's.
+
+use super::coordinate::{Coordinate, Place, Slopes};
+use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, Site};
+use crate::jet::Jet;
+use crate::mechanism::Powers;
+use crate::mechanism::drives::{Law, course_of};
+use crate::mechanism::kinematics::Kinematics;
+use crate::mechanism::model::Anchor;
+use crate::scene::{Element, JointKind};
+use std::sync::Arc;
+
+struct Motor {
+    on: Coordinate,
+    force: f64,
+    stiffness: f64,
+    damping: f64,
+    limit: f64,
+    target: Option<Arc<dyn Law>>,
+}
+
+pub(super) fn make(element: &Element, site: &Site<'_>) -> Box<dyn SceneElement> {
+    Box::new(Motor {
+        on: site.coordinate(),
+        force: element.number("force"),
+        stiffness: element.number("stiffness"),
+        damping: element.number("damping"),
+        limit: element.number("limit"),
+        target: law_of(element),
+    })
+}
+
+/// The law that its target follows.
+fn law_of(element: &Element) -> Option<Arc<dyn Law>> {
+    let kind = if element.on_hinge {
+        JointKind::Revolute
+    } else {
+        JointKind::Prismatic
+    };
+    let course = course_of(element.law.as_ref()?, kind);
+    course.law().cloned()
+}
+
+impl Motor {
+    /// The motion that it is to follow.
+    fn target(&self, t: f64) -> Jet {
+        let value = |law: &Arc<dyn Law>| law.at(t);
+        self.target.as_ref().map_or_else(Jet::default, value)
+    }
+
+    /// The coordinate from the target, and the force or torque on the child without the limit.
+    fn at(&self, t: f64, motion: &[Kinematics]) -> (Place, f64) {
+        let target = self.target(t);
+        let place = self.on.place(target.value, motion);
+        let ahead = self.stiffness * place.off + self.damping * (place.rate - target.rate);
+        (place, self.force - ahead)
+    }
+
+    /// The same with the limit.
+    fn limited(&self, t: f64, motion: &[Kinematics]) -> (Place, f64) {
+        let (place, force) = self.at(t, motion);
+        (place, force.clamp(-self.limit, self.limit))
+    }
+}
+
+impl ForceElement for Motor {
+    fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
+        let (place, force) = self.limited(at.t, at.motion);
+        self.on.press(&place, force, loads.wrench);
+    }
+
+    fn ends(&self, motion: &[Kinematics]) -> Option<[Anchor; 2]> {
+        let follows = self.stiffness > 0.0 || self.damping > 0.0;
+        follows.then(|| self.on.ends(motion))
+    }
+
+    fn coupling(&self, at: &At<'_>) -> Option<Coupling> {
+        let (place, force) = self.at(at.t, at.motion);
+        if force.abs() > self.limit || (self.stiffness == 0.0 && self.damping == 0.0) {
+            return None;
+        }
+        let target = self.target(at.t);
+        let slopes = Slopes {
+            by_position: -self.stiffness,
+            by_rate: -self.damping,
+            by_time: self.stiffness * target.rate + self.damping * target.acceleration,
+        };
+        Some(self.on.coupling(&place, &slopes, at.motion))
+    }
+
+    fn add_powers(&self, t: f64, motion: &[Kinematics], powers: &mut Powers) {
+        let (place, force) = self.limited(t, motion);
+        powers.drive += force * place.rate;
+    }
+}
+
+impl SceneElement for Motor {
+    fn period(&self) -> f64 {
+        let swing = |law: &Arc<dyn Law>| law.swing();
+        self.target.as_ref().map_or(f64::INFINITY, swing)
+    }
+
+    fn step_end(&self, t: f64) -> f64 {
+        let end = |law: &Arc<dyn Law>| law.step_end(t);
+        self.target.as_ref().map_or(f64::INFINITY, end)
+    }
+
+    fn report(&self, t: f64, motion: &[Kinematics]) -> ElementReport {
+        let (place, force) = self.limited(t, motion);
+        self.on.report(&place, force, motion)
+    }
+}

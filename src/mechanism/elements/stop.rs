@@ -1,0 +1,128 @@
+//! Stops of a slide or a hinge: F = K d^1.5 (1 + a dd/dt), never below 0, d the depth of the coordinate beyond a limit.
+//!
+//! This is the contact law of a joint with one difference: the damping term there divides the rate by that at which the contact
+//! began, which takes a memory; here by a given speed, a = chi / speed. An undisturbed impact at that speed rebounds with the
+//! requested restitution, whatever moves; a slower one with more.
+
+use super::coordinate::{Coordinate, Place, Slopes};
+use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, Site};
+use crate::contact::{NormalLaw, damping_factor};
+use crate::mechanism::Powers;
+use crate::mechanism::kinematics::Kinematics;
+use crate::mechanism::model::Anchor;
+use crate::scene::Element;
+
+struct Stop {
+    on: Coordinate,
+    /// Between the limits, or the only one: a hinge is taken within half a turn of it.
+    middle: f64,
+    /// From there, m or rad; infinite where there is none.
+    lower: f64,
+    upper: f64,
+    /// K, N/m^1.5 or N m/rad^1.5.
+    stiffness: f64,
+    /// a, s/m or s/rad.
+    damping: f64,
+}
+
+/// A stop that is touched.
+struct Press {
+    /// 1 at the upper limit, -1 at the lower.
+    side: f64,
+    /// d and its rate.
+    depth: f64,
+    rate: f64,
+    /// K d^1.5 and F, N or N m.
+    elastic: f64,
+    force: f64,
+}
+
+pub(super) fn make(element: &Element, site: &Site<'_>) -> Box<dyn SceneElement> {
+    let [lower, upper] = ["lower", "upper"].map(|key| element.number(key));
+    let middle = match (lower.is_finite(), upper.is_finite()) {
+        (true, true) => 0.5 * (lower + upper),
+        (true, false) => lower,
+        _ => upper,
+    };
+    let depth = element.number("depth");
+    let chi = damping_factor(NormalLaw::Gonthier, element.number("restitution"));
+    Box::new(Stop {
+        on: site.coordinate(),
+        middle,
+        lower: lower - middle,
+        upper: upper - middle,
+        stiffness: element.number("force") / (depth * depth.sqrt()),
+        damping: if chi > 0.0 {
+            chi / element.number("speed")
+        } else {
+            0.0
+        },
+    })
+}
+
+impl Stop {
+    /// The coordinate, and the stop that it touches.
+    fn at(&self, motion: &[Kinematics]) -> (Place, Option<Press>) {
+        let place = self.on.place(self.middle, motion);
+        let (side, depth) = if place.off > self.upper {
+            (1.0, place.off - self.upper)
+        } else if place.off < self.lower {
+            (-1.0, self.lower - place.off)
+        } else {
+            return (place, None);
+        };
+        let rate = side * place.rate;
+        let elastic = self.stiffness * depth * depth.sqrt();
+        let press = Press {
+            side,
+            depth,
+            rate,
+            elastic,
+            force: (elastic * (1.0 + self.damping * rate)).max(0.0),
+        };
+        (place, Some(press))
+    }
+}
+
+impl ForceElement for Stop {
+    fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
+        if let (place, Some(press)) = self.at(at.motion) {
+            let force = -press.side * press.force;
+            self.on.press(&place, force, loads.wrench);
+        }
+    }
+
+    fn ends(&self, motion: &[Kinematics]) -> Option<[Anchor; 2]> {
+        Some(self.on.ends(motion))
+    }
+
+    fn coupling(&self, at: &At<'_>) -> Option<Coupling> {
+        let (place, press) = self.at(at.motion);
+        let press = press.filter(|press| press.force > 0.0)?;
+        let slopes = Slopes {
+            by_position: -1.5 * press.force / press.depth,
+            by_rate: -press.elastic * self.damping,
+            by_time: 0.0,
+        };
+        Some(self.on.coupling(&place, &slopes, at.motion))
+    }
+
+    fn stored(&self, motion: &[Kinematics]) -> f64 {
+        let press = self.at(motion).1;
+        press.map_or(0.0, |press| 0.4 * press.elastic * press.depth)
+    }
+
+    fn add_powers(&self, _: f64, motion: &[Kinematics], powers: &mut Powers) {
+        if let Some(press) = self.at(motion).1 {
+            powers.damping += (press.force - press.elastic) * press.rate;
+        }
+    }
+}
+
+impl SceneElement for Stop {
+    fn report(&self, _: f64, motion: &[Kinematics]) -> ElementReport {
+        let (place, press) = self.at(motion);
+        let force = press.map_or(0.0, |press| -press.side * press.force);
+        self.on.report(&place, force, motion)
+    }
+}

@@ -1,0 +1,319 @@
+//! Bushings against closed solutions: deflections, natural frequencies, momentum and energy.
+
+use crate::common::METHODS;
+use crate::elements::{at, settings};
+use crate::joint_elements::{FORMULATIONS, momenta, started};
+use jointplay::scene::{Quat, Scene, Vec3};
+
+/// One free body of 0.5 kg at (0.1, 0.2, 0.3) m with `start` besides, and a bushing at its centroid to the world with `more`.
+fn one(start: &str, more: &str) -> String {
+    format!(
+        "[gravity]\nx = 0\ny = 0\nz = 0\n\
+         [[body]]\nname = \"mass\"\nmass = \"0.5 kg\"\ninertia = \"2e-4 3e-4 4e-4 kg m^2\"\n\
+         [[joint]]\nname = \"free\"\nkind = \"free\"\nchild = \"mass\"\nstart = {{ {start} }}\n\
+         [[bushing]]\nname = \"b\"\nfrom = {{ body = \"world\", at = \"100 200 300 mm\" }}\nto = {{ body = \"mass\" }}\n\
+         stiffness = \"200 300 500 N/m\"\nturning_stiffness = \"0.1 0.2 0.3 N m/rad\"\n{more}"
+    )
+}
+
+const STIFFNESS: [f64; 3] = [200.0, 300.0, 500.0];
+const TURNING: [f64; 3] = [0.1, 0.2, 0.3];
+const INERTIA: [f64; 3] = [2e-4, 3e-4, 4e-4];
+
+/// Rotation vector of a matrix, by the angle and axis of nalgebra.
+fn turned(rotation: &nalgebra::Matrix3<f64>) -> Vec3 {
+    Quat::from_matrix(rotation).scaled_axis()
+}
+
+#[test]
+fn a_bushing_has_the_six_natural_frequencies_of_its_stiffnesses() {
+    for method in METHODS {
+        let (step, bound) = settings(method);
+        for formulation in FORMULATIONS {
+            for axis in 0..3 {
+                let changes = [
+                    ("solver.method", method),
+                    ("solver.step", step),
+                    ("solver.tolerance", "1e-10"),
+                    ("formulation", formulation),
+                ];
+                let label = format!("{method} {formulation} {axis}");
+                let mut place = [100.0, 200.0, 300.0];
+                place[axis] += 20.0;
+                let start = format!("position = \"{} {} {} mm\"", place[0], place[1], place[2]);
+                let mut simulation = started(&one(&start, ""), &changes);
+                let t = 0.15;
+                let frame = at(&mut simulation, t);
+                let omega = (STIFFNESS[axis] / 0.5).sqrt();
+                let off = 0.02 * (omega * t).cos();
+                let expected = Vec3::new(0.1, 0.2, 0.3) + Vec3::ith(axis, off);
+                let wrong = (frame.bodies[0].position - expected).norm();
+                assert!(wrong < 2.0 * bound, "{label}: {wrong:e}");
+                let force = frame.elements[0].force[axis] + STIFFNESS[axis] * off;
+                assert!(force.abs() < 2e3 * bound, "{label}: {force:e}");
+
+                // About one axis it is linear however far it turns.
+                let mut about = [0, 0, 0];
+                about[axis] = 1;
+                let start = format!(
+                    "position = \"100 200 300 mm\", rotation = {{ axis = {about:?}, angle = \"1 rad\" }}"
+                );
+                let mut simulation = started(&one(&start, ""), &changes);
+                let frame = at(&mut simulation, t);
+                let omega = (TURNING[axis] / INERTIA[axis]).sqrt();
+                let angle = (omega * t).cos();
+                let wrong = (turned(&frame.bodies[0].rotation) - Vec3::ith(axis, angle)).norm();
+                assert!(wrong < 200.0 * bound, "{label}: {wrong:e}");
+                let residual = simulation.ledger().unwrap().relative_residual();
+                assert!(residual.abs() < 1e-3, "{label}: {residual:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn under_a_load_a_bushing_gives_way_along_and_about_its_own_axes() {
+    // Its axes are turned by 30 degrees about z, and the body rests 20 degrees about x from the world.
+    let (sin, cos) = 30_f64.to_radians().sin_cos();
+    let axes = nalgebra::Matrix3::new(cos, -sin, 0.0, sin, cos, 0.0, 0.0, 0.0, 1.0);
+    let rest = Quat::from_axis_angle(&Vec3::x_axis(), 20_f64.to_radians());
+    let bushing = "damping = \"10 10 10 N s/m\"\nturning_damping = \"5e-3 5e-3 5e-3 N m s/rad\"\n\
+        axes = { axis = [0, 0, 1], angle = \"30 deg\" }\nrotation = { axis = [1, 0, 0], angle = \"20 deg\" }\n";
+    let start =
+        "position = \"100 200 300 mm\", rotation = { axis = [1, 0, 0], angle = \"20 deg\" }";
+    for formulation in FORMULATIONS {
+        for method in ["radau5", "rosenbrock", "dopri5"] {
+            for axis in 0..3 {
+                let direction = axes.column(axis).into_owned();
+                let list = |size: f64, unit: &str| {
+                    let v = direction * size;
+                    format!("\"{:e} {:e} {:e} {unit}\"", v.x, v.y, v.z)
+                };
+                let load = format!(
+                    "[[load]]\nname = \"f\"\non = {{ body = \"mass\" }}\nforce = {}\ntorque = {}\n",
+                    list(4.0, "N"),
+                    list(0.05, "N m")
+                );
+                let changes = [
+                    ("solver.method", method),
+                    ("solver.tolerance", "1e-8"),
+                    ("formulation", formulation),
+                ];
+                let text = one(start, bushing) + &load;
+                let mut simulation = started(&text, &changes);
+                let frame = at(&mut simulation, 3.0);
+                let label = format!("{method} {formulation} {axis}");
+                let moved = frame.bodies[0].position - Vec3::new(0.1, 0.2, 0.3);
+                let expected = direction * (4.0 / STIFFNESS[axis]);
+                assert!(
+                    (moved - expected).norm() < 1e-7,
+                    "{label}: {moved} {expected}"
+                );
+                let turn =
+                    turned(&(frame.bodies[0].rotation * rest.inverse().to_rotation_matrix()));
+                let expected = direction * (0.05 / TURNING[axis]);
+                assert!(
+                    (turn - expected).norm() < 1e-6,
+                    "{label}: {turn} {expected}"
+                );
+                // Loads come first.
+                let report = &frame.elements[1];
+                let off = (report.force + direction * 4.0).norm();
+                assert!(off < 1e-3, "{label}: {off:e}");
+                assert!(
+                    (report.torque.unwrap() + direction * 0.05).norm() < 1e-5,
+                    "{label}: {report:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_tumbling_pair_on_a_soft_bushing_keeps_momentum_and_energy() {
+    // So soft that the bodies turn far against each other: no small angles.
+    let pair = "[gravity]\nx = 0\ny = 0\nz = 0\n\
+        [[body]]\nname = \"one\"\nmass = \"0.5 kg\"\ninertia = \"2e-4 3e-4 4e-4 kg m^2\"\n\
+        [[body]]\nname = \"two\"\nmass = \"0.3 kg\"\ninertia = \"1e-4 2e-4 1.5e-4 kg m^2\"\n\
+        [[joint]]\nname = \"a\"\nkind = \"free\"\nchild = \"one\"\n\
+        start = { position = [0, 0, 0], velocity = \"0.1 0 0.2 m/s\", angular_velocity = \"4 -3 8 rad/s\" }\n\
+        [[joint]]\nname = \"b\"\nkind = \"free\"\nchild = \"two\"\n\
+        start = { position = \"100 10 5 mm\", velocity = \"-0.2 0.1 0 m/s\", angular_velocity = \"-9 2 5 rad/s\", \
+        rotation = { axis = [1, 1, 0], angle = \"25 deg\" } }\n\
+        [[bushing]]\nname = \"b1\"\nfrom = { body = \"one\", at = \"50 0 0 mm\" }\nto = { body = \"two\", at = \"-40 10 0 mm\" }\n\
+        axes = { axis = [1, 2, 0], angle = \"40 deg\" }\nrotation = { axis = [0, 1, 0], angle = \"15 deg\" }\n\
+        stiffness = \"300 100 700 N/m\"\nturning_stiffness = \"0.05 0.03 0.1 N m/rad\"\n";
+    let damped = "damping = \"0.5 0.2 1 N s/m\"\nturning_damping = \"1e-3 5e-4 2e-3 N m s/rad\"\n";
+    for more in ["", damped] {
+        let mut ends = Vec::new();
+        for (method, formulation) in [
+            ("dopri5", "tree"),
+            ("dopri5", "lagrange"),
+            ("radau5", "tree"),
+            ("rosenbrock", "lagrange"),
+            ("automatic", "tree"),
+        ] {
+            let changes = [
+                ("solver.method", method),
+                ("solver.tolerance", "1e-10"),
+                ("formulation", formulation),
+            ];
+            let mut simulation = started(&format!("{pair}{more}"), &changes);
+            let scene = simulation.scene().clone();
+            let before = at(&mut simulation, 0.0);
+            let mut furthest: f64 = 0.0;
+            for sample in 1..=20 {
+                let frame = at(&mut simulation, 0.05 * f64::from(sample));
+                let relative = frame.bodies[0].rotation.transpose() * frame.bodies[1].rotation;
+                furthest = furthest.max(turned(&relative).norm());
+            }
+            assert!(furthest > 0.7 && furthest < 3.0, "{furthest}");
+            let frame = at(&mut simulation, 1.0);
+            let label = format!("{method} {formulation} {}", more.len());
+            for (then, now) in momenta(&before, &scene)
+                .iter()
+                .zip(&momenta(&frame, &scene))
+            {
+                let off = (now - then).norm() / then.norm();
+                assert!(off < 1e-8, "{label}: {off:e}");
+            }
+            let ledger = simulation.ledger().unwrap();
+            assert!(
+                ledger.relative_residual().abs() < 1e-6,
+                "{label}: {ledger:?}"
+            );
+            if more.is_empty() {
+                let off = (frame.kinetic + frame.elastic) / (before.kinetic + before.elastic) - 1.0;
+                assert!(off.abs() < 1e-8, "{label}: {off:e}");
+            } else {
+                assert!(ledger.damping_loss > 1e-3, "{label}: {ledger:?}");
+            }
+            ends.push(frame.bodies[1].position);
+        }
+        for end in &ends[1..] {
+            assert!((end - ends[0]).norm() < 1e-6, "{end} {}", ends[0]);
+        }
+    }
+}
+
+#[test]
+fn a_stiff_bushing_does_not_hold_implicit_methods_back() {
+    let stiff = one(
+        "position = \"100.001 200 300.001 mm\", rotation = { axis = [1, 2, 0], angle = \"1e-3 rad\" }",
+        "damping = \"4e3 4e3 4e3 N s/m\"\nturning_damping = \"2 2 2 N m s/rad\"\n",
+    )
+    .replace("200 300 500 N/m", "4e7 5e7 6e7 N/m")
+    .replace("0.1 0.2 0.3 N m/rad", "1e4 2e4 3e4 N m/rad");
+    for formulation in FORMULATIONS {
+        let evaluations = |method: &str| {
+            let changes = [
+                ("solver.method", method),
+                ("solver.tolerance", "1e-6"),
+                ("formulation", formulation),
+            ];
+            let mut simulation = started(&stiff, &changes);
+            let frame = at(&mut simulation, 1.0);
+            let off = frame.bodies[0].position - Vec3::new(0.1, 0.2, 0.3);
+            assert!(off.norm() < 1e-7, "{method} {formulation}: {off}");
+            simulation.statistics().evaluations
+        };
+        let explicit = evaluations("dopri5");
+        for method in ["radau5", "rosenbrock", "automatic"] {
+            let implicit = evaluations(method);
+            println!("{formulation} {method} {implicit}, dopri5 {explicit}");
+            assert!(
+                4 * implicit < explicit,
+                "{method} {formulation}: {implicit} {explicit}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_body_on_a_bushing_does_not_fly_freely() {
+    // Three free bodies with play: bodies that touch nothing are left out of steps, unless something else acts on them.
+    let text = jointplay::scene::built_in_text("chain").unwrap();
+    let bushing = "[[bushing]]\nname = \"b\"\nfrom = { body = \"world\", at = \"0 0 0 mm\" }\nto = { body = \"link3\" }\n\
+                   stiffness = \"0 2 0 N/m\"\nrotation = { axis = [1, 0, 0], angle = \"0 deg\" }\n\
+                   turning_stiffness = \"0 0 0.4 N m/rad\"\n";
+    let scene = Scene::parse(&format!("{text}\n{bushing}"), None, &[]).unwrap();
+    let mut simulation = jointplay::simulate::Simulation::new(&scene).unwrap();
+    at(&mut simulation, 0.05);
+    let residual = simulation.ledger().unwrap().relative_residual();
+    assert!(residual.abs() < 1e-4, "{residual:e}");
+}
+
+#[test]
+fn bad_bushings_are_refused_where_they_stand() {
+    let start = "position = [0, 0, 0]";
+    for (text, said) in [
+        (
+            one(start, "").replace("200 300 500 N/m", "200 -300 500 N/m"),
+            ["bushing.b.stiffness", "allowed 0 N/m to"],
+        ),
+        (
+            one(start, "").replace("0.3 N m/rad", "0.3 N/m"),
+            ["wrong unit `N/m`", "units of turning stiffness"],
+        ),
+        (
+            one(start, "")
+                .replace("200 300 500", "0 0 0")
+                .replace("0.1 0.2 0.3", "0 0 0"),
+            [
+                "does nothing: stiffness, damping, turning_stiffness",
+                "are 0",
+            ],
+        ),
+        (
+            one(start, "axes = { axis = [0, 0, 1] }\n"),
+            ["bushing.b.axes.angle", "missing"],
+        ),
+        (
+            one(start, "").replace("body = \"mass\" }\nstiff", "body = \"world\" }\nstiff"),
+            ["bushing.b.to", "same body"],
+        ),
+    ] {
+        let error = Scene::parse(&text, Some("mine.toml"), &[]).expect_err(&text);
+        let message = error.to_string();
+        for said in said {
+            assert!(message.contains(said), "{message}\nlacks {said}");
+        }
+    }
+}
+
+/// Three bodies about the z axis, each 20 mm further out than a bushing to the world that is stiffest that way.
+const RING: &str = "[gravity]\nx = 0\ny = 0\nz = 0\n\
+    [[pattern]]\nname = \"ring\"\ncount = 3\nabout = { axis = [0, 0, 1] }\n\
+    [[pattern.body]]\nname = \"mass\"\nmass = \"0.5 kg\"\ninertia = \"2e-4 3e-4 4e-4 kg m^2\"\n\
+    [[pattern.joint]]\nname = \"free\"\nkind = \"free\"\nchild = \"mass\"\nstart = { position = \"120 0 0 mm\" }\n\
+    [[pattern.bushing]]\nname = \"b\"\nfrom = { body = \"world\", at = \"100 0 0 mm\" }\nto = { body = \"mass\" }\n\
+    stiffness = \"500 300 200 N/m\"\nturning_stiffness = \"1 2 3 N m/rad\"\n";
+
+#[test]
+fn bushings_of_a_pattern_turn_with_its_copies() {
+    let mut simulation = started(RING, &[("solver.tolerance", "1e-10")]);
+    let frame = at(&mut simulation, 0.1);
+    let out = 0.1 + 0.02 * ((500.0_f64 / 0.5).sqrt() * 0.1).cos();
+    for (copy, body) in frame.bodies.iter().enumerate() {
+        let angle = std::f64::consts::TAU / 3.0 * copy as f64;
+        let expected = Vec3::new(angle.cos(), angle.sin(), 0.0) * out;
+        assert!(
+            (body.position - expected).norm() < 1e-9,
+            "{copy}: {}",
+            body.position
+        );
+        let torque = frame.elements[copy].torque.expect("a torque").norm();
+        assert!(torque < 1e-12, "{copy}: {torque:e}");
+    }
+    let backwards = RING.replace(
+        "from = { body = \"world\", at = \"100 0 0 mm\" }\nto = { body = \"mass\" }",
+        "from = { body = \"mass\" }\nto = { body = \"world\", at = \"100 0 0 mm\" }",
+    );
+    let error = Scene::parse(&backwards, None, &[]).expect_err("refused");
+    let message = error.to_string();
+    assert!(
+        message.contains("bushing.b1.to") || message.contains("bushing.b2.to"),
+        "{message}"
+    );
+    assert!(message.contains("make it that of `from`"), "{message}");
+}

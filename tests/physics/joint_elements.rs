@@ -1,0 +1,751 @@
+//! Elements that act on a slide or a hinge against closed solutions, in every method and both formulations.
+
+use crate::common::METHODS;
+use crate::elements::{at, settings};
+use jointplay::scene::{Scene, Vec3};
+use jointplay::simulate::{Frame, Simulation};
+
+/// One body on a joint with the world: what a coordinate of it is worth, and how it is written.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum On {
+    Slide,
+    Hinge,
+}
+use On::{Hinge, Slide};
+
+pub const FORMULATIONS: [&str; 2] = ["tree", "lagrange"];
+
+pub fn started(text: &str, changes: &[(&str, &str)]) -> Simulation {
+    Simulation::new(&crate::common::parse(text, changes)).unwrap()
+}
+
+impl On {
+    /// kg, or kg m^2 about the axis, which the centroid is 0.1 m away from.
+    fn inertia(self) -> f64 {
+        match self {
+            Slide => 0.5,
+            Hinge => 4e-4 + 0.5 * 0.1 * 0.1,
+        }
+    }
+
+    /// Units of position, velocity, force, stiffness and damping.
+    fn units(self) -> [&'static str; 5] {
+        match self {
+            Slide => ["m", "m/s", "N", "N/m", "N s/m"],
+            Hinge => ["rad", "rad/s", "N m", "N m/rad", "N m s/rad"],
+        }
+    }
+
+    fn force_key(self) -> &'static str {
+        match self {
+            Slide => "force",
+            Hinge => "torque",
+        }
+    }
+
+    fn text(self, start: [f64; 2], more: &str) -> String {
+        let [length, speed, ..] = self.units();
+        let kind = match self {
+            Slide => "kind = \"prismatic\"\naxis = [1, 0, 0]",
+            Hinge => "kind = \"revolute\"\naxis = [0, 0, 1]\nchild_point = \"-100 0 0 mm\"",
+        };
+        format!(
+            "[gravity]\nx = 0\ny = 0\nz = 0\n\
+             [[body]]\nname = \"mass\"\nmass = \"0.5 kg\"\ninertia = \"2e-4 3e-4 4e-4 kg m^2\"\n\
+             [[joint]]\nname = \"j\"\n{kind}\nchild = \"mass\"\n\
+             start = {{ position = \"{:e} {length}\", velocity = \"{:e} {speed}\" }}\n{more}",
+            start[0], start[1]
+        )
+    }
+
+    /// Starts at a coordinate and its rate.
+    fn starts(self, start: [f64; 2], more: &str, changes: &[(&str, &str)]) -> Simulation {
+        started(&self.text(start, more), changes)
+    }
+
+    fn coordinate(self, frame: &Frame) -> f64 {
+        let body = &frame.bodies[0];
+        match self {
+            Slide => body.position.x,
+            Hinge => body.rotation[(1, 0)].atan2(body.rotation[(0, 0)]),
+        }
+    }
+
+    fn rate(self, frame: &Frame) -> f64 {
+        match self {
+            Slide => frame.bodies[0].velocity.x,
+            Hinge => frame.bodies[0].angular_velocity.z,
+        }
+    }
+
+    /// What element `i` exerts on the body along the axis.
+    fn force(self, frame: &Frame, i: usize) -> f64 {
+        match self {
+            Slide => frame.elements[i].force.x,
+            Hinge => frame.elements[i].torque.expect("a torque").z,
+        }
+    }
+
+    fn spring(self, stiffness: f64, damping: f64) -> String {
+        let [position, _, _, by_position, by_rate] = self.units();
+        format!(
+            "[[joint_spring]]\nname = \"s\"\njoint = \"j\"\nposition = \"0.1 {position}\"\n\
+             stiffness = \"{stiffness:e} {by_position}\"\ndamping = \"{damping:e} {by_rate}\"\n"
+        )
+    }
+}
+
+/// x and dx/dt at `t` of m x'' + c x' + k x = 0, underdamped, from `x` and `v`.
+fn swing([m, c, k]: [f64; 3], [x, v]: [f64; 2], t: f64) -> [f64; 2] {
+    let d = c / (2.0 * m);
+    let w = (k / m - d * d).sqrt();
+    let (sin, cos) = (w * t).sin_cos();
+    let (a, b) = (x, (v + d * x) / w);
+    let fall = (-d * t).exp();
+    [
+        fall * (a * cos + b * sin),
+        fall * ((b * w - d * a) * cos - (a * w + d * b) * sin),
+    ]
+}
+
+#[test]
+fn a_joint_spring_swings_as_it_should_in_every_method_and_formulation() {
+    for on in [Slide, Hinge] {
+        let m = on.inertia();
+        let k = 400.0 * m;
+        for method in METHODS {
+            for formulation in FORMULATIONS {
+                let (step, bound) = settings(method);
+                let changes = [
+                    ("solver.method", method),
+                    ("solver.step", step),
+                    ("solver.tolerance", "1e-10"),
+                    ("formulation", formulation),
+                ];
+                let mut simulation = on.starts([0.13, 0.0], &on.spring(k, 0.0), &changes);
+                let frame = at(&mut simulation, 0.2);
+                let [off, rate] = swing([m, 0.0, k], [0.03, 0.0], 0.2);
+                let label = format!("{on:?} {method} {formulation}");
+                let wrong = (on.coordinate(&frame) - 0.1 - off).abs();
+                assert!(wrong < bound, "{label}: {wrong:e}");
+                assert!((on.rate(&frame) - rate).abs() < 20.0 * bound, "{label}");
+                let force = on.force(&frame, 0);
+                assert!(
+                    (force + k * off).abs() < 2.0 * k * bound,
+                    "{label}: {force}"
+                );
+                let elastic = frame.elastic - 0.5 * k * off * off;
+                assert!(elastic.abs() < 0.1 * k * bound, "{label}: {elastic:e}");
+                let residual = simulation.ledger().unwrap().relative_residual();
+                assert!(residual.abs() < 1e-4, "{label}: {residual:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn damping_and_preload_of_a_joint_spring_are_those_of_the_closed_solution() {
+    for on in [Slide, Hinge] {
+        let m = on.inertia();
+        let (k, c, preload) = (400.0 * m, 8.0 * m, 2.0 * m);
+        let spring = on.spring(k, c) + &format!("preload = \"{preload:e} {}\"\n", on.units()[2]);
+        for method in ["dopri5", "radau5", "rosenbrock", "automatic", "rk4"] {
+            for formulation in FORMULATIONS {
+                let changes = [
+                    ("solver.method", method),
+                    ("solver.tolerance", "1e-10"),
+                    ("formulation", formulation),
+                ];
+                let mut simulation = on.starts([0.13, 0.0], &spring, &changes);
+                let frame = at(&mut simulation, 0.25);
+                // About the place where the force vanishes.
+                let rest = -preload / k;
+                let [off, rate] = swing([m, c, k], [0.03 - rest, 0.0], 0.25);
+                let label = format!("{on:?} {method} {formulation}");
+                let wrong = (on.coordinate(&frame) - 0.1 - rest - off).abs();
+                assert!(wrong < 1e-8, "{label}: {wrong:e}");
+                let energy = |x: f64, v: f64| 0.5 * (m * v * v + k * x * x);
+                let lost = energy(0.03 - rest, 0.0) - energy(off, rate);
+                let ledger = simulation.ledger().unwrap();
+                assert!(
+                    (ledger.damping_loss / lost - 1.0).abs() < 1e-5,
+                    "{label}: {ledger:?}"
+                );
+                let off = on.coordinate(&frame) - 0.1;
+                let stored = off * (preload + 0.5 * k * off);
+                assert!((frame.elastic - stored).abs() < 1e-12, "{label}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_error_of_a_joint_spring_falls_with_the_order_of_the_method() {
+    let m = Hinge.inertia();
+    let k = 400.0 * m;
+    let error = |method: &str, formulation: &str, key: &str, value: f64| {
+        let value = format!("{value:e}{}", if key == "solver.step" { " s" } else { "" });
+        let changes = [
+            ("solver.method", method),
+            ("formulation", formulation),
+            (key, &*value),
+        ];
+        let mut simulation = Hinge.starts([0.13, 0.0], &Hinge.spring(k, 4.0 * m), &changes);
+        let frame = at(&mut simulation, 0.2);
+        let [off, _] = swing([m, 4.0 * m, k], [0.03, 0.0], 0.2);
+        (Hinge.coordinate(&frame) - 0.1 - off).abs()
+    };
+    for formulation in FORMULATIONS {
+        for (method, steps, order) in [
+            ("semi-implicit-euler", [1e-4, 5e-5], 1.0),
+            ("imex-euler", [1e-4, 5e-5], 1.0),
+            ("rk4", [4e-3, 2e-3], 4.0),
+        ] {
+            let [coarse, fine] = steps.map(|step| error(method, formulation, "solver.step", step));
+            let found = (coarse / fine).log2();
+            assert!(
+                (found - order).abs() < 0.2,
+                "{method} {formulation}: {found}"
+            );
+        }
+        for method in ["dopri5", "rosenbrock", "radau5", "automatic"] {
+            let [loose, tight] = [1e-4, 1e-8]
+                .map(|tolerance| error(method, formulation, "solver.tolerance", tolerance));
+            let label = format!("{method} {formulation}: {loose:e} {tight:e}");
+            assert!(loose < 1e-4 && tight < 1e-8 && tight < loose, "{label}");
+        }
+    }
+}
+
+#[test]
+fn stiff_elements_on_joints_do_not_hold_implicit_methods_back() {
+    for on in [Slide, Hinge] {
+        let m = on.inertia();
+        let stiff = on.spring(1.6e8 * m, 2e4 * m);
+        for formulation in FORMULATIONS {
+            let evaluations = |method: &str| {
+                let changes = [
+                    ("solver.method", method),
+                    ("solver.tolerance", "1e-6"),
+                    ("formulation", formulation),
+                ];
+                let mut simulation = on.starts([0.13, 0.0], &stiff, &changes);
+                let frame = at(&mut simulation, 1.0);
+                let off = on.coordinate(&frame) - 0.1;
+                assert!(off.abs() < 1e-6, "{on:?} {method} {formulation}: {off:e}");
+                simulation.statistics().evaluations
+            };
+            let explicit = evaluations("dopri5");
+            for method in ["radau5", "rosenbrock", "automatic"] {
+                let implicit = evaluations(method);
+                println!("{on:?} {formulation} {method} {implicit}, dopri5 {explicit}");
+                assert!(
+                    4 * implicit < explicit,
+                    "{on:?} {method}: {implicit} {explicit}"
+                );
+            }
+        }
+    }
+}
+
+/// A free body, an arm on a hinge and a rod on a slide of the arm, tumbling without gravity.
+const TUMBLING: &str = "[gravity]\nx = 0\ny = 0\nz = 0\n\
+    [[body]]\nname = \"base\"\nmass = \"0.5 kg\"\ninertia = \"2e-4 3e-4 4e-4 kg m^2\"\n\
+    [[body]]\nname = \"arm\"\nmass = \"0.3 kg\"\ninertia = \"2e-4 1e-4 2.5e-4 kg m^2\"\n\
+    [[body]]\nname = \"rod\"\nmass = \"0.2 kg\"\ninertia = \"1e-4 1.5e-4 2e-4 kg m^2\"\n\
+    [[joint]]\nname = \"free\"\nkind = \"free\"\nchild = \"base\"\n\
+    start = { position = [0, 0, 0], velocity = \"0.1 0.2 0.3 m/s\", angular_velocity = \"4 -3 5 rad/s\" }\n\
+    [[joint]]\nname = \"elbow\"\nkind = \"revolute\"\nparent = \"base\"\nchild = \"arm\"\naxis = [1, 2, 2]\n\
+    parent_point = \"50 10 20 mm\"\nchild_point = \"-60 20 0 mm\"\nrotation = { axis = [0, 1, 1], angle = \"35 deg\" }\n\
+    start = { position = \"20 deg\", velocity = \"2 rad/s\" }\n\
+    [[joint]]\nname = \"slide\"\nkind = \"prismatic\"\nparent = \"arm\"\nchild = \"rod\"\naxis = [2, -1, 1]\n\
+    parent_point = \"30 0 10 mm\"\nchild_point = \"0 20 -10 mm\"\n\
+    start = { position = \"5 mm\", velocity = \"0.2 m/s\" }\n";
+
+/// Momentum and angular momentum about the world's origin of bodies whose frames are at their centroids.
+pub fn momenta(frame: &Frame, scene: &Scene) -> [Vec3; 2] {
+    let mut sums = [Vec3::zeros(); 2];
+    for (body, m) in scene.bodies.iter().zip(&frame.bodies) {
+        let momentum = m.velocity * body.mass;
+        let spin = m.rotation.tr_mul(&m.angular_velocity);
+        sums[0] += momentum;
+        sums[1] += m.position.cross(&momentum) + m.rotation * (body.inertia * spin);
+    }
+    sums
+}
+
+#[test]
+fn what_acts_on_joints_keeps_momentum_and_its_energy_balance_closes() {
+    let springs = "[[joint_spring]]\nname = \"t\"\njoint = \"elbow\"\nstiffness = \"3 N m/rad\"\ndamping = \"DT N m s/rad\"\n\
+        [[joint_spring]]\nname = \"s\"\njoint = \"slide\"\nstiffness = \"500 N/m\"\ndamping = \"DS N s/m\"\npreload = \"2 N\"\n\
+        [[stop]]\nname = \"u\"\njoint = \"elbow\"\nlower = \"-15 deg\"\nupper = \"25 deg\"\ntorque = \"1 N m\"\ndepth = \"2 deg\"\n\
+        restitution = R\nspeed = \"1 rad/s\"\n\
+        [[stop]]\nname = \"l\"\njoint = \"slide\"\nlower = \"-6 mm\"\nupper = \"8 mm\"\nforce = \"20 N\"\ndepth = \"1 mm\"\n\
+        restitution = R\nspeed = \"0.2 m/s\"\n";
+    for damped in [false, true] {
+        let [turning, sliding, restitution] = match damped {
+            false => ["0", "0", "1"],
+            true => ["2e-3", "1.5", "0.7"],
+        };
+        let springs = springs.replace("DT", turning).replace("DS", sliding);
+        let text = TUMBLING.to_owned() + &springs.replace('R', restitution);
+        let mut ends = Vec::new();
+        for (formulation, method) in [
+            ("tree", "dopri5"),
+            ("lagrange", "dopri5"),
+            ("tree", "radau5"),
+            ("lagrange", "rosenbrock"),
+        ] {
+            let changes = [
+                ("solver.method", method),
+                ("solver.tolerance", "1e-10"),
+                ("formulation", formulation),
+            ];
+            let mut simulation = started(&text, &changes);
+            let scene = simulation.scene().clone();
+            let before = at(&mut simulation, 0.0);
+            let mut stopped = [false; 2];
+            for sample in 1..=50 {
+                let frame = at(&mut simulation, f64::from(sample) * 0.01);
+                let elbow = frame.elements[2].torque.expect("a torque");
+                let slide = frame.elements[3].force;
+                stopped[0] |= elbow.norm() > 0.1;
+                stopped[1] |= slide.norm() > 1.0;
+                // No stop pulls: the stop's force on the rod is towards the middle.
+                let offset = frame.elements[3].points[1] - frame.elements[3].points[0];
+                assert!(slide.dot(&offset) <= 0.0, "{slide} {offset}");
+            }
+            let frame = at(&mut simulation, 0.5);
+            let label = format!("{formulation} {method} damped {damped}");
+            assert!(damped || (stopped[0] && stopped[1]), "{label}: untouched");
+            let (then, now) = (momenta(&before, &scene), momenta(&frame, &scene));
+            for (then, now) in then.iter().zip(&now) {
+                let off = (now - then).norm() / then.norm();
+                assert!(off < 2e-8, "{label}: {off:e}");
+            }
+            let ledger = simulation.ledger().unwrap();
+            let residual = ledger.relative_residual();
+            assert!(residual.abs() < 1e-6, "{label}: {residual:e}");
+            if !damped {
+                let energy = |f: &Frame| f.kinetic + f.elastic;
+                let off = energy(&frame) / energy(&before) - 1.0;
+                assert!(off.abs() < 1e-7, "{label}: {off:e}");
+                assert_eq!(ledger.damping_loss, 0.0);
+            } else {
+                assert!(ledger.damping_loss > 1e-3, "{label}: {ledger:?}");
+            }
+            ends.push(frame.bodies[2].position);
+        }
+        for end in &ends[1..] {
+            assert!((end - ends[0]).norm() < 1e-6, "{end} {}", ends[0]);
+        }
+    }
+}
+
+#[test]
+fn a_joint_spring_on_a_drive_loads_it() {
+    for (on, rate) in [(Slide, "50 mm/s"), (Hinge, "50 mrad/s")] {
+        let kind = if on == Slide { "prismatic" } else { "revolute" };
+        let text = format!(
+            "[gravity]\nx = 0\ny = 0\nz = 0\n\
+             [[body]]\nname = \"driven\"\nmass = \"1 kg\"\ninertia = \"1e-3 1e-3 1e-3 kg m^2\"\n\
+             [[body]]\nname = \"mass\"\nmass = \"0.5 kg\"\ninertia = \"1e-3 1e-3 1e-3 kg m^2\"\n\
+             [[joint]]\nname = \"j\"\nkind = \"{kind}\"\nchild = \"driven\"\naxis = [0, 0, 1]\n\
+             drive = {{ law = \"constant\", position = \"0.1 {}\", velocity = \"{rate}\" }}\n\
+             [[joint]]\nname = \"free\"\nkind = \"free\"\nchild = \"mass\"\nstart = {{ position = \"0 500 0 mm\" }}\n{}",
+            on.units()[0],
+            on.spring(300.0, 0.0)
+        );
+        for formulation in FORMULATIONS {
+            let mut simulation = started(&text, &[("formulation", formulation)]);
+            let frame = at(&mut simulation, 0.2);
+            let stored = 0.5 * 300.0 * 0.01 * 0.01;
+            assert!(
+                (frame.elastic / stored - 1.0).abs() < 1e-6,
+                "{on:?} {formulation}"
+            );
+            let work = simulation.ledger().unwrap().drive_work;
+            assert!(
+                (work / stored - 1.0).abs() < 1e-5,
+                "{on:?} {formulation}: {work}"
+            );
+            let force = frame.actuators[0];
+            assert!(
+                (force - 300.0 * 0.01).abs() < 1e-5,
+                "{on:?} {formulation}: {force}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_hinge_is_taken_within_half_a_turn_of_the_position() {
+    for (start, position, expected) in [
+        (350.0_f64, 0.0, -10.0_f64),
+        (-190.0, 0.0, 170.0),
+        (20.0, 700.0, 40.0),
+        (725.0, 1.0, 4.0),
+    ] {
+        let spring = format!(
+            "[[joint_spring]]\nname = \"s\"\njoint = \"j\"\nposition = \"{position} deg\"\nstiffness = \"2 N m/rad\"\n"
+        );
+        let mut simulation = Hinge.starts([start.to_radians(), 0.0], &spring, &[]);
+        let torque = Hinge.force(&at(&mut simulation, 0.0), 0);
+        let wrong = torque + 2.0 * expected.to_radians();
+        assert!(wrong.abs() < 1e-12, "{start} {position}: {torque}");
+    }
+}
+
+/// chi of the law F = K d^1.5 (1 + chi d' / v) for which an impact at v rebounds with `restitution`, and the other way round:
+/// both from chi (1 + e) = ln((1 + chi) / (1 - e chi)), by bisection.
+fn bisect(mut low: f64, mut high: f64, above: impl Fn(f64) -> bool) -> f64 {
+    for _ in 0..200 {
+        let middle = 0.5 * (low + high);
+        if above(middle) {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    low
+}
+
+fn rebound_beyond(chi: f64, restitution: f64) -> bool {
+    chi * (1.0 + restitution) < ((1.0 + chi) / (1.0 - restitution * chi)).ln()
+}
+
+#[test]
+fn a_stop_rebounds_as_its_law_says_at_any_speed() {
+    let chi = bisect(1e-3, 1.0 / 0.6 - 1e-9, |chi| rebound_beyond(chi, 0.6));
+    for on in [Slide, Hinge] {
+        let m = on.inertia();
+        let [position, speed, force, ..] = on.units();
+        let stop = format!(
+            "[[stop]]\nname = \"s\"\njoint = \"j\"\nlower = \"-0.02 {position}\"\nupper = \"0.01 {position}\"\n\
+             {} = \"{:e} {force}\"\ndepth = \"1e-3 {position}\"\nrestitution = 0.6\nspeed = \"0.2 {speed}\"\n",
+            on.force_key(),
+            1000.0 * m
+        );
+        for method in METHODS {
+            for formulation in FORMULATIONS {
+                for (v, limit) in [(0.2_f64, 0.01), (-0.2, -0.02), (0.05, 0.01)] {
+                    let (step, bound) = match method {
+                        "semi-implicit-euler" | "imex-euler" => ("1 us", 1e-3),
+                        "rk4" => ("10 us", 2e-6),
+                        _ => ("10 us", 2e-6),
+                    };
+                    let changes = [
+                        ("solver.method", method),
+                        ("solver.step", step),
+                        ("solver.tolerance", "1e-10"),
+                        ("formulation", formulation),
+                    ];
+                    let own = chi * v.abs() / 0.2;
+                    let expected = if v.abs() == 0.2 {
+                        0.6
+                    } else {
+                        bisect(0.0, (1.0 / own).min(1.0), |e| rebound_beyond(own, e))
+                    };
+                    let mut simulation = on.starts([0.8 * limit, v], &stop, &changes);
+                    let frame = at(&mut simulation, 0.08);
+                    let label = format!("{on:?} {method} {formulation} {v}");
+                    let found = -on.rate(&frame) / v;
+                    assert!(
+                        (found - expected).abs() < bound,
+                        "{label}: {found} {expected}"
+                    );
+                    assert_eq!((frame.elastic, on.force(&frame, 0)), (0.0, 0.0), "{label}");
+                    let lost = 0.5 * m * v * v * (1.0 - expected * expected);
+                    let ledger = simulation.ledger().unwrap();
+                    let off = ledger.damping_loss / lost - 1.0;
+                    assert!(off.abs() < 1e4 * bound.min(1e-6), "{label}: {off:e}");
+                    assert!(
+                        ledger.relative_residual().abs() < 2e-3,
+                        "{label}: {ledger:?}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_weight_settles_on_a_stop_as_deep_as_hertz_says() {
+    let stop = "[[stop]]\nname = \"s\"\njoint = \"j\"\nlower = \"-5 mm\"\nforce = \"100 N\"\ndepth = \"1 mm\"\n\
+                restitution = 0.2\nspeed = \"0.1 m/s\"\n";
+    let text = Slide
+        .text([0.0, 0.0], stop)
+        .replace("x = 0\n", "x = \"-9.81 m/s^2\"\n");
+    for method in ["radau5", "automatic", "dopri5"] {
+        let changes = [("solver.method", method), ("solver.tolerance", "1e-8")];
+        let mut simulation = started(&text, &changes);
+        // The law has no damping without speed: the last micrometres ring for long.
+        let frame = at(&mut simulation, 3.0);
+        let depth = -5e-3 - Slide.coordinate(&frame);
+        let weight: f64 = 0.5 * 9.81;
+        let expected = 1e-3 * (weight / 100.0).powf(2.0 / 3.0);
+        assert!(
+            (depth / expected - 1.0).abs() < 0.02,
+            "{method}: {depth:e} {expected:e}"
+        );
+    }
+}
+
+#[test]
+fn a_motor_follows_its_target_like_a_spring_and_its_work_is_the_drives() {
+    for on in [Slide, Hinge] {
+        let m = on.inertia();
+        let (k, d) = (400.0 * m, 12.0 * m);
+        let [position, speed, _, by_position, by_rate] = on.units();
+        let gains = format!(
+            "[[motor]]\nname = \"m\"\njoint = \"j\"\nstiffness = \"{k:e} {by_position}\"\ndamping = \"{d:e} {by_rate}\"\n"
+        );
+        let held = gains.clone()
+            + &format!(
+                "target = {{ law = \"constant\", position = \"0.1 {position}\", velocity = \"0.3 {speed}\" }}\n"
+            );
+        let shaken = gains
+            + &format!(
+                "target = {{ law = \"harmonic\", amplitude = \"0.1 {position}\", frequency = \"4 Hz\", phase = \"30 deg\" }}\n"
+            );
+        for method in METHODS {
+            for formulation in FORMULATIONS {
+                let (step, bound) = settings(method);
+                let changes = [
+                    ("solver.method", method),
+                    ("solver.step", step),
+                    ("solver.tolerance", "1e-10"),
+                    ("formulation", formulation),
+                ];
+                let label = format!("{on:?} {method} {formulation}");
+                let t = 0.2;
+                // The distance from a target in uniform motion swings freely.
+                let mut simulation = on.starts([0.0, 0.0], &held, &changes);
+                let frame = at(&mut simulation, t);
+                let [off, rate] = swing([m, d, k], [-0.1, -0.3], t);
+                let wrong = (on.coordinate(&frame) - (0.1 + 0.3 * t) - off).abs();
+                assert!(wrong < 2.0 * bound, "{label}: {wrong:e}");
+                let force = on.force(&frame, 0);
+                assert!(
+                    (force + k * off + d * rate).abs() < 60.0 * k * bound,
+                    "{label}"
+                );
+                let kinetic = 0.5 * m * on.rate(&frame).powi(2);
+                let ledger = simulation.ledger().unwrap();
+                assert!(
+                    (ledger.drive_work - kinetic).abs() < 1e-4 * ledger.exchanged,
+                    "{label}: {ledger:?}"
+                );
+                assert_eq!(ledger.damping_loss, 0.0);
+                // m q'' + d q' + k q = Re (k + i w d) T e^(i w t), T = 0.1 e^(i phase) / i: forced and free.
+                let mut simulation = on.starts([0.0, 0.0], &shaken, &changes);
+                let frame = at(&mut simulation, t);
+                let w = std::f64::consts::TAU * 4.0;
+                let (re, im) = (k - m * w * w, d * w);
+                let size = 0.1 * (k * k + im * im).sqrt() / (re * re + im * im).sqrt();
+                let phase = 30_f64.to_radians() + (im / k).atan() - im.atan2(re);
+                let forced = |t: f64| {
+                    [
+                        size * (w * t + phase).sin(),
+                        size * w * (w * t + phase).cos(),
+                    ]
+                };
+                let [x, v] = forced(0.0);
+                let free = swing([m, d, k], [-x, -v], t)[0];
+                let wrong = (on.coordinate(&frame) - forced(t)[0] - free).abs();
+                assert!(wrong < 4.0 * bound, "{label}: {wrong:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_motor_gives_no_more_than_its_limit() {
+    for on in [Slide, Hinge] {
+        let m = on.inertia();
+        let [position, speed, force, by_position, _] = on.units();
+        let (k, limit) = (100.0 * m, 20.0 * m);
+        let motor = format!(
+            "[[motor]]\nname = \"m\"\njoint = \"j\"\nstiffness = \"{k:e} {by_position}\"\nlimit = \"{limit:e} {force}\"\n\
+             target = {{ law = \"constant\", position = \"1 {position}\", velocity = \"0 {speed}\" }}\n"
+        );
+        // At full force until 0.2 from the target, then free to swing about it.
+        let leaves = (2.0 * 0.8 / 20.0_f64).sqrt();
+        for method in ["dopri5", "radau5", "rosenbrock", "automatic"] {
+            for formulation in FORMULATIONS {
+                let changes = [
+                    ("solver.method", method),
+                    ("solver.tolerance", "1e-10"),
+                    ("formulation", formulation),
+                ];
+                let label = format!("{on:?} {method} {formulation}");
+                let mut simulation = on.starts([0.0, 0.0], &motor, &changes);
+                let t = 0.99 * leaves;
+                let frame = at(&mut simulation, t);
+                assert!((on.force(&frame, 0) / limit - 1.0).abs() < 1e-12, "{label}");
+                assert!(
+                    (on.coordinate(&frame) - 10.0 * t * t).abs() < 1e-8,
+                    "{label}"
+                );
+                let t = leaves + 0.05;
+                let frame = at(&mut simulation, t);
+                let [off, _] = swing([m, 0.0, k], [-0.2, 20.0 * leaves], 0.05);
+                let wrong = (on.coordinate(&frame) - 1.0 - off).abs();
+                assert!(wrong < 1e-7, "{label}: {wrong:e}");
+            }
+        }
+        // A constant force alone.
+        let push = format!(
+            "[[motor]]\nname = \"m\"\njoint = \"j\"\n{} = \"{limit:e} {force}\"\n",
+            on.force_key()
+        );
+        let mut simulation = on.starts([0.0, 0.0], &push, &[]);
+        let frame = at(&mut simulation, 0.3);
+        assert!((on.rate(&frame) - 6.0).abs() < 1e-9, "{on:?}");
+        let work = simulation.ledger().unwrap().drive_work;
+        assert!(
+            (work / (0.5 * m * 36.0) - 1.0).abs() < 1e-9,
+            "{on:?}: {work}"
+        );
+    }
+}
+
+#[test]
+fn a_motor_does_not_sleep_through_a_pulse_of_its_target() {
+    // Nothing moves before: an adaptive step would grow beyond the pulse, which is there and back.
+    let m = Slide.inertia();
+    let motor = format!(
+        "[[motor]]\nname = \"m\"\njoint = \"j\"\nstiffness = \"{:e} N/m\"\ndamping = \"{:e} N s/m\"\n\
+         target = {{ law = \"pulse\", height = \"10 mm\", start = \"1 s\", duration = \"5 ms\" }}\n",
+        1e4 * m,
+        20.0 * m
+    );
+    let end = |method: &str| {
+        let changes = [("solver.method", method), ("solver.tolerance", "1e-9")];
+        let mut simulation = Slide.starts([0.0, 0.0], &motor, &changes);
+        Slide.coordinate(&at(&mut simulation, 1.03))
+    };
+    let expected = end("rk4");
+    assert!(expected.abs() > 1e-4, "{expected:e}");
+    for method in ["dopri5", "radau5", "rosenbrock", "automatic"] {
+        let found = end(method);
+        assert!(
+            (found - expected).abs() < 1e-7,
+            "{method}: {found:e} {expected:e}"
+        );
+    }
+}
+
+#[test]
+fn columns_and_pictures_follow_what_the_joint_is() {
+    let columns = |on: On| {
+        let text = on.text([0.13, 0.0], &on.spring(200.0, 0.0));
+        let scene = Scene::parse(&text, None, &[]).unwrap();
+        let frame = at(&mut Simulation::new(&scene).unwrap(), 0.0);
+        jointplay::simulate::run_columns(&scene, &frame).0.join(",")
+    };
+    let (slide, hinge) = (columns(Slide), columns(Hinge));
+    assert!(slide.contains("s_force_x_N,s_force_y_N,s_force_z_N") && !slide.contains("s_torque"));
+    assert!(
+        hinge.contains("s_torque_x_Nm,s_torque_y_Nm,s_torque_z_Nm") && !hinge.contains("s_force")
+    );
+}
+
+#[test]
+fn bad_elements_on_joints_are_refused_where_they_stand() {
+    let text = TUMBLING.to_owned()
+        + "[[body]]\nname = \"wheel\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n\
+           [[joint]]\nname = \"crank\"\nkind = \"revolute\"\nchild = \"wheel\"\naxis = [0, 0, 1]\n\
+           drive = { law = \"constant\", velocity = \"60 rpm\" }\n";
+    for (more, said) in [
+        (
+            "[[joint_spring]]\nname = \"s\"\n",
+            ["joint_spring.s.joint", "missing"],
+        ),
+        (
+            "[[joint_spring]]\nname = \"s\"\njoint = \"elbwo\"\n",
+            ["did you mean `elbow`", "allowed "],
+        ),
+        (
+            "[[joint_spring]]\nname = \"s\"\njoint = \"free\"\n",
+            ["a free joint is neither", "elbow, slide"],
+        ),
+        (
+            "[[joint_spring]]\nname = \"s\"\njoint = \"elbow\"\n",
+            [
+                "joint_spring.s",
+                "does nothing: stiffness, damping, preload",
+            ],
+        ),
+        (
+            "[[joint_spring]]\nname = \"s\"\njoint = \"elbow\"\nstiffness = \"10 N/m\"\n",
+            ["wrong unit `N/m` (a unit of stiffness)", "N m/rad"],
+        ),
+        (
+            "[[joint_spring]]\nname = \"s\"\njoint = \"slide\"\nstiffness = \"-1 N/m\"\n",
+            ["stiffness", "allowed 0 N/m to"],
+        ),
+        (
+            "[[stop]]\nname = \"s\"\njoint = \"elbow\"\nforce = \"1 N\"\ndepth = \"1 deg\"\nupper = 0\n",
+            [
+                "stop.s.force",
+                "the joint is a hinge, where `torque` belongs",
+            ],
+        ),
+        (
+            "[[stop]]\nname = \"s\"\njoint = \"elbow\"\ntorque = \"1 N m\"\ndepth = \"1 deg\"\n",
+            ["stop.s.upper", "`lower`, `upper` or both"],
+        ),
+        (
+            "[[stop]]\nname = \"s\"\njoint = \"slide\"\nforce = \"1 N\"\ndepth = \"1 mm\"\nlower = \"2 mm\"\nupper = \"1 mm\"\n",
+            ["stop.s.upper", "above lower, 2 mm"],
+        ),
+        (
+            "[[stop]]\nname = \"s\"\njoint = \"elbow\"\ntorque = \"1 N m\"\ndepth = \"1 deg\"\nlower = \"-180 deg\"\nupper = \"180 deg\"\n",
+            ["stop.s.upper", "less than a turn"],
+        ),
+        (
+            "[[stop]]\nname = \"s\"\njoint = \"slide\"\nforce = \"1 N\"\ndepth = \"1 mm\"\nupper = 0\nrestitution = 0.5\n",
+            ["stop.s.speed", "missing"],
+        ),
+        (
+            "[[stop]]\nname = \"s\"\njoint = \"slide\"\nforce = \"1 N\"\ndepth = \"1 mm\"\nupper = 0\nrestitution = 0\n",
+            ["stop.s.restitution", "allowed 0.01 to 1"],
+        ),
+        (
+            "[[stop]]\nname = \"s\"\njoint = \"slide\"\nforce = \"1 N\"\ndepth = 0\nupper = 0\n",
+            ["stop.s.depth", "allowed 1e-9 m to 1000 m"],
+        ),
+        (
+            "[[motor]]\nname = \"m\"\njoint = \"crank\"\ntorque = \"1 N m\"\n",
+            ["motor.m.joint", "has a drive"],
+        ),
+        (
+            "[[motor]]\nname = \"m\"\njoint = \"elbow\"\nlimit = \"1 N m\"\n",
+            ["motor.m", "does nothing: torque, stiffness, damping"],
+        ),
+        (
+            "[[motor]]\nname = \"m\"\njoint = \"elbow\"\nstiffness = \"1 N m/rad\"\n",
+            ["motor.m.target", "missing"],
+        ),
+        (
+            "[[motor]]\nname = \"m\"\njoint = \"elbow\"\ntorque = \"1 N m\"\ntarget = { law = \"constant\", velocity = 0 }\n",
+            ["motor.m.target", "has no effect"],
+        ),
+        (
+            "[[motor]]\nname = \"m\"\njoint = \"elbow\"\nstiffness = \"1 N m/rad\"\ntarget = { law = \"constant\", velocity = \"1 m/s\" }\n",
+            ["motor.m.target.velocity", "rad/s"],
+        ),
+        (
+            "[[motor]]\nname = \"elbow\"\njoint = \"elbow\"\ntorque = \"1 N m\"\n",
+            ["motor.elbow.name", "already a joint or force element"],
+        ),
+    ] {
+        let error = Scene::parse(&format!("{text}{more}"), Some("mine.toml"), &[]);
+        let message = error.expect_err(more).to_string();
+        for said in said {
+            assert!(message.contains(said), "{message}\nlacks {said}");
+        }
+        assert!(message.starts_with("mine.toml:"), "{message}");
+    }
+}
