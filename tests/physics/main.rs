@@ -19,6 +19,7 @@ mod independent;
 mod known_systems;
 mod ledger;
 mod live_changes;
+mod machines;
 mod many_joints;
 mod order;
 mod pays_only;
