@@ -426,7 +426,7 @@ fn the_tie_rod_sets_the_toe() {
 fn each_machine_with_one_loose_joint_moves_the_same_under_another_solver() {
     for (name, joint, end) in [
         ("hexapod", "A6", 0.010),
-        ("delta", "B2", 0.010),
+        ("delta", "B2", 0.0015),
         ("four-bar", "A", 0.012),
         ("suspension", "lower", 0.004),
         ("press", "wrist", 0.030),
