@@ -8,7 +8,7 @@ mod common;
 #[path = "common/large.rs"]
 mod large;
 
-use common::{METHODS, SCENES, simulation};
+use common::{MACHINES, METHODS, SCENES, simulation};
 use jointplay::scene::Scene;
 use jointplay::simulate::{Frame, Simulation};
 use large::scene_text;
@@ -116,6 +116,17 @@ fn steps_samples_and_peaks_allocate_nothing() {
                 }
             }
         }
+    }
+}
+
+#[test]
+fn steps_of_the_machines_allocate_nothing() {
+    for name in MACHINES {
+        let mut simulation = simulation(name, &[]);
+        simulation.step().unwrap();
+        let found = allocations(|| simulation.advance_to(9e-3).unwrap());
+        assert_eq!(found, 0, "{name}");
+        assert!(simulation.statistics().impacts.iter().any(|&n| n > 0));
     }
 }
 

@@ -5,6 +5,7 @@ use std::fmt::Display;
 use serde::{Serialize, Serializer};
 
 use super::{AnalysisError, RunContext};
+use crate::scene::{BallJoint, Scene};
 use crate::simulate::{Simulation, StartError, Stopped};
 
 /// Steps between two checks of the clock, the cap and cancellation.
@@ -48,6 +49,24 @@ impl WorkBudget {
         ],
         tolerances: &[1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11],
     };
+    /// More loose joints than these make runs long.
+    const MANY: usize = 8;
+
+    /// For `scene`: runs of many loose joints are capped earlier, at the same steps and tolerances.
+    #[must_use]
+    pub fn of(self, scene: &Scene) -> Self {
+        let loose = |joint: &&BallJoint| joint.contact.clearance > 0.0;
+        if scene.ball_joints.iter().filter(loose).count() <= Self::MANY {
+            return self;
+        }
+        Self {
+            evaluations: self.evaluations.min(Self::QUICK.evaluations),
+            seconds: self.seconds.min(1.5),
+            measured: self.measured.min(Self::QUICK.measured),
+            ..self
+        }
+    }
+
     /// Cap for the reference, on which everything else depends.
     pub(super) const REFERENCE: Self = Self {
         evaluations: 40_000_000,

@@ -8,12 +8,17 @@ use std::io::Read;
 use std::path::Path;
 
 /// Names of the built-in scenes.
-pub const BUILT_IN: [&str; 5] = [
+pub const BUILT_IN: [&str; 10] = [
     "spcmm",
     "pendulum",
     "slider-crank",
     "slider-crank-driven",
     "chain",
+    "hexapod",
+    "delta",
+    "four-bar",
+    "suspension",
+    "press",
 ];
 
 /// The scene that opens if none is named.
@@ -48,6 +53,11 @@ pub fn built_in_text(name: &str) -> Option<&'static str> {
         "slider-crank" => include_str!("../../assets/scenes/slider-crank.toml"),
         "slider-crank-driven" => include_str!("../../assets/scenes/slider-crank-driven.toml"),
         "chain" => include_str!("../../assets/scenes/chain.toml"),
+        "hexapod" => include_str!("../../assets/scenes/hexapod.toml"),
+        "delta" => include_str!("../../assets/scenes/delta.toml"),
+        "four-bar" => include_str!("../../assets/scenes/four-bar.toml"),
+        "suspension" => include_str!("../../assets/scenes/suspension.toml"),
+        "press" => include_str!("../../assets/scenes/press.toml"),
         _ => return None,
     })
 }

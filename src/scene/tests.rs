@@ -47,12 +47,16 @@ fn every_ball_of_every_built_in_scene_starts_in_the_centre_of_its_socket() {
     for name in BUILT_IN {
         let scene = Scene::load(name, &[]).unwrap_or_else(|error| panic!("{name}: {error}"));
         assert_eq!(scene.name, name);
+        assert!(!scene.ball_joints.is_empty(), "{name}");
+        if scene.start == StartRule::Ideal {
+            // Put together when it starts: `tests/physics/machines.rs`.
+            continue;
+        }
         let poses = start_poses(&scene);
         let point = |end: Attachment| {
             end.body
                 .map_or(end.point, |body| poses[body].0 + poses[body].1 * end.point)
         };
-        assert!(!scene.ball_joints.is_empty(), "{name}");
         for joint in &scene.ball_joints {
             let e = point(joint.ball) - point(joint.socket);
             // The slider coordinates are given to ten digits.

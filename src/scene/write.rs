@@ -98,7 +98,8 @@ impl Scene {
                 || put_chain_joint(document.get_mut("chain"), name, part, item);
             return placed.then_some(()).ok_or_else(|| SceneError {
                 key: Some(key.to_owned()),
-                message: "cannot be written to a scene file".to_owned(),
+                message: "cannot be written to a scene file: every copy of a pattern has it"
+                    .to_owned(),
                 ..SceneError::default()
             });
         }
@@ -282,9 +283,16 @@ mod tests {
                         assert!(matches!(parameter.scope, Scope::Contact), "{error}");
                         continue;
                     }
-                    let text = changed
-                        .to_toml()
-                        .unwrap_or_else(|e| panic!("{name} {key}: {e}"));
+                    let text = match changed.to_toml() {
+                        Ok(text) => text,
+                        // The text has no place for the joint of one copy alone.
+                        Err(error) if error.message.contains("every copy of a pattern") => {
+                            assert!(key.starts_with("joint.") && key.contains("1."), "{key}");
+                            assert!(plain.source.text.contains("[[pattern]]"), "{name}");
+                            continue;
+                        }
+                        Err(error) => panic!("{name} {key}: {error}"),
+                    };
                     let read = Scene::parse(&text, None, &[]).expect("reads");
                     assert_eq!(bits(&read), bits(&changed), "{name} {key}\n{text}");
                     assert!(read.changes.is_empty());

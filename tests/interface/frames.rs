@@ -199,6 +199,19 @@ fn chain() {
 }
 
 #[test]
+fn machines() {
+    for (name, time) in crate::common::MACHINES
+        .iter()
+        .zip(["20ms", "20ms", "0.1s", "0.1s", "0.1s"])
+    {
+        golden(
+            &name.replace('-', "_"),
+            &format!("{name} --at {time} --size 640x400 --magnification 10 --overlay"),
+        );
+    }
+}
+
+#[test]
 fn what_is_missing_is_found() {
     let folder = tempfile::tempdir().expect("a scratch folder");
     let whole = Picture::read(&draw(folder.path(), IMPACT));

@@ -22,6 +22,7 @@ mod joint_elements;
 mod known_systems;
 mod ledger;
 mod live_changes;
+mod machines;
 mod many_joints;
 mod order;
 mod pays_only;

@@ -12,7 +12,7 @@ const IDEAL: (&str, &str) = ("contact.clearance", "0");
 
 #[test]
 fn rigid_scenes_evaluate_no_contact() {
-    for name in crate::common::SCENES {
+    for name in jointplay::scene::BUILT_IN {
         for form in ["tree", "lagrange"] {
             let changes = [IDEAL, ("formulation", form)];
             let mut simulation = simulation(name, &changes);

@@ -1,8 +1,8 @@
 //! Any values of the one parameter table: in their ranges a scene starts or says why not, outside of them every key says what
 //! is allowed. `PROPTEST_CASES` asks for more cases than every run of the tests makes, `PROPTEST_RNG_SEED` for others.
 
-use crate::common::METHODS;
 use crate::common::invariants::finite;
+use crate::common::{METHODS, SCENES};
 use jointplay::scene::{
     BUILT_IN, Doubt as SceneDoubt, Kind, Parameter, Scene, Scope, Value, table,
 };
@@ -76,8 +76,10 @@ fn key(scene: &Scene, parameter: &Parameter, joint: usize) -> String {
     }
 }
 
-/// A built-in scene, and changes in its keys' ranges.
-fn changed_scenes() -> impl Strategy<Value = (&'static str, Vec<(String, String)>)> {
+/// One of `scenes`, and changes in its keys' ranges.
+fn changed_scenes(
+    scenes: &'static [&'static str],
+) -> impl Strategy<Value = (&'static str, Vec<(String, String)>)> {
     let of_scene = |name: &'static str| {
         let scene = Scene::load(name, &[]).unwrap();
         let rows: Vec<BoxedStrategy<(&'static Parameter, Value)>> = scene
@@ -93,7 +95,7 @@ fn changed_scenes() -> impl Strategy<Value = (&'static str, Vec<(String, String)
             (name, changes.into_iter().map(write).collect::<Vec<_>>())
         })
     };
-    proptest::sample::select(&BUILT_IN[..]).prop_flat_map(of_scene)
+    proptest::sample::select(scenes).prop_flat_map(of_scene)
 }
 
 fn fail(what: impl Into<String>) -> TestCaseError {
@@ -121,7 +123,7 @@ struct Mixed {
 fn mixed() -> impl Strategy<Value = Mixed> {
     let word = proptest::sample::select;
     (
-        word(&BUILT_IN[..]),
+        word(&SCENES[..]),
         word(&METHODS[..]),
         word(&["tree", "lagrange"][..]),
         word(&["start", "largest"][..]),
@@ -219,7 +221,7 @@ proptest! {
     #![proptest_config(config(400))]
 
     #[test]
-    fn any_values_in_range_start_or_are_refused_and_stay_finite((name, changes) in changed_scenes()) {
+    fn any_values_in_range_start_or_are_refused_and_stay_finite((name, changes) in changed_scenes(&BUILT_IN)) {
         let scene = match Scene::load(name, &changes) {
             Ok(scene) => scene,
             Err(error) => return is_clear(&error.to_string(), &changes),
@@ -264,7 +266,7 @@ proptest! {
     }
 
     #[test]
-    fn any_changes_of_a_running_scene_are_taken_or_refused_and_stay_finite((name, changes) in changed_scenes()) {
+    fn any_changes_of_a_running_scene_are_taken_or_refused_and_stay_finite((name, changes) in changed_scenes(&SCENES)) {
         let mut simulation = Simulation::new(&Scene::load(name, &[]).unwrap()).unwrap();
         // Somewhere in the first impacts.
         simulation.advance_to(8e-3).map_err(|stopped| fail(stopped.to_string()))?;

@@ -75,7 +75,8 @@ fn all(root: &Path, quiet: bool, budget: &WorkBudget) -> Result<(), Failure> {
     let targets = page::Targets::claim(root)?;
     let mut found = Vec::with_capacity(BUILT_IN.len());
     for name in BUILT_IN {
-        found.push(measure(&Scene::load(name, &[])?, budget, quiet)?);
+        let scene = Scene::load(name, &[])?;
+        found.push(measure(&scene, &budget.of(&scene), quiet)?);
     }
     let costs = measuring::measure(quiet, None, |context| model_costs(budget, context))?;
     targets.write(&found, &costs)?;

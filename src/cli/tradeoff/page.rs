@@ -92,9 +92,9 @@ fn record(found: &[WorkPrecision], machine: &str) -> Record {
     record
 }
 
-/// The page with its headings, diagrams and table heads, but nothing measured.
-pub fn skeleton() -> String {
-    let scenes: String = BUILT_IN
+/// The page on `scenes` with its headings, diagrams and table heads, but nothing measured.
+pub fn skeleton(scenes: &[&str]) -> String {
+    let scenes: String = scenes
         .iter()
         .map(|name| scene(name, &[], &[], Vec::new()))
         .collect();

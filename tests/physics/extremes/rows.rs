@@ -326,5 +326,17 @@ pub fn rows() -> Vec<Row> {
     rows.push(pendulum("starts 1 mm inside the wall").edited(|s| start_at(s, Vec3::z() * -1.3e-3)));
     rows.push(calm("at rest on the wall, no gravity").edited(|s| start_at(s, Vec3::x() * 0.3e-3)));
     rows.push(calm("at rest in the middle, no gravity"));
+    // The machines, driven as fast as their parameters allow.
+    for (scene, key, value, duration) in [
+        ("hexapod", "parameter.rate", "5 Hz", 0.01),
+        ("delta", "parameter.rate", "5 Hz", 0.004),
+        ("four-bar", "parameter.speed", "60 rad/s", DURATION),
+        ("suspension", "parameter.bump", "20 mm", DURATION),
+        ("press", "parameter.speed", "400 rpm", DURATION),
+    ] {
+        let mut row = Row::new(&format!("{key} = {value}"), scene, &[(key, value)]);
+        row.duration = duration;
+        rows.push(row);
+    }
     rows
 }

@@ -1,0 +1,505 @@
+//! The machines among the built-in scenes, each against what is known of it otherwise: inverse kinematics in closed form, loop
+//! equations, a linear model; and one of its joints loose under an independent solver.
+
+use super::independent::moves_the_same;
+use crate::common::{Changes, MACHINES, SCENES, frame_now, parse, run_until, scene, simulation};
+use jointplay::scene::{BUILT_IN, Mat3, Scene, Value, Vec3};
+use jointplay::simulate::{ContactState, Frame, Simulation};
+use std::f64::consts::{PI, TAU};
+
+const IDEAL: (&str, &str) = ("contact.clearance", "0");
+/// Residual of the energy balance, of the energy exchanged.
+const PROMISE: f64 = 1e-4;
+
+#[test]
+fn they_and_the_others_are_all_there_are() {
+    assert_eq!([SCENES, MACHINES].concat(), BUILT_IN);
+}
+
+/// Pose of body `name`: position and axes.
+fn pose(scene: &Scene, frame: &Frame, name: &str) -> (Vec3, Mat3) {
+    let at = scene.bodies.iter().position(|body| body.name == name);
+    let body = &frame.bodies[at.expect("a body of this name")];
+    (body.position, body.rotation)
+}
+
+/// Calls `check` with the frames of an ideal run of `name` at some instants up to `end`; `more` are further changes.
+fn ideally(name: &str, more: &Changes, end: f64, check: impl Fn(&Scene, &Frame)) {
+    let changes = [&[IDEAL], more].concat();
+    let mut simulation = simulation(name, &changes);
+    let scene = simulation.scene().clone();
+    let mut frame = Frame::default();
+    for n in 0..=16 {
+        let time = end * f64::from(n) / 16.0;
+        simulation.advance_to(time).unwrap();
+        simulation.sample(time, &mut frame);
+        for joint in &frame.joints {
+            assert_eq!(joint.state, ContactState::Ideal, "{name}");
+            assert!(joint.eccentricity.norm() < 1e-9, "{name} at {time} s");
+        }
+        check(&scene, &frame);
+    }
+}
+
+/// The polar angle `t` on the side of `side` (1 or -1) at which a cos t + b sin t = c.
+fn on_circle(a: f64, b: f64, c: f64, side: f64) -> f64 {
+    b.atan2(a) + side * (c / a.hypot(b)).acos()
+}
+
+/// Unit vectors outward and along the tangent at `degrees`.
+fn around(degrees: f64) -> (Vec3, Vec3) {
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    (Vec3::new(cos, sin, 0.0), Vec3::new(-sin, cos, 0.0))
+}
+
+#[test]
+fn carriages_of_the_hexapod_stand_where_inverse_kinematics_wants_them() {
+    for (stroke, rate) in [(0.015, 1.0), (0.035, 2.0)] {
+        let (stroke_text, rate_text) = (format!("{stroke} m"), format!("{rate} Hz"));
+        let changes = [
+            ("parameter.stroke", &*stroke_text),
+            ("parameter.rate", &*rate_text),
+        ];
+        ideally("hexapod", &changes, 1.0, |scene, frame| {
+            let (centre, axes) = pose(scene, frame, "platform");
+            for leg in 1..=6 {
+                let slot = 60.0 * f64::from(leg - 1);
+                // Pairs: odd ones stand 8 degrees before their sixth of the circle and are held 16 degrees behind it.
+                let side = if leg % 2 == 1 { 1.0 } else { -1.0 };
+                let held = centre + axes * around(slot + side * 16.0).0 * 0.110;
+                let foot = around(slot - side * 8.0).0 * 0.250;
+                let flat = (held - foot).xy().norm();
+                let height = held.z + (0.30324_f64.powi(2) - flat * flat).sqrt();
+                let driven = stroke * (TAU * rate * frame.time + f64::from(leg) * PI / 3.0).sin();
+                let off = height - driven;
+                assert!(off.abs() < 1e-9, "leg {leg}, {} s: {off:e} m", frame.time);
+            }
+        });
+    }
+}
+
+#[test]
+fn arms_of_the_delta_stand_where_inverse_kinematics_wants_them() {
+    for (swing, lift) in [(0.25, 0.35), (0.5, 0.6)] {
+        let (swing_text, lift_text) = (format!("{swing} rad"), format!("{lift} rad"));
+        let changes = [
+            ("parameter.swing", &*swing_text),
+            ("parameter.lift", &*lift_text),
+        ];
+        ideally("delta", &changes, 1.0 / 1.5, |scene, frame| {
+            let (centre, axes) = pose(scene, frame, "platform");
+            let tilt = (axes - Mat3::identity()).amax();
+            assert!(tilt < 1e-9, "the platform tilts by {tilt:e}");
+            for arm in 0..3 {
+                let (outward, along) = around(120.0 * f64::from(arm));
+                // From the motor's axis to the sockets of the platform, in the arm's plane; and what of the rod lies in it.
+                let (x, z) = (centre.dot(&outward) + 0.045 - 0.120, centre.z);
+                let rod = 0.380_f64.powi(2) - centre.dot(&along).powi(2);
+                let (a, b) = (2.0 * 0.150 * x, -2.0 * 0.150 * z);
+                let c = x * x + z * z + 0.150_f64.powi(2) - rod;
+                let angle = on_circle(a, b, c, -1.0);
+                let phase = f64::from(arm) * TAU / 3.0;
+                let driven = lift + swing * (TAU * 1.5 * frame.time + phase).sin();
+                let off = angle - driven;
+                assert!(off.abs() < 1e-8, "arm {arm}, {} s: {off:e} rad", frame.time);
+            }
+        });
+    }
+}
+
+#[test]
+fn the_springs_of_the_delta_quieten_its_rods() {
+    let knocks = |grip: &str| {
+        let mut simulation = simulation("delta", &[("parameter.grip", grip)]);
+        simulation.advance_to(0.03).unwrap();
+        let before: u64 = simulation.statistics().impacts.iter().sum();
+        simulation.advance_to(0.06).unwrap();
+        simulation.statistics().impacts.iter().sum::<u64>() - before
+    };
+    let (held, free) = (knocks("30 N"), knocks("0.001 N"));
+    assert!(
+        2 * held < free,
+        "{held} impacts with springs, {free} without"
+    );
+}
+
+#[test]
+fn the_rocker_of_the_four_bar_obeys_the_loop_equation() {
+    for (crank, coupler) in [(0.035, 0.184458), (0.045, 0.200)] {
+        let (crank_text, coupler_text) = (format!("{crank} m"), format!("{coupler} m"));
+        let changes = [
+            ("parameter.crank", &*crank_text),
+            ("parameter.coupler", &*coupler_text),
+        ];
+        ideally("four-bar", &changes, TAU / 10.0, |scene, frame| {
+            let (sin, cos) = (10.0 * frame.time).sin_cos();
+            // From the crank's ball to the rocker's hinge; the rocker hangs by its angle about Y.
+            let d = Vec3::new(0.200 - crank * cos, 0.080 - crank * sin, 0.100);
+            let c = d.norm_squared() + 0.120_f64.powi(2) - coupler * coupler;
+            let angle = on_circle(2.0 * 0.120 * d.z, 2.0 * 0.120 * d.x, c, -1.0);
+            let axes = pose(scene, frame, "rocker").1;
+            let off = axes[(0, 2)].atan2(axes[(2, 2)]) - angle;
+            assert!(off.abs() < 1e-9, "{} s: {off:e} rad", frame.time);
+        });
+    }
+}
+
+#[test]
+fn the_ram_of_the_press_follows_from_two_circles() {
+    for crank in [0.020, 0.040, 0.044] {
+        let text = format!("{crank} m");
+        let changes = [("parameter.crank", &*text)];
+        ideally("press", &changes, 0.5, |scene, frame| {
+            let (sin, cos) = (2.0 * TAU * frame.time).sin_cos();
+            // The crank's pin; the knee lies on circles about it and about the crown, on the left of the line between them.
+            let pin = [0.330 + crank * cos, -0.190 + crank * sin];
+            let c = pin[0].powi(2) + pin[1].powi(2) + 0.2_f64.powi(2) - 0.288_f64.powi(2);
+            // From the vertical, to the right.
+            let swing = on_circle(-0.4 * pin[1], 0.4 * pin[0], c, -1.0);
+            let off = pose(scene, frame, "ram").0.z + 0.4 * swing.cos();
+            assert!(off.abs() < 1e-9, "{} s: {off:e} m", frame.time);
+        });
+    }
+}
+
+/// At the bottom the ram leans on its pins: it stands higher by the play of wrist and knee than without play.
+#[test]
+fn play_lifts_the_ram_of_the_press_at_the_bottom() {
+    let bottom = |clearance: &str| {
+        let changes = [
+            ("contact.clearance", clearance),
+            ("parameter.speed", "20 rpm"),
+        ];
+        let mut simulation = simulation("press", &changes);
+        // Half a turn; slowly, so that nothing rattles there.
+        run_until(&mut simulation, 1.5);
+        let scene = simulation.scene().clone();
+        pose(&scene, &frame_now(&mut simulation), "ram").0.z
+    };
+    let lift = bottom("0.1 mm") - bottom("0");
+    assert!((0.9e-4..1.3e-4).contains(&lift), "{lift:e} m");
+}
+
+/// The suspension written down again: its energies for the height of the body and the angle of the lower arm.
+struct Corner;
+
+impl Corner {
+    const SPRUNG: f64 = 50.0;
+
+    /// Centres of mass with their masses, and axes of the parts that turn with their moments of inertia.
+    fn parts(z: f64, theta: f64) -> ([(f64, Vec3); 5], [(Vec3, Mat3); 4]) {
+        let turned =
+            |angle: f64| *nalgebra::Rotation3::from_axis_angle(&Vec3::x_axis(), angle).matrix();
+        let hinges = [Vec3::new(0.0, 0.300, z), Vec3::new(0.0, 0.400, z + 0.250)];
+        let lower_axes = turned(theta);
+        let lower = hinges[0] + lower_axes * Vec3::new(0.0, 0.350, 0.0);
+        // The upper ball lies on a circle, at the distance of the upright's two balls from the lower one.
+        let d = hinges[1] - lower;
+        let reach = 0.020_f64.powi(2) + 0.250_f64.powi(2) - d.norm_squared() - 0.230_f64.powi(2);
+        let phi = on_circle(2.0 * 0.230 * d.y, 2.0 * 0.230 * d.z, reach, 1.0);
+        // Of both solutions the upper arm takes the one that points outward.
+        let other = on_circle(2.0 * 0.230 * d.y, 2.0 * 0.230 * d.z, reach, -1.0);
+        let phi = if phi.cos() > other.cos() { phi } else { other };
+        let upper_axes = turned(phi);
+        let upper = hinges[1] + upper_axes * Vec3::new(0.0, 0.230, 0.0);
+        // The upright: tilted with the line of its balls, then turned about it until the tie rod has its length.
+        let line = (upper - lower).normalize();
+        let camber = (-line.y).atan2(line.z) - 0.020_f64.atan2(0.250);
+        let v = turned(camber) * Vec3::new(0.120, -0.020, 0.080);
+        let along = line * line.dot(&v);
+        let (across, side) = (v - along, line.cross(&v));
+        let inner = Vec3::new(0.120, 0.310, z + 0.080);
+        let seat = lower + along - inner;
+        let c = 0.320_f64.powi(2) - seat.norm_squared() - across.norm_squared();
+        let (a, b) = (2.0 * seat.dot(&across), 2.0 * seat.dot(&side));
+        let (one, two) = (on_circle(a, b, c, 1.0), on_circle(a, b, c, -1.0));
+        let steer = if one.abs() < two.abs() { one } else { two };
+        let unit = nalgebra::Unit::new_normalize(line);
+        let axes = nalgebra::Rotation3::from_axis_angle(&unit, steer).matrix() * turned(camber);
+        let outer = lower + axes * Vec3::new(0.120, -0.020, 0.080);
+        // The tie rod does not spin here; that would move nothing else.
+        let rod = nalgebra::Rotation3::rotation_between(&Vec3::y(), &(outer - inner)).unwrap();
+        (
+            [
+                (Self::SPRUNG, Vec3::new(0.0, 0.0, z)),
+                (0.8, hinges[0] + lower_axes * Vec3::new(0.0, 0.175, 0.0)),
+                (0.6, hinges[1] + upper_axes * Vec3::new(0.0, 0.115, 0.0)),
+                (12.0, lower + axes * Vec3::new(0.0, 0.030, 0.120)),
+                (0.2, 0.5 * (inner + outer)),
+            ],
+            [
+                (Vec3::new(0.010, 0.002, 0.012), lower_axes),
+                (Vec3::new(0.0035, 0.0012, 0.0045), upper_axes),
+                (Vec3::new(0.18, 0.30, 0.18), axes),
+                (Vec3::new(1.8e-3, 1e-5, 1.8e-3), *rod.matrix()),
+            ],
+        )
+    }
+
+    /// Where the wheel's middle is.
+    fn wheel(z: f64, theta: f64) -> Vec3 {
+        let (masses, turning) = Self::parts(z, theta);
+        masses[3].1 + turning[2].1 * Vec3::new(0.0, 0.020, 0.0)
+    }
+
+    fn potential(z: f64, theta: f64) -> f64 {
+        let (masses, turning) = Self::parts(z, theta);
+        let weight: f64 = masses.iter().map(|(mass, at)| mass * 9.81 * at.z).sum();
+        let spring = |stiffness: f64, preload: f64, length: f64, points: [Vec3; 2]| {
+            let change = (points[1] - points[0]).norm() - length;
+            preload * change + 0.5 * stiffness * change * change
+        };
+        let seat = Vec3::new(0.0, 0.300, z) + turning[0].1 * Vec3::new(0.0, 0.250, 0.0);
+        let carried = -(Self::SPRUNG + 0.8) * 9.81 / 0.6618;
+        let all = -(Self::SPRUNG + 13.6) * 9.81;
+        let (top, road) = (
+            Vec3::new(0.0, 0.420, z + 0.320),
+            Vec3::new(0.0, 0.700, -0.170),
+        );
+        weight
+            + spring(40e3, carried, 0.3454, [top, seat])
+            + spring(100e3, all, 0.290, [road, Self::wheel(z, theta)])
+    }
+
+    /// Masses and stiffnesses of small motion about the rest: (11, 12, 22) of each.
+    fn linear() -> ([f64; 3], [f64; 3]) {
+        let h = 1e-5;
+        // The rates of all positions and angles for a unit rate of each coordinate.
+        let rates = |step: [f64; 2]| {
+            let (after, before) = (
+                Self::parts(step[0] * h, step[1] * h),
+                Self::parts(-step[0] * h, -step[1] * h),
+            );
+            let speeds = std::array::from_fn::<_, 5, _>(|n| {
+                let mass: f64 = after.0[n].0;
+                (after.0[n].1 - before.0[n].1) * (mass.sqrt() / (2.0 * h))
+            });
+            let spins = std::array::from_fn::<_, 4, _>(|n| {
+                let turn: Mat3 = (after.1[n].1 - before.1[n].1) / (2.0 * h);
+                // In the axes of the part, which at rest are those of the world.
+                let spin = Vec3::new(turn[(2, 1)], turn[(0, 2)], turn[(1, 0)]);
+                spin.component_mul(&after.1[n].0.map(f64::sqrt))
+            });
+            (speeds, spins)
+        };
+        let (a, b) = (rates([1.0, 0.0]), rates([0.0, 1.0]));
+        let product = |a: &([Vec3; 5], [Vec3; 4]), b: &([Vec3; 5], [Vec3; 4])| -> f64 {
+            let speeds: f64 = a.0.iter().zip(&b.0).map(|(a, b)| a.dot(b)).sum();
+            speeds + a.1.iter().zip(&b.1).map(|(a, b)| a.dot(b)).sum::<f64>()
+        };
+        let v = |z: f64, theta: f64| Self::potential(z * 1e-4, theta * 1e-4) / 1e-8;
+        let middle = v(0.0, 0.0);
+        let corners = v(1.0, 1.0) - v(1.0, -1.0) - v(-1.0, 1.0) + v(-1.0, -1.0);
+        (
+            [product(&a, &a), product(&a, &b), product(&b, &b)],
+            [
+                v(1.0, 0.0) - 2.0 * middle + v(-1.0, 0.0),
+                0.25 * corners,
+                v(0.0, 1.0) - 2.0 * middle + v(0.0, -1.0),
+            ],
+        )
+    }
+
+    /// Natural frequencies, Hz, and shapes (z, theta), the lower first.
+    fn modes() -> [(f64, [f64; 2]); 2] {
+        let (m, k) = Self::linear();
+        // det(K - w^2 M) = 0.
+        let a = m[0] * m[2] - m[1] * m[1];
+        let b = -(m[0] * k[2] + m[2] * k[0] - 2.0 * m[1] * k[1]);
+        let c = k[0] * k[2] - k[1] * k[1];
+        [-1.0, 1.0].map(|side: f64| {
+            let square = (-b + side * (b * b - 4.0 * a * c).sqrt()) / (2.0 * a);
+            let shape = [-(k[1] - square * m[1]), k[0] - square * m[0]];
+            (square.sqrt() / TAU, shape)
+        })
+    }
+}
+
+#[test]
+fn the_suspension_swings_as_its_linear_model() {
+    let (m, _) = Corner::linear();
+    let modes = Corner::modes();
+    // Without dampers, on a flat road, and with a little less of the tyre's preload: it is let go beside its rest.
+    let mut simulation = simulation(
+        "suspension",
+        &[
+            IDEAL,
+            ("parameter.bump", "0 mm"),
+            ("spring.coil.damping", "0 N s/m"),
+            ("spring.tyre.damping", "0 N s/m"),
+            ("spring.tyre.preload", "-600 N"),
+        ],
+    );
+    let scene = simulation.scene().clone();
+    let mut frame = Frame::default();
+    let samples: Vec<[f64; 2]> = (0..=6000)
+        .map(|n| {
+            let time = f64::from(n) * 0.5e-3;
+            simulation.advance_to(time).unwrap();
+            simulation.sample(time, &mut frame);
+            let axes = pose(&scene, &frame, "lower-arm").1;
+            let z = pose(&scene, &frame, "chassis").0.z;
+            [z, axes[(2, 1)].atan2(axes[(1, 1)])]
+        })
+        .collect();
+    for (frequency, shape) in modes {
+        // What is left of a sum of modes by the product with one, as they are orthogonal with the masses for weights.
+        let weights = [
+            m[0] * shape[0] + m[1] * shape[1],
+            m[1] * shape[0] + m[2] * shape[1],
+        ];
+        let mode = samples
+            .iter()
+            .map(|x| weights[0] * x[0] + weights[1] * x[1]);
+        let mode: Vec<f64> = mode.collect();
+        let (least, most) = mode
+            .iter()
+            .fold((f64::MAX, f64::MIN), |(a, b), &x| (a.min(x), b.max(x)));
+        let middle = 0.5 * (least + most);
+        let ups: Vec<f64> = (1..mode.len())
+            .filter(|&n| mode[n - 1] < middle && mode[n] >= middle)
+            .map(|n| n as f64 - (mode[n] - middle) / (mode[n] - mode[n - 1]))
+            .collect();
+        let periods = ups.len() - 1;
+        let found = periods as f64 / (0.5e-3 * (ups[periods] - ups[0]));
+        println!("{found} Hz, linear model {frequency} Hz, {periods} periods");
+        assert!(periods >= 6);
+        assert!(
+            (found / frequency - 1.0).abs() < 5e-3,
+            "{found} {frequency}"
+        );
+    }
+    // What its help says.
+    assert!(
+        (modes[0].0 - 2.7).abs() < 0.1 && (modes[1].0 - 15.0).abs() < 0.5,
+        "{modes:?}"
+    );
+}
+
+#[test]
+fn the_suspension_rests_as_drawn_and_play_lets_its_wheel_turn() {
+    let still = [IDEAL, ("parameter.bump", "0 mm")];
+    for sprung in ["30 kg", "50 kg", "100 kg"] {
+        let changes = [&still[..], &[("parameter.sprung", sprung)]].concat();
+        let mut simulation = simulation("suspension", &changes);
+        run_until(&mut simulation, 0.5);
+        let moved = frame_now(&mut simulation).pose.position - Vec3::new(0.0, 0.650, 0.0);
+        assert!(moved.norm() < 1e-6, "{sprung}: {moved:?}");
+    }
+    // Toe: the upright's angle about Z.
+    let toe = |changes: &Changes| {
+        let mut simulation = simulation("suspension", changes);
+        let (mut frame, mut least, mut most) = (Frame::default(), f64::MAX, f64::MIN);
+        for n in 0..=200 {
+            let time = 1e-3 * f64::from(n);
+            simulation.advance_to(time).unwrap();
+            simulation.sample(time, &mut frame);
+            let axes = pose(simulation.scene(), &frame, "upright").1;
+            let toe = axes[(1, 0)].atan2(axes[(0, 0)]);
+            (least, most) = (least.min(toe), most.max(toe));
+        }
+        most - least
+    };
+    let (ideal, loose) = (toe(&[IDEAL]), toe(&[]));
+    let worn = toe(&[("joint.lower.clearance", "0.5 mm")]);
+    println!("toe moves by {ideal:e}, {loose:e}, {worn:e} rad");
+    assert!(
+        loose > 5.0 * ideal && worn > 1.2 * loose,
+        "{ideal:e} {loose:e} {worn:e}"
+    );
+}
+
+/// The longer tie rod turns the front of the wheel outward, as its help says.
+#[test]
+fn the_tie_rod_sets_the_toe() {
+    let toe = |length: &str| {
+        let mut simulation = simulation("suspension", &[IDEAL, ("parameter.tie_rod", length)]);
+        let scene = simulation.scene().clone();
+        let axes = pose(&scene, &frame_now(&mut simulation), "upright").1;
+        axes[(1, 0)].atan2(axes[(0, 0)])
+    };
+    assert!(toe("320 mm").abs() < 1e-9);
+    assert!(toe("322 mm") > 0.01 && toe("318 mm") < -0.01);
+}
+
+#[test]
+fn each_machine_with_one_loose_joint_moves_the_same_under_another_solver() {
+    for (name, joint, end) in [
+        ("hexapod", "A6", 0.010),
+        ("delta", "B2", 0.0015),
+        ("four-bar", "A", 0.012),
+        ("suspension", "lower", 0.004),
+        ("press", "wrist", 0.030),
+    ] {
+        let key = format!("joint.{joint}.clearance");
+        let changes = [IDEAL, (&*key, "0.1 mm")];
+        let (contacts, off) = moves_the_same(name, &changes, end);
+        assert!(contacts >= 1, "{name}");
+        assert!(off < 5e-9, "{name}: {off:e}");
+    }
+}
+
+#[test]
+fn each_balances_its_energy_in_both_formulations_and_repeats_its_bits() {
+    for name in MACHINES {
+        for (form, end) in [("tree", 0.015), ("lagrange", 0.009)] {
+            let changes = [("formulation", form)];
+            let run = || {
+                let mut simulation = simulation(name, &changes);
+                run_until(&mut simulation, end);
+                simulation
+            };
+            let ran = run();
+            let ledger = ran.ledger().unwrap();
+            let residual = ledger.relative_residual().abs();
+            assert!(
+                residual < PROMISE,
+                "{name}, {form}: {residual:e} {ledger:?}"
+            );
+            assert!(ledger.exchanged > 0.0 && ledger.drive_work != 0.0, "{name}");
+            let impacts: u64 = ran.statistics().impacts.iter().sum();
+            assert!(impacts > 0, "{name}, {form}");
+            assert_eq!(ran.state_hash(), run().state_hash(), "{name}, {form}");
+        }
+    }
+}
+
+#[test]
+fn nothing_speaks_against_their_default_settings() {
+    for name in MACHINES {
+        let mut simulation = simulation(name, &[]);
+        run_until(&mut simulation, 0.04);
+        assert_eq!(simulation.doubts(), [], "{name}");
+        let warnings = simulation.scene().warnings();
+        assert!(warnings.is_empty(), "{name}: {warnings:?}");
+    }
+}
+
+/// At every corner of the ranges of its parameters a machine is put together, with play and without.
+#[test]
+fn each_assembles_at_the_ends_of_its_parameters() {
+    for name in MACHINES {
+        let plain = scene(name, &[]);
+        let mut own = plain.parameters();
+        own.retain(|row| row.scope == jointplay::scene::Scope::Own);
+        assert!(!own.is_empty(), "{name}");
+        for corner in 0..1_u32 << own.len() {
+            let ends = own.iter().enumerate().map(|(n, row)| {
+                let jointplay::scene::Kind::Number { min, max, .. } = row.kind else {
+                    panic!("{} is no number", row.key)
+                };
+                let end = if corner >> n & 1 == 1 { max } else { min };
+                (row.key, row.write(&Value::Number(end)))
+            });
+            let ends: Vec<(&str, String)> = ends.collect();
+            let mut changes: Vec<(&str, &str)> = ends.iter().map(|(k, v)| (*k, &**v)).collect();
+            changes.push(IDEAL);
+            let scene = parse(&plain.source.text, &changes);
+            let mut simulation =
+                Simulation::new(&scene).unwrap_or_else(|error| panic!("{name} {ends:?}: {error}"));
+            for joint in frame_now(&mut simulation).joints {
+                assert!(joint.eccentricity.norm() < 1e-9, "{name} {ends:?}");
+            }
+        }
+    }
+}
