@@ -41,7 +41,11 @@ pub(super) fn settle(scene: &Scene) -> Result<Settled, MechanismError> {
             if joint.contact.clearance == 0.0 {
                 continue;
             }
-            let force = mechanism.reaction(j).unwrap_or_default();
+            // Balls that share a load, it is not known how, stay in the middle: the loops could not close with both on a wall.
+            let force = mechanism
+                .reaction(j)
+                .filter(|_| mechanism.is_reaction_unique(j));
+            let force = force.unwrap_or_default();
             let eccentricity = resting_place(&joint.contact, force);
             let turned_back = match joint.ball.body {
                 Some(body) => mechanism.motion()[body].rotation.tr_mul(&eccentricity),

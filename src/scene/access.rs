@@ -243,7 +243,7 @@ impl Scene {
                     .strip_prefix("joint.J")
                     .and_then(|rest| rest.split('.').next())
                 {
-                    Some(index) => index.parse::<u64>().is_ok_and(|index| index <= links),
+                    Some(index) => index.parse::<u64>().map_or(true, |index| index <= links),
                     None => true,
                 }
             });

@@ -15,29 +15,39 @@ pub(super) struct Copy {
     pub centre: Vec3,
     pub turn: Quat,
     pub shift: Vec3,
-    /// Names of the bodies, joints and elements that the pattern has.
-    pub members: Arc<BTreeSet<String>>,
+    /// Names of the bodies and of the joints that the pattern has.
+    pub bodies: Arc<BTreeSet<String>>,
+    pub joints: Arc<BTreeSet<String>>,
 }
 
 impl Copy {
-    /// `name` with the copy's number if it is the pattern's own.
-    pub fn name<'a>(&self, name: &'a str) -> Cow<'a, str> {
-        if self.has(name) {
-            Cow::Owned(format!("{name}{}", self.number))
+    /// `name` of something that the pattern has.
+    pub fn name(&self, name: &str) -> String {
+        format!("{name}{}", self.number)
+    }
+
+    /// Which body `name` is: that of the copy, or one outside.
+    pub fn body<'a>(&self, name: &'a str) -> Cow<'a, str> {
+        self.own(&self.bodies, name)
+    }
+
+    /// Which joint `name` is: that of the copy, or one outside.
+    pub fn joint<'a>(&self, name: &'a str) -> Cow<'a, str> {
+        self.own(&self.joints, name)
+    }
+
+    fn own<'a>(&self, names: &BTreeSet<String>, name: &'a str) -> Cow<'a, str> {
+        if names.contains(name) {
+            Cow::Owned(self.name(name))
         } else {
             Cow::Borrowed(name)
         }
     }
 
-    /// Whether `name` is the pattern's own.
-    pub fn has(&self, name: &str) -> bool {
-        self.members.contains(name)
-    }
-
     /// Whether `name` is that of a body in this copy.
     pub fn made(&self, name: &str) -> bool {
         let own = name.strip_suffix(&self.number.to_string());
-        own.is_some_and(|own| self.has(own))
+        own.is_some_and(|own| self.bodies.contains(own))
     }
 
     /// Where a point of the first copy lies in this one, m.

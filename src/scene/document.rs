@@ -4,6 +4,7 @@ use super::beside::Beside;
 use super::copy::Copy as PatternCopy;
 use super::error::{brief, line_text, nearest, place_of};
 use super::given::{FileNumber, Place};
+use super::parameters::{Kind, ValueFault};
 use super::reading::Reading;
 use super::{Dimension, SceneError, Vec3, find};
 use crate::words::Words;
@@ -323,14 +324,23 @@ impl<'d> Node<'d> {
         Err(self.error("is not a name; allowed 1 to 40 letters (a to z), digits, `_` and `-`"))
     }
 
-    /// The name of something else: in a copy of a pattern, what belongs to the pattern is that of the same copy.
-    pub fn reference(&self) -> Result<Cow<'d, str>, SceneError> {
-        self.text().map(|name| self.numbered(name))
+    /// The name of a body: in a copy of a pattern that has this body, that of the copy.
+    pub fn body(&self) -> Result<Cow<'d, str>, SceneError> {
+        let name = self.text()?;
+        let copy = self.document.copy;
+        Ok(copy.map_or(Cow::Borrowed(name), |copy| copy.body(name)))
+    }
+
+    /// The name of a joint, as [`Self::body`].
+    pub fn joint(&self) -> Result<Cow<'d, str>, SceneError> {
+        let name = self.text()?;
+        let copy = self.document.copy;
+        Ok(copy.map_or(Cow::Borrowed(name), |copy| copy.joint(name)))
     }
 
     fn numbered(&self, name: &'d str) -> Cow<'d, str> {
         match self.document.copy {
-            Some(copy) => copy.name(name),
+            Some(copy) => Cow::Owned(copy.name(name)),
             None => Cow::Borrowed(name),
         }
     }
@@ -479,9 +489,26 @@ impl<'d> Node<'d> {
     pub fn parameter(&self, key: &str) -> Result<super::Value, SceneError> {
         let parameter = find(key).expect("only keys of the table are asked for");
         // A count or a pure number may be written bare; text and bare numbers read alike.
-        parameter
-            .read(self.scalar()?)
-            .map_err(|error| self.error(error.to_string()))
+        let text = self.scalar()?;
+        let (read, Kind::Number { dimension, .. }) = (parameter.read(text), parameter.kind) else {
+            let read = parameter.read(text);
+            return read.map_err(|error| self.error(error.to_string()));
+        };
+        match read {
+            Err(error) if matches!(error.fault, ValueFault::Quantity(_)) => {
+                // No quantity: an expression, perhaps.
+                let value = self
+                    .document
+                    .reading
+                    .evaluate(text, dimension, self.document.copy);
+                let value = value.map_err(|why| self.error(format!("{why}; {}", error.allowed)))?;
+                let value = super::Value::Number(value);
+                let checked = parameter.check(&value);
+                checked.map_err(|error| self.error(error.to_string()))?;
+                Ok(value)
+            }
+            read => read.map_err(|error| self.error(error.to_string())),
+        }
     }
 }
 
@@ -498,7 +525,12 @@ pub(super) fn lists<'d>(
     let mut nodes = Vec::new();
     for file in files {
         if let Some(list) = file.get(name) {
+            let first = nodes.len();
             nodes.extend(list.elements_up_to(most, what)?);
+            // Counted through all files.
+            for (index, node) in nodes.iter_mut().enumerate().skip(first) {
+                node.key = format!("{name}[{index}]");
+            }
         }
     }
     match nodes.get(most) {

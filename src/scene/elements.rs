@@ -94,6 +94,11 @@ pub static ELEMENT_KINDS: [ElementKind; 6] = [
             },
         ],
         acts_by: &["stiffness", "damping", "preload"],
+        choices: &[(
+            "side",
+            SpringSide::WORDS,
+            "which way it acts: a tyre and a rubber buffer only push, a rope only pulls",
+        )],
         force: |spring| spring.number("preload").abs(),
         look: ElementLook::Coil,
         ..PLAIN

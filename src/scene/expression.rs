@@ -183,7 +183,7 @@ impl Program {
         variable: impl Fn(&str) -> Option<usize>,
         names: &[&str],
     ) -> Result<Self, ExpressionError> {
-        Self::parse_with_units(text, variable, names, |_| None)
+        Self::parse_text(text, variable, names, |_| None, false)
     }
 
     /// As [`Self::parse`]; a number may be followed by a unit, by which it is multiplied. `unit` gives the length of the unit with
@@ -196,6 +196,16 @@ impl Program {
         variable: impl Fn(&str) -> Option<usize>,
         names: &[&str],
         unit: impl Fn(&str) -> Option<(usize, usize)>,
+    ) -> Result<Self, ExpressionError> {
+        Self::parse_text(text, variable, names, unit, true)
+    }
+
+    fn parse_text(
+        text: &str,
+        variable: impl Fn(&str) -> Option<usize>,
+        names: &[&str],
+        unit: impl Fn(&str) -> Option<(usize, usize)>,
+        angles: bool,
     ) -> Result<Self, ExpressionError> {
         if text.len() > LONGEST_EXPRESSION {
             return Err(ExpressionError {
@@ -213,6 +223,7 @@ impl Program {
             variable: &variable,
             names,
             unit: &unit,
+            angles,
         };
         parser.sum()?;
         match parser.peek() {
@@ -364,6 +375,8 @@ struct Parser<'t> {
     variable: &'t dyn Fn(&str) -> Option<usize>,
     names: &'t [&'t str],
     unit: &'t dyn Fn(&str) -> Option<(usize, usize)>,
+    /// Angles are not pure numbers: what gives one is not evaluated beforehand.
+    angles: bool,
 }
 
 type Parsed = Result<(), ExpressionError>;
@@ -397,9 +410,14 @@ impl<'t> Parser<'t> {
 
     /// Adds a step, or its result if it is constant.
     fn push(&mut self, step: Step) -> Parsed {
+        let gives_angle = matches!(
+            step,
+            Step::Unary(Unary::Asin | Unary::Acos | Unary::Atan) | Step::Binary(Binary::Atan2)
+        );
+        let folds = !(self.angles && gives_angle);
         match (step, &mut self.steps[..]) {
-            (Step::Unary(operation), [.., Step::Constant(x)]) => *x = x.unary(operation),
-            (Step::Binary(operation), [.., Step::Constant(x), Step::Constant(y)]) => {
+            (Step::Unary(operation), [.., Step::Constant(x)]) if folds => *x = x.unary(operation),
+            (Step::Binary(operation), [.., Step::Constant(x), Step::Constant(y)]) if folds => {
                 *x = x.binary(operation, *y);
                 self.steps.pop();
                 self.held -= 1;
@@ -529,10 +547,11 @@ impl<'t> Parser<'t> {
         self.at += length;
         self.push(Step::Variable(size))?;
         self.push(Step::Binary(Binary::Multiply))?;
-        match self.peek() {
-            Some('^') => Err(self.unexpected("an operator other than a power")),
-            _ => Ok(()),
+        let power = self.peek() == Some('^') || self.text[self.at..].starts_with("**");
+        if power {
+            return Err(self.unexpected("an operator other than a power"));
         }
+        Ok(())
     }
 
     /// A variable, a constant or a call. A name may contain dots.

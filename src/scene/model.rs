@@ -490,6 +490,34 @@ words!(LoadAxes {
     Body => "body",
 });
 
+/// Which way a spring acts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SpringSide {
+    /// Pushes and pulls.
+    Both,
+    /// Pushes only, like a tyre on the ground.
+    Push,
+    /// Pulls only, like a rope.
+    Pull,
+}
+
+words!(SpringSide {
+    Both => "both",
+    Push => "push",
+    Pull => "pull",
+});
+
+impl SpringSide {
+    /// The tension that is left of one, N.
+    pub fn of(self, tension: f64) -> f64 {
+        match self {
+            Self::Both => tension,
+            Self::Push => tension.min(0.0),
+            Self::Pull => tension.max(0.0),
+        }
+    }
+}
+
 /// A numeric key of an element or a drive.
 #[derive(Clone, Copy, Debug)]
 pub struct ElementNumber {

@@ -35,11 +35,13 @@ fn read_parameter(node: &Node<'_>) -> Result<OwnParameter, SceneError> {
     let name_node = section.require("name", "\"stroke\"")?;
     let name = name_node.name()?;
     let letters = |c: char| c.is_ascii_alphanumeric() || c == '_';
-    let reserved =
-        ["i", "pi", "e"].contains(&&*name) || name.starts_with(|c: char| c.is_ascii_digit());
+    let reserved = ["i", "pi", "e", "t"].contains(&&*name)
+        || all_units().any(|(unit, ..)| unit == name)
+        || name.starts_with(|c: char| c.is_ascii_digit());
     if reserved || !name.chars().all(letters) {
         return Err(name_node.error(
-            "cannot name a parameter, as expressions use it; allowed letters (a to z), digits and `_`, a letter first, but not i, pi or e",
+            "cannot name a parameter, as expressions use it; allowed letters (a to z), digits and `_`, a letter first, but not i, \
+             pi, e, t or a unit",
         ));
     }
     let value_node = section.require("value", "\"20 mm\"")?;
@@ -56,7 +58,7 @@ fn read_parameter(node: &Node<'_>) -> Result<OwnParameter, SceneError> {
                 Some(node) => (node, "unknown unit"),
                 None => (
                     value_node,
-                    "its unit is not to be seen here: give it with `unit`, for example `unit = \"mm\"`",
+                    "its unit cannot be told from an expression: give it with `unit`, for example `unit = \"mm\"`",
                 ),
             };
             return Err(at.error(key));

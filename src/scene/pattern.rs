@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
+use toml::de::DeValue;
 
 use super::copy::Copy;
 use super::document::{Node, Section, lists};
@@ -21,10 +22,29 @@ pub(super) struct Pattern<'d> {
 /// # Errors
 /// Anything wrong in their own keys, or too many copies.
 pub(super) fn read_patterns<'d>(files: &[Section<'d>]) -> Result<Vec<Pattern<'d>>, SceneError> {
-    lists(files, "pattern", MOST_BODIES, "patterns")?
-        .iter()
-        .map(read_pattern)
-        .collect()
+    let mut names = BTreeSet::new();
+    let mut patterns = Vec::new();
+    for node in lists(files, "pattern", MOST_BODIES, "patterns")? {
+        let pattern = read_pattern(&node)?;
+        let name = pattern.section.require("name", "\"leg\"")?;
+        if !names.insert(name.text()?) {
+            return Err(name.error("there is already a pattern of this name; names must differ"));
+        }
+        patterns.push(pattern);
+    }
+    Ok(patterns)
+}
+
+/// Most values that the copies of a pattern may have together.
+const MOST_VALUES: usize = 1_000_000;
+
+/// Number of values in a value.
+fn values(value: &DeValue<'_>) -> usize {
+    match value {
+        DeValue::Array(array) => array.iter().map(|value| values(value.get_ref())).sum(),
+        DeValue::Table(table) => table.iter().map(|(_, value)| values(value.get_ref())).sum(),
+        _ => 1,
+    }
 }
 
 fn read_pattern<'d>(node: &Node<'d>) -> Result<Pattern<'d>, SceneError> {
@@ -45,27 +65,30 @@ fn read_pattern<'d>(node: &Node<'d>) -> Result<Pattern<'d>, SceneError> {
             return Err(count_node.error(message));
         }
     };
-    let mut members = BTreeSet::new();
+    let (mut bodies, mut joints) = (BTreeSet::new(), BTreeSet::new());
     let mut size = 0;
-    for list in &lists {
-        let Some(list) = section.get(list) else {
+    for name in &lists {
+        let Some(list) = section.get(name) else {
             continue;
         };
-        let entries = list.elements()?;
-        size += entries.len();
-        let name = |entry: &Node<'d>| {
+        size += values(list.value.get_ref());
+        let names = list.elements()?.into_iter().filter_map(|entry| {
             let name = entry.value.get_ref().get("name")?.get_ref().as_str()?;
             Some(name.to_owned())
-        };
-        members.extend(entries.iter().filter_map(name));
+        });
+        match *name {
+            "body" => bodies.extend(names),
+            "joint" | "ball_joint" => joints.extend(names),
+            _ => {}
+        }
     }
     if size == 0 {
         let message = format!("nothing to repeat; allowed here: {}", lists.join(", "));
         return Err(section.error("", message));
     }
-    if size.saturating_mul(count as usize) > MOST_SHAPES {
+    if size.saturating_mul(count as usize) > MOST_VALUES {
         return Err(count_node.error(format!(
-            "{count} copies of {size} things are too many; allowed at most {MOST_SHAPES} in all"
+            "{count} copies of {size} values are too many; allowed at most {MOST_VALUES} in all"
         )));
     }
     let (centre, axis, angle) = match section.get("about") {
@@ -93,14 +116,15 @@ fn read_pattern<'d>(node: &Node<'d>) -> Result<Pattern<'d>, SceneError> {
         None => Vec3::zeros(),
         Some(node) => node.vector(Dimension::Length)?,
     };
-    let members = Arc::new(members);
+    let (bodies, joints) = (Arc::new(bodies), Arc::new(joints));
     let copies = (0..count)
         .map(|index| Copy {
             number: index + 1,
             centre,
             turn: turned(axis, angle * f64::from(index)),
             shift: step * f64::from(index),
-            members: members.clone(),
+            bodies: bodies.clone(),
+            joints: joints.clone(),
         })
         .collect();
     Ok(Pattern { section, copies })

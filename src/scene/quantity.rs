@@ -32,16 +32,17 @@ impl Quantity {
         }
     }
 
-    /// Its SI value if it has this dimension.
+    /// Its SI value if it has this dimension. Radians come and go in products (omega r, 2 pi f) unless `exact`; a bare number for
+    /// an angle would be a slip.
     ///
     /// # Errors
     /// Why it has not, or that it is not finite.
-    pub fn of(self, dimension: Dimension) -> Result<f64, String> {
+    pub fn of(self, dimension: Dimension, exact: bool) -> Result<f64, String> {
         let found = self.powers.map_err(|fault| {
             match fault {
                 Fault::Mixed => "adds or compares quantities of different dimensions",
                 Fault::NotPure => "takes a function of a quantity that is not a pure number",
-                Fault::Power => "takes a root or a power that no unit has",
+                Fault::Power => "takes a root or a power whose unit would not be whole",
             }
             .to_owned()
         })?;
@@ -49,8 +50,7 @@ impl Quantity {
             return Err("is not a finite number".to_owned());
         }
         let wanted = powers(dimension);
-        // Radians come and go in products (omega r, 2 pi f); a bare number for an angle would be a slip.
-        let angle = wanted[..3] != [0; 3] || wanted[3] == found[3] || self.value == 0.0;
+        let angle = !exact && wanted[..3] != [0; 3] || wanted[3] == found[3] || self.value == 0.0;
         if found[..3] == wanted[..3] && angle {
             return Ok(self.value + 0.0);
         }

@@ -512,37 +512,33 @@ fn read_output(
 
 /// Names seen so far, with their positions in the text: they must be unique.
 #[derive(Default)]
-struct Names {
-    /// Line of each, and the included file in which it is.
-    places: BTreeMap<String, (u32, Option<String>)>,
+struct Names<'d> {
+    /// Where each is.
+    places: BTreeMap<String, Node<'d>>,
 }
 
-impl Names {
+impl<'d> Names<'d> {
     /// Reserves `name` for the item at `node`, unless already taken.
-    fn taken(&mut self, name: &str, node: &Node<'_>) {
+    fn taken(&mut self, name: &str, node: &Node<'d>) {
         self.places
             .entry(name.to_owned())
-            .or_insert_with(|| line_of(node));
+            .or_insert_with(|| node.clone());
     }
 
-    fn add(&mut self, section: &Section<'_>, what: &str, name: &str) -> Result<(), SceneError> {
+    fn add(&mut self, section: &Section<'d>, what: &str, name: &str) -> Result<(), SceneError> {
         let node = section.require("name", "\"rod\"")?;
-        match self.places.insert(name.to_owned(), line_of(&node)) {
+        match self.places.insert(name.to_owned(), node.clone()) {
             None => Ok(()),
-            Some((line, file)) => {
+            Some(first) => {
+                let document = &first.document;
+                let (line, _) = place_of(document.text, first.place());
+                let file = document.file.filter(|_| document.included);
                 let of_file =
-                    file.map_or_else(String::new, |file| format!(" of {}", visible_line(&file)));
+                    file.map_or_else(String::new, |file| format!(" of {}", visible_line(file)));
                 Err(node.error(format!(
                     "there is already a {what} of this name, in line {line}{of_file}; names must differ, for example `{name}2`"
                 )))
             }
         }
     }
-}
-
-fn line_of(node: &Node<'_>) -> (u32, Option<String>) {
-    let document = &node.document;
-    let (line, _) = place_of(document.text, node.place());
-    let file = document.file.filter(|_| document.included);
-    (line, file.map(str::to_owned))
 }

@@ -49,7 +49,7 @@ pub(super) fn read_joint<'d>(
     let kind: JointKind = section.require("kind", "\"revolute\"")?.word()?;
     let child_node = section.require("child", "\"rod\"")?;
     let place = |node: &Node<'_>, also| {
-        let wanted = &*node.reference()?;
+        let wanted = &*node.body()?;
         let names = || Option::into_iter(also).chain(bodies.iter().map(String::as_str));
         let place = places.get(wanted).copied();
         place.ok_or_else(|| node.error(no_body(wanted, names())))
@@ -384,7 +384,7 @@ pub(super) fn read_attachment(
         .require(key, "{ body = \"rod\", at = \"0 0 100 mm\" }")?
         .section(&["body", "at"])?;
     let body_node = part.require("body", "\"rod\"")?;
-    let wanted = &*body_node.reference()?;
+    let wanted = &*body_node.body()?;
     let body = match (wanted, bodies.get(wanted)) {
         ("world", _) => None,
         (_, Some(&index)) => Some(index),
@@ -410,7 +410,7 @@ pub(super) fn read_one_degree_joint(
 ) -> Result<usize, SceneError> {
     const LISTED: usize = 12;
     let node = section.require("joint", "\"crank\"")?;
-    let wanted = &*node.reference()?;
+    let wanted = &*node.joint()?;
     match joints.get(wanted) {
         Some(&index) if scene.joints[index].has_coordinate() => Ok(index),
         found => {

@@ -1,6 +1,7 @@
 //! What is known of a scene while it is being read: changes, the scene's own parameters, the numbers so far.
 
-use std::cell::RefCell;
+use std::borrow::Cow;
+use std::cell::{OnceCell, RefCell};
 use std::collections::BTreeMap;
 use toml::Spanned;
 use toml::de::DeValue;
@@ -9,7 +10,7 @@ use super::copy::Copy;
 use super::expression::{Number as _, Program};
 use super::given::FileNumber;
 use super::quantity::Quantity;
-use super::units::{Dimension, all_units, parse_quantity, unit_at_start};
+use super::units::{Dimension, all_units, parse_quantity, split_unit, unit_at_start};
 
 /// What is known of a scene while it is being read.
 #[derive(Default)]
@@ -19,6 +20,8 @@ pub(super) struct Reading<'d> {
     /// The scene's own parameters.
     own: RefCell<BTreeMap<String, Quantity>>,
     numbers: RefCell<BTreeMap<String, FileNumber>>,
+    /// The sizes of [`all_units`].
+    units: OnceCell<Vec<Quantity>>,
 }
 
 impl<'d> Reading<'d> {
@@ -55,6 +58,7 @@ impl<'d> Reading<'d> {
             Ok(value) => return Ok(value),
             Err(error) => error.to_string(),
         };
+        let plain = plain(text);
         let own = self.own.borrow();
         let mut names: Vec<&str> = own.keys().map(String::as_str).collect();
         let mut values: Vec<Quantity> = own.values().copied().collect();
@@ -62,30 +66,31 @@ impl<'d> Reading<'d> {
             names.push("i");
             values.push(Quantity::constant(f64::from(copy.number)));
         }
-        let may_be_meant = !names.is_empty();
         let first_unit = values.len();
-        values.extend(all_units().map(|(_, of, size)| Quantity::new(size, of)));
+        let units = self.units.get_or_init(|| {
+            let unit = |(_, of, size)| Quantity::new(size, of);
+            all_units().map(unit).collect()
+        });
+        values.extend(units);
         let program = Program::parse_with_units(
-            text,
+            &plain,
             |name| names.iter().position(|own| *own == name),
             &names,
             |rest| unit_at_start(rest).map(|(length, place)| (length, first_unit + place)),
         );
+        let may_be_meant = operates(&plain) || split_unit(&plain) == plain;
         match program {
-            // A number and its unit alone: what is wrong with it, the first error knows better.
-            Ok(program)
-                if program.length() <= 3 + usize::from(text.trim().starts_with('-'))
-                    && !(0..first_unit).any(|own| program.uses(own))
-                    && !text.contains(['*', '+', '(']) =>
-            {
-                Err(error)
+            Ok(program) => {
+                let uses_own = (0..first_unit).any(|own| program.uses(own));
+                if !uses_own && !operates(&plain) {
+                    // A number with its unit: what is wrong with it, the first error knows better.
+                    return Err(error);
+                }
+                let value = program.eval(&values);
+                // A parameter alone is a quantity like any other, and no product in which radians come and go.
+                value.of(dimension, uses_own && program.length() == 1)
             }
-            Ok(program) => program.eval(&values).of(dimension),
-            Err(wrong)
-                if may_be_meant && !text.trim().starts_with(|c: char| c.is_ascii_digit()) =>
-            {
-                Err(wrong.to_string())
-            }
+            Err(wrong) if may_be_meant && !names.is_empty() => Err(wrong.to_string()),
             Err(_) => Err(error),
         }
     }
@@ -105,4 +110,22 @@ impl<'d> Reading<'d> {
     pub fn numbers(&self) -> BTreeMap<String, FileNumber> {
         self.numbers.take()
     }
+}
+
+/// Whether a text is more than a number with its unit.
+fn operates(text: &str) -> bool {
+    let rest = split_unit(text);
+    rest.starts_with(['/', '^']) || rest.contains(['*', '+', '-', '('])
+}
+
+/// The text with the signs that only units may have spelt out.
+fn plain(text: &str) -> Cow<'_, str> {
+    if text.is_ascii() {
+        return Cow::Borrowed(text);
+    }
+    let spelt = text
+        .replace(['µ', 'μ'], "u")
+        .replace('²', "^2")
+        .replace('³', "^3");
+    Cow::Owned(spelt.replace(['·', '⋅'], " ").replace('°', " deg"))
 }

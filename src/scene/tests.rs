@@ -561,7 +561,11 @@ fn a_parameter_of_the_file_is_a_row_like_the_others() {
     );
     assert_eq!(row.range(), "10 mm to 50 mm");
     let speed = scene.parameter("parameter.speed").expect("known");
-    assert_eq!((speed.label, speed.display_unit()), ("speed", "mm/s"));
+    // What follows from others is a number like any other.
+    assert_eq!(
+        (speed.label, speed.display_unit()),
+        ("parameter.speed", "m/s")
+    );
 }
 
 #[test]
@@ -618,7 +622,11 @@ fn wrong_numbers_and_expressions_say_what_is_wrong() {
             "there is already a parameter of this name",
         ),
         ("unit = \"mm/s\"", "unit = \"mph\"", "unknown unit"),
-        ("unit = \"mm/s\"\n", "", "its unit is not to be seen here"),
+        (
+            "unit = \"mm/s\"\n",
+            "",
+            "its unit cannot be told from an expression",
+        ),
     ] {
         let error = error(from, to);
         assert!(
@@ -904,4 +912,136 @@ fn a_body_of_a_density_weighs_what_its_shapes_do() {
         let error = read(body).expect_err(wanted).to_string();
         assert!(error.contains(wanted), "{error}");
     }
+}
+
+#[test]
+fn expressions_stand_wherever_a_number_does_and_mind_their_units() {
+    let text = |value: &str, more: &str| {
+        format!(
+            "[contact]\n{more}\n[[parameter]]\nname = \"radius\"\nvalue = \"50 mm\"\n[[parameter]]\nname = \"rate\"\nvalue = \"60 rpm\"\n\
+             [[body]]\nname = \"rod\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n\
+             [[joint]]\nname = \"hinge\"\nkind = \"revolute\"\nchild = \"rod\"\naxis = [0, 0, 1]\n{value}\n"
+        )
+    };
+    let read = |value: &str, more: &str| Scene::parse(&text(value, more), Some("own.toml"), &[]);
+    let start = |value: &str| {
+        let scene = read(&format!("start = {{ position = \"{value}\" }}"), "");
+        let JointStart::Scalar { position, .. } =
+            scene.unwrap_or_else(|error| panic!("{error}")).joints[0].start
+        else {
+            panic!("a hinge");
+        };
+        position
+    };
+    assert_eq!(start("asin(0.5)"), libm::asin(0.5));
+    assert_eq!(start("atan2(1, 2) + 0 deg"), libm::atan2(1.0, 2.0));
+    assert!((start("2 * 15°") - 0.5235987755982988).abs() < 1e-15);
+    let scene = read(
+        "",
+        "clearance = \"radius / 250 + 10 µm\"\nfriction = \"1/3\"",
+    )
+    .expect("reads");
+    assert!((scene.contact.clearance - 0.21e-3).abs() < 1e-18);
+    assert_eq!(scene.contact.friction, 1.0 / 3.0);
+    let drive = |law: &str| format!("drive = {{ law = {law} }}");
+    let spin = "\"constant\", velocity = \"rate\"";
+    assert!(read(&drive(spin), "").is_ok());
+    for (value, more, wanted) in [
+        (
+            drive("\"harmonic\", amplitude = \"1 deg\", frequency = \"rate\""),
+            "",
+            "gives 6.28319 s^-1 rad, which is not in Hz",
+        ),
+        (
+            drive("\"constant\", velocity = \"radius**2 * 3 mm**2\""),
+            "",
+            "`*` where an operator other than a power should stand",
+        ),
+        (
+            String::new(),
+            "clearance = \"radius\"",
+            "clearance 50 mm must be below the ball radius",
+        ),
+        (
+            String::new(),
+            "friction = \"2 * radius\"",
+            "gives 0.1 m, but must be a pure number; allowed 0 to 10",
+        ),
+        (
+            String::new(),
+            "friction = \"2 * radiu\"",
+            "no variable `radiu` (did you mean `radius`?)",
+        ),
+    ] {
+        let error = read(&value, more).expect_err(wanted).to_string();
+        assert!(error.contains(wanted), "{error}");
+    }
+    let unit = text("", "").replace("\"radius\"", "\"mm\"");
+    let error = Scene::parse(&unit, None, &[])
+        .expect_err("a unit")
+        .to_string();
+    assert!(error.contains("or a unit"), "{error}");
+}
+
+#[test]
+fn names_of_bodies_and_joints_in_a_pattern_are_apart() {
+    let text = "
+[[body]]
+name = \"hub\"
+mass = \"1 kg\"
+inertia = \"1 1 1 kg m^2\"
+
+[[joint]]
+name = \"axle\"
+kind = \"fixed\"
+child = \"hub\"
+
+[[pattern]]
+name = \"blades\"
+count = 3
+about = { axis = [0, 0, 1] }
+
+[[pattern.body]]
+name = \"blade\"
+mass = \"1 kg\"
+inertia = \"1 1 1 kg m^2\"
+
+[[pattern.joint]]
+name = \"hub\"
+kind = \"revolute\"
+parent = \"hub\"
+child = \"blade\"
+parent_point = \"1 0 0 m\"
+axis = [1, 0, 0]
+
+[[pattern.joint_spring]]
+name = \"s\"
+joint = \"hub\"
+stiffness = \"1 N m/rad\"
+";
+    let scene = Scene::parse(text, None, &[]).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(scene.joints[2].name, "hub2");
+    assert_eq!(scene.joints[2].parent, Some(0));
+    let angle = std::f64::consts::TAU / 3.0;
+    let turned = Vec3::new(libm::cos(angle), libm::sin(angle), 0.0);
+    assert!((scene.joints[2].parent_point - turned).norm() < 1e-15);
+    for (from, to, wanted) in [(
+        "inertia = \"1 1 1 kg m^2\"\n\n[[pattern.joint]]",
+        &format!(
+            "inertia = \"1 1 1 kg m^2\"\nshapes = [{}]\n\n[[pattern.joint]]",
+            "0, ".repeat(9999)
+        ),
+        "copies of",
+    )] {
+        let many = text.replace("count = 3", "count = 10000").replace(from, to);
+        let error = Scene::parse(&many, None, &[]).expect_err(wanted);
+        assert!(error.message.contains(wanted), "{error}");
+    }
+    let twice = format!(
+        "{text}[[pattern]]\nname = \"blades\"\ncount = 1\nalong = [0, 0, 0]\nfixed_shape = [{{ form = \"sphere\", centre = [0, 0, 0], radius = \"1 mm\", role = \"pin\" }}]\n"
+    );
+    let error = Scene::parse(&twice, None, &[])
+        .expect_err("twice")
+        .to_string();
+    assert!(error.contains("already a pattern of this name"), "{error}");
 }

@@ -1,6 +1,6 @@
 //! Force elements against closed solutions, in every method and both formulations.
 
-use crate::common::METHODS;
+use crate::common::{METHODS, parse};
 use jointplay::scene::{Scene, Vec3};
 use jointplay::simulate::{Frame, Simulation};
 
@@ -370,4 +370,76 @@ fn bad_elements_are_refused_where_they_stand() {
         }
         assert!(message.starts_with("mine.toml:"), "{message}");
     }
+}
+
+#[test]
+fn a_one_sided_spring_lets_go_and_catches_again() {
+    // Thrown off a spring that only pushes, a mass falls back on it as fast as it left; over the top it is in free flight.
+    let text = "
+[gravity]
+z = \"-9.81 m/s^2\"
+
+[[body]]
+name = \"mass\"
+mass = \"0.5 kg\"
+inertia = \"1e-3 1e-3 1e-3 kg m^2\"
+
+[[joint]]
+name = \"guide\"
+kind = \"prismatic\"
+child = \"mass\"
+axis = [0, 0, 1]
+start = { position = \"60 mm\" }
+
+[[spring]]
+name = \"pad\"
+from = { body = \"world\" }
+to = { body = \"mass\" }
+length = \"100 mm\"
+stiffness = \"2 kN/m\"
+side = \"push\"
+";
+    for (method, formulation) in [
+        ("dopri5", "tree"),
+        ("radau5", "lagrange"),
+        ("automatic", "tree"),
+        ("rosenbrock", "tree"),
+    ] {
+        let changes = [
+            ("solver.method", method),
+            ("solver.tolerance", "1e-9"),
+            ("formulation", formulation),
+        ];
+        let mut simulation = Simulation::new(&parse(text, &changes)).unwrap();
+        // Where it leaves the spring: half k 0.04^2 - m g 0.04 = half m v^2.
+        let speed = (2000.0 * 0.04_f64.powi(2) / 0.5 - 2.0 * 9.81 * 0.04).sqrt();
+        let top = 0.1 + speed * speed / (2.0 * 9.81);
+        let mut highest = 0.0_f64;
+        for n in 1..=1500 {
+            let frame = at(&mut simulation, f64::from(n) * 1e-3);
+            let height = frame.bodies[0].position.z;
+            highest = highest.max(height);
+            let force = frame.elements[0].force.z;
+            let expected = 2000.0 * (0.1 - height).max(0.0);
+            assert!((force - expected).abs() < 1e-9, "{force} {expected}");
+        }
+        assert!((highest - top).abs() < 1e-4, "{method}: {highest} {top}");
+        let ledger = simulation.ledger().unwrap();
+        assert!(
+            ledger.relative_residual().abs() < 1e-6,
+            "{method} {ledger:?}"
+        );
+    }
+    // Preloaded and damped: energy balances though the spring goes slack.
+    let damped = text.replace(
+        "stiffness = \"2 kN/m\"",
+        "stiffness = \"2 kN/m\"\ndamping = \"5 N s/m\"\npreload = \"-10 N\"",
+    );
+    let mut simulation = Simulation::new(&parse(&damped, &[("solver.tolerance", "1e-9")])).unwrap();
+    simulation.advance_to(1.0).unwrap();
+    let ledger = simulation.ledger().unwrap();
+    assert!(
+        ledger.damping_loss > 0.1 && ledger.relative_residual().abs() < 1e-6,
+        "{ledger:?}"
+    );
 }

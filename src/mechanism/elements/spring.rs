@@ -1,10 +1,11 @@
-//! Spring with a damper along the line between two points: tension T = preload + stiffness (l - length) + damping dl/dt.
+//! Spring with a damper along the line between two points: tension T = preload + stiffness (l - length) + damping dl/dt, or
+//! what is left of it where it only pushes or only pulls.
 
 use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, Site, point_of, push};
 use crate::mechanism::Powers;
 use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::model::Anchor;
-use crate::scene::{Element, Mat3, Vec3};
+use crate::scene::{Element, Mat3, SpringSide, Vec3};
 
 struct Spring {
     from: Anchor,
@@ -13,6 +14,7 @@ struct Spring {
     stiffness: f64,
     damping: f64,
     preload: f64,
+    side: SpringSide,
 }
 
 /// State at one instant.
@@ -27,6 +29,8 @@ struct State {
     rate: f64,
     /// N.
     tension: f64,
+    /// Whether it would act the other way, and does not.
+    slack: bool,
 }
 
 pub(super) fn make(element: &Element, site: &Site<'_>) -> Box<dyn SceneElement> {
@@ -37,6 +41,7 @@ pub(super) fn make(element: &Element, site: &Site<'_>) -> Box<dyn SceneElement> 
         stiffness: element.number("stiffness"),
         damping: element.number("damping"),
         preload: element.number("preload"),
+        side: element.choice("side"),
     })
 }
 
@@ -54,6 +59,8 @@ impl Spring {
         let velocity = end_velocity - start_velocity;
         let rate = along.dot(&velocity);
         let stretch = length - self.length;
+        let both = self.preload + self.stiffness * stretch + self.damping * rate;
+        let tension = self.side.of(both);
         State {
             arms: [start_arm, end_arm],
             points: [start, end],
@@ -61,7 +68,8 @@ impl Spring {
             length,
             along,
             rate,
-            tension: self.preload + self.stiffness * stretch + self.damping * rate,
+            tension,
+            slack: tension != both,
         }
     }
 }
@@ -80,6 +88,9 @@ impl ForceElement for Spring {
 
     fn coupling(&self, at: &At<'_>) -> Option<Coupling> {
         let (s, ends) = (self.state(at.motion), [self.from, self.to]);
+        if s.slack {
+            return None;
+        }
         if s.length == 0.0 {
             // A bushing resists separation in any direction; otherwise the direction, and with it the force, jumps here.
             let bush = self.length == 0.0 && self.preload == 0.0;
@@ -97,12 +108,24 @@ impl ForceElement for Spring {
 
     fn stored(&self, motion: &[Kinematics]) -> f64 {
         let stretch = self.state(motion).length - self.length;
+        let elastic = self.preload + self.stiffness * stretch;
+        // Beyond the length at which it is slack it keeps what it has there.
+        let stretch = match self.side.of(elastic) == elastic || self.stiffness == 0.0 {
+            true => stretch,
+            false => -self.preload / self.stiffness,
+        };
         stretch * (self.preload + 0.5 * self.stiffness * stretch)
     }
 
     fn add_powers(&self, _: f64, motion: &[Kinematics], powers: &mut Powers) {
-        let rate = self.state(motion).rate;
-        powers.damping += self.damping * rate * rate;
+        let s = self.state(motion);
+        powers.damping += match self.side {
+            SpringSide::Both => self.damping * s.rate * s.rate,
+            _ => {
+                let elastic = self.preload + self.stiffness * (s.length - self.length);
+                (s.tension - self.side.of(elastic)) * s.rate
+            }
+        };
     }
 }
 
