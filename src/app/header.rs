@@ -60,17 +60,19 @@ impl App {
         ComboBox::from_id_salt("scene")
             .width(if compact { 150.0 } else { 170.0 })
             .truncate()
+            // All scenes, where the window is high enough for them; otherwise the list scrolls.
+            .height(0.7 * ui.ctx().content_rect().height())
             .selected_text(&name)
             .show_ui(ui, |ui| {
+                let help = "A link that somebody gave you, the name of a scene, or a file";
+                let other = ui.selectable_label(false, "Link…").on_hover_text(help);
+                link = other.clicked();
+                ui.separator();
                 for built_in in BUILT_IN {
                     if ui.selectable_label(name == built_in, built_in).clicked() {
                         wanted = Some(built_in);
                     }
                 }
-                ui.separator();
-                let help = "A link that somebody gave you, the name of a scene, or a file";
-                let other = ui.selectable_label(false, "Link…").on_hover_text(help);
-                link = other.clicked();
             })
             .response
             .on_hover_text(&self.player.scene().title)
