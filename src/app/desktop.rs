@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 use std::io::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use eframe::egui;
@@ -82,10 +82,14 @@ impl Host for DesktopHost {
         self.opened.pop_front()
     }
 
-    fn watch(&mut self, ctx: &egui::Context, name: Option<&str>) {
+    fn folder(&self, name: &str) -> Option<PathBuf> {
+        Path::new(name).parent().map(Path::to_owned)
+    }
+
+    fn watch(&mut self, ctx: &egui::Context, name: Option<&str>, beside: &[String]) {
         self.watcher = name.and_then(|name| {
             let ctx = ctx.clone();
-            Watcher::start(name, move || ctx.request_repaint())
+            Watcher::start(name, beside, move || ctx.request_repaint())
         });
     }
 

@@ -13,7 +13,6 @@ use super::replay::Verdict;
 use super::share::shown::Instruments;
 use super::share::{Link, SceneText, is_link, shown};
 use super::{App, Notice};
-use crate::scene::Scene;
 
 /// Rows of a saved record.
 const ROWS: usize = 1000;
@@ -92,7 +91,8 @@ impl App {
         let opened = String::from_utf8(bytes)
             .map_err(|_| format!("{name}: not a text file"))
             .and_then(|text| {
-                Scene::parse(&text, Some(name), &[]).map_err(|error| error.to_string())
+                self.parse_file(name, &text, &[])
+                    .map_err(|error| error.to_string())
             })
             .and_then(|scene| self.show_scene(&scene));
         self.problem = opened.clone().err();
@@ -307,15 +307,7 @@ fn meta(player: &Player) -> String {
         .iter()
         .map(|(key, value)| (key.clone(), json!(value)))
         .collect();
-    let link = Link {
-        scene: SceneText::of(player.wanted()),
-        log: player.log(),
-        steps: Some(player.steps()),
-        time: Some(player.pacer.shown()),
-        hash: Some(player.simulation().state_hash()),
-        ..Link::default()
-    };
-    let meta = json!({
+    let mut meta = json!({
         "program": "jointplay",
         "version": crate::VERSION,
         "scene": scene.name,
@@ -329,8 +321,25 @@ fn meta(player: &Player) -> String {
         // The state is that at the end of the latest step.
         "state_time_s": player.simulation().time(),
         "state_hash": format!("{:016x}", player.simulation().state_hash()),
-        "link": link.format(),
     });
+    let wanted = player.wanted();
+    if wanted.source.beside.is_empty() {
+        let link = Link {
+            scene: SceneText::of(wanted),
+            log: player.log(),
+            steps: Some(player.steps()),
+            time: Some(player.pacer.shown()),
+            hash: Some(player.simulation().state_hash()),
+            ..Link::default()
+        };
+        meta["link"] = json!(link.format());
+    } else {
+        // A link carries one text.
+        let texts = wanted.source.beside.iter();
+        let texts = texts.map(|(name, text)| (name.clone(), json!(**text)));
+        meta["scene_text"] = json!(wanted.source.text);
+        meta["scene_files"] = texts.collect();
+    }
     format!("{meta:#}\n")
 }
 
@@ -351,6 +360,7 @@ fn describe(player: &Player) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Scene;
     use crate::simulate::Quantity;
 
     fn player(scene: &str) -> Player {
@@ -401,5 +411,20 @@ mod tests {
         assert_eq!(meta["method"], "automatic");
         let link = Link::parse(meta["link"].as_str().expect("a text")).expect("a link");
         assert_eq!(link.steps, Some(player.steps()));
+        assert!(meta.get("scene_files").is_none());
+    }
+
+    #[test]
+    fn the_record_of_a_scene_that_names_files_holds_their_texts_instead_of_a_link() {
+        let text = crate::scene::built_in_text("pendulum").expect("built in");
+        let text = format!("include = [\"own.toml\"]\n{text}");
+        let own = "[[parameter]]\nname = \"reach\"\nvalue = \"1 mm\"\n";
+        let beside = [("own.toml".to_owned(), own.into())].into();
+        let scene = Scene::parse_with(&text, Some("mine.toml"), &beside, &[]).expect("a scene");
+        let player = Player::new(&scene).expect("starts");
+        let meta: serde_json::Value = serde_json::from_str(&meta(&player)).expect("JSON");
+        assert!(meta.get("link").is_none());
+        assert_eq!(meta["scene_text"], text);
+        assert_eq!(meta["scene_files"], json!({"own.toml": own}));
     }
 }

@@ -1,5 +1,6 @@
 //! What the application asks of its platform: a desktop window or a web page.
 
+use std::path::PathBuf;
 use std::sync::{Arc, OnceLock};
 
 use eframe::egui;
@@ -84,11 +85,17 @@ pub trait Host {
     /// The next file that was chosen, or dropped and read.
     fn opened(&mut self) -> Option<OpenedFile>;
 
-    /// Watches the scene file `name` from now on, instead of any other; `None` for none. `ctx` is asked for a repaint when it
-    /// is saved.
-    fn watch(&mut self, _ctx: &egui::Context, _name: Option<&str>) {}
+    /// Folder in which the scene file `name`, opened here, finds the files that it names; `None` where files have no folder.
+    fn folder(&self, _name: &str) -> Option<PathBuf> {
+        None
+    }
 
-    /// The next content of the watched file. The first may be as it was when the watch began.
+    /// Watches the scene file `name` from now on, instead of any other, and the files `beside` it that it names; `None` for
+    /// none. `ctx` is asked for a repaint when one of them is saved.
+    fn watch(&mut self, _ctx: &egui::Context, _name: Option<&str>, _beside: &[String]) {}
+
+    /// The next content of the watched scene file, also when a file beside it was saved. The first may be as it was when the
+    /// watch began.
     fn saved_elsewhere(&mut self) -> Option<OpenedFile> {
         None
     }

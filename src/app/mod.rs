@@ -53,6 +53,7 @@ mod zoom;
 use eframe::egui::{self, ThemePreference, Ui};
 use eframe::egui_wgpu;
 
+use crate::analysis::source::SceneSource;
 use crate::render;
 use crate::scene::{DEFAULT_SCENE, Scene, Vec3};
 use crate::simulate::{Simulation, StartError};
@@ -414,7 +415,8 @@ impl App {
         let phase = self.player.watch().phase();
         let twin = self.player.twin().is_some();
         let pose = self.viewport.pose();
-        let same = load.scene.text == self.player.wanted().source.text;
+        let (there, here) = (&load.scene, SceneSource::of(self.player.wanted()));
+        let same = (&there.text, &there.beside) == (&here.text, &here.beside);
         let file = self.scene_file.name().map(str::to_owned).filter(|_| same);
         let scene = load.scene.scene().map_err(|error| error.to_string());
         self.problem = scene.and_then(|scene| self.show_scene(&scene)).err();

@@ -1,10 +1,10 @@
-//! The scene file that is shown is loaded again when it is saved elsewhere.
+//! The scene file that is shown is loaded again when it, or a file that it names, is saved elsewhere.
 
 use eframe::egui;
 
 use super::App;
 use super::host::OpenedFile;
-use crate::scene::Scene;
+use crate::scene::{Scene, SceneError};
 
 /// Stepping time within which the instant shown before must be reached again, s; otherwise the run begins at 0.
 const QUICK: f64 = 0.4;
@@ -13,14 +13,19 @@ const QUICK: f64 = 0.4;
 #[derive(Debug, Default)]
 pub(super) struct SceneFile {
     name: Option<String>,
-    /// Whether the host was told.
-    told: bool,
+    /// Files beside it that the host watches, too; `None` if the host was not told.
+    told: Option<Vec<String>>,
+    /// The file beside it in which there is an error. The shown scene may be without it.
+    wrong: Option<String>,
 }
 
 impl SceneFile {
     /// The file `name`, as the user named it; the host is to be told.
     pub(super) fn named(name: Option<String>) -> Self {
-        Self { name, told: false }
+        Self {
+            name,
+            ..Self::default()
+        }
     }
 
     /// The file.
@@ -30,10 +35,18 @@ impl SceneFile {
 }
 
 impl App {
-    /// Lets the host watch the file of the scene, and loads it again if it was saved.
+    /// Lets the host watch the files of the scene, and loads it again if one was saved.
     pub(super) fn receive_saved_scene(&mut self, ctx: &egui::Context) {
-        if !std::mem::replace(&mut self.scene_file.told, true) {
-            self.host.watch(ctx, self.scene_file.name());
+        let file = &mut self.scene_file;
+        let beside = &self.player.wanted().source.beside;
+        let wrong = file.wrong.as_ref();
+        let wrong = wrong.filter(|wrong| !beside.contains_key(*wrong));
+        let names = beside.keys().chain(wrong).filter(|_| file.name.is_some());
+        let told = file.told.as_ref();
+        if told.is_none_or(|told| !names.clone().eq(told)) {
+            let names: Vec<String> = names.cloned().collect();
+            self.host.watch(ctx, file.name.as_deref(), &names);
+            file.told = Some(names);
         }
         while let Some(file) = self.host.saved_elsewhere() {
             // The latest message may come from a file that is no longer shown.
@@ -45,39 +58,62 @@ impl App {
         }
     }
 
+    /// Parses `text`, which the file `name` holds, with the files that it names as they are now.
+    pub(super) fn parse_file(
+        &self,
+        name: &str,
+        text: &str,
+        changes: &[(String, String)],
+    ) -> Result<Scene, SceneError> {
+        match self.host.folder(name) {
+            Some(folder) => Scene::parse_in_folder(text, Some(name), &folder, changes),
+            None => Scene::parse(text, Some(name), changes),
+        }
+    }
+
     /// Shows the scene of `file`, with what was changed here unless the file now says something else. View, plots and, if that
     /// is quick, the instant stay. On an error the running scene stays.
     fn reload(&mut self, file: OpenedFile) -> Result<(), String> {
         let name = file.name;
         let bytes = file.content.map_err(|reason| format!("{name}: {reason}"))?;
         let text = String::from_utf8(bytes).map_err(|_| format!("{name}: not a text file"))?;
-        if text == self.player.wanted().source.text {
+        let wanted = self.player.wanted();
+        let source = &wanted.source;
+        let again = |scene: Scene| scene.source.beside == source.beside;
+        let same = text == source.text;
+        if same && (self.parse_file(&name, &text, &wanted.changes)).is_ok_and(again) {
             // Saved as it was, or back to it after an error.
             self.problem = None;
+            self.scene_file.wrong = None;
             return Ok(());
         }
-        let parse = |text: &str, changes: &[(String, String)]| {
-            Scene::parse(text, Some(&name), changes).map_err(|error| error.to_string())
+        let before = Scene::parse_with(&source.text, Some(&name), &source.beside, &[]);
+        let after = match self.parse_file(&name, &text, &[]) {
+            Ok(after) => after,
+            Err(error) => {
+                let file = error.file.clone();
+                self.scene_file.wrong = file.filter(|file| *file != name);
+                return Err(error.to_string());
+            }
         };
-        let (before, after) = (
-            parse(&self.player.wanted().source.text, &[]),
-            parse(&text, &[])?,
-        );
         let stays = |key: &str| {
             let before = before.as_ref().ok().and_then(|scene| scene.get(key).ok());
             before.is_some() && before == after.get(key).ok()
         };
         let mut changes = self.player.wanted().changes.clone();
         changes.retain(|(key, _)| stays(key));
-        let scene = parse(&text, &changes)?;
+        let scene = self.parse_file(&name, &text, &changes);
+        let scene = scene.map_err(|error| error.to_string())?;
 
         let link = self.link();
         let (playing, twin) = (self.player.is_playing(), self.player.twin().is_some());
         let (phase, time) = (self.player.watch().phase(), self.player.pacer.shown());
+        let told = self.scene_file.told.clone();
         self.show_scene(&scene)?;
         self.scene_file = SceneFile {
             name: Some(name),
-            told: true,
+            told,
+            wrong: None,
         };
         self.player.set_phase(phase);
         let reached = self.reach(time);

@@ -1,4 +1,5 @@
-//! Notices that a file was saved, by looking at it twice a second on a thread of its own: a window at rest stays at rest.
+//! Notices that a scene file or one beside it was saved, by looking at them twice a second on a thread of its own: a window at
+//! rest stays at rest.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -14,7 +15,7 @@ const PERIOD: Duration = Duration::from_millis(500);
 /// A file that does not change for so long is written completely.
 const SETTLED: Duration = Duration::from_millis(50);
 
-/// A file that is watched until this is dropped.
+/// A scene file and those beside it, watched until this is dropped.
 #[derive(Debug)]
 pub(super) struct Watcher {
     changes: Receiver<OpenedFile>,
@@ -22,25 +23,35 @@ pub(super) struct Watcher {
 }
 
 impl Watcher {
-    /// Watches the file `name`, and calls `changed` whenever there is something to [`Self::poll`]: first its content as it
-    /// is. `None` if the system provides no thread.
-    pub(super) fn start(name: &str, changed: impl Fn() + Send + 'static) -> Option<Self> {
+    /// Watches the file `name` and the files `beside` it, and calls `changed` whenever there is something to
+    /// [`Self::poll`]: first its content as it is. `None` if the system provides no thread.
+    pub(super) fn start(
+        name: &str,
+        beside: &[String],
+        changed: impl Fn() + Send + 'static,
+    ) -> Option<Self> {
         let (sender, changes) = channel();
         let over = Arc::new(AtomicBool::new(false));
         let asked = Arc::clone(&over);
         let (name, path) = (name.to_owned(), PathBuf::from(name));
+        let others = beside.iter().map(|other| path.with_file_name(other));
+        let files: Vec<PathBuf> = std::iter::once(path.clone()).chain(others).collect();
         let look = move || {
-            let mut seen = None;
+            let stamps = || -> Vec<_> { files.iter().map(|file| stamp(file)).collect() };
+            let mut seen = vec![None; files.len()];
             while !asked.load(Ordering::Relaxed) {
-                let now = stamp(&path);
+                let now = stamps();
                 if now != seen {
                     std::thread::sleep(SETTLED);
-                    if stamp(&path) != now {
+                    if stamps() != now {
                         continue;
                     }
-                    seen = now;
                     // Some editors replace a file: for a moment there is none.
-                    if now.is_some() {
+                    let there =
+                        |(now, seen): (&Option<_>, &Option<_>)| now.is_some() && now != seen;
+                    let saved = now[0].is_some() && now.iter().zip(&seen).any(there);
+                    seen = now;
+                    if saved {
                         let (name, content) = (name.clone(), read(&path));
                         if sender.send(OpenedFile { name, content }).is_err() {
                             return;
@@ -56,7 +67,7 @@ impl Watcher {
         Some(Self { changes, over })
     }
 
-    /// The next content of the file.
+    /// The next content of the scene file.
     pub(super) fn poll(&self) -> Option<OpenedFile> {
         self.changes.try_recv().ok()
     }
@@ -92,7 +103,7 @@ mod tests {
         let path = folder.path().join("a.toml");
         std::fs::write(&path, "first").expect("writes");
         let (sender, told) = channel();
-        let watcher = Watcher::start(&path.display().to_string(), move || {
+        let watcher = Watcher::start(&path.display().to_string(), &[], move || {
             // Nobody listens at the end.
             let _ = sender.send(());
         });
@@ -113,6 +124,41 @@ mod tests {
         std::thread::sleep(2 * PERIOD);
         std::fs::rename(&beside, &path).expect("renames");
         assert_eq!(next(), "3");
+        assert!(told.try_recv().is_err() && watcher.poll().is_none());
+    }
+
+    #[test]
+    fn the_content_arrives_again_when_a_file_beside_it_is_saved() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (path, leg) = (
+            folder.path().join("a.toml"),
+            folder.path().join("parts/leg"),
+        );
+        std::fs::create_dir(folder.path().join("parts")).expect("makes");
+        std::fs::write(&path, "scene").expect("writes");
+        std::fs::write(&leg, "1").expect("writes");
+        let (sender, told) = channel();
+        let beside = ["parts/leg".to_owned(), "gone".to_owned()];
+        let watcher = Watcher::start(&path.display().to_string(), &beside, move || {
+            // Nobody listens at the end.
+            let _ = sender.send(());
+        });
+        let watcher = watcher.expect("a thread");
+        let next = || {
+            told.recv_timeout(Duration::from_secs(30))
+                .expect("a change");
+            let content = watcher.poll().expect("its content").content;
+            assert_eq!(content.as_deref(), Ok(&b"scene"[..]));
+        };
+        next();
+        std::fs::write(&leg, "longer").expect("writes");
+        next();
+        // That it has gone is no news; that it is there again is.
+        std::fs::remove_file(&leg).expect("removes");
+        std::thread::sleep(2 * PERIOD);
+        assert!(told.try_recv().is_err());
+        std::fs::write(&leg, "3").expect("writes");
+        next();
         assert!(told.try_recv().is_err() && watcher.poll().is_none());
     }
 }

@@ -105,7 +105,7 @@ pub fn solver(scene: &Scene) -> String {
 /// What would change with `there` in place of `here`, one phrase each, except for the keys `except`; empty if the motion is the
 /// same.
 pub fn differences(there: &Scene, here: &Scene, except: &[String]) -> Vec<String> {
-    if there.source.text != here.source.text {
+    if there.source.text != here.source.text || there.source.beside != here.source.beside {
         let (new, old) = (&there.name, &here.name);
         return vec![if new == old {
             format!("Scene: another file of the name {new}")

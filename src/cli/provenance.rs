@@ -21,6 +21,9 @@ pub fn meta(scene: &Scene) -> Map<String, Json> {
         .map(|(key, value)| (key.clone(), json!(value)))
         .collect();
     meta.insert("changed_parameters".into(), Json::Object(changed));
+    // Its presence tells that the file of the scene is not all of it.
+    let checksum = |text: &str| json!(format!("{:08x}", crc32fast::hash(text.as_bytes())));
+    insert_files(&mut meta, "scene_files_crc32", scene, checksum);
     meta.insert("formulation".into(), json!(scene.formulation));
     meta.insert("method".into(), json!(scene.solver.method));
     meta.insert("step_s".into(), json!(scene.solver.step));
@@ -28,6 +31,21 @@ pub fn meta(scene: &Scene) -> Map<String, Json> {
         meta.insert("tolerance".into(), json!(scene.solver.tolerance));
     }
     meta
+}
+
+/// Adds the texts of `scene`: with the changed parameters they reproduce it, wherever its files went.
+pub fn insert_texts(meta: &mut Map<String, Json>, scene: &Scene) {
+    meta.insert("scene_text".into(), json!(scene.source.text));
+    insert_files(meta, "scene_files", scene, |text| json!(text));
+}
+
+/// Adds under `key` what `of` makes of the text of each file that `scene` names; nothing if it names none.
+fn insert_files(meta: &mut Map<String, Json>, key: &str, scene: &Scene, of: impl Fn(&str) -> Json) {
+    let texts = scene.source.beside.iter();
+    let files: Map<String, Json> = texts.map(|(name, text)| (name.clone(), of(text))).collect();
+    if !files.is_empty() {
+        meta.insert(key.into(), Json::Object(files));
+    }
 }
 
 /// Every parameter of `scene` with its value as a user would write it.

@@ -229,8 +229,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
     meta.shift_remove("ratio");
     meta.shift_remove("slower_than_asked");
     meta.insert("duration_s".into(), json!(duration));
-    // With the changed parameters it reproduces the run, wherever the file went.
-    meta.insert("scene_text".into(), json!(scene.source.text));
+    super::provenance::insert_texts(&mut meta, &scene);
     let mut files = Vec::new();
     if let (Some(file), Some(times)) = (file, times) {
         let path = file.target().path().to_owned();

@@ -10,7 +10,7 @@ use serde_json::{Map, Value as Json, json};
 
 use super::{Failure, provenance};
 use crate::files::{FileError, OutputFile, PROGRAM, PendingFile};
-use crate::scene::Scene;
+use crate::scene::{Scene, visible_line};
 use crate::simulate::{SavedState, Simulation};
 
 /// Counts the versions of the file's layout.
@@ -57,7 +57,7 @@ impl StateFile {
         // Rows of a run that goes on begin here.
         meta.insert("time_s".into(), json!(simulation.time()));
         meta.insert("step_end_s".into(), json!(saved.time()));
-        meta.insert("scene_text".into(), json!(scene.source.text));
+        provenance::insert_texts(&mut meta, scene);
         let state = serde_json::to_value(saved).unwrap_or_default();
         if SavedState::deserialize(&state).ok().as_ref() != Some(saved) {
             let why = "the state holds a value that is not a number";
@@ -132,13 +132,7 @@ pub fn read(path: &Path, scene: &Scene) -> Result<Begun, Failure> {
             word(&told.unwrap_or_default())
         )));
     }
-    check_scene(
-        meta("scene"),
-        meta("scene_text"),
-        meta("changed_parameters"),
-        scene,
-    )
-    .map_err(&refuse)?;
+    check_scene(content.get("meta").unwrap_or(&Json::Null), scene).map_err(&refuse)?;
     let time = meta("time_s").as_f64();
     let state = content.get("state").map(SavedState::deserialize);
     let (Some(time), Some(state)) = (time, state) else {
@@ -148,17 +142,30 @@ pub fn read(path: &Path, scene: &Scene) -> Result<Begun, Failure> {
     Ok(Begun { state, time })
 }
 
-/// Refuses the state of another scene than `scene`, in words.
-fn check_scene(name: &Json, text: &Json, changed: &Json, scene: &Scene) -> Result<(), String> {
-    if *text != *scene.source.text {
+/// Refuses the state with `meta` of another scene than `scene`, in words.
+fn check_scene(meta: &Json, scene: &Scene) -> Result<(), String> {
+    if meta["scene_text"] != *scene.source.text {
         return Err(format!(
             "a state of the scene `{}`, whose text is not that of the scene given here, `{}`: a run goes on only in the \
              scene in which it began",
-            word(name),
+            word(&meta["scene"]),
             scene.name
         ));
     }
-    let now = &provenance::meta(scene)["changed_parameters"];
+    let (then, beside) = (&meta["scene_files"], &scene.source.beside);
+    let names = then.as_object().into_iter().flat_map(Map::keys);
+    let differs = |name: &&String| beside.get(*name).is_none_or(|now| then[*name] != **now);
+    if let Some(name) = names.chain(beside.keys()).find(differs) {
+        return Err(format!(
+            "a state of the scene `{}` when its file {} held something else: a run goes on only in the scene in which it began",
+            scene.name,
+            visible_line(name)
+        ));
+    }
+    let (changed, now) = (
+        &meta["changed_parameters"],
+        &provenance::meta(scene)["changed_parameters"],
+    );
     if changed == now {
         return Ok(());
     }

@@ -68,6 +68,19 @@ impl Scene {
         Self::parse_beside(text, file, Beside::default(), changes)
     }
 
+    /// As [`Self::parse`] for the text of a file in `folder`, where the files that it names are read.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn parse_in_folder(
+        text: &str,
+        file: Option<&str>,
+        folder: &Path,
+        changes: &[(String, String)],
+    ) -> Result<Self, SceneError> {
+        Self::parse_beside(text, file, Beside::in_folder(folder), changes)
+    }
+
     /// As [`Self::parse`] for a text that names the files `beside` it.
     ///
     /// # Errors

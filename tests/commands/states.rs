@@ -275,3 +275,70 @@ fn a_state_that_does_not_belong_is_refused_in_words() {
     fs::remove_file(&path).unwrap();
     refused(same, 1, &["cannot read s"]);
 }
+
+#[test]
+fn a_run_goes_on_only_with_the_files_that_its_scene_named() {
+    let folder = folder();
+    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+    let load = |mass: &str| format!("[[parameter]]\nname = \"load\"\nvalue = \"{mass}\"\n");
+    let pendulum = jointplay::scene::built_in_text("pendulum").unwrap();
+    let robot = pendulum.replace("mass = \"0.384 kg\"", "mass = \"load\"");
+    assert_ne!(robot, pendulum);
+    let robot = format!("include = [\"leg.toml\"]\n{robot}");
+    write("robot.toml", &robot);
+    write("leg.toml", &load("0.4 kg"));
+    let run = |more: &str| {
+        let line = format!("run robot.toml --summary json --quiet --force {more}");
+        jointplay(folder.path(), &line)
+    };
+    let meta = |name: &str| -> Json {
+        let text = fs::read_to_string(folder.path().join(name)).unwrap();
+        serde_json::from_str::<Json>(&text).unwrap()["meta"].take()
+    };
+    let first = run("--duration 3ms --save-state s --every 1ms --out a.json").expect(0);
+    for meta in [meta("s"), meta("a.json")] {
+        assert_eq!(meta["scene_text"], robot);
+        let files = serde_json::json!({"leg.toml": load("0.4 kg")});
+        assert_eq!(meta["scene_files"], files);
+    }
+    let checksum = format!("{:08x}", crc32fast::hash(load("0.4 kg").as_bytes()));
+    assert_eq!(first.json()["scene_files_crc32"]["leg.toml"], checksum);
+    let whole = run("--duration 6ms").expect(0).json();
+    let last = run("--duration 6ms --from-state s").expect(0).json();
+    assert_eq!(whole["state_hash"], last["state_hash"]);
+
+    write("leg.toml", &load("0.8 kg"));
+    let other = run("--duration 6ms --from-state s").expect(2);
+    assert!(
+        other.stderr.contains("its file leg.toml"),
+        "{}",
+        other.stderr
+    );
+    // A state without the texts of files is one of another scene, too.
+    let state = fs::read_to_string(folder.path().join("s")).unwrap();
+    let mut state: Json = serde_json::from_str(&state).unwrap();
+    let content = state.as_object_mut().unwrap();
+    content.shift_remove("crc32");
+    let told = content["meta"].as_object_mut().unwrap();
+    told.shift_remove("scene_files").unwrap();
+    let text = serde_json::to_string(content).unwrap();
+    let checksum = format!("{:08x}", crc32fast::hash(text.as_bytes()));
+    content.insert("crc32".to_owned(), checksum.into());
+    write("s", &state.to_string());
+    write("leg.toml", &load("0.4 kg"));
+    let lacking = run("--duration 6ms --from-state s").expect(2);
+    assert!(
+        lacking.stderr.contains("its file leg.toml"),
+        "{}",
+        lacking.stderr
+    );
+
+    // What names no file says nothing about files.
+    let line =
+        "run pendulum --duration 3ms --save-state s --every 1ms --out a.json --force --quiet";
+    jointplay(folder.path(), line).expect(0);
+    for meta in [meta("s"), meta("a.json")] {
+        let keys = meta.as_object().unwrap().keys();
+        assert!(!keys.into_iter().any(|key| key.starts_with("scene_files")));
+    }
+}

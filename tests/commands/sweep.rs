@@ -166,6 +166,36 @@ fn neither_threads_nor_shards_change_a_bit() {
     );
 }
 
+#[test]
+fn shards_of_different_files_beside_the_scene_are_not_merged() {
+    let folder = folder();
+    let own = |value: &str| {
+        let text = format!("[[parameter]]\nname = \"own\"\nvalue = \"{value}\"\n");
+        fs::write(folder.path().join("own.toml"), text).unwrap();
+    };
+    let text = jointplay::scene::built_in_text("spcmm").unwrap();
+    let text = format!("include = [\"own.toml\"]\n{text}");
+    fs::write(folder.path().join("mine.toml"), text).unwrap();
+    let shard = |shard: &str, out: &str| {
+        let line = SMALL.replace("spcmm", "./mine.toml");
+        let line = format!("{line} --shard {shard} --out {out} --force");
+        jointplay(folder.path(), &line).expect(0);
+    };
+    let merge = || jointplay(folder.path(), "merge s1.npz s2.npz --out merged.npz");
+    own("1 mm");
+    shard("1/2", "s1.npz");
+    own("2 mm");
+    shard("2/2", "s2.npz");
+    let mixed = merge().expect(2).stderr;
+    assert!(
+        mixed.contains("different sweeps: scene_files_crc32: ") && mixed.contains("own.toml"),
+        "{mixed}"
+    );
+    own("1 mm");
+    shard("2/2", "s2.npz");
+    merge().expect(0);
+}
+
 #[cfg(unix)]
 #[test]
 fn an_interrupted_sweep_goes_on_where_it_stopped_and_a_damaged_part_is_refused() {

@@ -12,7 +12,7 @@ use egui_kittest::{
     Harness,
     kittest::{NodeT as _, Queryable as _},
 };
-use jointplay::app::{App, AppOptions, Clock, DesktopHost, Host, OpenedFile};
+use jointplay::app::{App, AppOptions, Clock, DesktopHost, Host, Link, OpenedFile, SceneText};
 use jointplay::scene::{Scene, built_in_text};
 
 /// What a host was asked for, and what it has to tell.
@@ -32,7 +32,7 @@ impl Host for Desk {
         None
     }
 
-    fn watch(&mut self, _ctx: &egui::Context, name: Option<&str>) {
+    fn watch(&mut self, _ctx: &egui::Context, name: Option<&str>, _beside: &[String]) {
         self.0.borrow_mut().watched.push(name.map(str::to_owned));
     }
 
@@ -215,6 +215,110 @@ fn only_the_file_of_the_shown_scene_is_watched() {
     assert_eq!(calls.borrow().watched, [Some(NAME.to_owned()), None, None]);
 }
 
+/// Lets the window look at the disk until `done`.
+fn wait(harness: &mut Harness<'_, App>, done: impl Fn(&Harness<'_, App>) -> bool) {
+    let started = std::time::Instant::now();
+    while !done(harness) {
+        assert!(started.elapsed().as_secs() < 30);
+        std::thread::sleep(std::time::Duration::from_millis(50));
+        harness.run_steps(1);
+    }
+}
+
+/// A file that a scene includes: a parameter of its own.
+fn own(name: &str, value: &str) -> String {
+    format!("[[parameter]]\nname = \"{name}\"\nvalue = \"{value}\"\n")
+}
+
+#[test]
+fn files_beside_the_scene_are_read_again_with_it_and_watched() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name);
+    let write = |name: &str, text: &str| std::fs::write(path(name), text).expect("writes");
+    let including = |names: &str, text: &str| format!("include = [{names}]\n{text}");
+    write("own.toml", &own("reach", "1 mm"));
+    write("mine.toml", &including("\"own.toml\"", &text()));
+    let changes = [("contact.restitution".to_owned(), "0.7".to_owned())];
+    let scene = Scene::load(path("mine.toml"), &changes).expect("a scene");
+    let mut harness = shown(scene, still, Box::new(DesktopHost::default()));
+    let get = |harness: &Harness<'_, App>, key: &str| {
+        let scene = harness.state().player().wanted();
+        scene.get(key).map(|value| format!("{value:?}")).ok()
+    };
+    let before = get(&harness, "parameter.reach");
+    assert!(before.is_some());
+    let notice = "Reloaded from the start, keeping 1 change";
+
+    // The included file alone.
+    write("own.toml", &own("reach", "25 mm"));
+    wait(&mut harness, |harness| {
+        get(harness, "parameter.reach") != before
+    });
+    assert!(says(&harness, notice), "{}", harness.state().announcement());
+    // The scene's own, which includes another one now, with an error in it.
+    write("other.toml", "[[parameter]]\nname = 1\n");
+    let both = including("\"own.toml\", \"other.toml\"", &rougher());
+    write("mine.toml", &both);
+    wait(&mut harness, |harness| says(harness, "other.toml:2"));
+    assert_eq!(friction(&harness), 0.15);
+    write("other.toml", &own("width", "3 mm"));
+    wait(&mut harness, |harness| friction(harness) == 0.25);
+    assert!(says(&harness, notice), "{}", harness.state().announcement());
+    let width = get(&harness, "parameter.width");
+    assert!(width.is_some());
+    write("other.toml", &own("width", "3.5 mm"));
+    wait(&mut harness, |harness| {
+        get(harness, "parameter.width") != width
+    });
+}
+
+/// A file dropped on the window.
+#[derive(Debug)]
+struct Dropped(PathBuf);
+
+impl egui::DroppedFile for Dropped {
+    fn path(&self) -> &std::path::Path {
+        &self.0
+    }
+
+    fn bytes(&self) -> Result<Vec<u8>, String> {
+        std::fs::read(&self.0).map_err(|cause| cause.to_string())
+    }
+}
+
+#[test]
+fn a_dropped_scene_finds_its_files_and_that_of_a_link_does_not() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("mine.toml");
+    let text = format!("include = [\"own.toml\"]\n{}", rougher());
+    std::fs::write(folder.path().join("own.toml"), own("reach", "1 mm")).expect("writes");
+    std::fs::write(&path, &text).expect("writes");
+    let scene = Scene::parse(&self::text(), None, &[]).expect("a scene");
+    let mut harness = shown(scene, still, Box::new(DesktopHost::default()));
+    let file = Arc::new(Dropped(path.clone()));
+    harness.input_mut().dropped_files.push(file);
+    harness.run_steps(3);
+    assert_eq!(
+        friction(&harness),
+        0.25,
+        "{}",
+        harness.state().announcement()
+    );
+    let source = &harness.state().player().wanted().source;
+    assert!(source.beside.contains_key("own.toml"));
+
+    let name = path.display().to_string();
+    let scene = SceneText::File { name, text };
+    let link = Link {
+        scene,
+        ..Link::default()
+    };
+    let ctx = harness.ctx.clone();
+    let opened = harness.state_mut().open_link(&ctx, &link.format());
+    let reason = opened.expect_err("no folder");
+    assert!(reason.contains("has no folder"), "{reason}");
+}
+
 #[test]
 fn a_file_on_the_disk_is_noticed() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -223,12 +327,7 @@ fn a_file_on_the_disk_is_noticed() {
     let scene = Scene::load(&path, &[]).expect("a scene");
     let mut harness = shown(scene, still, Box::new(DesktopHost::default()));
     std::fs::write(&path, rougher()).expect("writes");
-    let started = std::time::Instant::now();
-    while friction(&harness) != 0.25 {
-        assert!(started.elapsed().as_secs() < 30);
-        std::thread::sleep(std::time::Duration::from_millis(50));
-        harness.run_steps(1);
-    }
+    wait(&mut harness, |harness| friction(harness) == 0.25);
     assert!(says(&harness, "Reloaded"));
     let labels = harness.query_all_by_label_contains("Reloaded");
     assert!(
