@@ -718,7 +718,7 @@ fn scenes_are_listed_and_each_says_what_it_contains() {
             );
         }
     }
-    assert_eq!(list.lines().count(), 5);
+    assert_eq!(list.lines().count(), 10);
 
     let line_of = |report: &str, label: &str| {
         let line = report
