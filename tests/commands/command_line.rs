@@ -702,6 +702,11 @@ fn scenes_are_listed_and_each_says_what_it_contains() {
         ),
         ("slider-crank-driven", &["3 moving", "1 driven revolute"]),
         ("chain", &["8 moving", "8 with clearance"]),
+        ("hexapod", &["13 moving", "12 with clearance", "6 driven"]),
+        ("delta", &["10 moving", "12 with clearance", "3 driven"]),
+        ("four-bar", &["3 moving", "2 with clearance"]),
+        ("suspension", &["6 moving", "4 with clearance"]),
+        ("press", &["5 moving", "2 with clearance"]),
     ] {
         assert!(
             list.lines()

@@ -430,16 +430,18 @@ fn the_tie_rod_sets_the_toe() {
 fn each_machine_with_one_loose_joint_moves_the_same_under_another_solver() {
     for (name, joint, end) in [
         ("hexapod", "A6", 0.010),
-        ("delta", "B2", 0.0015),
+        ("delta", "B2", 0.003),
         ("four-bar", "A", 0.012),
         ("suspension", "lower", 0.004),
         ("press", "wrist", 0.030),
     ] {
         let key = format!("joint.{joint}.clearance");
-        let changes = [IDEAL, (&*key, "0.1 mm")];
+        // The other solver remembers the speed at which a contact began, not the largest one since.
+        let start = ("contact.approach_speed", "start");
+        let changes = [IDEAL, (&*key, "0.1 mm"), start];
         let (contacts, off) = moves_the_same(name, &changes, end);
         assert!(contacts >= 1, "{name}");
-        assert!(off < 5e-9, "{name}: {off:e}");
+        assert!(off < 1e-9, "{name}: {off:e}");
     }
 }
 
