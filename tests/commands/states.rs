@@ -106,10 +106,12 @@ fn built_in_scenes_go_on_with_the_same_bits_by_every_method() {
 #[test]
 fn machines_go_on_with_the_same_bits() {
     for name in MACHINES {
-        for method in ["automatic", "semi-implicit-euler"] {
-            let options = format!("--set solver.method={method} --set solver.tolerance=1e-4");
-            check(name, &options);
-        }
+        check(name, "--set solver.tolerance=1e-4");
+        // Longer steps are too long for the light rods of the delta.
+        check(
+            name,
+            "--set solver.method=semi-implicit-euler --set solver.step=1us",
+        );
     }
 }
 
