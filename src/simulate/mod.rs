@@ -50,7 +50,9 @@ impl StartError {
     /// The same error, with the line of `scene`'s file and the change that it concerns.
     pub fn located(&self, scene: &Scene) -> SceneError {
         let one = |joint: &str, parts: &[&str]| {
-            let mut keys = vec!["spcmm.".to_owned(), "formulation".to_owned()];
+            let mut keys = ["spcmm.", "parameter.", "formulation", "start"]
+                .map(str::to_owned)
+                .to_vec();
             for part in parts {
                 keys.push(format!("contact.{part}"));
                 keys.push(format!("joint.{joint}.{part}"));

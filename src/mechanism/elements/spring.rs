@@ -59,8 +59,13 @@ impl Spring {
         let velocity = end_velocity - start_velocity;
         let rate = along.dot(&velocity);
         let stretch = length - self.length;
-        let both = self.preload + self.stiffness * stretch + self.damping * rate;
-        let tension = self.side.of(both);
+        let elastic = self.preload + self.stiffness * stretch;
+        let both = elastic + self.damping * rate;
+        // Where the spring has let go, its damper has, too.
+        let tension = match self.side.of(elastic) == elastic {
+            true => self.side.of(both),
+            false => 0.0,
+        };
         State {
             arms: [start_arm, end_arm],
             points: [start, end],
