@@ -302,16 +302,42 @@ impl<'d> Node<'d> {
         )))
     }
 
-    /// One of an enum's words.
-    pub fn word<T: Words>(&self) -> Result<T, SceneError> {
+    /// A quantity in a closed range, SI.
+    pub fn within(&self, dimension: Dimension, range: (f64, f64)) -> Result<f64, SceneError> {
+        let value = self.quantity(dimension)?;
+        let (least, most) = range;
+        if (least..=most).contains(&value) {
+            return Ok(value);
+        }
+        let unit = super::si_unit(dimension);
+        let mut allowed = format!(
+            "out of range; allowed {} to {}",
+            super::format_quantity(least, unit),
+            super::format_quantity(most, unit)
+        );
+        if !unit.is_empty() {
+            allowed += &format!("; units {}", super::unit_names(dimension).join(", "));
+        }
+        Err(self.error(allowed))
+    }
+
+    /// One of some words.
+    pub fn choice(&self, words: &[&'static str]) -> Result<&'static str, SceneError> {
         let text = self.text()?;
-        T::of_word(text).ok_or_else(|| {
-            let near = nearest(text, T::WORDS.iter().copied());
+        let found = words.iter().copied().find(|word| *word == text);
+        found.ok_or_else(|| {
+            let near = nearest(text, words.iter().copied());
             self.error(format!(
                 "is not one of the choices{near}; allowed {}",
-                T::WORDS.join(", ")
+                words.join(", ")
             ))
         })
+    }
+
+    /// One of an enum's words.
+    pub fn word<T: Words>(&self) -> Result<T, SceneError> {
+        let word = self.choice(T::WORDS)?;
+        Ok(T::of_word(word).expect("one of its words"))
     }
 
     /// A name: letters, digits, `_` and `-`, as keys and column names are built from it; in a copy of a pattern, numbered.

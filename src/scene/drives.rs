@@ -1,7 +1,6 @@
 //! Laws of driven joints: one row per law, from which `drive` is read. The motion they prescribe is in `mechanism/drives`.
 
 use super::document::{MAX_SI, Node, Section};
-use super::error::nearest;
 use super::formula::read_formula;
 use super::points::{SHORTEST_PART, read_file, read_points};
 use super::*;
@@ -221,17 +220,7 @@ fn read_number(
     if least == ABOVE_ZERO {
         return node.positive(dimension, most, si_unit(dimension));
     }
-    let value = node.quantity(dimension)?;
-    if (least..=most).contains(&value) {
-        return Ok(value);
-    }
-    let unit = si_unit(dimension);
-    Err(node.error(format!(
-        "out of range; allowed {} to {}; units {}",
-        format_quantity(least, unit),
-        format_quantity(most, unit),
-        unit_names(dimension).join(", ")
-    )))
+    node.within(dimension, row.range)
 }
 
 /// The drive of a joint of `kind`, a slide or a hinge.
@@ -241,17 +230,8 @@ pub(super) fn read_drive(
     scene: &Scene,
 ) -> Result<Drive, SceneError> {
     // The word before anything else: it decides which other keys there are.
-    let words = || DRIVE_KINDS.iter().map(|row| row.word);
     if let Some(word) = node.peek(&node.key, "law") {
-        let text = word.text()?;
-        if !words().any(|known| known == text) {
-            let near = nearest(text, words());
-            let all: Vec<&str> = words().collect();
-            return Err(word.error(format!(
-                "is not one of the choices{near}; allowed {}",
-                all.join(", ")
-            )));
-        }
+        word.choice(&DRIVE_KINDS.each_ref().map(|row| row.word))?;
     }
     let mut all = vec!["law"];
     for key in DRIVE_KINDS.iter().flat_map(DriveKind::keys) {

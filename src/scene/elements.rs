@@ -6,7 +6,6 @@ use std::f64::consts::TAU;
 
 use super::document::{Node, Section};
 use super::drives::{FASTEST_DRIVE, read_drive};
-use super::error::nearest;
 use super::read_joints::{read_attachment, read_one_degree_joint, read_rotation};
 use super::*;
 use crate::words::Words;
@@ -484,21 +483,7 @@ pub(super) fn read_element<'d>(
                 None => section.require(key, like).map(|_| 0.0),
             };
         };
-        let value = node.quantity(dimension)?;
-        let (least, most) = row.range;
-        if (least..=most).contains(&value) {
-            return Ok(value);
-        }
-        let unit = si_unit(dimension);
-        let mut allowed = format!(
-            "out of range; allowed {} to {}",
-            format_quantity(least, unit),
-            format_quantity(most, unit)
-        );
-        if !unit.is_empty() {
-            allowed += &format!("; units {}", unit_names(dimension).join(", "));
-        }
-        Err(node.error(allowed))
+        node.within(dimension, row.range)
     };
     let numbers = kind.numbers.iter().map(number).collect::<Result<_, _>>()?;
     // A vector in axes that do not belong to the pattern turns with its copies.
@@ -523,22 +508,9 @@ pub(super) fn read_element<'d>(
         Err(node.error(format!("out of range; allowed {least} to {most}")))
     };
     let vectors = kind.vectors.iter().map(vector).collect::<Result<_, _>>()?;
-    let choice = |&(key, words, _): &(&str, &'static [&'static str], &str)| {
-        let Some(node) = section.get(key) else {
-            return Ok(words[0]);
-        };
-        let text = node.text()?;
-        words
-            .iter()
-            .copied()
-            .find(|word| *word == text)
-            .ok_or_else(|| {
-                let near = nearest(text, words.iter().copied());
-                node.error(format!(
-                    "is not one of the choices{near}; allowed {}",
-                    words.join(", ")
-                ))
-            })
+    let choice = |&(key, words, _): &(&str, &'static [&'static str], &str)| match section.get(key) {
+        Some(node) => node.choice(words),
+        None => Ok(words[0]),
     };
     let choices = kind.choices.iter().map(choice).collect::<Result<_, _>>()?;
     // Whether the first and second point are on bodies of the pattern's copy that is read; all are of a copy that does not turn.
