@@ -1,7 +1,7 @@
 //! Jointplay: a 3D laboratory that shows what play in a ball joint does to a machine.
 //!
 //! Layers from the bottom up; a module uses only those below it (`ARCHITECTURE.md`): [`contact`], [`files`] and [`integrate`],
-//! [`scene`], [`mechanism`], [`simulate`], [`analysis`], [`chart`] and [`view`], [`render`], [`app`], and the entries [`cli`],
+//! [`scene`], [`mechanism`], [`simulate`], [`analysis`], [`chart`], [`film`] and [`view`], [`render`], [`app`], and the entries [`cli`],
 //! `main.rs` and [`web`].
 
 /// The version that every output file names.
@@ -18,6 +18,8 @@ pub mod cli;
 pub mod contact;
 #[cfg(not(target_arch = "wasm32"))]
 pub mod files;
+#[cfg(feature = "gui")]
+pub mod film;
 pub mod integrate;
 pub mod jet;
 pub mod mechanism;

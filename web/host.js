@@ -48,6 +48,15 @@ export function makeHost(laboratory, lost) {
     });
     document.body.append(picker);
 
+    // The browser's own key for it is Escape, which it keeps to itself.
+    document.addEventListener('fullscreenchange', () => {
+        if (!document.fullscreenElement) laboratory.page?.present(false);
+    });
+    // It would load the page anew.
+    addEventListener('keydown', (event) => {
+        if (event.key === 'F5' && !event.ctrlKey && !event.shiftKey) event.preventDefault();
+    });
+
     return {
         address: () => location.origin + location.pathname,
 
@@ -72,6 +81,12 @@ export function makeHost(laboratory, lost) {
         },
 
         pick: () => picker.click(),
+
+        /** A browser may refuse, as on a phone: the page then fills what it has. */
+        fillScreen(on) {
+            if (on) document.documentElement.requestFullscreen?.().catch(() => {});
+            else if (document.fullscreenElement) document.exitFullscreen().catch(() => {});
+        },
 
         startWork(job) {
             if (typeof Worker !== 'function') return undefined;

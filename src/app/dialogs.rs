@@ -2,6 +2,7 @@
 
 use eframe::egui::{self, Grid, Id, Modal, RichText, ScrollArea, TextEdit, Ui};
 
+use super::film::{self, Wanted};
 use super::host::SaveFile;
 use super::keys::{BINDINGS, POINTER};
 use super::load::Load;
@@ -33,6 +34,11 @@ pub enum Dialog {
         /// Why they could not be saved.
         error: Option<String>,
     },
+    /// Asks what a film is to be.
+    Film {
+        /// As chosen so far.
+        wanted: Wanted,
+    },
     /// Runs to a section of a sweep that was not made of the displayed scene.
     Load {
         /// The run to the section.
@@ -49,6 +55,7 @@ impl Dialog {
             Self::About => "About Jointplay",
             Self::Open { .. } => "Open a link or a scene",
             Self::Save { .. } => "Save as",
+            Self::Film { .. } => "Film",
             Self::Load { .. } => "Change what is on show?",
         }
     }
@@ -60,6 +67,10 @@ impl Dialog {
             Self::Help | Self::About => None,
             Self::Open { path, .. } => Some(("Open", typed(path).map(Answer::Open))),
             Self::Save { path, .. } => Some(("Save", typed(path).map(Answer::Save))),
+            Self::Film { wanted } => {
+                let possible = wanted.objection().is_none();
+                Some(("Make film", possible.then_some(Answer::Film)))
+            }
             Self::Load { .. } => Some(("Change and run", Some(Answer::Load))),
         }
     }
@@ -74,6 +85,8 @@ pub enum Answer {
     Open(String),
     /// Save under this path.
     Save(String),
+    /// Make the film.
+    Film,
     /// Run to the section.
     Load,
 }
@@ -105,6 +118,7 @@ pub fn ui(
                     Dialog::About => about(ui, player, renderer),
                     Dialog::Open { path, error } => open(ui, path, error.as_deref()),
                     Dialog::Save { path, files, error } => save(ui, path, files, error.as_deref()),
+                    Dialog::Film { wanted } => film::choose(ui, wanted, player.reached()),
                     Dialog::Load { changes, .. } => load(ui, changes),
                 })
                 .inner;

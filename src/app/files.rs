@@ -241,6 +241,9 @@ impl App {
             // The rest is the line of the file with a mark under it.
             return problem.lines().next().unwrap_or("").to_owned();
         }
+        if self.film.is_some() {
+            return "Making the film".to_owned();
+        }
         if self.load.is_some() {
             return "Running to the chosen section".to_owned();
         }

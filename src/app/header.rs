@@ -110,6 +110,11 @@ impl App {
     fn save_menu(&mut self, ui: &mut Ui) {
         self.picture_menu(ui);
         ui.separator();
+        let help = "A film of a stretch of the timeline, MP4 or GIF";
+        if ui.button("Film…").on_hover_text(help).clicked() {
+            self.ask_for_film();
+            layout::close_menu(ui);
+        }
         let help = "What the plots recorded since the reset, CSV";
         if ui.button("Record…").on_hover_text(help).clicked() {
             self.save_record();
@@ -162,9 +167,21 @@ impl App {
                 replay.map(|replay| replay.fraction(&self.player)),
             ),
             ("Running to the chosen section…", self.loading()),
+            ("Making the film…", self.filming()),
         ];
         for (words, fraction) in ways {
-            if fraction.is_some_and(|fraction| under_way(ui, words, fraction)) {
+            let stop = if self.filming().is_some() {
+                (
+                    "Give up",
+                    "No film; the run goes back to where it was (Esc)",
+                )
+            } else {
+                (
+                    "Stop here",
+                    "Stay at the time that the run has reached (Esc)",
+                )
+            };
+            if fraction.is_some_and(|fraction| under_way(ui, words, fraction, stop)) {
                 self.cancel_replay();
             }
         }
@@ -191,8 +208,8 @@ fn plate(ui: &Ui, colour: egui::Color32) -> Frame {
         .inner_margin(egui::Margin::symmetric(12, 8))
 }
 
-/// Progress of a run to its target; returns whether it is to stop.
-fn under_way(ui: &mut Ui, words: &str, fraction: f32) -> bool {
+/// Progress of a run to its target; returns whether it is to stop: label and tooltip of that button.
+fn under_way(ui: &mut Ui, words: &str, fraction: f32, (stop, help): (&str, &str)) -> bool {
     let plate = plate(ui, ui.visuals().panel_fill);
     let row = plate.show(ui, |ui| {
         ui.horizontal_wrapped(|ui| {
@@ -200,9 +217,7 @@ fn under_way(ui: &mut Ui, words: &str, fraction: f32) -> bool {
             ui.label(format!("{words} {percent} %"));
             ui.add(egui::ProgressBar::new(fraction).desired_width(120.0))
                 .accessible_name("Run so far");
-            ui.button("Stop here")
-                .on_hover_text("Stay at the time that the run has reached (Esc)")
-                .clicked()
+            ui.button(stop).on_hover_text(help).clicked()
         })
         .inner
     });

@@ -105,6 +105,11 @@ pub trait Host {
         None
     }
 
+    /// Fills the screen with the window, or ends that.
+    fn fill_screen(&mut self, ctx: &egui::Context, on: bool) {
+        ctx.send_viewport_cmd(egui::ViewportCommand::Fullscreen(on));
+    }
+
     /// What is going on, for users who do not see the picture; the same sentences are in the accessibility tree. `event`:
     /// something has just happened.
     fn announce(&mut self, _text: &str, _event: bool) {}

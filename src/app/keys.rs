@@ -31,6 +31,7 @@ pub enum Action {
     Panel,
     Plots,
     Bench,
+    Present,
     Theme,
     Help,
     Close,
@@ -58,7 +59,7 @@ const fn bind(key: Key, action: Action, written: &'static str, help: &'static st
 }
 
 /// All keys.
-pub const BINDINGS: [Binding; 36] = [
+pub const BINDINGS: [Binding; 37] = [
     bind(Key::Space, Action::PlayPause, "Space", "Play or pause"),
     bind(
         Key::ArrowRight,
@@ -130,6 +131,12 @@ pub const BINDINGS: [Binding; 36] = [
     bind(Key::C, Action::Panel, "C", "Controls shown or hidden"),
     bind(Key::P, Action::Plots, "P", "Plots shown or hidden"),
     bind(Key::B, Action::Bench, "B", "Chaos bench shown or hidden"),
+    bind(
+        Key::F5,
+        Action::Present,
+        "F5",
+        "Presentation: the picture alone, large type, thick arrows",
+    ),
     bind(Key::T, Action::Theme, "T", "Light or dark"),
     bind(Key::Questionmark, Action::Help, "?", "This list"),
     bind(Key::Slash, Action::Help, "", ""),
@@ -138,7 +145,7 @@ pub const BINDINGS: [Binding; 36] = [
 ];
 
 /// Mouse and touch, for the overlay.
-pub const POINTER: [(&str, &str); 10] = [
+pub const POINTER: [(&str, &str); 12] = [
     ("Drag beside the machine, one finger", "Turn the view"),
     (
         "Drag on a body; a finger stays first",
@@ -158,6 +165,11 @@ pub const POINTER: [(&str, &str); 10] = [
         "Double-click, double tap",
         "Follow a body or joint; on the ground: stop following",
     ),
+    (
+        "Double-click, double tap on the lowest bar",
+        "Presentation, as F5",
+    ),
+    ("Ctrl +, Ctrl -, Ctrl 0", "Larger and smaller type; as it was"),
     ("Drop a file", "Open a scene"),
     ("Paste", "Open a link"),
     ("Arrows after a drag on a slider", "Move that slider"),

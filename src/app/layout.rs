@@ -2,7 +2,7 @@
 
 use eframe::egui::{self, Align2, CentralPanel, Frame, Id, Panel, Popup, ScrollArea, Ui};
 
-use super::{App, theme, transport};
+use super::{App, present, theme, transport};
 
 /// Below this width or height the window is small, points.
 const NARROW: f32 = 760.0;
@@ -163,6 +163,10 @@ impl App {
             ui.visuals_mut().disabled_alpha = 1.0;
             ui.disable();
         }
+        if self.is_presenting() {
+            self.presentation_ui(ui);
+            return self.dialog_ui(ui.ctx());
+        }
         let margin = if arrangement == Arrangement::Landscape {
             egui::Margin::symmetric(12, 4)
         } else {
@@ -195,6 +199,7 @@ impl App {
             show_bench,
             ..
         } = self;
+        let mut present = false;
         Panel::left("controls")
             .frame(bar)
             .default_size(300.0)
@@ -241,6 +246,7 @@ impl App {
         let asked = Panel::bottom("transport")
             .frame(bar)
             .show(ui, |ui| {
+                present = present::double_tapped(ui);
                 let contents = ui.add_enabled_ui(free, |ui| {
                     if timeline.ui(ui, player, viewport.focus()) {
                         viewport.arrive(player);
@@ -251,6 +257,9 @@ impl App {
             })
             .inner;
         self.central(ui, asked);
+        if present {
+            self.present(ui.ctx(), true);
+        }
         if let Some(load) = load.and_then(|shown| shown.inner) {
             self.start_load(load);
         }
@@ -265,9 +274,11 @@ impl App {
                 .show(ui, |ui| self.sheet(ui));
         }
         let free = !self.is_under_way();
+        let mut present = false;
         let asked = Panel::bottom("transport")
             .frame(bar)
             .show(ui, |ui| {
+                present = present::double_tapped(ui);
                 ui.add_enabled_ui(free, |ui| self.timeline_ui(ui));
                 let asked = ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.player));
                 ui.horizontal(|ui| self.sheet_tabs(ui, false));
@@ -275,13 +286,18 @@ impl App {
             })
             .inner;
         self.central(ui, asked);
+        if present {
+            self.present(ui.ctx(), true);
+        }
     }
 
     fn landscape(&mut self, ui: &mut Ui, bar: Frame) {
         let free = !self.is_under_way();
+        let mut present = false;
         let asked = Panel::bottom("transport")
             .frame(bar)
             .show(ui, |ui| {
+                present = present::double_tapped(ui);
                 ui.add_enabled_ui(free, |ui| self.timeline_ui(ui));
                 ui.horizontal(|ui| {
                     let room = ui.available_width() - 270.0;
@@ -307,10 +323,13 @@ impl App {
                 .show(ui, |ui| self.sheet(ui));
         }
         self.central(ui, asked);
+        if present {
+            self.present(ui.ctx(), true);
+        }
     }
 
     /// The picture in what the panels leave; resets the run if that was `asked` in them or in the picture.
-    fn central(&mut self, ui: &mut Ui, asked: bool) {
+    pub(super) fn central(&mut self, ui: &mut Ui, asked: bool) {
         let picture = CentralPanel::no_frame().show(ui, |ui| self.picture(ui));
         if asked || picture.inner {
             self.reset();
@@ -395,6 +414,7 @@ impl App {
         let area = ui.max_rect();
         self.picture_rect = area;
         let plain = self.picture.is_plain();
+        let presenting = self.is_presenting();
         self.player.place_ghost();
         self.viewport.ui(ui, &self.player, plain);
         if let Some(pull) = self.viewport.take_pull()
@@ -415,6 +435,9 @@ impl App {
             .max_rect(egui::Rect::from_min_size(inner.min, row))
             .layout(backwards);
         ui.scope_builder(buttons, |ui| {
+            if presenting {
+                return;
+            }
             menu(ui, "View options", false, |ui| {
                 ui.set_min_width(230.0);
                 if narrow {

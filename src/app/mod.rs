@@ -14,6 +14,7 @@ mod curve;
 mod desktop;
 mod dialogs;
 mod files;
+mod film;
 mod ghosts;
 mod header;
 #[cfg(not(target_arch = "wasm32"))]
@@ -31,6 +32,7 @@ mod paths;
 mod picture;
 mod player;
 mod plots;
+mod present;
 mod pull;
 mod reload;
 mod replay;
@@ -66,6 +68,7 @@ use controls::Controls;
 #[cfg(not(target_arch = "wasm32"))]
 pub use desktop::DesktopHost;
 use dialogs::{Answer, Dialog};
+pub use film::Wanted as WantedFilm;
 #[cfg(not(target_arch = "wasm32"))]
 pub use headless::{Headless, Overlay};
 pub use host::{Clock, Host, NoHost, OpenedFile, Running, SaveFile};
@@ -228,6 +231,11 @@ pub struct App {
     announcer: Announcer,
     microscope: Microscope,
     picture: Picture,
+    /// A film being made.
+    film: Option<film::Making>,
+    /// How the last one was to be.
+    film_wanted: Option<film::Wanted>,
+    presentation: Option<present::Presentation>,
     /// Where the 3D view is, points.
     picture_rect: egui::Rect,
     /// The graphics adapter and its interface; "" without a window.
@@ -290,6 +298,9 @@ impl App {
             announcer: Announcer::default(),
             microscope: Microscope::default(),
             picture: Picture::default(),
+            film: None,
+            film_wanted: None,
+            presentation: None,
             picture_rect: egui::Rect::ZERO,
             renderer: String::new(),
             graphics: None,
@@ -349,8 +360,9 @@ impl App {
         }
         self.fingers = None;
         self.graphics = state.cloned();
-        // A pending picture is lost.
+        // What was being drawn is lost.
         self.picture.forget();
+        self.cancel_film();
     }
 
     /// The running scene.
@@ -383,9 +395,10 @@ impl App {
         &self.bench
     }
 
-    /// Whether the run is being replayed to the state of a link or to a section of a sweep; until then it takes no commands.
+    /// Whether the run is being replayed to the state of a link or to a section of a sweep, or filmed; until then it takes no
+    /// commands.
     fn is_under_way(&self) -> bool {
-        self.replay.is_some() || self.load.is_some()
+        self.replay.is_some() || self.load.is_some() || self.film.is_some()
     }
 
     /// Progress of the run to a section of a sweep, 0 to 1; `None` if there is none.
@@ -500,8 +513,9 @@ impl App {
         Some(replay.fraction(&self.player))
     }
 
-    /// Stops the replay to the state of a link, or to a section, where it is.
+    /// Stops the replay to the state of a link, or to a section, where it is; gives up a film.
     fn cancel_replay(&mut self) {
+        self.cancel_film();
         if self.load.take().is_some() {
             self.viewport.arrive(&self.player);
         }
@@ -556,6 +570,9 @@ impl App {
             self.advance_load();
             return true;
         }
+        if self.film.is_some() {
+            return true;
+        }
         let sought = self.player.is_seeking();
         self.player.advance(dt);
         if sought && !self.player.is_seeking() {
@@ -585,6 +602,8 @@ impl App {
         self.problem = None;
         self.replay = None;
         self.load = None;
+        self.film = None;
+        self.film_wanted = None;
         self.verdict = None;
         Ok(())
     }
@@ -655,6 +674,7 @@ impl App {
                 let on = !(arrows.normal || arrows.friction);
                 (arrows.normal, arrows.friction) = (on, on);
             }
+            Action::Present => self.present(ctx, !self.is_presenting()),
             Action::Bench if self.compact => self.fold(Sheet::Bench),
             Action::Bench => self.show_bench = !self.show_bench,
             Action::Panel if self.compact => self.fold(Sheet::Controls),
@@ -678,7 +698,9 @@ impl App {
                 if self.dialog.take().is_none() {
                     self.cancel_replay();
                     self.problem = None;
-                    if !told {
+                    if !told && self.is_presenting() {
+                        self.present(ctx, false);
+                    } else if !told {
                         self.microscope.set_open(false);
                     }
                 }
@@ -723,6 +745,11 @@ impl App {
                     self.save_as(path, files);
                 }
             }
+            Some(Answer::Film) => {
+                if let Dialog::Film { wanted } = dialog {
+                    self.problem = self.make_film(wanted).err();
+                }
+            }
             Some(Answer::Load) => {
                 if let Dialog::Load { load, .. } = dialog {
                     self.go_to_section(*load);
@@ -756,6 +783,8 @@ impl eframe::App for App {
         self.receive_saved_scene(ctx);
         self.receive_links(ctx);
         self.receive_picture(ctx);
+        self.advance_film(ctx);
+        self.follow_screen(ctx);
         let measuring = self.accuracy.update(self.host.as_mut());
         if self.bench.update(self.host.as_mut()) || measuring {
             ctx.request_repaint_after(POLL);

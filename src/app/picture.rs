@@ -9,6 +9,7 @@ use super::canvas::{Canvas, Pending};
 use super::host::SaveFile;
 use super::layout;
 use super::overlay::SMALL;
+use crate::render::RenderError;
 
 /// Height of the plots below the view, points.
 const PLOTS: f32 = 230.0;
@@ -221,24 +222,60 @@ impl App {
             .graphics
             .clone()
             .ok_or("The picture cannot be drawn: there is no graphics adapter")?;
-        let (size, scale) = self
+        let measures = self
             .picture
             .size(self.picture_points(ctx), ctx.pixels_per_point());
-        let mut canvas = Canvas::beside(&state);
-        // Panels, collapsed parts and scroll positions are as in the window.
-        let memory = ctx.memory(Clone::clone);
-        canvas.ctx.memory_mut(|own| *own = memory);
-        canvas.ctx.options_mut(|options| options.zoom_factor = 1.0);
-        canvas.ctx.set_theme(ctx.theme());
-        canvas.time = ctx.input(|input| input.time);
+        let contents = self.picture.contents;
+        let drawn =
+            self.draw_off_screen(ctx, &mut Canvas::beside(&state), contents, measures, true);
+        drawn.map_err(|error| format!("The picture cannot be drawn: {error}"))
+    }
 
+    /// Draws a frame of a film of `size` pixels, whose `first` one settles the layout.
+    ///
+    /// # Errors
+    /// A size that cannot be drawn, in words.
+    pub(super) fn draw_frame(
+        &mut self,
+        ctx: &egui::Context,
+        canvas: &mut Canvas,
+        contents: Contents,
+        size: [u32; 2],
+        first: bool,
+    ) -> Result<Pending, String> {
+        let kept = (self.picture.contents, self.picture.times, self.picture.own);
+        (self.picture.contents, self.picture.times, self.picture.own) = (contents, None, size);
+        let measures = self
+            .picture
+            .size(self.picture_points(ctx), ctx.pixels_per_point());
+        (self.picture.contents, self.picture.times, self.picture.own) = kept;
+        let drawn = self.draw_off_screen(ctx, canvas, contents, measures, first);
+        drawn.map_err(|error| error.to_string())
+    }
+
+    /// Draws `contents` with (pixels, pixels per point) on `canvas`, which is `new` to it or has drawn the like before.
+    fn draw_off_screen(
+        &mut self,
+        ctx: &egui::Context,
+        canvas: &mut Canvas,
+        contents: Contents,
+        (size, scale): ([u32; 2], f32),
+        new: bool,
+    ) -> Result<Pending, RenderError> {
+        if new {
+            // Panels, collapsed parts and scroll positions are as in the window.
+            let memory = ctx.memory(Clone::clone);
+            canvas.ctx.memory_mut(|own| *own = memory);
+            canvas.ctx.options_mut(|options| options.zoom_factor = 1.0);
+            canvas.ctx.set_theme(ctx.theme());
+            canvas.time = ctx.input(|input| input.time);
+        }
         let kept = (self.picture_rect, self.compact, self.fingers);
         self.viewport.freeze(Some(self.picture_rect.aspect_ratio()));
-        let contents = self.picture.contents;
         self.picture.drawn = Some(contents);
         // egui settles the size of what is new to it over a few passes.
         let mut output = Ok(egui::FullOutput::default());
-        for _ in 0..3 {
+        for _ in 0..if new { 3 } else { 1 } {
             output = canvas.pass(size, scale, |ui| self.show_contents(ui, contents));
             if output.is_err() {
                 break;
@@ -247,8 +284,7 @@ impl App {
         self.picture.drawn = None;
         self.viewport.freeze(None);
         (self.picture_rect, self.compact, self.fingers) = kept;
-        let output = output.map_err(|error| format!("The picture cannot be drawn: {error}"))?;
-        Ok(canvas.paint(output, size, scale))
+        Ok(canvas.paint(output?, size, scale))
     }
 
     fn show_contents(&mut self, ui: &mut Ui, contents: Contents) {

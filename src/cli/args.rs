@@ -228,6 +228,7 @@ pub enum SummaryForm {
 /// `render`.
 #[derive(Debug, Args)]
 #[command(group = clap::ArgGroup::new("times").required(true).args(["at", "duration"]))]
+#[command(group = clap::ArgGroup::new("destination").required(true).args(["out", "film"]))]
 pub struct RenderArguments {
     /// Scene.
     #[command(flatten)]
@@ -259,7 +260,11 @@ pub struct RenderArguments {
     pub size: (u32, u32),
     /// Folder to write; it appears when all frames are done.
     #[arg(long, value_name = "FOLDER")]
-    pub out: PathBuf,
+    pub out: Option<PathBuf>,
+    /// Film to write instead; its ending chooses the format: .mp4 or .gif. It appears when all frames are done, with its
+    /// metadata beside it.
+    #[arg(long, value_name = "FILE", requires = "duration")]
+    pub film: Option<PathBuf>,
     /// Point of view to start from.
     #[arg(
         long,

@@ -127,8 +127,7 @@ fn an_account_that_lost_its_rows_stands_in_no_way() {
 #[test]
 fn frames_survive() {
     use super::Command;
-    use super::render::{Studio, Times, fill};
-    use crate::files::Folder;
+    use super::render::{Destination, Studio, Times, fill};
     use crate::render::Image;
     use crate::scene::Scene;
     use crate::simulate::Simulation;
@@ -144,9 +143,9 @@ fn frames_survive() {
 
         fn draw(&mut self, _instant: f64, _frame_time: Option<f64>) -> Result<Image, Failure> {
             Ok(Image {
-                width: 2,
-                height: 2,
-                rgba: vec![self.0.statistics().steps as u8; 16],
+                width: 16,
+                height: 16,
+                rgba: vec![self.0.statistics().steps as u8; 4 * 16 * 16],
             })
         }
 
@@ -162,28 +161,48 @@ fn frames_survive() {
     }
 
     let render = |folder: &Path, at: &str| {
-        let out = folder.join("out");
-        let line = format!("jointplay render pendulum --at {at} --quiet --force --out");
-        let words = line
-            .split_whitespace()
-            .map(Into::into)
-            .chain([out.into_os_string()]);
+        let line = format!("jointplay render pendulum --size 16x16 --quiet --force {at}");
+        let words = line.split_whitespace();
+        let words = words.map(|word| word.replace('@', &folder.display().to_string()));
         let Some(Command::Render(arguments)) = Arguments::try_parse_from(words).unwrap().command
         else {
             panic!("not a command to render");
         };
         let scene = Scene::load("pendulum", &[]).unwrap();
         let times = Times::new(&arguments).unwrap();
-        let folder = Folder::claim(&arguments.out, arguments.force)?;
+        let destination = Destination::claim(&arguments)?;
         let mut studio = Blank(Simulation::new(&scene).unwrap());
-        fill(folder, &mut studio, &scene, &times, &arguments)
+        fill(destination, &mut studio, &scene, &times, &arguments)
     };
     let whole = |old: &Tree, new: &Tree, found: &Tree| found == old || found == new;
-    let old = |folder: &Path| render(folder, "0s,1ms,3ms").unwrap();
+    let old = |folder: &Path| render(folder, "--at 0s,1ms,3ms --out @/out").unwrap();
     survive(
         Kind::default(),
         &old,
-        &|folder| outcome(render(folder, "0s,2ms")),
+        &|folder| outcome(render(folder, "--at 0s,2ms --out @/out")),
         &whole,
+    );
+    // A film and its metadata are two files: the one tells whether it belongs to the other.
+    let told = |old: &Tree, new: &Tree, found: &Tree| {
+        let is = |of: &Tree, name: &str| of.get(name) == found.get(name);
+        let each = |name: &String| is(old, name) || is(new, name);
+        let film = found.get("a.mp4");
+        found.keys().all(each)
+            && film.is_none_or(|film| {
+                let account = found.get("a.mp4.meta.json");
+                let account: Json = serde_json::from_slice(account.unwrap()).unwrap();
+                let checksum = format!("{:08x}", crc32fast::hash(film));
+                let whole = [old, new]
+                    .iter()
+                    .any(|of| is(of, "a.mp4") && is(of, "a.mp4.meta.json"));
+                whole == (account["film_crc32"] == checksum.as_str())
+            })
+    };
+    let film = |duration: &str| format!("--duration {duration} --fps 500 --film @/a.mp4");
+    survive(
+        Kind::default(),
+        &|folder: &Path| render(folder, &film("4ms")).unwrap(),
+        &|folder| outcome(render(folder, &film("2ms"))),
+        &told,
     );
 }

@@ -172,6 +172,7 @@ pub(super) fn push_forces(
     }
     let ruler = Ruler::new(shot.camera, shot.size);
     let height = shot.size[1] as f32;
+    let thickest = THICKEST * options.thickness;
     let reference = shot.marks.reference(options);
     let mut clipped = false;
     // `None` for a zero force.
@@ -182,7 +183,7 @@ pub(super) fn push_forces(
         clipped |= broken;
         Some(Arrow {
             broken,
-            ..Arrow::new(tail, along * length, THICKEST * height * pixel)
+            ..Arrow::new(tail, along * length, thickest * height * pixel)
         })
     };
     let reports = joints.iter().zip(&shot.frame.joints);
@@ -211,7 +212,7 @@ pub(super) fn push_forces(
     }
     if let Some(pull) = &shot.frame.pull {
         let [from, to] = pull.points.map(|point| to_f32(&point));
-        let width = OUTLINE * shot.pixels_per_point;
+        let width = OUTLINE * shot.options.arrows.thickness * shot.pixels_per_point;
         let faint = palette.outside.with_opacity(0.6);
         out.lines.push(Line::new(from, to, width, [faint; 2]));
     }
@@ -227,7 +228,7 @@ pub(super) fn push_forces(
         let contact = joint.socket_centre - mark.force.normalize_or_zero() * joint.inner;
         if let Some(arrow) = arrow(mark.force, contact) {
             let colour = palette.normal.with_opacity(mark.strength.sqrt());
-            let width = OUTLINE * shot.pixels_per_point;
+            let width = OUTLINE * shot.options.arrows.thickness * shot.pixels_per_point;
             arrow.outline(ruler.eye, colour, width, &mut out.marks);
             let kind = LabelKind::Peak(mark.joint);
             push_label(
@@ -272,7 +273,8 @@ pub(super) fn push_error(
     let height = shot.size[1] as f32;
     let unit = along.normalize_or(shot.camera.axes().0);
     if let Some((_, pixel)) = ruler.measure(tail, unit, 1.0) {
-        let arrow = Arrow::new(tail, along, THICKEST * height * pixel);
+        let thickest = THICKEST * shot.options.arrows.thickness;
+        let arrow = Arrow::new(tail, along, thickest * height * pixel);
         arrow.push(&mut out.arrows, colour);
     }
     push_label(out, words, LabelKind::Error, tail + along, colour);

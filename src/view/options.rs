@@ -70,6 +70,8 @@ pub struct ArrowOptions {
     pub reference: Option<f32>,
     /// Mark past peaks of the normal force.
     pub peaks: bool,
+    /// How thick, 1 being usual; a projector wants more.
+    pub thickness: f32,
 }
 
 impl Default for ArrowOptions {
@@ -80,6 +82,7 @@ impl Default for ArrowOptions {
             scaling: Scaling::Linear,
             reference: None,
             peaks: true,
+            thickness: 1.0,
         }
     }
 }

@@ -24,6 +24,8 @@ extern "C" {
     fn save(name: &str, mime: &str, bytes: &[u8]);
     #[wasm_bindgen(js_namespace = jointplayHost)]
     fn pick();
+    #[wasm_bindgen(js_namespace = jointplayHost, js_name = fillScreen)]
+    fn fill_screen(on: bool);
     #[wasm_bindgen(js_namespace = jointplayHost)]
     fn announce(text: &str, event: bool);
     /// Reports that the graphics of start number `start` are lost.
@@ -116,6 +118,10 @@ impl Host for WebHost {
 
     fn start(&mut self, job: Job) -> Option<Box<dyn Running>> {
         Some(Box::new(Worker::start(&job)?))
+    }
+
+    fn fill_screen(&mut self, _ctx: &egui::Context, on: bool) {
+        fill_screen(on);
     }
 
     fn announce(&mut self, text: &str, event: bool) {

@@ -143,6 +143,14 @@ impl Page {
         });
     }
 
+    /// Begins or ends the presentation.
+    pub fn present(&self, on: bool) {
+        self.with(|laboratory| {
+            laboratory.app.present(&laboratory.ctx, on);
+            laboratory.ctx.request_repaint();
+        });
+    }
+
     /// The controls shown, as JSON ([`Mirror::widgets`]). Empty the first time: the mirror starts with the next frame.
     pub fn widgets(&self) -> Option<String> {
         self.with(|laboratory| {

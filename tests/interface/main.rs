@@ -5,11 +5,13 @@
 mod common;
 
 mod bench_window;
+mod film;
 mod frames;
 mod hands;
 mod headless_window;
 mod instruments;
 mod lecture;
 mod page;
+mod present;
 mod reload;
 mod window;

@@ -26,9 +26,9 @@ use jointplay::simulate::{Channels, Frame, Quantity, Simulation};
 
 /// What a host was asked for.
 #[derive(Default)]
-struct Calls {
+pub struct Calls {
     shared: Vec<String>,
-    saved: Vec<SaveFile>,
+    pub saved: Vec<SaveFile>,
     announced: Vec<String>,
     picked: usize,
     to_open: VecDeque<OpenedFile>,
@@ -109,14 +109,14 @@ fn open(options: AppOptions, size: [f32; 2]) -> (Harness<'static, App>, Rc<RefCe
 }
 
 /// `scene` at t = 0, paused.
-fn window(scene: &str, size: [f32; 2]) -> (Harness<'static, App>, Rc<RefCell<Calls>>) {
+pub fn window(scene: &str, size: [f32; 2]) -> (Harness<'static, App>, Rc<RefCell<Calls>>) {
     let mut options = AppOptions::new(Scene::load(scene, &[]).expect("a built-in scene"));
     options.playing = false;
     open(options, size)
 }
 
 /// The one label whose text contains `words`; the report for screen readers may say the same.
-fn label(harness: &Harness<'_, App>, words: &str) -> bool {
+pub fn label(harness: &Harness<'_, App>, words: &str) -> bool {
     let labels = harness
         .query_all_by_label_contains(words)
         .filter(|node| node.accesskit_node().role() == Role::Label);
@@ -129,7 +129,7 @@ const LYING: [f32; 2] = [844.0, 390.0];
 /// A small phone of ten years ago, or a laptop at four times the size.
 const TINY: [f32; 2] = [320.0, 480.0];
 
-fn click(harness: &mut Harness<'_, App>, label: &str) {
+pub fn click(harness: &mut Harness<'_, App>, label: &str) {
     harness.get_by_label(label).click();
     harness.run_steps(3);
 }
@@ -703,7 +703,7 @@ fn scene_record_and_picture_are_saved() {
 }
 
 /// The next file that is saved.
-fn next_file(harness: &mut Harness<'_, App>, calls: &Rc<RefCell<Calls>>) -> SaveFile {
+pub fn next_file(harness: &mut Harness<'_, App>, calls: &Rc<RefCell<Calls>>) -> SaveFile {
     let begun = std::time::Instant::now();
     while calls.borrow().saved.is_empty() {
         assert!(begun.elapsed().as_secs() < 30, "nothing comes");
@@ -714,7 +714,7 @@ fn next_file(harness: &mut Harness<'_, App>, calls: &Rc<RefCell<Calls>>) -> Save
 }
 
 /// A picture's header and its pixels.
-fn decoded(file: &SaveFile) -> (png::Info<'static>, Vec<u8>) {
+pub fn decoded(file: &SaveFile) -> (png::Info<'static>, Vec<u8>) {
     let mut reader = png::Decoder::new(std::io::Cursor::new(file.bytes.as_slice()))
         .read_info()
         .expect("a PNG file");

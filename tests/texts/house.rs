@@ -10,7 +10,7 @@ const FLOORS: [&[&str]; 10] = [
     &["scene"],
     &["mechanism"],
     &["simulate"],
-    &["analysis", "chart", "view"],
+    &["analysis", "chart", "film", "view"],
     &["render"],
     &["app"],
     &["cli"],

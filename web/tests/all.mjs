@@ -2,6 +2,7 @@
 
 import './assist.test.mjs';
 import './bits.test.mjs';
+import './film.test.mjs';
 import './page.test.mjs';
 import './session.test.mjs';
 import './touch.test.mjs';

@@ -116,6 +116,11 @@ export async function open(query = '', options = {}) {
     return lab;
 }
 
+/** An empty page of the browser. */
+export async function blank() {
+    return (await launch()).newPage();
+}
+
 /** A page under test. */
 export class Lab {
     constructor(context, page) {

@@ -30,7 +30,7 @@ pub(super) fn write(
 }
 
 /// Writes `meta` alone, for a person to read.
-pub(super) fn write_meta(out: &mut impl Write, meta: &Map<String, Json>) -> io::Result<()> {
+pub fn write_meta(out: &mut impl Write, meta: &Map<String, Json>) -> io::Result<()> {
     serde_json::to_writer_pretty(&mut *out, meta).map_err(io::Error::from)?;
     out.write_all(b"\n")
 }

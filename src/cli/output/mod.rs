@@ -7,6 +7,8 @@ mod rows;
 mod table;
 
 pub use csv::significant;
+#[cfg(feature = "gui")]
+pub use json::write_meta;
 pub use npz::as_io;
 pub use table::{NoRow, Table};
 
@@ -71,12 +73,7 @@ impl RowsFile {
         // The user's own name is claimed first, so that an error names it.
         let rows = OutputFile::claim(path, force)?;
         let beside = match format {
-            Format::Csv => {
-                let meta = Self::meta_path(path);
-                // Metadata left by a run that was killed between its two renames is worthless and may be replaced.
-                let alone = !path.exists() && is_account(&meta);
-                Some(OutputFile::claim(&meta, force || alone)?)
-            }
+            Format::Csv => Some(claim_account(path, force)?),
             Format::Json | Format::Npz => None,
         };
         Ok(Self {
@@ -86,16 +83,11 @@ impl RowsFile {
         })
     }
 
-    /// The metadata file beside a CSV file: `run.csv` has `run.csv.meta.json`.
-    fn meta_path(path: &Path) -> PathBuf {
-        path.with_added_extension("meta.json")
-    }
-
     /// The files that `option` with `path` writes, for [`check_distinct`].
     pub fn names(option: &str, path: &Path) -> Vec<(String, PathBuf)> {
         let mut names = vec![(option.to_owned(), path.to_owned())];
         if Format::of(path) == Ok(Format::Csv) {
-            names.push((format!("the .meta.json of {option}"), Self::meta_path(path)));
+            names.push((format!("the .meta.json of {option}"), account_path(path)));
         }
         names
     }
@@ -128,21 +120,34 @@ impl RowsFile {
         let Some(beside) = self.beside else {
             return Ok(vec![rows]);
         };
-        meta.insert(ROWS_CHECKSUM.into(), checksum.into());
+        meta.insert("rows_crc32".into(), checksum.into());
         let account = beside.fill(|file| json::write_meta(file, &meta))?;
         // In this order a kill between the two leaves no rows without their metadata.
         Ok(vec![account, rows])
     }
 }
 
-/// Key of a CSV file's CRC-32 in its metadata.
-const ROWS_CHECKSUM: &str = "rows_crc32";
+/// Checks that the metadata beside the file `path`, which holds none itself, can be written: `run.csv` has `run.csv.meta.json`.
+///
+/// # Errors
+/// It exists without `force`, or its folder is unwritable.
+pub fn claim_account(path: &Path, force: bool) -> Result<OutputFile, Failure> {
+    let meta = account_path(path);
+    // Metadata left by a run that was killed between its two renames is worthless and may be replaced.
+    let alone = !path.exists() && is_account(&meta);
+    Ok(OutputFile::claim(&meta, force || alone)?)
+}
 
-/// Whether the file is metadata that [`RowsFile`] wrote beside rows.
+fn account_path(path: &Path) -> PathBuf {
+    path.with_added_extension("meta.json")
+}
+
+/// Whether the file is metadata that this program wrote beside rows or a film.
 fn is_account(path: &Path) -> bool {
     let meta = std::fs::read(path).unwrap_or_default();
     let meta: Json = serde_json::from_slice(&meta).unwrap_or_default();
-    meta["program"] == crate::files::PROGRAM && meta[ROWS_CHECKSUM].is_string()
+    let checked = |key: &str| meta[key].is_string();
+    meta["program"] == crate::files::PROGRAM && (checked("rows_crc32") || checked("film_crc32"))
 }
 
 /// Refuses a command if two of its outputs, or an output and its input, are one file; each comes with its description.

@@ -1,16 +1,17 @@
 //! `render`: frames without a window, drawn by the same code as those in it.
 
+mod destination;
 mod options;
 mod studio;
 
 use serde_json::{Map, Value as Json, json};
 
+pub(super) use self::destination::Destination;
 pub(super) use self::studio::Studio;
 use self::studio::{ApplicationStudio, SceneStudio};
 use super::args::RenderArguments;
 use super::summary::{Status, count as count_of, hash_text};
-use super::{Failure, interrupt, load, print, progress, provenance, quantity, start, warn};
-use crate::files::{Folder, MANIFEST};
+use super::{Failure, interrupt, load, progress, provenance, quantity, start, warn};
 use crate::scene::Scene;
 use crate::simulate::{Frame, Peak};
 use crate::view::{PeakMarks, ViewOptions};
@@ -84,7 +85,7 @@ pub fn render(arguments: &RenderArguments) -> Result<(), Failure> {
     };
     // From here on there is a scratch folder, which an interrupted run removes.
     interrupt::listen();
-    let folder = Folder::claim(&arguments.out, arguments.force)?;
+    let destination = Destination::claim(arguments)?;
     if !arguments.quiet {
         for warning in scene.warnings() {
             warn(&warning.to_string());
@@ -93,12 +94,12 @@ pub fn render(arguments: &RenderArguments) -> Result<(), Failure> {
     if let Some(reference) = common_reference(&scene, &times, &view, arguments)? {
         studio.fix_arrow_scale(reference);
     }
-    fill(folder, &mut *studio, &scene, &times, arguments)
+    fill(destination, &mut *studio, &scene, &times, arguments)
 }
 
-/// Draws all frames and gives the folder its final name.
+/// Draws all frames and gives the folder or the film its final name; an interrupted film leaves nothing.
 pub(super) fn fill(
-    folder: Folder,
+    mut destination: Destination,
     studio: &mut dyn Studio,
     scene: &Scene,
     times: &Times,
@@ -106,11 +107,6 @@ pub(super) fn fill(
 ) -> Result<(), Failure> {
     let meta = provenance::meta(scene);
     let bar = progress::bar(!arguments.quiet, times.instants.len() as u64);
-    let labels = labels(&meta);
-    let labels: Vec<(&str, &str)> = labels
-        .iter()
-        .map(|(key, text)| (*key, text.as_str()))
-        .collect();
     let mut frames = vec![Json::Null; times.instants.len()];
     let mut status = Status::Done;
     let mut failure = None;
@@ -125,21 +121,21 @@ pub(super) fn fill(
             failure = Some(stop);
             break;
         }
-        let png = studio
-            .draw(instant, times.time_scale)?
-            .png(&labels)
-            .map_err(|error| Failure::io(error.to_string()))?;
-        let file = format!("frame_{number:05}.png");
-        folder.write(&file, &png)?;
-        frames[number] = json!({
-            "file": file,
-            "time_s": instant,
-            "state_time_s": studio.simulation().time(),
-            "state_hash": hash_text(studio.simulation().state_hash()),
-        });
+        let image = studio.draw(instant, times.time_scale)?;
+        let mut told = destination.add(number, &image, &meta)?;
+        told.insert("time_s".into(), json!(instant));
+        told.insert("state_time_s".into(), json!(studio.simulation().time()));
+        let hash = hash_text(studio.simulation().state_hash());
+        told.insert("state_hash".into(), json!(hash));
+        frames[number] = Json::Object(told);
         bar.set_position(done as u64 + 1);
     }
     bar.finish_and_clear();
+    if let (Destination::Film { .. }, Status::Interrupted, Some(stop)) =
+        (&destination, status, &failure)
+    {
+        return Err(stop.clone());
+    }
 
     frames.retain(|frame| !frame.is_null());
     let written = count_of(frames.len() as u64, "frame");
@@ -149,12 +145,7 @@ pub(super) fn fill(
     manifest.insert("size".into(), json!([arguments.size.0, arguments.size.1]));
     manifest.insert("adapter".into(), json!(studio.adapter()));
     manifest.insert("frames".into(), Json::Array(frames));
-    folder.finish(manifest)?;
-    print(&format!(
-        "{} and {MANIFEST} in {}\n",
-        written,
-        arguments.out.display()
-    ))?;
+    destination.finish(manifest, &written, arguments)?;
     failure.map_or(Ok(()), Err)
 }
 

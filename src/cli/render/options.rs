@@ -99,6 +99,7 @@ pub fn view_options(arguments: &RenderArguments) -> Result<ViewOptions, Failure>
                 None => None,
             },
             peaks: shown(Hideable::Peaks),
+            thickness: 1.0,
         },
         flash: shown(Hideable::Flash),
         floor: shown(Hideable::Floor),

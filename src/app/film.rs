@@ -1,0 +1,338 @@
+//! Films of a stretch of the timeline. Each frame is an instant of the run, reached by stepping and drawn off screen like a
+//! picture to save: how long that takes does not show. Afterwards the run stands where it stood.
+
+use eframe::egui::{self, ComboBox, DragValue, RichText, Ui};
+
+use super::App;
+use super::canvas::{Canvas, Pending};
+use super::host::SaveFile;
+use super::picture::Contents;
+use super::{transport, value};
+use crate::film::{Film, Format};
+
+/// Sizes to choose from, pixels.
+const SIZES: [([u32; 2], &str); 4] = [
+    ([640, 360], "640 × 360"),
+    ([1280, 720], "1280 × 720"),
+    ([1920, 1080], "1920 × 1080"),
+    ([3840, 2160], "3840 × 2160 (4K)"),
+];
+/// Frames per second to choose from.
+const RATES: [f64; 4] = [15.0, 25.0, 30.0, 60.0];
+/// Most frames of a film: more than five minutes at the highest rate.
+const MOST_FRAMES: f64 = 20_000.0;
+
+/// What the next film is to be.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Wanted {
+    /// First and last instant, s.
+    pub span: [f64; 2],
+    /// Simulated seconds per second of film.
+    pub scale: f64,
+    /// Frames per second of film.
+    pub rate: f64,
+    /// Width and height, pixels.
+    pub size: [u32; 2],
+    /// With the plots below the view.
+    pub plots: bool,
+    /// Kind of file.
+    pub format: Format,
+}
+
+impl Wanted {
+    /// What was shown so far of a run that plays at `scale`.
+    pub fn all(reached: f64, scale: f64) -> Self {
+        Self {
+            span: [0.0, reached],
+            scale,
+            rate: 30.0,
+            size: SIZES[1].0,
+            plots: false,
+            format: Format::Mp4,
+        }
+    }
+
+    /// Number of frames: both ends count, as with `render --duration`.
+    fn frames(&self) -> f64 {
+        let [from, to] = self.span;
+        ((to - from) / self.scale * self.rate * (1.0 + 1e-9)).floor() + 1.0
+    }
+
+    /// Instant of frame `k`, s.
+    fn instant(&self, k: u64) -> f64 {
+        let [from, to] = self.span;
+        (from + k as f64 * self.scale / self.rate).min(to)
+    }
+
+    /// Why it cannot be made, in words.
+    pub fn objection(&self) -> Option<String> {
+        if self.span[0] > self.span[1] {
+            return Some("It ends before it begins".to_owned());
+        }
+        if self.frames() > MOST_FRAMES {
+            return Some(format!(
+                "More than {MOST_FRAMES} frames: a shorter stretch, a faster time scale or fewer frames a second"
+            ));
+        }
+        Film::new(self.format, self.size, self.rate)
+            .err()
+            .map(|error| error.to_string())
+    }
+}
+
+/// A film being made.
+pub struct Making {
+    wanted: Wanted,
+    film: Film,
+    canvas: Canvas,
+    pending: Option<Pending>,
+    /// The frame that is drawn next.
+    next: u64,
+    /// How the run was before: instant shown, s, time scale, and whether it played.
+    before: (f64, f64, bool),
+}
+
+impl Making {
+    /// How much is done, 0 to 1.
+    pub fn fraction(&self) -> f32 {
+        (self.film.frames() as f64 / self.wanted.frames()) as f32
+    }
+}
+
+/// The settings.
+pub fn choose(ui: &mut Ui, wanted: &mut Wanted, reached: f64) -> bool {
+    egui::Grid::new("film").num_columns(2).show(ui, |ui| {
+        let ends = [
+            ("From", "First instant of the film, on the timeline"),
+            ("To", "Last instant, at most what was shown of the run"),
+        ];
+        for (end, (name, help)) in wanted.span.iter_mut().zip(ends) {
+            ui.label(name);
+            let mut milliseconds = *end * 1e3;
+            let field = DragValue::new(&mut milliseconds)
+                .range(0.0..=reached * 1e3)
+                .speed(reached * 2.0)
+                .max_decimals(4)
+                .suffix(" ms");
+            if ui.add(field).on_hover_text(help).changed() {
+                *end = milliseconds / 1e3;
+            }
+            ui.end_row();
+        }
+        ui.label("Time scale");
+        let scales = transport::SCALES.map(|scale| (scale, value::time_scale(scale)));
+        let help = "Simulated seconds per second of film";
+        choice(
+            ui,
+            "Time scale of the film",
+            help,
+            &mut wanted.scale,
+            &scales,
+        );
+        ui.end_row();
+        ui.label("Frames");
+        let rates = RATES.map(|rate| (rate, format!("{rate} a second")));
+        choice(
+            ui,
+            "Frames of the film",
+            "Per second of film",
+            &mut wanted.rate,
+            &rates,
+        );
+        ui.end_row();
+        ui.label("Size");
+        let sizes = SIZES.map(|(size, name)| (size, name.to_owned()));
+        choice(ui, "Size of the film", "Pixels", &mut wanted.size, &sizes);
+        ui.end_row();
+        ui.label("Shows");
+        ui.horizontal(|ui| {
+            for (plots, name) in [(false, "View only"), (true, "View and plots")] {
+                ui.selectable_value(&mut wanted.plots, plots, name)
+                    .on_hover_text("The plots lie below the view");
+            }
+        });
+        ui.end_row();
+        ui.label("File");
+        ui.horizontal(|ui| {
+            let formats = [
+                (
+                    Format::Mp4,
+                    "MP4",
+                    "H.264: plays everywhere, small, exact times",
+                ),
+                (
+                    Format::Gif,
+                    "GIF",
+                    "Plays by itself in slides; 256 colours, at most 50 frames a second",
+                ),
+            ];
+            for (format, name, help) in formats {
+                ui.selectable_value(&mut wanted.format, format, name)
+                    .on_hover_text(help);
+            }
+        });
+        ui.end_row();
+    });
+    let frames = wanted.frames();
+    let told = match wanted.objection() {
+        Some(objection) => RichText::new(objection).color(ui.visuals().error_fg_color),
+        None => {
+            let length = frames / wanted.rate;
+            RichText::new(format!("{frames} frames, {length:.1} s of film")).weak()
+        }
+    };
+    ui.label(told);
+    false
+}
+
+/// A list of `options` for `value`.
+fn choice<T: Copy + PartialEq>(
+    ui: &mut Ui,
+    name: &str,
+    help: &str,
+    value: &mut T,
+    options: &[(T, String)],
+) {
+    let chosen = options.iter().find(|(option, _)| option == value);
+    ComboBox::from_id_salt(name)
+        .selected_text(chosen.map_or("own", |(_, text)| text.as_str()))
+        .show_ui(ui, |ui| {
+            for (option, text) in options {
+                ui.selectable_value(value, *option, text);
+            }
+        })
+        .response
+        .on_hover_text(help)
+        .accessible_name(name);
+}
+
+impl App {
+    /// Asks what the film is to be: what was shown so far, unless it was chosen otherwise before.
+    pub(super) fn ask_for_film(&mut self) {
+        let reached = self.player.reached();
+        let all = Wanted::all(reached, self.player.pacer.scale());
+        let mut wanted = self.film_wanted.clone().unwrap_or(all);
+        wanted.span = wanted.span.map(|end| end.min(reached));
+        if wanted.span[0] == wanted.span[1] {
+            wanted.span = [0.0, reached];
+        }
+        self.dialog = Some(super::dialogs::Dialog::Film { wanted });
+    }
+
+    /// Begins to make the film; it is saved when it is complete.
+    ///
+    /// # Errors
+    /// What cannot be made, in words.
+    pub fn make_film(&mut self, wanted: Wanted) -> Result<(), String> {
+        if let Some(objection) = wanted.objection() {
+            return Err(format!("No film: {objection}"));
+        }
+        let state = self
+            .graphics
+            .as_ref()
+            .ok_or("No film: there is no graphics adapter")?;
+        let film = Film::new(wanted.format, wanted.size, wanted.rate);
+        let film = film.map_err(|error| format!("No film: {error}"))?;
+        let pacer = &self.player.pacer;
+        let before = (pacer.shown(), pacer.scale(), self.player.is_playing());
+        let canvas = Canvas::beside(state);
+        // Impacts glow as long as they do where a run plays at this scale.
+        self.player.pacer.set_scale(wanted.scale);
+        self.player.go_to(wanted.span[0]);
+        self.viewport.arrive(&self.player);
+        self.film_wanted = Some(wanted.clone());
+        self.film = Some(Making {
+            wanted,
+            film,
+            canvas,
+            pending: None,
+            next: 0,
+            before,
+        });
+        Ok(())
+    }
+
+    /// Progress of the film, 0 to 1; `None` if none is being made.
+    pub fn filming(&self) -> Option<f32> {
+        Some(self.film.as_ref()?.fraction())
+    }
+
+    /// Gives up the film; nothing of it is left.
+    pub(super) fn cancel_film(&mut self) {
+        if let Some(making) = self.film.take() {
+            self.return_from_film(&making);
+        }
+    }
+
+    fn return_from_film(&mut self, making: &Making) {
+        let (shown, scale, playing) = making.before;
+        self.player.pacer.set_scale(scale);
+        self.player.go_to(shown);
+        self.player.set_playing(playing);
+        self.viewport.arrive(&self.player);
+    }
+
+    /// Draws the next frame, or takes the one that was drawn; never waits for it.
+    pub(super) fn advance_film(&mut self, ctx: &egui::Context) {
+        let Some(mut making) = self.film.take() else {
+            return;
+        };
+        ctx.request_repaint();
+        match self.film_on(ctx, &mut making) {
+            Ok(None) => self.film = Some(making),
+            Ok(Some(bytes)) => {
+                let format = making.wanted.format;
+                self.return_from_film(&making);
+                self.save(vec![SaveFile {
+                    name: format!("{}.{format}", self.player.scene().name),
+                    mime: format.mime(),
+                    bytes,
+                }]);
+            }
+            Err(reason) => {
+                self.return_from_film(&making);
+                self.problem = Some(format!("The film cannot be made: {reason}"));
+            }
+        }
+    }
+
+    /// One turn of `making`; returns the complete file.
+    fn film_on(
+        &mut self,
+        ctx: &egui::Context,
+        making: &mut Making,
+    ) -> Result<Option<Vec<u8>>, String> {
+        if let Some(pending) = &mut making.pending {
+            let Some(image) = pending.take() else {
+                return Ok(None);
+            };
+            making.pending = None;
+            let image = image.map_err(|error| error.to_string())?;
+            let added = making.film.add(&image.rgba);
+            added.map_err(|error| error.to_string())?;
+        }
+        if making.next as f64 >= making.wanted.frames() {
+            let wanted = making.wanted.clone();
+            let empty = Film::new(wanted.format, wanted.size, wanted.rate);
+            let empty = empty.map_err(|error| error.to_string())?;
+            let film = std::mem::replace(&mut making.film, empty);
+            return film.finish().map(Some).map_err(|error| error.to_string());
+        }
+        let instant = making.wanted.instant(making.next);
+        self.player.go_to(instant);
+        // The peaks since the frame before.
+        self.player.advance(0.0);
+        self.viewport
+            .advance(&self.player, (1.0 / making.wanted.rate) as f32);
+        let contents = if making.wanted.plots {
+            Contents::Plots
+        } else {
+            Contents::View
+        };
+        let first = making.next == 0;
+        let size = making.wanted.size;
+        making.pending = Some(self.draw_frame(ctx, &mut making.canvas, contents, size, first)?);
+        making.next += 1;
+        Ok(None)
+    }
+}

@@ -1,0 +1,153 @@
+//! Presentation: the picture, large type and thick arrows, for a projector and the last row. It changes nothing of the run.
+
+use eframe::egui::{self, Align2, FontId, Frame, Id, Panel, Rect, Sense, Ui, vec2};
+
+use super::{App, transport, value};
+
+/// Least height of a text as a share of the screen's: what the last row of a lecture hall can read.
+const LEAST_TEXT: f32 = 1.0 / 40.0;
+/// Smallest type of the interface, points.
+const SMALLEST: f32 = 12.0;
+/// Type of the caption, points.
+const CAPTION: f32 = 24.0;
+/// How much thicker arrows are.
+const THICKNESS: f32 = 2.0;
+/// Change of the screen's height that the type follows, as a share of it.
+const FOLLOWED: f32 = 0.02;
+
+/// What was before, and how the screen is.
+pub struct Presentation {
+    /// Zoom of the interface before.
+    zoom: f32,
+    /// Thickness of arrows before.
+    thickness: f32,
+    /// Height of the screen that the type was sized for, points at zoom 1.
+    height: f32,
+}
+
+/// Height of the screen, points at zoom 1.
+fn screen_height(ctx: &egui::Context) -> f32 {
+    ctx.content_rect().height() * ctx.zoom_factor()
+}
+
+/// Zoom at which the smallest type is legible from the last row of a screen `height` points high.
+fn legible(height: f32) -> f32 {
+    (height * LEAST_TEXT / SMALLEST).max(1.0)
+}
+
+impl App {
+    /// Begins or ends the presentation.
+    pub fn present(&mut self, ctx: &egui::Context, on: bool) {
+        if on == self.presentation.is_some() {
+            return;
+        }
+        match self.presentation.take() {
+            Some(before) => {
+                ctx.set_zoom_factor(before.zoom);
+                self.viewport.options.arrows.thickness = before.thickness;
+            }
+            None => {
+                let height = screen_height(ctx);
+                self.presentation = Some(Presentation {
+                    zoom: ctx.zoom_factor(),
+                    thickness: self.viewport.options.arrows.thickness,
+                    height,
+                });
+                ctx.set_zoom_factor(legible(height));
+                self.viewport.options.arrows.thickness = THICKNESS;
+            }
+        }
+        self.host.fill_screen(ctx, on);
+    }
+
+    /// Whether it is a presentation.
+    pub fn is_presenting(&self) -> bool {
+        self.presentation.is_some()
+    }
+
+    /// Sizes the type for the screen, once its size has changed: on the way to the full screen and back.
+    pub(super) fn follow_screen(&mut self, ctx: &egui::Context) {
+        let Some(presentation) = &mut self.presentation else {
+            return;
+        };
+        let height = screen_height(ctx);
+        let change = (height - presentation.height).abs();
+        // A pass later the new zoom is in force: only then the height is that of the screen.
+        let settled = (ctx.zoom_factor() - legible(presentation.height)).abs() < 1e-3;
+        if settled && change > FOLLOWED * presentation.height {
+            presentation.height = height;
+            ctx.set_zoom_factor(legible(height));
+        }
+    }
+
+    /// The whole of the window.
+    pub(super) fn presentation_ui(&mut self, ui: &mut Ui) {
+        let bar = Frame::side_top_panel(ui.style()).inner_margin(egui::Margin::symmetric(12, 4));
+        let free = !self.is_under_way();
+        let mut leave = false;
+        let asked = Panel::bottom("presentation")
+            .frame(bar)
+            .show(ui, |ui| {
+                leave = double_tapped(ui);
+                let row = egui::Layout::right_to_left(egui::Align::Center);
+                let size = vec2(ui.available_width(), ui.spacing().interact_size.y);
+                ui.allocate_ui_with_layout(size, row, |ui| {
+                    let help = "Back to the window with its panels (F5, Esc, double-tap on this bar)";
+                    leave |= ui.button("Leave").on_hover_text(help).clicked();
+                    ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
+                        ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.player))
+                            .inner
+                    })
+                    .inner
+                })
+                .inner
+            })
+            .inner;
+        self.central(ui, asked);
+        self.caption(ui);
+        if leave {
+            self.present(ui.ctx(), false);
+        }
+    }
+
+    /// The last finished impact: ball joint, largest normal force, how long it lasted.
+    pub fn last_impact(&self) -> Option<String> {
+        let player = &self.player;
+        let shown = player.pacer.shown();
+        // The simulation may be a step ahead of what is on show.
+        let mut impacts = player.simulation().impacts().rev();
+        let impact = impacts.find(|impact| impact.end <= shown)?;
+        let name = &player.scene().ball_joints[impact.joint].name;
+        let force = value::quantity(impact.peak, "N", 3);
+        let lasted = (impact.end - impact.start) * 1e3;
+        Some(format!("{name}, {force}, {} ms", value::number(lasted, 2)))
+    }
+
+    fn caption(&self, ui: &mut Ui) {
+        let Some(words) = self.last_impact() else {
+            return;
+        };
+        let area = self.picture_rect;
+        let ink = ui.visuals().strong_text_color();
+        let painter = ui.painter_at(area);
+        let words = painter.layout_no_wrap(words, FontId::proportional(CAPTION), ink);
+        let place = Align2::CENTER_TOP.align_size_within_rect(words.size(), area.shrink(12.0));
+        let plate = place.expand2(vec2(12.0, 4.0));
+        painter.rect_filled(plate, 6.0, ui.visuals().window_fill.gamma_multiply(0.85));
+        let text = words.text().to_owned();
+        painter.galley(place.min, words, ink);
+        let response = ui.interact(plate, Id::unique("last impact"), Sense::hover());
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, &text));
+        response.on_hover_text(
+            "The last impact that has ended: its ball joint, its largest normal force, and how long the ball touched",
+        );
+    }
+}
+
+/// Whether the bar that fills `ui` is double-clicked or double-tapped where it holds nothing else. Comes before its contents, which
+/// lie over it.
+pub fn double_tapped(ui: &Ui) -> bool {
+    let bar: Rect = ui.max_rect();
+    ui.interact(bar, ui.scope_id().with("double tap"), Sense::click())
+        .double_clicked()
+}

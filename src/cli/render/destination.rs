@@ -1,0 +1,137 @@
+//! Where frames go: a folder of pictures, or a film.
+
+use std::io::Write;
+use std::path::Path;
+
+use serde_json::{Map, Value as Json, json};
+
+use super::labels;
+use crate::cli::args::RenderArguments;
+use crate::cli::output::{claim_account, write_meta};
+use crate::cli::{Failure, print};
+use crate::files::{Folder, MANIFEST, OutputFile, publish};
+use crate::film::{Film, FilmError, Format};
+use crate::render::Image;
+
+/// What takes the frames. Until [`Destination::finish`] nothing of it has its final name.
+pub(in crate::cli) enum Destination {
+    /// `frame_00000.png`, …, and a manifest.
+    Pictures(Folder),
+    /// One file, with what a manifest says beside it.
+    Film {
+        /// The frames so far.
+        film: Box<Film>,
+        /// The file.
+        file: OutputFile,
+        /// Its metadata.
+        account: OutputFile,
+    },
+}
+
+impl Destination {
+    /// What `arguments` name.
+    ///
+    /// # Errors
+    /// Names that cannot be written, and films that no format holds.
+    pub fn claim(arguments: &RenderArguments) -> Result<Self, Failure> {
+        let Some(path) = &arguments.film else {
+            let folder = arguments.out.as_deref().unwrap_or(Path::new(""));
+            return Ok(Self::Pictures(Folder::claim(folder, arguments.force)?));
+        };
+        let name = path.to_string_lossy();
+        let Some(format) = Format::of_name(&name) else {
+            return Err(Failure::usage(format!(
+                "--film {name}: the name must end in {}",
+                Format::ALL.map(|format| format!(".{format}")).join(" or ")
+            )));
+        };
+        let size = [arguments.size.0, arguments.size.1];
+        let rate = arguments.fps.unwrap_or_default();
+        let film = Film::new(format, size, rate).map_err(unfilmable)?;
+        let file = OutputFile::claim(path, arguments.force)?;
+        let account = claim_account(path, arguments.force)?;
+        Ok(Self::Film {
+            film: Box::new(film),
+            file,
+            account,
+        })
+    }
+
+    /// Takes frame `number`, and returns what is said of it. `meta` is the provenance of all.
+    ///
+    /// # Errors
+    /// Input/output, or a film that becomes too large.
+    pub fn add(
+        &mut self,
+        number: usize,
+        image: &Image,
+        meta: &Map<String, Json>,
+    ) -> Result<Map<String, Json>, Failure> {
+        let mut told = Map::new();
+        match self {
+            Self::Pictures(folder) => {
+                let labels = labels(meta);
+                let labels: Vec<(&str, &str)> = labels
+                    .iter()
+                    .map(|(key, text)| (*key, text.as_str()))
+                    .collect();
+                let png = image
+                    .png(&labels)
+                    .map_err(|error| Failure::io(error.to_string()))?;
+                let file = format!("frame_{number:05}.png");
+                folder.write(&file, &png)?;
+                told.insert("file".into(), json!(file));
+            }
+            Self::Film { film, .. } => {
+                film.add(&image.rgba).map_err(unfilmable)?;
+                // Of the pixels before they are encoded, as a PNG has them.
+                let checksum = format!("{:08x}", crc32fast::hash(&image.rgba));
+                told.insert("pixels_crc32".into(), json!(checksum));
+            }
+        }
+        Ok(told)
+    }
+
+    /// Gives everything its final name.
+    ///
+    /// # Errors
+    /// Input/output.
+    pub fn finish(
+        self,
+        mut manifest: Map<String, Json>,
+        written: &str,
+        arguments: &RenderArguments,
+    ) -> Result<(), Failure> {
+        match self {
+            Self::Pictures(folder) => {
+                folder.finish(manifest)?;
+                let place = arguments.out.as_deref().unwrap_or(Path::new(""));
+                print(&format!(
+                    "{written} and {MANIFEST} in {}\n",
+                    place.display()
+                ))
+            }
+            Self::Film {
+                film,
+                file,
+                account,
+            } => {
+                let bytes = film.finish().map_err(unfilmable)?;
+                let checksum = format!("{:08x}", crc32fast::hash(&bytes));
+                manifest.insert("film_crc32".into(), json!(checksum));
+                let place = file.path().to_owned();
+                let account = account.fill(|out| write_meta(out, &manifest))?;
+                let film = file.fill(|out| out.write_all(&bytes))?;
+                publish(vec![account, film])?;
+                print(&format!("{written} in {}\n", place.display()))
+            }
+        }
+    }
+}
+
+fn unfilmable(error: FilmError) -> Failure {
+    match error {
+        FilmError::Encoder(_) => Failure::io(error.to_string()),
+        _ => Failure::usage(error.to_string()),
+    }
+}

@@ -1,0 +1,117 @@
+//! GIF: each frame holds the rectangle that changed, in its own 256 colours.
+
+use gif::{Encoder, Frame, Repeat};
+
+use super::{Encode, FilmError};
+
+/// Most frames per second: browsers take delays below 2 hundredths of a second for a mistake and show such films slowly.
+const MOST_RATE: f64 = 50.0;
+/// Trade-off of the palette search, 1 (best) to 30.
+const SPEED: i32 = 10;
+
+/// A GIF being written.
+pub struct Gif {
+    encoder: Encoder<Vec<u8>>,
+    size: [usize; 2],
+    rate: f64,
+    frames: u64,
+    /// The frame before, as it was given.
+    before: Vec<u8>,
+    /// The changed rectangle.
+    changed: Vec<u8>,
+}
+
+impl Gif {
+    pub fn new([width, height]: [u32; 2], rate: f64) -> Result<Self, FilmError> {
+        let too_much = |limit| FilmError::TooMuch {
+            width,
+            height,
+            rate,
+            limit,
+        };
+        if !(rate > 0.0 && rate <= MOST_RATE) {
+            return Err(too_much("a GIF shows at most 50 frames a second"));
+        }
+        let (Ok(across), Ok(down)) = (u16::try_from(width), u16::try_from(height)) else {
+            return Err(too_much("an edge of a GIF has at most 65535 pixels"));
+        };
+        let mut encoder = Encoder::new(Vec::new(), across, down, &[]).map_err(refused)?;
+        encoder.set_repeat(Repeat::Infinite).map_err(refused)?;
+        Ok(Self {
+            encoder,
+            size: [width as usize, height as usize],
+            rate,
+            frames: 0,
+            before: Vec::new(),
+            changed: Vec::new(),
+        })
+    }
+
+    /// Left, top, width and height of what differs from the frame before; one pixel where nothing does.
+    fn difference(&self, rgba: &[u8]) -> [usize; 4] {
+        let [width, height] = self.size;
+        if self.before.is_empty() {
+            return [0, 0, width, height];
+        }
+        let row = 4 * width;
+        let mut bounds: Option<[usize; 4]> = None;
+        let rows = rgba.chunks_exact(row).zip(self.before.chunks_exact(row));
+        for (y, (now, before)) in rows.enumerate() {
+            if now == before {
+                continue;
+            }
+            let differs = |x: &usize| now[4 * x..4 * x + 4] != before[4 * x..4 * x + 4];
+            let (Some(first), Some(last)) =
+                ((0..width).find(differs), (0..width).rev().find(differs))
+            else {
+                continue;
+            };
+            let [left, top, right, _] = bounds.unwrap_or([first, y, last, y]);
+            bounds = Some([left.min(first), top, right.max(last), y]);
+        }
+        let [left, top, right, bottom] = bounds.unwrap_or_default();
+        [left, top, right - left + 1, bottom - top + 1]
+    }
+}
+
+impl Encode for Gif {
+    fn add(&mut self, rgba: &[u8]) -> Result<(), FilmError> {
+        let [width, height] = self.size;
+        assert_eq!(rgba.len(), 4 * width * height, "a frame of the film's size");
+        let [left, top, across, down] = self.difference(rgba);
+        self.changed.clear();
+        for y in top..top + down {
+            let from = 4 * (y * width + left);
+            self.changed
+                .extend_from_slice(&rgba[from..from + 4 * across]);
+        }
+        for pixel in self.changed.chunks_exact_mut(4) {
+            pixel[3] = 255;
+        }
+        let mut frame =
+            Frame::from_rgba_speed(across as u16, down as u16, &mut self.changed, SPEED);
+        (frame.left, frame.top) = (left as u16, top as u16);
+        // Rounded times, not rounded intervals: the film as a whole keeps its pace.
+        let hundredths = |frames: u64| (100.0 * frames as f64 / self.rate).round();
+        frame.delay = (hundredths(self.frames + 1) - hundredths(self.frames)) as u16;
+        self.encoder.write_frame(&frame).map_err(refused)?;
+        self.frames += 1;
+        self.before.clear();
+        self.before.extend_from_slice(rgba);
+        Ok(())
+    }
+
+    fn bytes(&self) -> usize {
+        self.encoder.get_ref().len()
+    }
+
+    fn finish(self: Box<Self>) -> Result<Vec<u8>, FilmError> {
+        self.encoder
+            .into_inner()
+            .map_err(|error| FilmError::Encoder(error.to_string()))
+    }
+}
+
+fn refused(error: gif::EncodingError) -> FilmError {
+    FilmError::Encoder(error.to_string())
+}

@@ -1,0 +1,134 @@
+//! Presentation: what the last row sees.
+
+use eframe::egui::{self, Key, PointerButton, TextStyle, vec2};
+use egui_kittest::{Harness, SnapshotResults, kittest::Queryable as _};
+use jointplay::app::App;
+use jointplay::simulate::Simulation;
+
+use crate::window::sized;
+
+const SCREEN: egui::Vec2 = vec2(1280.0, 720.0);
+
+/// Presses F5, and gives the window the points that are left at its new zoom: a real one has the same pixels as before.
+fn f5(harness: &mut Harness<'_, App>, screen: egui::Vec2) {
+    harness.key_press(Key::F5);
+    harness.step();
+    harness.set_size(screen / harness.ctx.zoom_factor());
+    harness.run();
+}
+
+#[test]
+fn f5_leaves_the_picture_with_type_for_the_last_row_and_changes_nothing_of_the_run() {
+    for screen in [SCREEN, vec2(1920.0, 1080.0), vec2(800.0, 450.0)] {
+        let mut harness = sized("spcmm", screen.into(), egui::Theme::Light);
+        harness.state_mut().player_mut().run_to(30e-3);
+        harness.run();
+        let state = |harness: &Harness<'_, App>| {
+            let player = harness.state().player();
+            (player.pacer.shown(), player.simulation().state_hash())
+        };
+        let before = state(&harness);
+        f5(&mut harness, screen);
+        assert!(harness.state().is_presenting());
+        // The panels are away, time and transport are there.
+        for gone in ["Controls", "Save", "View options", "Clearance"] {
+            assert!(harness.query_by_label(gone).is_none(), "{gone}");
+        }
+        harness.get_by_label("Play");
+        let zoom = harness.ctx.zoom_factor();
+        let styles = &harness.ctx.global_style().text_styles;
+        for style in [TextStyle::Small, TextStyle::Body, TextStyle::Button] {
+            let share = styles[&style].size * zoom / screen.y;
+            assert!(share >= 1.0 / 40.0 - 1e-6, "{screen:?} {style:?}: {share}");
+        }
+
+        // The caption is of the last impact that has ended at the instant shown.
+        let mut simulation =
+            Simulation::new(harness.state().player().scene()).expect("starts");
+        let mut impacts = Vec::new();
+        while simulation.time() < 30e-3 {
+            simulation.step().expect("runs");
+            simulation.take_impacts(&mut impacts);
+        }
+        let last = impacts.iter().rfind(|impact| impact.end <= before.0);
+        let last = last.expect("an impact");
+        let words = harness.state().last_impact().expect("an impact");
+        harness.get_by_label(&words);
+        let mut parts = words.split(", ");
+        let joints = &simulation.scene().ball_joints;
+        assert_eq!(parts.next(), Some(joints[last.joint].name.as_str()));
+        let number = |text: &str| -> f64 {
+            let digits: String = text.chars().take_while(|c| !c.is_whitespace()).collect();
+            digits.replace('\u{2212}', "-").parse().expect("a number")
+        };
+        let (force, lasted) = (parts.next().expect("a force"), parts.next().expect("a time"));
+        assert!(force.ends_with(" N") && lasted.ends_with(" ms"), "{words}");
+        assert!((number(force) / last.peak - 1.0).abs() < 5.1e-3, "{words}");
+        let milliseconds = (last.end - last.start) * 1e3;
+        assert!((number(lasted) / milliseconds - 1.0).abs() < 0.051, "{words}");
+
+        harness.key_press(Key::Escape);
+        harness.step();
+        harness.set_size(screen);
+        harness.run();
+        assert!(!harness.state().is_presenting());
+        assert_eq!(harness.ctx.zoom_factor(), 1.0);
+        harness.get_by_label("Save");
+        assert_eq!(state(&harness), before);
+    }
+}
+
+#[test]
+fn the_type_follows_the_screen() {
+    let mut harness = sized("pendulum", SCREEN.into(), egui::Theme::Light);
+    f5(&mut harness, SCREEN);
+    let zoom = harness.ctx.zoom_factor();
+    assert!((zoom - 1.5).abs() < 1e-3, "{zoom}");
+    // The full screen is larger than the window was.
+    harness.set_size(vec2(1920.0, 1080.0) / zoom);
+    harness.step();
+    harness.step();
+    let zoom = harness.ctx.zoom_factor();
+    assert!((zoom - 2.25).abs() < 1e-3, "{zoom}");
+}
+
+#[test]
+fn a_double_click_on_the_bar_does_it_too() {
+    for size in [[1280.0, 800.0], [390.0, 844.0], [844.0, 390.0]] {
+        let mut harness = sized("pendulum", size, egui::Theme::Light);
+        // Beside the last control of the bar, or in the gap above its edge.
+        let at = egui::pos2(size[0] - 4.0, size[1] - 3.0);
+        for _ in 0..2 {
+            for pressed in [true, false] {
+                harness.event(egui::Event::PointerMoved(at));
+                harness.event(egui::Event::PointerButton {
+                    pos: at,
+                    button: PointerButton::Primary,
+                    pressed,
+                    modifiers: egui::Modifiers::NONE,
+                });
+                harness.step();
+            }
+        }
+        assert!(harness.state().is_presenting(), "{size:?}");
+    }
+}
+
+#[test]
+fn pictures_of_a_presentation() {
+    let mut results = SnapshotResults::new();
+    for (name, scene, theme) in [
+        ("presentation_light", "spcmm", egui::Theme::Light),
+        ("presentation_dark", "slider-crank-driven", egui::Theme::Dark),
+    ] {
+        let mut harness = sized(scene, SCREEN.into(), theme);
+        harness.state_mut().player_mut().run_to(30e-3);
+        harness.run();
+        f5(&mut harness, SCREEN);
+        let zoom = harness.ctx.zoom_factor();
+        harness.set_pixels_per_point(zoom);
+        harness.run();
+        harness.snapshot(name);
+        results.extend_harness(&mut harness);
+    }
+}
