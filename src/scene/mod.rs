@@ -14,9 +14,11 @@ mod elements;
 mod error;
 mod expression;
 mod field;
+mod format;
 mod formula;
 mod given;
 mod include;
+mod key;
 mod load;
 mod model;
 mod numbers;
@@ -47,7 +49,9 @@ pub use error::SceneError;
 pub use expression::{
     Binary, ExpressionError, Fault, LONGEST_EXPRESSION, Number, Program, Unary, smooth_step,
 };
+pub use format::FILE;
 pub use given::{FileNumber, OwnParameter};
+pub use key::{Absent, FileKey, FileTable, Many, Takes, Variants};
 pub use load::*;
 pub use model::*;
 pub use parameters::*;
