@@ -461,13 +461,17 @@ pub(super) fn read_element<'d>(
         section.number(key)
     };
     let numbers = kind.numbers.iter().map(number).collect::<Result<_, _>>()?;
+    let choice = |&(key, words, _): &(&str, &'static [&'static str], &str)| match section.get(key) {
+        Some(node) => node.choice(),
+        None => Ok(words[0]),
+    };
+    let choices = kind.choices.iter().map(choice);
+    let choices: Vec<&str> = choices.collect::<Result<_, _>>()?;
     // A vector in axes that do not belong to the pattern turns with its copies.
     let turns = section.document.copy.filter(|copy| {
         let body = points.first().and_then(|point| point.body);
         let own = body.is_some_and(|body| copy.made(&scene.bodies[body].name));
-        !own || section
-            .get("axes")
-            .is_none_or(|axes| axes.text() != Ok(LoadAxes::Body.word()))
+        !own || !choices.contains(&LoadAxes::Body.word())
     });
     let vector = |row: &ElementVector| {
         let value = section.vector(row.key)?;
@@ -479,11 +483,6 @@ pub(super) fn read_element<'d>(
         .iter()
         .map(vector)
         .collect::<Result<_, SceneError>>()?;
-    let choice = |&(key, words, _): &(&str, &'static [&'static str], &str)| match section.get(key) {
-        Some(node) => node.choice(),
-        None => Ok(words[0]),
-    };
-    let choices = kind.choices.iter().map(choice).collect::<Result<_, _>>()?;
     // Whether the first and second point are on bodies of the pattern's copy that is read; all are of a copy that does not turn.
     let owned = |place: usize| {
         let copy = section.document.copy.filter(|copy| !copy.keeps_axes());

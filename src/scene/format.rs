@@ -865,3 +865,18 @@ fn of_element(kind: &'static ElementKind) -> FileTable {
     let head = format!("[[{}]]", kind.section);
     FileTable::new(kind.section, head.leak(), kind.help, keys.leak())
 }
+
+/// Every table of a scene file: the whole file, then the tables that its keys take, each after the one that names it first.
+pub fn file_tables() -> Vec<&'static FileTable> {
+    fn add(table: &'static FileTable, all: &mut Vec<&'static FileTable>) {
+        if all.iter().all(|other| other.name != table.name) {
+            all.push(table);
+            for inner in table.keys.iter().filter_map(FileKey::table) {
+                add(inner, all);
+            }
+        }
+    }
+    let mut all = Vec::new();
+    add(&FILE, &mut all);
+    all
+}

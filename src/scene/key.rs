@@ -6,7 +6,7 @@ use super::units::Dimension;
 /// Largest length, speed, angle, … in SI units that a file may give.
 pub(super) const MAX_SI: f64 = 1e6;
 /// Lower end of a range that excludes 0.
-pub(super) const ABOVE_ZERO: f64 = f64::MIN_POSITIVE;
+pub const ABOVE_ZERO: f64 = f64::MIN_POSITIVE;
 /// Range of a number that only [`MAX_SI`] bounds.
 pub(super) const ANY: (f64, f64) = (-MAX_SI, MAX_SI);
 /// Range of numbers that are checked together.
@@ -270,7 +270,7 @@ impl FileKey {
     }
 
     /// Dimension of its numbers, where they have one; of pairs, that of the second. `hinge`: whether it belongs to one.
-    pub(super) fn dimension(&self, hinge: bool) -> Option<Dimension> {
+    pub fn dimension(&self, hinge: bool) -> Option<Dimension> {
         let dimension = match self.takes {
             Takes::Number(dimension, _)
             | Takes::Vector(dimension, _)
@@ -284,7 +284,7 @@ impl FileKey {
     }
 
     /// Closed range of its numbers, SI.
-    pub(super) fn range(&self) -> (f64, f64) {
+    pub fn range(&self) -> (f64, f64) {
         match self.takes {
             Takes::Number(_, range) | Takes::Vector(_, range) => range,
             _ => UNCHECKED,
@@ -292,7 +292,7 @@ impl FileKey {
     }
 
     /// Most entries of its list.
-    pub(super) fn many(&self) -> Option<Many> {
+    pub fn many(&self) -> Option<Many> {
         match self.takes {
             Takes::List(_, many)
             | Takes::Vectors(_, many)

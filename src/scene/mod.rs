@@ -49,18 +49,16 @@ pub use error::SceneError;
 pub use expression::{
     Binary, ExpressionError, Fault, LONGEST_EXPRESSION, Number, Program, Unary, smooth_step,
 };
-pub use format::FILE;
+pub use format::{FILE, file_tables};
 pub use given::{FileNumber, OwnParameter};
-pub use key::{Absent, FileKey, FileTable, Many, Takes, Variants};
+pub use key::{ABOVE_ZERO, Absent, FileKey, FileTable, Many, Takes, Variants};
 pub use load::*;
 pub use model::*;
 pub use parameters::*;
-pub use table::{reference_page, table};
+pub use table::{find, reference_page, table};
 pub use units::*;
 pub use value::Value;
 pub use visible::{visible, visible_line};
-
-use table::find;
 
 /// The parameter of any scene (by its key or the last part of it) or other word from `words` nearest to `wrong`, as errors
 /// quote it: in brackets, or empty.
