@@ -43,6 +43,10 @@ pub enum Command {
     Reproduce(ReproduceArguments),
     /// Print the reference page of all parameters (Markdown).
     Parameters,
+    /// Print the page about scene files: a guide, and the reference of every key (Markdown).
+    Reference,
+    /// Print a JSON schema of scene files, by which editors complete and check them.
+    Schema,
 }
 
 /// A scene and what to change in it.

@@ -17,10 +17,12 @@ mod page;
 mod progress;
 mod provenance;
 mod quantity;
+pub mod reference;
 #[cfg(feature = "gui")]
 mod render;
 pub mod reproduce;
 mod run;
+pub mod schema;
 mod state;
 mod summary;
 #[cfg(test)]
@@ -89,6 +91,8 @@ fn dispatch(arguments: Arguments) -> Result<(), Failure> {
         Some(Command::Merge(arguments)) => sweep::merge(&arguments),
         Some(Command::Reproduce(arguments)) => reproduce::reproduce(&arguments),
         Some(Command::Parameters) => print(&reference_page()),
+        Some(Command::Reference) => print(&reference::page()),
+        Some(Command::Schema) => print(&schema::page()),
     }
 }
 

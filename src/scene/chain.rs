@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::document::{Node, Section};
-use super::read_bodies::{BODY_KEYS, read_rigid_body};
-use super::read_joints::{contact_parts, read_own_contact, read_rotation};
+use super::read_bodies::read_rigid_body;
+use super::read_joints::{read_own_contact, read_rotation};
 use super::*;
 
 /// Adds the bodies, free joints and ball joints of the `[chain]` in `node`: link 1 hangs from a fixed socket at `hang`,
@@ -17,26 +17,13 @@ pub(super) fn expand<'d>(
     node: &Node<'d>,
     scene: &mut Scene,
 ) -> Result<BTreeMap<String, Node<'d>>, SceneError> {
-    let section = node.section(&["links", "hang", "rotation", "link", "joint"])?;
-    let hang = section
-        .get("hang")
-        .map_or(Ok(Vec3::zeros()), |node| node.vector(Dimension::Length))?;
-    let rotation = section
-        .get("rotation")
-        .map_or(Ok(Quat::identity()), |node| read_rotation(&node))?;
-    let known: Vec<&str> = ["ball", "socket", "opening"]
-        .into_iter()
-        .chain(BODY_KEYS)
-        .collect();
-    let link_node = section.require("link", "{ mass = \"0.384 kg\", … }")?;
-    let link = link_node.section(&known)?;
+    let section = node.section()?;
+    let hang = section.vector("hang")?;
+    let rotation = read_rotation(section.get("rotation"))?;
+    let link = section.require("link")?.section()?;
     let template = read_rigid_body(&link, String::new())?;
-    let ball = link
-        .require("ball", "\"0 0 100 mm\"")?
-        .vector(Dimension::Length)?;
-    let socket = link
-        .require("socket", "\"0 0 -100 mm\"")?
-        .vector(Dimension::Length)?;
+    let ball = link.vector("ball")?;
+    let socket = link.vector("socket")?;
     let opening = link
         .get("opening")
         .map_or(Ok(scene.view.down.unit()), |node| node.direction())?;
@@ -142,11 +129,10 @@ fn read_own<'d>(
 ) -> Result<BTreeMap<String, Node<'d>>, SceneError> {
     let mut places = BTreeMap::new();
     let first = scene.ball_joints.len() - links;
-    let known: Vec<&str> = ["name"].into_iter().chain(contact_parts()).collect();
-    let list = section.get("joint").map(|node| node.elements());
+    let list = section.get("joint").map(|node| node.entries());
     for node in list.transpose()?.unwrap_or_default() {
-        let own = node.section_as(node.title("chain.joint"), &known)?;
-        let name = own.require("name", "\"J1\"")?.name()?;
+        let own = node.section_as(node.title("chain.joint"))?;
+        let name = own.require("name")?.name()?;
         let joints = &mut scene.ball_joints[first..];
         let number = name.strip_prefix('J').and_then(|n| n.parse::<usize>().ok());
         let found = number.and_then(|n| joints.get_mut(n.checked_sub(1)?));

@@ -4,17 +4,15 @@ use super::beside::Beside;
 use super::copy::Copy as PatternCopy;
 use super::error::{brief, line_text, nearest, place_of};
 use super::given::{FileNumber, Place};
+use super::key::{ABOVE_ZERO, Absent, FileKey, FileTable, MAX_SI, Many, Takes, Variants};
 use super::parameters::{Kind, ValueFault};
 use super::reading::Reading;
-use super::{Dimension, SceneError, Vec3, find};
+use super::{Dimension, SceneError, Vec3, find, format_quantity, si_unit, unit_names};
 use crate::words::Words;
 use std::borrow::Cow;
 use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
-
-/// Largest length, speed, angle, … in SI units that a file may give.
-pub(super) const MAX_SI: f64 = 1e6;
 
 /// The text being read, its name in errors, and what its values may refer to.
 #[derive(Clone, Copy)]
@@ -26,6 +24,8 @@ pub(super) struct Document<'d> {
     pub included: bool,
     /// The copy of a pattern that the values belong to.
     pub copy: Option<&'d PatternCopy>,
+    /// Whether the values belong to a hinge, where some have other dimensions.
+    pub on_hinge: bool,
     /// Files that it names.
     pub beside: &'d Beside<'d>,
 }
@@ -37,6 +37,10 @@ pub(super) struct Section<'d> {
     pub path: String,
     pub table: &'d DeTable<'d>,
     pub span: Range<usize>,
+    /// Which keys it may have.
+    pub rows: &'static FileTable,
+    /// Its variant.
+    pub word: Option<&'static str>,
 }
 
 /// A value with its key.
@@ -44,6 +48,8 @@ pub(super) struct Section<'d> {
 pub(super) struct Node<'d> {
     pub document: Document<'d>,
     pub key: String,
+    /// Row of the key; of an entry of a list, that of the list.
+    pub row: &'static FileKey,
     pub value: &'d Spanned<DeValue<'d>>,
     /// Where the text gives a value, and whether it is not this one: a change came after it.
     written: Option<Range<usize>>,
@@ -89,32 +95,67 @@ impl<'d> Document<'d> {
 }
 
 impl<'d> Section<'d> {
-    /// A table whose keys are all among `known`.
+    /// A table of the file; `rows` says which keys it may have.
+    ///
+    /// # Errors
+    /// The word that selects its variant is missing or wrong, or another key does not belong there.
     pub fn new(
         document: Document<'d>,
         path: String,
         table: &'d DeTable<'d>,
         span: Range<usize>,
-        known: &[&str],
+        rows: &'static FileTable,
     ) -> Result<Self, SceneError> {
-        let section = Self {
+        let mut section = Self {
             document,
             path,
             table,
             span,
+            rows,
+            word: None,
         };
-        let unknown = table
-            .keys()
-            .filter(|key| !known.contains(&key.get_ref().as_ref()))
-            .min_by_key(|key| key.span().start);
-        match unknown {
-            None => Ok(section),
-            Some(key) => {
-                let near = nearest(key.get_ref(), known.iter().copied());
-                let message = format!("unknown key{near}; allowed here: {}", known.join(", "));
-                Err(document.error(key.span(), &section.key(key.get_ref()), None, message))
+        // First of all: a word may decide which other keys there are.
+        for key in rows.keys {
+            if let (Takes::Word(_), Some(node)) = (key.takes, section.get(key.name)) {
+                let word = node.choice()?;
+                if matches!(rows.variants, Some(Variants::Word(by, _)) if by == key.name) {
+                    section.word = Some(word);
+                }
             }
         }
+        if let Some(Variants::Presence(words)) = rows.variants {
+            let mut given = words.iter().filter(|word| section.get(word).is_some());
+            section.word = given.next().copied().filter(|_| given.next().is_none());
+        }
+        let known: Vec<&str> = rows.of(section.word).map(|key| key.name).collect();
+        let unknown = table
+            .iter()
+            .filter(|(key, _)| !known.contains(&key.get_ref().as_ref()))
+            .min_by_key(|(key, _)| key.span().start);
+        if let Some((key, _)) = unknown {
+            return Err(section.foreign(key, &known));
+        }
+        if let (Some(Variants::Word(by, _)), None) = (rows.variants, section.word) {
+            section.require(by)?;
+        }
+        Ok(section)
+    }
+
+    /// The error for a key that is not among the `known` ones.
+    fn foreign(&self, key: &Spanned<Cow<'_, str>>, known: &[&str]) -> SceneError {
+        let name = key.get_ref();
+        if let (Some(Variants::Word(_, one)), Some(word)) = (self.rows.variants, self.word)
+            && let (false, Some(node)) = (one.is_empty(), self.find(name))
+        {
+            let own = self.rows.of(self.word).filter(|key| !key.of.is_empty());
+            let own: Vec<&str> = own.map(|key| key.name).collect();
+            let one = one.replace("{}", word);
+            return node.error(format!("not allowed here: a {one} has {}", own.join(", ")));
+        }
+        let near = nearest(name, known.iter().copied());
+        let message = format!("unknown key{near}; allowed here: {}", known.join(", "));
+        let document = self.document;
+        document.error(key.span(), &self.key(name), None, message)
     }
 
     /// Full path of a key in this table.
@@ -128,17 +169,54 @@ impl<'d> Section<'d> {
 
     /// An optional value.
     pub fn get(&self, name: &str) -> Option<Node<'d>> {
-        Node::new(self.document, self.key(name), self.table.get(name))
+        debug_assert!(
+            self.rows.key(name, None).is_some(),
+            "no row for `{name}` in the table `{}`",
+            self.rows.name
+        );
+        self.find(name)
     }
 
-    /// A required value; `like` is an example of one.
-    pub fn require(&self, name: &str, like: &str) -> Result<Node<'d>, SceneError> {
+    /// The value of a key, if it is there and has a row.
+    fn find(&self, name: &str) -> Option<Node<'d>> {
+        let row = self.rows.key(name, self.word)?;
+        Node::new(self.document, self.key(name), row, self.table.get(name))
+    }
+
+    /// A required value.
+    pub fn require(&self, name: &str) -> Result<Node<'d>, SceneError> {
         self.get(name).ok_or_else(|| {
+            let row = self.rows.key(name, self.word);
+            let like = row.map_or("", |row| row.like(self.document.on_hinge));
             self.error(
                 name,
                 format!("missing; write for example `{name} = {like}`"),
             )
         })
+    }
+
+    /// What the row of a key gives where it is left out, if that is a number.
+    fn default(&self, name: &str) -> Option<f64> {
+        match self.rows.key(name, self.word)?.absent {
+            Absent::Is(number) => Some(number),
+            _ => None,
+        }
+    }
+
+    /// A number as its row says, SI.
+    pub fn number(&self, name: &str) -> Result<f64, SceneError> {
+        match (self.get(name), self.default(name)) {
+            (None, Some(default)) => Ok(default),
+            _ => self.require(name)?.number(),
+        }
+    }
+
+    /// A vector as its row says, SI.
+    pub fn vector(&self, name: &str) -> Result<Vec3, SceneError> {
+        match (self.get(name), self.default(name)) {
+            (None, Some(default)) => Ok(Vec3::repeat(default)),
+            _ => self.require(name)?.vector(),
+        }
     }
 
     /// Byte offset of this table in the text.
@@ -169,12 +247,14 @@ impl<'d> Node<'d> {
     fn new(
         document: Document<'d>,
         key: String,
+        row: &'static FileKey,
         written: Option<&'d Spanned<DeValue<'d>>>,
     ) -> Option<Self> {
         let change = document.reading.change(&key);
         Some(Self {
             document,
             key,
+            row,
             value: change.or(written)?,
             written: written.map(Spanned::span),
             changed: change.is_some(),
@@ -184,7 +264,7 @@ impl<'d> Node<'d> {
     /// The same value under another key.
     pub fn retitled(&self, key: String) -> Self {
         let written = self.written.is_some().then_some(self.value);
-        Self::new(self.document, key, written).unwrap_or_else(|| self.clone())
+        Self::new(self.document, key, self.row, written).unwrap_or_else(|| self.clone())
     }
 
     /// Byte offset of this value in the text.
@@ -244,7 +324,7 @@ impl<'d> Node<'d> {
     /// A finite quantity, SI: a number with its unit, or an expression. From now on it is a number of the scene, under this key.
     pub fn quantity(&self, dimension: Dimension) -> Result<f64, SceneError> {
         let place = self.place_of(Place::Value);
-        self.number(self.scalar()?, dimension, place)
+        self.evaluated(self.scalar()?, dimension, place)
     }
 
     /// Where the scene's text gives this value.
@@ -257,7 +337,7 @@ impl<'d> Node<'d> {
     }
 
     /// The quantity `text`, at `place`, as [`Self::quantity`].
-    fn number(&self, text: &str, dimension: Dimension, place: Place) -> Result<f64, SceneError> {
+    fn evaluated(&self, text: &str, dimension: Dimension, place: Place) -> Result<f64, SceneError> {
         let reading = self.document.reading;
         let value = reading
             .evaluate(text, dimension, self.document.copy)
@@ -283,46 +363,65 @@ impl<'d> Node<'d> {
                 | Dimension::TurningDamping
         );
         if moves && value.abs() > MAX_SI {
-            let limit = super::format_quantity(MAX_SI, super::si_unit(dimension));
+            let limit = format_quantity(MAX_SI, si_unit(dimension));
             return Err(self.error(format!("out of range; allowed -{limit} to {limit}")));
         }
         Ok(())
     }
 
-    /// A quantity above 0 and at most `max` (SI, shown in `unit`).
-    pub fn positive(&self, dimension: Dimension, max: f64, unit: &str) -> Result<f64, SceneError> {
+    /// A number as its row says: a quantity of its dimension, in its range, SI.
+    pub fn number(&self) -> Result<f64, SceneError> {
+        let dimension = self.dimension();
         let value = self.quantity(dimension)?;
-        if value > 0.0 && value <= max {
-            return Ok(value);
-        }
-        let units = super::unit_names(dimension).join(", ");
-        let top = super::format_quantity(max, unit);
-        Err(self.error(format!(
-            "out of range; allowed above 0 up to {top}; units {units}"
-        )))
-    }
-
-    /// A quantity in a closed range, SI.
-    pub fn within(&self, dimension: Dimension, range: (f64, f64)) -> Result<f64, SceneError> {
-        let value = self.quantity(dimension)?;
-        let (least, most) = range;
+        let (least, most) = self.row.range();
         if (least..=most).contains(&value) {
             return Ok(value);
         }
-        let unit = super::si_unit(dimension);
-        let mut allowed = format!(
-            "out of range; allowed {} to {}",
-            super::format_quantity(least, unit),
-            super::format_quantity(most, unit)
-        );
+        let unit = si_unit(dimension);
+        let mut allowed = match format_quantity(most, unit) {
+            top if least == ABOVE_ZERO => format!("out of range; allowed above 0 up to {top}"),
+            top => {
+                let bottom = format_quantity(least, unit);
+                format!("out of range; allowed {bottom} to {top}")
+            }
+        };
         if !unit.is_empty() {
-            allowed += &format!("; units {}", super::unit_names(dimension).join(", "));
+            allowed += &format!("; units {}", unit_names(dimension).join(", "));
         }
         Err(self.error(allowed))
     }
 
-    /// One of some words.
-    pub fn choice(&self, words: &[&'static str]) -> Result<&'static str, SceneError> {
+    /// An example of a value, by its row.
+    pub fn like(&self) -> &'static str {
+        self.row.like(self.document.on_hinge)
+    }
+
+    /// Dimension of its numbers, by its row.
+    pub fn dimension(&self) -> Dimension {
+        let dimension = self.row.dimension(self.document.on_hinge);
+        dimension.unwrap_or(Dimension::None)
+    }
+
+    /// A whole number as its row says.
+    pub fn whole(&self) -> Result<u32, SceneError> {
+        let (least, most) = match self.row.takes {
+            Takes::Whole(least, most) => (least, most),
+            _ => (0, u32::MAX),
+        };
+        match self.scalar()?.parse() {
+            Ok(number) if (least..=most).contains(&number) => Ok(number),
+            _ => Err(self.error(format!(
+                "out of range; allowed {least} to {most}; a whole number, no unit"
+            ))),
+        }
+    }
+
+    /// One of the words of its row.
+    pub fn choice(&self) -> Result<&'static str, SceneError> {
+        let words = match self.row.takes {
+            Takes::Word(words) => words,
+            _ => &[],
+        };
         let text = self.text()?;
         let found = words.iter().copied().find(|word| *word == text);
         found.ok_or_else(|| {
@@ -334,10 +433,10 @@ impl<'d> Node<'d> {
         })
     }
 
-    /// One of an enum's words.
+    /// One of an enum's words, which are those of its row.
     pub fn word<T: Words>(&self) -> Result<T, SceneError> {
-        let word = self.choice(T::WORDS)?;
-        Ok(T::of_word(word).expect("one of its words"))
+        let word = self.choice()?;
+        Ok(T::of_word(word).expect("the row has the words of the enum"))
     }
 
     /// A name: letters, digits, `_` and `-`, as keys and column names are built from it; in a copy of a pattern, numbered.
@@ -371,9 +470,12 @@ impl<'d> Node<'d> {
         }
     }
 
-    /// The elements of an array of at most `most`; `what` names them in errors. As [`Self::elements`].
-    pub fn elements_up_to(&self, most: usize, what: &str) -> Result<Vec<Node<'d>>, SceneError> {
+    /// The entries of a list, as many as its row allows. As [`Self::elements`].
+    pub fn entries(&self) -> Result<Vec<Node<'d>>, SceneError> {
         let elements = self.elements()?;
+        let Some(Many { most, what }) = self.row.many() else {
+            return Ok(elements);
+        };
         match elements.get(most) {
             None => Ok(elements),
             Some(first) => Err(self.document.error(
@@ -396,7 +498,8 @@ impl<'d> Node<'d> {
             .as_array()
             .ok_or_else(|| self.wrong_type("an array"))?;
         let node = |(index, value)| {
-            Node::new(self.document, format!("{}[{index}]", self.key), Some(value))
+            let key = format!("{}[{index}]", self.key);
+            Node::new(self.document, key, self.row, Some(value))
         };
         Ok(array.iter().enumerate().filter_map(node).collect())
     }
@@ -428,13 +531,13 @@ impl<'d> Node<'d> {
             let (numbers, unit) = words.split_at(N);
             let unit = unit.join(" ");
             for (index, (value, number)) in values.iter_mut().zip(numbers).enumerate() {
-                let part = Node::new(self.document, key(index), Some(self.value));
+                let part = Node::new(self.document, key(index), self.row, Some(self.value));
                 let part = part.expect("there is a value");
                 let place = self.place_of(Place::Part);
                 *value = if part.changed {
-                    part.number(part.scalar()?, dimension, place)?
+                    part.evaluated(part.scalar()?, dimension, place)?
                 } else {
-                    part.number(&format!("{number} {unit}"), dimension, place)?
+                    part.evaluated(&format!("{number} {unit}"), dimension, place)?
                 };
             }
             return Ok(values);
@@ -444,20 +547,31 @@ impl<'d> Node<'d> {
             return Err(self.error(format!("needs {N} values, has {}", elements.len())));
         }
         for (index, (value, element)) in values.iter_mut().zip(&elements).enumerate() {
-            let part = Node::new(self.document, key(index), Some(element.value));
+            let part = Node::new(self.document, key(index), self.row, Some(element.value));
             *value = part.expect("there is a value").quantity(dimension)?;
         }
         Ok(values)
     }
 
-    /// A vector with a dimension, SI.
-    pub fn vector(&self, dimension: Dimension) -> Result<Vec3, SceneError> {
-        self.quantities::<3>(dimension).map(Vec3::from)
+    /// Numbers as its row says, SI.
+    pub fn numbers<const N: usize>(&self) -> Result<[f64; N], SceneError> {
+        self.quantities(self.dimension())
+    }
+
+    /// A vector as its row says, SI.
+    pub fn vector(&self) -> Result<Vec3, SceneError> {
+        let vector = Vec3::from(self.numbers::<3>()?);
+        let (least, most) = self.row.range();
+        if vector.min() >= least && vector.max() <= most {
+            return Ok(vector);
+        }
+        let [least, most] = [least, most].map(|at| format_quantity(at, si_unit(self.dimension())));
+        Err(self.error(format!("out of range; allowed {least} to {most}")))
     }
 
     /// A direction, normalised.
     pub fn direction(&self) -> Result<Vec3, SceneError> {
-        let vector = self.vector(Dimension::None)?;
+        let vector = Vec3::from(self.quantities::<3>(Dimension::None)?);
         // Scaled first: squares of huge or tiny components would leave the range of f64.
         let size = vector.amax();
         if size > 0.0 {
@@ -467,37 +581,20 @@ impl<'d> Node<'d> {
         }
     }
 
-    /// A table whose keys are all among `known`.
-    pub fn section(&self, known: &[&str]) -> Result<Section<'d>, SceneError> {
-        self.section_as(self.key.clone(), known)
+    /// A table as its row says.
+    pub fn section(&self) -> Result<Section<'d>, SceneError> {
+        self.section_as(self.key.clone())
     }
 
     /// As [`Self::section`], with a different path for its keys.
-    pub fn section_as(&self, path: String, known: &[&str]) -> Result<Section<'d>, SceneError> {
+    pub fn section_as(&self, path: String) -> Result<Section<'d>, SceneError> {
+        let rows = self.row.table().expect("a row that takes tables");
         let table = self
             .value
             .get_ref()
             .as_table()
             .ok_or_else(|| self.wrong_type("a table"))?;
-        Section::new(self.document, path, table, self.value.span(), known)
-    }
-
-    /// Checks the word that the key `name` of a table selects, if present: it determines which other keys are allowed, so a
-    /// wrong word must be reported before any of those.
-    pub fn check_word<T: Words>(&self, path: &str, name: &str) -> Result<(), SceneError> {
-        let node = self.peek(path, name);
-        node.map_or(Ok(()), |node| node.word::<T>().map(|_| ()))
-    }
-
-    /// Value of the key `name` of a table whose keys have the path `path`, if it is a table with such a key.
-    pub fn peek(&self, path: &str, name: &str) -> Option<Node<'d>> {
-        Some(Node {
-            document: self.document,
-            key: format!("{path}.{name}"),
-            value: self.value.get_ref().as_table()?.get(name)?,
-            written: None,
-            changed: false,
-        })
+        Section::new(self.document, path, table, self.value.span(), rows)
     }
 
     /// Value of the table's `name` key, for the paths of its keys; the array index if there is none yet.
@@ -512,8 +609,12 @@ impl<'d> Node<'d> {
     }
 
     /// A parameter's value, read and checked against its row of the table.
-    pub fn parameter(&self, key: &str) -> Result<super::Value, SceneError> {
-        let parameter = find(key).expect("only keys of the table are asked for");
+    pub fn parameter(&self) -> Result<super::Value, SceneError> {
+        let parameter = match self.row.takes {
+            Takes::Parameter(key) => find(key),
+            _ => None,
+        };
+        let parameter = parameter.expect("a row of a parameter");
         // A count or a pure number may be written bare; text and bare numbers read alike.
         let text = self.scalar()?;
         let (read, Kind::Number { dimension, .. }) = (parameter.read(text), parameter.kind) else {
@@ -538,31 +639,34 @@ impl<'d> Node<'d> {
     }
 }
 
-/// Entries of the list `name` of all `files`, at most `most`; `what` names them in errors.
+/// Entries of the list `name` of all `files`, and `more` of other origin, as many as the row of the list allows.
 ///
 /// # Errors
 /// No list, or too many entries.
 pub(super) fn lists<'d>(
     files: &[Section<'d>],
     name: &str,
-    most: usize,
-    what: &str,
+    more: Vec<Node<'d>>,
 ) -> Result<Vec<Node<'d>>, SceneError> {
     let mut nodes = Vec::new();
     for file in files {
         if let Some(list) = file.get(name) {
             let first = nodes.len();
-            nodes.extend(list.elements_up_to(most, what)?);
+            nodes.extend(list.entries()?);
             // Counted through all files.
             for (index, node) in nodes.iter_mut().enumerate().skip(first) {
                 node.key = format!("{name}[{index}]");
             }
         }
     }
+    nodes.extend(more);
+    let Some(Many { most, what }) = nodes.first().and_then(|node| node.row.many()) else {
+        return Ok(nodes);
+    };
     match nodes.get(most) {
         None => Ok(nodes),
         Some(first) => Err(first.error(format!(
-            "too many: {} {what} in all files; allowed at most {most}",
+            "too many: {} {what} with those of patterns and included files; allowed at most {most}",
             nodes.len()
         ))),
     }

@@ -1,227 +1,181 @@
 //! Laws of driven joints: one row per law, from which `drive` is read. The motion they prescribe is in `mechanism/drives`.
 
-use super::document::{MAX_SI, Node, Section};
+use super::document::{Node, Section};
 use super::formula::read_formula;
-use super::points::{SHORTEST_PART, read_file, read_points};
+use super::key::{FileKey, FileTable, MAX_SI, Takes, key, many, number, positive};
+use super::points::{MOST_POINTS, SHORTEST_PART, read_file, read_points};
 use super::*;
 
 /// Highest frequency of a harmonic drive, Hz.
 pub(super) const FASTEST_DRIVE: f64 = 1e4;
 /// Most terms of a sum of harmonics.
 const MOST_TERMS: usize = 100;
-/// Lower end of a range that excludes 0.
-const ABOVE_ZERO: f64 = f64::MIN_POSITIVE;
-/// Range of a number that [`Node::quantity`] bounds.
-const ANY: (f64, f64) = (-MAX_SI, MAX_SI);
 
-/// A law being read.
-struct DriveText<'a, 'd> {
-    law: &'a Node<'d>,
-    section: &'a Section<'d>,
-    kind: JointKind,
-    scene: &'a Scene,
+const fn place(name: &'static str, help: &'static str) -> FileKey {
+    key(name, number(Dimension::Length), "\"10 mm\"", help).on_hinge(Dimension::Angle, "\"10 deg\"")
 }
 
-const fn number(
-    key: &'static str,
-    dimension: Dimension,
-    range: (f64, f64),
-    default: Option<f64>,
-    like: &'static str,
-    help: &'static str,
-) -> ElementNumber {
-    ElementNumber {
-        key,
-        dimension,
-        range,
-        default,
-        like,
-        help,
-        on_hinge: None,
-    }
-}
-
-const fn place(key: &'static str, default: Option<f64>, help: &'static str) -> ElementNumber {
-    number(key, Dimension::Length, ANY, default, "\"10 mm\"", help)
-}
+const MEAN: FileKey = place("mean", "mean").zero();
 
 /// Amplitude, frequency and phase of a harmonic.
-const TERM: [ElementNumber; 3] = [
-    place("amplitude", None, "amplitude"),
-    number(
+const TERM: [FileKey; 3] = [
+    place("amplitude", "amplitude"),
+    key(
         "frequency",
-        Dimension::Frequency,
-        (ABOVE_ZERO, FASTEST_DRIVE),
-        None,
+        positive(Dimension::Frequency, FASTEST_DRIVE),
         "\"1 Hz\"",
         "frequency",
     ),
-    number(
+    key(
         "phase",
-        Dimension::Angle,
-        ANY,
-        Some(0.0),
+        number(Dimension::Angle),
         "\"90 deg\"",
         "phase at t = 0",
-    ),
+    )
+    .zero(),
 ];
 
-const MEAN: ElementNumber = place("mean", Some(0.0), "mean");
+static TERMS: FileTable = FileTable::new("term", "a term", "a harmonic of a sum", &TERM);
 
-const START: ElementNumber = number(
+const START: FileKey = key(
     "start",
-    Dimension::Time,
-    ANY,
-    Some(0.0),
+    number(Dimension::Time),
     "\"1 s\"",
     "when it begins",
-);
+)
+.zero();
 
-const DURATION: ElementNumber = number(
+const DURATION: FileKey = key(
     "duration",
-    Dimension::Time,
-    (SHORTEST_PART, MAX_SI),
-    None,
+    Takes::Number(Dimension::Time, (SHORTEST_PART, MAX_SI)),
     "\"0.5 s\"",
     "how long it lasts",
 );
 
-/// Every law of a drive.
+/// Every law of a drive. On a hinge lengths are angles, and speeds angular speeds.
 pub static DRIVE_KINDS: [DriveKind; 8] = [
     DriveKind {
         word: "spcmm",
         help: "slider of the paper's machine; places the joint itself",
-        numbers: &[],
-        others: &[("slider", "which slider, 1, 2 or 3 (must be given)")],
+        keys: &[key(
+            "slider",
+            Takes::Whole(1, 3),
+            "1",
+            "which slider: 1, 2 or 3",
+        )],
     },
     DriveKind {
         word: "constant",
         help: "position + velocity t",
-        numbers: &[
-            place("position", Some(0.0), "where it is at t = 0"),
-            number(
+        keys: &[
+            place("position", "where it is at t = 0").zero(),
+            key(
                 "velocity",
-                Dimension::Speed,
-                ANY,
-                None,
+                number(Dimension::Speed),
                 "\"10 mm/s\"",
                 "its rate",
-            ),
+            )
+            .on_hinge(Dimension::AngularSpeed, "\"6 rad/s\""),
         ],
-        others: &[],
     },
     DriveKind {
         word: "harmonic",
         help: "mean + amplitude sin(2π frequency t + phase)",
-        numbers: &[MEAN, TERM[0], TERM[1], TERM[2]],
-        others: &[],
+        keys: &[MEAN, TERM[0], TERM[1], TERM[2]],
     },
     DriveKind {
         word: "harmonics",
         help: "mean + a sum of harmonics",
-        numbers: &[MEAN],
-        others: &[(
-            "terms",
-            "1 to 100 of `{ amplitude, frequency, phase }`, as of `harmonic` (must be given)",
-        )],
+        keys: &[
+            MEAN,
+            key(
+                "terms",
+                Takes::List(&TERMS, many(MOST_TERMS, "terms")),
+                "[{ amplitude = \"10 mm\", frequency = \"1 Hz\" }]",
+                "the harmonics",
+            )
+            .on_hinge(
+                Dimension::Angle,
+                "[{ amplitude = \"10 deg\", frequency = \"1 Hz\" }]",
+            ),
+        ],
     },
     DriveKind {
         word: "ramp",
         help: "from one position to another: with s from 0 to 1 over the duration, from + (to - from) (10 s³ - 15 s⁴ + 6 s⁵), \
                whose rate and acceleration are 0 at both ends",
-        numbers: &[
-            place("from", Some(0.0), "where it is before"),
-            place("to", None, "where it is afterwards"),
+        keys: &[
+            place("from", "where it is before").zero(),
+            place("to", "where it is afterwards"),
             START,
             DURATION,
         ],
-        others: &[],
     },
     DriveKind {
         word: "pulse",
         help: "one bump: with s from 0 to 1 over the duration, base + height sin³(π s)",
-        numbers: &[
-            place("base", Some(0.0), "where it is before and afterwards"),
-            place("height", None, "height of the bump above it"),
+        keys: &[
+            place("base", "where it is before and afterwards").zero(),
+            place("height", "height of the bump above it"),
             START,
             DURATION,
         ],
-        others: &[],
     },
     DriveKind {
         word: "table",
         help: "cubic spline through points",
-        numbers: &[],
-        others: &[
-            (
+        keys: &[
+            key(
                 "points",
-                "2 to 10000 of `[time, position]`, in the order of time",
-            ),
-            (
+                Takes::Pairs(
+                    [Dimension::Time, Dimension::Length],
+                    many(MOST_POINTS, "points"),
+                ),
+                "[[\"0 s\", \"0 mm\"], [\"1 s\", \"10 mm\"]]",
+                "time and position, in the order of time, at least two",
+            )
+            .on_hinge(
+                Dimension::Angle,
+                "[[\"0 s\", \"0 deg\"], [\"1 s\", \"10 deg\"]]",
+            )
+            .or("file"),
+            key(
                 "file",
-                "instead of `points`: a CSV file beside the scene, two columns under a header with units, `time_s,position_mm`",
-            ),
-            (
+                Takes::File,
+                "\"bump.csv\"",
+                "the points: two columns under a header with units, `time_s,position_mm`",
+            )
+            .or("points"),
+            key(
                 "repeat",
-                "true if the points are one period of the motion (false if left out)",
-            ),
+                Takes::Flag,
+                "true",
+                "whether the points are one period of the motion",
+            )
+            .absent("false"),
         ],
     },
     DriveKind {
         word: "formula",
         help: "an expression of the time t in s, see below",
-        numbers: &[number(
-            "resolve",
-            Dimension::Time,
-            (SHORTEST_PART, 1.0),
-            Some(1e-3),
-            "\"1 ms\"",
-            "longest step that an adaptive method takes; a fifth of what the formula does in the shortest time suits it",
-        )],
-        others: &[
-            ("formula", "the expression (must be given)"),
-            ("unit", "unit of its value (m or rad if left out)"),
+        keys: &[
+            key(
+                "formula",
+                Takes::Text,
+                "\"0.01 * sin(2*pi*t)\"",
+                "an expression of `t`",
+            ),
+            key("unit", Takes::Text, "\"mm\"", "unit of its value").absent("`m`, `rad` on a hinge"),
+            key(
+                "resolve",
+                Takes::Number(Dimension::Time, (SHORTEST_PART, 1.0)),
+                "\"1 ms\"",
+                "longest step that an adaptive method takes; a fifth of what the formula does in the shortest time suits it",
+            )
+            .is(1e-3),
         ],
     },
 ];
-
-impl DriveKind {
-    fn keys(&self) -> impl Iterator<Item = &'static str> {
-        let numbers = self.numbers.iter().map(|number| number.key);
-        numbers.chain(self.others.iter().map(|(key, _)| *key))
-    }
-}
-
-/// What `dimension` in a row stands for at a joint of `kind`, and an example of it there.
-fn at_joint(
-    kind: JointKind,
-    dimension: Dimension,
-    like: &'static str,
-) -> (Dimension, &'static str) {
-    match (kind, dimension) {
-        (JointKind::Revolute, Dimension::Length) => (Dimension::Angle, "\"10 deg\""),
-        (JointKind::Revolute, Dimension::Speed) => (Dimension::AngularSpeed, "\"6 rad/s\""),
-        _ => (dimension, like),
-    }
-}
-
-/// One number of a law.
-fn read_number(
-    section: &Section<'_>,
-    row: &ElementNumber,
-    kind: JointKind,
-) -> Result<f64, SceneError> {
-    let (dimension, like) = at_joint(kind, row.dimension, row.like);
-    let node = match (section.get(row.key), row.default) {
-        (None, Some(default)) => return Ok(default),
-        _ => section.require(row.key, like)?,
-    };
-    let (least, most) = row.range;
-    if least == ABOVE_ZERO {
-        return node.positive(dimension, most, si_unit(dimension));
-    }
-    node.within(dimension, row.range)
-}
 
 /// The drive of a joint of `kind`, a slide or a hinge.
 pub(super) fn read_drive(
@@ -229,37 +183,20 @@ pub(super) fn read_drive(
     kind: JointKind,
     scene: &Scene,
 ) -> Result<Drive, SceneError> {
-    // The word before anything else: it decides which other keys there are.
-    if let Some(word) = node.peek(&node.key, "law") {
-        word.choice(&DRIVE_KINDS.each_ref().map(|row| row.word))?;
-    }
-    let mut all = vec!["law"];
-    for key in DRIVE_KINDS.iter().flat_map(DriveKind::keys) {
-        if !all.contains(&key) {
-            all.push(key);
-        }
-    }
-    let law = node.section(&all)?.require("law", "\"constant\"")?;
-    let word = law.text()?;
+    let mut node = node.clone();
+    node.document.on_hinge = kind == JointKind::Revolute;
+    let section = node.section()?;
+    let law = section.require("law")?;
+    let word = law.choice()?;
     let row = DRIVE_KINDS.iter().find(|row| row.word == word);
-    let row = row.expect("its word was checked");
-    let keys: Vec<&str> = ["law"].into_iter().chain(row.keys()).collect();
-    let section = node.section(&keys)?;
-    let numbers = row.numbers.iter();
-    let numbers = numbers
-        .map(|number| read_number(&section, number, kind))
-        .collect::<Result<_, _>>()?;
-    let text = DriveText {
-        law: &law,
-        section: &section,
-        kind,
-        scene,
-    };
+    let row = row.expect("its words are those of the rows");
+    let numbers = row.numbers().map(|number| section.number(number.name));
+    let numbers = numbers.collect::<Result<_, _>>()?;
     let data = match row.word {
-        "spcmm" => read_slider(&text)?,
-        "harmonics" => read_terms(&text)?,
-        "table" => read_table(&text)?,
-        "formula" => read_law_of_formula(&text)?,
+        "spcmm" => read_slider(&section, &law, kind, scene)?,
+        "harmonics" => read_terms(&section)?,
+        "table" => read_table(&section)?,
+        "formula" => read_law_of_formula(&section)?,
         _ => DriveData::Numbers,
     };
     Ok(Drive {
@@ -269,35 +206,45 @@ pub(super) fn read_drive(
     })
 }
 
-fn read_slider(text: &DriveText<'_, '_>) -> Result<DriveData, SceneError> {
-    if text.kind != JointKind::Prismatic {
-        return Err(text.law.error("the law spcmm drives prismatic joints only"));
+/// Dimension of the joint's coordinate.
+fn coordinate(section: &Section<'_>) -> Dimension {
+    match section.document.on_hinge {
+        true => Dimension::Angle,
+        false => Dimension::Length,
     }
-    if text.scene.spcmm.is_none() {
-        return Err(text
-            .law
-            .error("the law spcmm needs a section [spcmm] in the file"));
+}
+
+fn read_slider(
+    section: &Section<'_>,
+    law: &Node<'_>,
+    kind: JointKind,
+    scene: &Scene,
+) -> Result<DriveData, SceneError> {
+    if kind != JointKind::Prismatic {
+        return Err(law.error("the law spcmm drives prismatic joints only"));
     }
-    let slider = text.section.require("slider", "1")?;
+    if scene.spcmm.is_none() {
+        return Err(law.error("the law spcmm needs a section [spcmm] in the file"));
+    }
+    let slider = section.require("slider")?;
     match slider.scalar()?.parse::<u8>() {
         Ok(number @ 1..=3) => Ok(DriveData::Slider(number as usize - 1)),
         _ => Err(slider.error("out of range; allowed 1, 2 or 3; a whole number, no unit")),
     }
 }
 
-fn read_terms(text: &DriveText<'_, '_>) -> Result<DriveData, SceneError> {
-    let like = "[{ amplitude = \"10 mm\", frequency = \"1 Hz\" }]";
-    let node = text.section.require("terms", like)?;
-    let nodes = node.elements_up_to(MOST_TERMS, "terms")?;
+fn read_terms(section: &Section<'_>) -> Result<DriveData, SceneError> {
+    let node = section.require("terms")?;
+    let nodes = node.entries()?;
     if nodes.is_empty() {
+        let like = node.like();
         return Err(node.error(format!("needs a term; write for example `terms = {like}`")));
     }
-    let keys = TERM.map(|number| number.key);
     let term = |node: Node<'_>| {
-        let section = node.section(&keys)?;
+        let section = node.section()?;
         let mut term = [0.0; 3];
         for (value, row) in term.iter_mut().zip(&TERM) {
-            *value = read_number(&section, row, text.kind)?;
+            *value = section.number(row.name)?;
         }
         Ok(term)
     };
@@ -305,9 +252,7 @@ fn read_terms(text: &DriveText<'_, '_>) -> Result<DriveData, SceneError> {
     Ok(DriveData::Terms(terms))
 }
 
-fn read_table(text: &DriveText<'_, '_>) -> Result<DriveData, SceneError> {
-    let section = text.section;
-    let (dimension, _) = at_joint(text.kind, Dimension::Length, "");
+fn read_table(section: &Section<'_>) -> Result<DriveData, SceneError> {
     let repeats = section
         .get("repeat")
         .map_or(Ok(false), |node| node.flag())?;
@@ -315,22 +260,15 @@ fn read_table(text: &DriveText<'_, '_>) -> Result<DriveData, SceneError> {
         (Some(_), Some(file)) => {
             return Err(file.error("not allowed here: `points` are given as well"));
         }
-        (None, Some(file)) => read_file(&file, dimension, repeats)?,
-        _ => {
-            let like = match text.kind {
-                JointKind::Revolute => "[[\"0 s\", \"0 deg\"], [\"1 s\", \"10 deg\"]]",
-                _ => "[[\"0 s\", \"0 mm\"], [\"1 s\", \"10 mm\"]]",
-            };
-            read_points(&section.require("points", like)?, dimension, repeats)?
-        }
+        (None, Some(file)) => read_file(&file, coordinate(section), repeats)?,
+        _ => read_points(&section.require("points")?, coordinate(section), repeats)?,
     };
     Ok(DriveData::Points { points, repeats })
 }
 
-fn read_law_of_formula(text: &DriveText<'_, '_>) -> Result<DriveData, SceneError> {
-    let (dimension, _) = at_joint(text.kind, Dimension::Length, "");
-    let node = text.section.require("formula", "\"0.01 * sin(2*pi*t)\"")?;
-    let unit = text.section.get("unit");
-    let (program, scale) = read_formula(&node, unit.as_ref(), dimension)?;
+fn read_law_of_formula(section: &Section<'_>) -> Result<DriveData, SceneError> {
+    let node = section.require("formula")?;
+    let unit = section.get("unit");
+    let (program, scale) = read_formula(&node, unit.as_ref(), coordinate(section))?;
     Ok(DriveData::Formula(program, scale))
 }

@@ -20,6 +20,7 @@ const PLAIN: ElementKind = ElementKind {
     joint: None,
     numbers: &[],
     vectors: &[],
+    frame: "",
     rotations: &[],
     law: None,
     acts_by: &[],
@@ -142,6 +143,7 @@ pub static ELEMENT_KINDS: [ElementKind; 6] = [
                 help: "torque",
             },
         ],
+        frame: "the world's, or the body's with `axes = \"body\"`",
         acts_by: &["force", "torque"],
         choices: &[(
             "axes",
@@ -281,6 +283,7 @@ pub static ELEMENT_KINDS: [ElementKind; 6] = [
                 "about its axes",
             ),
         ],
+        frame: "its axes: `axes` in the body of `from`",
         rotations: &[
             ("axes", "its axes in the body of `from`"),
             (
@@ -346,28 +349,6 @@ pub static ELEMENT_KINDS: [ElementKind; 6] = [
     },
 ];
 
-impl ElementKind {
-    fn keys(&self) -> Vec<&'static str> {
-        let numbers = self.numbers.iter().map(|number| number.key);
-        let on_hinges = self.numbers.iter().map(|number| number.on(true).0);
-        let joint = self.joint.map(|_| "joint");
-        let vectors = self.vectors.iter().map(|vector| vector.key);
-        let rotations = self.rotations.iter().map(|(key, _)| *key);
-        let law = self.law.map(|(key, _)| key);
-        let choices = self.choices.iter().map(|(key, ..)| *key);
-        let points = self.points.iter().copied();
-        let all = ["name"].into_iter().chain(joint).chain(points);
-        let all = all.chain(numbers).chain(on_hinges).chain(vectors);
-        let mut keys: Vec<&str> = Vec::new();
-        for key in all.chain(rotations).chain(law).chain(choices) {
-            if !keys.contains(&key) {
-                keys.push(key);
-            }
-        }
-        keys
-    }
-}
-
 fn stop_fault(stop: &Element) -> Option<(&'static str, String)> {
     let [lower, upper] = ["lower", "upper"].map(|key| stop.number(key));
     let unit = if stop.on_hinge { "deg" } else { "mm" };
@@ -421,8 +402,8 @@ pub(super) fn read_element<'d>(
     bodies: &BTreeMap<String, usize>,
     joints: &BTreeMap<String, usize>,
 ) -> Result<(Element, Section<'d>), SceneError> {
-    let section = node.section_as(node.title(kind.section), &kind.keys())?;
-    let name = section.require("name", "\"s1\"")?.name()?.into_owned();
+    let mut section = node.section_as(node.title(kind.section))?;
+    let name = section.require("name")?.name()?.into_owned();
     let point = |key: &&str| read_attachment(&section, key, scene, bodies);
     let mut points = kind
         .points
@@ -458,15 +439,15 @@ pub(super) fn read_element<'d>(
                 "this joint has a drive, which leaves a {} nothing to move",
                 kind.section
             );
-            return Err(section.require("joint", "\"crank\"")?.error(why));
+            return Err(section.require("joint")?.error(why));
         }
         points = of.points().to_vec();
         joint = Some(of);
     }
     let on_hinge = joint.is_some_and(|joint| joint.kind == JointKind::Revolute);
+    section.document.on_hinge = on_hinge;
     let number = |row: &ElementNumber| {
-        let (key, dimension, like) = row.on(on_hinge);
-        let (other, ..) = row.on(!on_hinge);
+        let [key, other] = [on_hinge, !on_hinge].map(|hinge| row.on(hinge).0);
         if other != key {
             let (here, there) = if on_hinge {
                 ("hinge", "slide")
@@ -477,42 +458,31 @@ pub(super) fn read_element<'d>(
                 format!("the joint is a {here}, where `{key}` belongs; `{other}` is for a {there}");
             section.refuse(other, &why)?;
         }
-        let Some(node) = section.get(key) else {
-            return match row.default {
-                Some(default) => Ok(default),
-                None => section.require(key, like).map(|_| 0.0),
-            };
-        };
-        node.within(dimension, row.range)
+        section.number(key)
     };
     let numbers = kind.numbers.iter().map(number).collect::<Result<_, _>>()?;
+    let choice = |&(key, words, _): &(&str, &'static [&'static str], &str)| match section.get(key) {
+        Some(node) => node.choice(),
+        None => Ok(words[0]),
+    };
+    let choices = kind.choices.iter().map(choice);
+    let choices: Vec<&str> = choices.collect::<Result<_, _>>()?;
     // A vector in axes that do not belong to the pattern turns with its copies.
     let turns = section.document.copy.filter(|copy| {
         let body = points.first().and_then(|point| point.body);
         let own = body.is_some_and(|body| copy.made(&scene.bodies[body].name));
-        !own || section
-            .get("axes")
-            .is_none_or(|axes| axes.text() != Ok(LoadAxes::Body.word()))
+        !own || !choices.contains(&LoadAxes::Body.word())
     });
     let vector = |row: &ElementVector| {
-        let Some(node) = section.get(row.key) else {
-            return Ok(Vec3::zeros());
-        };
-        let value = node.vector(row.dimension)?;
-        let (least, most) = row.range;
-        if value.min() >= least && value.max() <= most {
-            let turns = turns.filter(|_| row.direction);
-            return Ok(turns.map_or(value, |copy| copy.direction(value)));
-        }
-        let [least, most] = [least, most].map(|at| format_quantity(at, si_unit(row.dimension)));
-        Err(node.error(format!("out of range; allowed {least} to {most}")))
+        let value = section.vector(row.key)?;
+        let turns = turns.filter(|_| row.direction);
+        Ok(turns.map_or(value, |copy| copy.direction(value)))
     };
-    let vectors = kind.vectors.iter().map(vector).collect::<Result<_, _>>()?;
-    let choice = |&(key, words, _): &(&str, &'static [&'static str], &str)| match section.get(key) {
-        Some(node) => node.choice(words),
-        None => Ok(words[0]),
-    };
-    let choices = kind.choices.iter().map(choice).collect::<Result<_, _>>()?;
+    let vectors = kind
+        .vectors
+        .iter()
+        .map(vector)
+        .collect::<Result<_, SceneError>>()?;
     // Whether the first and second point are on bodies of the pattern's copy that is read; all are of a copy that does not turn.
     let owned = |place: usize| {
         let copy = section.document.copy.filter(|copy| !copy.keeps_axes());
@@ -522,8 +492,7 @@ pub(super) fn read_element<'d>(
     // What an orientation in a body outside a pattern is to, turns with the pattern's copies.
     let turned = section.document.copy.filter(|_| !owned(0));
     let rotation = |&(key, _): &(&str, &str)| {
-        let node = section.get(key);
-        let rotation = node.map_or(Ok(Quat::identity()), |node| read_rotation(&node))?;
+        let rotation = read_rotation(section.get(key))?;
         Ok(turned.map_or(rotation, |copy| copy.rotation(rotation)))
     };
     if !kind.rotations.is_empty() && owned(0) && !owned(1) {

@@ -5,20 +5,8 @@ use toml::Spanned;
 use toml::de::DeTable;
 
 use super::document::{Document, Section};
+use super::format::INCLUDED;
 use super::*;
-
-/// Most files that a scene may include.
-const MOST_FILES: usize = 100;
-
-/// Lists that an included file may have, besides the sections of [`ELEMENT_KINDS`].
-const LISTS: [&str; 6] = [
-    "parameter",
-    "pattern",
-    "body",
-    "joint",
-    "ball_joint",
-    "fixed_shape",
-];
 
 /// Names and texts of the files that `top` includes, in its order.
 ///
@@ -28,9 +16,7 @@ pub(super) fn included_texts<'d>(
     top: &Section<'d>,
 ) -> Result<Vec<(&'d str, Arc<str>)>, SceneError> {
     let mut texts: Vec<(&str, Arc<str>)> = Vec::new();
-    let nodes = top
-        .get("include")
-        .map(|node| node.elements_up_to(MOST_FILES, "files"));
+    let nodes = top.get("include").map(|node| node.entries());
     for node in nodes.transpose()?.unwrap_or_default() {
         let name = node.text()?;
         if texts.iter().any(|(other, _)| *other == name) {
@@ -60,7 +46,5 @@ pub(super) fn section<'d>(
     document: Document<'d>,
     parsed: &'d Spanned<DeTable<'d>>,
 ) -> Result<Section<'d>, SceneError> {
-    let elements = ELEMENT_KINDS.iter().map(|kind| kind.section);
-    let keys: Vec<&str> = LISTS.into_iter().chain(elements).collect();
-    Section::new(document, String::new(), parsed.get_ref(), 0..0, &keys)
+    Section::new(document, String::new(), parsed.get_ref(), 0..0, &INCLUDED)
 }

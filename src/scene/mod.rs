@@ -14,9 +14,11 @@ mod elements;
 mod error;
 mod expression;
 mod field;
+mod format;
 mod formula;
 mod given;
 mod include;
+mod key;
 mod load;
 mod model;
 mod numbers;
@@ -47,16 +49,16 @@ pub use error::SceneError;
 pub use expression::{
     Binary, ExpressionError, Fault, LONGEST_EXPRESSION, Number, Program, Unary, smooth_step,
 };
+pub use format::{FILE, file_tables};
 pub use given::{FileNumber, OwnParameter};
+pub use key::{ABOVE_ZERO, Absent, FileKey, FileTable, Many, Takes, Variants};
 pub use load::*;
 pub use model::*;
 pub use parameters::*;
-pub use table::{reference_page, table};
+pub use table::{find, reference_page, table};
 pub use units::*;
 pub use value::Value;
 pub use visible::{visible, visible_line};
-
-use table::find;
 
 /// The parameter of any scene (by its key or the last part of it) or other word from `words` nearest to `wrong`, as errors
 /// quote it: in brackets, or empty.

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use super::expression::Program;
 use super::given::{FileNumber, OwnParameter};
+use super::key::{FileKey, Takes};
 use super::units::Dimension;
 use crate::contact;
 use crate::integrate::Method;
@@ -518,7 +519,7 @@ impl SpringSide {
     }
 }
 
-/// A numeric key of an element or a drive.
+/// A numeric key of an element.
 #[derive(Clone, Copy, Debug)]
 pub struct ElementNumber {
     /// Key.
@@ -600,10 +601,16 @@ pub struct DriveKind {
     pub word: &'static str,
     /// What it is.
     pub help: &'static str,
-    /// Its numbers. On a hinge a length stands for an angle, a speed for an angular speed.
-    pub numbers: &'static [ElementNumber],
-    /// Its other keys: key, help.
-    pub others: &'static [(&'static str, &'static str)],
+    /// Its keys.
+    pub keys: &'static [FileKey],
+}
+
+impl DriveKind {
+    /// Rows of its numbers.
+    pub(super) fn numbers(&self) -> impl Iterator<Item = &'static FileKey> + use<> {
+        let number = |key: &&FileKey| matches!(key.takes, Takes::Number(..));
+        self.keys.iter().filter(number)
+    }
 }
 
 impl PartialEq for DriveKind {
@@ -649,7 +656,7 @@ impl Drive {
     /// # Panics
     /// If the row has no such key.
     pub fn number(&self, key: &str) -> f64 {
-        let at = self.kind.numbers.iter().position(|of| of.key == key);
+        let at = self.kind.numbers().position(|of| of.name == key);
         self.numbers[at.expect("a number of the row")]
     }
 
@@ -677,6 +684,8 @@ pub struct ElementKind {
     pub numbers: &'static [ElementNumber],
     /// Its vectors, 0 if the file gives none.
     pub vectors: &'static [ElementVector],
+    /// The frame of their components.
+    pub frame: &'static str,
     /// Its orientations, none if the file gives none: key, help.
     pub rotations: &'static [(&'static str, &'static str)],
     /// A law of time for its joint's coordinate, as of a drive, if it may have one: key, help.

@@ -12,10 +12,10 @@ use super::*;
 /// Anything wrong in one.
 pub(super) fn read_own(files: &[Section<'_>]) -> Result<Vec<OwnParameter>, SceneError> {
     let mut all: Vec<OwnParameter> = Vec::new();
-    for node in lists(files, "parameter", MOST_OWN, "parameters")? {
+    for node in lists(files, "parameter", Vec::new())? {
         let own = read_parameter(&node)?;
         if all.iter().any(|other| other.key == own.key) {
-            let name = node.section(&OWN_KEYS)?.require("name", "\"stroke\"")?;
+            let name = node.section()?.require("name")?;
             return Err(name.error("there is already a parameter of this name; names must differ"));
         }
         all.push(own);
@@ -25,14 +25,10 @@ pub(super) fn read_own(files: &[Section<'_>]) -> Result<Vec<OwnParameter>, Scene
     Ok(all)
 }
 
-/// Most parameters that a file may define.
-const MOST_OWN: usize = 1000;
-const OWN_KEYS: [&str; 6] = ["name", "label", "value", "unit", "range", "help"];
-
 fn read_parameter(node: &Node<'_>) -> Result<OwnParameter, SceneError> {
     let title = node.title("parameter");
-    let section = node.section_as(title.clone(), &OWN_KEYS)?;
-    let name_node = section.require("name", "\"stroke\"")?;
+    let section = node.section_as(title.clone())?;
+    let name_node = section.require("name")?;
     let name = name_node.name()?;
     let letters = |c: char| c.is_ascii_alphanumeric() || c == '_';
     let reserved = ["i", "pi", "e", "t"].contains(&&*name)
@@ -44,7 +40,7 @@ fn read_parameter(node: &Node<'_>) -> Result<OwnParameter, SceneError> {
              pi, e, t or a unit",
         ));
     }
-    let value_node = section.require("value", "\"20 mm\"")?;
+    let value_node = section.require("value")?;
     let text = value_node.scalar()?;
     let unit = section.get("unit").map(|node| node.text()).transpose()?;
     // The unit's dimension; without one, that of the value as it is written.

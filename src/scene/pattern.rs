@@ -6,10 +6,8 @@ use toml::de::DeValue;
 
 use super::copy::Copy;
 use super::document::{Node, Section, lists};
+use super::key::Takes;
 use super::*;
-
-/// Lists that a pattern may have, besides the sections of [`ELEMENT_KINDS`].
-const MEMBERS: [&str; 4] = ["body", "joint", "ball_joint", "fixed_shape"];
 
 /// A `[[pattern]]` with its copies.
 pub(super) struct Pattern<'d> {
@@ -24,9 +22,9 @@ pub(super) struct Pattern<'d> {
 pub(super) fn read_patterns<'d>(files: &[Section<'d>]) -> Result<Vec<Pattern<'d>>, SceneError> {
     let mut names = BTreeSet::new();
     let mut patterns = Vec::new();
-    for node in lists(files, "pattern", MOST_BODIES, "patterns")? {
+    for node in lists(files, "pattern", Vec::new())? {
         let pattern = read_pattern(&node)?;
-        let name = pattern.section.require("name", "\"leg\"")?;
+        let name = pattern.section.require("name")?;
         if !names.insert(name.text()?) {
             return Err(name.error("there is already a pattern of this name; names must differ"));
         }
@@ -48,23 +46,13 @@ fn values(value: &DeValue<'_>) -> usize {
 }
 
 fn read_pattern<'d>(node: &Node<'d>) -> Result<Pattern<'d>, SceneError> {
-    let elements = ELEMENT_KINDS.iter().map(|kind| kind.section);
-    let lists: Vec<&str> = MEMBERS.into_iter().chain(elements).collect();
-    let known: Vec<&str> = ["name", "count", "about", "along"]
-        .into_iter()
-        .chain(lists.iter().copied())
-        .collect();
-    let section = node.section_as(node.title("pattern"), &known)?;
-    section.require("name", "\"leg\"")?.name()?;
-    let count_node = section.require("count", "6")?;
-    let count = match count_node.scalar()?.parse::<u32>() {
-        Ok(count) if (1..=MOST_BODIES as u32).contains(&count) => count,
-        _ => {
-            let message =
-                format!("out of range; allowed 1 to {MOST_BODIES}; a whole number, no unit");
-            return Err(count_node.error(message));
-        }
-    };
+    let section = node.section_as(node.title("pattern"))?;
+    let lists = section.rows.keys.iter();
+    let lists = lists.filter(|key| matches!(key.takes, Takes::List(..)));
+    let lists: Vec<&str> = lists.map(|key| key.name).collect();
+    section.require("name")?.name()?;
+    let count_node = section.require("count")?;
+    let count = count_node.whole()?;
     let (mut bodies, mut joints) = (BTreeSet::new(), BTreeSet::new());
     let mut size = 0;
     for name in &lists {
@@ -72,7 +60,7 @@ fn read_pattern<'d>(node: &Node<'d>) -> Result<Pattern<'d>, SceneError> {
             continue;
         };
         size += values(list.value.get_ref());
-        let names = list.elements()?.into_iter().filter_map(|entry| {
+        let names = list.entries()?.into_iter().filter_map(|entry| {
             let name = entry.value.get_ref().get("name")?.get_ref().as_str()?;
             Some(name.to_owned())
         });
@@ -94,15 +82,12 @@ fn read_pattern<'d>(node: &Node<'d>) -> Result<Pattern<'d>, SceneError> {
     let (centre, axis, angle) = match section.get("about") {
         None => (Vec3::zeros(), Vec3::z(), 0.0),
         Some(node) => {
-            let about = node.section(&["point", "axis", "angle"])?;
-            let point = about.get("point");
-            let angle = about.get("angle");
+            let about = node.section()?;
+            let even = std::f64::consts::TAU / f64::from(count);
             (
-                point.map_or(Ok(Vec3::zeros()), |node| node.vector(Dimension::Length))?,
-                about.require("axis", "[0, 0, 1]")?.direction()?,
-                angle.map_or(Ok(std::f64::consts::TAU / f64::from(count)), |node| {
-                    node.quantity(Dimension::Angle)
-                })?,
+                about.vector("point")?,
+                about.require("axis")?.direction()?,
+                about.get("angle").map_or(Ok(even), |node| node.number())?,
             )
         }
     };
@@ -114,7 +99,7 @@ fn read_pattern<'d>(node: &Node<'d>) -> Result<Pattern<'d>, SceneError> {
             ));
         }
         None => Vec3::zeros(),
-        Some(node) => node.vector(Dimension::Length)?,
+        Some(node) => node.vector()?,
     };
     let (bodies, joints) = (Arc::new(bodies), Arc::new(joints));
     let copies = (0..count)
@@ -144,7 +129,7 @@ impl<'d> Pattern<'d> {
     pub fn nodes(&'d self, name: &str) -> Result<Vec<Node<'d>>, SceneError> {
         let mut nodes = Vec::new();
         if let Some(list) = self.section.get(name) {
-            let entries = list.elements()?;
+            let entries = list.entries()?;
             for copy in &self.copies {
                 for entry in &entries {
                     let mut node = entry.clone();

@@ -2,13 +2,14 @@
 
 use std::ops::Range;
 
-use super::document::{Document, MAX_SI, Node};
+use super::document::{Document, Node};
+use super::key::MAX_SI;
 use super::{Dimension, SceneError, format_quantity, parse_quantity, si_unit, unit_names};
 
 /// Shortest interval of a table, ramp or pulse, s.
 pub(super) const SHORTEST_PART: f64 = 1e-6;
 /// Most points of a table.
-const MOST_POINTS: usize = 10_000;
+pub(super) const MOST_POINTS: usize = 10_000;
 /// First and last point of a period may differ by this fraction of the range of all, as measured ones do.
 const CLOSED: f64 = 1e-9;
 
@@ -20,7 +21,7 @@ pub(super) fn read_points(
     dimension: Dimension,
     repeats: bool,
 ) -> Result<Points, SceneError> {
-    let nodes = node.elements_up_to(MOST_POINTS, "points")?;
+    let nodes = node.entries()?;
     let mut points = Points::new();
     for point in &nodes {
         let pair = point.elements()?;

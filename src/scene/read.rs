@@ -4,6 +4,7 @@ use super::beside::Beside;
 use super::document::{Document, Node, Section, lists};
 use super::elements::read_element;
 use super::error::{no_body, place_of};
+use super::format::FILE;
 use super::include::{self, included_texts};
 use super::own::read_own;
 use super::pattern::{Pattern, read_patterns};
@@ -15,42 +16,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Top-level keys of a file, besides the sections of [`ELEMENT_KINDS`].
-const TOP: [&str; 19] = [
-    "name",
-    "title",
-    "description",
-    "start",
-    "formulation",
-    "gravity",
-    "contact",
-    "solver",
-    "spcmm",
-    "chain",
-    "view",
-    "output",
-    "body",
-    "joint",
-    "ball_joint",
-    "fixed_shape",
-    "parameter",
-    "pattern",
-    "include",
-];
-
 /// Parameters that determine the bodies: changing one reads the file again.
 pub(super) const REBUILDS: [&str; 2] = ["chain.links", "spcmm.slider_plane"];
-/// Keys of `[spcmm]` that are not parameters: the file's bodies are built to these dimensions.
-pub(super) const SPCMM_DIMENSIONS: [&str; 5] = [
-    "mean_x",
-    "gamma",
-    "hinge_radius",
-    "driving_rod",
-    "driven_rod",
-];
-
-/// Keys of `[view]` that are not parameters.
-pub(super) const VIEW_SETTINGS: [&str; 3] = ["floor", "yaw", "pitch"];
 
 /// Where the file gives each parameter's value.
 type Places<'d> = BTreeMap<String, Node<'d>>;
@@ -110,6 +77,7 @@ impl Scene {
             beside: &beside,
             included: false,
             copy: None,
+            on_hinge: false,
         };
         let mut scene = Self::read_document(document, changes)?;
         scene.source.beside = beside.into_texts();
@@ -130,9 +98,7 @@ impl Scene {
             ));
         }
         let parsed = document.parse()?;
-        let elements = ELEMENT_KINDS.iter().map(|kind| kind.section);
-        let keys: Vec<&str> = TOP.into_iter().chain(elements).collect();
-        let top = Section::new(document, String::new(), parsed.get_ref(), 0..0, &keys)?;
+        let top = Section::new(document, String::new(), parsed.get_ref(), 0..0, &FILE)?;
         let texts = included_texts(&top)?;
         let documents = texts
             .iter()
@@ -200,14 +166,15 @@ fn is_of_text(key: &str) -> bool {
 
 /// Whether a key belongs in a scene file although it can never be changed from outside.
 pub(super) fn file_only(key: &str) -> bool {
-    let (section, rest) = key.split_once('.').unwrap_or((key, ""));
-    match section {
-        // The file's bodies are built to these.
-        "spcmm" => SPCMM_DIMENSIONS.contains(&rest),
-        "output" => rest == "body",
-        "name" | "title" | "description" => rest.is_empty(),
-        _ => false,
+    let mut table: Option<&FileTable> = Some(&FILE);
+    let mut fixed = false;
+    for part in key.split('.') {
+        let Some(row) = table.and_then(|table| table.key(part, None)) else {
+            return false;
+        };
+        (table, fixed) = (row.table(), row.fixed);
     }
+    fixed
 }
 
 /// Everything that is neither a parameter nor part of the mechanism; the rest at its defaults.
@@ -225,40 +192,23 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
     let spcmm = match top.get("spcmm") {
         None => None,
         Some(node) => {
-            let section = node.section(&keys_with("spcmm", &SPCMM_DIMENSIONS))?;
-            let length = |name| {
-                section
-                    .require(name, "\"52 mm\"")?
-                    .positive(Dimension::Length, 100.0, "m")
-            };
+            let section = node.section()?;
             Some(Spcmm {
-                mean_x: section
-                    .require("mean_x", "\"203 mm\"")?
-                    .quantity(Dimension::Length)?,
-                gamma: section
-                    .require("gamma", "\"15 deg\"")?
-                    .quantity(Dimension::Angle)?,
-                hinge_radius: length("hinge_radius")?,
-                driving_rod: length("driving_rod")?,
-                driven_rod: length("driven_rod")?,
+                mean_x: section.number("mean_x")?,
+                gamma: section.number("gamma")?,
+                hinge_radius: section.number("hinge_radius")?,
+                driving_rod: section.number("driving_rod")?,
+                driven_rod: section.number("driven_rod")?,
                 ..Spcmm::default()
             })
         }
     };
     let (mut floor, mut isometric) = (None, None);
     if let Some(view) = top.get("view") {
-        let section = view.section(&keys_with("view", &VIEW_SETTINGS))?;
-        let get = |name: &str, dimension| {
-            section
-                .get(name)
-                .map(|node| node.quantity(dimension))
-                .transpose()
-        };
-        floor = get("floor", Dimension::Length)?;
-        isometric = match (
-            get("yaw", Dimension::Angle)?,
-            get("pitch", Dimension::Angle)?,
-        ) {
+        let section = view.section()?;
+        let get = |name: &str| section.get(name).map(|node| node.number()).transpose();
+        floor = get("floor")?;
+        isometric = match (get("yaw")?, get("pitch")?) {
             (Some(yaw), Some(pitch)) => Some((yaw, pitch)),
             (None, None) => None,
             _ => return Err(section.error("", "yaw and pitch belong together: give both or none")),
@@ -304,28 +254,15 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
     })
 }
 
-/// The parameter table's keys in a section, plus `more`.
-fn keys_with<'a>(section: &str, more: &[&'a str]) -> Vec<&'a str> {
-    let parts = table()
-        .iter()
-        .filter_map(|parameter| parameter.key.strip_prefix(section)?.strip_prefix('.'));
-    parts.chain(more.iter().copied()).collect()
-}
-
 /// Reads every parameter from the file, or takes its default; returns where each is given.
 fn read_parameters<'d>(top: &Section<'d>, scene: &mut Scene) -> Result<Places<'d>, SceneError> {
     let mut places = Places::new();
     let mut sections: BTreeMap<&str, Section<'d>> = BTreeMap::new();
-    for (name, more) in [
-        ("gravity", &[][..]),
-        ("contact", &[]),
-        ("solver", &[]),
-        ("spcmm", &SPCMM_DIMENSIONS),
-        ("chain", &["hang", "rotation", "link", "joint"]),
-        ("view", &VIEW_SETTINGS),
-    ] {
-        if let Some(node) = top.get(name) {
-            sections.insert(name, node.section(&keys_with(name, more))?);
+    for parameter in table() {
+        if let Some((name, _)) = parameter.key.split_once('.')
+            && let (Some(node), false) = (top.get(name), sections.contains_key(name))
+        {
+            sections.insert(name, node.section()?);
         }
     }
     let find_node = |key: &'static str| match key.split_once('.') {
@@ -348,7 +285,7 @@ fn read_parameters<'d>(top: &Section<'d>, scene: &mut Scene) -> Result<Places<'d
         let Some(node) = find_node(parameter.key) else {
             continue;
         };
-        scene.write(parameter, &node.parameter(parameter.key)?);
+        scene.write(parameter, &node.parameter()?);
         places.insert(parameter.key.to_owned(), node);
     }
     Ok(places)
@@ -370,25 +307,17 @@ fn read_mechanism<'d>(
     scene: &mut Scene,
     places: &mut Places<'d>,
 ) -> Result<(), SceneError> {
-    let list = |name: &str, most: usize, what: &str| {
-        let mut nodes = lists(files, name, most, what)?;
-        for pattern in patterns {
-            nodes.extend(pattern.nodes(name)?);
-        }
-        match nodes.get(most) {
-            None => Ok(nodes),
-            Some(first) => Err(first.error(format!(
-                "too many: {} {what} with those of patterns; allowed at most {most}",
-                nodes.len()
-            ))),
-        }
+    let list = |name: &str| {
+        let copies = patterns.iter().map(|pattern| pattern.nodes(name));
+        let copies = copies.collect::<Result<Vec<_>, _>>()?;
+        lists(files, name, copies.concat())
     };
     let top = &files[0];
     let mut names = Names::default();
 
     let mut bodies = Vec::new();
     let mut body_sections = Vec::new();
-    for node in list("body", MOST_BODIES, "bodies")? {
+    for node in list("body")? {
         let (body, section) = read_body(&node)?;
         names.add(&section, "body", &body.name)?;
         bodies.push(body);
@@ -402,7 +331,7 @@ fn read_mechanism<'d>(
         .collect();
     let mut joint_names = Names::default();
     let mut joints: Vec<JointText<'d>> = Vec::new();
-    for node in list("joint", MOST_BODIES, "joints")? {
+    for node in list("joint")? {
         let joint = read_joint(&node, scene, &file_order, &file_places)?;
         joint_names.add(&joint.section, "joint", &joint.name)?;
         let slider = |of: &JointText<'_>| of.joint.drive.as_ref()?.slider();
@@ -422,7 +351,7 @@ fn read_mechanism<'d>(
     }
     (scene.bodies, scene.joints) = sort_forest(bodies, joints, &body_sections)?;
     let by_name = indices_by_name(&scene.bodies);
-    for node in list("ball_joint", MOST_BALL_JOINTS, "ball joints")? {
+    for node in list("ball_joint")? {
         let BallJointText {
             joint,
             section,
@@ -436,7 +365,7 @@ fn read_mechanism<'d>(
         scene.ball_joints.push(joint);
         places.extend(own);
     }
-    for node in list("fixed_shape", MOST_SHAPES, "shapes")? {
+    for node in list("fixed_shape")? {
         let shape = read_shape(&node, true, scene.spcmm.as_ref())?;
         scene.fixed_shapes.push(shape);
     }
@@ -457,7 +386,7 @@ fn read_mechanism<'d>(
     let tree_joints = tree_joints.map(|(joint, index)| (joint.name.clone(), index));
     let tree_joints: BTreeMap<String, usize> = tree_joints.collect();
     for kind in &ELEMENT_KINDS {
-        for node in list(kind.section, MOST_ELEMENTS, "force elements")? {
+        for node in list(kind.section)? {
             let (element, section) = read_element(&node, kind, scene, &by_name, &tree_joints)?;
             // Joints and elements share one table of column names.
             joint_names.add(&section, "joint or force element", &element.name)?;
@@ -500,10 +429,7 @@ fn read_output(
         file_order.last().map_or(last, String::as_str)
     }
     .to_owned();
-    let section = top
-        .get("output")
-        .map(|node| node.section(&["body", "probe"]))
-        .transpose()?;
+    let section = top.get("output").map(|node| node.section()).transpose()?;
     let node = section.as_ref().and_then(|section| section.get("body"));
     let wanted = node
         .as_ref()
@@ -517,7 +443,7 @@ fn read_output(
     };
     let probe = section
         .and_then(|section| section.get("probe"))
-        .map(|node| node.vector(Dimension::Length))
+        .map(|node| node.vector())
         .transpose()?;
     scene.output = Output { body, probe };
     Ok(())
@@ -539,7 +465,7 @@ impl<'d> Names<'d> {
     }
 
     fn add(&mut self, section: &Section<'d>, what: &str, name: &str) -> Result<(), SceneError> {
-        let node = section.require("name", "\"rod\"")?;
+        let node = section.require("name")?;
         match self.places.insert(name.to_owned(), node.clone()) {
             None => Ok(()),
             Some(first) => {

@@ -8,7 +8,7 @@ use crate::words::words;
 
 /// Forms of a shape.
 #[derive(Clone, Copy, PartialEq)]
-enum Form {
+pub(super) enum Form {
     Capsule,
     Cylinder,
     Cone,
@@ -27,28 +27,23 @@ words!(Form {
 });
 
 /// Largest mass, kg, and inertia, kg m^2, that a file may give: anything beyond is a typing slip.
-const MAX_MASS: f64 = 1e9;
+pub(super) const MAX_MASS: f64 = 1e9;
 const MAX_INERTIA: f64 = 1e12;
 
 /// Moments of inertia are often given to three digits: the triangle inequality gets this relative slack.
 const TRIANGLE_SLACK: f64 = 1e-9;
 
-/// Keys of mass and shape, for bodies and links.
-pub(super) const BODY_KEYS: [&str; 6] =
-    ["mass", "centre", "inertia", "products", "shapes", "density"];
-
 /// Largest density, kg/m^3: five times that of osmium.
-const MAX_DENSITY: f64 = 1e5;
+pub(super) const MAX_DENSITY: f64 = 1e5;
 
 /// One `[[body]]`.
 pub(super) fn read_body<'d>(node: &Node<'d>) -> Result<(Body, Section<'d>), SceneError> {
-    let known: Vec<&str> = ["name"].into_iter().chain(BODY_KEYS).collect();
-    let section = node.section_as(node.title("body"), &known)?;
-    let name = section.require("name", "\"rod\"")?.name()?.into_owned();
+    let section = node.section_as(node.title("body"))?;
+    let name_node = section.require("name")?;
+    let name = name_node.name()?.into_owned();
     if name == "world" {
-        return Err(section
-            .require("name", "")?
-            .error("`world` is the frame that everything stands on; choose another name"));
+        let why = "`world` is the frame that everything stands on; choose another name";
+        return Err(name_node.error(why));
     }
     Ok((read_rigid_body(&section, name)?, section))
 }
@@ -57,7 +52,7 @@ pub(super) fn read_body<'d>(node: &Node<'d>) -> Result<(Body, Section<'d>), Scen
 pub(super) fn read_rigid_body(section: &Section<'_>, name: String) -> Result<Body, SceneError> {
     let shapes = match section.get("shapes") {
         Some(node) => node
-            .elements_up_to(MOST_SHAPES, "shapes")?
+            .entries()?
             .iter()
             .map(|shape| read_shape(shape, false, None))
             .collect::<Result<_, _>>()?,
@@ -66,20 +61,11 @@ pub(super) fn read_rigid_body(section: &Section<'_>, name: String) -> Result<Bod
     if let Some(node) = section.get("density") {
         return read_solid(section, &node, name, shapes);
     }
-    let mass =
-        section
-            .require("mass", "\"0.384 kg\"")?
-            .positive(Dimension::Mass, MAX_MASS, "kg")?;
-    let centre = match section.get("centre") {
-        Some(node) => node.vector(Dimension::Length)?,
-        None => Vec3::zeros(),
-    };
-    let inertia = read_inertia(section)?;
     Ok(Body {
         name,
-        mass,
-        centre,
-        inertia,
+        mass: section.number("mass")?,
+        centre: section.vector("centre")?,
+        inertia: read_inertia(section)?,
         shapes,
         density: None,
     })
@@ -95,7 +81,7 @@ fn read_solid(
     for key in ["mass", "centre", "inertia", "products"] {
         section.refuse(key, "it follows from `density` and `shapes`")?;
     }
-    let density = node.positive(Dimension::Density, MAX_DENSITY, "kg/m^3")?;
+    let density = node.number()?;
     let solid = Solid::of_shapes(&shapes);
     let (mass, inertia) = (density * solid.volume, solid.inertia() * density);
     let heaviest = inertia.amax() <= MAX_INERTIA && mass <= MAX_MASS;
@@ -120,12 +106,9 @@ fn read_solid(
 /// The inertia matrix about the centroid in body axes: `inertia` = Ixx, Iyy, Izz and, where the axes are not principal,
 /// `products` = the integrals of xy, xz, yz over the mass.
 fn read_inertia(section: &Section<'_>) -> Result<Mat3, SceneError> {
-    let node = section.require("inertia", "\"1.58e-5 1.92e-3 1.93e-3 kg m^2\"")?;
-    let [xx, yy, zz] = node.quantities::<3>(Dimension::Inertia)?;
-    let [xy, xz, yz] = match section.get("products") {
-        Some(products) => products.quantities::<3>(Dimension::Inertia)?,
-        None => [0.0; 3],
-    };
+    let node = section.require("inertia")?;
+    let [xx, yy, zz] = node.numbers()?;
+    let [xy, xz, yz] = section.vector("products")?.into();
     let inertia = Mat3::new(xx, -xy, -xz, -xy, yy, -yz, -xz, -yz, zz);
     if inertia.amax() > MAX_INERTIA {
         return Err(node.error("out of range; allowed above 0 up to 1e12 kg m^2"));
@@ -157,70 +140,20 @@ pub(super) fn read_shape(
     fixed: bool,
     spcmm: Option<&Spcmm>,
 ) -> Result<Shape, SceneError> {
-    let mut known = vec![
-        "form",
-        "role",
-        "from",
-        "to",
-        "radius",
-        "centre",
-        "size",
-        "corners",
-        "thickness",
-    ];
-    known.extend(spcmm.map(|_| "at_slider_plane"));
-    node.check_word::<Role>(&node.key, "role")?;
-    node.check_word::<Form>(&node.key, "form")?;
-    let section = node.section(&known)?;
-    let role_node = section.require("role", "\"frame\"")?;
-    let role = role_node.word::<Role>()?;
-    let form_node = section.require("form", "\"capsule\"")?;
-    let form = form_node.word::<Form>()?;
-
-    let needs: &[&str] = match form {
-        Form::Box => &["centre", "size"],
-        Form::Sphere => &["centre", "radius"],
-        Form::Plate => &["corners", "thickness"],
-        Form::Capsule | Form::Cylinder | Form::Cone => &["from", "to", "radius"],
-    };
-    for name in [
-        "from",
-        "to",
-        "radius",
-        "centre",
-        "size",
-        "corners",
-        "thickness",
-    ] {
-        if !needs.contains(&name) {
-            section.refuse(name, &format!("a {form} has {}", needs.join(", ")))?;
-        }
-    }
-    let shift = match (
-        section
-            .get("at_slider_plane")
-            .map(|node| node.flag())
-            .transpose()?,
-        spcmm,
-    ) {
-        (Some(true), Some(spcmm)) => Vec3::new(spcmm.slider_plane, 0.0, 0.0),
+    let section = node.section()?;
+    let role = section.require("role")?.word()?;
+    let form_node = section.require("form")?;
+    let form: Form = form_node.word()?;
+    let shift = match (fixed, spcmm) {
+        (true, spcmm) => read_shift(&section, spcmm)?,
         _ => Vec3::zeros(),
     };
-    let point = |name| -> Result<Vec3, SceneError> {
-        Ok(section
-            .require(name, "\"0 0 10 mm\"")?
-            .vector(Dimension::Length)?
-            + shift)
-    };
-    let size = |name| {
-        section
-            .require(name, "\"4 mm\"")?
-            .positive(Dimension::Length, 1000.0, "m")
-    };
+    let point = |name| Ok::<_, SceneError>(section.vector(name)? + shift);
+    let size = |name| section.number(name);
     let geometry = match form {
         Form::Box => {
-            let node = section.require("size", "\"10 20 30 mm\"")?;
-            let size = node.vector(Dimension::Length)?;
+            let node = section.require("size")?;
+            let size = node.vector()?;
             if size.min() <= 0.0 {
                 return Err(node.error("edge lengths must be above 0; units m, mm, um"));
             }
@@ -234,12 +167,11 @@ pub(super) fn read_shape(
             radius: size("radius")?,
         },
         Form::Plate => {
-            let node =
-                section.require("corners", "[\"0 0 0 mm\", \"10 0 0 mm\", \"0 10 0 mm\"]")?;
+            let node = section.require("corners")?;
             let corners = node
-                .elements_up_to(MOST_CORNERS, "corners")?
+                .entries()?
                 .iter()
-                .map(|corner| Ok(corner.vector(Dimension::Length)? + shift))
+                .map(|corner| Ok(corner.vector()? + shift))
                 .collect::<Result<Vec<_>, SceneError>>()?;
             if corners.len() < 3 {
                 return Err(node.error(format!(
@@ -270,6 +202,18 @@ pub(super) fn read_shape(
         shape.follow(copy, &form_node)?;
     }
     Ok(shape)
+}
+
+/// By how much a fixed shape is moved with the slider plane of `spcmm`, m.
+fn read_shift(section: &Section<'_>, spcmm: Option<&Spcmm>) -> Result<Vec3, SceneError> {
+    let Some(node) = section.get("at_slider_plane") else {
+        return Ok(Vec3::zeros());
+    };
+    match (node.flag()?, spcmm) {
+        (true, Some(spcmm)) => Ok(Vec3::new(spcmm.slider_plane, 0.0, 0.0)),
+        (true, None) => Err(node.error("there is no slider plane without a section [spcmm]")),
+        (false, _) => Ok(Vec3::zeros()),
+    }
 }
 
 impl Shape {

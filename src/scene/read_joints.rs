@@ -30,24 +30,10 @@ pub(super) fn read_joint<'d>(
     bodies: &[String],
     places: &BTreeMap<&str, usize>,
 ) -> Result<JointText<'d>, SceneError> {
-    let known = [
-        "name",
-        "kind",
-        "parent",
-        "child",
-        "axis",
-        "parent_point",
-        "child_point",
-        "rotation",
-        "drive",
-        "start",
-    ];
-    let title = node.title("joint");
-    node.check_word::<JointKind>(&title, "kind")?;
-    let section = node.section_as(title, &known)?;
-    let name = section.require("name", "\"P1\"")?.name()?.into_owned();
-    let kind: JointKind = section.require("kind", "\"revolute\"")?.word()?;
-    let child_node = section.require("child", "\"rod\"")?;
+    let section = node.section_as(node.title("joint"))?;
+    let name = section.require("name")?.name()?.into_owned();
+    let kind: JointKind = section.require("kind")?.word()?;
+    let child_node = section.require("child")?;
     let place = |node: &Node<'_>, also| {
         let wanted = &*node.body()?;
         let names = || Option::into_iter(also).chain(bodies.iter().map(String::as_str));
@@ -60,22 +46,15 @@ pub(super) fn read_joint<'d>(
         Some(node) if node.text()? != "world" => Some(place(node, Some("world"))?),
         _ => None,
     };
-    let point = |name| {
-        section
-            .get(name)
-            .map_or(Ok(Vec3::zeros()), |node| node.vector(Dimension::Length))
-    };
     let mut joint = Joint {
         name: name.clone(),
         kind,
         parent,
         child,
-        parent_point: point("parent_point")?,
-        child_point: point("child_point")?,
+        parent_point: section.vector("parent_point")?,
+        child_point: section.vector("child_point")?,
         axis: Vec3::x(),
-        rotation: section
-            .get("rotation")
-            .map_or(Ok(Quat::identity()), |node| read_rotation(&node))?,
+        rotation: read_rotation(section.get("rotation"))?,
         drive: None,
         start: JointStart::Scalar {
             position: 0.0,
@@ -84,11 +63,7 @@ pub(super) fn read_joint<'d>(
     };
     match kind {
         JointKind::Free => read_free(&section, &mut joint)?,
-        JointKind::Fixed => {
-            for key in ["axis", "drive", "start"] {
-                section.refuse(key, "a fixed joint does not move")?;
-            }
-        }
+        JointKind::Fixed => {}
         JointKind::Prismatic | JointKind::Revolute => read_moving(&section, scene, &mut joint)?,
     }
     let own = |copy: &Copy| parent.is_some_and(|parent| copy.made(&bodies[parent]));
@@ -126,32 +101,18 @@ impl Joint {
 /// A free body: its initial pose and velocity.
 fn read_free(section: &Section<'_>, joint: &mut Joint) -> Result<(), SceneError> {
     if joint.parent.is_some() {
-        let node = section.require("parent", "\"world\"")?;
+        let node = section.require("parent")?;
         return Err(node.error("a free joint has the world as its parent; allowed \"world\""));
     }
-    for key in ["axis", "parent_point", "drive", "rotation"] {
-        section.refuse(key, "a free joint has only `child_point` and `start`")?;
-    }
-    let node = section.require("start", "{ position = \"0 0 100 mm\" }")?;
-    let start = node.section(&["position", "rotation", "velocity", "angular_velocity"])?;
-    let vector = |name, dimension| {
-        start
-            .get(name)
-            .map_or(Ok(Vec3::zeros()), |node| node.vector(dimension))
-    };
-    let rotation = start
-        .get("rotation")
-        .map_or(Ok(Quat::identity()), |node| read_rotation(&node))?;
-    let angular_velocity = vector("angular_velocity", Dimension::AngularSpeed)?;
+    let start = section.require("start")?.section()?;
+    let rotation = read_rotation(start.get("rotation"))?;
+    let angular_velocity = start.vector("angular_velocity")?;
     // The file gives pose and velocity of the joint point; the model wants those of the frame's origin.
     let arm = rotation * joint.child_point;
     joint.start = JointStart::Pose {
-        position: start
-            .require("position", "\"0 0 100 mm\"")?
-            .vector(Dimension::Length)?
-            - arm,
+        position: start.vector("position")? - arm,
         rotation,
-        velocity: vector("velocity", Dimension::Speed)? - angular_velocity.cross(&arm),
+        velocity: start.vector("velocity")? - angular_velocity.cross(&arm),
         angular_velocity,
     };
     joint.child_point = Vec3::zeros();
@@ -160,10 +121,6 @@ fn read_free(section: &Section<'_>, joint: &mut Joint) -> Result<(), SceneError>
 
 /// A slide or a hinge: axis, and either a drive or start values.
 fn read_moving(section: &Section<'_>, scene: &Scene, joint: &mut Joint) -> Result<(), SceneError> {
-    let (place, rate) = match joint.kind {
-        JointKind::Revolute => (Dimension::Angle, Dimension::AngularSpeed),
-        _ => (Dimension::Length, Dimension::Speed),
-    };
     if let Some(node) = section.get("drive") {
         section.refuse("start", "the drive says where the joint starts")?;
         let drive = read_drive(&node, joint.kind, scene)?;
@@ -181,75 +138,43 @@ fn read_moving(section: &Section<'_>, scene: &Scene, joint: &mut Joint) -> Resul
             return Ok(());
         }
     } else if let Some(node) = section.get("start") {
-        let start = node.section(&["position", "velocity"])?;
-        let number = |name, dimension| {
-            start
-                .get(name)
-                .map_or(Ok(0.0), |node| node.quantity(dimension))
-        };
+        let mut start = node.section()?;
+        start.document.on_hinge = joint.kind == JointKind::Revolute;
         joint.start = JointStart::Scalar {
-            position: number("position", place)?,
-            velocity: number("velocity", rate)?,
+            position: start.number("position")?,
+            velocity: start.number("velocity")?,
         };
     }
-    joint.axis = section.require("axis", "[0, 0, 1]")?.direction()?;
+    joint.axis = section.require("axis")?.direction()?;
     Ok(())
 }
 
-/// An orientation in one of four forms:
+/// An orientation, none if the key is left out, in one of four forms:
 /// `{ axis = [0, 1, 0], angle = "15 deg" }`;
 /// `{ sequence = "xzy", angles = ["0 deg", "2 deg", "15 deg"] }`, R = Rx Rz Ry as in paper eq. (2);
 /// `{ x = [1, 0, 0], y = [0, 1, 0] }`, the body's x axis, and the side on which its y axis lies;
 /// `{ quaternion = [w, x, y, z] }`.
-pub(super) fn read_rotation(node: &Node<'_>) -> Result<Quat, SceneError> {
-    let section = node.section(&[
-        "axis",
-        "angle",
-        "sequence",
-        "angles",
-        "x",
-        "y",
-        "quaternion",
-    ])?;
-    let forms = ["axis", "sequence", "x", "quaternion"];
-    let given: Vec<&str> = forms
-        .into_iter()
-        .filter(|name| section.get(name).is_some())
-        .collect();
-    let [form] = given[..] else {
+pub(super) fn read_rotation(node: Option<Node<'_>>) -> Result<Quat, SceneError> {
+    let Some(node) = node else {
+        return Ok(Quat::identity());
+    };
+    let section = node.section()?;
+    let Some(form) = section.word else {
         return Err(node.error(
             "needs exactly one form: axis and angle, sequence and angles, x and y, or quaternion",
         ));
     };
-    let partner = match form {
-        "axis" => "angle",
-        "sequence" => "angles",
-        "x" => "y",
-        _ => "",
-    };
-    for name in ["angle", "angles", "y"] {
-        if name != partner {
-            section.refuse(name, &format!("it does not go with {form}"))?;
-        }
-    }
     let turn =
         |axis: Vec3, angle: f64| Quat::from_axis_angle(&nalgebra::Unit::new_normalize(axis), angle);
     match form {
         "axis" => {
-            let axis = section.require("axis", "[0, 1, 0]")?.direction()?;
-            Ok(turn(
-                axis,
-                section
-                    .require("angle", "\"15 deg\"")?
-                    .quantity(Dimension::Angle)?,
-            ))
+            let axis = section.require("axis")?.direction()?;
+            Ok(turn(axis, section.number("angle")?))
         }
         "sequence" => {
-            let node = section.require("sequence", "\"xzy\"")?;
+            let node = section.require("sequence")?;
             let letters = node.text()?;
-            let angles = section
-                .require("angles", "\"0 2 15 deg\"")?
-                .quantities::<3>(Dimension::Angle)?;
+            let angles = section.require("angles")?.numbers::<3>()?;
             if letters.chars().count() != 3 {
                 return Err(
                     node.error("must be three of the letters x, y and z, for example \"xzy\"")
@@ -273,8 +198,8 @@ pub(super) fn read_rotation(node: &Node<'_>) -> Result<Quat, SceneError> {
                 })
         }
         "x" => {
-            let x = section.require("x", "[1, 0, 0]")?.direction()?;
-            let y_node = section.require("y", "[0, 1, 0]")?;
+            let x = section.require("x")?.direction()?;
+            let y_node = section.require("y")?;
             let z = x.cross(&y_node.direction()?);
             if z.norm() < 1e-6 {
                 return Err(y_node.error("must not be parallel to x"));
@@ -286,8 +211,8 @@ pub(super) fn read_rotation(node: &Node<'_>) -> Result<Quat, SceneError> {
             ))
         }
         _ => {
-            let node = section.require("quaternion", "[1, 0, 0, 0]")?;
-            let [w, x, y, z] = node.quantities::<4>(Dimension::None)?;
+            let node = section.require("quaternion")?;
+            let [w, x, y, z] = node.numbers()?;
             let size = w.abs().max(x.abs()).max(y.abs()).max(z.abs());
             if size == 0.0 {
                 return Err(node.error("a quaternion must not be zero"));
@@ -311,7 +236,7 @@ pub(super) fn sort_forest(
     for text in &joints {
         let child = text.joint.child;
         if let Some(first) = of_child[child].replace(text) {
-            let node = text.section.require("child", "")?;
+            let node = text.section.require("child")?;
             return Err(node.error(format!(
                 "this body is already the child of joint `{}`: {closing}",
                 first.name
@@ -350,7 +275,7 @@ pub(super) fn sort_forest(
         .iter()
         .find(|text| place[text.joint.child] == usize::MAX)
     {
-        let node = text.section.require("parent", "\"world\"")?;
+        let node = text.section.require("parent")?;
         return Err(node.error(format!(
             "these joints form a cycle that does not reach the world: {closing}"
         )));
@@ -380,10 +305,8 @@ pub(super) fn read_attachment(
     scene: &Scene,
     bodies: &BTreeMap<String, usize>,
 ) -> Result<Attachment, SceneError> {
-    let part = section
-        .require(key, "{ body = \"rod\", at = \"0 0 100 mm\" }")?
-        .section(&["body", "at"])?;
-    let body_node = part.require("body", "\"rod\"")?;
+    let part = section.require(key)?.section()?;
+    let body_node = part.require("body")?;
     let wanted = &*body_node.body()?;
     let body = match (wanted, bodies.get(wanted)) {
         ("world", _) => None,
@@ -393,9 +316,7 @@ pub(super) fn read_attachment(
             return Err(body_node.error(no_body(wanted, std::iter::once("world").chain(names))));
         }
     };
-    let mut point = part
-        .get("at")
-        .map_or(Ok(Vec3::zeros()), |node| node.vector(Dimension::Length))?;
+    let mut point = part.vector("at")?;
     if let Some(copy) = section.document.copy.filter(|copy| !copy.made(wanted)) {
         point = copy.point(point);
     }
@@ -409,7 +330,7 @@ pub(super) fn read_one_degree_joint(
     joints: &BTreeMap<String, usize>,
 ) -> Result<usize, SceneError> {
     const LISTED: usize = 12;
-    let node = section.require("joint", "\"crank\"")?;
+    let node = section.require("joint")?;
     let wanted = &*node.joint()?;
     match joints.get(wanted) {
         Some(&index) if scene.joints[index].has_coordinate() => Ok(index),
@@ -446,12 +367,8 @@ pub(super) fn read_ball_joint<'d>(
     scene: &Scene,
     bodies: &BTreeMap<String, usize>,
 ) -> Result<BallJointText<'d>, SceneError> {
-    let known: Vec<&str> = ["name", "socket", "ball", "opening"]
-        .into_iter()
-        .chain(contact_parts())
-        .collect();
-    let section = node.section_as(node.title("joint"), &known)?;
-    let name = section.require("name", "\"S1\"")?.name()?.into_owned();
+    let section = node.section_as(node.title("joint"))?;
+    let name = section.require("name")?.name()?.into_owned();
     let attachment = |key: &str| read_attachment(&section, key, scene, bodies);
     let (socket, ball) = (attachment("socket")?, attachment("ball")?);
     if socket.body == ball.body {
@@ -487,11 +404,6 @@ pub(super) fn read_ball_joint<'d>(
     })
 }
 
-/// Keys of `[contact]`, which a joint may override.
-pub(super) fn contact_parts() -> impl Iterator<Item = &'static str> {
-    contact_rows().map(|(part, _)| part)
-}
-
 /// Applies the contact overrides of `section` to `joint`; returns where each is given, by parameter.
 ///
 /// # Errors
@@ -503,7 +415,7 @@ pub(super) fn read_own_contact<'d>(
     let mut places = BTreeMap::new();
     for (part, field) in contact_rows() {
         if let Some(node) = section.get(part) {
-            let value = node.parameter(&format!("contact.{part}"))?;
+            let value = node.parameter()?;
             (field.set)(&mut joint.contact, &value);
             joint.overrides.push(part);
             places.insert(format!("joint.{}.{part}", joint.name), node);

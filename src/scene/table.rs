@@ -503,7 +503,7 @@ pub fn reference_page() -> String {
 }
 
 /// The row of a key (without a joint's name).
-pub(super) fn find(key: &str) -> Option<&'static Parameter> {
+pub fn find(key: &str) -> Option<&'static Parameter> {
     TABLE.iter().find(|parameter| parameter.key == key)
 }
 

@@ -263,6 +263,12 @@ pub fn unit_names(dimension: Dimension) -> Vec<&'static str> {
     units(dimension).iter().map(|(name, _)| *name).collect()
 }
 
+/// What quantities of a dimension are called.
+pub fn dimension_name(dimension: Dimension) -> &'static str {
+    let row = UNITS.iter().find(|(of, ..)| *of == dimension);
+    row.map_or("", |(_, name, _)| name)
+}
+
 /// All units as a Markdown table.
 pub fn unit_table() -> String {
     let row = |&(_, name, units): &(Dimension, &str, &[Unit])| {
@@ -540,13 +546,6 @@ fn example(dimension: Dimension) -> String {
             names.join(", ")
         ),
     }
-}
-
-fn dimension_name(dimension: Dimension) -> &'static str {
-    UNITS
-        .iter()
-        .find(|(d, _, _)| *d == dimension)
-        .map_or("", |(_, name, _)| name)
 }
 
 /// Says what a unit would measure, if anything.

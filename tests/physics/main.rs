@@ -34,3 +34,4 @@ mod settled;
 mod settled_start;
 mod twin;
 mod wear;
+mod written;

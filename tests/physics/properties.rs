@@ -17,7 +17,7 @@ const MOST_EVALUATIONS: u64 = 3000;
 const MOST_LINKS: u64 = 12;
 
 /// The same cases every time, unless the environment asks for others.
-fn config(cases: u32) -> ProptestConfig {
+pub fn config(cases: u32) -> ProptestConfig {
     let asked = |name| std::env::var_os(name).is_some();
     let usual = ProptestConfig {
         failure_persistence: None,

@@ -3,10 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use jointplay::scene::{
-    DRIVE_KINDS, ELEMENT_KINDS, ElementJoint, ElementNumber, Scene, Vec3, format_quantity,
-    reference_page, si_unit, unit_table,
-};
+use jointplay::cli::{reference, schema};
+use jointplay::scene::{Scene, Vec3, file_tables, reference_page};
 use jointplay::simulate::{Frame, Simulation};
 
 fn root() -> PathBuf {
@@ -54,108 +52,34 @@ fn every_example_of_the_page_of_scenes_runs() {
     }
 }
 
-/// The sections of all kinds as table rows for the file-format page.
-fn element_table() -> String {
-    let mut out = String::new();
-    for kind in &ELEMENT_KINDS {
-        let points = kind.points.iter();
-        let joint = kind.joint.map(|which| match which {
-            ElementJoint::Any => "`joint` (a slide or a hinge)".to_owned(),
-            ElementJoint::Undriven => "`joint` (a slide or a hinge without a drive)".to_owned(),
-        });
-        let mut keys: Vec<String> = joint.into_iter().collect();
-        keys.extend(points.map(|key| format!("`{key}` (`{{ body, at }}`)")));
-        for number in kind.numbers {
-            let ([key, own_key], [unit, own_unit]) = {
-                let [slide, hinge] = [false, true].map(|hinge| number.on(hinge));
-                ([slide.0, hinge.0], [slide.1, hinge.1].map(si_unit))
-            };
-            let default = match number.default {
-                None => "must be given".to_owned(),
-                Some(value) if value.is_infinite() => "no limit if left out".to_owned(),
-                Some(value) if unit == own_unit => {
-                    format!("{} if left out", format_quantity(value, unit))
-                }
-                Some(value) => format!(
-                    "{}, on a hinge {}, if left out",
-                    format_quantity(value, unit),
-                    format_quantity(value, own_unit)
-                ),
-            };
-            let hinge = if own_key == key {
-                String::new()
-            } else {
-                format!(" (on a hinge `{own_key}`)")
-            };
-            keys.push(format!("`{key}`{hinge}: {} ({default})", number.help));
-        }
-        for vector in kind.vectors {
-            let (key, help, unit) = (vector.key, vector.help, si_unit(vector.dimension));
-            keys.push(format!(
-                "`{key}`: {help}, a vector in {unit} (0 if left out)"
-            ));
-        }
-        for (key, help) in kind.rotations {
-            keys.push(format!("`{key}`: {help}, a rotation (none if left out)"));
-        }
-        if let Some((key, help)) = kind.law {
-            keys.push(format!("`{key}`: {help}, a law as of a drive"));
-        }
-        for (key, words, help) in kind.choices {
-            keys.push(format!(
-                "`{key}`: {help}, {} ({} if left out)",
-                words.join(" or "),
-                words[0]
-            ));
-        }
-        out.push_str(&format!(
-            "| `[[{}]]` | {}: `name`, {} |\n",
-            kind.section,
-            kind.help,
-            keys.join("; ")
-        ));
+/// Whether the file at `path` is `text`; with `UPDATE_PAGES` set it becomes that.
+fn is_page(path: &str, text: &str, command: &str) {
+    if std::env::var_os("UPDATE_PAGES").is_some() {
+        fs::write(root().join(path), text).unwrap();
     }
-    out
-}
-
-/// The laws of drives as a table for the file-format page.
-fn drive_table() -> String {
-    let mut out = "| law | motion | keys |\n|---|---|---|\n".to_owned();
-    for kind in &DRIVE_KINDS {
-        let number = |number: &ElementNumber| {
-            let default = match number.default {
-                None => "must be given".to_owned(),
-                Some(0.0) => "0 if left out".to_owned(),
-                Some(value) => {
-                    let text = format_quantity(value, si_unit(number.dimension));
-                    format!("{text} if left out")
-                }
-            };
-            format!("`{}`: {} ({default})", number.key, number.help)
-        };
-        let numbers = kind.numbers.iter().map(number);
-        let others = kind.others.iter();
-        let others = others.map(|(key, help)| format!("`{key}`: {help}"));
-        let keys: Vec<String> = others.chain(numbers).collect();
-        out += &format!(
-            "| `{}` | {} | {} |\n",
-            kind.word,
-            kind.help,
-            keys.join("; ")
-        );
-    }
-    out
+    assert!(read(path) == text, "{path} is not what `{command}` prints");
 }
 
 #[test]
-fn the_page_of_scenes_lists_the_units_that_are_read() {
-    let page = read("docs/scene-format.md");
-    assert!(page.contains(&unit_table()), "{}", unit_table());
-    assert!(page.contains(&element_table()), "{}", element_table());
-    assert!(page.contains(&drive_table()), "{}", drive_table());
+fn the_page_of_scenes_has_the_tables_of_the_rows() {
+    let path = "docs/scene-format.md";
+    let page = reference::fill(&read(path)).unwrap_or_else(|name| panic!("no table `{name}`"));
+    is_page(path, &page, "jointplay reference");
+    for table in file_tables() {
+        assert!(reference::has(&page, table), "no table `{}`", table.name);
+    }
     for unit in ["µm", "kg·m²", "60 rpm", "15°"] {
         assert!(page.contains(unit), "{unit}");
     }
+}
+
+#[test]
+fn the_schema_is_what_the_program_prints() {
+    is_page(
+        "assets/scene.schema.json",
+        &schema::page(),
+        "jointplay schema",
+    );
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 mod documents;
 mod drives;
+mod format;
 mod house;
 mod scene_corpus;
 mod scene_errors;

@@ -15,11 +15,16 @@ const MUTATIONS: u64 = 40;
 const MUTATIONS_OF_BUILT_IN: u64 = 200;
 
 /// Changes that a mutated text comes with now and then, some of them right.
-const CHANGES: [&str; 20] = [
+const CHANGES: [&str; 25] = [
     "parameter.stroke=12 mm",
     "parameter.stroke=1",
     "body.rod.mass=2 kg",
     "body.rod1.mass=0 kg",
+    "parameter.arm=60 mm",
+    "body.block.density=1 g/cm^3",
+    "spring.coil.stiffness=0 N/m",
+    "joint.drive4.drive.duration=1 us",
+    "motor.turn.torque=-1 N m",
     "contact.clearance=0",
     "contact.clearance=0.5mm",
     "contact.clearance=1e400 mm",
@@ -39,7 +44,7 @@ const CHANGES: [&str; 20] = [
 ];
 
 /// What tends to break readers.
-const TOKENS: [&str; 40] = [
+const TOKENS: [&str; 45] = [
     "0",
     "-0",
     "1",
@@ -60,6 +65,11 @@ const TOKENS: [&str; 40] = [
     "\"1 2 3 4 mm\"",
     "\"\u{b5}m\"",
     "\"1 m m\"",
+    "\"arm / 2\"",
+    "\"2 * (3 mm + i * 1 m)\"",
+    "\"sqrt(-1) * 1 mm / 0\"",
+    "\"t^2\"",
+    "{ law = \"harmonic\", amplitude = 0, frequency = \"1 Hz\" }",
     "[]",
     "[[]]",
     "{}",

@@ -1,0 +1,266 @@
+//! `reference`: the page of the scene format, whose tables follow from the rows by which the reader goes.
+
+use crate::scene::{
+    ABOVE_ZERO, Absent, DRIVE_KINDS, Dimension, ELEMENT_KINDS, FILE, FileKey, FileTable, Kind,
+    Takes, Variants, dimension_name, file_tables, find, format_quantity, si_unit, unit_table,
+};
+
+/// The page as it was when the program was built.
+const PAGE: &str = include_str!("../../docs/scene-format.md");
+/// What stands before and after a table in the page.
+const START: &str = "<!-- table ";
+const END: &str = "<!-- end of table -->";
+
+/// The page of the scene format.
+pub fn page() -> String {
+    fill(PAGE).unwrap_or_else(|name| unreachable!("a test fills the page: {name}"))
+}
+
+/// `page` with its tables drawn anew.
+///
+/// # Errors
+/// The name of a table that there is not, or that does not end.
+pub fn fill(page: &str) -> Result<String, String> {
+    let mut parts = page.split(START);
+    let mut out = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let gap = part.split_once(" -->").and_then(|(name, rest)| {
+            let (_, rest) = rest.split_once(END)?;
+            Some((name, draw(name)?, rest))
+        });
+        let Some((name, table, rest)) = gap else {
+            return Err(part.lines().next().unwrap_or_default().to_owned());
+        };
+        out += &format!("{START}{name} -->\n\n{table}\n{END}{rest}");
+    }
+    Ok(out)
+}
+
+/// What stands under a name in the page.
+fn draw(name: &str) -> Option<String> {
+    Some(match name {
+        "units" => unit_table(),
+        "frames" => frames(),
+        "laws" => laws(),
+        "force elements" => elements(),
+        _ => keys(file_tables().into_iter().find(|table| table.name == name)?),
+    })
+}
+
+/// Whether the tables of the page draw this one: there is a table of its name, or it is a force element.
+pub fn has(page: &str, table: &FileTable) -> bool {
+    is_element(table) || page.contains(&format!("{START}{} -->", table.name))
+}
+
+fn is_element(table: &FileTable) -> bool {
+    ELEMENT_KINDS.iter().any(|kind| kind.section == table.name)
+}
+
+/// A Markdown table.
+fn markdown(heads: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
+    let mut out = format!(
+        "| {} |\n|{}\n",
+        heads.join(" | "),
+        "---|".repeat(heads.len())
+    );
+    for row in rows {
+        out += &format!("| {} |\n", row.join(" | "));
+    }
+    out
+}
+
+/// The keys of a table, one a row.
+fn keys(table: &FileTable) -> String {
+    let by = match table.variants {
+        Some(Variants::Word(by, _)) => by,
+        Some(Variants::Presence(_)) => "form",
+        None => "",
+    };
+    let framed = table.keys.iter().any(|key| !key.frame.is_empty());
+    let columns = [true, !by.is_empty(), true, true, framed, true];
+    let shown = |cells: [String; 6]| {
+        let cells = cells.into_iter().zip(columns);
+        cells
+            .filter_map(|(cell, shown)| shown.then_some(cell))
+            .collect::<Vec<_>>()
+    };
+    let heads = ["key", by, "value", "if left out", "frame", "what it is"].map(str::to_owned);
+    let heads = shown(heads);
+    let row = |key: &FileKey| {
+        shown([
+            format!("`{}`", key.name),
+            key.of.join(", "),
+            value(key, table),
+            absent(key),
+            key.frame.to_owned(),
+            sentence(key.help).to_owned(),
+        ])
+    };
+    let own = table.keys.iter().filter(|key| !of_contact(key, table));
+    let mut rows: Vec<Vec<String>> = own.map(row).collect();
+    if rows.len() < table.keys.len() {
+        let cells = [
+            "any key of `[contact]`",
+            "",
+            "as there",
+            "as there",
+            "",
+            "for this joint alone",
+        ];
+        rows.push(shown(cells.map(str::to_owned)));
+    }
+    let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
+    markdown(&heads, rows)
+}
+
+/// Whether a key is one of `[contact]` that another table has, too.
+fn of_contact(key: &FileKey, table: &FileTable) -> bool {
+    let contact = |parameter: &str| parameter.starts_with("contact.");
+    matches!(key.takes, Takes::Parameter(parameter) if contact(parameter))
+        && table.name != "contact"
+}
+
+/// The first sentence of a text.
+fn sentence(text: &str) -> &str {
+    text.split_once(". ")
+        .map_or(text, |(first, _)| first)
+        .trim_end_matches('.')
+}
+
+/// What a key of `table` takes, in words.
+pub fn value(key: &FileKey, table: &FileTable) -> String {
+    let dimension = |of: Dimension| match of {
+        Dimension::None => "number",
+        of => dimension_name(of),
+    };
+    let number = |of: Dimension| match key.on_hinge {
+        Some((hinge, _)) if hinge != of => {
+            format!("{}, on a hinge {}", dimension(of), dimension(hinge))
+        }
+        _ => dimension(of).to_owned(),
+    };
+    let words = |words: &[&str]| format!("`{}`", words.join("`, `"));
+    match key.takes {
+        Takes::Number(of, range) => number(of) + &bounds(of, range),
+        Takes::Vector(Dimension::None, _) | Takes::Direction => "direction".to_owned(),
+        Takes::Vector(of, range) => format!("vector, {}{}", number(of), bounds(of, range)),
+        Takes::Numbers(count, of) => format!("{count} of {}", number(of)),
+        Takes::Quantity => "any quantity".to_owned(),
+        Takes::Range => "two quantities".to_owned(),
+        Takes::Whole(least, most) => format!("whole number, {least} to {most}"),
+        Takes::Flag => words(&["true", "false"]),
+        Takes::Text => "text".to_owned(),
+        Takes::Name => "name".to_owned(),
+        Takes::Body => "name of a body".to_owned(),
+        Takes::Joint => "name of a joint".to_owned(),
+        Takes::File => "name of a file".to_owned(),
+        Takes::Word(of) => words(of),
+        Takes::Parameter(name) => {
+            find(name).map_or_else(String::new, |parameter| match parameter.kind {
+                Kind::Number { dimension: of, .. } => {
+                    format!("{}, {}", dimension(of), parameter.range())
+                }
+                Kind::Count { .. } => format!("whole number, {}", parameter.range()),
+                Kind::Choice(of) => words(of),
+            })
+        }
+        Takes::Table(of) if of.head.starts_with('[') => format!("`{}`", of.head),
+        Takes::Table(of) => of.head.to_owned(),
+        Takes::List(of, _) if table.head.starts_with("[[") && of.head.starts_with("[[") => {
+            format!("`[[{}.{}]]`", table.name, key.name)
+        }
+        Takes::List(of, _) if of.head.starts_with("[[") => format!("`{}`", of.head),
+        Takes::List(_, many) => format!("list of {}", many.what),
+        Takes::Vectors(of, _) => format!("list of vectors, {}", number(of)),
+        Takes::Pairs([first, second], many) => format!(
+            "list of pairs, {} and {}, at most {}",
+            dimension(first),
+            number(second),
+            many.most
+        ),
+        Takes::Files(_) => "list of names of files".to_owned(),
+    }
+}
+
+/// A range after the dimension of its numbers; empty where it is no limit to speak of.
+fn bounds(dimension: Dimension, (least, most): (f64, f64)) -> String {
+    /// Beyond any sensible value, in SI units.
+    const HUGE: f64 = 1e5;
+    let show = |at: f64| format_quantity(at, si_unit(dimension));
+    let above = match least {
+        ABOVE_ZERO => ", above 0".to_owned(),
+        0.0 => ", not below 0".to_owned(),
+        _ if least.abs() > HUGE => String::new(),
+        _ => format!(", from {}", show(least)),
+    };
+    match most <= HUGE {
+        true => format!("{above}, up to {}", show(most)),
+        false => above,
+    }
+}
+
+/// What holds where a key is left out, in words.
+pub fn absent(key: &FileKey) -> String {
+    match (key.absent, key.takes) {
+        (_, Takes::Parameter(name)) => {
+            let show = |parameter: &crate::scene::Parameter| parameter.show(&parameter.default);
+            find(name).map_or_else(String::new, show)
+        }
+        (Absent::Fault, _) => "must be given".to_owned(),
+        (Absent::Or(other), _) => format!("must be given, or `{other}`"),
+        (Absent::Is(_), Takes::Table(_)) => "none".to_owned(),
+        (Absent::Is(value), _) if value.is_infinite() => "no limit".to_owned(),
+        (Absent::Is(0.0), _) => "0".to_owned(),
+        (Absent::Is(value), _) => {
+            let unit = key.dimension(false).map_or("", si_unit);
+            format_quantity(value, unit)
+        }
+        (Absent::Means(words), Takes::Word(_)) => format!("`{words}`"),
+        (Absent::Means(words), _) => words.to_owned(),
+    }
+}
+
+/// The laws of drives.
+fn laws() -> String {
+    let row =
+        |kind: &crate::scene::DriveKind| vec![format!("`{}`", kind.word), kind.help.to_owned()];
+    markdown(&["law", "motion"], DRIVE_KINDS.iter().map(row))
+}
+
+/// All force elements.
+fn elements() -> String {
+    let tables = FILE.keys.iter().filter_map(FileKey::table);
+    let part = |table: &FileTable| {
+        let head = table.head;
+        format!("### `{head}`\n\nA {}.\n\n{}", table.help, keys(table))
+    };
+    let parts: Vec<String> = tables.filter(|table| is_element(table)).map(part).collect();
+    parts.join("\n")
+}
+
+/// Frames, with the keys whose values are in them.
+fn frames() -> String {
+    let mut frames: Vec<(&str, Vec<String>)> = Vec::new();
+    for table in file_tables() {
+        let mut own: Vec<(&str, Vec<&str>)> = Vec::new();
+        for key in table.keys.iter().filter(|key| !key.frame.is_empty()) {
+            match own.iter_mut().find(|(frame, _)| *frame == key.frame) {
+                Some((_, names)) => names.push(key.name),
+                None => own.push((key.frame, vec![key.name])),
+            }
+        }
+        let head = match table.head.starts_with('[') {
+            true => format!("`{}`", table.head),
+            false => table.head.to_owned(),
+        };
+        for (frame, names) in own {
+            let keys = format!("`{}` of {head}", names.join("`, `"));
+            match frames.iter_mut().find(|(of, _)| *of == frame) {
+                Some((_, all)) => all.push(keys),
+                None => frames.push((frame, vec![keys])),
+            }
+        }
+    }
+    let row = |(frame, keys): (&str, Vec<String>)| vec![frame.to_owned(), keys.join("; ")];
+    markdown(&["frame", "keys"], frames.into_iter().map(row))
+}

@@ -1,0 +1,211 @@
+//! `schema`: a JSON schema of scene files (draft 7), for editors. It follows from the rows by which the reader goes, and allows
+//! whatever the reader does not refuse for its form alone.
+
+use serde_json::{Map, Value as Json, json};
+
+use super::reference::{absent, value};
+use crate::scene::{
+    ABOVE_ZERO, Absent, Dimension, FILE, FileKey, FileTable, Kind, Takes, Variants, file_tables,
+    find, unit_names,
+};
+
+/// The schema as text.
+pub fn page() -> String {
+    // A schema is a tree of texts: writing it cannot fail.
+    serde_json::to_string_pretty(&schema()).unwrap_or_default() + "\n"
+}
+
+fn schema() -> Json {
+    let mut schema = json!({
+        "$schema": "http://json-schema.org/draft-07/schema#",
+        "title": "Jointplay scene",
+    });
+    merge(&mut schema, of_table(&FILE));
+    let others = file_tables().into_iter().skip(1);
+    let definitions: Map<String, Json> = others
+        .map(|table| (table.name.to_owned(), of_table(table)))
+        .collect();
+    schema["definitions"] = definitions.into();
+    schema
+}
+
+/// Adds the members of `more`.
+fn merge(to: &mut Json, more: Json) {
+    if let (Some(to), Json::Object(more)) = (to.as_object_mut(), more) {
+        to.extend(more);
+    }
+}
+
+fn of_table(table: &FileTable) -> Json {
+    let description = json!({ "description": capital(table.help) });
+    let mut schema = description;
+    match table.words() {
+        [] => merge(&mut schema, of_variant(table, None)),
+        words => {
+            let variants = words.iter().map(|word| of_variant(table, Some(word)));
+            merge(
+                &mut schema,
+                json!({ "oneOf": variants.collect::<Vec<_>>() }),
+            );
+        }
+    }
+    schema
+}
+
+/// The keys of one variant of a table, or of a table without variants.
+fn of_variant(table: &FileTable, word: Option<&'static str>) -> Json {
+    let by = match table.variants {
+        Some(Variants::Word(by, _)) => by,
+        _ => "",
+    };
+    let keys: Vec<&FileKey> = table.of(word).collect();
+    let mut properties = Map::new();
+    for key in &keys {
+        let mut schema = of_key(key, table);
+        if let (true, Some(word)) = (key.name == by, word) {
+            schema["enum"] = json!([word]);
+        }
+        properties.insert(key.name.to_owned(), schema);
+    }
+    let needed = keys
+        .iter()
+        .filter(|key| matches!(key.absent, Absent::Fault));
+    let needed: Vec<&str> = needed.map(|key| key.name).collect();
+    let mut schema = json!({
+        "type": "object",
+        "properties": properties,
+        "additionalProperties": false,
+        "required": needed,
+    });
+    let either = keys.iter().filter_map(|key| match key.absent {
+        Absent::Or(other) => Some(json!({
+            "anyOf": [{ "required": [key.name] }, { "required": [other] }]
+        })),
+        _ => None,
+    });
+    let either: Vec<Json> = either.collect();
+    if !either.is_empty() {
+        schema["allOf"] = either.into();
+    }
+    schema
+}
+
+fn of_key(key: &FileKey, table: &FileTable) -> Json {
+    let mut description = format!("{}\n\nValue: {}", capital(key.help), value(key, table));
+    let dimension = match key.takes {
+        Takes::Parameter(name) => match find(name).map(|parameter| parameter.kind) {
+            Some(Kind::Number { dimension, .. }) => Some(dimension),
+            _ => None,
+        },
+        _ => key.dimension(false),
+    };
+    let mut units = dimension.map_or_else(Vec::new, unit_names);
+    if let Some((hinge, _)) = key.on_hinge.filter(|own| Some(own.0) != dimension) {
+        units.extend(unit_names(hinge));
+    }
+    if !units.is_empty() {
+        description += &format!("; units {}", units.join(", "));
+    }
+    description += &format!(".\nIf left out: {}.", absent(key));
+    if !key.frame.is_empty() {
+        description += &format!("\nFrame: {}.", key.frame);
+    }
+    let mut schema = json!({ "description": description });
+    merge(&mut schema, of_value(key));
+    if let Some(many) = key.many() {
+        schema["maxItems"] = many.most.into();
+    }
+    if let Some(example) = example(key.like) {
+        schema["examples"] = json!([example]);
+    }
+    schema
+}
+
+fn of_value(key: &FileKey) -> Json {
+    let text = || json!({ "type": "string" });
+    let list = |items: Json| json!({ "type": "array", "items": items });
+    match key.takes {
+        Takes::Number(of, range) => number(of, range),
+        Takes::Vector(of, range) => numbers(3, number(of, range)),
+        Takes::Direction => numbers(3, number(Dimension::None, key.range())),
+        Takes::Numbers(count, of) => numbers(count, number(of, key.range())),
+        Takes::Quantity => json!({ "type": ["string", "number"] }),
+        Takes::Range => numbers(2, json!({ "type": ["string", "number"] })),
+        Takes::Whole(least, most) => whole(least.into(), most.into()),
+        Takes::Flag => json!({ "type": "boolean" }),
+        Takes::Name => json!({ "type": "string", "pattern": "^[A-Za-z0-9_-]{1,40}$" }),
+        Takes::Text | Takes::Body | Takes::Joint | Takes::File => text(),
+        Takes::Word(words) => json!({ "enum": words }),
+        Takes::Parameter(name) => match find(name).map(|parameter| parameter.kind) {
+            Some(Kind::Number {
+                dimension,
+                min,
+                max,
+                ..
+            }) => number(dimension, (min, max)),
+            Some(Kind::Count { min, max }) => whole(min, max),
+            // "x" stands for "+x".
+            Some(Kind::Choice(words)) => {
+                let plain = words.iter().filter_map(|word| word.strip_prefix('+'));
+                let all: Vec<&str> = words.iter().copied().chain(plain).collect();
+                json!({ "enum": all })
+            }
+            None => json!({}),
+        },
+        Takes::Table(of) => json!({ "allOf": [reference(of)] }),
+        Takes::List(of, _) => list(reference(of)),
+        Takes::Vectors(of, _) => list(numbers(3, number(of, key.range()))),
+        Takes::Pairs([first, second], _) => {
+            let part = |of| number(of, key.range());
+            list(json!({
+                "type": "array", "items": [part(first), part(second)], "minItems": 2, "maxItems": 2
+            }))
+        }
+        Takes::Files(_) => list(text()),
+    }
+}
+
+fn reference(table: &FileTable) -> Json {
+    json!({ "$ref": format!("#/definitions/{}", table.name) })
+}
+
+/// A quantity: a text with its unit or an expression, or a bare 0; a pure number may be bare.
+fn number(dimension: Dimension, (least, most): (f64, f64)) -> Json {
+    let mut schema = json!({ "type": ["string", "number"] });
+    if dimension != Dimension::None {
+        merge(&mut schema, json!({ "minimum": 0, "maximum": 0 }));
+        return schema;
+    }
+    if least == ABOVE_ZERO {
+        schema["exclusiveMinimum"] = json!(0);
+    } else if least.is_finite() {
+        schema["minimum"] = json!(least);
+    }
+    if most.is_finite() {
+        schema["maximum"] = json!(most);
+    }
+    schema
+}
+
+/// A list of `count` numbers, or a text with one unit for all.
+fn numbers(count: usize, items: Json) -> Json {
+    json!({ "type": ["string", "array"], "items": items, "minItems": count, "maxItems": count })
+}
+
+fn whole(least: u64, most: u64) -> Json {
+    json!({ "type": ["integer", "string"], "minimum": least, "maximum": most, "pattern": "^\\s*\\+?[0-9]+\\s*$" })
+}
+
+/// A text with a capital letter first.
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().into_iter().flat_map(char::to_uppercase);
+    first.chain(letters).collect()
+}
+
+/// A value as a scene file writes it, as JSON.
+fn example(like: &str) -> Option<Json> {
+    let text = format!("like = {like}");
+    let mut table: Map<String, Json> = toml::from_str(&text).ok()?;
+    table.remove("like")
+}

@@ -1,0 +1,364 @@
+//! Any values of the rows of the scene format: a scene is read as it is written and starts, or is refused with the key that is
+//! wrong; what may be written in several ways means the same in all of them.
+
+use crate::common::invariants::finite;
+use crate::properties::config;
+use jointplay::scene::{
+    ABOVE_ZERO, Absent, Dimension, ELEMENT_KINDS, ElementKind, FileKey, FileTable, Quat, Scene,
+    SceneError, Takes, Texts, Vec3, file_tables, si_unit,
+};
+use jointplay::simulate::{Frame, Simulation};
+use proptest::prelude::*;
+use proptest::test_runner::TestCaseError;
+
+/// Steps that every start is followed by.
+const STEPS: u32 = 4;
+
+/// The table of the format with this name.
+fn rows(name: &str) -> &'static FileTable {
+    let mut all = file_tables().into_iter();
+    all.find(|table| table.name == name).expect("a table")
+}
+
+/// A number in quotes with the SI unit of its dimension.
+fn quoted(value: f64, dimension: Dimension) -> String {
+    format!("\"{value:e} {}\"", si_unit(dimension))
+}
+
+/// Numbers in a range, evenly in their decades from 1e-4 to 1e4, either sign, the ends if they are near.
+fn within((least, most): (f64, f64)) -> BoxedStrategy<f64> {
+    let sized = (-4.0..4.0_f64).prop_map(|decade| 10_f64.powf(decade));
+    let signed = (sized, any::<bool>()).prop_map(|(size, below)| if below { -size } else { size });
+    let inside = (least.max(-1e4), most.min(1e4));
+    let inside = match least {
+        ABOVE_ZERO => (most.min(1e-4), inside.1),
+        _ => inside,
+    };
+    signed
+        .prop_map(move |x| x.clamp(inside.0, inside.1))
+        .boxed()
+}
+
+/// A value of a key as a file writes it; `hinge`: whether it belongs to one.
+fn value(key: &'static FileKey, hinge: bool) -> BoxedStrategy<String> {
+    let dimension = key.dimension(hinge).unwrap_or(Dimension::None);
+    let like = match key.on_hinge {
+        Some((_, like)) if hinge => like,
+        _ => key.like,
+    };
+    match key.takes {
+        Takes::Number(_, range) => within(range)
+            .prop_map(move |x| quoted(x, dimension))
+            .boxed(),
+        Takes::Vector(_, range) => proptest::collection::vec(within(range), 3)
+            .prop_map(move |v| {
+                let all: Vec<String> = v.iter().map(|x| quoted(*x, dimension)).collect();
+                format!("[{}]", all.join(", "))
+            })
+            .boxed(),
+        Takes::Direction => (-9..10_i32, -9..10_i32, 1..10_i32)
+            .prop_map(|(x, y, z)| format!("[{x}, {y}, {z}]"))
+            .boxed(),
+        Takes::Word(words) => proptest::sample::select(words)
+            .prop_map(|word| format!("\"{word}\""))
+            .boxed(),
+        Takes::Flag => any::<bool>().prop_map(|flag| flag.to_string()).boxed(),
+        Takes::Table(table) if !table.words().is_empty() => {
+            // The law of the paper's machine needs that machine.
+            let words = table.words().iter().copied();
+            let words: Vec<&'static str> = words.filter(|word| *word != "spcmm").collect();
+            proptest::sample::select(words)
+                .prop_flat_map(move |word| filled(table, Some(word), hinge, &[]))
+                .prop_map(|keys| format!("{{ {} }}", keys.join(", ")))
+                .boxed()
+        }
+        _ => Just(like.to_owned()).boxed(),
+    }
+}
+
+/// Keys of a table with values, without those in `skip`: all that must be given, and most others.
+fn filled(
+    table: &'static FileTable,
+    word: Option<&'static str>,
+    hinge: bool,
+    skip: &[&str],
+) -> BoxedStrategy<Vec<String>> {
+    let mut all: Vec<BoxedStrategy<Option<String>>> = Vec::new();
+    let by = table.variants.map(|_| table.words());
+    for key in table.of(word).filter(|key| !skip.contains(&key.name)) {
+        let values = match (key.takes, word) {
+            (Takes::Word(words), Some(word)) if by == Some(words) => {
+                Just(format!("\"{word}\"")).boxed()
+            }
+            _ => value(key, hinge),
+        };
+        let written = values.prop_map(|value| format!("{} = {value}", key.name));
+        all.push(match key.absent {
+            Absent::Fault => written.prop_map(Some).boxed(),
+            // What goes instead of it is a file.
+            Absent::Or(_) if matches!(key.takes, Takes::File) => Just(None).boxed(),
+            Absent::Or(_) => written.prop_map(Some).boxed(),
+            _ => proptest::option::weighted(0.7, written).boxed(),
+        });
+    }
+    all.prop_map(|keys| keys.into_iter().flatten().collect())
+        .boxed()
+}
+
+/// Two bodies, the second on a slide or hinge of the first.
+fn machine(hinge: bool, more: &str) -> String {
+    let kind = if hinge { "revolute" } else { "prismatic" };
+    let body = "mass = \"1 kg\"\ninertia = \"1e-2 1e-2 1e-2 kg m^2\"\n";
+    format!(
+        "[[body]]\nname = \"base\"\n{body}\n[[joint]]\nname = \"base\"\nkind = \"free\"\nchild = \"base\"\n\
+         start = {{ position = \"0 0 1 m\" }}\n\n[[body]]\nname = \"rod\"\n{body}\n[[joint]]\nname = \"crank\"\n\
+         kind = \"{kind}\"\nparent = \"base\"\nchild = \"rod\"\naxis = [0, 1, 0]\n{more}"
+    )
+}
+
+/// What is wrong is said at its place, in words for a person.
+fn is_clear(error: &SceneError, text: &str) -> Result<(), TestCaseError> {
+    let words = error.to_string();
+    prop_assert!(
+        error.key.is_some() && error.position.is_some(),
+        "{words}\n{text}"
+    );
+    prop_assert!(!words.contains("NaN") && words.len() < 2000, "{words}");
+    Ok(())
+}
+
+/// A scene that is read starts and runs with numbers, or says why not.
+fn runs(text: &str) -> Result<(), TestCaseError> {
+    let scene = match Scene::parse(text, None, &[]) {
+        Ok(scene) => scene,
+        Err(error) => return is_clear(&error, text),
+    };
+    let saved = scene.to_toml();
+    prop_assert_eq!(saved.as_deref(), Ok(text));
+    let mut simulation = match Simulation::new(&scene) {
+        Ok(simulation) => simulation,
+        Err(error) => {
+            prop_assert!(!error.located(&scene).to_string().contains("NaN"));
+            return Ok(());
+        }
+    };
+    let mut frame = Frame::default();
+    simulation.sample(0.0, &mut frame);
+    prop_assert!(finite(&frame), "{}", text);
+    for _ in 0..STEPS {
+        if let Err(stopped) = simulation.step() {
+            prop_assert!(!stopped.to_string().contains("NaN"), "{}", stopped);
+            break;
+        }
+    }
+    simulation.sample(simulation.time(), &mut frame);
+    prop_assert!(finite(&frame), "{}", text);
+    Ok(())
+}
+
+/// Everything of a scene but its text and the numbers in it.
+fn built(text: &str, files: &Texts) -> String {
+    let mut scene =
+        Scene::parse_with(text, None, files, &[]).unwrap_or_else(|error| panic!("{error}\n{text}"));
+    scene.source = Default::default();
+    format!("{scene:?}")
+}
+
+/// A force element with any values, on a slide or a hinge.
+fn elements() -> impl Strategy<Value = String> {
+    (proptest::sample::select(&ELEMENT_KINDS[..]), any::<bool>()).prop_flat_map(
+        |(kind, hinge): (&'static ElementKind, bool)| {
+            // Of a number with another key on a hinge, the right one.
+            let other = kind.numbers.iter().filter_map(|number| {
+                let [here, there] = [hinge, !hinge].map(|hinge| number.on(hinge).0);
+                (here != there).then_some(there)
+            });
+            let skip: Vec<&str> = ["name"]
+                .into_iter()
+                .chain(kind.points.iter().copied())
+                .chain(other)
+                .collect();
+            filled(rows(kind.section), None, hinge, &skip).prop_map(move |keys| {
+                let bodies = ["base", "rod"].into_iter().rev();
+                let points = kind.points.iter().zip(bodies);
+                let point =
+                    |(key, body)| format!("{key} = {{ body = \"{body}\", at = \"0 0 10 mm\" }}\n");
+                let points: String = points.map(point).collect();
+                let section = format!(
+                    "\n[[{}]]\nname = \"e\"\n{points}{}\n",
+                    kind.section,
+                    keys.join("\n")
+                );
+                machine(hinge, &section)
+            })
+        },
+    )
+}
+
+/// A joint with any drive.
+fn drives() -> impl Strategy<Value = String> {
+    let joint = rows("joint");
+    let drive = joint.key("drive", Some("revolute")).expect("a row");
+    any::<bool>().prop_flat_map(move |hinge| {
+        value(drive, hinge).prop_map(move |drive| machine(hinge, &format!("drive = {drive}\n")))
+    })
+}
+
+/// A sum, difference, product or quotient of lengths and numbers that is a length, as text and as computed here, m.
+fn lengths() -> impl Strategy<Value = (String, f64)> {
+    let leaf = (1..999_u32, any::<bool>()).prop_map(|(x, mm)| match mm {
+        true => (format!("{x} mm"), f64::from(x) * 1e-3),
+        false => (format!("{x} m"), f64::from(x)),
+    });
+    let arm = Just(("arm".to_owned(), 0.12));
+    prop_oneof![leaf, arm].prop_recursive(4, 24, 2, |inner| {
+        (inner.clone(), inner, 1..9_u32, 0..5_u32).prop_map(
+            |((a, x), (b, y), n, which)| match which {
+                0 => (format!("({a} + {b})"), x + y),
+                1 => (format!("({a} - {b})"), x - y),
+                2 => (format!("{n} * {a}"), f64::from(n) * x),
+                3 => (format!("{a} / {n}"), x / f64::from(n)),
+                _ => (format!("max({a}, {b})"), x.max(y)),
+            },
+        )
+    })
+}
+
+/// Forms that a file gives by numbers.
+const FORMS: [&str; 6] = ["capsule", "cylinder", "cone", "box", "sphere", "plate"];
+
+const ARM: &str = "[[parameter]]\nname = \"arm\"\nvalue = \"120 mm\"\n";
+
+proptest! {
+    #![proptest_config(config(96))]
+
+    #[test]
+    fn any_force_element_is_read_and_runs_or_its_key_is_named(text in elements()) {
+        runs(&text)?;
+    }
+
+    #[test]
+    fn any_drive_is_read_and_runs_or_its_key_is_named(text in drives()) {
+        runs(&text)?;
+    }
+
+    #[test]
+    fn an_expression_is_what_it_computes((text, value) in lengths()) {
+        let scene = format!("{ARM}{}", machine(false, &format!("start = {{ position = \"{text}\" }}\n")));
+        match Scene::parse(&scene, None, &[]) {
+            Ok(scene) => {
+                let read = scene.source.numbers["joint.crank.start.position"].value;
+                prop_assert!((read - value).abs() <= 1e-12 * value.abs().max(1e3), "{text}: {read} {value}");
+            }
+            Err(error) => {
+                is_clear(&error, &scene)?;
+                prop_assert!(value.abs() > 1e6, "{error}");
+            }
+        }
+        // No length is a mass.
+        let wrong = scene.replacen("\"1 kg\"", &format!("\"{text}\""), 1);
+        let error = Scene::parse(&wrong, None, &[]).expect_err("a length for a mass");
+        prop_assert_eq!(error.key.as_deref(), Some("body.base.mass"));
+    }
+
+    #[test]
+    fn a_number_is_the_same_plain_as_an_expression_and_as_a_parameter(value in within((-1e4, 1e4))) {
+        let plain = format!("{value:e} m");
+        let own = format!("[[parameter]]\nname = \"own\"\nvalue = \"{plain}\"\n");
+        let scene = |text: &str| {
+            let more = format!("start = {{ position = \"{text}\" }}\nparent_point = [0, \"{text}\", 0]\n");
+            built(&format!("{own}{}", machine(false, &more)), &Texts::new())
+        };
+        let expected = scene(&plain);
+        for other in ["own".to_owned(), format!("2 * ({plain}) / 2"), "own * 4 / 4".to_owned()] {
+            prop_assert_eq!(scene(&other), expected.clone(), "{}", other);
+        }
+    }
+
+    #[test]
+    fn copies_of_a_pattern_lie_where_they_should(
+        count in 1..6_u32,
+        at in proptest::array::uniform3(-1.0..1.0_f64),
+        centre in proptest::array::uniform3(-1.0..1.0_f64),
+        axis in proptest::array::uniform3(1..9_i32),
+        angle in -3.0..3.0_f64,
+        along in proptest::array::uniform3(-1.0..1.0_f64),
+    ) {
+        let list = |v: [f64; 3]| format!("\"{:e} {:e} {:e} m\"", v[0], v[1], v[2]);
+        let text = format!(
+            "[[pattern]]\nname = \"p\"\ncount = {count}\nalong = {}\n\
+             about = {{ point = {}, axis = {axis:?}, angle = \"{angle:e} rad\" }}\n\
+             body = [{{ name = \"rod\", mass = \"i * 1 kg\", inertia = \"1 1 1 kg m^2\" }}]\n\
+             joint = [{{ name = \"free\", kind = \"free\", child = \"rod\", start = {{ position = {} }} }}]\n",
+            list(along), list(centre), list(at)
+        );
+        let scene = Scene::parse(&text, None, &[]).unwrap();
+        prop_assert_eq!(scene.bodies.len(), count as usize);
+        let simulation = Simulation::new(&scene).unwrap();
+        let mut frame = Frame::default();
+        simulation.sample(0.0, &mut frame);
+        let [at, centre, along] = [at, centre, along].map(Vec3::from);
+        let axis = nalgebra::Unit::new_normalize(Vec3::from(axis.map(f64::from)));
+        for (k, body) in frame.bodies.iter().enumerate() {
+            let turn = Quat::from_axis_angle(&axis, angle * k as f64);
+            let expected = centre + turn * (at - centre) + along * k as f64;
+            prop_assert!((body.position - expected).norm() < 1e-12);
+            let turned = body.rotation - turn.to_rotation_matrix().into_inner();
+            prop_assert!(turned.amax() < 1e-12);
+            prop_assert_eq!(scene.bodies[k].mass, (k + 1) as f64);
+        }
+    }
+
+    #[test]
+    fn what_is_included_is_as_if_it_stood_in_the_scene(element in elements(), cut in 0..5_usize) {
+        // Included after all of its own: the order of a list that stands in both is the same then.
+        let parts: Vec<&str> = element.split_inclusive("\n\n").collect();
+        let (here, there) = parts.split_at(cut.min(parts.len()));
+        let (here, there) = (here.concat(), there.concat());
+        let files = Texts::from([("part.toml".to_owned(), there.into())]);
+        if Scene::parse(&element, None, &[]).is_ok() {
+            let whole = format!("name = \"x\"\n{element}");
+            let split = format!("name = \"x\"\ninclude = [\"part.toml\"]\n{here}");
+            prop_assert_eq!(built(&whole, &Texts::new()), built(&split, &files));
+        }
+    }
+
+    #[test]
+    fn a_body_of_a_density_weighs_in_proportion_wherever_its_shapes_lie(
+        form in proptest::sample::select(&FORMS[..]),
+        density in 1.0..1e4_f64,
+        shift in proptest::array::uniform3(-0.5..0.5_f64),
+        size in proptest::array::uniform3(0.01..0.3_f64),
+    ) {
+        let body = |density: f64, shift: [f64; 3]| {
+            let point = |v: [f64; 3]| {
+                let v: Vec<String> = v.iter().zip(shift).map(|(a, b)| format!("\"{:e} m\"", a + b)).collect();
+                format!("[{}]", v.join(", "))
+            };
+            let [a, b, c] = size;
+            let geometry = match form {
+                "box" => format!("centre = {}, size = \"{a} {b} {c} m\"", point([0.0; 3])),
+                "sphere" => format!("centre = {}, radius = \"{a} m\"", point([0.0; 3])),
+                "plate" => format!(
+                    "corners = [{}, {}, {}], thickness = \"{c} m\"",
+                    point([0.0; 3]), point([a, 0.0, 0.0]), point([0.0, b, 0.0])
+                ),
+                _ => format!("from = {}, to = {}, radius = \"{c} m\"", point([0.0; 3]), point([a, b, 0.0])),
+            };
+            let text = format!(
+                "[[body]]\nname = \"a\"\ndensity = \"{density:e} kg/m^3\"\n\
+                 shapes = [{{ form = \"{form}\", role = \"pin\", {geometry} }}]\n\
+                 [[joint]]\nname = \"j\"\nkind = \"fixed\"\nchild = \"a\"\n"
+            );
+            Scene::parse(&text, None, &[]).map(|scene| scene.bodies[0].clone())
+        };
+        let plain = body(density, [0.0; 3]).unwrap();
+        let heavy = body(2.0 * density, [0.0; 3]).unwrap();
+        let moved = body(density, shift).unwrap();
+        prop_assert_eq!(heavy.mass, 2.0 * plain.mass);
+        prop_assert_eq!(heavy.inertia, plain.inertia * 2.0);
+        prop_assert!((moved.mass / plain.mass - 1.0).abs() < 1e-9);
+        prop_assert!((moved.centre - plain.centre - Vec3::from(shift)).norm() < 1e-9);
+        prop_assert!((moved.inertia - plain.inertia).amax() < 1e-6 * plain.inertia.amax());
+    }
+}

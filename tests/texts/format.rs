@@ -1,0 +1,258 @@
+//! The rows of the scene format: each is read as it says, nothing else is read, and the JSON schema made from them takes and
+//! refuses what the reader does.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use boon::{Compiler, Draft, SchemaIndex, Schemas};
+use jointplay::cli::schema;
+use jointplay::scene::{
+    BUILT_IN, FILE, FileKey, FileTable, Scene, SceneError, Takes, Texts, Variants, built_in_text,
+    file_tables,
+};
+use serde_json::Value as Json;
+use toml_edit::{DocumentMut, Item, Value};
+
+/// A scene with a file beside it for each key that names one.
+const WITH_FILES: &str = r#"include = ["leg.toml"]
+[[joint]]
+name = "j"
+kind = "prismatic"
+child = "leg"
+axis = [0, 0, 1]
+drive = { law = "table", file = "bump.csv" }
+"#;
+
+fn beside() -> Texts {
+    let leg = "[[body]]\nname = \"leg\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n";
+    let files = [("leg.toml", leg), ("bump.csv", "t_s,z_mm\n0,0\n1,1\n")];
+    files
+        .map(|(name, text)| (name.to_owned(), text.into()))
+        .into()
+}
+
+fn parse(text: &str) -> Result<Scene, SceneError> {
+    Scene::parse_with(text, None, &beside(), &[])
+}
+
+/// Name and text of every file of the corpus that begins with `kind`.
+fn corpus(kind: &str) -> Vec<(String, String)> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fuzz/corpus");
+    let entries = std::fs::read_dir(folder).unwrap();
+    let mut paths: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
+    paths.sort();
+    let name = |path: &Path| path.file_name().unwrap().to_string_lossy().into_owned();
+    let own = paths.iter().filter(|path| name(path).starts_with(kind));
+    own.map(|path| (name(path), std::fs::read_to_string(path).unwrap()))
+        .collect()
+}
+
+/// Scenes that are read, and have every key together.
+fn scenes() -> Vec<(String, String)> {
+    let built_in = BUILT_IN.map(|name| (name.to_owned(), built_in_text(name).unwrap().to_owned()));
+    let files = [("with files".to_owned(), WITH_FILES.to_owned())];
+    let all = corpus("good-").into_iter().chain(built_in).chain(files);
+    all.collect()
+}
+
+/// Where a value stands in a file: keys and places in lists.
+#[derive(Clone, Debug)]
+enum Step {
+    Key(String),
+    Place(usize),
+}
+
+/// What stands at a place of a file.
+fn at<'a>(root: &'a mut Item, path: &[Step]) -> &'a mut Item {
+    path.iter().fold(root, |item, step| match step {
+        Step::Key(key) => item.get_mut(key.as_str()).expect("is there"),
+        Step::Place(place) => item.get_mut(*place).expect("is there"),
+    })
+}
+
+/// Every key of `item`, a table as `rows` says, with its place and row; and every table with its place.
+struct Found {
+    keys: Vec<(Vec<Step>, &'static FileKey)>,
+    tables: Vec<(Vec<Step>, &'static FileTable)>,
+}
+
+impl Found {
+    fn of(text: &str) -> Self {
+        let document: DocumentMut = text.parse().unwrap();
+        let mut found = Self {
+            keys: Vec::new(),
+            tables: Vec::new(),
+        };
+        found.walk(document.as_item(), &FILE, Vec::new());
+        found
+    }
+
+    fn walk(&mut self, item: &Item, rows: &'static FileTable, path: Vec<Step>) {
+        let table = item.as_table_like().expect("a table");
+        self.tables.push((path.clone(), rows));
+        let there = |word: &&&str| match rows.variants {
+            Some(Variants::Word(by, _)) => table.get(by).and_then(Item::as_str) == Some(**word),
+            _ => table.contains_key(word),
+        };
+        let word = rows.words().iter().find(there).copied();
+        for (name, inner) in table.iter() {
+            let row = rows.key(name, word).unwrap_or_else(|| panic!("{name}"));
+            let path = [&path[..], &[Step::Key(name.to_owned())]].concat();
+            self.keys.push((path.clone(), row));
+            match row.takes {
+                Takes::Table(rows) => self.walk(inner, rows, path),
+                Takes::List(rows, _) => {
+                    let count = inner.as_array().map(|list| list.len());
+                    let count = count.or_else(|| Some(inner.as_array_of_tables()?.len()));
+                    for place in 0..count.expect("a list") {
+                        let path = [&path[..], &[Step::Place(place)]].concat();
+                        self.walk(&inner[place], rows, path);
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+}
+
+/// `text` with another value at a place, or a new key in the table there.
+fn changed(text: &str, path: &[Step], key: Option<&str>) -> String {
+    let document: DocumentMut = text.parse().unwrap();
+    let mut root = document.into_item();
+    let date: Value = "1979-05-27".parse().unwrap();
+    match (at(&mut root, path), key) {
+        (item, None) => *item = Item::Value(date),
+        (item, Some(key)) => {
+            let table = item.as_table_like_mut().expect("a table");
+            table.insert(key, Item::Value(date));
+        }
+    }
+    let table = root.into_table().expect("the whole file");
+    DocumentMut::from(table).to_string()
+}
+
+/// Last part of the key of an error, without places in lists.
+fn last(error: &SceneError) -> String {
+    let key = error.key.as_deref().unwrap_or_default();
+    let last = key.rsplit('.').next().unwrap_or_default();
+    last.split('[').next().unwrap_or_default().to_owned()
+}
+
+#[test]
+fn every_row_is_read_and_nothing_else_is() {
+    let mut read = BTreeSet::new();
+    for (name, text) in scenes() {
+        parse(&text).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let found = Found::of(&text);
+        for (path, row) in found.keys {
+            // No key takes a date: one that is not read would let it pass.
+            let wrong = changed(&text, &path, None);
+            let error = parse(&wrong).expect_err(&format!("{name}: {path:?} is not read"));
+            assert_eq!(last(&error), row.name, "{name}: {path:?}: {error}");
+            read.insert(std::ptr::from_ref(row));
+        }
+        for (path, rows) in found.tables {
+            let error = parse(&changed(&text, &path, Some("colour"))).unwrap_err();
+            assert_eq!(last(&error), "colour", "{name}: {path:?}: {error}");
+            assert!(
+                error.message.contains("unknown key"),
+                "{}: {error}",
+                rows.name
+            );
+        }
+    }
+    for table in file_tables() {
+        for row in table.keys {
+            let missing = !read.contains(&std::ptr::from_ref(row));
+            assert!(!missing, "no scene has `{}` of `{}`", row.name, table.name);
+        }
+    }
+}
+
+#[test]
+fn rows_say_what_they_are() {
+    let tables = file_tables();
+    let names: BTreeSet<&str> = tables.iter().map(|table| table.name).collect();
+    assert_eq!(names.len(), tables.len(), "two tables of one name");
+    for table in tables {
+        assert!(!table.help.is_empty() && !table.head.is_empty());
+        for row in table.keys {
+            let place = format!("{} of {}", row.name, table.name);
+            assert!(!row.help.is_empty() && !row.help.contains('|'), "{place}");
+            assert!(
+                row.of.iter().all(|word| table.words().contains(word)),
+                "{place}"
+            );
+            for like in [Some(row.like), row.on_hinge.map(|(_, like)| like)] {
+                let text = format!("like = {}", like.unwrap_or("0"));
+                let parsed = like == Some("") || text.parse::<DocumentMut>().is_ok();
+                assert!(parsed, "{place}: {text}");
+            }
+        }
+    }
+}
+
+/// The schema, as a validator that knows nothing of this program reads it.
+struct Schema {
+    schemas: Schemas,
+    index: SchemaIndex,
+}
+
+impl Schema {
+    fn new() -> Self {
+        let text: Json = serde_json::from_str(&schema::page()).unwrap();
+        let mut compiler = Compiler::new();
+        compiler.set_default_draft(Draft::V7);
+        compiler.add_resource("scene.json", text).unwrap();
+        let mut schemas = Schemas::new();
+        let index = compiler
+            .compile("scene.json", &mut schemas)
+            .unwrap_or_else(|error| panic!("{error:#}"));
+        Self { schemas, index }
+    }
+
+    fn check(&self, text: &str) -> Result<(), String> {
+        let scene: Json = toml::from_str(text).map_err(|error| error.to_string())?;
+        let checked = self.schemas.validate(&scene, self.index);
+        checked.map_err(|error| format!("{error:#}"))
+    }
+}
+
+/// Scenes whose form is right, so that no schema can refuse them, although the reader does.
+const BEYOND_FORM: [&str; 49] = [""; 49];
+
+#[test]
+fn the_schema_takes_every_scene_and_refuses_bad_ones() {
+    let schema = Schema::new();
+    let page = include_str!("../../docs/scene-format.md");
+    let blocks = page.split("```toml\n").skip(1);
+    let examples = blocks
+        .filter_map(|rest| Some(("example".to_owned(), rest.split("```").next()?.to_owned())));
+    for (name, text) in scenes().into_iter().chain(examples) {
+        let text = text.trim_start_matches('\u{feff}');
+        schema
+            .check(text)
+            .unwrap_or_else(|error| panic!("{name}: {error}\n{text}"));
+    }
+    let passed = |(name, text): (String, String)| schema.check(&text).is_ok().then_some(name);
+    let passed: Vec<String> = corpus("bad-").into_iter().filter_map(passed).collect();
+    assert_eq!(passed, BEYOND_FORM);
+}
+
+#[test]
+fn the_schema_refuses_a_wrong_value_of_every_key_and_any_other_key() {
+    let schema = Schema::new();
+    for (name, text) in scenes() {
+        let text = text.trim_start_matches('\u{feff}');
+        let found = Found::of(text);
+        for (path, _) in &found.keys {
+            // Neither a number, a text, a list nor a table of such keys.
+            let wrong = changed(text, path, None).replace("1979-05-27", "{ colour = { red = 1 } }");
+            assert!(schema.check(&wrong).is_err(), "{name}: {path:?}");
+        }
+        for (path, _) in &found.tables {
+            let wrong = changed(text, path, Some("colour"));
+            assert!(schema.check(&wrong).is_err(), "{name}: {path:?}");
+        }
+    }
+}
