@@ -1,4 +1,4 @@
-//! Tree joints and ball joints of a scene file, and the forest they make.
+//! Tree joints, joints that close loops, and ball joints of a scene file, and the forest they make.
 
 use super::copy::Copy;
 use super::document::{Node, Section};
@@ -8,12 +8,18 @@ use super::table::contact_rows;
 use super::*;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// A tree joint whose bodies are still indices in file order.
+/// Largest cosine of the angle between the axes of a universal joint that passes for a right one: what is written with few
+/// digits.
+const SQUARE: f64 = 1e-4;
+
+/// A joint whose bodies are still indices in file order.
 pub(super) struct JointText<'d> {
     pub name: String,
     pub section: Section<'d>,
     /// `parent` and `child` are body indices in file order.
     pub joint: Joint,
+    /// Its child hangs elsewhere.
+    pub closes_loop: bool,
 }
 
 /// A ball joint with the positions of its contact keys.
@@ -36,11 +42,13 @@ pub(super) fn read_joint<'d>(
         "parent",
         "child",
         "axis",
+        "child_axis",
         "parent_point",
         "child_point",
         "rotation",
         "drive",
         "start",
+        "closes_loop",
     ];
     let title = node.title("joint");
     node.check_word::<JointKind>(&title, "kind")?;
@@ -73,6 +81,7 @@ pub(super) fn read_joint<'d>(
         parent_point: point("parent_point")?,
         child_point: point("child_point")?,
         axis: Vec3::x(),
+        child_axis: Vec3::y(),
         rotation: section
             .get("rotation")
             .map_or(Ok(Quat::identity()), |node| read_rotation(&node))?,
@@ -82,6 +91,18 @@ pub(super) fn read_joint<'d>(
             velocity: 0.0,
         },
     };
+    let closes_loop = section
+        .get("closes_loop")
+        .map_or(Ok(false), |node| node.flag())?;
+    if closes_loop {
+        check_closing(&section, &joint)?;
+    }
+    if kind != JointKind::Universal {
+        section.refuse(
+            "child_axis",
+            "only a universal joint has an axis in the child",
+        )?;
+    }
     match kind {
         JointKind::Free => read_free(&section, &mut joint)?,
         JointKind::Fixed => {
@@ -90,19 +111,54 @@ pub(super) fn read_joint<'d>(
             }
         }
         JointKind::Prismatic | JointKind::Revolute => read_moving(&section, scene, &mut joint)?,
+        JointKind::Cylindrical | JointKind::Universal => read_two_degrees(&section, &mut joint)?,
     }
     let own = |copy: &Copy| parent.is_some_and(|parent| copy.made(&bodies[parent]));
     if let Some(copy) = node.document.copy.filter(|copy| !own(copy)) {
         joint.follow(copy);
     }
+    let outside = |copy: &&Copy| closes_loop && !copy.made(&bodies[child]);
+    if let Some(copy) = node.document.copy.filter(outside) {
+        joint.follow_in_child(copy);
+    }
     Ok(JointText {
         name,
         section,
         joint,
+        closes_loop,
     })
 }
 
+/// What a joint that closes a loop may be.
+fn check_closing(section: &Section<'_>, joint: &Joint) -> Result<(), SceneError> {
+    if joint.kind == JointKind::Free {
+        let node = section.require("kind", "\"revolute\"")?;
+        return Err(node.error(
+            "a free joint holds nothing, so that it closes no loop; allowed fixed, prismatic, revolute, cylindrical, universal",
+        ));
+    }
+    if joint.parent == Some(joint.child) {
+        let node = section.require("child", "\"rod\"")?;
+        return Err(
+            node.error("parent and child are the same body: a joint that closes a loop needs two")
+        );
+    }
+    let drive =
+        "a joint that closes a loop has no drive; drive a slide or a hinge that a body hangs on";
+    section.refuse("drive", drive)?;
+    let start =
+        "a joint that closes a loop starts where the joints that its bodies hang on put them";
+    section.refuse("start", start)
+}
+
 impl Joint {
+    /// Follows a copy of a pattern that its child does not belong to.
+    fn follow_in_child(&mut self, copy: &Copy) {
+        self.child_point = copy.point(self.child_point);
+        self.child_axis = copy.direction(self.child_axis);
+        self.rotation = self.rotation * copy.turn.inverse();
+    }
+
     /// Follows a copy of a pattern that its parent does not belong to.
     fn follow(&mut self, copy: &Copy) {
         self.parent_point = copy.point(self.parent_point);
@@ -193,6 +249,55 @@ fn read_moving(section: &Section<'_>, scene: &Scene, joint: &mut Joint) -> Resul
         };
     }
     joint.axis = section.require("axis", "[0, 0, 1]")?.direction()?;
+    Ok(())
+}
+
+/// A joint that slides and turns, or turns about two axes.
+fn read_two_degrees(section: &Section<'_>, joint: &mut Joint) -> Result<(), SceneError> {
+    let universal = joint.kind == JointKind::Universal;
+    let why = format!(
+        "a {} joint has no drive; allowed on prismatic and revolute joints",
+        joint.kind
+    );
+    section.refuse("drive", &why)?;
+    joint.axis = section.require("axis", "[0, 0, 1]")?.direction()?;
+    if universal {
+        let node = section.require("child_axis", "[0, 1, 0]")?;
+        let second = joint.rotation * node.direction()?;
+        let along = joint.axis.dot(&second);
+        if along.abs() > SQUARE {
+            let degrees = libm::acos(along.clamp(-1.0, 1.0)).to_degrees();
+            return Err(node.error(format!(
+                "must be perpendicular to `axis` where the angles are 0; with `rotation` it is at {degrees:.4} deg to it"
+            )));
+        }
+        let square = (second - joint.axis * along).normalize();
+        joint.child_axis = joint.rotation.inverse() * square;
+    }
+    let keys = if universal {
+        [
+            "angle",
+            "child_angle",
+            "angular_velocity",
+            "child_angular_velocity",
+        ]
+    } else {
+        ["position", "angle", "velocity", "angular_velocity"]
+    };
+    let start = section.get("start").map(|node| node.section(&keys));
+    let start = start.transpose()?;
+    let number = |key: usize, dimension| {
+        let node = start.as_ref().and_then(|start| start.get(keys[key]));
+        node.map_or(Ok(0.0), |node| node.quantity(dimension))
+    };
+    let (place, rate) = match universal {
+        true => (Dimension::Angle, Dimension::AngularSpeed),
+        false => (Dimension::Length, Dimension::Speed),
+    };
+    joint.start = JointStart::Pair {
+        position: [number(0, place)?, number(1, Dimension::Angle)?],
+        velocity: [number(2, rate)?, number(3, Dimension::AngularSpeed)?],
+    };
     Ok(())
 }
 
@@ -306,7 +411,8 @@ pub(super) fn sort_forest(
     joints: Vec<JointText<'_>>,
     sections: &[Section<'_>],
 ) -> Result<(Vec<Body>, Vec<Joint>), SceneError> {
-    let closing = "each body hangs on exactly one joint; close loops with a [[ball_joint]]";
+    let closing = "each body hangs on exactly one joint; close loops with a [[ball_joint]], or with a joint that has \
+                   `closes_loop = true`";
     let mut of_child: Vec<Option<&JointText<'_>>> = vec![None; bodies.len()];
     for text in &joints {
         let child = text.joint.child;
@@ -419,6 +525,13 @@ pub(super) fn read_one_degree_joint(
                     "a {} joint is neither a slide nor a hinge",
                     scene.joints[index].kind
                 ),
+                None if scene
+                    .closing_joints
+                    .iter()
+                    .any(|joint| joint.name == wanted) =>
+                {
+                    "a joint that closes a loop has no coordinate to act on".to_owned()
+                }
                 None => "no such tree joint".to_owned(),
             };
             let names = scene
