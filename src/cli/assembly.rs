@@ -5,7 +5,7 @@ use serde_json::{Map, Value as Json, json};
 use super::output::significant;
 use super::summary;
 use crate::mechanism::Placement;
-use crate::scene::format_quantity_digits;
+use crate::scene::{Scene, format_quantity_digits};
 use crate::simulate::Simulation;
 
 /// A body moved or turned by more than this is not where its scene puts it: m, rad.
@@ -21,6 +21,11 @@ const NEAR: Placement = Placement {
 };
 
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
+
+/// Name of a joint at which trees are cut.
+fn cut_joint(scene: &Scene, joint: usize) -> &str {
+    scene.cut_joints().nth(joint).unwrap_or_default()
+}
 
 fn exceeds(a: &Placement, b: &Placement) -> bool {
     a.moved > b.moved || a.turned > b.turned
@@ -55,15 +60,25 @@ fn lines(simulation: &Simulation) -> Vec<(String, String)> {
         ""
     };
     let gap = if gap > NEAR.moved {
-        let joint = &scene.ball_joints[joint].name;
         format!(
-            "largest gap {guess} {} at {joint}",
-            format_quantity_digits(gap, "mm", 4)
+            "largest gap {guess} {} at {}",
+            format_quantity_digits(gap, "mm", 4),
+            cut_joint(scene, joint)
         )
     } else {
         format!("no gap {guess}")
     };
-    let mut lines = vec![("Assembly".to_owned(), gap + mode)];
+    let turned = assembly
+        .most_turned
+        .filter(|(_, turned)| *turned > NEAR.turned);
+    let turned = turned.map_or_else(String::new, |(joint, turned)| {
+        format!(
+            "; turned most {} at {}",
+            format_quantity_digits(turned, "deg", 4),
+            cut_joint(scene, joint)
+        )
+    });
+    let mut lines = vec![("Assembly".to_owned(), gap + &turned + mode)];
     let bodies = || scene.bodies.iter().zip(&assembly.bodies);
     for (body, placement) in bodies().filter(|(_, p)| exceeds(p, &NEAR)) {
         lines.push((format!("  {}", body.name), words(placement)));
@@ -95,7 +110,7 @@ fn warnings(simulation: &Simulation) -> Vec<String> {
         let gap = assembly.widest.map_or_else(String::new, |(joint, gap)| {
             format!(
                 " {} was {} open.",
-                scene.ball_joints[joint].name,
+                cut_joint(scene, joint),
                 format_quantity_digits(gap, "mm", 4)
             )
         });
@@ -120,7 +135,7 @@ pub struct Start {
     pub lines: Vec<(String, String)>,
     /// Assembly results that the scene can hardly intend.
     pub warnings: Vec<String>,
-    /// Ideal ball joints whose reactions are not unique.
+    /// Ideal ball joints and joints that close loops whose reactions are not unique.
     pub reactions: Vec<String>,
     /// Driven joints whose actuator forces are not unique.
     pub actuators: Vec<String>,
@@ -138,9 +153,7 @@ impl Start {
         Self {
             lines: lines(simulation),
             warnings: warnings(simulation),
-            reactions: reactions
-                .map(|&j| scene.ball_joints[j].name.clone())
-                .collect(),
+            reactions: reactions.map(|&j| cut_joint(scene, j).to_owned()).collect(),
             actuators: loose.actuators.iter().map(|&i| driven[i].clone()).collect(),
             assembly: json(simulation),
         }
@@ -189,7 +202,7 @@ fn json(simulation: &Simulation) -> Json {
         .collect();
     let widest = assembly.widest;
     json!({
-        "largest_gap_joint": widest.map(|(joint, _)| &scene.ball_joints[joint].name),
+        "largest_gap_joint": widest.map(|(joint, _)| cut_joint(scene, joint)),
         "largest_gap_m": widest.map(|(_, gap)| gap),
         "other_mode": assembly.other_mode,
         "bodies": bodies,

@@ -10,7 +10,9 @@ use super::{Failure, load, print, start};
 use crate::contact::FrictionLaw;
 use crate::integrate::Method;
 use crate::mechanism::Summary;
-use crate::scene::{BallJoint, Body, Formulation, JointKind, Scene, format_quantity, to_display};
+use crate::scene::{
+    BallJoint, Body, Formulation, Joint, JointKind, Scene, format_quantity, to_display,
+};
 use crate::simulate::{Frame, LARGEST_IMPLICIT, Listed, Simulation, channels_of};
 
 /// Runs `check`.
@@ -85,7 +87,10 @@ fn report(
     for body in scene.bodies.iter().filter(|body| body.density.is_some()) {
         line(&format!("  {}", body.name), &of_its_shapes(body));
     }
-    line("Joints", &tree_joints(scene));
+    line("Joints", &joints(&scene.joints));
+    if !scene.closing_joints.is_empty() {
+        line("Close loops", &joints(&scene.closing_joints));
+    }
     line(
         "Ball joints",
         &format!(
@@ -152,24 +157,25 @@ fn of_its_shapes(body: &Body) -> String {
     )
 }
 
-fn tree_joints(scene: &Scene) -> String {
+fn joints(all: &[Joint]) -> String {
     let kinds = [
-        (JointKind::Prismatic, "prismatic"),
-        (JointKind::Revolute, "revolute"),
-        (JointKind::Free, "free"),
-        (JointKind::Fixed, "fixed"),
+        JointKind::Prismatic,
+        JointKind::Revolute,
+        JointKind::Cylindrical,
+        JointKind::Universal,
+        JointKind::Free,
+        JointKind::Fixed,
     ];
     let mut parts = Vec::new();
-    for (kind, word) in kinds {
+    for kind in kinds {
         for driven in [true, false] {
             let alike = || {
-                scene
-                    .joints
-                    .iter()
-                    .filter(|j| j.kind == kind && j.drive.is_some() == driven)
+                let alike = |j: &&Joint| j.kind == kind && j.drive.is_some() == driven;
+                all.iter().filter(alike)
             };
             let count = alike().count();
             if count > 0 {
+                let word = kind.word();
                 let word = if driven {
                     format!("driven {word}")
                 } else {

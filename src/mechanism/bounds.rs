@@ -8,6 +8,7 @@ use super::MechanismError;
 use super::factor::NONE;
 use super::lagrange::Layout;
 use super::model::{BodyIndex, Model, Motion};
+use super::pairs::Rows;
 use crate::integrate::Method;
 use crate::scene::{Formulation, Scene, StartRule};
 
@@ -122,10 +123,11 @@ impl Cost {
             cost.add(n * n, squares / 2);
             solution.push(2 * sum);
         }
-        let mut depth: Vec<u64> = Vec::with_capacity(model.bodies.len());
-        for body in &model.bodies {
+        let mut depth = vec![0; model.bodies.len()];
+        for &b in &model.order {
+            let body = &model.bodies[b];
             let above = depth.get(body.parent).copied().unwrap_or(0);
-            depth.push(if body.driven_only { 0 } else { above + 1 });
+            depth[b] = if body.driven_only { 0 } else { above + 1 };
             if !matches!(body.motion, Motion::Fixed | Motion::Driven { .. }) {
                 cost.add(0, OF_AN_ANCESTOR * above);
             }
@@ -137,17 +139,25 @@ impl Cost {
         let mut first_on = vec![u64::MAX; model.blocks.len()];
         let mut sides_on = vec![0_u64; model.blocks.len()];
         let mut rows = Vec::with_capacity(3 * joints.len());
-        for (i, &j) in (0_u64..).zip(joints) {
+        let balls = joints.iter().map(|&j| {
             let joint = &model.joints[j];
-            let mut first = i;
-            let bodies = [joint.ball.body, joint.socket.body];
+            ([joint.ball.body, joint.socket.body], 3)
+        });
+        let closures = model.closures.iter().flat_map(|pair| {
+            let bodies = [pair.child.body, pair.parent.body];
+            let count = |rows: Vec<Rows>| rows.iter().map(Rows::count).sum();
+            pair.rows().map(|rows| (bodies, count(rows)))
+        });
+        for (bodies, count) in balls.chain(closures) {
+            let at = rows.len() as u64;
+            let mut first = at;
             let [ball, socket] = bodies.map(block_of);
             for block in [ball, socket.filter(|_| socket != ball)]
                 .into_iter()
                 .flatten()
             {
                 let n = model.blocks[block].n as u64;
-                first_on[block] = first_on[block].min(i);
+                first_on[block] = first_on[block].min(at);
                 first = first.min(first_on[block]);
                 sides_on[block] += 1;
                 cost.add(6 * n, 3 * solution[block] + sides_on[block] * 9 * n);
@@ -155,11 +165,11 @@ impl Cost {
             for b in bodies {
                 cost.add(0, 3 * OF_AN_ANCESTOR * depth.get(b).copied().unwrap_or(0));
             }
-            rows.extend([3 * first; 3]);
+            rows.extend(std::iter::repeat_n(first, count));
         }
         cost.add_envelope(&rows);
         let n = model.nv as u64;
-        if n > 0 && 3 * joints.len() as u64 == n {
+        if n > 0 && rows.len() as u64 == n {
             // Determinant that tells which side of a singular pose the loops are on.
             cost.add(n * n, n.saturating_pow(3) / 3);
         }
@@ -254,7 +264,7 @@ pub fn check(scene: &Scene, model: &Model) -> Result<(), MechanismError> {
     let cost = |form| Cost::of(form, scene, model, &closed);
     let own = cost(scene.formulation);
     // Joints are closed in the coordinates of the tree, whatever the formulation.
-    let assembly = match closed.is_empty() {
+    let assembly = match closed.is_empty() && model.closures.is_empty() {
         true => Cost::default(),
         false => cost(Formulation::Tree),
     };

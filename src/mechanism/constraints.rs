@@ -1,11 +1,13 @@
-//! Ideal ball joints in tree coordinates: three constraint rows each, (45), solved for their Lagrange multipliers, and the
-//! projection that keeps closed loops closed.
+//! Joints that close loops in tree coordinates: three constraint rows for each ideal ball joint, (45), up to six for others, solved
+//! for their Lagrange multipliers, and the projection that keeps closed loops closed.
 
-use super::kinematics::part;
-use super::model::{BodyIndex, Model};
+use super::kinematics::{Kinematics, Wrench, part};
+use super::model::{Anchor, BodyIndex, Model};
+use super::pairs::Rows;
 use super::rows::RowSystem;
 use super::tree::{Tree, visit_columns};
-use crate::scene::Vec3;
+use crate::scene::{Mat3, Vec3};
+use std::ops::Range;
 
 /// The rows of one joint in one block: Jacobian J and W = M^-1 J^T, both 3 x n row-major from `offset`.
 struct Side {
@@ -33,16 +35,61 @@ impl Side {
     }
 }
 
-/// Constraint rows of a set of ball joints.
+/// One part of a joint that closes a loop: of its points or of its orientation. Its three rows in the blocks are the relative
+/// velocity, or angular velocity, of its bodies along the world's axes; what it holds are up to three directions of these.
+struct Unit {
+    /// Index of the joint among those that close loops.
+    closure: usize,
+    turns: bool,
+    rows: Vec<Rows>,
+    /// Its first constraint row, and how many there are.
+    first: usize,
+    count: usize,
+    /// Directions of these, and violation with its first and second derivative, at the latest motion.
+    along: [Vec3; 3],
+    state: [[f64; 3]; 3],
+}
+
+impl Unit {
+    fn range(&self) -> Range<usize> {
+        self.first..self.first + self.count
+    }
+
+    /// Looks at the motion of the bodies.
+    fn measure(&mut self, model: &Model, motion: &[Kinematics]) {
+        let pair = &model.closures[self.closure];
+        let (c, p) = (&motion[pair.child.body], &motion[pair.parent.body]);
+        let mut at = 0;
+        for rows in &self.rows {
+            rows.linearise(c, p, &[], |i, row, state| {
+                self.along[at + i] = row.child[usize::from(self.turns)];
+                self.state[at + i] = state;
+            });
+            at += rows.count();
+        }
+    }
+
+    /// Force, or torque, of these multipliers of all rows.
+    fn load(&self, multipliers: &[f64]) -> Vec3 {
+        let own = self.along.iter().zip(&multipliers[self.range()]);
+        own.map(|(along, x)| along * *x).sum()
+    }
+}
+
+/// Constraint rows of a set of ball joints and of all joints that close loops.
 pub struct Constraints {
     joints: Vec<usize>,
+    /// After the ball joints.
+    units: Vec<Unit>,
     sides: Vec<Vec<Side>>,
-    /// (i, j, side of i, side of j) with j <= i for every shared block.
+    /// (i, j, side of i, side of j) with j <= i for every shared block, of ball joints alone.
     pairs: Vec<(usize, usize, usize, usize)>,
+    /// The same where i is not a ball joint.
+    unit_pairs: Vec<(usize, usize, usize, usize)>,
     jacobian: Vec<f64>,
     weighted: Vec<f64>,
     matrix: RowSystem,
-    /// Multipliers of the latest solve: force on the ball, N, three per joint.
+    /// Multipliers of the latest solve: force on the ball, N, three per joint; then those of the units, N or N m.
     multipliers: Vec<f64>,
     scratch: Vec<f64>,
     step: Vec<f64>,
@@ -55,20 +102,41 @@ pub struct Constraints {
 }
 
 impl Constraints {
-    /// Rows of the joints with these indices.
+    /// Rows of the ball joints with these indices and of the joints that close loops.
     pub fn new(model: &Model, joints: &[usize]) -> Self {
         let mut total = 0;
+        let mut count = 3 * joints.len();
+        let mut units = Vec::new();
+        for (closure, pair) in model.closures.iter().enumerate() {
+            for (rows, turns) in pair.rows().into_iter().zip([false, true]) {
+                let first = count;
+                count += rows.iter().map(Rows::count).sum::<usize>();
+                units.push(Unit {
+                    closure,
+                    turns,
+                    rows,
+                    first,
+                    count: count - first,
+                    along: [Vec3::zeros(); 3],
+                    state: [[0.0; 3]; 3],
+                });
+            }
+        }
         let block_of = |b: BodyIndex| {
             (b < model.bodies.len() && !model.bodies[b].driven_only).then(|| model.block_of[b])
         };
-        let sides: Vec<Vec<Side>> = joints
-            .iter()
-            .map(|&j| {
-                let joint = &model.joints[j];
-                let mut blocks: Vec<usize> = [joint.ball.body, joint.socket.body]
-                    .into_iter()
-                    .filter_map(block_of)
-                    .collect();
+        let balls = joints.iter().map(|&j| {
+            let joint = &model.joints[j];
+            [joint.ball.body, joint.socket.body]
+        });
+        let others = units.iter().map(|unit| {
+            let pair = &model.closures[unit.closure];
+            [pair.child.body, pair.parent.body]
+        });
+        let sides: Vec<Vec<Side>> = balls
+            .chain(others)
+            .map(|bodies| {
+                let mut blocks: Vec<usize> = bodies.into_iter().filter_map(block_of).collect();
                 blocks.dedup();
                 blocks
                     .into_iter()
@@ -85,8 +153,13 @@ impl Constraints {
                     .collect()
             })
             .collect();
+        let balls = joints.len();
+        let rows_of = |i: usize| match i.checked_sub(balls) {
+            None => 3 * i..3 * i + 3,
+            Some(unit) => units[unit].range(),
+        };
         let mut pairs = Vec::new();
-        let mut columns = vec![Vec::new(); 3 * joints.len()];
+        let mut columns = vec![Vec::new(); count];
         // (joint, side) pairs that act on each block so far.
         let mut on_block = vec![Vec::new(); model.blocks.len()];
         for (i, sides) in sides.iter().enumerate() {
@@ -96,24 +169,25 @@ impl Constraints {
                 pairs.extend(on_block[side.block].iter().map(|&(j, sj)| (i, j, si, sj)));
             }
             pairs[from..].sort_unstable();
-            for row in 3 * i..3 * i + 3 {
-                let others = pairs[from..]
-                    .iter()
-                    .flat_map(|&(_, j, ..)| 3 * j..3 * j + 3);
+            for row in rows_of(i) {
+                let others = pairs[from..].iter().flat_map(|&(_, j, ..)| rows_of(j));
                 columns[row].extend(others.filter(|&column| column < row));
             }
         }
+        let unit_pairs = pairs.split_off(pairs.partition_point(|&(i, ..)| i < balls));
         Self {
             joints: joints.to_vec(),
+            units,
             sides,
             pairs,
+            unit_pairs,
             jacobian: vec![0.0; total],
             weighted: vec![0.0; total],
             matrix: RowSystem::new(columns),
-            multipliers: vec![0.0; 3 * joints.len()],
-            scratch: vec![0.0; 3 * joints.len()],
+            multipliers: vec![0.0; count],
+            scratch: vec![0.0; count],
             step: vec![0.0; model.nv],
-            square: if 3 * joints.len() == model.nv {
+            square: if count == model.nv {
                 vec![0.0; model.nv * model.nv]
             } else {
                 Vec::new()
@@ -140,7 +214,8 @@ impl Constraints {
         let a = &mut self.square;
         a.resize(n * n, 0.0);
         a.fill(0.0);
-        for (k, sides) in self.sides.iter().enumerate() {
+        let (of_balls, of_units) = self.sides.split_at(self.joints.len());
+        for (k, sides) in of_balls.iter().enumerate() {
             for side in sides {
                 let first = model.blocks[side.block].v;
                 for i in 0..3 {
@@ -152,12 +227,26 @@ impl Constraints {
                 }
             }
         }
+        for (unit, sides) in self.units.iter().zip(of_units) {
+            for side in sides {
+                let first = model.blocks[side.block].v;
+                let [x, y, z] = side.rows(&self.jacobian);
+                for (row, along) in unit.range().zip(&unit.along) {
+                    let Some(at) = place(row) else { continue };
+                    for (c, a) in a[at * n + first..][..side.n].iter_mut().enumerate() {
+                        *a += along.dot(&Vec3::new(x[c], y[c], z[c]));
+                    }
+                }
+            }
+        }
         super::factor::is_determinant_positive(a, n)
     }
 
     /// Treats the rows as dependent from now on, with a rank of at most `rank`.
     pub fn treat_as_dependent(&mut self, rank: usize) {
-        let group = (0..self.rows()).map(|i| i - i % 3).collect();
+        let units = self.units_of_rows();
+        let group = units.flat_map(|rows| rows.clone().map(move |_| rows.start));
+        let group = group.collect();
         self.matrix.treat_as_dependent(rank, 0, group);
         self.time = None;
     }
@@ -172,9 +261,25 @@ impl Constraints {
         self.matrix.rank()
     }
 
-    /// Whether the reaction of the `k`-th joint is unique at the latest factorisation.
+    /// Whether the reaction of the `k`-th joint is unique at the latest factorisation: of the ball joints, then of the joints that
+    /// close loops.
     pub fn is_unique(&self, k: usize) -> bool {
-        self.matrix.is_unique(3 * k, 3)
+        let rows = match k.checked_sub(self.joints.len()) {
+            None => 3 * k..3 * k + 3,
+            Some(closure) => self.units[2 * closure].first..self.units[2 * closure + 1].range().end,
+        };
+        self.matrix.is_unique(rows.start, rows.len())
+    }
+
+    /// Rows of each ball joint, then of the points and of the orientation of each joint that closes a loop.
+    fn units_of_rows(&self) -> impl Iterator<Item = Range<usize>> {
+        let balls = (0..self.joints.len()).map(|k| 3 * k..3 * k + 3);
+        balls.chain(self.units.iter().map(Unit::range))
+    }
+
+    /// After a plain factorisation: the smallest ratio of a pivot to the largest diagonal entry of its joint.
+    pub fn least_joint_pivot(&self) -> f64 {
+        self.matrix.least_joint_pivot(self.units_of_rows())
     }
 
     /// The system J M^-1 J^T.
@@ -189,12 +294,52 @@ impl Constraints {
 
     /// Number of rows.
     pub fn rows(&self) -> usize {
-        3 * self.joints.len()
+        self.multipliers.len()
+    }
+
+    /// Multipliers of the latest solve.
+    pub fn multipliers(&self) -> &[f64] {
+        &self.multipliers
     }
 
     /// Force on the ball of the `k`-th constrained joint, N.
     pub fn reaction(&self, k: usize) -> Vec3 {
         Vec3::from_column_slice(&self.multipliers[3 * k..3 * k + 3])
+    }
+
+    /// Adds what `multipliers` of all rows exert on the bodies to `wrench`.
+    pub fn load(
+        &self,
+        model: &Model,
+        multipliers: &[f64],
+        motion: &[Kinematics],
+        wrench: &mut [Wrench],
+    ) {
+        let mut push = |body: BodyIndex, arm: Vec3, force: Vec3| {
+            let w = &mut wrench[body];
+            w.force += force;
+            w.torque += arm.cross(&force);
+        };
+        for (k, &j) in self.joints.iter().enumerate() {
+            let force = Vec3::from_column_slice(part::<3>(multipliers, 3 * k));
+            let joint = &model.joints[j];
+            let [ball, socket] = joint.arms(motion);
+            push(joint.ball.body, ball, force);
+            push(joint.socket.body, socket, -force);
+        }
+        for unit in self.units.iter().filter(|unit| !unit.turns) {
+            let pair = &model.closures[unit.closure];
+            let force = unit.load(multipliers);
+            let [child, parent] = pair.arms(motion);
+            push(pair.child.body, child, force);
+            push(pair.parent.body, parent, -force);
+        }
+        for unit in self.units.iter().filter(|unit| unit.turns) {
+            let pair = &model.closures[unit.closure];
+            let torque = unit.load(multipliers);
+            wrench[pair.child.body].torque += torque;
+            wrench[pair.parent.body].torque -= torque;
+        }
     }
 
     /// Computes the Jacobians and factors J M^-1 J^T for a tree that has been moved forward and assembled at (t, q); does
@@ -232,6 +377,7 @@ impl Constraints {
                 );
             }
         }
+        self.add_unit_columns(model, &tree.motion);
         self.weighted.copy_from_slice(&self.jacobian);
         for side in self.sides.iter().flatten() {
             for row in side.rows_mut(&mut self.weighted) {
@@ -245,14 +391,78 @@ impl Constraints {
             let block = left.map(|left| right.map(|right| dot(left, right)));
             self.matrix.add_block(i, j, &block);
         }
+        self.add_unit_blocks();
         self.least_pivot = self.matrix.factor();
+    }
+
+    /// Jacobians of the units.
+    fn add_unit_columns(&mut self, model: &Model, motion: &[Kinematics]) {
+        let balls = self.joints.len();
+        for (unit, sides) in self.units.iter_mut().zip(&self.sides[balls..]) {
+            unit.measure(model, motion);
+            let pair = &model.closures[unit.closure];
+            let arms = pair.arms(motion);
+            let ends = [(&pair.child, arms[0], 1.0), (&pair.parent, arms[1], -1.0)];
+            for (&Anchor { body, .. }, arm, sign) in ends {
+                let moves = model.bodies.get(body).is_some_and(|own| !own.driven_only);
+                let own = |side: &&Side| moves && side.block == model.block_of[body];
+                let Some(side) = sides.iter().find(own) else {
+                    continue;
+                };
+                let point = motion[body].position + arm;
+                let [x, y, z] = side.rows_mut(&mut self.jacobian);
+                let turns = unit.turns;
+                visit_columns(model, motion, body, &point, |column, velocity, omega| {
+                    let moved = if turns { omega } else { velocity };
+                    x[column] += sign * moved.x;
+                    y[column] += sign * moved.y;
+                    z[column] += sign * moved.z;
+                });
+            }
+        }
+    }
+
+    /// The blocks of J M^-1 J^T that belong to units.
+    fn add_unit_blocks(&mut self) {
+        let balls = self.joints.len();
+        let world = [Vec3::x(), Vec3::y(), Vec3::z()];
+        for unit in &self.units {
+            self.matrix.refer(unit.first, 0.0);
+        }
+        let mut referred = (usize::MAX, 0.0);
+        for &(i, j, si, sj) in &self.unit_pairs {
+            let (a, b) = (&self.sides[i][si], &self.sides[j][sj]);
+            let (left, right) = (a.rows(&self.jacobian), b.rows(&self.weighted));
+            let block = left.map(|left| right.map(|right| dot(left, right)));
+            let block = Mat3::from_fn(|r, c| block[r][c]);
+            let unit = &self.units[i - balls];
+            if i == j {
+                // Of both sides, if it has two.
+                let before = if referred.0 == i { referred.1 } else { 0.0 };
+                referred = (i, before + block.trace());
+                self.matrix.refer(unit.first, referred.1);
+            }
+            let (first, others) = match j.checked_sub(balls) {
+                None => (3 * j, &world[..]),
+                Some(other) => {
+                    let other = &self.units[other];
+                    (other.first, &other.along[..other.count])
+                }
+            };
+            for (row, along) in unit.range().zip(&unit.along) {
+                let moved = block.tr_mul(along);
+                for (column, other) in (first..=row).zip(others) {
+                    self.matrix.add(row, column, moved.dot(other));
+                }
+            }
+        }
     }
 
     fn is_factored(&self, t: f64, q: &[f64]) -> bool {
         self.time == Some(t) && self.positions == q
     }
 
-    /// x = J v for the rows of joint `k`.
+    /// x = J v for the three rows of joint or unit `k`.
     fn apply(&self, model: &Model, k: usize, v: &[f64]) -> Vec3 {
         let mut sum = Vec3::zeros();
         for side in &self.sides[k] {
@@ -265,16 +475,48 @@ impl Constraints {
 
     /// v += M^-1 J^T x.
     fn add_weighted(&self, model: &Model, x: &[f64], v: &mut [f64]) {
-        for (k, sides) in self.sides.iter().enumerate() {
-            for side in sides {
-                let v = &mut v[model.blocks[side.block].v..][..side.n];
-                let [w1, w2, w3] = side.rows(&self.weighted);
-                let [x1, x2, x3] = *part(x, 3 * k);
-                for (c, v) in v.iter_mut().enumerate() {
-                    *v = *v + w1[c] * x1 + w2[c] * x2 + w3[c] * x3;
-                }
+        let (of_balls, of_units) = self.sides.split_at(self.joints.len());
+        for (k, sides) in of_balls.iter().enumerate() {
+            self.add_weighted_rows(model, sides, part(x, 3 * k), v);
+        }
+        for (unit, sides) in self.units.iter().zip(of_units) {
+            self.add_weighted_rows(model, sides, &unit.load(x).into(), v);
+        }
+    }
+
+    /// The same for the three rows of these sides.
+    #[inline(always)]
+    fn add_weighted_rows(
+        &self,
+        model: &Model,
+        sides: &[Side],
+        &[x1, x2, x3]: &[f64; 3],
+        v: &mut [f64],
+    ) {
+        for side in sides {
+            let v = &mut v[model.blocks[side.block].v..][..side.n];
+            let [w1, w2, w3] = side.rows(&self.weighted);
+            for (c, v) in v.iter_mut().enumerate() {
+                *v = *v + w1[c] * x1 + w2[c] * x2 + w3[c] * x3;
             }
         }
+    }
+
+    /// Looks at the motion of the bodies, and puts the negative of each unit's violation (`order` 0), of its rate (1) or second
+    /// derivative (2) to its multipliers. Returns the largest.
+    fn put_unit_residuals(&mut self, model: &Model, motion: &[Kinematics], order: usize) -> f64 {
+        let mut largest: f64 = 0.0;
+        for unit in &mut self.units {
+            unit.measure(model, motion);
+            for (x, state) in self.multipliers[unit.first..]
+                .iter_mut()
+                .zip(&unit.state[..unit.count])
+            {
+                *x = -state[order];
+                largest = largest.max(x.abs());
+            }
+        }
+        largest
     }
 
     /// Corrects the unconstrained accelerations `vdot` so that the joints stay closed, and keeps the multipliers.
@@ -286,6 +528,14 @@ impl Constraints {
             let residual = bias + self.apply(model, k, vdot);
             for i in 0..3 {
                 self.multipliers[3 * k + i] = -residual[i];
+            }
+        }
+        self.put_unit_residuals(model, &tree.motion, 2);
+        for (u, unit) in self.units.iter().enumerate() {
+            let moved = self.apply(model, self.joints.len() + u, vdot);
+            let own = self.multipliers[unit.range()].iter_mut();
+            for (x, along) in own.zip(&unit.along) {
+                *x -= along.dot(&moved);
             }
         }
         self.matrix.solve(&mut self.multipliers);
@@ -301,13 +551,20 @@ impl Constraints {
                 self.scratch[3 * k + i] = -residual[i];
             }
         }
+        for (u, unit) in self.units.iter().enumerate() {
+            let moved = self.apply(model, self.joints.len() + u, vdot);
+            let own = self.scratch[unit.range()].iter_mut();
+            for (x, along) in own.zip(&unit.along) {
+                *x = -along.dot(&moved);
+            }
+        }
         self.matrix.solve(&mut self.scratch);
         self.add_weighted(model, &self.scratch, vdot);
     }
 
     /// Projects positions, then velocities, onto the constraints in the metric of the mass matrix.
     ///
-    /// Returns the remaining closure error, m: above `1e-12` the loops could not be closed.
+    /// Returns the remaining closure error, m or rad: above `1e-12` the loops could not be closed.
     pub fn project(&mut self, model: &Model, tree: &mut Tree, t: f64, y: &mut [f64]) -> f64 {
         let gravity = Vec3::zeros();
         let mut error = f64::INFINITY;
@@ -321,6 +578,7 @@ impl Constraints {
                     self.multipliers[3 * k + i] = -e[i];
                 }
             }
+            largest = largest.max(self.put_unit_residuals(model, &tree.motion, 0));
             // Newton converges quadratically: stop once another step would only change rounding errors.
             // Dependent rows leave a residual: the inconsistency of the parts' dimensions.
             let stirred = if self.is_dependent() { 1e-8 } else { 1e-13 };
@@ -348,6 +606,7 @@ impl Constraints {
                 self.multipliers[3 * k + i] = -rate[i];
             }
         }
+        self.put_unit_residuals(model, &tree.motion, 1);
         self.matrix.solve(&mut self.multipliers);
         let mut step = std::mem::take(&mut self.step);
         step.fill(0.0);

@@ -19,7 +19,7 @@ pub(super) trait Equations: Send {
     /// Absolute scale of each component of (positions, velocities).
     fn scale<'a>(&'a self, model: &'a Model) -> &'a [f64];
 
-    /// Treats the rows of the ideal joints as dependent from now on, with rank `rank`.
+    /// Treats the rows of the joints that close loops as dependent from now on, with rank `rank`.
     fn treat_as_dependent(&mut self, rank: usize);
 
     /// State for the forest's coordinates `y` and the motion `motion` that goes with them.
@@ -73,7 +73,8 @@ pub(super) trait Equations: Send {
     /// T^+: velocities from position rates at `y`.
     fn velocities_of(&self, model: &Model, y: &[f64], rate: &[f64], out: &mut [f64]);
 
-    /// Projects the state after a step: quaternions to unit length, loops closed. Returns the remaining closure error, m.
+    /// Projects the state after a step: quaternions to unit length, loops closed. Returns the remaining closure error, m
+    /// or rad.
     fn project(&mut self, model: &Model, t: f64, y: &mut [f64]) -> f64;
 
     /// Whether this projection closes loops.
@@ -128,6 +129,9 @@ pub(super) trait Equations: Send {
 
     /// Whether that reaction is unique.
     fn is_reaction_unique(&self, k: usize) -> bool;
+
+    /// Whether that of the `c`-th joint that closes a loop is.
+    fn is_closure_unique(&self, model: &Model, c: usize) -> bool;
 
     /// Force (N) or torque (N m) of every actuator, given true accelerations in [`Self::motion`]. May change the loads.
     fn actuators(&mut self, model: &Model, gravity: &Vec3, out: &mut [f64]);

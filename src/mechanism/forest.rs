@@ -1,15 +1,15 @@
-//! The complete `tree` formulation: the spanning forest, and the ideal ball joints that close loops in it.
+//! The complete `tree` formulation: the spanning forest, and the ideal ball joints and other joints that close loops in it.
 
 use super::constraints::Constraints;
 use super::equations::Equations;
 use super::kinematics::{Driven, Kinematics, Wrench, spin_of};
-use super::model::{Anchor, BallJoint, BodyIndex, Model, Motion};
+use super::model::{BallJoint, BodyIndex, Model, Motion};
 use super::path::Path;
 use super::power::inverse_dynamics;
 use super::tree::{self, Tree};
 use crate::scene::Vec3;
 
-/// Spanning forest with constraint rows for its ideal ball joints.
+/// Spanning forest with constraint rows for what closes loops in it.
 pub(super) struct Forest {
     tree: Tree,
     constraints: Option<Constraints>,
@@ -18,10 +18,10 @@ pub(super) struct Forest {
 impl Forest {
     /// For `model`.
     pub(super) fn new(model: &Model) -> Self {
-        let closed = &model.ideal_joints;
+        let constraints = || Constraints::new(model, &model.ideal_joints);
         Self {
             tree: Tree::new(model),
-            constraints: (!closed.is_empty()).then(|| Constraints::new(model, closed)),
+            constraints: model.closes_loops().then(constraints),
         }
     }
 
@@ -37,10 +37,11 @@ impl Forest {
         inverse_dynamics(model, motion, wrench, gravity, moved, found);
     }
 
-    /// Adds the reactions of the ideal joints to the loads.
+    /// Adds the reactions of the joints that close loops to the loads.
     fn load_reactions(&mut self, model: &Model) {
         if let Some(constraints) = &self.constraints {
-            load_reactions(model, &mut self.tree, |k| constraints.reaction(k));
+            let Tree { motion, wrench, .. } = &mut self.tree;
+            constraints.load(model, constraints.multipliers(), motion, wrench);
         }
     }
 }
@@ -236,6 +237,10 @@ impl Equations for Forest {
         self.constraints.as_ref().is_none_or(|c| c.is_unique(k))
     }
 
+    fn is_closure_unique(&self, model: &Model, c: usize) -> bool {
+        self.is_reaction_unique(model.ideal_joints.len() + c)
+    }
+
     fn actuators(&mut self, model: &Model, gravity: &Vec3, out: &mut [f64]) {
         self.load_reactions(model);
         self.find_drive_forces(model, gravity, |_| true, |drive, force| out[drive] = force);
@@ -247,14 +252,12 @@ impl Equations for Forest {
             return true;
         };
         let mut force_under = |multipliers: Option<&[f64]>| {
-            tree.wrench.fill(Wrench::zero());
+            let Tree { motion, wrench, .. } = &mut *tree;
+            wrench.fill(Wrench::zero());
             if let Some(multipliers) = multipliers {
-                load_reactions(model, tree, |k| {
-                    Vec3::from_column_slice(&multipliers[3 * k..3 * k + 3])
-                });
+                constraints.load(model, multipliers, motion, wrench);
             }
             let mut force = 0.0;
-            let Tree { motion, wrench, .. } = &mut *tree;
             let found = |drive, value| {
                 if drive == i {
                     force = value;
@@ -300,20 +303,5 @@ impl Equations for Forest {
             power += force * driven.coordinates[drive].rate;
         });
         power
-    }
-}
-
-/// Adds the reactions of the ideal joints, in their order, to the loads on the bodies.
-fn load_reactions(model: &Model, tree: &mut Tree, reaction: impl Fn(usize) -> Vec3) {
-    let mut load = |anchor: &Anchor, force: Vec3| {
-        let arm = tree.motion[anchor.body].rotation * anchor.offset;
-        let w = &mut tree.wrench[anchor.body];
-        w.force += force;
-        w.torque += arm.cross(&force);
-    };
-    for (k, &j) in model.ideal_joints.iter().enumerate() {
-        let force = reaction(k);
-        load(&model.joints[j].ball, force);
-        load(&model.joints[j].socket, -force);
     }
 }

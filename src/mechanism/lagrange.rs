@@ -5,48 +5,15 @@
 
 use super::equations::{Equations, LEAST_PIVOT};
 use super::kinematics::{self, Driven, Kinematics, Wrench, part};
-use super::model::{BallJoint, BodyIndex, Model, Motion};
+use super::model::{Anchor, BallJoint, BodyIndex, Model, Motion, Pair};
+use super::pairs::{JacobianRow, Rows};
 use super::path::Path;
 use super::rows::RowSystem;
 use super::tree::visit_free;
-use crate::jet::Jet;
-use crate::scene::{JointKind, Mat3, Scene, Vec3};
+use crate::scene::{Mat3, Scene, Vec3};
 
 /// Baumgarte parameters of the paper: Phi'' + 2 alpha Phi' + beta^2 Phi = 0, 1/s.
 const BAUMGARTE: (f64, f64) = (5.0, 5.0);
-
-/// Kinds of constraint rows between a child and a parent.
-#[derive(Clone, Copy, Debug)]
-enum Rows {
-    /// Two points coincide: 3 rows, (45) and the first three of (47).
-    Point { child: Vec3, parent: Vec3 },
-    /// A vector of the child stays perpendicular to one of the parent: 1 row, as in (46), (47).
-    Perpendicular { child: Vec3, parent: Vec3 },
-    /// The child's point stays at `parent + s along`, s = 0 or the driven coordinate: 1 row, (46) and Phi_D of (48).
-    Offset {
-        child: Vec3,
-        parent: Vec3,
-        along: Vec3,
-        drive: Option<usize>,
-    },
-    /// Angle from the parent's `zero` to the child's `child` about `axis` is the driven coordinate: 1 row.
-    Angle {
-        child: Vec3,
-        zero: Vec3,
-        axis: Vec3,
-        drive: usize,
-    },
-}
-
-impl Rows {
-    fn count(&self) -> usize {
-        if matches!(self, Self::Point { .. }) {
-            3
-        } else {
-            1
-        }
-    }
-}
 
 /// Rows of one joint, between a child and a parent.
 pub struct Group {
@@ -63,25 +30,6 @@ impl Group {
     }
 }
 
-/// J of one row for its two bodies: (velocity, angular velocity) of the child, then of the parent.
-#[derive(Clone, Copy)]
-struct JacobianRow {
-    child: [Vec3; 2],
-    parent: [Vec3; 2],
-    /// Inverse inertia of both times their angular parts; zero for the world.
-    turned: [Vec3; 2],
-}
-
-impl JacobianRow {
-    fn new(child: [Vec3; 2], parent: [Vec3; 2]) -> Self {
-        Self {
-            child,
-            parent,
-            turned: [Vec3::zeros(); 2],
-        }
-    }
-}
-
 /// Equations of motion with multipliers.
 pub struct Lagrange {
     /// Bodies, then the world.
@@ -93,9 +41,12 @@ pub struct Lagrange {
     groups: Vec<Group>,
     /// Row of each driven coordinate.
     driver_row: Vec<usize>,
-    /// First row of each ideal ball joint.
+    /// First row of each ideal ball joint, and of each joint that closes a loop.
     ideal_row: Vec<usize>,
+    closure_row: Vec<usize>,
     rows: Vec<JacobianRow>,
+    /// Of each row, inverse inertia of child and parent times its angular parts; zero for the world.
+    turned: Vec<[Vec3; 2]>,
     /// Group of each row.
     group_of: Vec<usize>,
     /// Pairs (i, j), j <= i, of rows that share a body.
@@ -116,9 +67,10 @@ pub struct Layout {
     pub groups: Vec<Group>,
     /// Number of rows.
     rows: usize,
-    /// First row of each driven coordinate and of each ideal ball joint.
+    /// First row of each driven coordinate, of each ideal ball joint, and of each joint that closes a loop.
     driver_row: Vec<usize>,
     ideal_row: Vec<usize>,
+    closure_row: Vec<usize>,
 }
 
 impl Layout {
@@ -139,71 +91,26 @@ impl Layout {
             first
         };
         for (b, (body, joint)) in model.bodies.iter().zip(&scene.joints).enumerate() {
-            let parent = body.parent;
-            // Vectors of the parent, and the same vectors in the child's axes at q = 0.
-            let x = joint.axis;
-            let across = if x.x.abs() < 0.7 {
-                Vec3::x()
-            } else {
-                Vec3::y()
-            };
-            let y = x.cross(&across).normalize();
-            let z = x.cross(&y);
-            let seen = |v: &Vec3| joint.rotation.inverse() * v;
-            let (child_point, parent_point) = (-body.to_centroid, body.from_parent);
-            let point = Rows::Point {
-                child: child_point,
-                parent: parent_point,
-            };
-            let perpendicular = |c: &Vec3, p: &Vec3| Rows::Perpendicular {
-                child: seen(c),
-                parent: *p,
-            };
-            let offset = |along: &Vec3, drive| Rows::Offset {
-                child: child_point,
-                parent: parent_point,
-                along: *along,
-                drive,
-            };
-            let drive = match body.motion {
-                Motion::Driven { drive, .. } => Some(drive),
-                _ => None,
-            };
-            match joint.kind {
-                JointKind::Free => {}
-                JointKind::Fixed => {
-                    add(point, b, parent);
-                    for (c, p) in [(&x, &y), (&x, &z), (&y, &z)] {
-                        add(perpendicular(c, p), b, parent);
-                    }
+            let pair = match model.linked_at(b) {
+                Some((pair, _)) => *pair,
+                None => {
+                    let child = Anchor {
+                        body: b,
+                        offset: -body.to_centroid,
+                    };
+                    let parent = Anchor {
+                        body: body.parent,
+                        offset: body.from_parent,
+                    };
+                    Pair::new(joint, child, parent)
                 }
-                JointKind::Revolute => {
-                    add(point, b, parent);
-                    add(perpendicular(&x, &y), b, parent);
-                    add(perpendicular(&x, &z), b, parent);
-                    if let Some(drive) = drive {
-                        driver_row[drive] = add(
-                            Rows::Angle {
-                                child: seen(&y),
-                                zero: y,
-                                axis: x,
-                                drive,
-                            },
-                            b,
-                            parent,
-                        );
-                    }
-                }
-                JointKind::Prismatic => {
-                    add(offset(&y, None), b, parent);
-                    add(offset(&z, None), b, parent);
-                    for (c, p) in [(&x, &y), (&x, &z), (&y, &z)] {
-                        add(perpendicular(c, p), b, parent);
-                    }
-                    if let Some(drive) = drive {
-                        driver_row[drive] = add(offset(&x, Some(drive)), b, parent);
-                    }
-                }
+            };
+            let parent = pair.parent.body;
+            for rows in pair.rows().into_iter().flatten() {
+                add(rows, b, parent);
+            }
+            if let Motion::Driven { drive, .. } = body.motion {
+                driver_row[drive] = add(pair.driven_row(drive), b, parent);
             }
         }
         let ideal_row = model
@@ -218,11 +125,18 @@ impl Layout {
                 add(point, joint.ball.body, joint.socket.body)
             })
             .collect();
+        let of_closure = |pair: &Pair| {
+            let rows = pair.rows().into_iter().flatten();
+            let first = rows.map(|rows| add(rows, pair.child.body, pair.parent.body));
+            first.reduce(usize::min).unwrap_or_default()
+        };
+        let closure_row = model.closures.iter().map(of_closure).collect();
         Self {
             groups,
             rows,
             driver_row,
             ideal_row,
+            closure_row,
         }
     }
 }
@@ -235,6 +149,7 @@ impl Lagrange {
             rows,
             driver_row,
             ideal_row,
+            closure_row,
         } = Layout::new(scene, model);
         let group_of: Vec<usize> = groups
             .iter()
@@ -248,19 +163,20 @@ impl Lagrange {
                 columns[i].push(j);
             }
         }
-        let n = model.bodies.len();
-        let empty = JacobianRow::new([Vec3::zeros(); 2], [Vec3::zeros(); 2]);
+        let n = model.massive;
         // Bodies that depend on time alone are part of the state here too.
         let mut driven = Driven::new(model);
         driven.only_coordinates();
         Self {
-            motion: vec![Kinematics::rest(); n + 1],
-            wrench: vec![Wrench::zero(); n + 1],
+            motion: vec![Kinematics::rest(); model.world() + 1],
+            wrench: vec![Wrench::zero(); model.world() + 1],
             driven,
             groups,
             driver_row,
             ideal_row,
-            rows: vec![empty; rows],
+            closure_row,
+            rows: vec![JacobianRow::ZERO; rows],
+            turned: vec![[Vec3::zeros(); 2]; rows],
             group_of,
             pairs,
             matrix: RowSystem::new(columns),
@@ -280,11 +196,11 @@ impl Lagrange {
             &self.groups[self.group_of[i]],
             &self.groups[self.group_of[j]],
         );
-        let (ri, rj) = (&self.rows[i], &self.rows[j]);
+        let (ri, rj, turned) = (&self.rows[i], &self.rows[j], &self.turned[j]);
         let mut sum = 0.0;
         let others = [
-            (gj.child, &rj.child[0], &rj.turned[0]),
-            (gj.parent, &rj.parent[0], &rj.turned[1]),
+            (gj.child, &rj.child[0], &turned[0]),
+            (gj.parent, &rj.parent[0], &turned[1]),
         ];
         for (bi, ji) in [(gi.child, &ri.child), (gi.parent, &ri.parent)] {
             if bi == model.bodies.len() {
@@ -302,95 +218,25 @@ impl Lagrange {
     /// Jacobian rows, and the residual of the unconstrained accelerations: -(J a0 + bias) - 2 alpha Phi' - beta^2 Phi.
     fn linearise(&mut self) {
         self.drift = 0.0;
-        let zero = Vec3::zeros();
         for group in &self.groups {
             let (c, p) = (&self.motion[group.child], &self.motion[group.parent]);
-            let (wc, wp) = (c.angular_velocity, p.angular_velocity);
-            let at = group.first;
-            match group.rows {
-                Rows::Point { child, parent } => {
-                    let (dc, dp) = (c.rotation * child, p.rotation * parent);
-                    let phi = (c.position + dc) - (p.position + dp);
-                    let rate = c.point_velocity(&dc) - p.point_velocity(&dp);
-                    let acceleration = c.point_acceleration(&dc) - p.point_acceleration(&dp);
-                    for i in 0..3 {
-                        let mut e = zero;
-                        e[i] = 1.0;
-                        self.rows[at + i] = JacobianRow::new([e, dc.cross(&e)], [-e, e.cross(&dp)]);
-                        self.residual[at + i] = stabilised(phi[i], rate[i], acceleration[i]);
-                        self.drift = self.drift.max(phi[i].abs());
-                    }
-                }
-                Rows::Perpendicular { child, parent } => {
-                    let (a, b) = (c.rotation * child, p.rotation * parent);
-                    let cross = a.cross(&b);
-                    let phi = a.dot(&b);
-                    let relative = wc - wp;
-                    let turning = wc.cross(&a).cross(&b) + a.cross(&wp.cross(&b));
-                    let acceleration = (c.angular_acceleration - p.angular_acceleration)
-                        .dot(&cross)
-                        + relative.dot(&turning);
-                    self.rows[at] = JacobianRow::new([zero, cross], [zero, -cross]);
-                    self.residual[at] = stabilised(phi, relative.dot(&cross), acceleration);
-                    self.drift = self.drift.max(phi.abs());
-                }
-                Rows::Offset {
-                    child,
-                    parent,
-                    along,
-                    drive,
-                } => {
-                    let (dc, dp, b) = (c.rotation * child, p.rotation * parent, p.rotation * along);
-                    let f = drive.map_or(Jet::default(), |d| self.driven.coordinates[d]);
-                    let d = (c.position + dc) - (p.position + dp);
-                    let d1 = c.point_velocity(&dc) - p.point_velocity(&dp);
-                    let d2 = c.point_acceleration(&dc) - p.point_acceleration(&dp);
-                    let b1 = wp.cross(&b);
-                    let b2 = p.angular_acceleration.cross(&b) + wp.cross(&b1);
-                    let phi = b.dot(&d) - f.value;
-                    let rate = b1.dot(&d) + b.dot(&d1) - f.rate;
-                    let acceleration = b2.dot(&d) + 2.0 * b1.dot(&d1) + b.dot(&d2) - f.acceleration;
-                    self.rows[at] =
-                        JacobianRow::new([b, dc.cross(&b)], [-b, b.cross(&dp) + b.cross(&d)]);
-                    self.residual[at] = stabilised(phi, rate, acceleration);
-                    self.drift = self.drift.max(phi.abs());
-                }
-                Rows::Angle {
-                    child,
-                    zero: reference,
-                    axis,
-                    drive,
-                } => {
-                    let (a, b, x) = (
-                        c.rotation * child,
-                        p.rotation * reference,
-                        p.rotation * axis,
-                    );
-                    let f = self.driven.coordinates[drive];
-                    let angle = libm::atan2(b.cross(&a).dot(&x), b.dot(&a));
-                    // A driven crank turns many times: compare modulo a turn.
-                    let turns = libm::round((f.value - angle) / std::f64::consts::TAU);
-                    let phi = angle + turns * std::f64::consts::TAU - f.value;
-                    let relative = wc - wp;
-                    let acceleration = (c.angular_acceleration - p.angular_acceleration).dot(&x)
-                        + relative.dot(&wp.cross(&x))
-                        - f.acceleration;
-                    self.rows[at] = JacobianRow::new([zero, x], [zero, -x]);
-                    self.residual[at] = stabilised(phi, relative.dot(&x) - f.rate, acceleration);
-                    self.drift = self.drift.max(phi.abs());
-                }
-            }
+            let found = |i: usize, row, [phi, rate, acceleration]: [f64; 3]| {
+                self.rows[group.first + i] = row;
+                self.residual[group.first + i] = stabilised(phi, rate, acceleration);
+                self.drift = self.drift.max(phi.abs());
+            };
+            group.rows.linearise(c, p, &self.driven.coordinates, found);
         }
     }
 }
 
 impl Equations for Lagrange {
     fn positions(&self, model: &Model) -> usize {
-        7 * model.bodies.len()
+        7 * model.massive
     }
 
     fn velocities(&self, model: &Model) -> usize {
-        6 * model.bodies.len()
+        6 * model.massive
     }
 
     fn scale<'a>(&'a self, _: &'a Model) -> &'a [f64] {
@@ -398,14 +244,15 @@ impl Equations for Lagrange {
     }
 
     fn treat_as_dependent(&mut self, rank: usize) {
-        let balls = self.ideal_row.first().copied().unwrap_or(self.rows.len());
+        let mut cut = self.ideal_row.iter().chain(&self.closure_row);
+        let cut = cut.next().copied().unwrap_or(self.rows.len());
         let group = |&g: &usize| self.groups[g].first;
         let group = self.group_of.iter().map(group).collect();
-        self.matrix.treat_as_dependent(balls + rank, balls, group);
+        self.matrix.treat_as_dependent(cut + rank, cut, group);
     }
 
     fn state_of(&self, model: &Model, _: Vec<f64>, motion: &[Kinematics]) -> Vec<f64> {
-        let bodies = model.bodies.len();
+        let bodies = model.massive;
         let mut y = Vec::with_capacity(13 * bodies);
         for m in &motion[..bodies] {
             let q = kinematics::quaternion_of(&m.rotation);
@@ -430,17 +277,20 @@ impl Equations for Lagrange {
     fn coordinate(&self, model: &Model, _: &[f64], b: BodyIndex) -> Option<[f64; 2]> {
         match model.bodies[b].motion {
             Motion::Driven { drive, .. } => Some(self.driven.coordinate(drive)),
-            Motion::Revolute { .. } | Motion::Prismatic { .. } => Some([
-                position_of(model, &self.motion, b),
-                rate_of(model, &self.motion, b),
-            ]),
+            Motion::Revolute { .. } | Motion::Prismatic { .. } => match model.linked_at(b) {
+                Some((pair, part)) => pair.coordinates(&self.motion).nth(part),
+                None => Some([
+                    position_of(model, &self.motion, b),
+                    rate_of(model, &self.motion, b),
+                ]),
+            },
             Motion::Fixed | Motion::Free { .. } => None,
         }
     }
 
     fn update_kinematics(&mut self, model: &Model, t: f64, y: &[f64]) {
         self.driven.update(model, t, &mut self.motion);
-        let n = model.bodies.len();
+        let n = model.massive;
         let (qs, vs) = y.split_at(7 * n);
         for b in 0..n {
             self.motion[b].move_freely(part(qs, 7 * b), part(vs, 6 * b));
@@ -452,7 +302,7 @@ impl Equations for Lagrange {
     }
 
     fn update_along(&mut self, model: &Model, _: f64, y: &[f64], path: &Path) {
-        let (qs, vs) = y.split_at(7 * model.bodies.len());
+        let (qs, vs) = y.split_at(7 * model.massive);
         for &b in &path.dynamic {
             self.motion[b].move_freely(part(qs, 7 * b), part(vs, 6 * b));
         }
@@ -463,7 +313,7 @@ impl Equations for Lagrange {
     }
 
     fn accelerate(&mut self, model: &Model, gravity: &Vec3, _: f64, _: &[f64], dv: &mut [f64]) {
-        for (b, body) in model.bodies.iter().enumerate() {
+        for (b, body) in model.bodies[..model.massive].iter().enumerate() {
             let m = &mut self.motion[b];
             let load = &self.wrench[b];
             let w_body = m.rotation.tr_mul(&m.angular_velocity);
@@ -474,14 +324,15 @@ impl Equations for Lagrange {
             self.inverse_inertia[b] = m.rotation * body.inertia_inverse * m.rotation.transpose();
         }
         self.linearise();
-        for (row, &group) in self.rows.iter_mut().zip(&self.group_of) {
+        let rows = self.rows.iter().zip(&mut self.turned);
+        for ((row, [of_child, of_parent]), &group) in rows.zip(&self.group_of) {
             let group = &self.groups[group];
             for (b, turned, j) in [
-                (group.child, 0, row.child[1]),
-                (group.parent, 1, row.parent[1]),
+                (group.child, of_child, row.child[1]),
+                (group.parent, of_parent, row.parent[1]),
             ] {
                 if b < model.bodies.len() {
-                    row.turned[turned] = self.inverse_inertia[b] * j;
+                    *turned = self.inverse_inertia[b] * j;
                 }
             }
         }
@@ -504,7 +355,7 @@ impl Equations for Lagrange {
                 }
             }
         }
-        for (b, m) in self.motion[..model.bodies.len()].iter().enumerate() {
+        for (b, m) in self.motion[..model.massive].iter().enumerate() {
             dv[6 * b..6 * b + 3].copy_from_slice(m.acceleration.as_slice());
             dv[6 * b + 3..6 * b + 6].copy_from_slice(m.angular_acceleration.as_slice());
         }
@@ -514,7 +365,7 @@ impl Equations for Lagrange {
     fn complete_motion(&mut self, _: &Model, _: &[f64], _: &[f64]) {}
 
     fn position_rate(&self, model: &Model, y: &[f64], dq: &mut [f64]) {
-        let n = model.bodies.len();
+        let n = model.massive;
         let (qs, vs) = y.split_at(7 * n);
         for b in 0..n {
             let rate = kinematics::free_rate(part(qs, 7 * b), part(vs, 6 * b));
@@ -523,7 +374,7 @@ impl Equations for Lagrange {
     }
 
     fn velocities_of(&self, model: &Model, y: &[f64], rate: &[f64], out: &mut [f64]) {
-        for b in 0..model.bodies.len() {
+        for b in 0..model.massive {
             out[6 * b..6 * b + 3].copy_from_slice(&rate[7 * b..7 * b + 3]);
             let turn = 7 * b + 3..7 * b + 7;
             let spin = kinematics::spin_of(&y[turn.clone()], &rate[turn]);
@@ -532,7 +383,7 @@ impl Equations for Lagrange {
     }
 
     fn project(&mut self, model: &Model, _: f64, y: &mut [f64]) -> f64 {
-        for b in 0..model.bodies.len() {
+        for b in 0..model.massive {
             kinematics::normalise_quaternion(&mut y[7 * b + 3..7 * b + 7]);
         }
         0.0
@@ -556,7 +407,7 @@ impl Equations for Lagrange {
     }
 
     fn apply_inverse_mass(&mut self, model: &Model, x: &mut [f64]) {
-        for (b, body) in model.bodies.iter().enumerate() {
+        for (b, body) in model.bodies[..model.massive].iter().enumerate() {
             let torque = Vec3::new(x[6 * b + 3], x[6 * b + 4], x[6 * b + 5]);
             let alpha = self.inverse_inertia[b] * torque;
             for i in 0..3 {
@@ -640,6 +491,13 @@ impl Equations for Lagrange {
 
     fn is_reaction_unique(&self, k: usize) -> bool {
         self.matrix.is_unique(self.ideal_row[k], 3)
+    }
+
+    fn is_closure_unique(&self, model: &Model, c: usize) -> bool {
+        let first = self.closure_row[c];
+        let rows = model.closures[c].rows();
+        let count = rows.iter().flatten().map(Rows::count).sum();
+        self.matrix.is_unique(first, count)
     }
 
     fn actuators(&mut self, _: &Model, _: &Vec3, out: &mut [f64]) {
@@ -732,7 +590,7 @@ fn stabilised(phi: f64, rate: f64, acceleration: f64) -> f64 {
 
 /// Scales of the body coordinates: those of a free body in the tree, from the model's length scale.
 fn body_scales(model: &Model) -> Vec<f64> {
-    let n = model.bodies.len();
+    let n = model.massive;
     let (length, speed) = (model.length_scale, model.length_scale / 0.1);
     let mut scale = Vec::with_capacity(13 * n);
     for _ in 0..n {

@@ -1,7 +1,8 @@
 //! Equations of motion of a scene.
 //!
-//! Ball joints are always the cut joints: without them every scene is a forest of trees. Each ball joint then adds either
-//! three constraint rows (ideal) or one contact force (clearance). A scene pays only for what it contains.
+//! Ball joints are always cut joints: without them and the joints that say so, every scene is a forest of trees. Each ball joint
+//! then adds either three constraint rows (ideal) or one contact force (clearance), any other cut joint up to six rows. A scene
+//! pays only for what it contains.
 
 mod band;
 mod bounds;
@@ -21,6 +22,7 @@ mod kinematics;
 mod lagrange;
 mod lu;
 mod model;
+mod pairs;
 mod path;
 mod power;
 mod rows;
@@ -40,6 +42,7 @@ pub use drives::period_of;
 pub use elements::{Counts, ElementReport, Gap, Powers, Pull, Touch, Touching};
 pub use flight::{Flight, Flyer};
 pub use kinematics::{Kinematics, Wrench};
+pub use pairs::Opening;
 pub use spcmm::Unreachable;
 pub use start::{Assembly, Placement};
 pub use summary::Summary;
@@ -64,43 +67,32 @@ pub enum MechanismError {
     /// A rod cannot reach its slider somewhere along the trajectory.
     #[error("{0}")]
     Unreachable(#[from] Unreachable),
-    /// An ideal ball joint left open by the scene's values, which are to be used as given.
+    /// A joint that closes a loop, left open by the scene's values, which are to be used as given.
     #[error(
-        "ball joint {joint}: ball and socket centres are {} apart as given, and an ideal joint may be open by at most {}: \
-         correct the start values, or let start = \"ideal\" close it",
-        length(*.given), length(OPEN_AS_GIVEN)
+        "{given} as given, and {} may be open by at most {}: correct the start values, or let start = \"ideal\" close it",
+        .given.kind(), .given.most()
     )]
     Open {
-        /// Name of the joint.
-        joint: String,
-        /// |Z_j - Z_i| as the scene gives it, m.
-        given: f64,
+        /// How far it is open.
+        given: OpenJoint,
     },
     /// Loops that cannot be closed near the initial guess.
-    #[error(
-        "ball joint {joint}: ball and socket centres are {} apart as given and cannot be closed{}",
-        length(*.given), unclosed(.stays)
-    )]
+    #[error("{given} as given and cannot be closed{}", unclosed(.stays))]
     NoClosure {
-        /// Name of the joint with the widest gap as given.
-        joint: String,
-        /// |Z_j - Z_i| as the scene gives it, m.
-        given: f64,
-        /// Joints still open where assembly converged: names and Z_j - Z_i, m, world axes. No admissible motion of the
-        /// mechanism makes these gaps smaller. Empty if assembly did not converge.
-        stays: Vec<(String, Vec3)>,
+        /// The widest gap as given.
+        given: OpenJoint,
+        /// Joints still open where assembly converged. No admissible motion of the mechanism makes these gaps smaller. Empty if
+        /// assembly did not converge.
+        stays: Vec<OpenJoint>,
     },
     /// Loops that close, but that the drives open again at once.
     #[error(
-        "ball joint {joint}: the drives ask for speeds at which it opens at {} along {}; no motion that the mechanism has \
-         follows both",
-        speed(.rate.norm()), axes(.rate)
+        "{}: the drives ask for speeds at which it {}; no motion that the mechanism has follows both",
+        .rate.title(), .rate.opens()
     )]
     InconsistentDrives {
-        /// Name of the joint.
-        joint: String,
-        /// d(Z_j - Z_i)/dt, m/s, world axes.
-        rate: Vec3,
+        /// The joint, with m/s and rad/s.
+        rate: OpenJoint,
     },
     /// A ball that starts deeper in its socket wall than is plausible for a contact.
     #[error(
@@ -164,15 +156,95 @@ pub enum MechanismError {
     },
 }
 
-/// Largest gap of an ideal joint where start values are used as given, m.
+/// Largest gap of a joint that closes a loop where start values are used as given, m, and by how much its bodies may then be turned
+/// against what it holds, rad.
 const OPEN_AS_GIVEN: f64 = 1e-5;
+const TURNED_AS_GIVEN: f64 = 1e-4;
+
+/// How far a joint that closes a loop is open.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OpenJoint {
+    /// Its name.
+    pub joint: String,
+    /// Whether it is a ball joint: e = Z_j - Z_i then is all.
+    pub ball: bool,
+    /// In the world's axes, m and rad.
+    pub opening: Opening,
+}
+
+impl OpenJoint {
+    /// The joint, at the beginning of a sentence.
+    fn title(&self) -> String {
+        let kind = if self.ball { "ball joint" } else { "joint" };
+        format!("{kind} {}", self.joint)
+    }
+
+    /// What may be open by [`Self::most`].
+    fn kind(&self) -> &'static str {
+        if self.ball {
+            "an ideal joint"
+        } else {
+            "a joint that closes a loop"
+        }
+    }
+
+    fn most(&self) -> String {
+        let apart = length(OPEN_AS_GIVEN);
+        if self.ball {
+            return apart;
+        }
+        format!("{apart} and {}", angle(TURNED_AS_GIVEN))
+    }
+
+    /// `B by 5 mm along y and by 3 deg`.
+    fn stays(&self) -> String {
+        let Opening { apart, turned } = &self.opening;
+        let apart = (apart.norm() > start::CLOSED)
+            .then(|| format!(" by {} along {}", length(apart.norm()), axes(apart)));
+        let turned = (*turned > start::CLOSED).then(|| format!(" by {}", angle(*turned)));
+        let parts: Vec<String> = apart.into_iter().chain(turned).collect();
+        format!("{}{}", self.joint, parts.join(" and"))
+    }
+
+    /// `opens at 1 m/s along y`.
+    fn opens(&self) -> String {
+        let Opening { apart, turned } = &self.opening;
+        if apart.norm() > start::HELD {
+            let speed = format_quantity_digits(apart.norm(), "m/s", 4);
+            return format!("opens at {speed} along {}", axes(apart));
+        }
+        format!(
+            "is turned open at {}",
+            format_quantity_digits(*turned, "rad/s", 4)
+        )
+    }
+}
+
+impl std::fmt::Display for OpenJoint {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let apart = length(self.opening.apart.norm());
+        if self.ball {
+            return write!(
+                f,
+                "{}: ball and socket centres are {apart} apart",
+                self.title()
+            );
+        }
+        let turned = angle(self.opening.turned);
+        write!(
+            f,
+            "{}: its bodies are {apart} apart there and turned against it by {turned}",
+            self.title()
+        )
+    }
+}
 
 fn length(si: f64) -> String {
     format_quantity_digits(si, if si < 1.0 { "mm" } else { "m" }, 4)
 }
 
-fn speed(si: f64) -> String {
-    format_quantity_digits(si, "m/s", 4)
+fn angle(si: f64) -> String {
+    format_quantity_digits(si, "deg", 4)
 }
 
 /// World axes along which a vector has a significant component: `x and z`.
@@ -186,14 +258,11 @@ fn axes(vector: &Vec3) -> String {
         .join(" and ")
 }
 
-fn unclosed(stays: &[(String, Vec3)]) -> String {
+fn unclosed(stays: &[OpenJoint]) -> String {
     if stays.is_empty() {
         return ": the parts do not reach, or the guess is too far off".to_owned();
     }
-    let each = |(joint, gap): &(String, Vec3)| {
-        format!("{joint} by {} along {}", length(gap.norm()), axes(gap))
-    };
-    let each: Vec<String> = stays.iter().map(each).collect();
+    let each: Vec<String> = stays.iter().map(OpenJoint::stays).collect();
     format!(
         ": remaining gaps: {} (no joint can move that way)",
         each.join(", ")
@@ -210,7 +279,7 @@ pub struct Structure {
 /// The equations of motion of one scene in one formulation.
 pub struct Mechanism {
     model: Arc<Model>,
-    /// Rank of the ideal joints' constraint rows, if some are dependent.
+    /// Rank of the constraint rows of joints that close loops, if some are dependent.
     rank: Option<usize>,
     equations: Box<dyn Equations>,
     /// Ball joints with clearance.
@@ -223,6 +292,7 @@ pub struct Mechanism {
     pull: Option<Pull>,
     /// World gravity, m/s^2.
     pub gravity: Vec3,
+    /// Of the joints at which trees are cut: ball joints, then joints that close loops.
     joint_names: Vec<String>,
     /// Linearisation; allocated if an implicit method is chosen.
     stiff: Option<Box<stiff::Stiff>>,
@@ -279,7 +349,7 @@ impl Mechanism {
             equations,
             contacts,
             gravity: scene.gravity,
-            joint_names: scene.ball_joints.iter().map(|j| j.name.clone()).collect(),
+            joint_names: scene.cut_joints().map(str::to_owned).collect(),
             stiff: None,
             friction: None,
             implicit: None,
@@ -389,7 +459,7 @@ impl Mechanism {
         self.paths[j].as_ref().map(|path| &path.parts[..])
     }
 
-    /// Gap of ball joint `j` at (t, y), and the motion of the bodies that decide it.
+    /// OpenJoint of ball joint `j` at (t, y), and the motion of the bodies that decide it.
     pub fn measure_one(&mut self, j: usize, t: f64, y: &[f64]) {
         self.evaluated = None;
         match &self.paths[j] {
@@ -446,11 +516,24 @@ impl Mechanism {
         Some(self.equations.reaction(k))
     }
 
-    /// Whether the reaction of joint `j` is unique at the latest evaluation. Where ideal joints constrain a direction
-    /// redundantly, [`Self::reaction`] is the one with the least sum of squares over all ideal joints.
+    /// Whether the reaction of joint `j` is unique at the latest evaluation: a ball joint, or after them a joint that closes a
+    /// loop. Where such joints constrain a direction redundantly, [`Self::reaction`] is the one with the least sum of squares over
+    /// all of them, in N and N m.
     pub fn is_reaction_unique(&self, j: usize) -> bool {
-        let ideal = self.model.joints[j].ideal;
-        ideal.is_none_or(|k| self.equations.is_reaction_unique(k))
+        match self.model.joints.get(j) {
+            Some(joint) => joint
+                .ideal
+                .is_none_or(|k| self.equations.is_reaction_unique(k)),
+            None => {
+                let c = j - self.model.joints.len();
+                self.equations.is_closure_unique(&self.model, c)
+            }
+        }
+    }
+
+    /// Number of joints at which trees are cut: ball joints, then joints that close loops.
+    pub fn cut_joints(&self) -> usize {
+        self.model.joints.len() + self.model.closures.len()
     }
 
     /// Whether any ball joint is ideal, so that [`Self::reaction`] changes with every evaluation.
@@ -483,10 +566,13 @@ impl Mechanism {
         self.equations.actuators(&self.model, &self.gravity, out);
     }
 
-    /// Coordinate and rate of every sliding or turning joint, in the order of the scene, after an evaluation at `y`.
+    /// Coordinates of all joints that slide or turn, with their rates, after an evaluation at `y`: those that bodies hang on, in
+    /// the order of the scene, then those that close loops.
     pub fn coordinates(&self, y: &[f64]) -> impl Iterator<Item = [f64; 2]> {
-        let all = 0..self.model.bodies.len();
-        all.filter_map(move |b| self.equations.coordinate(&self.model, y, b))
+        let all = self.model.order.iter();
+        let hung = all.filter_map(move |&b| self.equations.coordinate(&self.model, y, b));
+        let closures = self.model.closures.iter();
+        hung.chain(closures.flat_map(|pair| pair.coordinates(self.equations.motion())))
     }
 
     /// Kinetic energy and gravitational potential (zero at the world origin) at the latest evaluation, J.

@@ -7,12 +7,15 @@ use super::drives::{Course, Law, course_of};
 use super::factor::{NONE, Pattern};
 use super::spcmm::Trajectory;
 use crate::jet::Jet;
-use crate::scene::{Attachment, JointKind, JointStart, Mat3, Quat, Scene, StartRule, Vec3};
+use crate::scene::{Attachment, Joint, JointKind, JointStart, Mat3, Quat, Scene, StartRule, Vec3};
 
-/// Index of a body; one past the last stands for the world.
+/// Index of a body: those of the scene, then massless links; one past the last stands for the world.
 pub type BodyIndex = usize;
 
 /// A body in its centroid frame: axes of the scene's body frame, origin at the centroid.
+///
+/// A joint of two degrees is two of one degree in series: between them hangs a massless link, whose frame lies at the joint
+/// point with the parent's axes where its coordinate is 0.
 #[derive(Clone, Debug)]
 pub struct Body {
     pub mass: f64,
@@ -98,6 +101,42 @@ pub struct BallJoint {
     pub ideal: Option<usize>,
 }
 
+/// A joint between two bodies, whether the child hangs on it or it closes a loop.
+#[derive(Clone, Copy, Debug)]
+pub struct Pair {
+    pub kind: JointKind,
+    /// Its points.
+    pub child: Anchor,
+    pub parent: Anchor,
+    /// Its axis and two directions across, parent axes; the same in the child's axes where the coordinates are 0.
+    pub axes: [Vec3; 3],
+    pub seen: [Vec3; 3],
+    /// Second axis of a universal joint, child axes.
+    pub second: Vec3,
+}
+
+impl Pair {
+    /// Of `joint` between these points.
+    pub fn new(joint: &Joint, child: Anchor, parent: Anchor) -> Self {
+        let x = joint.axis;
+        let across = if x.x.abs() < 0.7 {
+            Vec3::x()
+        } else {
+            Vec3::y()
+        };
+        let y = x.cross(&across).normalize();
+        let axes = [x, y, x.cross(&y)];
+        Self {
+            kind: joint.kind,
+            child,
+            parent,
+            axes,
+            seen: axes.map(|axis| joint.rotation.inverse() * axis),
+            second: joint.child_axis,
+        }
+    }
+}
+
 /// A driven coordinate.
 #[derive(Clone, Debug)]
 pub struct DriveLaw {
@@ -109,6 +148,15 @@ pub struct DriveLaw {
 #[derive(Clone, Debug)]
 pub struct Model {
     pub bodies: Vec<Body>,
+    /// How many of them are the scene's; the rest are massless links.
+    pub massive: usize,
+    /// All bodies, parents before children; and the place of each there.
+    pub order: Vec<BodyIndex>,
+    pub place: Vec<usize>,
+    /// The joints of two degrees, by their links.
+    pub linked: Vec<Pair>,
+    /// Joints that close loops.
+    pub closures: Vec<Pair>,
     /// Position coordinates.
     pub nq: usize,
     /// Velocity coordinates.
@@ -139,9 +187,14 @@ pub struct Model {
 impl Model {
     /// Compiles `scene`.
     pub fn new(scene: &Scene) -> Self {
-        let world = scene.bodies.len();
+        let massive = scene.bodies.len();
+        let of_two = |joint: &&Joint| joint.kind.freedoms().len() == 2;
+        let world = massive + scene.joints.iter().filter(of_two).count();
         let mut drives = Vec::new();
         let mut bodies: Vec<Body> = Vec::new();
+        let mut links: Vec<Body> = Vec::new();
+        let mut linked = Vec::new();
+        let mut order = Vec::with_capacity(world);
         let mut root = vec![usize::MAX; world];
         for (index, (body, joint)) in scene.bodies.iter().zip(&scene.joints).enumerate() {
             let parent = joint.parent.unwrap_or(world);
@@ -162,7 +215,9 @@ impl Model {
                 }
                 // Numbered below, tree by tree.
                 (JointKind::Prismatic, None) => Motion::Prismatic { q: 0, v: 0 },
-                (JointKind::Revolute, None) => Motion::Revolute { q: 0, v: 0 },
+                (JointKind::Revolute | JointKind::Cylindrical | JointKind::Universal, _) => {
+                    Motion::Revolute { q: 0, v: 0 }
+                }
                 (JointKind::Free, _) => Motion::Free { q: 0, v: 0 },
             };
             let moves_freely = matches!(
@@ -181,29 +236,53 @@ impl Model {
             } else {
                 usize::MAX
             };
-            // Rot(axis, q) R0 = (a a^T + cos q (1 - a a^T) + sin q [a]x) R0.
+            if parent != world && root[index] != usize::MAX {
+                bodies[parent].carries = true;
+            }
             let rest = joint.rotation.to_rotation_matrix().into_inner();
-            let revolute = joint.kind == JointKind::Revolute;
-            let along = joint.axis * joint.axis.transpose();
-            let (fixed, cosine, sine) = if revolute {
-                (
-                    along * rest,
-                    (Mat3::identity() - along) * rest,
-                    joint.axis.cross_matrix() * rest,
-                )
-            } else {
-                (rest, Mat3::zeros(), Mat3::zeros())
+            let from_parent = joint.parent_point - parent_centre;
+            let to_centroid = body.centre - joint.child_point;
+            let (mut hangs_on, mut from, mut axis) = (parent, from_parent, joint.axis);
+            if joint.kind.freedoms().len() == 2 {
+                let link = massive + links.len();
+                root[link] = if parent_root == usize::MAX {
+                    link
+                } else {
+                    parent_root
+                };
+                root[index] = root[link];
+                let child = Anchor {
+                    body: index,
+                    offset: -to_centroid,
+                };
+                let of_parent = Anchor {
+                    body: parent,
+                    offset: from_parent,
+                };
+                linked.push(Pair::new(joint, child, of_parent));
+                links.push(link_of(joint, parent, from_parent));
+                order.push(link);
+                (hangs_on, from) = (link, Vec3::zeros());
+                if joint.kind == JointKind::Universal {
+                    axis = joint.rotation * joint.child_axis;
+                }
+            }
+            order.push(index);
+            let turns = match motion {
+                Motion::Driven { revolute, .. } => revolute,
+                _ => matches!(motion, Motion::Revolute { .. }),
             };
+            let [fixed, cosine, sine] = turning(&axis, rest, turns);
             let inertia = body.inertia;
             bodies.push(Body {
                 mass: body.mass,
                 inertia,
                 inertia_inverse: inertia.try_inverse().unwrap_or_else(Mat3::zeros),
-                parent,
+                parent: hangs_on,
                 motion,
-                from_parent: joint.parent_point - parent_centre,
-                to_centroid: body.centre - joint.child_point,
-                axis: joint.axis,
+                from_parent: from,
+                to_centroid,
+                axis,
                 fixed,
                 cosine,
                 sine,
@@ -212,9 +291,11 @@ impl Model {
                 carries: false,
                 diagonal: inertia == Mat3::from_diagonal(&inertia.diagonal()),
             });
-            if parent != world && root[index] != usize::MAX {
-                bodies[parent].carries = true;
-            }
+        }
+        bodies.append(&mut links);
+        let mut place = vec![0; world];
+        for (at, &body) in order.iter().enumerate() {
+            place[body] = at;
         }
 
         let swings = drives.iter().map(|driven| driven.course.swing(scene));
@@ -223,6 +304,11 @@ impl Model {
         let bounding = laws.filter(|law| law.bounds_steps()).cloned().collect();
         let mut model = Self {
             bodies,
+            massive,
+            order,
+            place,
+            linked,
+            closures: Vec::new(),
             nq: 0,
             nv: 0,
             blocks: Vec::new(),
@@ -255,7 +341,31 @@ impl Model {
                 ideal,
             });
         }
+        for joint in &scene.closing_joints {
+            let [parent, child] = joint.points().map(|point| model.anchor(scene, &point));
+            model.closures.push(Pair::new(joint, child, parent));
+        }
         model
+    }
+
+    /// The joint of two degrees that body `b` belongs to as its link or its child, and which of its coordinates moves `b`.
+    pub fn linked_at(&self, b: BodyIndex) -> Option<(&Pair, usize)> {
+        let link = |b: BodyIndex| self.linked.get(b.checked_sub(self.massive)?);
+        let own = link(b).map(|pair| (pair, 0));
+        own.or_else(|| Some((link(self.bodies[b].parent)?, 1)))
+    }
+
+    /// Coordinate and rate at t = 0 of the joint of one degree above body `b`, as the scene gives them.
+    fn start_of(&self, scene: &Scene, b: BodyIndex) -> [f64; 2] {
+        let (joint, part) = match self.linked_at(b) {
+            Some((pair, part)) => (pair.child.body, part),
+            None => (b, 0),
+        };
+        match scene.joints[joint].start {
+            JointStart::Scalar { position, velocity } => [position, velocity],
+            JointStart::Pair { position, velocity } => [position[part], velocity[part]],
+            JointStart::Pose { .. } => [0.0, 0.0],
+        }
     }
 
     /// A point of `scene`.
@@ -276,7 +386,8 @@ impl Model {
         let mut scale_q: Vec<f64> = Vec::new();
         let mut scale_v: Vec<f64> = Vec::new();
         let mut trees: Vec<Vec<BodyIndex>> = Vec::new();
-        for (b, &root) in root.iter().enumerate() {
+        for &b in &self.order {
+            let root = root[b];
             if root == b {
                 self.block_of[b] = trees.len();
                 trees.push(vec![b]);
@@ -299,11 +410,8 @@ impl Model {
                 };
                 last[b] = above;
                 let (q, v) = (start_q.len(), start_v.len());
-                let mut one = |length: f64, speed: f64, start: JointStart| {
-                    let (position, velocity) = match start {
-                        JointStart::Scalar { position, velocity } => (position, velocity),
-                        JointStart::Pose { .. } => (0.0, 0.0),
-                    };
+                let [position, velocity] = self.start_of(scene, b);
+                let mut one = |length: f64, speed: f64| {
                     start_q.push(position);
                     start_v.push(velocity);
                     scale_q.push(length);
@@ -313,12 +421,12 @@ impl Model {
                 match &mut self.bodies[b].motion {
                     Motion::Prismatic { q: at_q, v: at_v } => {
                         (*at_q, *at_v) = (q, v);
-                        one(scales.length, scales.speed, scene.joints[b].start);
+                        one(scales.length, scales.speed);
                         last[b] = v - first;
                     }
                     Motion::Revolute { q: at_q, v: at_v } => {
                         (*at_q, *at_v) = (q, v);
-                        one(scales.angle, scales.angular_speed, scene.joints[b].start);
+                        one(scales.angle, scales.angular_speed);
                         last[b] = v - first;
                     }
                     Motion::Free { q: at_q, v: at_v } => {
@@ -360,6 +468,11 @@ impl Model {
         self.scale = scale_q;
     }
 
+    /// Whether any joint closes a loop.
+    pub fn closes_loops(&self) -> bool {
+        !self.ideal_joints.is_empty() || !self.closures.is_empty()
+    }
+
     /// The world's index among bodies.
     pub fn world(&self) -> BodyIndex {
         self.bodies.len()
@@ -382,6 +495,47 @@ impl Model {
     }
 }
 
+/// Relative rotation of a joint for coordinate q: Rot(axis, q) R0 = (a a^T + cos q (1 - a a^T) + sin q [a]x) R0 if it `turns`,
+/// else R0.
+fn turning(axis: &Vec3, rest: Mat3, turns: bool) -> [Mat3; 3] {
+    if !turns {
+        return [rest, Mat3::zeros(), Mat3::zeros()];
+    }
+    let along = axis * axis.transpose();
+    [
+        along * rest,
+        (Mat3::identity() - along) * rest,
+        axis.cross_matrix() * rest,
+    ]
+}
+
+/// The massless link of a joint of two degrees: on a slide of a cylindrical joint, on the first hinge of a universal one.
+fn link_of(joint: &Joint, parent: BodyIndex, from_parent: Vec3) -> Body {
+    let slides = joint.kind == JointKind::Cylindrical;
+    let [fixed, cosine, sine] = turning(&joint.axis, Mat3::identity(), !slides);
+    Body {
+        mass: 0.0,
+        inertia: Mat3::zeros(),
+        inertia_inverse: Mat3::zeros(),
+        parent,
+        motion: if slides {
+            Motion::Prismatic { q: 0, v: 0 }
+        } else {
+            Motion::Revolute { q: 0, v: 0 }
+        },
+        from_parent,
+        to_centroid: Vec3::zeros(),
+        axis: joint.axis,
+        fixed,
+        cosine,
+        sine,
+        origin: Vec3::zeros(),
+        driven_only: false,
+        carries: true,
+        diagonal: true,
+    }
+}
+
 /// The closed form that `scene` follows, if any.
 fn closed_form_of(scene: &Scene) -> Option<Arc<dyn ClosedForm>> {
     let spcmm = scene.spcmm.as_ref()?;
@@ -396,7 +550,7 @@ fn free_start(start: JointStart) -> (Vec3, Quat, Vec3, Vec3) {
             velocity,
             angular_velocity,
         } => (position, rotation, velocity, angular_velocity),
-        JointStart::Scalar { .. } => (
+        JointStart::Scalar { .. } | JointStart::Pair { .. } => (
             Vec3::zeros(),
             Quat::identity(),
             Vec3::zeros(),
@@ -414,12 +568,15 @@ struct Scales {
 }
 
 impl Scales {
-    /// Length: the smallest ball radius, at most 1 m. Speed: that length in a tenth of a second. Angles: 0.1 rad, 1 rad/s.
+    /// Length: the smallest ball radius, at most 1 m; a joint that closes a loop counts as a ball joint of the scene's radius.
+    /// Speed: that length in a tenth of a second. Angles: 0.1 rad, 1 rad/s.
     fn of(scene: &Scene) -> Self {
+        let closing = scene.closing_joints.iter();
         let length = scene
             .ball_joints
             .iter()
             .map(|j| j.contact.ball_radius)
+            .chain(closing.map(|_| scene.contact.ball_radius))
             .fold(f64::INFINITY, f64::min)
             .min(1.0);
         Self {

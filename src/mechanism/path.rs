@@ -32,7 +32,7 @@ impl Path {
                 b = model.bodies[b].parent;
             }
         }
-        bodies.sort_unstable();
+        bodies.sort_unstable_by_key(|&b| model.place[b]);
         bodies.dedup();
         let mut path = Self::default();
         for b in bodies {
@@ -61,7 +61,7 @@ impl Path {
         for b in [joint.ball.body, joint.socket.body] {
             if b != model.world() && !path.dynamic.contains(&b) {
                 path.dynamic.push(b);
-                path.add_parts(7 * b..7 * b + 7, 7 * model.bodies.len() + 6 * b, 6);
+                path.add_parts(7 * b..7 * b + 7, 7 * model.massive + 6 * b, 6);
             }
         }
         path

@@ -25,7 +25,8 @@ impl Sources {
         // Parents come before children.
         let mut moved = vec![false; n + 1];
         let mut free_rider = false;
-        for (b, body) in model.bodies.iter().enumerate() {
+        for &b in &model.order {
+            let body = &model.bodies[b];
             moved[b] = moved[body.parent] || matches!(body.motion, Motion::Driven { .. });
             free_rider |= moved[b] && !body.driven_only;
         }
@@ -108,10 +109,11 @@ pub(super) fn inverse_dynamics(
         load.force = (m.acceleration - gravity) * body.mass - load.force;
         load.torque = torque - load.torque;
     }
-    for (b, body) in model.bodies.iter().enumerate().rev() {
+    for &b in model.order.iter().rev() {
         if !moved(b) {
             continue;
         }
+        let body = &model.bodies[b];
         let m = &motion[b];
         let needed = wrench[b];
         if let Motion::Driven { drive, revolute } = body.motion {

@@ -2,6 +2,7 @@
 //! (a planar loop closed by a ball joint, two ball joints that make a hinge), Cholesky with pivoting up to the rank.
 
 use super::factor::Skyline;
+use std::ops::Range;
 
 /// Scaled pivots at or below this are rounding.
 const ROUNDING: f64 = 1e-12;
@@ -14,6 +15,9 @@ const NO_PART: f64 = 1e-7;
 /// The coupled constraint rows.
 pub struct RowSystem {
     skyline: Skyline,
+    /// Where rows begin that have a unit of their own: what an entry on their diagonal would be without the others, if that is
+    /// known; else 0. Rows that nothing moves do not tell it themselves.
+    reference: Vec<f64>,
     dependent: Option<Box<Dependent>>,
 }
 
@@ -21,9 +25,15 @@ impl RowSystem {
     /// For rows that couple with these `columns` before their own.
     pub fn new(columns: Vec<Vec<usize>>) -> Self {
         Self {
+            reference: vec![0.0; columns.len()],
             skyline: Skyline::new(columns),
             dependent: None,
         }
+    }
+
+    /// Says what an entry on the diagonal of the rows from `first` on would be, could their sides move freely in their unit.
+    pub fn refer(&mut self, first: usize, diagonal: f64) {
+        self.reference[first] = diagonal;
     }
 
     /// Treats the rows as dependent from now on, with a rank of at most `rank`. Among the possible solutions, the multipliers
@@ -94,17 +104,20 @@ impl RowSystem {
     pub fn factor(&mut self) -> f64 {
         match &mut self.dependent {
             None => self.skyline.factor(),
-            Some(rows) => rows.factor(&self.skyline),
+            Some(rows) => rows.factor(&self.skyline, &self.reference),
         }
     }
 
-    /// After a plain factorisation: the smallest ratio of a pivot to the largest diagonal entry of the `count` rows of its
-    /// joint. For a row that is zero up to rounding, the ratio to its own diagonal entry would be meaningless.
-    pub fn least_joint_pivot(&self, count: usize) -> f64 {
+    /// After a plain factorisation: the smallest ratio of a pivot to the largest diagonal entry of the rows of its joint, which
+    /// `joints` lists, or to what was referred to. For a row that is zero up to rounding, the ratio to its own diagonal entry
+    /// would be meaningless.
+    pub fn least_joint_pivot(&self, joints: impl Iterator<Item = Range<usize>>) -> f64 {
         let mut least = f64::INFINITY;
-        for first in (0..self.skyline.len()).step_by(count) {
-            let rows = || (first..first + count).map(|i| self.skyline.diagonal_and_pivot(i));
-            let largest = rows().map(|(diagonal, _)| diagonal).fold(0.0, f64::max);
+        for joint in joints {
+            let reference = self.reference[joint.start];
+            let rows = || joint.clone().map(|i| self.skyline.diagonal_and_pivot(i));
+            let largest = rows().map(|(diagonal, _)| diagonal);
+            let largest = largest.fold(reference, f64::max);
             for (_, pivot) in rows() {
                 let ratio = pivot / largest;
                 if !(ratio >= least) {
@@ -163,9 +176,9 @@ impl Dependent {
         }
     }
 
-    fn factor(&mut self, entries: &Skyline) -> f64 {
+    fn factor(&mut self, entries: &Skyline, reference: &[f64]) -> f64 {
         let n = self.n;
-        self.scale.fill(0.0);
+        self.scale.copy_from_slice(reference);
         for i in 0..n {
             let largest = &mut self.scale[self.group[i]];
             *largest = largest.max(entries.get(i, i));
@@ -323,6 +336,7 @@ impl Dependent {
 mod tests {
     use super::*;
     use nalgebra::{DMatrix, DVector};
+    use std::iter::once;
 
     /// Row i of B, the last two of which depend on the first three.
     fn rows() -> DMatrix<f64> {
@@ -350,7 +364,7 @@ mod tests {
         let a = &b * b.transpose();
         let right = &a * DVector::from_fn(5, |i, _| 1.0 + i as f64);
         let mut plain = system(&a);
-        assert!(plain.factor() < 1e-12 || plain.least_joint_pivot(5) < 1e-12);
+        assert!(plain.factor() < 1e-12 || plain.least_joint_pivot(once(0..5)) < 1e-12);
         for most in [3, 5] {
             let mut system = system(&a);
             system.treat_as_dependent(most, 0, vec![0; 5]);
@@ -383,7 +397,7 @@ mod tests {
         assert_eq!(
             {
                 system.factor();
-                system.least_joint_pivot(3)
+                system.least_joint_pivot(once(0..3))
             },
             0.0
         );

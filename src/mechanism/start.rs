@@ -4,16 +4,17 @@ use super::closed_form::ClosedForm;
 use super::constraints::Constraints;
 use super::kinematics::{self, Kinematics};
 use super::model::{self, Model, Motion};
+use super::pairs::Opening;
 use super::tree::Tree;
-use super::{Mechanism, MechanismError, OPEN_AS_GIVEN};
+use super::{Mechanism, MechanismError, OPEN_AS_GIVEN, OpenJoint, TURNED_AS_GIVEN};
 use crate::scene::{StartRule, Vec3};
 
 /// Smallest pivot ratio at which the start velocities still have three correct digits.
 const DEPENDENT_ROWS: f64 = 1e-13;
-/// Largest gap at which a loop counts as closed at the start, m.
-const CLOSED: f64 = 1e-9;
-/// With dependent rows, largest speed at which a joint may open at the start, m/s: rounding of the drives.
-const HELD: f64 = 1e-8;
+/// Largest gap at which a loop counts as closed at the start, m or rad.
+pub(super) const CLOSED: f64 = 1e-9;
+/// With dependent rows, largest speed at which a joint may open at the start, m/s or rad/s: rounding of the drives.
+pub(super) const HELD: f64 = 1e-8;
 /// Distance of the neighbouring poses at which the rank is checked, as a time at the scales' speeds, s: a tenth of the
 /// length scale, 0.01 rad.
 const BESIDE: f64 = 0.01;
@@ -25,8 +26,11 @@ const AT_REST: f64 = 1e-9;
 pub struct Assembly {
     /// How far each body was moved from the guess.
     pub bodies: Vec<Placement>,
-    /// Of the joints that start closed, the one with the widest gap in the guess, and |Z_j - Z_i| there, m.
+    /// Of the joints that start closed, the one with the widest gap in the guess, and that gap (|Z_j - Z_i| of a ball joint), m.
+    /// Joints that close loops count after the ball joints.
     pub widest: Option<(usize, f64)>,
+    /// Of the joints that close loops, the one whose bodies are turned most against what it holds in the guess, rad.
+    pub most_turned: Option<(usize, f64)>,
     /// Whether the loops closed in another assembly mode than that of the guess, with a singular pose between the two. Known
     /// only if closed joints and drives leave no degree of freedom.
     pub other_mode: bool,
@@ -62,11 +66,12 @@ impl Mechanism {
         } else {
             model.ideal_joints.clone()
         };
+        let closes = !all.is_empty() || !model.closures.is_empty();
         // Poses alone need no mass matrix.
-        let mut tree = if all.is_empty() {
-            Tree::without_masses(model)
-        } else {
+        let mut tree = if closes {
             Tree::new(model)
+        } else {
+            Tree::without_masses(model)
         };
         let settled = self.settled.as_ref().map(|settled| &settled.state);
         let mut y = settled.unwrap_or(&model.start_state).clone();
@@ -86,10 +91,8 @@ impl Mechanism {
             if all.contains(&j) {
                 // An assembled start only needs a rough guess, which Newton's method then closes.
                 if d > OPEN_AS_GIVEN && !assembled {
-                    return Err(MechanismError::Open {
-                        joint: joint(),
-                        given: d,
-                    });
+                    let given = self.gap_of(j, model.joints[j].eccentricity(&guess));
+                    return Err(MechanismError::Open { given });
                 }
             } else if d > clearance + 0.01 * self.contacts.coefficients(j).ball_radius {
                 return Err(MechanismError::OutsideSocket {
@@ -99,13 +102,26 @@ impl Mechanism {
                 });
             }
         }
+        let balls = model.joints.len();
+        let openings = model.closures.iter().map(|pair| pair.opening(&guess));
+        let openings: Vec<(usize, Opening)> = (balls..).zip(openings).collect();
+        for &(joint, opening) in &openings {
+            let Opening { apart, turned } = opening;
+            if !assembled && !(apart.norm() <= OPEN_AS_GIVEN && turned <= TURNED_AS_GIVEN) {
+                let given = self.gap(joint, opening);
+                return Err(MechanismError::Open { given });
+            }
+        }
         let widest = all.iter().map(|&j| (j, distance(j)));
+        let widest = widest.chain(openings.iter().map(|(j, o)| (*j, o.apart.norm())));
+        let turned = openings.iter().map(|(j, o)| (*j, o.turned));
         let mut assembly = Assembly {
             widest: widest.max_by(|a, b| a.1.total_cmp(&b.1)),
+            most_turned: turned.max_by(|a, b| a.1.total_cmp(&b.1)),
             closed_form: closed_form.is_some(),
             ..Assembly::default()
         };
-        if !all.is_empty() {
+        if closes {
             let mut constraints = Constraints::new(model, &all);
             let guessed = y.clone();
             self.assemble(&mut constraints, &mut tree, &mut y)?;
@@ -113,9 +129,10 @@ impl Mechanism {
         }
         Tree::normalise(model, &mut y);
         tree.update_kinematics(model, T, &y);
-        let bodies = model.bodies.iter().zip(guess.iter().zip(&tree.motion));
+        let bodies = model.bodies[..model.massive].iter();
+        let bodies = bodies.zip(guess.iter().zip(&tree.motion));
         assembly.bodies = bodies.map(|(body, (a, b))| placement(body, a, b)).collect();
-        let rank = self.rank_of_ideal_joints(&mut tree, &y)?;
+        let rank = self.rank_of_closed_joints(&mut tree, &y)?;
         if rank.is_some() {
             self.check_speeds(&mut tree, &y)?;
         }
@@ -142,8 +159,8 @@ impl Mechanism {
         let guess = y.clone();
         let error = constraints.project(model, tree, T, y);
         tree.update_kinematics(model, T, y);
-        if error <= CLOSED && constraints.system().least_joint_pivot(3) >= DEPENDENT_ROWS {
-            return Ok(());
+        if error <= CLOSED && constraints.least_joint_pivot() >= DEPENDENT_ROWS {
+            return self.check_sides(constraints, tree, &guess, y);
         }
         // Rows are dependent here or were on the way here: try again with the independent ones.
         constraints.treat_as_dependent(constraints.rows());
@@ -157,7 +174,47 @@ impl Mechanism {
         if model.closed_form.is_some() && rank_around(model, constraints, tree, y).is_none() {
             return Err(MechanismError::Singular);
         }
-        Ok(())
+        self.check_sides(constraints, tree, &guess, y)
+    }
+
+    /// Checks that no joint closed the wrong way round: its rows do not tell an axis from its opposite.
+    fn check_sides(
+        &self,
+        constraints: &mut Constraints,
+        tree: &mut Tree,
+        guess: &[f64],
+        y: &[f64],
+    ) -> Result<(), MechanismError> {
+        tree.update_kinematics(&self.model, 0.0, y);
+        let mut closures = self.model.closures.iter();
+        if closures.all(|pair| pair.opening(&tree.motion).turned <= 1.0) {
+            return Ok(());
+        }
+        Err(self.no_closure(constraints, tree, guess, y))
+    }
+
+    /// A joint at which trees are cut: ball joints, then joints that close loops.
+    fn gap(&self, joint: usize, opening: Opening) -> OpenJoint {
+        OpenJoint {
+            joint: self.joint_names[joint].clone(),
+            ball: joint < self.model.joints.len(),
+            opening,
+        }
+    }
+
+    /// Ball joint `joint` with e = Z_j - Z_i, or its rate.
+    fn gap_of(&self, joint: usize, apart: Vec3) -> OpenJoint {
+        self.gap(joint, Opening { apart, turned: 0.0 })
+    }
+
+    /// Gaps of the joints that `constraints` closes.
+    fn gaps(&self, constraints: &Constraints, motion: &[Kinematics]) -> Vec<OpenJoint> {
+        let model = &self.model;
+        let balls = constraints.joints().iter();
+        let balls = balls.map(|&j| self.gap_of(j, model.joints[j].eccentricity(motion)));
+        let others = (model.joints.len()..).zip(&model.closures);
+        let others = others.map(|(j, pair)| self.gap(j, pair.opening(motion)));
+        balls.chain(others).collect()
     }
 
     /// Checks that no ideal joint opens at the velocities in `y`: where directions are constrained more than once, for
@@ -167,8 +224,15 @@ impl Mechanism {
         for &j in &self.model.ideal_joints {
             let rate = self.model.joints[j].opening_rate(&tree.motion);
             if !(rate.norm() <= HELD) {
-                let joint = self.joint_names[j].clone();
-                return Err(MechanismError::InconsistentDrives { joint, rate });
+                let rate = self.gap_of(j, rate);
+                return Err(MechanismError::InconsistentDrives { rate });
+            }
+        }
+        for (j, pair) in (self.model.joints.len()..).zip(&self.model.closures) {
+            let rate = pair.opening_rate(&tree.motion);
+            if !(rate.apart.norm() <= HELD && rate.turned <= HELD) {
+                let rate = self.gap(j, rate);
+                return Err(MechanismError::InconsistentDrives { rate });
             }
         }
         Ok(())
@@ -190,43 +254,37 @@ impl Mechanism {
         let at_rest = steps
             .map(|((a, b), scale)| (a - b).abs() / scale)
             .all(|moved| moved <= AT_REST);
-        let joints = constraints.joints().to_vec();
-        let name = |j: usize| self.joint_names[j].clone();
         tree.update_kinematics(model, T, &again);
-        let open = |&j: &usize| {
-            let gap = model.joints[j].eccentricity(&tree.motion);
-            (gap.norm() > CLOSED).then(|| (name(j), gap))
-        };
-        let stays = if at_rest {
-            joints.iter().filter_map(open).collect()
-        } else {
-            Vec::new()
-        };
-        tree.update_kinematics(model, T, guess);
-        let given = |j: usize| model.joints[j].eccentricity(&tree.motion).norm();
-        let given = joints.iter().map(|&j| (j, given(j)));
-        let (joint, given) = given.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default();
-        MechanismError::NoClosure {
-            joint: name(joint),
-            given,
-            stays,
+        let mut stays = Vec::new();
+        if at_rest {
+            stays = self.gaps(constraints, &tree.motion);
+            stays.retain(|OpenJoint { opening, .. }| {
+                opening.apart.norm() > CLOSED || opening.turned > CLOSED
+            });
         }
+        tree.update_kinematics(model, T, guess);
+        let given = self.gaps(constraints, &tree.motion);
+        let size =
+            |gap: &OpenJoint| gap.opening.apart.norm() + gap.opening.turned * model.length_scale;
+        let widest = given.into_iter().max_by(|a, b| size(a).total_cmp(&size(b)));
+        let given = widest.unwrap_or_else(|| unreachable!("something did not close"));
+        MechanismError::NoClosure { given, stays }
     }
 
-    /// Rank of the ideal joints' rows in the assembled pose `y` and around it; `None` if all are independent.
-    fn rank_of_ideal_joints(
+    /// Rank of the closed joints' rows in the assembled pose `y` and around it; `None` if all are independent.
+    fn rank_of_closed_joints(
         &self,
         tree: &mut Tree,
         y: &[f64],
     ) -> Result<Option<usize>, MechanismError> {
         const T: f64 = 0.0;
         let model = &self.model;
-        if model.ideal_joints.is_empty() {
+        if !model.closes_loops() {
             return Ok(None);
         }
         let mut constraints = Constraints::new(model, &model.ideal_joints);
         factor_at(model, &mut constraints, tree, T, y);
-        if constraints.system().least_joint_pivot(3) >= DEPENDENT_ROWS {
+        if constraints.least_joint_pivot() >= DEPENDENT_ROWS {
             return Ok(None);
         }
         constraints.treat_as_dependent(constraints.rows());
@@ -236,10 +294,13 @@ impl Mechanism {
                 return MechanismError::Singular;
             }
             factor_at(model, &mut constraints, tree, T, y);
-            let names = model.ideal_joints.iter().enumerate();
-            let shared = names.filter(|&(k, _)| !constraints.is_unique(k));
+            let closures = model.joints.len()..self.cut_joints();
+            let names = model.ideal_joints.iter().copied().chain(closures);
+            let shared = names
+                .enumerate()
+                .filter(|&(k, _)| !constraints.is_unique(k));
             MechanismError::Branching {
-                joints: shared.map(|(_, &j)| self.joint_names[j].clone()).collect(),
+                joints: shared.map(|(_, j)| self.joint_names[j].clone()).collect(),
             }
         })
     }

@@ -23,6 +23,8 @@ pub struct Summary {
     pub degrees_of_freedom: usize,
     /// Ideal ball joints.
     pub ideal_joints: usize,
+    /// Joints that close loops besides the ball joints.
+    pub closing_joints: usize,
     /// Ball joints with clearance: contacts evaluated at every step.
     pub contacts: usize,
     /// Contacts with friction.
@@ -43,7 +45,7 @@ impl Summary {
             .filter(|&j| mechanism.contacts.has_clearance(j))
             .collect();
         Self {
-            bodies: model.bodies.len(),
+            bodies: model.massive,
             driven_bodies: model.bodies.iter().filter(|b| b.driven_only).count(),
             drives: model.drives.len(),
             velocity_coordinates,
@@ -52,6 +54,7 @@ impl Summary {
             dependent_rows: constraint_rows - rank,
             degrees_of_freedom: velocity_coordinates.saturating_sub(rank),
             ideal_joints: model.ideal_joints.len(),
+            closing_joints: model.closures.len(),
             frictional_contacts: contacts
                 .iter()
                 .filter(|&&j| mechanism.contacts.coefficients(j).friction > 0.0)

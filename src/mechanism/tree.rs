@@ -89,7 +89,8 @@ impl Tree {
     /// For `model`, if only its motion is needed: [`Self::update_kinematics`].
     pub fn without_masses(model: &Model) -> Self {
         let n = model.bodies.len();
-        let dynamic: Vec<usize> = (0..n).filter(|&b| !model.bodies[b].driven_only).collect();
+        let moves = |&b: &usize| !model.bodies[b].driven_only;
+        let dynamic: Vec<usize> = model.order.iter().copied().filter(moves).collect();
         Self {
             motion: vec![Kinematics::rest(); n + 1],
             wrench: vec![Wrench::zero(); n + 1],

@@ -110,7 +110,8 @@ impl Scene {
                 names.join(", ")
             };
             let first = name.split('.').next().unwrap_or(name);
-            let hinge = self.joints.iter().any(|joint| joint.name == first);
+            let mut others = self.joints.iter().chain(&self.closing_joints);
+            let hinge = others.any(|joint| joint.name == first);
             let message = if hinge {
                 // Its numbers are keys where the file gives them.
                 let own = format!("joint.{first}.");

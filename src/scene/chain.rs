@@ -105,6 +105,7 @@ pub(super) fn expand<'d>(
             parent_point: Vec3::zeros(),
             child_point: Vec3::zeros(),
             axis: Vec3::x(),
+            child_axis: Vec3::y(),
             rotation: Quat::identity(),
             drive: None,
             start: JointStart::Pose {

@@ -479,7 +479,8 @@ fn of_shape(name: &'static str, head: &'static str, more: &[FileKey]) -> FileTab
 
 static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
     const MOVES: &[&str] = &["prismatic", "revolute"];
-    const PLACED: &[&str] = &["fixed", "prismatic", "revolute"];
+    const TURNS: &[&str] = &["prismatic", "revolute", "cylindrical", "universal"];
+    const PLACED: &[&str] = &["fixed", "prismatic", "revolute", "cylindrical", "universal"];
     let keys = [
         key(
             "name",
@@ -491,7 +492,7 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
             "kind",
             Takes::Word(JointKind::WORDS),
             "\"revolute\"",
-            "how it moves: not, along `axis`, about it, or in every way",
+            "how it moves: not, along `axis`, about it, both, about two axes, or in every way",
         ),
         key(
             "parent",
@@ -512,9 +513,17 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
             "[0, 0, 1]",
             "along which it slides or about which it turns, by the right-hand rule",
         )
-        .of(MOVES)
+        .of(TURNS)
         .absent("must be given, except with the law `spcmm`")
         .frame(PARENT),
+        key(
+            "child_axis",
+            Takes::Direction,
+            "[0, 1, 0]",
+            "its second axis, perpendicular to `axis` where both angles are 0",
+        )
+        .of(&["universal"])
+        .frame("the child's"),
         key(
             "parent_point",
             vector(D::Length),
@@ -565,6 +574,30 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
             "where the child starts, and how it moves",
         )
         .of(&["free"]),
+        key(
+            "start",
+            Takes::Table(&CYLINDRICAL_START),
+            "{ position = \"10 mm\", angle = \"30 deg\" }",
+            "where it starts, and how fast",
+        )
+        .of(&["cylindrical"])
+        .absent("0, at rest"),
+        key(
+            "start",
+            Takes::Table(&UNIVERSAL_START),
+            "{ angle = \"10 deg\", child_angle = \"30 deg\" }",
+            "where it starts, and how fast",
+        )
+        .of(&["universal"])
+        .absent("0, at rest"),
+        key(
+            "closes_loop",
+            Takes::Flag,
+            "true",
+            "whether its child hangs on another joint, so that this one closes a loop; it then has neither `drive` nor `start`",
+        )
+        .of(PLACED)
+        .absent("false"),
     ];
     FileTable::new(
         "joint",
@@ -586,6 +619,54 @@ static START: FileTable = FileTable::new(
         key("velocity", number(D::Speed), "\"10 mm/s\"", "its rate")
             .on_hinge(D::AngularSpeed, "\"6 rad/s\"")
             .zero(),
+    ],
+);
+
+static CYLINDRICAL_START: FileTable = FileTable::new(
+    "cylindrical_start",
+    "start of a cylindrical joint",
+    "where it starts, along its axis and about it",
+    &[
+        key("position", number(D::Length), "\"10 mm\"", "along it").zero(),
+        key("angle", number(D::Angle), "\"30 deg\"", "about it").zero(),
+        key("velocity", number(D::Speed), "\"10 mm/s\"", "along it").zero(),
+        key(
+            "angular_velocity",
+            number(D::AngularSpeed),
+            "\"6 rad/s\"",
+            "about it",
+        )
+        .zero(),
+    ],
+);
+
+static UNIVERSAL_START: FileTable = FileTable::new(
+    "universal_start",
+    "start of a universal joint",
+    "where it starts, about its axes",
+    &[
+        key("angle", number(D::Angle), "\"10 deg\"", "about `axis`").zero(),
+        key(
+            "child_angle",
+            number(D::Angle),
+            "\"30 deg\"",
+            "about `child_axis`",
+        )
+        .zero(),
+        key(
+            "angular_velocity",
+            number(D::AngularSpeed),
+            "\"6 rad/s\"",
+            "about `axis`",
+        )
+        .zero(),
+        key(
+            "child_angular_velocity",
+            number(D::AngularSpeed),
+            "\"6 rad/s\"",
+            "about `child_axis`",
+        )
+        .zero(),
     ],
 );
 

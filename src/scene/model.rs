@@ -20,8 +20,8 @@ pub type Quat = nalgebra::UnitQuaternion<f64>;
 
 /// A mechanism and everything needed to simulate and draw it.
 ///
-/// Cut every ball joint and a forest remains: each body hangs on its parent by exactly one entry of `joints`, and parents
-/// come before children.
+/// Cut every ball joint and every joint that closes a loop, and a forest remains: each body hangs on its parent by exactly one
+/// entry of `joints`, and parents come before children.
 #[derive(Clone, Debug)]
 pub struct Scene {
     /// Short name: that of the built-in scene, or of the file without its extension.
@@ -54,6 +54,8 @@ pub struct Scene {
     pub joints: Vec<Joint>,
     /// The cut joints.
     pub ball_joints: Vec<BallJoint>,
+    /// Joints that close loops: both bodies hang elsewhere. They have neither drive nor start values.
+    pub closing_joints: Vec<Joint>,
     /// Force elements: springs, external loads.
     pub elements: Vec<Element>,
     /// Fixed shapes (rails, frame), world axes.
@@ -62,6 +64,15 @@ pub struct Scene {
     pub source: Source,
     /// Parameters changed since the file was read, in order: key and value as a user would write them.
     pub changes: Vec<(String, String)>,
+}
+
+impl Scene {
+    /// Names of the joints at which trees are cut, in the order in which they are counted: ball joints, then joints that close
+    /// loops.
+    pub fn cut_joints(&self) -> impl Iterator<Item = &str> {
+        let balls = self.ball_joints.iter().map(|joint| joint.name.as_str());
+        balls.chain(self.closing_joints.iter().map(|joint| joint.name.as_str()))
+    }
 }
 
 /// How the start values of the joints are to be understood.
@@ -358,11 +369,12 @@ pub enum Geometry {
     },
 }
 
-/// The tree joint that connects `child` to `parent`.
+/// The joint that connects `child` to `parent`: one that the child hangs on in the tree, or one that closes a loop.
 ///
 /// Pose of the child for joint coordinate q, with R the parent's (world: identity) rotation, `rotation` = R0: revolute
 /// `R_child = R Rot(axis, q) R0`, the two points coincide; prismatic `R_child = R R0`, the child's point is at the parent's
-/// point + q axis; fixed as prismatic with q = 0; free (parent is the world): see `start`.
+/// point + q axis; cylindrical both, first the slide, then the turn; universal `R_child = R Rot(axis, q1) R0 Rot(child_axis, q2)`,
+/// the two points coincide; fixed as prismatic with q = 0; free (parent is the world): see `start`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
     /// Unique name.
@@ -377,8 +389,10 @@ pub struct Joint {
     pub parent_point: Vec3,
     /// Joint point in the child's frame, m.
     pub child_point: Vec3,
-    /// Unit axis in the parent's frame (revolute, prismatic).
+    /// Unit axis in the parent's frame (all but fixed and free).
     pub axis: Vec3,
+    /// Second unit axis of a universal joint in the child's frame, perpendicular to `axis`.
+    pub child_axis: Vec3,
     /// Child's orientation in the parent at q = 0.
     pub rotation: Quat,
     /// Prescribes q(t); `None` leaves it to the dynamics.
@@ -401,9 +415,9 @@ impl Joint {
         [parent, child]
     }
 
-    /// Whether one coordinate, driven or not, gives its position.
+    /// Whether it is a slide or a hinge: one coordinate, driven or not, gives its position.
     pub fn has_coordinate(&self) -> bool {
-        matches!(self.kind, JointKind::Prismatic | JointKind::Revolute)
+        self.kind.freedoms().len() == 1
     }
 }
 
@@ -418,6 +432,10 @@ pub enum JointKind {
     Revolute,
     /// Six degrees of freedom.
     Free,
+    /// Slides along `axis` and turns about it.
+    Cylindrical,
+    /// Turns about `axis` of the parent and about `child_axis` of the child.
+    Universal,
 }
 
 words!(JointKind {
@@ -425,7 +443,37 @@ words!(JointKind {
     Prismatic => "prismatic",
     Revolute => "revolute",
     Free => "free",
+    Cylindrical => "cylindrical",
+    Universal => "universal",
 });
+
+/// What one coordinate of a joint measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Freedom {
+    /// Displacement along the axis of a slide or a cylindrical joint, m.
+    Slide,
+    /// Angle of a hinge, rad.
+    Turn,
+    /// Angle of a cylindrical joint, rad.
+    TurnOfSlide,
+    /// Angle of a universal joint about its axis in the parent, rad.
+    FirstTurn,
+    /// The same about its axis in the child.
+    SecondTurn,
+}
+
+impl JointKind {
+    /// Its coordinates; a free joint's pose has none.
+    pub fn freedoms(self) -> &'static [Freedom] {
+        match self {
+            Self::Fixed | Self::Free => &[],
+            Self::Prismatic => &[Freedom::Slide],
+            Self::Revolute => &[Freedom::Turn],
+            Self::Cylindrical => &[Freedom::Slide, Freedom::TurnOfSlide],
+            Self::Universal => &[Freedom::FirstTurn, Freedom::SecondTurn],
+        }
+    }
+}
 
 /// Start values of a joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -436,6 +484,13 @@ pub enum JointStart {
         position: f64,
         /// dq/dt at t = 0.
         velocity: f64,
+    },
+    /// Coordinates (m or rad) and rates of a joint of two degrees, in the order of [`JointKind::freedoms`].
+    Pair {
+        /// q at t = 0.
+        position: [f64; 2],
+        /// dq/dt at t = 0.
+        velocity: [f64; 2],
     },
     /// Pose of the body frame and its motion, world axes.
     Pose {

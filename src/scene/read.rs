@@ -243,6 +243,7 @@ fn read_settings(top: &Section<'_>) -> Result<Scene, SceneError> {
         bodies: Vec::new(),
         joints: Vec::new(),
         ball_joints: Vec::new(),
+        closing_joints: Vec::new(),
         elements: Vec::new(),
         fixed_shapes: Vec::new(),
         source: Source {
@@ -349,8 +350,21 @@ fn read_mechanism<'d>(
         }
         joints.push(joint);
     }
+    let (closing, joints): (Vec<_>, Vec<_>) = joints.into_iter().partition(|text| text.closes_loop);
     (scene.bodies, scene.joints) = sort_forest(bodies, joints, &body_sections)?;
     let by_name = indices_by_name(&scene.bodies);
+    for JointText { section, joint, .. } in closing {
+        if !section.document.included {
+            let title = format!("joint.{}", joint.name);
+            scene.source.places.insert(title, section.place());
+        }
+        let sorted = |body: usize| by_name[&file_order[body]];
+        scene.closing_joints.push(Joint {
+            parent: joint.parent.map(sorted),
+            child: sorted(joint.child),
+            ..joint
+        });
+    }
     for node in list("ball_joint")? {
         let BallJointText {
             joint,

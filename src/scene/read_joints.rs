@@ -1,4 +1,4 @@
-//! Tree joints and ball joints of a scene file, and the forest they make.
+//! Tree joints, joints that close loops, and ball joints of a scene file, and the forest they make.
 
 use super::copy::Copy;
 use super::document::{Node, Section};
@@ -8,12 +8,18 @@ use super::table::contact_rows;
 use super::*;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// A tree joint whose bodies are still indices in file order.
+/// Largest cosine of the angle between the axes of a universal joint that passes for a right one: what is written with few
+/// digits.
+const SQUARE: f64 = 1e-4;
+
+/// A joint whose bodies are still indices in file order.
 pub(super) struct JointText<'d> {
     pub name: String,
     pub section: Section<'d>,
     /// `parent` and `child` are body indices in file order.
     pub joint: Joint,
+    /// Its child hangs elsewhere.
+    pub closes_loop: bool,
 }
 
 /// A ball joint with the positions of its contact keys.
@@ -54,6 +60,7 @@ pub(super) fn read_joint<'d>(
         parent_point: section.vector("parent_point")?,
         child_point: section.vector("child_point")?,
         axis: Vec3::x(),
+        child_axis: Vec3::y(),
         rotation: read_rotation(section.get("rotation"))?,
         drive: None,
         start: JointStart::Scalar {
@@ -61,23 +68,59 @@ pub(super) fn read_joint<'d>(
             velocity: 0.0,
         },
     };
+    let closes_loop = match section.get("closes_loop") {
+        Some(node) => node.flag()?,
+        None => false,
+    };
+    if closes_loop {
+        check_closing(&section, &joint)?;
+    }
     match kind {
         JointKind::Free => read_free(&section, &mut joint)?,
         JointKind::Fixed => {}
         JointKind::Prismatic | JointKind::Revolute => read_moving(&section, scene, &mut joint)?,
+        JointKind::Cylindrical | JointKind::Universal => read_two_degrees(&section, &mut joint)?,
     }
     let own = |copy: &Copy| parent.is_some_and(|parent| copy.made(&bodies[parent]));
     if let Some(copy) = node.document.copy.filter(|copy| !own(copy)) {
         joint.follow(copy);
     }
+    let outside = |copy: &&Copy| closes_loop && !copy.made(&bodies[child]);
+    if let Some(copy) = node.document.copy.filter(outside) {
+        joint.follow_in_child(copy);
+    }
     Ok(JointText {
         name,
         section,
         joint,
+        closes_loop,
     })
 }
 
+/// What a joint that closes a loop may be.
+fn check_closing(section: &Section<'_>, joint: &Joint) -> Result<(), SceneError> {
+    if joint.parent == Some(joint.child) {
+        let node = section.require("child")?;
+        return Err(
+            node.error("parent and child are the same body: a joint that closes a loop needs two")
+        );
+    }
+    let drive =
+        "a joint that closes a loop has no drive; drive a slide or a hinge that a body hangs on";
+    section.refuse("drive", drive)?;
+    let start =
+        "a joint that closes a loop starts where the joints that its bodies hang on put them";
+    section.refuse("start", start)
+}
+
 impl Joint {
+    /// Follows a copy of a pattern that its child does not belong to.
+    fn follow_in_child(&mut self, copy: &Copy) {
+        self.child_point = copy.point(self.child_point);
+        self.child_axis = copy.direction(self.child_axis);
+        self.rotation = self.rotation * copy.turn.inverse();
+    }
+
     /// Follows a copy of a pattern that its parent does not belong to.
     fn follow(&mut self, copy: &Copy) {
         self.parent_point = copy.point(self.parent_point);
@@ -146,6 +189,43 @@ fn read_moving(section: &Section<'_>, scene: &Scene, joint: &mut Joint) -> Resul
         };
     }
     joint.axis = section.require("axis")?.direction()?;
+    Ok(())
+}
+
+/// A joint that slides and turns, or turns about two axes.
+fn read_two_degrees(section: &Section<'_>, joint: &mut Joint) -> Result<(), SceneError> {
+    let universal = joint.kind == JointKind::Universal;
+    joint.axis = section.require("axis")?.direction()?;
+    if universal {
+        let node = section.require("child_axis")?;
+        let second = joint.rotation * node.direction()?;
+        let along = joint.axis.dot(&second);
+        if along.abs() > SQUARE {
+            let degrees = libm::acos(along.clamp(-1.0, 1.0)).to_degrees();
+            return Err(node.error(format!(
+                "must be perpendicular to `axis` where the angles are 0; with `rotation` it is at {degrees:.4} deg to it"
+            )));
+        }
+        let square = (second - joint.axis * along).normalize();
+        joint.child_axis = joint.rotation.inverse() * square;
+    }
+    let [first, second, rate, second_rate] = if universal {
+        [
+            "angle",
+            "child_angle",
+            "angular_velocity",
+            "child_angular_velocity",
+        ]
+    } else {
+        ["position", "angle", "velocity", "angular_velocity"]
+    };
+    let (mut position, mut velocity) = ([0.0; 2], [0.0; 2]);
+    if let Some(node) = section.get("start") {
+        let start = node.section()?;
+        position = [start.number(first)?, start.number(second)?];
+        velocity = [start.number(rate)?, start.number(second_rate)?];
+    }
+    joint.start = JointStart::Pair { position, velocity };
     Ok(())
 }
 
@@ -231,7 +311,8 @@ pub(super) fn sort_forest(
     joints: Vec<JointText<'_>>,
     sections: &[Section<'_>],
 ) -> Result<(Vec<Body>, Vec<Joint>), SceneError> {
-    let closing = "each body hangs on exactly one joint; close loops with a [[ball_joint]]";
+    let closing = "each body hangs on exactly one joint; close loops with a [[ball_joint]], or with a joint that has \
+                   `closes_loop = true`";
     let mut of_child: Vec<Option<&JointText<'_>>> = vec![None; bodies.len()];
     for text in &joints {
         let child = text.joint.child;
@@ -340,6 +421,13 @@ pub(super) fn read_one_degree_joint(
                     "a {} joint is neither a slide nor a hinge",
                     scene.joints[index].kind
                 ),
+                None if scene
+                    .closing_joints
+                    .iter()
+                    .any(|joint| joint.name == wanted) =>
+                {
+                    "a joint that closes a loop has no coordinate to act on".to_owned()
+                }
                 None => "no such tree joint".to_owned(),
             };
             let names = scene

@@ -17,6 +17,7 @@ fn start_poses(scene: &Scene) -> Vec<(Vec3, Quat)> {
         let q = match (slider, joint.start) {
             (Some(coordinate), _) => sliders[coordinate],
             (_, JointStart::Scalar { position, .. }) => position,
+            (_, JointStart::Pair { .. }) => panic!("no built-in scene has one"),
             (
                 _,
                 JointStart::Pose {

@@ -7,7 +7,7 @@ pub use choice::{Listed, NoChannel, channels_of, chosen_columns};
 pub use table::{PlotKind, Quantity};
 
 use super::Frame;
-use crate::scene::{JointKind, Scene};
+use crate::scene::{Freedom, Joint, Scene};
 use table::{Each, Signal, TABLE, Take};
 
 /// Ball joints and drives that are recorded; in a longer chain the rest would cost more memory than it is worth.
@@ -146,8 +146,8 @@ fn lay_out(
     let key = |signal: &Signal| (place(signal), signal.take.each());
     for group in signals.chunk_by(|a, b| key(a) == key(b)) {
         let parts = parts_of(scene, group[0].take.each());
-        for (part, (name, kind)) in parts.into_iter().take(most).enumerate() {
-            let here = |signal: &&&Signal| has(scene, first, signal, part, kind);
+        for (part, (name, freedom)) in parts.into_iter().take(most).enumerate() {
+            let here = |signal: &&&Signal| has(scene, first, signal, part, freedom);
             for signal in group.iter().filter(here) {
                 let take = signal.take;
                 for (component, &(symbol, word)) in take.components().iter().enumerate() {
@@ -173,20 +173,25 @@ fn lay_out(
     }
 }
 
-/// Names of the parts a signal is repeated for; for a joint that slides or turns also its kind.
-fn parts_of(scene: &Scene, each: Each) -> Vec<(&str, Option<JointKind>)> {
+/// Names of the parts a signal is repeated for; for a coordinate of a joint also what it measures.
+fn parts_of(scene: &Scene, each: Each) -> Vec<(&str, Option<Freedom>)> {
     let joints = scene.ball_joints.iter().map(|joint| joint.name.as_str());
     let elements = scene.elements.iter().map(|element| element.name.as_str());
     let driven = scene.joints.iter().filter(|joint| joint.drive.is_some());
-    let moving = scene.joints.iter().filter(|joint| joint.has_coordinate());
+    let moving = scene.joints.iter().chain(&scene.closing_joints);
+    let coordinates = |joint: &'_ Joint| joint.kind.freedoms().iter().map(|freedom| Some(*freedom));
     let bodies = scene.bodies.iter().map(|body| body.name.as_str());
     match each {
         Each::Once => vec![("", None)],
         Each::Output => vec![(scene.bodies[scene.output.body].name.as_str(), None)],
         Each::Body => bodies.map(|name| (name, None)).collect(),
-        Each::Coordinate => moving.map(|j| (j.name.as_str(), Some(j.kind))).collect(),
+        Each::Coordinate => moving
+            .flat_map(|j| coordinates(j).map(|freedom| (j.name.as_str(), freedom)))
+            .collect(),
         Each::Joint => joints.map(|name| (name, None)).collect(),
-        Each::Drive => driven.map(|j| (j.name.as_str(), Some(j.kind))).collect(),
+        Each::Drive => driven
+            .flat_map(|j| coordinates(j).map(|freedom| (j.name.as_str(), freedom)))
+            .collect(),
         Each::Element => elements.map(|name| (name, None)).collect(),
     }
 }
@@ -197,13 +202,17 @@ fn has(
     first: Option<&Frame>,
     signal: &Signal,
     part: usize,
-    kind: Option<JointKind>,
+    freedom: Option<Freedom>,
 ) -> bool {
     let take = signal.take;
     let known = |may_have: bool| first.map_or(may_have, |f| take.value(f, part, 0).is_some());
     match take {
-        Take::Slide | Take::SlideCoordinate(_) => kind != Some(JointKind::Revolute),
-        Take::Hinge | Take::HingeCoordinate(_) => kind == Some(JointKind::Revolute),
+        Take::Slide | Take::SlideCoordinate(_) => freedom == Some(Freedom::Slide),
+        Take::HingeCoordinate(0) if freedom == Some(Freedom::TurnOfSlide) => true,
+        Take::Hinge | Take::HingeCoordinate(_) => freedom == Some(Freedom::Turn),
+        Take::TurnRate => freedom == Some(Freedom::TurnOfSlide),
+        Take::FirstTurn(_) => freedom == Some(Freedom::FirstTurn),
+        Take::SecondTurn(_) => freedom == Some(Freedom::SecondTurn),
         Take::OtherAxes(_) | Take::OtherAngles(_) => part != scene.output.body,
         Take::Given(..) | Take::Taken(..) => {
             known(scene.solver.energy_ledger) && (!signal.of_elements || !scene.elements.is_empty())

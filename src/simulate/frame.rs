@@ -19,8 +19,8 @@ pub struct Frame {
     pub elements: Vec<ElementReport>,
     /// The hand that pulls, if any: force from the hand on the grasped point. Only set in the displayed frame.
     pub pull: Option<ElementReport>,
-    /// Sliding and turning joints in scene order: coordinate, m or rad, and its rate. In the `lagrange` form the angle of a
-    /// joint that is not driven lies between -pi and pi.
+    /// Coordinates of the joints that slide or turn, m or rad, each with its rate: joints that bodies hang on in scene order, then
+    /// joints that close loops. The angles of these, and in the `lagrange` form of all that are not driven, lie between -pi and pi.
     pub coordinates: Vec<[f64; 2]>,
     /// Driven joints in scene order: actuator force, N (or torque, N m), positive along the joint axis's positive sense.
     pub actuators: Vec<f64>,

@@ -63,9 +63,9 @@ impl StartError {
             MechanismError::Unreachable(_)
             | MechanismError::OtherBranch
             | MechanismError::Singular => ("spcmm".to_owned(), vec!["spcmm.".to_owned()]),
-            MechanismError::Open { joint, .. }
-            | MechanismError::NoClosure { joint, .. }
-            | MechanismError::InconsistentDrives { joint, .. } => one(joint, &["clearance"]),
+            MechanismError::Open { given: gap }
+            | MechanismError::NoClosure { given: gap, .. }
+            | MechanismError::InconsistentDrives { rate: gap } => one(&gap.joint, &["clearance"]),
             MechanismError::OutsideSocket { joint, .. } => {
                 one(joint, &["clearance", "ball_radius"])
             }
@@ -102,7 +102,7 @@ pub enum Effect {
 /// are the least-squares reactions and what follows from them.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct NotUnique {
-    /// Ball joints, by index.
+    /// Ball joints, by index; joints that close loops count after them.
     pub reactions: Vec<usize>,
     /// Actuators, by index among the driven joints.
     pub actuators: Vec<usize>,

@@ -655,11 +655,9 @@ impl Simulation {
     /// Forces at the latest state that the motion does not determine.
     pub fn not_unique(&mut self) -> NotUnique {
         self.sample(self.state.now.t, &mut Frame::default());
-        let Self {
-            mechanism, state, ..
-        } = self;
+        let mechanism = &mut self.mechanism;
         NotUnique {
-            reactions: (0..state.now.gaps.len())
+            reactions: (0..mechanism.cut_joints())
                 .filter(|&j| !mechanism.is_reaction_unique(j))
                 .collect(),
             actuators: (0..mechanism.drives())

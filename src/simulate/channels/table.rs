@@ -3,8 +3,9 @@
 
 use Quantity as Q;
 use Take::{
-    Angles, Axes, BodyAxes, Element, ElementValue, Given, Hinge, HingeCoordinate, Joint, JointAxes,
-    OtherAngles, OtherAxes, ProbeError, Slide, SlideCoordinate, Taken, Whole,
+    Angles, Axes, BodyAxes, Element, ElementValue, FirstTurn, Given, Hinge, HingeCoordinate, Joint,
+    JointAxes, OtherAngles, OtherAxes, ProbeError, SecondTurn, Slide, SlideCoordinate, Taken,
+    TurnRate, Whole,
 };
 
 use crate::scene::Vec3;
@@ -238,8 +239,13 @@ pub(super) enum Take {
     OtherAngles(fn(&Pose) -> Vec3),
     /// Of each sliding joint: its coordinate, or the rate of that.
     SlideCoordinate(usize),
-    /// The same of each turning joint.
+    /// The same of each turning joint, and of the angle of a joint that slides, too.
     HingeCoordinate(usize),
+    /// The rate of that angle.
+    TurnRate,
+    /// The same of a universal joint about its axis in the parent, and about that in the child.
+    FirstTurn(usize),
+    SecondTurn(usize),
     /// Of each ball joint.
     Joint(fn(&JointReport) -> f64),
     /// Of each ball joint, along x, y, z.
@@ -269,7 +275,7 @@ pub(super) enum Each {
     Output,
     /// Bodies.
     Body,
-    /// Joints that slide or turn.
+    /// Coordinates of joints that slide or turn.
     Coordinate,
     /// Ball joints.
     Joint,
@@ -290,7 +296,9 @@ impl Take {
             Element(_) | ElementValue(_) => Each::Element,
             Axes(_) | Angles(_) => Each::Output,
             BodyAxes(_) | OtherAxes(_) | OtherAngles(_) => Each::Body,
-            SlideCoordinate(_) | HingeCoordinate(_) => Each::Coordinate,
+            SlideCoordinate(_) | HingeCoordinate(_) | TurnRate | FirstTurn(_) | SecondTurn(_) => {
+                Each::Coordinate
+            }
             Whole(..) | Given(..) | Taken(..) | ProbeError => Each::Once,
         }
     }
@@ -324,9 +332,11 @@ impl Take {
                 let body = frame.bodies.get(part);
                 body.map(|body| of(&pose_of(body))[component])
             }
-            SlideCoordinate(order) | HingeCoordinate(order) => {
-                frame.coordinates.get(part).map(|c| c[*order])
-            }
+            SlideCoordinate(order)
+            | HingeCoordinate(order)
+            | FirstTurn(order)
+            | SecondTurn(order) => frame.coordinates.get(part).map(|c| c[*order]),
+            TurnRate => frame.coordinates.get(part).map(|c| c[1]),
             Joint(of) => frame.joints.get(part).map(of),
             JointAxes(of) => frame.joints.get(part).map(|joint| of(joint)[component]),
             Slide | Hinge => frame.actuators.get(part).copied(),
@@ -462,6 +472,11 @@ pub(super) const TABLE: &[Signal] = &[
     asked("@.rate", "@_rate_m_s", SlideCoordinate(1), "rate of the joint's coordinate"),
     asked("@.angle", "@_angle_rad", HingeCoordinate(0), "angle of the joint about its axis"),
     asked("@.rate", "@_rate_rad_s", HingeCoordinate(1), "rate of the joint's angle"),
+    asked("@.angle_rate", "@_angle_rate_rad_s", TurnRate, "rate of the joint's angle"),
+    asked("@.angle", "@_angle_rad", FirstTurn(0), "angle of the joint about its axis in the parent"),
+    asked("@.angle_rate", "@_angle_rate_rad_s", FirstTurn(1), "rate of that angle"),
+    asked("@.child_angle", "@_child_angle_rad", SecondTurn(0), "angle of the joint about its axis in the child"),
+    asked("@.child_angle_rate", "@_child_angle_rate_rad_s", SecondTurn(1), "rate of that angle"),
 
     asked("@.gap", "@_gap_m", Joint(|joint| -joint.penetration), "gap between ball and socket wall; negative in contact"),
     asked("@.clearance", "@_clearance_m", Joint(|joint| joint.clearance), "radial clearance in force"),

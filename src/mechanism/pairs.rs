@@ -1,0 +1,335 @@
+//! What a joint holds between two bodies, in terms of the motion of both: constraint rows, coordinates, and how far it is open.
+//! The same in every formulation.
+
+use super::kinematics::Kinematics;
+use super::model::Pair;
+use crate::jet::Jet;
+use crate::scene::{JointKind, Vec3};
+
+/// Kinds of constraint rows between a child and a parent.
+#[derive(Clone, Copy, Debug)]
+pub enum Rows {
+    /// Two points coincide: 3 rows, (45) and the first three of (47).
+    Point { child: Vec3, parent: Vec3 },
+    /// A vector of the child stays perpendicular to one of the parent: 1 row, as in (46), (47).
+    Perpendicular { child: Vec3, parent: Vec3 },
+    /// The child's point stays at `parent + s along`, s = 0 or the driven coordinate: 1 row, (46) and Phi_D of (48).
+    Offset {
+        child: Vec3,
+        parent: Vec3,
+        along: Vec3,
+        drive: Option<usize>,
+    },
+    /// Angle from the parent's `zero` to the child's `child` about `axis` is the driven coordinate: 1 row.
+    Angle {
+        child: Vec3,
+        zero: Vec3,
+        axis: Vec3,
+        drive: usize,
+    },
+}
+
+/// J of one row for its two bodies: (velocity, angular velocity) of the child, then of the parent.
+#[derive(Clone, Copy)]
+pub struct JacobianRow {
+    pub child: [Vec3; 2],
+    pub parent: [Vec3; 2],
+}
+
+impl JacobianRow {
+    /// Of a row that nothing moves.
+    pub const ZERO: Self = {
+        let zero = Vec3::new(0.0, 0.0, 0.0);
+        Self {
+            child: [zero; 2],
+            parent: [zero; 2],
+        }
+    };
+}
+
+impl Rows {
+    /// Number of rows.
+    pub fn count(&self) -> usize {
+        if matches!(self, Self::Point { .. }) {
+            3
+        } else {
+            1
+        }
+    }
+
+    /// Calls `found` with each row's number, its Jacobian, and its violation with the first and second time derivatives, for the
+    /// motion of child and parent and the driven coordinates.
+    #[inline(always)]
+    pub fn linearise(
+        &self,
+        c: &Kinematics,
+        p: &Kinematics,
+        driven: &[Jet],
+        mut found: impl FnMut(usize, JacobianRow, [f64; 3]),
+    ) {
+        let zero = Vec3::zeros();
+        let (wc, wp) = (c.angular_velocity, p.angular_velocity);
+        match *self {
+            Self::Point { child, parent } => {
+                let (dc, dp) = (c.rotation * child, p.rotation * parent);
+                let phi = (c.position + dc) - (p.position + dp);
+                let rate = c.point_velocity(&dc) - p.point_velocity(&dp);
+                let acceleration = c.point_acceleration(&dc) - p.point_acceleration(&dp);
+                for i in 0..3 {
+                    let mut e = zero;
+                    e[i] = 1.0;
+                    let row = JacobianRow {
+                        child: [e, dc.cross(&e)],
+                        parent: [-e, e.cross(&dp)],
+                    };
+                    found(i, row, [phi[i], rate[i], acceleration[i]]);
+                }
+            }
+            Self::Perpendicular { child, parent } => {
+                let (a, b) = (c.rotation * child, p.rotation * parent);
+                let cross = a.cross(&b);
+                let relative = wc - wp;
+                let turning = wc.cross(&a).cross(&b) + a.cross(&wp.cross(&b));
+                let acceleration = (c.angular_acceleration - p.angular_acceleration).dot(&cross)
+                    + relative.dot(&turning);
+                let row = JacobianRow {
+                    child: [zero, cross],
+                    parent: [zero, -cross],
+                };
+                found(0, row, [a.dot(&b), relative.dot(&cross), acceleration]);
+            }
+            Self::Offset {
+                child,
+                parent,
+                along,
+                drive,
+            } => {
+                let (dc, dp, b) = (c.rotation * child, p.rotation * parent, p.rotation * along);
+                let f = drive.map_or(Jet::default(), |d| driven[d]);
+                let d = (c.position + dc) - (p.position + dp);
+                let d1 = c.point_velocity(&dc) - p.point_velocity(&dp);
+                let d2 = c.point_acceleration(&dc) - p.point_acceleration(&dp);
+                let b1 = wp.cross(&b);
+                let b2 = p.angular_acceleration.cross(&b) + wp.cross(&b1);
+                let phi = b.dot(&d) - f.value;
+                let rate = b1.dot(&d) + b.dot(&d1) - f.rate;
+                let acceleration = b2.dot(&d) + 2.0 * b1.dot(&d1) + b.dot(&d2) - f.acceleration;
+                let row = JacobianRow {
+                    child: [b, dc.cross(&b)],
+                    parent: [-b, b.cross(&dp) + b.cross(&d)],
+                };
+                found(0, row, [phi, rate, acceleration]);
+            }
+            Self::Angle {
+                child,
+                zero: reference,
+                axis,
+                drive,
+            } => {
+                let (a, b, x) = (
+                    c.rotation * child,
+                    p.rotation * reference,
+                    p.rotation * axis,
+                );
+                let f = driven[drive];
+                let angle = libm::atan2(b.cross(&a).dot(&x), b.dot(&a));
+                // A driven crank turns many times: compare modulo a turn.
+                let turns = libm::round((f.value - angle) / std::f64::consts::TAU);
+                let phi = angle + turns * std::f64::consts::TAU - f.value;
+                let relative = wc - wp;
+                let acceleration = (c.angular_acceleration - p.angular_acceleration).dot(&x)
+                    + relative.dot(&wp.cross(&x))
+                    - f.acceleration;
+                let row = JacobianRow {
+                    child: [zero, x],
+                    parent: [zero, -x],
+                };
+                found(0, row, [phi, relative.dot(&x) - f.rate, acceleration]);
+            }
+        }
+    }
+}
+
+/// How far a joint is open.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Opening {
+    /// How far its points are from where it holds them together, world axes: m, or m/s.
+    pub apart: Vec3,
+    /// By how much its bodies are turned against what it holds: rad, or rad/s.
+    pub turned: f64,
+}
+
+impl Pair {
+    /// The rows that it holds, no drive: of its points, then of its orientation. Those of one part have their directions
+    /// perpendicular to each other.
+    pub fn rows(&self) -> [Vec<Rows>; 2] {
+        let [x, y, z] = self.axes;
+        let [seen_x, seen_y, _] = self.seen;
+        let slides = [self.offset(&y, None), self.offset(&z, None)];
+        let along = [(seen_x, y), (seen_x, z)];
+        let (points, orientation): (&[Rows], &[(Vec3, Vec3)]) = match self.kind {
+            JointKind::Free => (&[], &[]),
+            JointKind::Fixed => (&[self.point()], &[along[0], along[1], (seen_y, z)]),
+            JointKind::Revolute => (&[self.point()], &along),
+            JointKind::Universal => (&[self.point()], &[(self.second, x)]),
+            JointKind::Prismatic => (&slides, &[along[0], along[1], (seen_y, z)]),
+            JointKind::Cylindrical => (&slides, &along),
+        };
+        let perpendicular = |&(child, parent): &(Vec3, Vec3)| Rows::Perpendicular { child, parent };
+        [
+            points.to_vec(),
+            orientation.iter().map(perpendicular).collect(),
+        ]
+    }
+
+    /// The row that prescribes its one coordinate.
+    pub fn driven_row(&self, drive: usize) -> Rows {
+        match self.kind {
+            JointKind::Prismatic => self.offset(&self.axes[0], Some(drive)),
+            _ => Rows::Angle {
+                child: self.seen[1],
+                zero: self.axes[1],
+                axis: self.axes[0],
+                drive,
+            },
+        }
+    }
+
+    fn point(&self) -> Rows {
+        Rows::Point {
+            child: self.child.offset,
+            parent: self.parent.offset,
+        }
+    }
+
+    fn offset(&self, along: &Vec3, drive: Option<usize>) -> Rows {
+        Rows::Offset {
+            child: self.child.offset,
+            parent: self.parent.offset,
+            along: *along,
+            drive,
+        }
+    }
+
+    /// Whether the child's point moves along the axis.
+    pub fn slides(&self) -> bool {
+        matches!(self.kind, JointKind::Prismatic | JointKind::Cylindrical)
+    }
+
+    /// Motion of child and parent.
+    fn ends<'a>(&self, motion: &'a [Kinematics]) -> [&'a Kinematics; 2] {
+        [&motion[self.child.body], &motion[self.parent.body]]
+    }
+
+    /// The child's and the parent's point from the centroids of their bodies, m; of one that slides, the child's point as one of
+    /// either body.
+    pub fn arms(&self, motion: &[Kinematics]) -> [Vec3; 2] {
+        let [c, p] = self.ends(motion);
+        let arm = c.rotation * self.child.offset;
+        let other = if self.slides() {
+            c.position + arm - p.position
+        } else {
+            p.rotation * self.parent.offset
+        };
+        [arm, other]
+    }
+
+    /// Its coordinates with their rates, m or rad, in the order of [`JointKind::freedoms`]; angles between -pi and pi.
+    pub fn coordinates(&self, motion: &[Kinematics]) -> impl Iterator<Item = [f64; 2]> + use<> {
+        let [c, p] = self.ends(motion);
+        let axis = p.rotation * self.axes[0];
+        let spin = c.angular_velocity - p.angular_velocity;
+        let slide = || {
+            let arm = c.rotation * self.child.offset;
+            let at = c.position + arm - p.position;
+            let slid = at - p.rotation * self.parent.offset;
+            let velocity = c.point_velocity(&arm) - p.point_velocity(&at);
+            [axis.dot(&slid), axis.dot(&velocity)]
+        };
+        let turn = |about: &Vec3, from: &Vec3, to: &Vec3| {
+            let angle = libm::atan2(from.cross(to).dot(about), from.dot(to));
+            [angle, about.dot(&spin)]
+        };
+        let hinge = || {
+            turn(
+                &axis,
+                &(p.rotation * self.axes[1]),
+                &(c.rotation * self.seen[1]),
+            )
+        };
+        let both = match self.kind {
+            JointKind::Fixed | JointKind::Free => [None, None],
+            JointKind::Prismatic => [Some(slide()), None],
+            JointKind::Revolute => [Some(hinge()), None],
+            JointKind::Cylindrical => [Some(slide()), Some(hinge())],
+            JointKind::Universal => {
+                let second = c.rotation * self.second;
+                // Where both coordinates are 0, as the parent sees it.
+                let [x, y, z] = self.seen.map(|seen| seen.dot(&self.second));
+                let zero = p.rotation * (self.axes[0] * x + self.axes[1] * y + self.axes[2] * z);
+                let first = turn(&axis, &zero, &second);
+                [
+                    Some(first),
+                    Some(turn(&second, &axis, &(c.rotation * self.seen[0]))),
+                ]
+            }
+        };
+        both.into_iter().flatten()
+    }
+
+    /// How far it is open, m and rad. Its rows do not tell an axis from its opposite; this does.
+    pub fn opening(&self, motion: &[Kinematics]) -> Opening {
+        let [c, p] = self.ends(motion);
+        let axes = self.axes.map(|axis| p.rotation * axis);
+        let seen = self.seen.map(|axis| c.rotation * axis);
+        let gap = (c.position + c.rotation * self.child.offset)
+            - (p.position + p.rotation * self.parent.offset);
+        let apart = if self.slides() {
+            gap - axes[0] * axes[0].dot(&gap)
+        } else {
+            gap
+        };
+        let turned = match self.kind {
+            JointKind::Free => 0.0,
+            JointKind::Revolute | JointKind::Cylindrical => {
+                libm::atan2(axes[0].cross(&seen[0]).norm(), axes[0].dot(&seen[0]))
+            }
+            JointKind::Universal => {
+                let second = c.rotation * self.second;
+                let (sine, cosine) = (axes[0].dot(&second), axes[0].cross(&second).norm());
+                libm::atan2(sine, cosine).abs()
+            }
+            JointKind::Fixed | JointKind::Prismatic => {
+                // Of a rotation by an angle about n: the sums are 2 sin n and 1 + 2 cos.
+                let pairs = || axes.iter().zip(&seen);
+                let sine = pairs().map(|(a, b)| a.cross(b)).sum::<Vec3>().norm();
+                let cosine = pairs().map(|(a, b)| a.dot(b)).sum::<f64>() - 1.0;
+                libm::atan2(sine, cosine)
+            }
+        };
+        Opening { apart, turned }
+    }
+
+    /// At what speeds it opens, m/s and rad/s.
+    pub fn opening_rate(&self, motion: &[Kinematics]) -> Opening {
+        let [c, p] = self.ends(motion);
+        let rates = self.rows().map(|rows| {
+            let mut sum = Vec3::zeros();
+            for row in rows {
+                row.linearise(c, p, &[], |_, row, [_, rate, _]| {
+                    let along = if row.child[0] == Vec3::zeros() {
+                        row.child[1]
+                    } else {
+                        row.child[0]
+                    };
+                    sum += along * rate;
+                });
+            }
+            sum
+        });
+        Opening {
+            apart: rates[0],
+            turned: rates[1].norm(),
+        }
+    }
+}
