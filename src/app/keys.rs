@@ -169,7 +169,10 @@ pub const POINTER: [(&str, &str); 12] = [
         "Double-click, double tap on the lowest bar",
         "Presentation, as F5",
     ),
-    ("Ctrl +, Ctrl -, Ctrl 0", "Larger and smaller type; as it was"),
+    (
+        "Ctrl +, Ctrl -, Ctrl 0",
+        "Larger and smaller type; as it was",
+    ),
     ("Drop a file", "Open a scene"),
     ("Paste", "Open a link"),
     ("Arrows after a drag on a slider", "Move that slider"),
