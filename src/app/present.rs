@@ -2,12 +2,12 @@
 
 use eframe::egui::{self, Align2, FontId, Frame, Id, Panel, Rect, Sense, Ui, vec2};
 
-use super::{App, transport, value};
+use super::{App, theme, transport, value};
 
 /// Least height of a text as a share of the screen's: what the last row of a lecture hall can read.
 const LEAST_TEXT: f32 = 1.0 / 40.0;
-/// Smallest type of the interface, points.
-const SMALLEST: f32 = 12.0;
+/// Smallest type of the interface, points: that of the ticks of the arrows' legend.
+const SMALLEST: f32 = 11.0;
 /// Type of the caption, points.
 const CAPTION: f32 = 24.0;
 /// How much thicker arrows are.
@@ -90,7 +90,7 @@ impl App {
             .show(ui, |ui| {
                 leave = double_tapped(ui);
                 let row = egui::Layout::right_to_left(egui::Align::Center);
-                let size = vec2(ui.available_width(), ui.spacing().interact_size.y);
+                let size = vec2(ui.available_width(), theme::side(ui, transport::PLAY));
                 ui.allocate_ui_with_layout(size, row, |ui| {
                     let help =
                         "Back to the window with its panels (F5, Esc, double-tap on this bar)";

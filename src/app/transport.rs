@@ -16,7 +16,7 @@ const SCALES_WIDTH: f32 = 94.0;
 const SCALE_APART: f32 = 20.0;
 
 /// Size of the button that plays and pauses, points.
-const PLAY: f32 = 40.0;
+pub const PLAY: f32 = 40.0;
 
 /// The next scale of [`SCALES`] faster or slower than the present one.
 pub fn next_scale(scale: f64, faster: bool) -> f64 {
