@@ -2,7 +2,7 @@
 
 use super::document::{MAX_SI, Node, Section};
 use super::formula::read_formula;
-use super::points::{SHORTEST_PART, read_file, read_points};
+use super::points::{Graph, SHORTEST_PART, read_file, read_points};
 use super::*;
 
 /// Highest frequency of a harmonic drive, Hz.
@@ -311,17 +311,18 @@ fn read_table(text: &DriveText<'_, '_>) -> Result<DriveData, SceneError> {
     let repeats = section
         .get("repeat")
         .map_or(Ok(false), |node| node.flag())?;
+    let graph = Graph::motion(dimension, repeats);
     let points = match (section.get("points"), section.get("file")) {
         (Some(_), Some(file)) => {
             return Err(file.error("not allowed here: `points` are given as well"));
         }
-        (None, Some(file)) => read_file(&file, dimension, repeats)?,
+        (None, Some(file)) => read_file(&file, &graph)?,
         _ => {
             let like = match text.kind {
                 JointKind::Revolute => "[[\"0 s\", \"0 deg\"], [\"1 s\", \"10 deg\"]]",
                 _ => "[[\"0 s\", \"0 mm\"], [\"1 s\", \"10 mm\"]]",
             };
-            read_points(&section.require("points", like)?, dimension, repeats)?
+            read_points(&section.require("points", like)?, &graph)?
         }
     };
     Ok(DriveData::Points { points, repeats })

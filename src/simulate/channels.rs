@@ -27,6 +27,13 @@ impl Reading {
     pub fn read(&self, frame: &Frame) -> Option<f64> {
         self.take.value(frame, self.part, self.component)
     }
+
+    /// Lets `frame` ask for it, where frames have it only if asked.
+    pub fn ask(&self, frame: &mut Frame) {
+        if matches!(self.take, Take::Reaction(_)) {
+            frame.reactions.get_or_insert_default();
+        }
+    }
 }
 
 /// One recorded series.
@@ -179,12 +186,14 @@ fn parts_of(scene: &Scene, each: Each) -> Vec<(&str, Option<JointKind>)> {
     let elements = scene.elements.iter().map(|element| element.name.as_str());
     let driven = scene.joints.iter().filter(|joint| joint.drive.is_some());
     let moving = scene.joints.iter().filter(|joint| joint.has_coordinate());
+    let holding = scene.joints.iter().filter(|j| j.kind != JointKind::Free);
     let bodies = scene.bodies.iter().map(|body| body.name.as_str());
     match each {
         Each::Once => vec![("", None)],
         Each::Output => vec![(scene.bodies[scene.output.body].name.as_str(), None)],
         Each::Body => bodies.map(|name| (name, None)).collect(),
         Each::Coordinate => moving.map(|j| (j.name.as_str(), Some(j.kind))).collect(),
+        Each::Holding => holding.map(|j| (j.name.as_str(), Some(j.kind))).collect(),
         Each::Joint => joints.map(|name| (name, None)).collect(),
         Each::Drive => driven.map(|j| (j.name.as_str(), Some(j.kind))).collect(),
         Each::Element => elements.map(|name| (name, None)).collect(),

@@ -91,12 +91,22 @@ fn element_table() -> String {
         }
         for vector in kind.vectors {
             let (key, help, unit) = (vector.key, vector.help, si_unit(vector.dimension));
-            keys.push(format!(
-                "`{key}`: {help}, a vector in {unit} (0 if left out)"
-            ));
+            keys.push(match vector.upward {
+                true => {
+                    format!("`{key}`: {help}, a direction (against the file's gravity if left out)")
+                }
+                false => format!("`{key}`: {help}, a vector in {unit} (0 if left out)"),
+            });
         }
         for (key, help) in kind.rotations {
             keys.push(format!("`{key}`: {help}, a rotation (none if left out)"));
+        }
+        if let Some(curve) = kind.curve {
+            let [points, file] = curve.keys;
+            keys.push(format!("`{points}`: {}", curve.help));
+            keys.push(format!(
+                "`{file}`: instead of `{points}`: a CSV file beside the scene, two columns under a header with units"
+            ));
         }
         if let Some((key, help)) = kind.law {
             keys.push(format!("`{key}`: {help}, a law as of a drive"));
@@ -290,6 +300,36 @@ fn the_mass_on_a_spring_of_the_page_swings_about_its_rest() {
     let ledger = simulation.ledger().expect("is kept");
     assert!(ledger.damping_loss > 0.0 && ledger.external_work != 0.0);
     assert!(ledger.relative_residual().abs() < 1e-5, "{ledger:?}");
+}
+
+#[test]
+fn the_wheel_of_the_page_rides_over_its_bump() {
+    let scene = Scene::parse(&example("name = \"strut\""), None, &[]).expect("the example loads");
+    let mut simulation = Simulation::new(&scene).expect("the example starts");
+    let mut frame = Frame::default();
+    let (mut highest, mut most, mut least) = (0.0_f64, 0.0_f64, f64::INFINITY);
+    while simulation.time() < 1.0 {
+        let next = simulation.time() + 2e-3;
+        simulation.step_until(next).expect("it runs");
+        simulation.sample(simulation.time(), &mut frame);
+        let [ground, wheel] = frame.elements[1].points;
+        let force = frame.elements[1].force.z;
+        assert!(force == 0.0 || wheel.z - ground.z < 0.3);
+        highest = highest.max(ground.z);
+        (most, least) = (most.max(force), least.min(force));
+    }
+    assert!((highest - 0.04).abs() < 1e-4, "{highest}");
+    let weight = 320.0 * 9.81;
+    assert!(
+        most > 2.0 * weight && least < 0.5 * weight,
+        "{most} {least}"
+    );
+    let ledger = simulation.ledger().expect("is kept");
+    assert!(
+        ledger.drive_work > 0.0 && ledger.damping_loss > 0.0,
+        "{ledger:?}"
+    );
+    assert!(ledger.relative_residual().abs() < 1e-3, "{ledger:?}");
 }
 
 #[test]

@@ -4,7 +4,7 @@
 use Quantity as Q;
 use Take::{
     Angles, Axes, BodyAxes, Element, ElementValue, Given, Hinge, HingeCoordinate, Joint, JointAxes,
-    OtherAngles, OtherAxes, ProbeError, Slide, SlideCoordinate, Taken, Whole,
+    OtherAngles, OtherAxes, ProbeError, Reaction, Slide, SlideCoordinate, Taken, Whole,
 };
 
 use crate::scene::Vec3;
@@ -240,6 +240,8 @@ pub(super) enum Take {
     SlideCoordinate(usize),
     /// The same of each turning joint.
     HingeCoordinate(usize),
+    /// Of each joint that holds its child: the force on that, or the torque, along x, y, z.
+    Reaction(usize),
     /// Of each ball joint.
     Joint(fn(&JointReport) -> f64),
     /// Of each ball joint, along x, y, z.
@@ -271,6 +273,8 @@ pub(super) enum Each {
     Body,
     /// Joints that slide or turn.
     Coordinate,
+    /// These and fixed ones.
+    Holding,
     /// Ball joints.
     Joint,
     /// Driven joints.
@@ -291,15 +295,15 @@ impl Take {
             Axes(_) | Angles(_) => Each::Output,
             BodyAxes(_) | OtherAxes(_) | OtherAngles(_) => Each::Body,
             SlideCoordinate(_) | HingeCoordinate(_) => Each::Coordinate,
+            Reaction(_) => Each::Holding,
             Whole(..) | Given(..) | Taken(..) | ProbeError => Each::Once,
         }
     }
 
     pub(super) fn components(&self) -> Components {
         match self {
-            Axes(_) | BodyAxes(_) | OtherAxes(_) | JointAxes(_) | ProbeError | Element(_) => {
-                &[("x", "x"), ("y", "y"), ("z", "z")]
-            }
+            Axes(_) | BodyAxes(_) | OtherAxes(_) | JointAxes(_) | Reaction(_) | ProbeError
+            | Element(_) => &[("x", "x"), ("y", "y"), ("z", "z")],
             Angles(_) | OtherAngles(_) => &[("α", "alpha"), ("β", "beta"), ("γ", "gamma")],
             _ => &[("", "")],
         }
@@ -326,6 +330,10 @@ impl Take {
             }
             SlideCoordinate(order) | HingeCoordinate(order) => {
                 frame.coordinates.get(part).map(|c| c[*order])
+            }
+            Reaction(which) => {
+                let of_part = frame.reactions.as_ref()?.get(part)?;
+                Some(of_part[*which][component])
             }
             Joint(of) => frame.joints.get(part).map(of),
             JointAxes(of) => frame.joints.get(part).map(|joint| of(joint)[component]),
@@ -462,6 +470,9 @@ pub(super) const TABLE: &[Signal] = &[
     asked("@.rate", "@_rate_m_s", SlideCoordinate(1), "rate of the joint's coordinate"),
     asked("@.angle", "@_angle_rad", HingeCoordinate(0), "angle of the joint about its axis"),
     asked("@.rate", "@_rate_rad_s", HingeCoordinate(1), "rate of the joint's angle"),
+
+    asked("@.reaction.#", "@_reaction_#_N", Reaction(0), "force of the joint on its child, its drive's included"),
+    asked("@.reaction_torque.#", "@_reaction_torque_#_Nm", Reaction(1), "torque of the joint on its child about its joint point, its drive's included"),
 
     asked("@.gap", "@_gap_m", Joint(|joint| -joint.penetration), "gap between ball and socket wall; negative in contact"),
     asked("@.clearance", "@_clearance_m", Joint(|joint| joint.clearance), "radial clearance in force"),
