@@ -155,6 +155,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
             ))
         })?
     };
+    table.ask(&mut frame);
     if let (Some(times), Some(file)) = (&times, &file) {
         check_size(times.last.saturating_add(1), table.names().len())?;
         table.spool_beside(file.target())?;

@@ -136,6 +136,10 @@ pub(super) trait Equations: Send {
     /// Force (N) or torque (N m) of every actuator, given true accelerations in [`Self::motion`]. May change the loads.
     fn actuators(&mut self, model: &Model, gravity: &Vec3, out: &mut [f64]);
 
+    /// The motion, and force and torque about its centroid that the joint above each body exerts on it, actuators included,
+    /// after [`Self::actuators`]. Changes the loads.
+    fn joint_loads(&mut self) -> (&[Kinematics], &[Wrench]);
+
     /// Whether the force or torque of actuator `i` is unique.
     fn is_actuator_unique(&mut self, model: &Model, gravity: &Vec3, i: usize) -> bool;
 

@@ -246,6 +246,11 @@ impl Equations for Forest {
         self.find_drive_forces(model, gravity, |_| true, |drive, force| out[drive] = force);
     }
 
+    /// What drives need, every joint bears: the loads hold it for each body.
+    fn joint_loads(&mut self) -> (&[Kinematics], &[Wrench]) {
+        (&self.tree.motion, &self.tree.wrench)
+    }
+
     fn is_actuator_unique(&mut self, model: &Model, gravity: &Vec3, i: usize) -> bool {
         let Self { tree, constraints } = self;
         let Some(constraints) = constraints else {

@@ -506,6 +506,20 @@ impl Equations for Lagrange {
         }
     }
 
+    /// From the multipliers of the joints' rows, which come before those of the joints that close loops.
+    fn joint_loads(&mut self) -> (&[Kinematics], &[Wrench]) {
+        self.wrench.fill(Wrench::zero());
+        let cut = self.ideal_row.iter().chain(&self.closure_row).next();
+        let rows = &self.rows[..cut.copied().unwrap_or(self.rows.len())];
+        for ((row, &group), lambda) in rows.iter().zip(&self.group_of).zip(&self.multipliers) {
+            let [along, about] = row.child;
+            let load = &mut self.wrench[self.groups[group].child];
+            load.force += along * *lambda;
+            load.torque += about * *lambda;
+        }
+        (&self.motion, &self.wrench)
+    }
+
     fn is_actuator_unique(&mut self, _: &Model, _: &Vec3, i: usize) -> bool {
         self.matrix.is_unique(self.driver_row[i], 1)
     }

@@ -28,6 +28,7 @@ mod power;
 mod rows;
 mod settled;
 mod spcmm;
+mod spline;
 mod start;
 mod stiff;
 mod summary;
@@ -56,7 +57,7 @@ use elements::{ForceElement, SceneElement, elements_of};
 use equations::{Equations, LEAST_PIVOT};
 use forest::Forest;
 use lagrange::Lagrange;
-use model::Model;
+use model::{Model, Motion};
 use path::Path;
 use settled::Settled;
 use tree::Tree;
@@ -566,6 +567,20 @@ impl Mechanism {
         self.equations.actuators(&self.model, &self.gravity, out);
     }
 
+    /// Force, N, and torque about the child's joint point, N m, that every fixed, sliding or turning joint exerts on its child,
+    /// its drive's included, in the order of the scene, after [`Self::actuators`]. World axes.
+    pub fn joint_reactions(&mut self) -> impl Iterator<Item = [Vec3; 2]> {
+        let (motion, loads) = self.equations.joint_loads();
+        // The massless links of joints of two degrees pass on what their parents exert.
+        let bodies = &self.model.bodies[..self.model.massive];
+        let bodies = bodies.iter().zip(motion).zip(loads);
+        bodies.filter_map(|((body, m), load)| {
+            let arm = m.rotation * body.to_centroid;
+            let held = !matches!(body.motion, Motion::Free { .. });
+            held.then(|| [load.force, load.torque + arm.cross(&load.force)])
+        })
+    }
+
     /// Coordinates of all joints that slide or turn, with their rates, after an evaluation at `y`: those that bodies hang on, in
     /// the order of the scene, then those that close loops.
     pub fn coordinates(&self, y: &[f64]) -> impl Iterator<Item = [f64; 2]> {
@@ -586,20 +601,20 @@ impl Mechanism {
         (kinetic, potential)
     }
 
-    /// Energy stored in contacts and springs at the gaps last measured, J.
-    pub fn elastic_energy(&self) -> f64 {
+    /// Energy stored in contacts and springs at the gaps last measured, those at `t`, J.
+    pub fn elastic_energy(&self, t: f64) -> f64 {
         let motion = self.equations.motion();
         let mut energy = 0.0;
         for contact in self.contacts.loose() {
-            energy += contact.stored(motion);
+            energy += contact.stored(t, motion);
         }
-        energy + self.energy_in_elements()
+        energy + self.energy_in_elements(t)
     }
 
-    /// Energy stored in springs at the latest evaluation, J.
-    pub fn energy_in_elements(&self) -> f64 {
+    /// Energy stored in springs at the latest evaluation, that at `t`, J.
+    pub fn energy_in_elements(&self, t: f64) -> f64 {
         let motion = self.equations.motion();
-        self.elements.iter().map(|e| e.stored(motion)).sum()
+        self.elements.iter().map(|e| e.stored(t, motion)).sum()
     }
 
     /// Reports of the force elements at `t`, the time of the latest evaluation, in the order of the scene.

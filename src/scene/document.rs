@@ -371,9 +371,16 @@ impl<'d> Node<'d> {
 
     /// A number as its row says: a quantity of its dimension, in its range, SI.
     pub fn number(&self) -> Result<f64, SceneError> {
-        let dimension = self.dimension();
+        self.within(self.dimension(), self.row.range())
+    }
+
+    /// A quantity in a closed range, SI.
+    pub fn within(
+        &self,
+        dimension: Dimension,
+        (least, most): (f64, f64),
+    ) -> Result<f64, SceneError> {
         let value = self.quantity(dimension)?;
-        let (least, most) = self.row.range();
         if (least..=most).contains(&value) {
             return Ok(value);
         }

@@ -3,7 +3,7 @@
 use super::document::{Node, Section};
 use super::formula::read_formula;
 use super::key::{FileKey, FileTable, MAX_SI, Takes, key, many, number, positive};
-use super::points::{MOST_POINTS, SHORTEST_PART, read_file, read_points};
+use super::points::{Graph, MOST_POINTS, SHORTEST_PART, read_file, read_points};
 use super::*;
 
 /// Highest frequency of a harmonic drive, Hz.
@@ -256,12 +256,13 @@ fn read_table(section: &Section<'_>) -> Result<DriveData, SceneError> {
     let repeats = section
         .get("repeat")
         .map_or(Ok(false), |node| node.flag())?;
+    let graph = Graph::motion(coordinate(section), repeats);
     let points = match (section.get("points"), section.get("file")) {
         (Some(_), Some(file)) => {
             return Err(file.error("not allowed here: `points` are given as well"));
         }
-        (None, Some(file)) => read_file(&file, coordinate(section), repeats)?,
-        _ => read_points(&section.require("points")?, coordinate(section), repeats)?,
+        (None, Some(file)) => read_file(&file, &graph)?,
+        _ => read_points(&section.require("points")?, &graph)?,
     };
     Ok(DriveData::Points { points, repeats })
 }

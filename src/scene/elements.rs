@@ -6,6 +6,8 @@ use std::f64::consts::TAU;
 
 use super::document::{Node, Section};
 use super::drives::{FASTEST_DRIVE, read_drive};
+use super::key::MAX_SI;
+use super::points::{Axis, Graph, read_file, read_points};
 use super::read_joints::{read_attachment, read_one_degree_joint, read_rotation};
 use super::*;
 use crate::words::Words;
@@ -22,6 +24,7 @@ const PLAIN: ElementKind = ElementKind {
     vectors: &[],
     frame: "",
     rotations: &[],
+    curve: None,
     law: None,
     acts_by: &[],
     choices: &[],
@@ -45,12 +48,33 @@ const fn stiff(key: &'static str, dimension: Dimension, help: &'static str) -> E
         dimension,
         range: (0.0, LARGEST_FORCE),
         direction: false,
+        upward: false,
         help,
     }
 }
 
+/// Tension of a spring by its change of length.
+const SPRING_CURVE: CurveAxes = (
+    [("length", Dimension::Length), ("tension", Dimension::Force)],
+    "[[\"-10 mm\", \"-50 N\"], [0, 0], [\"10 mm\", \"80 N\"]]",
+);
+
+/// Force or torque of a joint spring by its joint's coordinate.
+const HINGE_CURVE: CurveAxes = (
+    [("angle", Dimension::Angle), ("torque", Dimension::Torque)],
+    "[[\"-10 deg\", \"-5 N m\"], [0, 0], [\"10 deg\", \"8 N m\"]]",
+);
+const SLIDE_CURVE: CurveAxes = (
+    [("position", Dimension::Length), ("force", Dimension::Force)],
+    SPRING_CURVE.1,
+);
+
+/// What a curve of a spring takes the place of.
+const INSTEAD_OF: &[&str] = &["stiffness", "preload"];
+const CURVE_KEYS: [&str; 2] = ["characteristic", "file"];
+
 /// Every kind of force element.
-pub static ELEMENT_KINDS: [ElementKind; 6] = [
+pub static ELEMENT_KINDS: [ElementKind; 7] = [
     ElementKind {
         section: "spring",
         help: "spring with a damper along the line between two points",
@@ -93,13 +117,21 @@ pub static ELEMENT_KINDS: [ElementKind; 6] = [
                 on_hinge: None,
             },
         ],
+        curve: Some(&ElementCurve {
+            keys: CURVE_KEYS,
+            slide: SPRING_CURVE,
+            hinge: SPRING_CURVE,
+            instead_of: INSTEAD_OF,
+            help: "tension over the change of the distance from `length`, 2 to 10000 of `[change, tension]`, in place of \
+                   `stiffness` and `preload`",
+        }),
         acts_by: &["stiffness", "damping", "preload"],
         choices: &[(
             "side",
             SpringSide::WORDS,
             "which way it acts: a tyre and a rubber buffer only push, a rope only pulls",
         )],
-        force: |spring| spring.number("preload").abs(),
+        force: |spring| spring.unstretched().abs(),
         look: ElementLook::Coil,
         ..PLAIN
     },
@@ -133,6 +165,7 @@ pub static ELEMENT_KINDS: [ElementKind; 6] = [
                 dimension: Dimension::Force,
                 range: (-LARGEST_FORCE, LARGEST_FORCE),
                 direction: true,
+                upward: false,
                 help: "force at the point",
             },
             ElementVector {
@@ -140,6 +173,7 @@ pub static ELEMENT_KINDS: [ElementKind; 6] = [
                 dimension: Dimension::Torque,
                 range: (-LARGEST_FORCE, LARGEST_FORCE),
                 direction: true,
+                upward: false,
                 help: "torque",
             },
         ],
@@ -196,8 +230,19 @@ pub static ELEMENT_KINDS: [ElementKind; 6] = [
                 on_hinge: on_hinge("preload", Dimension::Torque, "\"0.5 N m\""),
             },
         ],
+        curve: Some(&ElementCurve {
+            keys: CURVE_KEYS,
+            slide: SLIDE_CURVE,
+            hinge: HINGE_CURVE,
+            instead_of: INSTEAD_OF,
+            help: "force or torque, towards lower coordinates, over the coordinate from `position`, 2 to 10000 of \
+                   `[coordinate, force]`, in place of `stiffness` and `preload`",
+        }),
         acts_by: &["stiffness", "damping", "preload"],
-        force: |spring| spring.force_at_joint("preload"),
+        force: |spring| match spring.on_hinge {
+            true => 0.0,
+            false => spring.unstretched().abs(),
+        },
         look: ElementLook::Coil,
         ..PLAIN
     },
@@ -347,6 +392,56 @@ pub static ELEMENT_KINDS: [ElementKind; 6] = [
         fault: motor_fault,
         ..PLAIN
     },
+    ElementKind {
+        section: "tyre",
+        help: "tyre of a wheel on a ground that may move up and down: a spring with a damper along `up`, which only pushes",
+        points: &["on"],
+        numbers: &[
+            ElementNumber {
+                key: "radius",
+                dimension: Dimension::Length,
+                range: (1e-6, 1e3),
+                default: None,
+                like: "\"300 mm\"",
+                help: "height of the point `on`, the wheel's centre, over the ground at which it begins to push",
+                on_hinge: None,
+            },
+            ElementNumber {
+                key: "stiffness",
+                dimension: Dimension::Stiffness,
+                range: (0.0, LARGEST_FORCE),
+                default: None,
+                like: "\"200 kN/m\"",
+                help: "change of its force with the height",
+                on_hinge: None,
+            },
+            ElementNumber {
+                key: "damping",
+                dimension: Dimension::Damping,
+                range: (0.0, LARGEST_FORCE),
+                default: Some(0.0),
+                like: "\"200 N s/m\"",
+                help: "change of its force with the rate of the height",
+                on_hinge: None,
+            },
+        ],
+        vectors: &[ElementVector {
+            key: "up",
+            dimension: Dimension::None,
+            range: (-1.0, 1.0),
+            direction: true,
+            upward: true,
+            help: "which way is up",
+        }],
+        law: Some((
+            "ground",
+            "height of the ground, along `up` from the world's origin; at rest there if left out",
+        )),
+        acts_by: &["stiffness"],
+        fault: tyre_fault,
+        look: ElementLook::Ground,
+        ..PLAIN
+    },
 ];
 
 fn stop_fault(stop: &Element) -> Option<(&'static str, String)> {
@@ -384,6 +479,12 @@ fn motor_fault(motor: &Element) -> Option<(&'static str, String)> {
     Some(("target", why.to_owned()))
 }
 
+fn tyre_fault(tyre: &Element) -> Option<(&'static str, String)> {
+    let why = "a ground follows a law of its own, not that of the scene's sliders";
+    let slider = tyre.law.as_ref()?.slider();
+    slider.map(|_| ("ground", why.to_owned()))
+}
+
 impl Element {
     /// Magnitude of a number that is a force on a slide and a torque on a hinge, N: 0 on a hinge.
     fn force_at_joint(&self, key: &str) -> f64 {
@@ -392,6 +493,63 @@ impl Element {
             false => self.number(key).abs(),
         }
     }
+
+    /// Tension of a spring at the length, or the coordinate, from which its change counts, N or N m: of a curve, about that.
+    fn unstretched(&self) -> f64 {
+        let Some(points) = &self.curve else {
+            return self.number("preload");
+        };
+        let next = points.partition_point(|point| point[0] < 0.0);
+        let next = next.clamp(1, points.len() - 1);
+        let ([x0, y0], [x1, y1]) = (points[next - 1], points[next]);
+        y0 - x0 * (y1 - y0) / (x1 - x0)
+    }
+}
+
+/// The curve of `row`, if `section` gives one.
+fn read_curve(
+    section: &Section<'_>,
+    row: &ElementCurve,
+    on_hinge: bool,
+) -> Result<Option<Vec<[f64; 2]>>, SceneError> {
+    let (axes, _) = if on_hinge { row.hinge } else { row.slide };
+    let most = [MAX_SI, LARGEST_FORCE];
+    let axis = |i: usize| Axis {
+        name: axes[i].0,
+        dimension: axes[i].1,
+        most: most[i],
+    };
+    let (least, unit) = match on_hinge {
+        true => (1e-9, "1e-9 rad"),
+        false => (1e-9, "1 nm"),
+    };
+    let graph = Graph {
+        axes: [axis(0), axis(1)],
+        rise: (least, unit),
+        repeats: false,
+    };
+    let [points, file] = row.keys;
+    let found = match (section.get(points), section.get(file)) {
+        (Some(_), Some(node)) => {
+            return Err(node.error(format!("not allowed here: `{points}` is given as well")));
+        }
+        (Some(node), None) => read_points(&node, &graph)?,
+        (None, Some(node)) => read_file(&node, &graph)?,
+        (None, None) => return Ok(None),
+    };
+    for key in row.instead_of {
+        section.refuse(
+            key,
+            &format!("`{points}`, or its `{file}`, says what the spring exerts"),
+        )?;
+    }
+    Ok(Some(found))
+}
+
+/// Upwards, against the gravity that the file gives; `None` if it gives none.
+fn up_of(scene: &Scene) -> Option<Vec3> {
+    let size = scene.gravity.amax();
+    (size > 0.0).then(|| -(scene.gravity / size).normalize())
 }
 
 /// One element of `kind`; `bodies` and `joints` map names to indices in the sorted scene.
@@ -474,7 +632,14 @@ pub(super) fn read_element<'d>(
         !own || !choices.contains(&LoadAxes::Body.word())
     });
     let vector = |row: &ElementVector| {
-        let value = section.vector(row.key)?;
+        if row.upward && section.get(row.key).is_none() {
+            let why = "missing; without gravity only the file can say which way is up: write for example `up = [0, 0, 1]`";
+            return up_of(scene).ok_or_else(|| section.error(row.key, why));
+        }
+        let value = match row.upward {
+            true => section.require(row.key)?.direction()?,
+            false => section.vector(row.key)?,
+        };
         let turns = turns.filter(|_| row.direction);
         Ok(turns.map_or(value, |copy| copy.direction(value)))
     };
@@ -505,8 +670,10 @@ pub(super) fn read_element<'d>(
         .iter()
         .map(rotation)
         .collect::<Result<_, SceneError>>()?;
-    let law = kind.law.and_then(|(key, _)| section.get(key)).zip(joint);
-    let law = law.map(|(node, joint)| read_drive(&node, joint.kind, scene));
+    let curve = kind.curve.map(|row| read_curve(&section, row, on_hinge));
+    let law = kind.law.and_then(|(key, _)| section.get(key));
+    let of_joint = joint.map_or(JointKind::Prismatic, |joint| joint.kind);
+    let law = law.map(|node| read_drive(&node, of_joint, scene));
     let element = Element {
         name,
         kind,
@@ -516,6 +683,7 @@ pub(super) fn read_element<'d>(
         numbers,
         vectors,
         rotations,
+        curve: curve.transpose()?.flatten(),
         law: law.transpose()?,
         choices,
     };
@@ -523,7 +691,8 @@ pub(super) fn read_element<'d>(
         true => element.number(key) != 0.0,
         false => element.vector(key) != Vec3::zeros(),
     };
-    if !kind.acts_by.iter().any(acts) {
+    let curved = element.curve.iter().flatten().any(|point| point[1] != 0.0);
+    if !curved && !kind.acts_by.iter().any(acts) {
         let own = |key: &&'static str| {
             let number = kind.numbers.iter().find(|number| number.key == *key);
             number.map_or(*key, |number| number.on(on_hinge).0)

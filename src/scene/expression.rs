@@ -262,6 +262,32 @@ impl Program {
         stack[0]
     }
 
+    /// The same with `values` for all variables but the first, and what is then constant computed.
+    ///
+    /// # Panics
+    /// As [`Self::eval`].
+    pub fn bound(&self, values: &[f64]) -> Self {
+        let mut steps: Vec<Step> = Vec::new();
+        for &step in &self.steps {
+            let step = match step {
+                Step::Variable(index @ 1..) => Step::Constant(values[index - 1]),
+                step => step,
+            };
+            match (step, &mut steps[..]) {
+                (Step::Unary(operation), [.., Step::Constant(x)]) => *x = x.unary(operation),
+                (Step::Binary(operation), [.., Step::Constant(x), Step::Constant(y)]) => {
+                    *x = x.binary(operation, *y);
+                    steps.pop();
+                }
+                _ => steps.push(step),
+            }
+        }
+        Self {
+            steps,
+            kink: self.kink,
+        }
+    }
+
     /// A function in it whose derivatives jump.
     pub fn kink(&self) -> Option<&'static str> {
         self.kink

@@ -9,6 +9,7 @@ use super::elements::ELEMENT_KINDS;
 use super::key::{
     Absent, FileKey, FileTable, Many, Takes, Variants, key, many, number, positive, vector,
 };
+use super::points::MOST_POINTS;
 use super::read_bodies::{Form, MAX_DENSITY, MAX_MASS};
 use super::table::{contact_rows, find};
 use super::units::Dimension as D;
@@ -925,8 +926,13 @@ fn of_element(kind: &'static ElementKind) -> FileTable {
         }
     }
     let vector = |row: &'static ElementVector| {
+        let frame = kind.frame;
+        if row.upward {
+            let up = key(row.key, Takes::Direction, "[0, 0, 1]", row.help);
+            return up.absent("against the file's gravity").frame(frame);
+        }
         let takes = Takes::Vector(row.dimension, row.range);
-        key(row.key, takes, "", row.help).zero().frame(kind.frame)
+        key(row.key, takes, "", row.help).zero().frame(frame)
     };
     keys.extend(kind.vectors.iter().map(vector));
     let rotation = |&(name, help): &(&'static str, &'static str)| {
@@ -934,6 +940,23 @@ fn of_element(kind: &'static ElementKind) -> FileTable {
         key(name, Takes::Table(&ROTATION), like, help).zero()
     };
     keys.extend(kind.rotations.iter().map(rotation));
+    if let Some(curve) = kind.curve {
+        let [points, file] = curve.keys;
+        let pairs = |(axes, _): CurveAxes| {
+            let dimensions = axes.map(|(_, dimension)| dimension);
+            Takes::Pairs(dimensions, many(MOST_POINTS, "points"))
+        };
+        let absent = "`stiffness` and `preload` hold";
+        let row = key(points, pairs(curve.slide), curve.slide.1, curve.help).absent(absent);
+        let (hinge, like) = curve.hinge;
+        keys.push(if like == curve.slide.1 {
+            row
+        } else {
+            row.on_hinge(hinge[1].1, like)
+        });
+        let help = "instead of the points: a CSV file beside the scene, two columns under a header with units";
+        keys.push(key(file, Takes::File, "\"coil.csv\"", help).absent(absent));
+    }
     let law = kind.law.map(|(name, help)| {
         let like = "{ law = \"constant\", velocity = \"10 mm/s\" }";
         key(name, Takes::Table(&DRIVE), like, help).absent("none")

@@ -92,9 +92,11 @@ pub(super) fn read_formula(
     dimension: Dimension,
 ) -> Result<(Program, f64), SceneError> {
     let text = node.text()?;
-    let variable = |name: &str| (name == "t").then_some(0);
-    let program = Program::parse(text, variable, &["t"])
-        .map_err(|error| within(node, text, error.at, &error.to_string()))?;
+    let document = node.document;
+    let (program, of_quantities) = document
+        .reading
+        .formula(text, dimension, document.copy)
+        .map_err(|(at, why)| within(node, text, at, &why))?;
     if let Some(function) = program.kink() {
         let at = text.find(function).unwrap_or(0);
         let message = format!(
@@ -105,6 +107,10 @@ pub(super) fn read_formula(
     }
     let scale = match unit {
         None => 1.0,
+        Some(unit) if of_quantities => {
+            let why = "not allowed here: a formula with quantities has its own unit; a parameter without one is a number";
+            return Err(unit.error(why));
+        }
         Some(unit) => {
             let one = format!("1 {}", unit.text()?);
             parse_quantity(&one, dimension).map_err(|error| unit.error(error.to_string()))?

@@ -625,9 +625,29 @@ pub struct ElementVector {
     pub range: (f64, f64),
     /// Whether it points somewhere; else its components belong to three axes.
     pub direction: bool,
+    /// Whether it is a unit vector, opposite to the gravity of the file where that gives none; else it is 0 there.
+    pub upward: bool,
     /// What it is.
     pub help: &'static str,
 }
+
+/// A curve of an element: a number that depends on another, through points.
+#[derive(Debug)]
+pub struct ElementCurve {
+    /// Keys: of its points, and of a file with them.
+    pub keys: [&'static str; 2],
+    /// Names and dimensions of both numbers, and an example.
+    pub slide: CurveAxes,
+    /// The same on a hinge.
+    pub hinge: CurveAxes,
+    /// Numbers that it takes the place of.
+    pub instead_of: &'static [&'static str],
+    /// What it is.
+    pub help: &'static str,
+}
+
+/// Names and dimensions of the two numbers of a curve, and an example of its points.
+pub type CurveAxes = ([(&'static str, Dimension); 2], &'static str);
 
 /// Joints that an element may act on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -645,6 +665,8 @@ pub enum ElementLook {
     Coil,
     /// An arrow for its force.
     Arrow,
+    /// A disc on the ground at its first point.
+    Ground,
     /// Nothing.
     Hidden,
 }
@@ -737,13 +759,15 @@ pub struct ElementKind {
     pub joint: Option<ElementJoint>,
     /// Its numbers.
     pub numbers: &'static [ElementNumber],
-    /// Its vectors, 0 if the file gives none.
+    /// Its vectors.
     pub vectors: &'static [ElementVector],
     /// The frame of their components.
     pub frame: &'static str,
     /// Its orientations, none if the file gives none: key, help.
     pub rotations: &'static [(&'static str, &'static str)],
-    /// A law of time for its joint's coordinate, as of a drive, if it may have one: key, help.
+    /// A curve in place of some of its numbers, if it may have one.
+    pub curve: Option<&'static ElementCurve>,
+    /// A law of time, as of a drive, for its joint's coordinate or else for a length, if it may have one: key, help.
     pub law: Option<(&'static str, &'static str)>,
     /// Numbers and vectors of which at least one is needed for it to have any effect.
     pub acts_by: &'static [&'static str],
@@ -773,6 +797,8 @@ pub struct Element {
     pub(super) numbers: Vec<f64>,
     pub(super) vectors: Vec<Vec3>,
     pub(super) rotations: Vec<Quat>,
+    /// Points of the curve of its row, SI, in order, if it has one.
+    pub curve: Option<Vec<[f64; 2]>>,
     /// The law of its row.
     pub law: Option<Drive>,
     pub(super) choices: Vec<&'static str>,

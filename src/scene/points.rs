@@ -1,4 +1,4 @@
-//! Points of a motion: instants and coordinates, from the scene or from a CSV file beside it.
+//! Points of a motion or of a curve: pairs of numbers of which the first rises, from the scene or from a CSV file beside it.
 
 use std::ops::Range;
 
@@ -15,36 +15,93 @@ const CLOSED: f64 = 1e-9;
 
 type Points = Vec<[f64; 2]>;
 
+/// One of the two numbers of a point.
+#[derive(Clone, Copy)]
+pub(super) struct Axis {
+    pub name: &'static str,
+    pub dimension: Dimension,
+    /// Largest, SI.
+    pub most: f64,
+}
+
+impl Axis {
+    /// `a time`.
+    fn article(self) -> String {
+        let article = if self.name.starts_with('a') {
+            "an"
+        } else {
+            "a"
+        };
+        format!("{article} {}", self.name)
+    }
+}
+
+/// What points are read.
+#[derive(Clone, Copy)]
+pub(super) struct Graph {
+    pub axes: [Axis; 2],
+    /// Least rise of the first number from one point to the next, SI, and in words.
+    pub rise: (f64, &'static str),
+    /// Whether they are a period.
+    pub repeats: bool,
+}
+
+impl Graph {
+    /// A motion, whose coordinate has this dimension.
+    pub fn motion(dimension: Dimension, repeats: bool) -> Self {
+        let axis = |name, dimension| Axis {
+            name,
+            dimension,
+            most: MAX_SI,
+        };
+        Self {
+            axes: [axis("time", Dimension::Time), axis("position", dimension)],
+            rise: (SHORTEST_PART, "1 us"),
+            repeats,
+        }
+    }
+
+    /// Whether the latest point comes after the one before.
+    fn check_rise(&self, points: &[[f64; 2]]) -> Result<(), String> {
+        let (least, words) = self.rise;
+        match points {
+            [.., [before, _], [now, _]] if !(now - before >= least) => Err(format!(
+                "{}s must rise, by at least {words} from one point to the next",
+                self.axes[0].name
+            )),
+            _ => Ok(()),
+        }
+    }
+}
+
 /// Points that are written in the scene.
-pub(super) fn read_points(
-    node: &Node<'_>,
-    dimension: Dimension,
-    repeats: bool,
-) -> Result<Points, SceneError> {
+pub(super) fn read_points(node: &Node<'_>, graph: &Graph) -> Result<Points, SceneError> {
+    let [first, second] = graph.axes;
     let nodes = node.entries()?;
     let mut points = Points::new();
     for point in &nodes {
         let pair = point.elements()?;
-        let [time, place] = &pair[..] else {
+        let [x, y] = &pair[..] else {
             return Err(point.error(format!(
-                "needs a time and a position, has {} values",
+                "needs {} and {}, has {} values",
+                first.article(),
+                second.article(),
                 pair.len()
             )));
         };
-        points.push([time.quantity(Dimension::Time)?, place.quantity(dimension)?]);
-        check_time(&points).map_err(|why| time.error(why))?;
+        let value =
+            |node: &Node<'_>, axis: Axis| node.within(axis.dimension, (-axis.most, axis.most));
+        points.push([value(x, first)?, value(y, second)?]);
+        graph.check_rise(&points).map_err(|why| x.error(why))?;
     }
-    close(&mut points, repeats).map_err(|why| node.error(why))?;
+    close(&mut points, graph.repeats).map_err(|why| node.error(why))?;
     Ok(points)
 }
 
 /// Points of a CSV file: two columns under a header such as `time_s,position_mm` or `t [s]; z [mm]`. Lines that are empty or
 /// begin with `#` do not count.
-pub(super) fn read_file(
-    node: &Node<'_>,
-    dimension: Dimension,
-    repeats: bool,
-) -> Result<Points, SceneError> {
+pub(super) fn read_file(node: &Node<'_>, graph: &Graph) -> Result<Points, SceneError> {
+    let [first, second] = graph.axes;
     let name = node.text()?;
     let beside = node.document.beside;
     let text = beside.text(name).map_err(|why| node.error(why))?;
@@ -64,20 +121,22 @@ pub(super) fn read_file(
             continue;
         }
         let cells = cells(&text, span.clone());
-        let [time, place] = &cells[..] else {
+        let [x, y] = &cells[..] else {
             let message = format!(
-                "needs two columns, time and position, between them a comma, a semicolon or a tab; has {}",
+                "needs two columns, {} and {}, between them a comma, a semicolon or a tab; has {}",
+                first.name,
+                second.name,
                 cells.len()
             );
             return Err(file.error(span, "", None, message));
         };
-        let Some((of_time, of_place)) = columns else {
-            let column = |cell: &Range<usize>, dimension| {
+        let Some((of_x, of_y)) = columns else {
+            let column = |cell: &Range<usize>, axis| {
                 let header = text[cell.clone()].trim_start_matches('\u{feff}');
-                let column = Column::new(header, dimension);
+                let column = Column::new(header, axis);
                 column.map_err(|why| file.error(cell.clone(), "", None, why))
             };
-            columns = Some((column(time, Dimension::Time)?, column(place, dimension)?));
+            columns = Some((column(x, first)?, column(y, second)?));
             continue;
         };
         let value = |cell: &Range<usize>, column: Column<'_>| {
@@ -85,14 +144,15 @@ pub(super) fn read_file(
             let fault = |why| file.error(cell.clone(), column.header, Some(number), why);
             column.read(number).map_err(fault)
         };
-        points.push([value(time, of_time)?, value(place, of_place)?]);
+        points.push([value(x, of_x)?, value(y, of_y)?]);
         if points.len() > MOST_POINTS {
             let message = format!("too many points; allowed at most {MOST_POINTS}");
             return Err(file.error(span, "", None, message));
         }
-        check_time(&points).map_err(|why| file.error(time.clone(), "", None, why))?;
+        let fault = |why| file.error(x.clone(), "", None, why);
+        graph.check_rise(&points).map_err(fault)?;
     }
-    close(&mut points, repeats).map_err(|why| node.error(why))?;
+    close(&mut points, graph.repeats).map_err(|why| node.error(why))?;
     Ok(points)
 }
 
@@ -114,12 +174,13 @@ fn cells(text: &str, line: Range<usize>) -> Vec<Range<usize>> {
 struct Column<'t> {
     header: &'t str,
     unit: &'t str,
-    dimension: Dimension,
+    axis: Axis,
 }
 
 impl<'t> Column<'t> {
     /// With the unit in its header: in brackets, or after the last underscore.
-    fn new(header: &'t str, dimension: Dimension) -> Result<Self, String> {
+    fn new(header: &'t str, axis: Axis) -> Result<Self, String> {
+        let dimension = axis.dimension;
         let bracketed = |open: char, close: char| {
             let inner = header.strip_suffix(close)?;
             Some(inner.rsplit_once(open)?.1.trim())
@@ -129,15 +190,13 @@ impl<'t> Column<'t> {
             .or_else(|| Some(header.rsplit_once('_')?.1));
         let known = |unit: &&str| parse_quantity(&format!("1 {unit}"), dimension).is_ok();
         match unit.filter(known) {
-            Some(unit) => Ok(Self {
-                header,
-                unit,
-                dimension,
-            }),
+            Some(unit) => Ok(Self { header, unit, axis }),
             None => {
                 let example = match dimension {
                     Dimension::Time => "time_s",
                     Dimension::Angle => "angle_deg",
+                    Dimension::Force => "force_N",
+                    Dimension::Torque => "torque [N m]",
                     _ => "position_mm",
                 };
                 Err(format!(
@@ -153,25 +212,17 @@ impl<'t> Column<'t> {
         if number.parse::<f64>().is_err() {
             return Err("is not a number; its unit stands in the header".to_owned());
         }
-        match parse_quantity(&format!("{number} {}", self.unit), self.dimension) {
-            Ok(value) if value.abs() <= MAX_SI => Ok(value),
+        let Axis {
+            dimension, most, ..
+        } = self.axis;
+        match parse_quantity(&format!("{number} {}", self.unit), dimension) {
+            Ok(value) if value.abs() <= most => Ok(value),
             Ok(_) => {
-                let limit = format_quantity(MAX_SI, si_unit(self.dimension));
+                let limit = format_quantity(most, si_unit(dimension));
                 Err(format!("out of range; allowed -{limit} to {limit}"))
             }
             Err(error) => Err(error.to_string()),
         }
-    }
-}
-
-/// Whether the latest point comes after the one before.
-fn check_time(points: &[[f64; 2]]) -> Result<(), String> {
-    match points {
-        [.., [before, _], [now, _]] if !(now - before >= SHORTEST_PART) => Err(format!(
-            "times must rise, by at least {} us from one point to the next",
-            1e6 * SHORTEST_PART
-        )),
-        _ => Ok(()),
     }
 }
 

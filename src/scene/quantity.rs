@@ -32,6 +32,16 @@ impl Quantity {
         }
     }
 
+    /// Its SI value, whatever its dimension.
+    pub fn value(&self) -> f64 {
+        self.value
+    }
+
+    /// Whether it is a number without a unit.
+    pub fn is_pure(&self) -> bool {
+        matches!(self.powers, Ok([0, 0, 0, 0]))
+    }
+
     /// Its SI value if it has this dimension. Radians come and go in products (omega r, 2 pi f) unless `exact`; a bare number for
     /// an angle would be a slip.
     ///

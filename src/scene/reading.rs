@@ -60,18 +60,9 @@ impl<'d> Reading<'d> {
         };
         let plain = plain(text);
         let own = self.own.borrow();
-        let mut names: Vec<&str> = own.keys().map(String::as_str).collect();
-        let mut values: Vec<Quantity> = own.values().copied().collect();
-        if let Some(copy) = copy {
-            names.push("i");
-            values.push(Quantity::constant(f64::from(copy.number)));
-        }
+        let (names, mut values) = named(&own, copy);
         let first_unit = values.len();
-        let units = self.units.get_or_init(|| {
-            let unit = |(_, of, size)| Quantity::new(size, of);
-            all_units().map(unit).collect()
-        });
-        values.extend(units);
+        values.extend(self.units());
         let program = Program::parse_with_units(
             &plain,
             |name| names.iter().position(|own| *own == name),
@@ -95,6 +86,58 @@ impl<'d> Reading<'d> {
         }
     }
 
+    /// The expression `text` of the time t, s, with the scene's own parameters as they are now, and whether it is one of
+    /// quantities: if a parameter in it has a unit, or a number, then t is a time, and its value has this `dimension`.
+    /// Otherwise all are pure numbers.
+    ///
+    /// # Errors
+    /// What is wrong with it, and at which byte.
+    pub fn formula(
+        &self,
+        text: &str,
+        dimension: Dimension,
+        copy: Option<&Copy>,
+    ) -> Result<(Program, bool), (usize, String)> {
+        let own = self.own.borrow();
+        let (mut names, mut values) = named(&own, copy);
+        names.insert(0, "t");
+        values.insert(0, Quantity::new(0.0, Dimension::Time));
+        let first_unit = values.len();
+        values.extend(self.units());
+        let variable = |name: &str| names.iter().position(|of| *of == name);
+        let numbers: Vec<f64> = values[1..].iter().map(Quantity::value).collect();
+        let bare = Program::parse(text, variable, &names);
+        let has_unit = |program: &Program| {
+            (1..first_unit).any(|own| program.uses(own) && !values[own].is_pure())
+        };
+        if let Ok(program) = &bare
+            && !has_unit(program)
+        {
+            return Ok((program.bound(&numbers), false));
+        }
+        let spelt = plain(text);
+        let unit = |rest: &str| {
+            let (length, place) = unit_at_start(rest)?;
+            Some((length, first_unit + place))
+        };
+        match Program::parse_with_units(&spelt, variable, &names, unit) {
+            Ok(program) => match program.eval(&values).of(dimension, false) {
+                Ok(_) => Ok((program.bound(&numbers), true)),
+                Err(why) => Err((0, why)),
+            },
+            // Without units in it, the first error knows better.
+            Err(wrong) => Err(bare.err().unwrap_or(wrong)).map_err(|e| (e.at, e.to_string())),
+        }
+    }
+
+    /// The sizes of [`all_units`].
+    fn units(&self) -> &[Quantity] {
+        self.units.get_or_init(|| {
+            let unit = |(_, of, size)| Quantity::new(size, of);
+            all_units().map(unit).collect()
+        })
+    }
+
     /// Adds the scene's own parameter `name`, for expressions that follow.
     pub fn own(&self, name: &str, value: f64, dimension: Dimension) {
         let value = Quantity::new(value, dimension);
@@ -110,6 +153,20 @@ impl<'d> Reading<'d> {
     pub fn numbers(&self) -> BTreeMap<String, FileNumber> {
         self.numbers.take()
     }
+}
+
+/// Names and values that expressions may use: the scene's own parameters, and the number of a pattern's copy.
+fn named<'a>(
+    own: &'a BTreeMap<String, Quantity>,
+    copy: Option<&Copy>,
+) -> (Vec<&'a str>, Vec<Quantity>) {
+    let mut names: Vec<&str> = own.keys().map(String::as_str).collect();
+    let mut values: Vec<Quantity> = own.values().copied().collect();
+    if let Some(copy) = copy {
+        names.push("i");
+        values.push(Quantity::constant(f64::from(copy.number)));
+    }
+    (names, values)
 }
 
 /// Whether a text is more than a number with its unit.

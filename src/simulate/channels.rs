@@ -7,7 +7,7 @@ pub use choice::{Listed, NoChannel, channels_of, chosen_columns};
 pub use table::{PlotKind, Quantity};
 
 use super::Frame;
-use crate::scene::{Freedom, Joint, Scene};
+use crate::scene::{Freedom, Joint, JointKind, Scene};
 use table::{Each, Signal, TABLE, Take};
 
 /// Ball joints and drives that are recorded; in a longer chain the rest would cost more memory than it is worth.
@@ -26,6 +26,13 @@ impl Reading {
     #[inline]
     pub fn read(&self, frame: &Frame) -> Option<f64> {
         self.take.value(frame, self.part, self.component)
+    }
+
+    /// Lets `frame` ask for it, where frames have it only if asked.
+    pub fn ask(&self, frame: &mut Frame) {
+        if matches!(self.take, Take::Reaction(_)) {
+            frame.reactions.get_or_insert_default();
+        }
     }
 }
 
@@ -180,6 +187,7 @@ fn parts_of(scene: &Scene, each: Each) -> Vec<(&str, Option<Freedom>)> {
     let driven = scene.joints.iter().filter(|joint| joint.drive.is_some());
     let moving = scene.joints.iter().chain(&scene.closing_joints);
     let coordinates = |joint: &'_ Joint| joint.kind.freedoms().iter().map(|freedom| Some(*freedom));
+    let holding = scene.joints.iter().filter(|j| j.kind != JointKind::Free);
     let bodies = scene.bodies.iter().map(|body| body.name.as_str());
     match each {
         Each::Once => vec![("", None)],
@@ -188,6 +196,7 @@ fn parts_of(scene: &Scene, each: Each) -> Vec<(&str, Option<Freedom>)> {
         Each::Coordinate => moving
             .flat_map(|j| coordinates(j).map(|freedom| (j.name.as_str(), freedom)))
             .collect(),
+        Each::Holding => holding.map(|j| (j.name.as_str(), None)).collect(),
         Each::Joint => joints.map(|name| (name, None)).collect(),
         Each::Drive => driven
             .flat_map(|j| coordinates(j).map(|freedom| (j.name.as_str(), freedom)))

@@ -24,6 +24,9 @@ pub struct Frame {
     pub coordinates: Vec<[f64; 2]>,
     /// Driven joints in scene order: actuator force, N (or torque, N m), positive along the joint axis's positive sense.
     pub actuators: Vec<f64>,
+    /// Fixed, sliding and turning joints in scene order: force, N, and torque about the child's joint point, N m, on the child,
+    /// its drive's included. Filled only in a frame that asks for it: one that has a list here.
+    pub reactions: Option<Vec<[Vec3; 2]>>,
     /// The output body.
     pub pose: Pose,
     /// Kinetic energy of all bodies, J.

@@ -34,7 +34,7 @@ pub(super) fn fill(
         out.joints
             .push(joint_report(mechanism, joint, &memory[j], j));
     }
-    out.elastic = mechanism.elastic_energy();
+    out.elastic = mechanism.elastic_energy(time);
     out.elements.clear();
     out.elements.extend(mechanism.element_reports(time));
     let (kinetic, gravitational) = mechanism.energies();
@@ -45,6 +45,10 @@ pub(super) fn fill(
     out.coordinates.extend(mechanism.coordinates(y));
     out.actuators.resize(mechanism.drives(), 0.0);
     mechanism.actuators(&mut out.actuators);
+    if let Some(reactions) = &mut out.reactions {
+        reactions.clear();
+        reactions.extend(mechanism.joint_reactions());
+    }
 }
 
 fn joint_report(

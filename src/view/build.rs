@@ -9,6 +9,7 @@ use super::arrows::{ARROW_LENGTH, push_arrow, push_forces};
 use super::cast::{cast, room};
 use super::coil::push_coil;
 use super::drawn::{self, BarKind, DrawnJoint, DrawnShape, Solid};
+use super::ground::push_ground;
 use super::instances::{self, bar, placed, push_label};
 use super::theme::Material;
 use super::{
@@ -45,6 +46,8 @@ const HALO: f32 = 1.7;
 const CLEAR_BALL: f32 = 0.25;
 /// Radius of a drawn spring, in radii of the scene.
 const COIL: f32 = 0.025;
+/// Radius of the ring that marks the ground under a tyre, in the same.
+const GROUND: f32 = 0.12;
 
 impl SceneView {
     /// Prepares the meshes and bounds of `scene`; `frame` is any frame of it, preferably the first.
@@ -270,11 +273,20 @@ impl SceneView {
             .sort_by(|a, b| distance(b).total_cmp(&distance(a)));
 
         for (element, report) in scene.elements.iter().zip(&frame.elements) {
-            if element.kind.look == ElementLook::Coil {
-                let [from, to] = report.points.map(|point| to_f32(&point));
-                let (radius, width) = (COIL * self.bounds.radius, 2.2 * shot.pixels_per_point);
-                let colour = palette.material(Role::Pin).colour;
-                push_coil(from, to, radius, width, colour, &mut out.lines);
+            let [from, to] = report.points.map(|point| to_f32(&point));
+            let width = 2.2 * shot.pixels_per_point;
+            let colour = palette.material(Role::Pin).colour;
+            match element.kind.look {
+                ElementLook::Coil => {
+                    let radius = COIL * self.bounds.radius;
+                    push_coil(from, to, radius, width, colour, &mut out.lines);
+                }
+                ElementLook::Ground => {
+                    let up = to_f32(&element.vector("up"));
+                    let radius = GROUND * self.bounds.radius;
+                    push_ground(from, up, radius, width, colour, &mut out.lines);
+                }
+                ElementLook::Arrow | ElementLook::Hidden => {}
             }
         }
         push_forces(shot, &joints, &palette, out);

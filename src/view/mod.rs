@@ -19,6 +19,7 @@ mod drawn;
 #[cfg(test)]
 pub(crate) mod fixture;
 mod ghost;
+mod ground;
 mod instances;
 mod options;
 mod peaks;

@@ -212,6 +212,36 @@ fn the_mass_on_a_spring_of_the_page_swings_about_its_rest() {
 }
 
 #[test]
+fn the_wheel_of_the_page_rides_over_its_bump() {
+    let scene = Scene::parse(&example("name = \"strut\""), None, &[]).expect("the example loads");
+    let mut simulation = Simulation::new(&scene).expect("the example starts");
+    let mut frame = Frame::default();
+    let (mut highest, mut most, mut least) = (0.0_f64, 0.0_f64, f64::INFINITY);
+    while simulation.time() < 1.0 {
+        let next = simulation.time() + 2e-3;
+        simulation.step_until(next).expect("it runs");
+        simulation.sample(simulation.time(), &mut frame);
+        let [ground, wheel] = frame.elements[1].points;
+        let force = frame.elements[1].force.z;
+        assert!(force == 0.0 || wheel.z - ground.z < 0.3);
+        highest = highest.max(ground.z);
+        (most, least) = (most.max(force), least.min(force));
+    }
+    assert!((highest - 0.04).abs() < 1e-4, "{highest}");
+    let weight = 320.0 * 9.81;
+    assert!(
+        most > 2.0 * weight && least < 0.5 * weight,
+        "{most} {least}"
+    );
+    let ledger = simulation.ledger().expect("is kept");
+    assert!(
+        ledger.drive_work > 0.0 && ledger.damping_loss > 0.0,
+        "{ledger:?}"
+    );
+    assert!(ledger.relative_residual().abs() < 1e-3, "{ledger:?}");
+}
+
+#[test]
 fn the_flap_of_the_page_opens_against_its_stop_and_shuts() {
     let scene = Scene::parse(&example("name = \"flap\""), None, &[]).expect("the example loads");
     let mut simulation = Simulation::new(&scene).expect("the example starts");

@@ -80,6 +80,125 @@ fn numbers_of_a_law_are_keys_and_may_be_expressions() {
     );
 }
 
+/// Position that a formula prescribes at `t`, s: that of a scene with `own` parameters.
+fn formula(own: &str, kind: &str, drive: &str, t: f64) -> f64 {
+    let text = format!("{own}{}", text(kind, drive));
+    let scene = Scene::parse(&text, None, &[]).unwrap_or_else(|error| panic!("{error}"));
+    position(&scene, t)
+}
+
+fn position(scene: &Scene, t: f64) -> f64 {
+    match &scene.joints[0].drive.as_ref().expect("driven").data {
+        DriveData::Formula(program, scale) => scale * program.eval(&[t]),
+        other => panic!("{other:?}"),
+    }
+}
+
+const OWN: &str = "[[parameter]]\nname = \"stroke\"\nvalue = \"20 mm\"\n\
+                   [[parameter]]\nname = \"rate\"\nvalue = \"3 Hz\"\n\
+                   [[parameter]]\nname = \"lift\"\nvalue = \"30 deg\"\n\
+                   [[parameter]]\nname = \"part\"\nvalue = 0.5\n";
+
+#[test]
+fn a_formula_may_be_one_of_the_scenes_parameters() {
+    let t = 0.07;
+    for (kind, drive, expected) in [
+        (
+            "prismatic",
+            "formula = \"stroke * sin(2*pi*rate*t + lift)\"",
+            0.02 * libm::sin(2.0 * std::f64::consts::PI * 3.0 * t + 30f64.to_radians()),
+        ),
+        // Pure numbers are numbers like any other.
+        (
+            "prismatic",
+            "formula = \"10 * part * t\", unit = \"mm\"",
+            5e-3 * t,
+        ),
+        (
+            "revolute",
+            "formula = \"lift * (1 - exp(-t / 20 ms)) * part\"",
+            30f64.to_radians() * (1.0 - libm::exp(-t / 0.02)) * 0.5,
+        ),
+        (
+            "prismatic",
+            "formula = \"3 mm + 2 m/s^2 * t^2\"",
+            3e-3 + 2.0 * t * t,
+        ),
+        ("prismatic", "formula = \"stroke\"", 0.02),
+        // What is constant is computed beforehand: its derivative is not infinite but 0.
+        (
+            "revolute",
+            "formula = \"asin(2 * part) * rate * t\"",
+            1.5 * std::f64::consts::PI * t,
+        ),
+    ] {
+        let found = formula(OWN, kind, &format!("law = \"formula\", {drive}"), t);
+        assert!(
+            (found - expected).abs() < 1e-14,
+            "{drive}: {found} {expected}"
+        );
+    }
+    let text = format!(
+        "{OWN}{}",
+        text(
+            "prismatic",
+            "law = \"formula\", formula = \"stroke * t / 1 s\""
+        )
+    );
+    let mut scene = Scene::parse(&text, None, &[]).unwrap();
+    assert_eq!(position(&scene, 1.0), 0.02);
+    scene.set("parameter.stroke", "5 mm").unwrap();
+    assert_eq!(position(&scene, 1.0), 5e-3);
+    assert_eq!(scene.undo_change("parameter.stroke").map(|_| ()), Ok(()));
+    assert_eq!(position(&scene, 1.0), 0.02);
+    for (drive, fragments) in [
+        (
+            "formula = \"stroke * sin(3*t)\"",
+            &[
+                "joint.P.drive.formula",
+                "a function of a quantity that is not a pure number",
+            ][..],
+        ),
+        (
+            "formula = \"stroke + t\"",
+            &["adds or compares quantities of different dimensions"],
+        ),
+        (
+            "formula = \"rate * t\"",
+            &["which is not in m; units m, cm, mm"],
+        ),
+        (
+            "formula = \"stroke * rate * t\", unit = \"mm\"",
+            &[
+                "joint.P.drive.unit",
+                "a formula with quantities has its own unit",
+            ],
+        ),
+        (
+            "formula = \"strok * rate * t\"",
+            &[
+                "my.toml:22:39",
+                "no variable `strok` (did you mean `stroke`?)",
+            ],
+        ),
+        (
+            "formula = \"max(stroke, 2 mm)\"",
+            &["`max` has no second derivative"],
+        ),
+        (
+            "formula = \"stroke / (rate * t)\"",
+            &["is not a finite number"],
+        ),
+    ] {
+        let text = format!(
+            "{OWN}{}",
+            self::text("prismatic", &format!("law = \"formula\", {drive}"))
+        );
+        let error = Scene::parse(&text, Some("my.toml"), &[]).expect_err(drive);
+        holds(drive, &error, fragments);
+    }
+}
+
 #[test]
 fn what_is_wrong_with_a_law_is_named() {
     let cases: &[(&str, &[&str])] = &[

@@ -87,6 +87,11 @@ impl Table {
         Ok(())
     }
 
+    /// Lets `frame` ask for what its columns are read from.
+    pub fn ask(&self, frame: &mut Frame) {
+        self.readings.iter().for_each(|reading| reading.ask(frame));
+    }
+
     /// Column names, in order.
     pub fn names(&self) -> &[String] {
         &self.names

@@ -150,7 +150,7 @@ impl ForceElement for Bushing {
         Some(Coupling::at_one_point(ends, along, Vec3::zeros(), turning))
     }
 
-    fn stored(&self, motion: &[Kinematics]) -> f64 {
+    fn stored(&self, _: f64, motion: &[Kinematics]) -> f64 {
         let s = self.state(motion);
         let twice = |stiffness: &Vec3, x: &Vec3| stiffness.component_mul(x).dot(x);
         0.5 * (twice(&self.stiffness, &s.offset) + twice(&self.turning_stiffness, &s.turn))

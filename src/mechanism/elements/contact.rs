@@ -206,7 +206,7 @@ impl ForceElement for Contact {
         })
     }
 
-    fn stored(&self, _: &[Kinematics]) -> f64 {
+    fn stored(&self, _: f64, _: &[Kinematics]) -> f64 {
         self.law.elastic_energy(self.gap.separation.penetration)
     }
 

@@ -1,28 +1,27 @@
 //! Spring with a damper on a slide or a hinge: force or torque -(preload + stiffness s + damping ds/dt) on the child, s the
-//! joint's coordinate from `position`.
+//! joint's coordinate from `position`, or a curve over s in place of the first two.
 
 use super::coordinate::{Coordinate, Place, Slopes};
+use super::elastic::Elastic;
 use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, Site};
 use crate::mechanism::Powers;
 use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::model::Anchor;
-use crate::scene::Element;
+use crate::scene::{Element, SpringSide};
 
 struct JointSpring {
     on: Coordinate,
     position: f64,
-    stiffness: f64,
+    elastic: Elastic,
     damping: f64,
-    preload: f64,
 }
 
 pub(super) fn make(element: &Element, site: &Site<'_>) -> Box<dyn SceneElement> {
     Box::new(JointSpring {
         on: site.coordinate(),
         position: element.number("position"),
-        stiffness: element.number("stiffness"),
+        elastic: Elastic::of(element, SpringSide::Both),
         damping: element.number("damping"),
-        preload: element.number("preload"),
     })
 }
 
@@ -30,7 +29,7 @@ impl JointSpring {
     /// The coordinate, and the force or torque on the child.
     fn at(&self, motion: &[Kinematics]) -> (Place, f64) {
         let place = self.on.place(self.position, motion);
-        let back = self.preload + self.stiffness * place.off + self.damping * place.rate;
+        let back = self.elastic.tension(place.off) + self.damping * place.rate;
         (place, -back)
     }
 }
@@ -48,16 +47,16 @@ impl ForceElement for JointSpring {
     fn coupling(&self, at: &At<'_>) -> Option<Coupling> {
         let (place, _) = self.at(at.motion);
         let slopes = Slopes {
-            by_position: -self.stiffness,
+            by_position: -self.elastic.stiffness(place.off),
             by_rate: -self.damping,
             by_time: 0.0,
         };
         Some(self.on.coupling(&place, &slopes, at.motion))
     }
 
-    fn stored(&self, motion: &[Kinematics]) -> f64 {
-        let off = self.on.place(self.position, motion).off;
-        off * (self.preload + 0.5 * self.stiffness * off)
+    fn stored(&self, _: f64, motion: &[Kinematics]) -> f64 {
+        self.elastic
+            .stored(self.on.place(self.position, motion).off)
     }
 
     fn add_powers(&self, _: f64, motion: &[Kinematics], powers: &mut Powers) {

@@ -4,22 +4,27 @@
 mod bushing;
 mod contact;
 mod coordinate;
+mod elastic;
 mod joint_spring;
 mod load;
 mod motor;
 mod pull;
 mod spring;
 mod stop;
+mod tyre;
 
 pub(super) use contact::Contact;
 pub use contact::Gap;
 
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
 
+use super::drives::{Law, course_of};
 use super::kinematics::{Kinematics, Wrench};
 use super::model::{Anchor, Model};
 use crate::contact::{Memory, Stiffness};
-use crate::scene::{Attachment, Element, Mat3, Scene, Vec3};
+use crate::scene::{Attachment, Element, JointKind, Mat3, Scene, Vec3};
 use coordinate::Coordinate;
 pub use pull::Pull;
 
@@ -224,8 +229,8 @@ pub(super) trait ForceElement: Send {
         None
     }
 
-    /// Energy stored, J; for a contact, at the gap last measured.
-    fn stored(&self, _motion: &[Kinematics]) -> f64 {
+    /// Energy stored at `t`, J; for a contact, at the gap last measured.
+    fn stored(&self, _t: f64, _motion: &[Kinematics]) -> f64 {
         0.0
     }
 
@@ -267,13 +272,14 @@ impl Site<'_> {
 type Make = fn(&Element, &Site<'_>) -> Box<dyn SceneElement>;
 
 /// All kinds by section.
-const KINDS: [(&str, Make); 6] = [
+const KINDS: [(&str, Make); 7] = [
     ("spring", spring::make),
     ("load", load::make),
     ("joint_spring", joint_spring::make),
     ("stop", stop::make),
     ("bushing", bushing::make),
     ("motor", motor::make),
+    ("tyre", tyre::make),
 ];
 
 /// The force elements of `scene`, in its order.
@@ -305,6 +311,16 @@ pub(super) fn hand(scene: &Scene, model: &Model, pull: Pull) -> Box<dyn SceneEle
     };
     let on = model.anchor(scene, &point);
     Box::new(pull::Hand { on, pull })
+}
+
+/// The law of time of `element`, if it has one.
+fn law_of(element: &Element) -> Option<Arc<dyn Law>> {
+    let kind = match element.on_hinge {
+        true => JointKind::Revolute,
+        false => JointKind::Prismatic,
+    };
+    let course = course_of(element.law.as_ref()?, kind);
+    course.law().cloned()
 }
 
 /// Position and velocity of a point, m and m/s, and its arm from the centroid.

@@ -2,13 +2,13 @@
 //! coordinate. Its work is a drive's.
 
 use super::coordinate::{Coordinate, Place, Slopes};
-use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, Site};
+use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, Site, law_of};
 use crate::jet::Jet;
 use crate::mechanism::Powers;
-use crate::mechanism::drives::{Law, course_of};
+use crate::mechanism::drives::Law;
 use crate::mechanism::kinematics::Kinematics;
 use crate::mechanism::model::Anchor;
-use crate::scene::{Element, JointKind};
+use crate::scene::Element;
 use std::sync::Arc;
 
 struct Motor {
@@ -29,17 +29,6 @@ pub(super) fn make(element: &Element, site: &Site<'_>) -> Box<dyn SceneElement> 
         limit: element.number("limit"),
         target: law_of(element),
     })
-}
-
-/// The law that its target follows.
-fn law_of(element: &Element) -> Option<Arc<dyn Law>> {
-    let kind = if element.on_hinge {
-        JointKind::Revolute
-    } else {
-        JointKind::Prismatic
-    };
-    let course = course_of(element.law.as_ref()?, kind);
-    course.law().cloned()
 }
 
 impl Motor {

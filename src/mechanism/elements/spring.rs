@@ -1,6 +1,7 @@
 //! Spring with a damper along the line between two points: tension T = preload + stiffness (l - length) + damping dl/dt, or
-//! what is left of it where it only pushes or only pulls.
+//! a curve over l - length in place of the first two, or what is left of it where it only pushes or only pulls.
 
+use super::elastic::Elastic;
 use super::{At, Coupling, ElementReport, ForceElement, Loads, SceneElement, Site, point_of, push};
 use crate::mechanism::Powers;
 use crate::mechanism::kinematics::Kinematics;
@@ -11,9 +12,8 @@ struct Spring {
     from: Anchor,
     to: Anchor,
     length: f64,
-    stiffness: f64,
+    elastic: Elastic,
     damping: f64,
-    preload: f64,
     side: SpringSide,
 }
 
@@ -27,6 +27,8 @@ struct State {
     length: f64,
     along: Vec3,
     rate: f64,
+    /// N, without the damper, as if it acted both ways.
+    elastic: f64,
     /// N.
     tension: f64,
     /// Whether it would act the other way, and does not.
@@ -34,14 +36,14 @@ struct State {
 }
 
 pub(super) fn make(element: &Element, site: &Site<'_>) -> Box<dyn SceneElement> {
+    let side = element.choice("side");
     Box::new(Spring {
         from: site.anchors[0],
         to: site.anchors[1],
         length: element.number("length"),
-        stiffness: element.number("stiffness"),
+        elastic: Elastic::of(element, side),
         damping: element.number("damping"),
-        preload: element.number("preload"),
-        side: element.choice("side"),
+        side,
     })
 }
 
@@ -58,8 +60,7 @@ impl Spring {
         };
         let velocity = end_velocity - start_velocity;
         let rate = along.dot(&velocity);
-        let stretch = length - self.length;
-        let elastic = self.preload + self.stiffness * stretch;
+        let elastic = self.elastic.tension(length - self.length);
         let both = elastic + self.damping * rate;
         // Where the spring has let go, its damper has, too.
         let tension = match self.side.of(elastic) == elastic {
@@ -73,6 +74,7 @@ impl Spring {
             length,
             along,
             rate,
+            elastic,
             tension,
             slack: tension != both,
         }
@@ -96,40 +98,31 @@ impl ForceElement for Spring {
         if s.slack {
             return None;
         }
+        let stiffness = self.elastic.stiffness(s.length - self.length);
         if s.length == 0.0 {
             // A bushing resists separation in any direction; otherwise the direction, and with it the force, jumps here.
-            let bush = self.length == 0.0 && self.preload == 0.0;
-            let by_displacement = Mat3::identity() * -self.stiffness;
+            let bush = self.length == 0.0 && s.elastic == 0.0;
+            let by_displacement = Mat3::identity() * -stiffness;
             return bush.then(|| Coupling::between_points(ends, by_displacement, Mat3::zeros()));
         }
         // F = -T u with u = e / |e|: dT = (k u + c P e_dot / l) . de + c u . de_dot, du = P de / l, P = 1 - u u'.
         let u = s.along;
         let turning = (Mat3::identity() - u * u.transpose()) / s.length;
-        let rise = u * self.stiffness + turning * s.velocity * self.damping;
+        let rise = u * stiffness + turning * s.velocity * self.damping;
         let by_displacement = -u * rise.transpose() - turning * s.tension;
         let by_rate = -u * (u * self.damping).transpose();
         Some(Coupling::between_points(ends, by_displacement, by_rate))
     }
 
-    fn stored(&self, motion: &[Kinematics]) -> f64 {
-        let stretch = self.state(motion).length - self.length;
-        let elastic = self.preload + self.stiffness * stretch;
-        // Beyond the length at which it is slack it keeps what it has there.
-        let stretch = match self.side.of(elastic) == elastic || self.stiffness == 0.0 {
-            true => stretch,
-            false => -self.preload / self.stiffness,
-        };
-        stretch * (self.preload + 0.5 * self.stiffness * stretch)
+    fn stored(&self, _: f64, motion: &[Kinematics]) -> f64 {
+        self.elastic.stored(self.state(motion).length - self.length)
     }
 
     fn add_powers(&self, _: f64, motion: &[Kinematics], powers: &mut Powers) {
         let s = self.state(motion);
         powers.damping += match self.side {
             SpringSide::Both => self.damping * s.rate * s.rate,
-            _ => {
-                let elastic = self.preload + self.stiffness * (s.length - self.length);
-                (s.tension - self.side.of(elastic)) * s.rate
-            }
+            _ => (s.tension - self.side.of(s.elastic)) * s.rate,
         };
     }
 }

@@ -107,7 +107,7 @@ impl ForceElement for Stop {
         Some(self.on.coupling(&place, &slopes, at.motion))
     }
 
-    fn stored(&self, motion: &[Kinematics]) -> f64 {
+    fn stored(&self, _: f64, motion: &[Kinematics]) -> f64 {
         let press = self.at(motion).1;
         press.map_or(0.0, |press| 0.4 * press.elastic * press.depth)
     }

@@ -167,7 +167,10 @@ mod tests {
                           length = \"1 m\"\nstiffness = \"1 N/m\"\n";
 
     fn first(scene: &Scene) -> Frame {
-        let mut frame = Frame::default();
+        let mut frame = Frame {
+            reactions: Some(Vec::new()),
+            ..Frame::default()
+        };
         let mut simulation = Simulation::new(scene).expect("starts");
         simulation.sample(0.0, &mut frame);
         frame

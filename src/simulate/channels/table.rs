@@ -4,8 +4,8 @@
 use Quantity as Q;
 use Take::{
     Angles, Axes, BodyAxes, Element, ElementValue, FirstTurn, Given, Hinge, HingeCoordinate, Joint,
-    JointAxes, OtherAngles, OtherAxes, ProbeError, SecondTurn, Slide, SlideCoordinate, Taken,
-    TurnRate, Whole,
+    JointAxes, OtherAngles, OtherAxes, ProbeError, Reaction, SecondTurn, Slide, SlideCoordinate,
+    Taken, TurnRate, Whole,
 };
 
 use crate::scene::Vec3;
@@ -246,6 +246,8 @@ pub(super) enum Take {
     /// The same of a universal joint about its axis in the parent, and about that in the child.
     FirstTurn(usize),
     SecondTurn(usize),
+    /// Of each joint that holds its child: the force on that, or the torque, along x, y, z.
+    Reaction(usize),
     /// Of each ball joint.
     Joint(fn(&JointReport) -> f64),
     /// Of each ball joint, along x, y, z.
@@ -277,6 +279,8 @@ pub(super) enum Each {
     Body,
     /// Coordinates of joints that slide or turn.
     Coordinate,
+    /// These and fixed ones.
+    Holding,
     /// Ball joints.
     Joint,
     /// Driven joints.
@@ -299,15 +303,15 @@ impl Take {
             SlideCoordinate(_) | HingeCoordinate(_) | TurnRate | FirstTurn(_) | SecondTurn(_) => {
                 Each::Coordinate
             }
+            Reaction(_) => Each::Holding,
             Whole(..) | Given(..) | Taken(..) | ProbeError => Each::Once,
         }
     }
 
     pub(super) fn components(&self) -> Components {
         match self {
-            Axes(_) | BodyAxes(_) | OtherAxes(_) | JointAxes(_) | ProbeError | Element(_) => {
-                &[("x", "x"), ("y", "y"), ("z", "z")]
-            }
+            Axes(_) | BodyAxes(_) | OtherAxes(_) | JointAxes(_) | Reaction(_) | ProbeError
+            | Element(_) => &[("x", "x"), ("y", "y"), ("z", "z")],
             Angles(_) | OtherAngles(_) => &[("α", "alpha"), ("β", "beta"), ("γ", "gamma")],
             _ => &[("", "")],
         }
@@ -337,6 +341,10 @@ impl Take {
             | FirstTurn(order)
             | SecondTurn(order) => frame.coordinates.get(part).map(|c| c[*order]),
             TurnRate => frame.coordinates.get(part).map(|c| c[1]),
+            Reaction(which) => {
+                let of_part = frame.reactions.as_ref()?.get(part)?;
+                Some(of_part[*which][component])
+            }
             Joint(of) => frame.joints.get(part).map(of),
             JointAxes(of) => frame.joints.get(part).map(|joint| of(joint)[component]),
             Slide | Hinge => frame.actuators.get(part).copied(),
@@ -477,6 +485,9 @@ pub(super) const TABLE: &[Signal] = &[
     asked("@.angle_rate", "@_angle_rate_rad_s", FirstTurn(1), "rate of that angle"),
     asked("@.child_angle", "@_child_angle_rad", SecondTurn(0), "angle of the joint about its axis in the child"),
     asked("@.child_angle_rate", "@_child_angle_rate_rad_s", SecondTurn(1), "rate of that angle"),
+
+    asked("@.reaction.#", "@_reaction_#_N", Reaction(0), "force of the joint on its child, its drive's included"),
+    asked("@.reaction_torque.#", "@_reaction_torque_#_Nm", Reaction(1), "torque of the joint on its child about its joint point, its drive's included"),
 
     asked("@.gap", "@_gap_m", Joint(|joint| -joint.penetration), "gap between ball and socket wall; negative in contact"),
     asked("@.clearance", "@_clearance_m", Joint(|joint| joint.clearance), "radial clearance in force"),

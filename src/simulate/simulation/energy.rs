@@ -196,6 +196,6 @@ fn energies(mechanism: &Mechanism, state: &State) -> Energies {
     Energies {
         kinetic,
         gravitational,
-        elastic: in_contacts + mechanism.energy_in_elements(),
+        elastic: in_contacts + mechanism.energy_in_elements(state.now.t),
     }
 }

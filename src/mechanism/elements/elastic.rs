@@ -1,0 +1,251 @@
+//! What a spring exerts without its damper: preload + stiffness s at a change of length (or of a joint's coordinate) s, or a
+//! curve through points, straight beyond them. Of one that acts one way only, what is left of it.
+
+use crate::jet::Jet;
+use crate::mechanism::spline::{Ends, Spline};
+use crate::scene::{Element, SpringSide};
+
+/// Beyond any stretch, m or rad.
+const FARTHEST: f64 = 1e7;
+
+pub(super) enum Elastic {
+    Line {
+        /// At 0, N or N m.
+        preload: f64,
+        /// N/m or N m/rad.
+        stiffness: f64,
+        side: SpringSide,
+    },
+    Curve(Curve),
+}
+
+impl Elastic {
+    /// That of `element`, which acts on `side`.
+    pub fn of(element: &Element, side: SpringSide) -> Self {
+        match &element.curve {
+            Some(points) => Self::Curve(Curve::new(points, side)),
+            None => Self::Line {
+                preload: element.number("preload"),
+                stiffness: element.number("stiffness"),
+                side,
+            },
+        }
+    }
+
+    /// Tension at `stretch`, N or N m, as if it acted both ways.
+    pub fn tension(&self, stretch: f64) -> f64 {
+        match self {
+            Self::Line {
+                preload, stiffness, ..
+            } => preload + stiffness * stretch,
+            Self::Curve(curve) => curve.at(stretch).value,
+        }
+    }
+
+    /// Its derivative there, N/m or N m/rad.
+    pub fn stiffness(&self, stretch: f64) -> f64 {
+        match self {
+            Self::Line { stiffness, .. } => *stiffness,
+            Self::Curve(curve) => curve.at(stretch).rate,
+        }
+    }
+
+    /// Energy stored, J: what it took to get there from a stretch of 0.
+    pub fn stored(&self, stretch: f64) -> f64 {
+        match self {
+            Self::Line {
+                preload,
+                stiffness,
+                side,
+            } => {
+                let elastic = preload + stiffness * stretch;
+                // Beyond the length at which it is slack it keeps what it has there.
+                let stretch = match side.of(elastic) == elastic || *stiffness == 0.0 {
+                    true => stretch,
+                    false => -preload / stiffness,
+                };
+                stretch * (preload + 0.5 * stiffness * stretch)
+            }
+            Self::Curve(curve) => curve.stored(stretch),
+        }
+    }
+}
+
+/// A tension that depends on the stretch along a curve.
+pub(super) struct Curve {
+    spline: Spline,
+    /// Stretches at which the cubic of the tension changes, or what is left of it begins or ends, in order, and the energy
+    /// stored there, J.
+    marks: Vec<[f64; 2]>,
+    /// Whether it acts before the first mark, between two, after the last.
+    acts: Vec<bool>,
+}
+
+impl Curve {
+    fn new(points: &[[f64; 2]], side: SpringSide) -> Self {
+        let mut curve = Self {
+            spline: Spline::new(points, Ends::Straight),
+            marks: Vec::new(),
+            acts: Vec::new(),
+        };
+        let mut marks = curve.spline.knots.clone();
+        if side != SpringSide::Both {
+            marks.extend(curve.roots());
+            marks.sort_by(f64::total_cmp);
+            marks.dedup();
+        }
+        let acts = |stretch: f64| {
+            let tension = curve.at(stretch).value;
+            side.of(tension) == tension
+        };
+        let between = marks.windows(2).map(|ends| 0.5 * (ends[0] + ends[1]));
+        let [first, last] = [marks[0], marks[marks.len() - 1]];
+        let width = last - first;
+        curve.acts = std::iter::once(first - width)
+            .chain(between)
+            .chain([last + width])
+            .map(acts)
+            .collect();
+        let mut stored = 0.0;
+        for (i, &mark) in marks.iter().enumerate() {
+            if i > 0 && curve.acts[i] {
+                stored += curve.work(marks[i - 1], mark);
+            }
+            curve.marks.push([mark, stored]);
+        }
+        let unstretched = curve.stored(0.0);
+        curve
+            .marks
+            .iter_mut()
+            .for_each(|mark| mark[1] -= unstretched);
+        curve
+    }
+
+    /// Tension and its derivatives by the stretch.
+    fn at(&self, stretch: f64) -> Jet {
+        let [first, last] = self.spline.ends();
+        let within = stretch.clamp(first, last);
+        let at = self.spline.at(within);
+        if stretch == within {
+            return at;
+        }
+        Jet::new(at.value + at.rate * (stretch - within), at.rate, 0.0)
+    }
+
+    fn stored(&self, stretch: f64) -> f64 {
+        let next = self.marks.partition_point(|mark| mark[0] <= stretch);
+        let [mark, stored] = self.marks[next.saturating_sub(1)];
+        match self.acts[next] {
+            true => stored + self.work(mark, stretch),
+            false => stored,
+        }
+    }
+
+    /// Work of stretching it from `a` to `b` without passing a mark, J: Simpson's rule is exact for a cubic.
+    fn work(&self, a: f64, b: f64) -> f64 {
+        let [at_a, middle, at_b] = [a, 0.5 * (a + b), b].map(|stretch| self.at(stretch).value);
+        (b - a) * (at_a + 4.0 * middle + at_b) / 6.0
+    }
+
+    /// Stretches at which the tension passes zero.
+    fn roots(&self) -> Vec<f64> {
+        let knots = &self.spline.knots;
+        let mut roots = Vec::new();
+        // Between these it rises or falls all the way.
+        let mut ends = Vec::new();
+        for (i, [_, b, c, d]) in self.spline.cubics.iter().enumerate() {
+            ends.push(knots[i]);
+            // Where b + 2 c s + 3 d s^2 is zero, in the form that does not cancel.
+            let half = -(c + c.signum() * (c * c - 3.0 * b * d).max(0.0).sqrt());
+            let mut turns = [half / (3.0 * d), b / half].map(|s| knots[i] + s);
+            turns.sort_by(f64::total_cmp);
+            let inside = |turn: &f64| knots[i] < *turn && *turn < knots[i + 1];
+            ends.extend(turns.into_iter().filter(inside));
+        }
+        let [first, last] = self.spline.ends();
+        ends.push(last);
+        for pair in ends.windows(2) {
+            roots.extend(self.root(pair[0], pair[1]));
+        }
+        // The straight ends.
+        let crossing = |knot: f64| knot - self.at(knot).value / self.at(knot).rate;
+        roots.extend(Some(crossing(first)).filter(|at| (-FARTHEST..first).contains(at)));
+        roots.extend(Some(crossing(last)).filter(|at| last < *at && *at < FARTHEST));
+        roots
+    }
+
+    /// Where between `a` and `b` the tension, which rises or falls all the way, is zero.
+    fn root(&self, mut a: f64, mut b: f64) -> Option<f64> {
+        let above = |stretch: f64| self.at(stretch).value > 0.0;
+        let at_a = above(a);
+        if at_a == above(b) {
+            return None;
+        }
+        // Until the two are neighbours among the numbers that there are.
+        loop {
+            let middle = 0.5 * (a + b);
+            if middle <= a || middle >= b {
+                return Some(b);
+            }
+            match above(middle) == at_a {
+                true => a = middle,
+                false => b = middle,
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const POINTS: [[f64; 2]; 5] = [
+        [-0.04, -90.0],
+        [-0.02, 5.0],
+        [-0.01, -8.0],
+        [0.01, 6.0],
+        [0.03, 70.0],
+    ];
+
+    #[test]
+    fn the_energy_is_the_integral_of_what_acts() {
+        for side in [SpringSide::Both, SpringSide::Push, SpringSide::Pull] {
+            let curve = Curve::new(&POINTS, side);
+            assert!(curve.stored(0.0).abs() < 1e-15);
+            for to in [-0.07, -0.033, -0.0201, -0.015, 0.002, 0.02, 0.05] {
+                let n = 400_000;
+                let h = to / f64::from(n);
+                let tension = |i: u32| side.of(curve.at((f64::from(i) + 0.5) * h).value);
+                let integral: f64 = (0..n).map(|i| h * tension(i)).sum();
+                let off = curve.stored(to) - integral;
+                assert!(off.abs() < 1e-9, "{side:?} {to}: {off:e}");
+            }
+        }
+    }
+
+    #[test]
+    fn it_goes_on_straight_beyond_its_points() {
+        let curve = Curve::new(&POINTS, SpringSide::Both);
+        for (end, beyond) in [(-0.04, -0.1), (0.03, 0.2)] {
+            let (at, there) = (curve.at(end), curve.at(beyond));
+            let expected = at.value + at.rate * (beyond - end);
+            assert_eq!((there.value, there.rate), (expected, at.rate));
+        }
+    }
+
+    #[test]
+    fn every_zero_is_found() {
+        let curve = Curve::new(&POINTS, SpringSide::Push);
+        let mut roots = curve.roots();
+        roots.sort_by(f64::total_cmp);
+        // It passes zero between the first two, the second two, the third two: once each.
+        assert_eq!(roots.len(), 3, "{roots:?}");
+        for root in roots {
+            assert!(curve.at(root).value.abs() < 1e-9, "{root}");
+        }
+        // Beyond its points only.
+        let line = Curve::new(&[[0.0, 1.0], [1.0, 3.0]], SpringSide::Push);
+        assert_eq!(line.roots(), [-0.5]);
+        assert_eq!(line.acts, [true, false, false, false]);
+    }
+}

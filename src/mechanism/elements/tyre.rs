@@ -1,0 +1,137 @@
+//! Tyre of a wheel on a ground that moves up and down: F = k d + c dd/dt along `up` at the wheel's centre while it is
+//! pressed in by d = height of the ground + radius - height of the centre, never below 0. The work of the moving ground is a
+//! drive's.
+
+use std::sync::Arc;
+
+use super::{
+    At, Coupling, ElementReport, ForceElement, Loads, SceneElement, Site, law_of, point_of, push,
+};
+use crate::jet::Jet;
+use crate::mechanism::Powers;
+use crate::mechanism::drives::Law;
+use crate::mechanism::kinematics::Kinematics;
+use crate::mechanism::model::Anchor;
+use crate::scene::{Element, Mat3, Vec3};
+
+struct Tyre {
+    /// The wheel's centre.
+    on: Anchor,
+    up: Vec3,
+    radius: f64,
+    stiffness: f64,
+    damping: f64,
+    ground: Option<Arc<dyn Law>>,
+}
+
+/// State at one instant.
+struct State {
+    centre: Vec3,
+    arm: Vec3,
+    /// Height of the ground along `up`, m.
+    ground: Jet,
+    /// d, never below 0, m, and its rate.
+    depth: f64,
+    rate: f64,
+    /// N; not above 0 where it has let go.
+    force: f64,
+}
+
+pub(super) fn make(element: &Element, site: &Site<'_>) -> Box<dyn SceneElement> {
+    Box::new(Tyre {
+        on: site.anchors[0],
+        up: element.vector("up"),
+        radius: element.number("radius"),
+        stiffness: element.number("stiffness"),
+        damping: element.number("damping"),
+        ground: law_of(element),
+    })
+}
+
+impl Tyre {
+    fn at(&self, t: f64, motion: &[Kinematics]) -> State {
+        let (centre, velocity, arm) = point_of(&self.on, motion);
+        let height = |law: &Arc<dyn Law>| law.at(t);
+        let ground = self.ground.as_ref().map_or_else(Jet::default, height);
+        let depth = (ground.value + self.radius - self.up.dot(&centre)).max(0.0);
+        let rate = ground.rate - self.up.dot(&velocity);
+        // Where the spring has let go, its damper has, too.
+        let force = match depth > 0.0 {
+            true => (self.stiffness * depth + self.damping * rate).max(0.0),
+            false => 0.0,
+        };
+        State {
+            centre,
+            arm,
+            ground,
+            depth,
+            rate,
+            force,
+        }
+    }
+}
+
+impl ForceElement for Tyre {
+    fn load(&mut self, at: &At<'_>, loads: &mut Loads<'_>) {
+        let s = self.at(at.t, at.motion);
+        let force = self.up * s.force;
+        push(&mut loads.wrench[self.on.body], &s.arm, &force);
+    }
+
+    fn ends(&self, motion: &[Kinematics]) -> Option<[Anchor; 2]> {
+        // What it presses on is where the centre is, but stays with the world, the last of the bodies.
+        let world = Anchor {
+            body: motion.len() - 1,
+            offset: point_of(&self.on, motion).0,
+        };
+        Some([world, self.on])
+    }
+
+    fn coupling(&self, at: &At<'_>) -> Option<Coupling> {
+        let s = self.at(at.t, at.motion);
+        if s.force <= 0.0 {
+            return None;
+        }
+        let along = self.up * self.up.transpose();
+        let ends = self.ends(at.motion)?;
+        let by_height: [Mat3; 2] = [along * -self.stiffness, along * -self.damping];
+        let mut coupling = Coupling::between_points(ends, by_height[0], by_height[1]);
+        let ground = self.stiffness * s.ground.rate + self.damping * s.ground.acceleration;
+        coupling.stiffness.by_clearance = self.up * ground;
+        Some(coupling)
+    }
+
+    fn stored(&self, t: f64, motion: &[Kinematics]) -> f64 {
+        let depth = self.at(t, motion).depth;
+        0.5 * self.stiffness * depth * depth
+    }
+
+    fn add_powers(&self, t: f64, motion: &[Kinematics], powers: &mut Powers) {
+        let s = self.at(t, motion);
+        powers.drive += s.force * s.ground.rate;
+        powers.damping += (s.force - self.stiffness * s.depth) * s.rate;
+    }
+}
+
+impl SceneElement for Tyre {
+    fn period(&self) -> f64 {
+        let swing = |law: &Arc<dyn Law>| law.swing();
+        self.ground.as_ref().map_or(f64::INFINITY, swing)
+    }
+
+    fn step_end(&self, t: f64) -> f64 {
+        let end = |law: &Arc<dyn Law>| law.step_end(t);
+        self.ground.as_ref().map_or(f64::INFINITY, end)
+    }
+
+    /// From the ground below the centre to that.
+    fn report(&self, t: f64, motion: &[Kinematics]) -> ElementReport {
+        let s = self.at(t, motion);
+        let above = self.up.dot(&s.centre) - s.ground.value;
+        ElementReport {
+            points: [s.centre - self.up * above, s.centre],
+            force: self.up * s.force,
+            ..ElementReport::default()
+        }
+    }
+}

@@ -1,0 +1,387 @@
+//! Springs with a characteristic through points against closed solutions, in every method and both formulations.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use crate::common::{METHODS, parse};
+use crate::elements::{at, settings};
+use crate::joint_elements::FORMULATIONS;
+use jointplay::scene::Scene;
+use jointplay::simulate::{Frame, Simulation};
+
+const MASS: f64 = 0.5;
+/// Moment of inertia of the hinged body about its hinge.
+const INERTIA: f64 = 4e-4 + MASS * 0.01;
+
+/// Of a piece T(s) = A s + B s^3 between 0 and `WIDTH`: the natural spline through (0, 0), (WIDTH, F1), (2 WIDTH, F2) with
+/// m1 = 3 (F2 - 2 F1) / 2 WIDTH^2 has A = F1 / WIDTH - m1 WIDTH / 6 and B = m1 / 6 WIDTH. Below 0 it is straight.
+const WIDTH: f64 = 0.1;
+const F1: f64 = 10.0;
+const F2: f64 = 40.0;
+const M1: f64 = 1.5 * (F2 - 2.0 * F1) / (WIDTH * WIDTH);
+const A: f64 = F1 / WIDTH - M1 * WIDTH / 6.0;
+const B: f64 = M1 / (6.0 * WIDTH);
+
+/// What carries the spring.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum On {
+    /// A spring between the world and a free body.
+    Body,
+    Slide,
+    Hinge,
+}
+
+impl On {
+    fn inertia(self) -> f64 {
+        if self == Self::Hinge { INERTIA } else { MASS }
+    }
+
+    /// Scales the forces, so that all move alike.
+    fn scale(self) -> f64 {
+        self.inertia() / MASS
+    }
+
+    fn text(self, points: &[[f64; 2]], more: &str) -> String {
+        let (x, f) = match self {
+            Self::Hinge => ("rad", "N m"),
+            _ => ("m", "N"),
+        };
+        let point =
+            |p: &[f64; 2]| format!("[\"{:e} {x}\", \"{:e} {f}\"]", p[0], p[1] * self.scale());
+        let points: Vec<String> = points.iter().map(point).collect();
+        let points = points.join(", ");
+        let (joint, spring) = match self {
+            Self::Body => (
+                "kind = \"free\"\nstart = { position = \"400 0 0 mm\" }",
+                "[[spring]]\nfrom = { body = \"world\" }\nto = { body = \"mass\" }\nlength = \"300 mm\"",
+            ),
+            Self::Slide => (
+                "kind = \"prismatic\"\naxis = [1, 0, 0]\nstart = { position = \"400 mm\" }",
+                "[[joint_spring]]\njoint = \"j\"\nposition = \"300 mm\"",
+            ),
+            Self::Hinge => (
+                "kind = \"revolute\"\naxis = [0, 0, 1]\nchild_point = \"-100 0 0 mm\"\nstart = { position = \"0.4 rad\" }",
+                "[[joint_spring]]\njoint = \"j\"\nposition = \"0.3 rad\"",
+            ),
+        };
+        format!(
+            "[gravity]\nx = 0\ny = 0\nz = 0\n\
+             [[body]]\nname = \"mass\"\nmass = \"{MASS} kg\"\ninertia = \"2e-4 3e-4 4e-4 kg m^2\"\n\
+             [[joint]]\nname = \"j\"\nchild = \"mass\"\n{joint}\n\
+             {spring}\nname = \"s\"\ncharacteristic = [{points}]\n{more}"
+        )
+    }
+
+    fn starts(self, points: &[[f64; 2]], more: &str, changes: &[(&str, &str)]) -> Simulation {
+        Simulation::new(&parse(&self.text(points, more), changes)).unwrap()
+    }
+
+    /// Coordinate from where the spring is unstretched, and its rate.
+    fn state(self, frame: &Frame) -> [f64; 2] {
+        let body = &frame.bodies[0];
+        match self {
+            Self::Hinge => {
+                let angle = libm::atan2(body.rotation[(1, 0)], body.rotation[(0, 0)]);
+                [angle - 0.3, body.angular_velocity.z]
+            }
+            _ => [body.position.x - 0.3, body.velocity.x],
+        }
+    }
+}
+
+const POINTS: [[f64; 2]; 3] = [[0.0, 0.0], [WIDTH, F1], [2.0 * WIDTH, F2]];
+
+/// Complete elliptic integral of the first kind for k^2 = `m`.
+fn elliptic(m: f64) -> f64 {
+    let (mut a, mut b) = (1.0, (1.0 - m).sqrt());
+    for _ in 0..40 {
+        (a, b) = (0.5 * (a + b), (a * b).sqrt());
+    }
+    FRAC_PI_2 / a
+}
+
+/// When a mass let go at `WIDTH` passes 0, and its speed there.
+fn passes() -> (f64, f64) {
+    let cubic = B * WIDTH * WIDTH;
+    let omega = ((A + cubic) / MASS).sqrt();
+    let time = elliptic(cubic / (2.0 * (A + cubic))) / omega;
+    let speed = WIDTH * ((A + 0.5 * cubic) / MASS).sqrt();
+    (time, speed)
+}
+
+#[test]
+fn a_hardening_spring_swings_as_duffing_says_in_every_method_and_formulation() {
+    let (passes, speed) = passes();
+    let omega = (A / MASS).sqrt();
+    for on in [On::Body, On::Slide, On::Hinge] {
+        for method in METHODS {
+            for formulation in FORMULATIONS {
+                let (step, bound) = settings(method);
+                let mut simulation = on.starts(
+                    &POINTS,
+                    "",
+                    &[
+                        ("solver.method", method),
+                        ("solver.step", step),
+                        ("solver.tolerance", "1e-10"),
+                        ("formulation", formulation),
+                    ],
+                );
+                let label = format!("{on:?} {method} {formulation}");
+                // A quarter along the cubic, a half along the straight end, and back into the cubic.
+                let frame = at(&mut simulation, passes);
+                let [x, v] = on.state(&frame);
+                assert!(
+                    x.abs() < bound && (v + speed).abs() < 20.0 * bound,
+                    "{label}: {x:e} {v}"
+                );
+                let stored = on.scale() * 0.5 * MASS * speed * speed;
+                assert!(frame.elastic.abs() < 20.0 * bound * on.scale(), "{label}");
+                let frame = at(&mut simulation, passes + 0.5 * PI / omega);
+                let [x, _] = on.state(&frame);
+                assert!((x + speed / omega).abs() < 2.0 * bound, "{label}: {x:e}");
+                assert!(
+                    (frame.elastic / stored - 1.0).abs() < 100.0 * bound,
+                    "{label}"
+                );
+                let frame = at(&mut simulation, passes + PI / omega);
+                let [x, v] = on.state(&frame);
+                assert!(
+                    x.abs() < 4.0 * bound && (v - speed).abs() < 40.0 * bound,
+                    "{label}: {x:e}"
+                );
+                let residual = simulation.ledger().unwrap().relative_residual();
+                assert!(residual.abs() < 1e-4, "{label}: {residual:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_error_falls_with_the_order_of_the_method_along_a_curve() {
+    let (passes, _) = passes();
+    let error = |method: &str, steps: f64| {
+        let step = format!("{:e} s", passes / steps);
+        let changes = [("solver.method", method), ("solver.step", &*step)];
+        let mut simulation = On::Body.starts(&POINTS, "", &changes);
+        On::Body.state(&at(&mut simulation, passes))[0].abs()
+    };
+    for (method, steps, order) in [
+        ("semi-implicit-euler", [1e3, 2e3], 1.0),
+        ("imex-euler", [1e3, 2e3], 1.0),
+        ("rk4", [20.0, 40.0], 4.0),
+    ] {
+        let [coarse, fine] = steps.map(|steps| error(method, steps));
+        let found = (coarse / fine).log2();
+        println!("{method}: {coarse:e}, {fine:e}, order {found}");
+        assert!((found - order).abs() < 0.2, "{method}: {found}");
+    }
+}
+
+#[test]
+fn points_on_a_line_are_the_spring_of_that_line() {
+    let line = [[-0.05, -1.0], [0.0, 3.0], [0.1, 11.0], [0.15, 15.0]];
+    for (on, keys) in [
+        (On::Body, "stiffness = \"80 N/m\"\npreload = \"3 N\""),
+        (On::Slide, "stiffness = \"80 N/m\"\npreload = \"3 N\""),
+    ] {
+        for side in ["", "side = \"push\"", "side = \"pull\""] {
+            if on == On::Slide && !side.is_empty() {
+                continue;
+            }
+            let more = format!("damping = \"2 N s/m\"\n{side}\n");
+            let text = on.text(&line, &more);
+            let from = text.find("characteristic").unwrap();
+            let to = from + text[from..].find('\n').unwrap();
+            let plain = format!("{}{keys}{}", &text[..from], &text[to..]);
+            let [mut a, mut b] = [&text, &plain].map(|text| {
+                let scene = parse(text, &[("solver.tolerance", "1e-10")]);
+                Simulation::new(&scene).unwrap()
+            });
+            let offset = at(&mut a, 0.0).elastic - at(&mut b, 0.0).elastic;
+            for n in 1..20 {
+                let [a, b] = [&mut a, &mut b].map(|s| at(s, 0.02 * f64::from(n)));
+                assert!((a.bodies[0].position - b.bodies[0].position).norm() < 1e-9);
+                assert!((a.elements[0].force - b.elements[0].force).norm() < 1e-6);
+                // Where it does not act, the two may count from different lengths.
+                assert!(
+                    (a.elastic - b.elastic - offset).abs() < 1e-7,
+                    "{on:?} {side}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_stiff_curve_does_not_hold_an_implicit_method_back() {
+    let stiff = [[-0.05, -5e6], [0.0, 0.0], [0.05, 3e6], [0.11, 9e6]];
+    let evaluations = |method: &str| {
+        let changes = [("solver.method", method), ("solver.tolerance", "1e-6")];
+        let mut simulation = On::Body.starts(&stiff, "damping = \"10 kN s/m\"", &changes);
+        let [x, _] = On::Body.state(&at(&mut simulation, 0.2));
+        assert!(x.abs() < 1e-6, "{method}: {x}");
+        simulation.statistics().evaluations
+    };
+    let explicit = evaluations("dopri5");
+    for method in ["radau5", "automatic"] {
+        let implicit = evaluations(method);
+        println!("{method} {implicit}, dopri5 {explicit} evaluations");
+        assert!(4 * implicit < explicit, "{method}: {implicit} {explicit}");
+    }
+}
+
+#[test]
+fn a_buffer_that_only_pushes_gives_back_what_it_took() {
+    // Thrown off a buffer that hardens, a mass falls back on it; over the top it flies freely.
+    let text = "[gravity]\nz = \"-9.81 m/s^2\"\n\
+        [[body]]\nname = \"mass\"\nmass = \"0.5 kg\"\ninertia = \"1e-3 1e-3 1e-3 kg m^2\"\n\
+        [[joint]]\nname = \"guide\"\nkind = \"prismatic\"\nchild = \"mass\"\naxis = [0, 0, 1]\nstart = { position = \"60 mm\" }\n\
+        [[spring]]\nname = \"pad\"\nfrom = { body = \"world\" }\nto = { body = \"mass\" }\nlength = \"100 mm\"\nside = \"push\"\n\
+        characteristic = [[\"-50 mm\", \"-200 N\"], [\"-30 mm\", \"-40 N\"], [\"-10 mm\", \"-5 N\"], [0, 0], [\"10 mm\", \"4 N\"]]\n";
+    for (method, formulation) in [
+        ("dopri5", "tree"),
+        ("radau5", "lagrange"),
+        ("automatic", "tree"),
+        ("rosenbrock", "tree"),
+    ] {
+        let changes = [
+            ("solver.method", method),
+            ("solver.tolerance", "1e-9"),
+            ("formulation", formulation),
+        ];
+        let mut simulation = Simulation::new(&parse(text, &changes)).unwrap();
+        let mut highest = 0.0_f64;
+        let energy = at(&mut simulation, 0.0);
+        let whole = energy.elastic + 0.5 * 9.81 * 0.06;
+        for n in 1..=1500 {
+            let frame = at(&mut simulation, f64::from(n) * 1e-3);
+            let height = frame.bodies[0].position.z;
+            highest = highest.max(height);
+            let force = frame.elements[0].force.z;
+            assert!(
+                force >= 0.0 && (force == 0.0) == (height >= 0.1),
+                "{force} at {height}"
+            );
+            assert!(
+                (frame.kinetic + frame.potential - whole).abs() < 1e-6,
+                "{method}"
+            );
+        }
+        let top = whole / (0.5 * 9.81);
+        assert!(
+            top > 0.2 && (highest - top).abs() < 1e-4,
+            "{method}: {highest} {top}"
+        );
+        let ledger = simulation.ledger().unwrap();
+        assert!(
+            ledger.relative_residual().abs() < 1e-6,
+            "{method} {ledger:?}"
+        );
+    }
+}
+
+#[test]
+fn a_characteristic_may_lie_in_a_file_beside_the_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = folder.path().join("scene.toml");
+    let text = On::Body.text(&POINTS, "");
+    let from = text.find("characteristic").unwrap();
+    std::fs::write(&scene, format!("{}file = \"coil.csv\"\n", &text[..from])).unwrap();
+    let coil = folder.path().join("coil.csv");
+    std::fs::write(
+        &coil,
+        "# measured\nlength_mm, tension [N]\n0, 0\n100, 10\n200, 40\n",
+    )
+    .unwrap();
+    let scene = Scene::load(&scene, &[]).unwrap();
+    assert_eq!(scene.elements[0].curve.as_deref(), Some(&POINTS[..]));
+    let mut simulation = Simulation::new(&scene).unwrap();
+    let (passes, _) = passes();
+    assert!(On::Body.state(&at(&mut simulation, passes))[0].abs() < 1e-4);
+}
+
+#[test]
+fn what_is_wrong_with_a_characteristic_is_named() {
+    let start = "[[body]]\nname = \"mass\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n\
+        [[joint]]\nname = \"h\"\nkind = \"revolute\"\naxis = [0, 0, 1]\nchild = \"mass\"\n";
+    let spring = "[[spring]]\nname = \"s\"\nfrom = { body = \"world\" }\nto = { body = \"mass\" }\nlength = \"1 m\"\n";
+    let turning = "[[joint_spring]]\nname = \"t\"\njoint = \"h\"\n";
+    for (element, more, said) in [
+        (
+            spring,
+            "characteristic = [[0, 0], [\"1 mm\", \"1 N\"]]\nstiffness = \"1 N/m\"",
+            ["spring.s.stiffness", "not allowed here: `characteristic`"],
+        ),
+        (
+            spring,
+            "characteristic = [[0, 0], [\"1 mm\", \"1 N\"]]\npreload = \"1 N\"",
+            ["spring.s.preload", "not allowed here"],
+        ),
+        (
+            spring,
+            "characteristic = [[0, 0], [\"1 mm\", \"1 N\"]]\nfile = \"a.csv\"",
+            ["spring.s.file", "`characteristic` is given as well"],
+        ),
+        (
+            spring,
+            "file = \"a.csv\"",
+            ["spring.s.file", "has no folder"],
+        ),
+        (
+            spring,
+            "characteristic = [[0, 0]]",
+            [
+                "spring.s.characteristic",
+                "has 1 points; allowed 2 to 10000",
+            ],
+        ),
+        (
+            spring,
+            "characteristic = [[0, 0], [\"2 mm\", \"1 N\"], [\"1 mm\", \"2 N\"]]",
+            [
+                "spring.s.characteristic[2][0] = \"1 mm\"",
+                "lengths must rise, by at least 1 nm",
+            ],
+        ),
+        (
+            spring,
+            "characteristic = [[0, 0], [\"2 mm\"]]",
+            [
+                "spring.s.characteristic[1]",
+                "needs a length and a tension, has 1 values",
+            ],
+        ),
+        (
+            spring,
+            "characteristic = [[0, 0], [\"2 mm\", \"1 mm\"]]",
+            ["spring.s.characteristic[1][1]", "wrong unit `mm`"],
+        ),
+        (
+            spring,
+            "characteristic = [[0, 0], [\"2 mm\", 0]]",
+            ["spring.s", "does nothing"],
+        ),
+        (
+            turning,
+            "characteristic = [[0, 0], [\"2 mm\", \"1 N\"]]",
+            ["joint_spring.t.characteristic[1][0]", "wrong unit `mm`"],
+        ),
+        (
+            turning,
+            "characteristic = [[\"1 deg\"]]",
+            [
+                "joint_spring.t.characteristic[0]",
+                "needs an angle and a torque",
+            ],
+        ),
+    ] {
+        let text = format!("{start}{element}{more}\n");
+        let error = Scene::parse(&text, Some("mine.toml"), &[])
+            .expect_err(more)
+            .to_string();
+        for said in said {
+            assert!(error.contains(said), "{error}\nlacks {said}");
+        }
+        assert!(error.starts_with("mine.toml:"), "{error}");
+    }
+}
