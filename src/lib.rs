@@ -21,6 +21,7 @@ pub mod files;
 pub mod integrate;
 pub mod jet;
 pub mod mechanism;
+pub mod mesh;
 #[cfg(feature = "gui")]
 pub mod render;
 pub mod scene;

@@ -2,8 +2,10 @@
 
 use super::copy::Copy;
 use super::document::{Node, Section};
+use super::read_joints::read_rotation;
 use super::solid::Solid;
 use super::*;
+use crate::mesh::Format;
 use crate::words::words;
 
 /// Forms of a shape.
@@ -15,6 +17,7 @@ enum Form {
     Box,
     Sphere,
     Plate,
+    Mesh,
 }
 
 words!(Form {
@@ -24,11 +27,15 @@ words!(Form {
     Box => "box",
     Sphere => "sphere",
     Plate => "plate",
+    Mesh => "mesh",
 });
 
 /// Largest mass, kg, and inertia, kg m^2, that a file may give: anything beyond is a typing slip.
 const MAX_MASS: f64 = 1e9;
 const MAX_INERTIA: f64 = 1e12;
+
+/// Largest dimension of a shape, m.
+const LARGEST_SHAPE: f64 = 1000.0;
 
 /// Moments of inertia are often given to three digits: the triangle inequality gets this relative slack.
 const TRIANGLE_SLACK: f64 = 1e-9;
@@ -94,6 +101,26 @@ fn read_solid(
 ) -> Result<Body, SceneError> {
     for key in ["mass", "centre", "inertia", "products"] {
         section.refuse(key, "it follows from `density` and `shapes`")?;
+    }
+    for (shape, index) in shapes.iter().zip(0..) {
+        let Geometry::Mesh { mesh, unit, .. } = &shape.geometry else {
+            continue;
+        };
+        if let Some(ends) = mesh.open_edge() {
+            let [from, to] = ends.map(|end| {
+                let [x, y, z] =
+                    end.map(|x| format_quantity_digits(f64::from(x) * unit * 1e3, "", 4));
+                format!("({x}, {y}, {z})")
+            });
+            return Err(section.error(
+                &format!("shapes[{index}]"),
+                format!(
+                    "this mesh is not closed, so it has no volume for `density`: its edge from {from} to {to} mm in the \
+                     file's frame does not lie between two triangles that face the same way; close it, or give `mass`, \
+                     `centre` and `inertia`"
+                ),
+            ));
+        }
     }
     let density = node.positive(Dimension::Density, MAX_DENSITY, "kg/m^3")?;
     let solid = Solid::of_shapes(&shapes);
@@ -167,13 +194,21 @@ pub(super) fn read_shape(
         "size",
         "corners",
         "thickness",
+        "file",
+        "unit",
+        "position",
+        "rotation",
+        "colour",
     ];
     known.extend(spcmm.map(|_| "at_slider_plane"));
     node.check_word::<Role>(&node.key, "role")?;
     node.check_word::<Form>(&node.key, "form")?;
     let section = node.section(&known)?;
-    let role_node = section.require("role", "\"frame\"")?;
-    let role = role_node.word::<Role>()?;
+    let role = section.get("role").map(|node| node.word()).transpose()?;
+    let colour = section
+        .get("colour")
+        .map(|node| read_colour(&node))
+        .transpose()?;
     let form_node = section.require("form", "\"capsule\"")?;
     let form = form_node.word::<Form>()?;
 
@@ -182,6 +217,7 @@ pub(super) fn read_shape(
         Form::Sphere => &["centre", "radius"],
         Form::Plate => &["corners", "thickness"],
         Form::Capsule | Form::Cylinder | Form::Cone => &["from", "to", "radius"],
+        Form::Mesh => &["file", "unit", "position", "rotation"],
     };
     for name in [
         "from",
@@ -191,6 +227,10 @@ pub(super) fn read_shape(
         "size",
         "corners",
         "thickness",
+        "file",
+        "unit",
+        "position",
+        "rotation",
     ] {
         if !needs.contains(&name) {
             section.refuse(name, &format!("a {form} has {}", needs.join(", ")))?;
@@ -215,7 +255,7 @@ pub(super) fn read_shape(
     let size = |name| {
         section
             .require(name, "\"4 mm\"")?
-            .positive(Dimension::Length, 1000.0, "m")
+            .positive(Dimension::Length, LARGEST_SHAPE, "m")
     };
     let geometry = match form {
         Form::Box => {
@@ -263,13 +303,78 @@ pub(super) fn read_shape(
                 _ => Geometry::Cone { from, to, radius },
             }
         }
+        Form::Mesh => read_mesh(&section, shift)?,
     };
-    let mut shape = Shape { geometry, role };
+    let mut shape = Shape {
+        geometry,
+        role,
+        colour,
+    };
     // A body's shapes move with it.
     if let Some(copy) = node.document.copy.filter(|_| fixed) {
         shape.follow(copy, &form_node)?;
     }
     Ok(shape)
+}
+
+/// Triangles of a file beside the scene.
+fn read_mesh(section: &Section<'_>, shift: Vec3) -> Result<Geometry, SceneError> {
+    let file = section.require("file", "\"arm.stl\"")?;
+    let name = file.text()?;
+    let document = &file.document;
+    let mesh = document
+        .beside
+        .mesh(name, document, |why| file.error(why))?;
+    let own = Format::of(name).and_then(Format::unit);
+    let unit = match own.filter(|_| section.get("unit").is_none()) {
+        Some(unit) => unit,
+        None => read_unit(&section.require("unit", "\"mm\"")?)?,
+    };
+    let bounds = mesh.bounds();
+    let largest = bounds
+        .as_flattened()
+        .iter()
+        .fold(0.0, |most, x| x.abs().max(most));
+    if f64::from(largest) * unit > LARGEST_SHAPE {
+        let size = format_quantity(f64::from(largest) * unit, "m");
+        let message =
+            format!("with this unit, the mesh reaches {size} far; allowed up to {LARGEST_SHAPE} m");
+        return Err(section.get("unit").unwrap_or(file).error(message));
+    }
+    let position = section
+        .get("position")
+        .map(|node| node.vector(Dimension::Length));
+    let rotation = section.get("rotation").map(|node| read_rotation(&node));
+    Ok(Geometry::Mesh {
+        mesh,
+        unit,
+        position: position.transpose()?.unwrap_or_default() + shift,
+        rotation: rotation.transpose()?.unwrap_or_default(),
+    })
+}
+
+/// Length of a file's unit, m: a unit of length alone (`"mm"`), or with a number (`"25.4 mm"`).
+fn read_unit(node: &Node<'_>) -> Result<f64, SceneError> {
+    match parse_quantity(&format!("1 {}", node.scalar()?), Dimension::Length) {
+        Ok(unit) => Ok(unit),
+        Err(_) => node.positive(Dimension::Length, LARGEST_SHAPE, "m"),
+    }
+}
+
+/// Red, green and blue of `"#rrggbb"`.
+fn read_colour(node: &Node<'_>) -> Result<[u8; 3], SceneError> {
+    let text = node.text()?;
+    let digits = text.strip_prefix('#').filter(|digits| digits.len() == 6);
+    let parts = [0, 2, 4].map(|at| {
+        let digits = digits?.get(at..at + 2)?;
+        // A sign would be read, too.
+        let plain = digits.bytes().all(|digit| digit.is_ascii_hexdigit());
+        u8::from_str_radix(digits, 16).ok().filter(|_| plain)
+    });
+    match parts {
+        [Some(red), Some(green), Some(blue)] => Ok([red, green, blue]),
+        _ => Err(node.error("no colour; allowed `#` and six hexadecimal digits, red, green and blue, for example \"#c2255c\"")),
+    }
 }
 
 impl Shape {
@@ -289,9 +394,15 @@ impl Shape {
                 }
             }
             Geometry::Box { centre, .. } if copy.keeps_axes() => *centre = copy.point(*centre),
+            Geometry::Mesh {
+                position, rotation, ..
+            } => {
+                *position = copy.point(*position);
+                *rotation = copy.rotation(*rotation);
+            }
             Geometry::Box { .. } => {
                 return Err(form.error(
-                    "a fixed box keeps to the world's axes and cannot turn with a pattern; allowed here: capsule, cylinder, cone, sphere, plate",
+                    "a fixed box keeps to the world's axes and cannot turn with a pattern; allowed here: capsule, cylinder, cone, sphere, plate, mesh",
                 ));
             }
         }

@@ -41,6 +41,7 @@ pub(super) fn read_joint<'d>(
         "rotation",
         "drive",
         "start",
+        "drawn",
     ];
     let title = node.title("joint");
     node.check_word::<JointKind>(&title, "kind")?;
@@ -81,6 +82,7 @@ pub(super) fn read_joint<'d>(
             position: 0.0,
             velocity: 0.0,
         },
+        drawn: section.get("drawn").map_or(Ok(true), |node| node.flag())?,
     };
     match kind {
         JointKind::Free => read_free(&section, &mut joint)?,

@@ -8,8 +8,9 @@ use parry3d::query::Ray;
 use super::arrows::{ARROW_LENGTH, push_arrow, push_forces};
 use super::cast::{cast, room};
 use super::coil::push_coil;
-use super::drawn::{self, BarKind, DrawnJoint, DrawnShape, Solid};
+use super::drawn::{self, BarKind, DrawnJoint, DrawnShape, Pose, Solid};
 use super::instances::{self, bar, placed, push_label};
+use super::symbols::{Symbol, symbols};
 use super::theme::Material;
 use super::{
     Background, Bounds, Camera, DrawList, Floor, Instance, LabelKind, Layer, Light, Line, Mesh,
@@ -21,6 +22,7 @@ use crate::simulate::Frame;
 /// What the view precomputes for a scene: built once per scene, and again when its bodies or shapes change.
 pub struct SceneView {
     pub(super) parts: Vec<DrawnShape>,
+    symbols: Vec<Symbol>,
     plates: Arc<[MeshData]>,
     joint_names: Vec<Arc<str>>,
     axis_names: [Arc<str>; 4],
@@ -54,6 +56,7 @@ impl SceneView {
         let down = to_f32(&scene.view.down.unit());
         let extents = extents(&parts, frame, &joints);
         let bounds = bounds(&extents);
+        let symbols = symbols(scene, &parts, frame, &joints, bounds.radius);
         let lowest = extents
             .iter()
             .map(|(p, r)| p.dot(down) + r)
@@ -80,6 +83,7 @@ impl SceneView {
         Self {
             room,
             watched,
+            symbols,
             at_start: joints,
             parts,
             plates: plates.into(),
@@ -217,8 +221,17 @@ impl SceneView {
             } else {
                 &mut out.solid
             };
-            let material = palette.material(part.role).with_opacity(opacity);
+            let material = part.material(&palette).with_opacity(opacity);
             push_solid(layer, &part.place(frame, &joints), material);
+        }
+        for symbol in self.symbols.iter().filter(|_| options.hinges) {
+            let pose = Pose::in_frame(frame, symbol.body);
+            let (from, to) = (pose.apply(symbol.from), pose.apply(symbol.to));
+            let material = palette.material(symbol.role);
+            out.solid.push(
+                Mesh::Cylinder,
+                bar(from, to - from, symbol.radius, material),
+            );
         }
         for (i, joint) in joints.iter().enumerate() {
             let ball = instances::ball(joint.ball_centre, joint.ball_radius, palette.ball);
@@ -512,7 +525,7 @@ pub(super) fn push_solid(layer: &mut Layer, solid: &Solid<'_>, material: Materia
         Solid::Ball { centre, radius } => {
             layer.push(Mesh::Sphere, instances::ball(centre, radius, material))
         }
-        Solid::Plate { mesh, pose, .. } => {
+        Solid::Own { mesh, pose, .. } => {
             layer.push(mesh, placed(pose.rotation, pose.position, material))
         }
     }

@@ -24,6 +24,8 @@ mod options;
 mod peaks;
 mod pick;
 mod shot;
+mod surface;
+mod symbols;
 #[cfg(test)]
 mod tests;
 mod theme;

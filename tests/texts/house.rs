@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// Floors from the ground up; modules of one floor know nothing of each other.
 const FLOORS: [&[&str]; 10] = [
-    &["words", "jet"],
+    &["words", "jet", "mesh"],
     &["contact", "files", "integrate"],
     &["scene"],
     &["mechanism"],
@@ -17,8 +17,9 @@ const FLOORS: [&[&str]; 10] = [
     &["main", "web"],
 ];
 /// Modules whose results must be the same bits everywhere.
-const EXACT: [&str; 7] = [
+const EXACT: [&str; 8] = [
     "jet",
+    "mesh",
     "contact",
     "integrate",
     "scene",
