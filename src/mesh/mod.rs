@@ -274,6 +274,20 @@ mod tests {
     }
 
     #[test]
+    fn the_seeds_of_the_fuzz_target_are_read() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fuzz/meshes");
+        let mut count = 0;
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            let format = Format::of(path.to_str().unwrap()).unwrap();
+            let mesh = read(format, &std::fs::read(&path).unwrap()).unwrap();
+            assert_eq!(mesh.open_edge(), None, "{}", path.display());
+            count += 1;
+        }
+        assert_eq!(count, 5);
+    }
+
+    #[test]
     fn a_gltf_file_finds_its_buffer_beside_it() {
         let other = |name: &str| match name {
             "box.bin" => Ok(gltf_parts().1),

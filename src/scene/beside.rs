@@ -11,8 +11,7 @@ use std::sync::Arc;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
 
-use super::document::Document;
-use super::{SceneError, Texts};
+use super::Texts;
 use crate::mesh::{Fault, Format, Mesh};
 
 /// Largest file that is read, bytes: a scene is a few kilobytes.
@@ -43,6 +42,17 @@ fn kept(bytes: Vec<u8>) -> Arc<str> {
 
 fn encoded(bytes: &[u8]) -> Arc<str> {
     format!("{ENCODED}{}", BASE64.encode(bytes)).into()
+}
+
+/// Why a file gives no mesh.
+pub(super) enum NoMesh {
+    /// It is not there, or not of a known kind.
+    Nowhere(String),
+    /// What is wrong in it, with its text if it is one.
+    Within {
+        text: Option<Arc<str>>,
+        fault: Fault,
+    },
 }
 
 /// What a file is for.
@@ -95,26 +105,21 @@ impl<'d> Beside<'d> {
         Ok(text)
     }
 
-    /// Triangles of the file `name` beside the scene in `document`.
+    /// Triangles of the file `name`.
     ///
     /// # Errors
-    /// What is wrong with it, and where; `on_scene` makes an error of why there is no such file.
-    pub fn mesh(
-        &self,
-        name: &str,
-        document: &Document<'_>,
-        on_scene: impl Fn(String) -> SceneError,
-    ) -> Result<Arc<Mesh>, SceneError> {
+    /// Why there are none.
+    pub fn mesh(&self, name: &str) -> Result<Arc<Mesh>, NoMesh> {
         if let Some(mesh) = self.meshes.borrow().get(name) {
             return Ok(mesh.clone());
         }
         let format = Format::of(name).ok_or_else(|| {
-            on_scene(format!(
+            NoMesh::Nowhere(format!(
                 "is no file with a mesh; allowed names that end in {}",
                 Format::ENDINGS
             ))
         })?;
-        let text = self.content(name, Use::Mesh).map_err(&on_scene)?;
+        let text = self.content(name, Use::Mesh).map_err(NoMesh::Nowhere)?;
         // A file that this one names lies beside it.
         let other = |other: &str| {
             let other = Path::new(name).with_file_name(other);
@@ -122,10 +127,13 @@ impl<'d> Beside<'d> {
             Ok(file_bytes(&text).into_owned())
         };
         let mesh = format.read(&file_bytes(&text), &other);
-        let mesh = Arc::new(mesh.map_err(|fault| error_in(name, &text, fault, document))?);
-        self.meshes
-            .borrow_mut()
-            .insert(name.to_owned(), mesh.clone());
+        let mesh = mesh.map_err(|fault| NoMesh::Within {
+            text: Some(text.clone()).filter(|text| !text.starts_with(ENCODED)),
+            fault,
+        })?;
+        let mesh = Arc::new(mesh);
+        let mut meshes = self.meshes.borrow_mut();
+        meshes.insert(name.to_owned(), mesh.clone());
         Ok(mesh)
     }
 
@@ -185,28 +193,6 @@ impl<'d> Beside<'d> {
         }
         held.set(held.get() + bytes.len() as u64);
         Ok(kept(bytes))
-    }
-}
-
-/// The error for what is wrong with the mesh in the file `name`, kept as `text`.
-fn error_in(name: &str, text: &str, fault: Fault, document: &Document<'_>) -> SceneError {
-    match fault.at {
-        Some(at) if !text.starts_with(ENCODED) => {
-            let file = Document {
-                file: Some(name),
-                text,
-                ..*document
-            };
-            file.error(at..at, "", None, fault.why)
-        }
-        at => SceneError {
-            file: Some(name.to_owned()),
-            message: match at {
-                Some(at) => format!("byte {at}: {}", fault.why),
-                None => fault.why,
-            },
-            ..SceneError::default()
-        },
     }
 }
 

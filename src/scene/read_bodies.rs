@@ -1,11 +1,12 @@
 //! Bodies and shapes of a scene file.
 
+use super::beside::NoMesh;
 use super::copy::Copy;
-use super::document::{Node, Section};
+use super::document::{Document, Node, Section};
 use super::read_joints::read_rotation;
 use super::solid::Solid;
 use super::*;
-use crate::mesh::Format;
+use crate::mesh::{Fault, Format};
 use crate::words::words;
 
 /// Forms of a shape.
@@ -322,9 +323,11 @@ fn read_mesh(section: &Section<'_>, shift: Vec3) -> Result<Geometry, SceneError>
     let file = section.require("file", "\"arm.stl\"")?;
     let name = file.text()?;
     let document = &file.document;
-    let mesh = document
-        .beside
-        .mesh(name, document, |why| file.error(why))?;
+    let mesh = document.beside.mesh(name);
+    let mesh = mesh.map_err(|why| match why {
+        NoMesh::Nowhere(why) => file.error(why),
+        NoMesh::Within { text, fault } => error_in(name, text.as_deref(), fault, document),
+    })?;
     let own = Format::of(name).and_then(Format::unit);
     let unit = match own.filter(|_| section.get("unit").is_none()) {
         Some(unit) => unit,
@@ -351,6 +354,28 @@ fn read_mesh(section: &Section<'_>, shift: Vec3) -> Result<Geometry, SceneError>
         position: position.transpose()?.unwrap_or_default() + shift,
         rotation: rotation.transpose()?.unwrap_or_default(),
     })
+}
+
+/// The error for what is wrong in the file `name` beside the scene in `document`.
+fn error_in(name: &str, text: Option<&str>, fault: Fault, document: &Document<'_>) -> SceneError {
+    match (text, fault.at) {
+        (Some(text), Some(at)) => {
+            let file = Document {
+                file: Some(name),
+                text,
+                ..*document
+            };
+            file.error(at..at, "", None, fault.why)
+        }
+        (_, at) => SceneError {
+            file: Some(name.to_owned()),
+            message: match at {
+                Some(at) => format!("byte {at}: {}", fault.why),
+                None => fault.why,
+            },
+            ..SceneError::default()
+        },
+    }
 }
 
 /// Length of a file's unit, m: a unit of length alone (`"mm"`), or with a number (`"25.4 mm"`).

@@ -8,7 +8,7 @@ use parry3d::query::Ray;
 use super::arrows::{ARROW_LENGTH, push_arrow, push_forces};
 use super::cast::{cast, room};
 use super::coil::push_coil;
-use super::drawn::{self, BarKind, DrawnJoint, DrawnShape, Pose, Solid};
+use super::drawn::{self, BarKind, DrawnJoint, DrawnShape, Solid};
 use super::instances::{self, bar, placed, push_label};
 use super::symbols::{Symbol, symbols};
 use super::theme::Material;
@@ -54,9 +54,10 @@ impl SceneView {
         let (parts, plates) = drawn::parts(scene);
         let joints = drawn::joints(scene, frame, 1.0);
         let down = to_f32(&scene.view.down.unit());
-        let extents = extents(&parts, frame, &joints);
+        let without = bounds(&extents(&parts, &[], frame, &joints));
+        let symbols = symbols(scene, &parts, frame, &joints, without.radius);
+        let extents = extents(&parts, &symbols, frame, &joints);
         let bounds = bounds(&extents);
-        let symbols = symbols(scene, &parts, frame, &joints, bounds.radius);
         let lowest = extents
             .iter()
             .map(|(p, r)| p.dot(down) + r)
@@ -174,7 +175,7 @@ impl SceneView {
     fn extents(&self, scene: &Scene, frame: &Frame, options: &ViewOptions) -> Vec<(Vec3, f32)> {
         let m = self.magnification(scene, frame, options);
         let joints = drawn::joints(scene, frame, m);
-        let mut extents = extents(&self.parts, frame, &joints);
+        let mut extents = extents(&self.parts, &self.symbols, frame, &joints);
         // Half a reference length of arrows around each joint: they point anywhere, and most are shorter. Included even if
         // not drawn, so that pictures with and without them can be compared.
         let arrow = ARROW_LENGTH * self.bounds.radius;
@@ -225,8 +226,7 @@ impl SceneView {
             push_solid(layer, &part.place(frame, &joints), material);
         }
         for symbol in self.symbols.iter().filter(|_| options.hinges) {
-            let pose = Pose::in_frame(frame, symbol.body);
-            let (from, to) = (pose.apply(symbol.from), pose.apply(symbol.to));
+            let [from, to] = symbol.ends(frame);
             let material = palette.material(symbol.role);
             out.solid.push(
                 Mesh::Cylinder,
@@ -429,8 +429,16 @@ impl SceneView {
 }
 
 /// Spheres (centre, radius) whose convex hull contains everything drawn.
-fn extents(parts: &[DrawnShape], frame: &Frame, joints: &[DrawnJoint]) -> Vec<(Vec3, f32)> {
-    let mut extents = Vec::new();
+fn extents(
+    parts: &[DrawnShape],
+    symbols: &[Symbol],
+    frame: &Frame,
+    joints: &[DrawnJoint],
+) -> Vec<(Vec3, f32)> {
+    let ends = symbols
+        .iter()
+        .flat_map(|symbol| symbol.ends(frame).map(|end| (end, symbol.radius)));
+    let mut extents: Vec<(Vec3, f32)> = ends.collect();
     for part in parts {
         part.place(frame, joints)
             .extent(|centre, radius| extents.push((centre, radius)));

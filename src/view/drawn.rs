@@ -9,6 +9,7 @@ use std::sync::Arc;
 use glam::{Mat3, Vec3};
 use parry3d::shape::SharedShape;
 
+use super::sticks::sticks;
 use super::surface::surface;
 use super::theme::Material;
 use super::{Colour, Mesh, MeshData, Palette, to_f32, zones};
@@ -184,8 +185,10 @@ pub(super) fn parts(scene: &Scene) -> (Vec<DrawnShape>, Vec<MeshData>) {
         .iter()
         .enumerate()
         .map(|(i, shape)| (None, i, shape));
+    let sticks = sticks(scene);
     let moving = scene.bodies.iter().enumerate().flat_map(|(b, body)| {
-        body.shapes
+        let shapes = sticks.get(&b).unwrap_or(&body.shapes);
+        shapes
             .iter()
             .enumerate()
             .map(move |(i, shape)| (Some(b), i, shape))
@@ -313,8 +316,14 @@ impl Meshes {
         let vertices = file.vertices().iter().map(scaled).collect();
         let bounds = file.bounds().map(|end| scaled(&end));
         let corner = |i: usize| Vec3::from([0, 1, 2].map(|axis| bounds[i >> axis & 1][axis]));
+        // The page reads no files: without this it holds none of that code.
+        let shape = if cfg!(target_arch = "wasm32") {
+            None
+        } else {
+            SharedShape::trimesh(vertices, file.triangles().to_vec()).ok()
+        };
         let own = OwnMesh {
-            shape: SharedShape::trimesh(vertices, file.triangles().to_vec()).ok(),
+            shape,
             points: (0..8).map(corner).collect(),
             mesh: self.add(surface(file, unit))?,
         };

@@ -24,6 +24,7 @@ mod options;
 mod peaks;
 mod pick;
 mod shot;
+mod sticks;
 mod surface;
 mod symbols;
 #[cfg(test)]

@@ -9,10 +9,16 @@ use super::to_f32;
 use crate::scene::{Joint, JointKind, Role, Scene};
 use crate::simulate::Frame;
 
-/// Radius of a pin, at most, in radii of the scene.
-const RADIUS: f32 = 0.016;
-/// How far a pin or a rail may reach from its joint, in radii of the scene.
-const REACH: f32 = 0.3;
+/// Radii of a pin in parts of the hub's width, and, at most, of the scene's radius; without a hub.
+const IN_HUB: f32 = 0.2;
+const THICKEST: f32 = 0.04;
+const ALONE: f32 = 0.02;
+/// How far a rail reaches beyond what slides on it, in radii of the scene.
+const REACH: f32 = 0.25;
+/// Radii of a rail and its sleeve, in radii of the scene.
+const RAIL: [f32; 2] = [0.012, 0.022];
+/// Shapes of a body that are looked at for each of its joints: setting up takes time proportional to the scene.
+const MOST_SHAPES: usize = 500;
 /// Sine of the angle at which a bar still lies along an axis.
 const ALONG: f32 = 0.02;
 
@@ -24,6 +30,14 @@ pub(super) struct Symbol {
     pub to: Vec3,
     pub radius: f32,
     pub role: Role,
+}
+
+impl Symbol {
+    /// Its ends in `frame`, m, world axes.
+    pub fn ends(&self, frame: &Frame) -> [Vec3; 2] {
+        let pose = Pose::in_frame(frame, self.body);
+        [self.from, self.to].map(|end| pose.apply(end))
+    }
 }
 
 /// A joint at one instant, world axes.
@@ -50,7 +64,10 @@ pub(super) fn symbols(
     // The world last.
     let of = |body: Option<usize>| body.unwrap_or(scene.bodies.len());
     for part in parts {
-        shapes[of(part.body)].push((part.role, part.place(frame, joints)));
+        let shapes = &mut shapes[of(part.body)];
+        if shapes.len() < MOST_SHAPES {
+            shapes.push((part.role, part.place(frame, joints)));
+        }
     }
     let mut symbols = Vec::new();
     for joint in scene.joints.iter().filter(|joint| joint.drawn) {
@@ -87,22 +104,22 @@ pub(super) fn symbols(
         };
         match joint.kind {
             JointKind::Revolute if !place.has_pin() => {
-                let half = place.half_width(REACH * radius);
-                let thick = (0.5 * half).clamp(0.5 * RADIUS * radius, RADIUS * radius);
-                let half = half + 1.2 * thick;
-                bar(joint.parent, [-half, half], thick, Role::Pin);
+                let hub = place.hub(radius);
+                let thick = match hub {
+                    Some([low, high]) => (IN_HUB * (high - low)).min(THICKEST * radius),
+                    None => ALONE * radius,
+                };
+                let [low, high] = hub.unwrap_or_default();
+                let ends = [low - 1.5 * thick, high + 1.5 * thick];
+                bar(joint.parent, ends, thick, Role::Pin);
             }
             JointKind::Prismatic if !place.has_rail() => {
-                let thick = RADIUS * radius;
+                let [rail, sleeve] = RAIL.map(|part| part * radius);
                 let [low, high] = place.span();
                 let ends = [low - REACH * radius, high + REACH * radius];
-                bar(joint.parent, ends, 0.5 * thick, Role::Rail);
-                bar(
-                    Some(joint.child),
-                    [-2.0 * thick, 2.0 * thick],
-                    thick,
-                    Role::Slider,
-                );
+                bar(joint.parent, ends, rail, Role::Rail);
+                let ends = [-2.0 * sleeve, 2.0 * sleeve];
+                bar(Some(joint.child), ends, sleeve, Role::Slider);
             }
             _ => {}
         }
@@ -111,17 +128,16 @@ pub(super) fn symbols(
 }
 
 impl Place<'_> {
-    /// Whether a bar of the scene lies along the axis through the joint.
+    /// Whether a bar of the scene, not a disc, lies on the joint's axis.
     fn has_pin(&self) -> bool {
         let along = |solid: &Solid<'_>| match *solid {
             Solid::Bar {
                 from, to, radius, ..
             } => {
                 let bar = (to - from).normalize_or_zero();
-                let near = from + bar * (self.point - from).dot(bar).clamp(0.0, from.distance(to));
-                bar.cross(self.axis).length() < ALONG
-                    && bar != Vec3::ZERO
-                    && near.distance(self.point) < 0.5 * radius
+                let off = (from - self.point).reject_from_normalized(self.axis);
+                let is_long = from.distance(to) > radius;
+                is_long && bar.cross(self.axis).length() < ALONG && off.length() < 0.5 * radius
             }
             _ => false,
         };
@@ -138,20 +154,28 @@ impl Place<'_> {
         of_parent.iter().any(|(role, _)| *role == Role::Rail) || self.has_pin()
     }
 
-    /// How far the shapes of the two bodies reach along the axis to both sides of the joint, m, as far as `most`.
-    fn half_width(&self, most: f32) -> f32 {
-        let mut widest = 0.0;
+    /// From where to where on the axis the shapes of the two bodies lie, from the joint, m; seen from as far as `most`.
+    fn hub(&self, most: f32) -> Option<[f32; 2]> {
+        let mut ends: Option<[f32; 2]> = None;
         for (_, solid) in self.shapes[1].iter().chain(self.shapes[2]) {
-            for out in [self.axis, -self.axis] {
-                let ray = Ray::new(self.point + out * most, -out);
-                let reach = cast(solid, &ray).map_or(0.0, |distance| most - distance);
-                // What begins beyond is no hub.
-                if reach < most {
-                    widest = reach.max(widest);
+            let (mut sum, mut count) = (Vec3::ZERO, 0.0);
+            solid.extent(|point, _| (sum, count) = (sum + point, count + 1.0));
+            let inwards = (sum / count - self.point).reject_from_normalized(self.axis);
+            // The joint may lie on the very edge of its hub.
+            for point in [self.point, self.point + inwards * 0.05] {
+                let reach = |out: Vec3| {
+                    let ray = Ray::new(point + out * most, -out);
+                    // What begins beyond is no hub.
+                    let met = cast(solid, &ray).filter(|distance| *distance > 0.0)?;
+                    Some(most - met)
+                };
+                if let (Some(high), Some(low)) = (reach(self.axis), reach(-self.axis)) {
+                    let [lowest, highest] = ends.unwrap_or([-low, high]);
+                    ends = Some([lowest.min(-low), highest.max(high)]);
                 }
             }
         }
-        widest
+        ends
     }
 
     /// How far the child's shapes reach along the axis, from its joint, m.

@@ -11,5 +11,6 @@ mod headless_window;
 mod instruments;
 mod lecture;
 mod page;
+mod pictures;
 mod reload;
 mod window;

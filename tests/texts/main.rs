@@ -3,5 +3,6 @@
 mod documents;
 mod drives;
 mod house;
+mod meshes;
 mod scene_corpus;
 mod scene_errors;
