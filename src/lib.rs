@@ -23,6 +23,7 @@ pub mod film;
 pub mod integrate;
 pub mod jet;
 pub mod mechanism;
+pub mod mesh;
 #[cfg(feature = "gui")]
 pub mod render;
 pub mod scene;

@@ -486,6 +486,8 @@ pub enum Hideable {
     Triad,
     /// Names of the ball joints.
     Names,
+    /// Pins and rails of hinges and slides.
+    Hinges,
     /// Sockets.
     Sockets,
     /// Trail of the probe tip.

@@ -5,7 +5,7 @@ use serde_json::{Map, Value as Json, json};
 #[cfg(feature = "gui")]
 use super::Failure;
 use crate::files::PROGRAM;
-use crate::scene::Scene;
+use crate::scene::{Scene, file_bytes};
 
 /// The common part of every output's `meta`.
 pub fn meta(scene: &Scene) -> Map<String, Json> {
@@ -22,7 +22,7 @@ pub fn meta(scene: &Scene) -> Map<String, Json> {
         .collect();
     meta.insert("changed_parameters".into(), Json::Object(changed));
     // Its presence tells that the file of the scene is not all of it.
-    let checksum = |text: &str| json!(format!("{:08x}", crc32fast::hash(text.as_bytes())));
+    let checksum = |text: &str| json!(format!("{:08x}", crc32fast::hash(&file_bytes(text))));
     insert_files(&mut meta, "scene_files_crc32", scene, checksum);
     meta.insert("formulation".into(), json!(scene.formulation));
     meta.insert("method".into(), json!(scene.solver.method));

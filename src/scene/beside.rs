@@ -1,15 +1,66 @@
 //! Files that a scene names: read once, when the scene is loaded, and kept in its source, so that whatever reads the scene
-//! again gets the same text.
+//! again gets the same content.
 
-use std::cell::RefCell;
+use std::borrow::Cow;
+use std::cell::{Cell, RefCell};
+use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::{Component, Path};
 use std::sync::Arc;
 
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD as BASE64;
+
 use super::Texts;
+use crate::mesh::{Fault, Format, Mesh};
 
 /// Largest file that is read, bytes: a scene is a few kilobytes.
 pub const LARGEST_FILE: u64 = 4 << 20;
+/// Largest file with a mesh, and all of them together, bytes.
+pub const LARGEST_MESH: u64 = 8 << 20;
+
+/// Before the content of a file that is no text, or a text that begins so itself: base64 follows.
+const ENCODED: &str = "base64:";
+
+/// What the file held that a scene keeps as `text`.
+pub fn file_bytes(text: &str) -> Cow<'_, [u8]> {
+    let decoded = text.strip_prefix(ENCODED).map(|data| BASE64.decode(data));
+    match decoded {
+        Some(Ok(bytes)) => bytes.into(),
+        _ => text.as_bytes().into(),
+    }
+}
+
+/// How a scene keeps what a file holds.
+fn kept(bytes: Vec<u8>) -> Arc<str> {
+    match String::from_utf8(bytes) {
+        Ok(text) if !text.starts_with(ENCODED) => text.into(),
+        Ok(text) => encoded(text.as_bytes()),
+        Err(fault) => encoded(fault.as_bytes()),
+    }
+}
+
+fn encoded(bytes: &[u8]) -> Arc<str> {
+    format!("{ENCODED}{}", BASE64.encode(bytes)).into()
+}
+
+/// Why a file gives no mesh.
+pub(super) enum NoMesh {
+    /// It is not there, or not of a known kind.
+    Nowhere(String),
+    /// What is wrong in it, with its text if it is one.
+    Within {
+        text: Option<Arc<str>>,
+        fault: Fault,
+    },
+}
+
+/// What a file is for.
+#[derive(Clone, Copy)]
+enum Use {
+    Text,
+    Mesh,
+}
 
 /// Where a scene finds the files that it names, and those that it has asked for.
 #[derive(Default)]
@@ -19,6 +70,10 @@ pub(super) struct Beside<'d> {
     /// Read before.
     known: Option<&'d Texts>,
     asked: RefCell<Texts>,
+    /// Bytes that were read for each [`Use`].
+    held: [Cell<u64>; 2],
+    /// Read from the files in `asked`.
+    meshes: RefCell<BTreeMap<String, Arc<Mesh>>>,
 }
 
 impl<'d> Beside<'d> {
@@ -43,11 +98,52 @@ impl<'d> Beside<'d> {
     /// # Errors
     /// Why there is none.
     pub fn text(&self, name: &str) -> Result<Arc<str>, String> {
+        let text = self.content(name, Use::Text)?;
+        if text.starts_with(ENCODED) {
+            return Err("not a text file: it is not valid UTF-8".to_owned());
+        }
+        Ok(text)
+    }
+
+    /// Triangles of the file `name`.
+    ///
+    /// # Errors
+    /// Why there are none.
+    pub fn mesh(&self, name: &str) -> Result<Arc<Mesh>, NoMesh> {
+        if let Some(mesh) = self.meshes.borrow().get(name) {
+            return Ok(mesh.clone());
+        }
+        let format = Format::of(name).ok_or_else(|| {
+            NoMesh::Nowhere(format!(
+                "is no file with a mesh; allowed names that end in {}",
+                Format::ENDINGS
+            ))
+        })?;
+        let text = self.content(name, Use::Mesh).map_err(NoMesh::Nowhere)?;
+        // A file that this one names lies beside it.
+        let other = |other: &str| {
+            let other = Path::new(name).with_file_name(other);
+            let text = self.content(&other.to_string_lossy(), Use::Mesh)?;
+            Ok(file_bytes(&text).into_owned())
+        };
+        let mesh = format.read(&file_bytes(&text), &other);
+        let mesh = mesh.map_err(|fault| NoMesh::Within {
+            text: Some(text.clone()).filter(|text| !text.starts_with(ENCODED)),
+            fault,
+        })?;
+        let mesh = Arc::new(mesh);
+        let mut meshes = self.meshes.borrow_mut();
+        meshes.insert(name.to_owned(), mesh.clone());
+        Ok(mesh)
+    }
+
+    /// What the file `name` holds, as it is kept.
+    fn content(&self, name: &str, what: Use) -> Result<Arc<str>, String> {
         let found = self.asked.borrow().get(name).cloned();
         let found = found.or_else(|| self.known?.get(name).cloned());
         let text = match found {
             Some(text) => text,
-            None => self.read(name)?,
+            None => self.read(name, what)?,
         };
         let mut asked = self.asked.borrow_mut();
         asked.insert(name.to_owned(), text.clone());
@@ -59,7 +155,7 @@ impl<'d> Beside<'d> {
         self.asked.into_inner()
     }
 
-    fn read(&self, name: &str) -> Result<Arc<str>, String> {
+    fn read(&self, name: &str, what: Use) -> Result<Arc<str>, String> {
         let plain = |part: Component<'_>| matches!(part, Component::Normal(_));
         if name.is_empty() || !Path::new(name).components().all(plain) {
             return Err(
@@ -79,20 +175,43 @@ impl<'d> Beside<'d> {
             return Err("this is a directory, not a file".to_owned());
         }
         let mut bytes = Vec::new();
-        let held: u64 = self.asked.borrow().values().map(|t| t.len() as u64).sum();
-        let room = LARGEST_FILE.saturating_sub(held);
+        let (most, kind) = match what {
+            Use::Text => (LARGEST_FILE, "files"),
+            Use::Mesh => (LARGEST_MESH, "meshes"),
+        };
+        let held = &self.held[what as usize];
+        let room = most.saturating_sub(held.get());
         // One byte more than allowed: a pipe or a device does not report its size.
         std::fs::File::open(path)
             .and_then(|file| file.take(room + 1).read_to_end(&mut bytes))
             .map_err(|cause| format!("cannot read this file: {cause}"))?;
         if bytes.len() as u64 > room {
-            let most = LARGEST_FILE >> 20;
+            let most = most >> 20;
             return Err(format!(
-                "too large; allowed at most {most} MiB in all files that a scene names"
+                "too large; allowed at most {most} MiB in all {kind} that a scene names"
             ));
         }
-        let text = String::from_utf8(bytes);
-        let text = text.map_err(|_| "not a text file: it is not valid UTF-8".to_owned())?;
-        Ok(text.into())
+        held.set(held.get() + bytes.len() as u64);
+        Ok(kept(bytes))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_kept_gives_back_the_bytes() {
+        for bytes in [
+            &b"v 1 2 3"[..],
+            b"base64:AAAA",
+            b"base64:",
+            b"",
+            b"\xff\x00solid",
+        ] {
+            let text = kept(bytes.to_vec());
+            assert_eq!(&*file_bytes(&text), bytes);
+        }
+        assert_eq!(&*kept(b"plain".to_vec()), "plain");
     }
 }

@@ -114,6 +114,7 @@ pub(super) fn expand<'d>(
                 velocity: Vec3::zeros(),
                 angular_velocity: Vec3::zeros(),
             },
+            drawn: true,
         };
         scene.bodies.push(body);
         scene.joints.push(joint);

@@ -444,7 +444,15 @@ fn of_shape(name: &'static str, head: &'static str, more: &[FileKey]) -> FileTab
             Takes::Word(Role::WORDS),
             "\"frame\"",
             "what it is part of, which decides its colour",
-        ),
+        )
+        .absent("that of what its body does"),
+        key(
+            "colour",
+            Takes::Text,
+            "\"#c2255c\"",
+            "red, green and blue in place of the role's colour",
+        )
+        .absent("the role's"),
         point("from", LONG, "one end of the axis; of a cone, its base"),
         point("to", LONG, "the other end; of a cone, its tip"),
         length(
@@ -469,6 +477,31 @@ fn of_shape(name: &'static str, head: &'static str, more: &[FileKey]) -> FileTab
         .of(&["plate"])
         .frame(BODY_FRAME),
         length("thickness", &["plate"], "half to each side of the corners"),
+        key(
+            "file",
+            Takes::File,
+            "\"arm.stl\"",
+            "its triangles: STL, OBJ or glTF, beside the scene",
+        )
+        .of(&["mesh"]),
+        key(
+            "unit",
+            positive(D::Length, LARGEST),
+            "\"1 mm\"",
+            "length of the file's unit, or that unit alone, `\"mm\"`",
+        )
+        .of(&["mesh"])
+        .absent("1 m for glTF; must be given for STL and OBJ"),
+        point("position", &["mesh"], "where the file's frame lies").zero(),
+        key(
+            "rotation",
+            Takes::Table(&ROTATION),
+            "{ axis = [1, 0, 0], angle = \"90 deg\" }",
+            "orientation of the file's frame",
+        )
+        .of(&["mesh"])
+        .zero()
+        .frame(BODY_FRAME),
     ];
     let keys = joined(&[&own, more]);
     let help = match more.is_empty() {
@@ -591,6 +624,14 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
         )
         .of(&["universal"])
         .absent("0, at rest"),
+        key(
+            "drawn",
+            Takes::Flag,
+            "false",
+            "whether a pin or a rail is drawn for it, where the scene's shapes show none",
+        )
+        .of(MOVES)
+        .absent("true"),
         key(
             "closes_loop",
             Takes::Flag,

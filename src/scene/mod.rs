@@ -31,6 +31,7 @@ mod read;
 mod read_bodies;
 mod read_joints;
 mod reading;
+mod roles;
 mod solid;
 mod table;
 #[cfg(test)]
@@ -40,7 +41,7 @@ mod value;
 mod visible;
 mod write;
 
-pub use beside::LARGEST_FILE;
+pub use beside::{LARGEST_FILE, LARGEST_MESH, file_bytes};
 pub use check::least_impact_steps;
 pub use doubt::{Doubt, Warning, WarningKind};
 pub use drives::DRIVE_KINDS;

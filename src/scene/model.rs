@@ -10,6 +10,7 @@ use super::key::{FileKey, Takes};
 use super::units::Dimension;
 use crate::contact;
 use crate::integrate::Method;
+use crate::mesh::Mesh;
 
 /// A vector in three dimensions, f64.
 pub type Vec3 = nalgebra::Vector3<f64>;
@@ -284,15 +285,22 @@ pub struct Body {
 
 /// What a shape represents: the view picks its colour and material.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[allow(missing_docs)]
 pub enum Role {
+    /// A part that slides.
     Slider,
+    /// A part that a drive turns: a crank.
     DrivingRod,
+    /// A part that follows: a coupler, a link.
     DrivenRod,
+    /// The part that does the machine's work.
     Platform,
+    /// A shaft, bolt or bearing.
     Pin,
+    /// A measuring tip.
     Probe,
+    /// What a part slides on.
     Rail,
+    /// What stands still.
     Frame,
 }
 
@@ -312,8 +320,10 @@ words!(Role {
 pub struct Shape {
     /// Form and position.
     pub geometry: Geometry,
-    /// What it represents.
-    pub role: Role,
+    /// What it represents; `None` leaves that to what its body does ([`Scene::body_roles`]).
+    pub role: Option<Role>,
+    /// Red, green and blue (sRGB), where it is not to have the colour of its role.
+    pub colour: Option<[u8; 3]>,
 }
 
 /// Form and position of a shape, m.
@@ -367,6 +377,17 @@ pub enum Geometry {
         /// Thickness.
         thickness: f64,
     },
+    /// Triangles of a file.
+    Mesh {
+        /// In the file's frame and unit; shapes of the same file share them.
+        mesh: Arc<Mesh>,
+        /// Length of the file's unit.
+        unit: f64,
+        /// Origin of the file's frame.
+        position: Vec3,
+        /// Orientation of the file's frame.
+        rotation: Quat,
+    },
 }
 
 /// The joint that connects `child` to `parent`: one that the child hangs on in the tree, or one that closes a loop.
@@ -399,6 +420,8 @@ pub struct Joint {
     pub drive: Option<Drive>,
     /// Its start values; without meaning where a drive prescribes its motion.
     pub start: JointStart,
+    /// Whether the view draws a pin or a rail for it.
+    pub drawn: bool,
 }
 
 impl Joint {

@@ -1,9 +1,12 @@
 //! Bodies and shapes of a scene file.
 
+use super::beside::NoMesh;
 use super::copy::Copy;
-use super::document::{Node, Section};
+use super::document::{Document, Node, Section};
+use super::read_joints::read_rotation;
 use super::solid::Solid;
 use super::*;
+use crate::mesh::{Fault, Format};
 use crate::words::words;
 
 /// Forms of a shape.
@@ -15,6 +18,7 @@ pub(super) enum Form {
     Box,
     Sphere,
     Plate,
+    Mesh,
 }
 
 words!(Form {
@@ -24,11 +28,15 @@ words!(Form {
     Box => "box",
     Sphere => "sphere",
     Plate => "plate",
+    Mesh => "mesh",
 });
 
 /// Largest mass, kg, and inertia, kg m^2, that a file may give: anything beyond is a typing slip.
 pub(super) const MAX_MASS: f64 = 1e9;
 const MAX_INERTIA: f64 = 1e12;
+
+/// Largest dimension of a shape, m.
+const LARGEST_SHAPE: f64 = 1000.0;
 
 /// Moments of inertia are often given to three digits: the triangle inequality gets this relative slack.
 const TRIANGLE_SLACK: f64 = 1e-9;
@@ -80,6 +88,26 @@ fn read_solid(
 ) -> Result<Body, SceneError> {
     for key in ["mass", "centre", "inertia", "products"] {
         section.refuse(key, "it follows from `density` and `shapes`")?;
+    }
+    for (shape, index) in shapes.iter().zip(0..) {
+        let Geometry::Mesh { mesh, unit, .. } = &shape.geometry else {
+            continue;
+        };
+        if let Some(ends) = mesh.open_edge() {
+            let [from, to] = ends.map(|end| {
+                let [x, y, z] =
+                    end.map(|x| format_quantity_digits(f64::from(x) * unit * 1e3, "", 4));
+                format!("({x}, {y}, {z})")
+            });
+            return Err(section.error(
+                &format!("shapes[{index}]"),
+                format!(
+                    "this mesh is not closed, so it has no volume for `density`: its edge from {from} to {to} mm in the \
+                     file's frame does not lie between two triangles that face the same way; close it, or give `mass`, \
+                     `centre` and `inertia`"
+                ),
+            ));
+        }
     }
     let density = node.number()?;
     let solid = Solid::of_shapes(&shapes);
@@ -141,7 +169,9 @@ pub(super) fn read_shape(
     spcmm: Option<&Spcmm>,
 ) -> Result<Shape, SceneError> {
     let section = node.section()?;
-    let role = section.require("role")?.word()?;
+    let role = section.get("role").map(|node| node.word()).transpose()?;
+    let colour = section.get("colour").as_ref().map(read_colour);
+    let colour = colour.transpose()?;
     let form_node = section.require("form")?;
     let form: Form = form_node.word()?;
     let shift = match (fixed, spcmm) {
@@ -195,13 +225,98 @@ pub(super) fn read_shape(
                 _ => Geometry::Cone { from, to, radius },
             }
         }
+        Form::Mesh => read_mesh(&section, shift)?,
     };
-    let mut shape = Shape { geometry, role };
+    let mut shape = Shape {
+        geometry,
+        role,
+        colour,
+    };
     // A body's shapes move with it.
     if let Some(copy) = node.document.copy.filter(|_| fixed) {
         shape.follow(copy, &form_node)?;
     }
     Ok(shape)
+}
+
+/// Triangles of a file beside the scene.
+fn read_mesh(section: &Section<'_>, shift: Vec3) -> Result<Geometry, SceneError> {
+    let file = section.require("file")?;
+    let name = file.text()?;
+    let document = &file.document;
+    let mesh = document.beside.mesh(name);
+    let mesh = mesh.map_err(|why| match why {
+        NoMesh::Nowhere(why) => file.error(why),
+        NoMesh::Within { text, fault } => error_in(name, text.as_deref(), fault, document),
+    })?;
+    let own = Format::of(name).and_then(Format::unit);
+    let unit = match own.filter(|_| section.get("unit").is_none()) {
+        Some(unit) => unit,
+        None => read_unit(&section.require("unit")?)?,
+    };
+    let bounds = mesh.bounds();
+    let largest = bounds
+        .as_flattened()
+        .iter()
+        .fold(0.0, |most, x| x.abs().max(most));
+    if f64::from(largest) * unit > LARGEST_SHAPE {
+        let size = format_quantity(f64::from(largest) * unit, "m");
+        let message =
+            format!("with this unit, the mesh reaches {size} far; allowed up to {LARGEST_SHAPE} m");
+        return Err(section.get("unit").unwrap_or(file).error(message));
+    }
+    Ok(Geometry::Mesh {
+        mesh,
+        unit,
+        position: section.vector("position")? + shift,
+        rotation: read_rotation(section.get("rotation"))?,
+    })
+}
+
+/// The error for what is wrong in the file `name` beside the scene in `document`.
+fn error_in(name: &str, text: Option<&str>, fault: Fault, document: &Document<'_>) -> SceneError {
+    match (text, fault.at) {
+        (Some(text), Some(at)) => {
+            let file = Document {
+                file: Some(name),
+                text,
+                ..*document
+            };
+            file.error(at..at, "", None, fault.why)
+        }
+        (_, at) => SceneError {
+            file: Some(name.to_owned()),
+            message: match at {
+                Some(at) => format!("byte {at}: {}", fault.why),
+                None => fault.why,
+            },
+            ..SceneError::default()
+        },
+    }
+}
+
+/// Length of a file's unit, m: a unit of length alone (`"mm"`), or with a number (`"25.4 mm"`).
+fn read_unit(node: &Node<'_>) -> Result<f64, SceneError> {
+    match parse_quantity(&format!("1 {}", node.scalar()?), Dimension::Length) {
+        Ok(unit) => Ok(unit),
+        Err(_) => node.number(),
+    }
+}
+
+/// Red, green and blue of `"#rrggbb"`.
+fn read_colour(node: &Node<'_>) -> Result<[u8; 3], SceneError> {
+    let text = node.text()?;
+    let digits = text.strip_prefix('#').filter(|digits| digits.len() == 6);
+    let parts = [0, 2, 4].map(|at| {
+        let digits = digits?.get(at..at + 2)?;
+        // A sign would be read, too.
+        let plain = digits.bytes().all(|digit| digit.is_ascii_hexdigit());
+        u8::from_str_radix(digits, 16).ok().filter(|_| plain)
+    });
+    match parts {
+        [Some(red), Some(green), Some(blue)] => Ok([red, green, blue]),
+        _ => Err(node.error("no colour; allowed `#` and six hexadecimal digits, red, green and blue, for example \"#c2255c\"")),
+    }
 }
 
 /// By how much a fixed shape is moved with the slider plane of `spcmm`, m.
@@ -233,9 +348,15 @@ impl Shape {
                 }
             }
             Geometry::Box { centre, .. } if copy.keeps_axes() => *centre = copy.point(*centre),
+            Geometry::Mesh {
+                position, rotation, ..
+            } => {
+                *position = copy.point(*position);
+                *rotation = copy.rotation(*rotation);
+            }
             Geometry::Box { .. } => {
                 return Err(form.error(
-                    "a fixed box keeps to the world's axes and cannot turn with a pattern; allowed here: capsule, cylinder, cone, sphere, plate",
+                    "a fixed box keeps to the world's axes and cannot turn with a pattern; allowed here: capsule, cylinder, cone, sphere, plate, mesh",
                 ));
             }
         }

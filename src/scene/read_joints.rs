@@ -67,6 +67,7 @@ pub(super) fn read_joint<'d>(
             position: 0.0,
             velocity: 0.0,
         },
+        drawn: section.get("drawn").map_or(Ok(true), |node| node.flag())?,
     };
     let closes_loop = match section.get("closes_loop") {
         Some(node) => node.flag()?,

@@ -1,6 +1,7 @@
 //! Mass properties of the forms that shapes have: what a body of one density weighs.
 
 use super::{Geometry, Mat3, Shape, Vec3};
+use crate::mesh::Mesh;
 use std::f64::consts::PI;
 
 /// Volume and its first two moments.
@@ -49,6 +50,25 @@ impl Solid {
                 Self::together(ends.into_iter().chain(bar))
             }
             Geometry::Plate { corners, thickness } => Self::plate(corners, *thickness),
+            Geometry::Mesh {
+                mesh,
+                unit,
+                position,
+                rotation,
+            } => {
+                let Self {
+                    volume,
+                    centre,
+                    second,
+                } = Self::inside(mesh);
+                let turn = rotation.to_rotation_matrix().into_inner();
+                let area = unit * unit;
+                Self::new(
+                    volume * area * unit,
+                    position + turn * centre * *unit,
+                    turn * second * turn.transpose() * (area * area * unit),
+                )
+            }
         }
     }
 
@@ -91,6 +111,23 @@ impl Solid {
         let volume = PI * radius * radius * height;
         let square = [0.25 * radius * radius, height * height / 12.0];
         Self::new(volume, 0.5 * (from + to), round(&axis, square) * volume)
+    }
+
+    /// What a closed mesh encloses: tetrahedra with a common corner, those seen from behind counted negative.
+    fn inside(mesh: &Mesh) -> Self {
+        let origin = mesh.middle();
+        let (mut volume, mut first, mut second) = (0.0, Vec3::zeros(), Mat3::zeros());
+        for [a, b, c] in mesh.tetrahedra(origin) {
+            let part = a.dot(&b.cross(&c)) / 6.0;
+            let sum = a + b + c;
+            let squares = a * a.transpose() + b * b.transpose() + c * c.transpose();
+            volume += part;
+            first += sum * (part / 4.0);
+            second += (squares + sum * sum.transpose()) * (part / 20.0);
+        }
+        let centre = if volume > 0.0 { first / volume } else { first };
+        second -= centre * centre.transpose() * volume;
+        Self::new(volume, Vec3::from(origin.map(f64::from)) + centre, second)
     }
 
     /// A convex polygon, as triangles with a common corner, extruded.
@@ -136,6 +173,8 @@ fn round(axis: &Vec3, [across, along]: [f64; 2]) -> Mat3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::Format;
+    use crate::scene::Quat;
 
     /// Whether `point` lies in the form: written from its definition.
     fn holds(geometry: &Geometry, point: &Vec3) -> bool {
@@ -174,6 +213,7 @@ mod tests {
                 (point - corners[0]).dot(&normal).abs() <= 0.5 * thickness
                     && (0..corners.len()).all(inside)
             }
+            Geometry::Mesh { .. } => unreachable!("tested against forms"),
         }
     }
 
@@ -278,5 +318,89 @@ mod tests {
         });
         let both = Solid::together([half(-0.05), half(0.05)]);
         assert!((whole.inertia() - both.inertia()).amax() < 1e-16 && both.centre.norm() < 1e-16);
+    }
+
+    /// A shape of the OBJ file `text`, in millimetres, turned and shifted.
+    fn of_file(text: &str) -> Geometry {
+        let alone = |_: &str| Err(String::new());
+        let mesh = Format::Obj.read(text.as_bytes(), &alone).unwrap();
+        assert_eq!(mesh.open_edge(), None);
+        Geometry::Mesh {
+            mesh: mesh.into(),
+            unit: 1e-3,
+            position: Vec3::new(0.1, -0.2, 0.3),
+            rotation: Quat::from_euler_angles(0.4, -0.7, 1.1),
+        }
+    }
+
+    /// Deviations of volume and inertia from those of the form, relative, and of the centroid from `position`, m.
+    fn off(mesh: &Geometry, form: &Geometry) -> [f64; 3] {
+        let Geometry::Mesh {
+            position, rotation, ..
+        } = mesh
+        else {
+            panic!("a mesh")
+        };
+        let (found, wanted) = (Solid::of(mesh), Solid::of(form));
+        let turn = rotation.to_rotation_matrix().into_inner();
+        let inertia = turn * wanted.inertia() * turn.transpose();
+        [
+            (found.volume / wanted.volume - 1.0).abs(),
+            (found.centre - position).norm(),
+            (found.inertia() - inertia).amax() / inertia.amax(),
+        ]
+    }
+
+    #[test]
+    fn a_mesh_of_a_box_weighs_what_the_box_does() {
+        let mut text = String::new();
+        for i in 0..8 {
+            let side = |bit: i32, size: f64| if i >> bit & 1 == 1 { size } else { -size };
+            text += &format!("v {} {} {}\n", side(0, 10.0), side(1, 20.0), side(2, 35.0));
+        }
+        text += "f 1 5 7 3\nf 2 4 8 6\nf 1 2 6 5\nf 3 7 8 4\nf 1 3 4 2\nf 5 6 8 7\n";
+        let size = Vec3::new(0.02, 0.04, 0.07);
+        let centre = Vec3::zeros();
+        let [volume, centroid, inertia] = off(&of_file(&text), &Geometry::Box { centre, size });
+        assert!(volume < 1e-12 && centroid < 1e-12 && inertia < 1e-12);
+    }
+
+    #[test]
+    fn a_mesh_of_a_ball_weighs_what_the_ball_does() {
+        let centre = Vec3::zeros();
+        let ball = Geometry::Sphere {
+            centre,
+            radius: 0.05,
+        };
+        let errors = [40_usize, 80].map(|n| {
+            let mut text = format!("v 0 0 {}\nv 0 0 {}\n", 50.0, -50.0);
+            for i in 1..n {
+                for k in 0..2 * n {
+                    let (theta, phi) = (PI * i as f64 / n as f64, PI * k as f64 / n as f64);
+                    let (across, z) = (50.0 * libm::sin(theta), 50.0 * libm::cos(theta));
+                    let (x, y) = (across * libm::cos(phi), across * libm::sin(phi));
+                    text += &format!("v {x} {y} {z}\n");
+                }
+            }
+            let at = |i: usize, k: usize| 3 + (i - 1) * 2 * n + k % (2 * n);
+            for k in 0..2 * n {
+                text += &format!("f 1 {} {}\n", at(1, k), at(1, k + 1));
+                text += &format!("f 2 {} {}\n", at(n - 1, k + 1), at(n - 1, k));
+                for i in 1..n - 1 {
+                    let [a, b, c, d] = [at(i, k), at(i + 1, k), at(i + 1, k + 1), at(i, k + 1)];
+                    text += &format!("f {a} {b} {c} {d}\n");
+                }
+            }
+            off(&of_file(&text), &ball)
+        });
+        // The polyhedron lies within the ball, by a part that falls with the square of its edges.
+        assert!(
+            errors[1][0] < 2e-3 && errors[1][1] < 1e-8 && errors[1][2] < 3e-3,
+            "{errors:?}"
+        );
+        for i in [0, 2] {
+            let order = errors[0][i] / errors[1][i];
+            assert!((order - 4.0).abs() < 0.05, "{order}");
+        }
     }
 }

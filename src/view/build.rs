@@ -11,6 +11,7 @@ use super::coil::push_coil;
 use super::drawn::{self, BarKind, DrawnJoint, DrawnShape, Solid};
 use super::ground::push_ground;
 use super::instances::{self, bar, placed, push_label};
+use super::symbols::{Symbol, symbols};
 use super::theme::Material;
 use super::{
     Background, Bounds, Camera, DrawList, Floor, Instance, LabelKind, Layer, Light, Line, Mesh,
@@ -22,6 +23,7 @@ use crate::simulate::Frame;
 /// What the view precomputes for a scene: built once per scene, and again when its bodies or shapes change.
 pub struct SceneView {
     pub(super) parts: Vec<DrawnShape>,
+    symbols: Vec<Symbol>,
     plates: Arc<[MeshData]>,
     joint_names: Vec<Arc<str>>,
     axis_names: [Arc<str>; 4],
@@ -55,7 +57,9 @@ impl SceneView {
         let (parts, plates) = drawn::parts(scene);
         let joints = drawn::joints(scene, frame, 1.0);
         let down = to_f32(&scene.view.down.unit());
-        let extents = extents(&parts, frame, &joints);
+        let without = bounds(&extents(&parts, &[], frame, &joints));
+        let symbols = symbols(scene, &parts, frame, &joints, without.radius);
+        let extents = extents(&parts, &symbols, frame, &joints);
         let bounds = bounds(&extents);
         let lowest = extents
             .iter()
@@ -83,6 +87,7 @@ impl SceneView {
         Self {
             room,
             watched,
+            symbols,
             at_start: joints,
             parts,
             plates: plates.into(),
@@ -173,7 +178,7 @@ impl SceneView {
     fn extents(&self, scene: &Scene, frame: &Frame, options: &ViewOptions) -> Vec<(Vec3, f32)> {
         let m = self.magnification(scene, frame, options);
         let joints = drawn::joints(scene, frame, m);
-        let mut extents = extents(&self.parts, frame, &joints);
+        let mut extents = extents(&self.parts, &self.symbols, frame, &joints);
         // Half a reference length of arrows around each joint: they point anywhere, and most are shorter. Included even if
         // not drawn, so that pictures with and without them can be compared.
         let arrow = ARROW_LENGTH * self.bounds.radius;
@@ -220,8 +225,16 @@ impl SceneView {
             } else {
                 &mut out.solid
             };
-            let material = palette.material(part.role).with_opacity(opacity);
+            let material = part.material(&palette).with_opacity(opacity);
             push_solid(layer, &part.place(frame, &joints), material);
+        }
+        for symbol in self.symbols.iter().filter(|_| options.hinges) {
+            let [from, to] = symbol.ends(frame);
+            let material = palette.material(symbol.role);
+            out.solid.push(
+                Mesh::Cylinder,
+                bar(from, to - from, symbol.radius, material),
+            );
         }
         for (i, joint) in joints.iter().enumerate() {
             let ball = instances::ball(joint.ball_centre, joint.ball_radius, palette.ball);
@@ -428,8 +441,16 @@ impl SceneView {
 }
 
 /// Spheres (centre, radius) whose convex hull contains everything drawn.
-fn extents(parts: &[DrawnShape], frame: &Frame, joints: &[DrawnJoint]) -> Vec<(Vec3, f32)> {
-    let mut extents = Vec::new();
+fn extents(
+    parts: &[DrawnShape],
+    symbols: &[Symbol],
+    frame: &Frame,
+    joints: &[DrawnJoint],
+) -> Vec<(Vec3, f32)> {
+    let ends = symbols
+        .iter()
+        .flat_map(|symbol| symbol.ends(frame).map(|end| (end, symbol.radius)));
+    let mut extents: Vec<(Vec3, f32)> = ends.collect();
     for part in parts {
         part.place(frame, joints)
             .extent(|centre, radius| extents.push((centre, radius)));
@@ -524,7 +545,7 @@ pub(super) fn push_solid(layer: &mut Layer, solid: &Solid<'_>, material: Materia
         Solid::Ball { centre, radius } => {
             layer.push(Mesh::Sphere, instances::ball(centre, radius, material))
         }
-        Solid::Plate { mesh, pose, .. } => {
+        Solid::Own { mesh, pose, .. } => {
             layer.push(mesh, placed(pose.rotation, pose.position, material))
         }
     }

@@ -63,13 +63,13 @@ fn with_shape<T>(solid: &Solid<'_>, ask: impl FnOnce(&dyn Shape, &ParryPose) -> 
         Solid::Ball { centre, radius } => {
             ask(&Ball::new(radius), &ParryPose::from_translation(centre))
         }
-        Solid::Plate {
-            hull,
+        Solid::Own {
+            shape,
             pose: Pose { position, rotation },
             ..
         } => {
             let pose = ParryPose::from_parts(position, Quat::from_mat3(&rotation));
-            ask(hull?, &pose)
+            ask(&**shape?, &pose)
         }
     })
 }

@@ -7,10 +7,14 @@
 use std::sync::Arc;
 
 use glam::{Mat3, Vec3};
-use parry3d::shape::ConvexPolyhedron;
+use parry3d::shape::SharedShape;
 
-use super::{Mesh, MeshData, to_f32, zones};
-use crate::scene::{Geometry, Role, Scene, Shape};
+use super::sticks::sticks;
+use super::surface::surface;
+use super::theme::Material;
+use super::{Colour, Mesh, MeshData, Palette, to_f32, zones};
+use crate::mesh;
+use crate::scene::{self, Geometry, Role, Scene, Shape};
 use crate::simulate::{BodyMotion, Frame};
 
 /// Largest drawn inner radius of a socket, in ball radii: it limits the magnification.
@@ -27,6 +31,8 @@ pub(super) struct DrawnShape {
     /// Index among `fixed_shapes`, or among the body's shapes.
     pub index: usize,
     pub role: Role,
+    /// Its own colour.
+    colour: Option<Colour>,
     form: Form,
 }
 
@@ -44,11 +50,20 @@ enum Form {
         centre: Vec3,
         radius: f32,
     },
-    Plate {
-        mesh: Mesh,
-        hull: Option<Arc<ConvexPolyhedron>>,
-        points: Vec<Vec3>,
+    Own {
+        triangles: OwnMesh,
+        place: Pose,
     },
+}
+
+/// A mesh of the scene's own.
+#[derive(Clone)]
+struct OwnMesh {
+    mesh: Mesh,
+    /// What a ray meets.
+    shape: Option<SharedShape>,
+    /// Their convex hull contains it.
+    points: Arc<[Vec3]>,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -105,9 +120,9 @@ pub(super) enum Solid<'a> {
         centre: Vec3,
         radius: f32,
     },
-    Plate {
+    Own {
         mesh: Mesh,
-        hull: Option<&'a ConvexPolyhedron>,
+        shape: Option<&'a SharedShape>,
         points: &'a [Vec3],
         pose: Pose,
     },
@@ -126,17 +141,29 @@ impl Pose {
         rotation: Mat3::IDENTITY,
     };
 
-    fn of(motion: &BodyMotion) -> Self {
-        let column = |i: usize| to_f32(&motion.rotation.column(i).into_owned());
+    fn new(position: &scene::Vec3, rotation: &scene::Mat3) -> Self {
+        let column = |i: usize| to_f32(&rotation.column(i).into_owned());
         Self {
-            position: to_f32(&motion.position),
+            position: to_f32(position),
             rotation: Mat3::from_cols(column(0), column(1), column(2)),
+        }
+    }
+
+    fn of_body(motion: &BodyMotion) -> Self {
+        Self::new(&motion.position, &motion.rotation)
+    }
+
+    /// The pose in the world of what has the pose `inner` in this frame.
+    fn of(&self, inner: &Self) -> Self {
+        Self {
+            position: self.apply(inner.position),
+            rotation: self.rotation * inner.rotation,
         }
     }
 
     pub fn in_frame(frame: &Frame, body: Option<usize>) -> Self {
         body.and_then(|b| frame.bodies.get(b))
-            .map_or(Self::WORLD, Self::of)
+            .map_or(Self::WORLD, Self::of_body)
     }
 
     pub fn apply(&self, point: Vec3) -> Vec3 {
@@ -144,17 +171,24 @@ impl Pose {
     }
 }
 
-/// Shapes of `scene`, and the meshes that are not shared: the zones of wear maps, then its plates.
+/// Shapes of `scene`, and the meshes that are not shared: the zones of wear maps, then its plates and the
+/// meshes of its files.
 pub(super) fn parts(scene: &Scene) -> (Vec<DrawnShape>, Vec<MeshData>) {
-    let mut meshes = zones::meshes();
+    let mut meshes = Meshes {
+        data: zones::meshes(),
+        of_files: Vec::new(),
+    };
     let mut parts = Vec::new();
+    let roles = scene.body_roles();
     let fixed = scene
         .fixed_shapes
         .iter()
         .enumerate()
         .map(|(i, shape)| (None, i, shape));
+    let sticks = sticks(scene);
     let moving = scene.bodies.iter().enumerate().flat_map(|(b, body)| {
-        body.shapes
+        let shapes = sticks.get(&b).unwrap_or(&body.shapes);
+        shapes
             .iter()
             .enumerate()
             .map(move |(i, shape)| (Some(b), i, shape))
@@ -164,7 +198,12 @@ pub(super) fn parts(scene: &Scene) -> (Vec<DrawnShape>, Vec<MeshData>) {
             parts.push(DrawnShape {
                 body,
                 index,
-                role: shape.role,
+                role: shape
+                    .role
+                    .unwrap_or(body.map_or(Role::Frame, |body| roles[body])),
+                colour: shape.colour.map(|[red, green, blue]| {
+                    Colour::hex(u32::from_be_bytes([0, red, green, blue]))
+                }),
                 form,
             });
         }
@@ -183,18 +222,14 @@ pub(super) fn parts(scene: &Scene) -> (Vec<DrawnShape>, Vec<MeshData>) {
             body: Some(scene.output.body),
             index: 0,
             role: Role::Probe,
+            colour: None,
             form,
         });
     }
-    (parts, meshes)
+    (parts, meshes.data)
 }
 
-fn form(
-    scene: &Scene,
-    body: Option<usize>,
-    shape: &Shape,
-    meshes: &mut Vec<MeshData>,
-) -> Option<Form> {
+fn form(scene: &Scene, body: Option<usize>, shape: &Shape, meshes: &mut Meshes) -> Option<Form> {
     let bar = |from, to, radius: f64, kind| {
         let ends = [from, to].map(|point| {
             let point = to_f32(point);
@@ -235,15 +270,65 @@ fn form(
                 .iter()
                 .map(|(p, _)| Vec3::new(p[0], p[1], p[2]))
                 .collect();
-            let hull = ConvexPolyhedron::from_convex_hull(&points).map(Arc::new);
-            let id = u16::try_from(meshes.len()).ok()?;
-            meshes.push(mesh);
-            Some(Form::Plate {
-                mesh: Mesh::Plate(id),
-                hull,
-                points,
-            })
+            let triangles = OwnMesh {
+                shape: SharedShape::convex_hull(&points),
+                points: points.into(),
+                mesh: meshes.add(mesh)?,
+            };
+            let place = Pose::WORLD;
+            Some(Form::Own { triangles, place })
         }
+        Geometry::Mesh {
+            mesh,
+            unit,
+            position,
+            rotation,
+        } => Some(Form::Own {
+            triangles: meshes.of_file(mesh, *unit)?,
+            place: Pose::new(position, &rotation.to_rotation_matrix().into_inner()),
+        }),
+    }
+}
+
+/// Meshes that are not shared by all scenes.
+struct Meshes {
+    data: Vec<MeshData>,
+    /// Those of files, with the lengths of their units, m.
+    of_files: Vec<(Arc<mesh::Mesh>, f64, OwnMesh)>,
+}
+
+impl Meshes {
+    fn add(&mut self, mesh: MeshData) -> Option<Mesh> {
+        let id = u16::try_from(self.data.len()).ok()?;
+        self.data.push(mesh);
+        Some(Mesh::Plate(id))
+    }
+
+    /// The mesh of a file: one for all shapes that name it.
+    fn of_file(&mut self, file: &Arc<mesh::Mesh>, unit: f64) -> Option<OwnMesh> {
+        let same = |(other, length, _): &&(Arc<mesh::Mesh>, f64, OwnMesh)| {
+            Arc::ptr_eq(other, file) && *length == unit
+        };
+        if let Some((_, _, known)) = self.of_files.iter().find(same) {
+            return Some(known.clone());
+        }
+        let scaled = |p: &[f32; 3]| Vec3::from(p.map(|x| (f64::from(x) * unit) as f32));
+        let vertices = file.vertices().iter().map(scaled).collect();
+        let bounds = file.bounds().map(|end| scaled(&end));
+        let corner = |i: usize| Vec3::from([0, 1, 2].map(|axis| bounds[i >> axis & 1][axis]));
+        // The page reads no files: without this it holds none of that code.
+        let shape = if cfg!(target_arch = "wasm32") {
+            None
+        } else {
+            SharedShape::trimesh(vertices, file.triangles().to_vec()).ok()
+        };
+        let own = OwnMesh {
+            shape,
+            points: (0..8).map(corner).collect(),
+            mesh: self.add(surface(file, unit))?,
+        };
+        self.of_files.push((file.clone(), unit, own.clone()));
+        Some(own)
     }
 }
 
@@ -352,6 +437,15 @@ pub(super) fn joints(scene: &Scene, frame: &Frame, m: f32) -> Vec<DrawnJoint> {
 }
 
 impl DrawnShape {
+    /// Its colour and finish.
+    pub fn material(&self, palette: &Palette) -> Material {
+        let of_role = palette.material(self.role);
+        Material {
+            colour: self.colour.unwrap_or(of_role.colour),
+            ..of_role
+        }
+    }
+
     /// Whether it is long and thin.
     pub fn is_bar(&self) -> bool {
         matches!(self.form, Form::Bar { .. })
@@ -407,11 +501,11 @@ impl DrawnShape {
                 centre: pose.apply(*centre),
                 radius: *radius,
             },
-            Form::Plate { mesh, hull, points } => Solid::Plate {
-                mesh: *mesh,
-                hull: hull.as_deref(),
-                points,
-                pose,
+            Form::Own { triangles, place } => Solid::Own {
+                mesh: triangles.mesh,
+                shape: triangles.shape.as_ref(),
+                points: &triangles.points,
+                pose: pose.of(place),
             },
         }
     }
@@ -456,7 +550,7 @@ impl Solid<'_> {
                 }
             }
             Solid::Ball { centre, radius } => visit(*centre, *radius),
-            Solid::Plate { points, pose, .. } => {
+            Solid::Own { points, pose, .. } => {
                 points.iter().for_each(|&p| visit(pose.apply(p), 0.0))
             }
         }

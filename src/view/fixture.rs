@@ -11,7 +11,11 @@ const BALL: f64 = 0.010;
 const CLEARANCE: f64 = 0.3e-3;
 
 fn shape(role: Role, geometry: Geometry) -> Shape {
-    Shape { geometry, role }
+    Shape {
+        geometry,
+        role: Some(role),
+        colour: None,
+    }
 }
 
 fn bar(role: Role, from: Vec3, to: Vec3, radius: f64) -> Shape {

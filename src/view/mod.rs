@@ -25,6 +25,9 @@ mod options;
 mod peaks;
 mod pick;
 mod shot;
+mod sticks;
+mod surface;
+mod symbols;
 #[cfg(test)]
 mod tests;
 mod theme;

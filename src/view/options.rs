@@ -20,6 +20,8 @@ pub struct ViewOptions {
     pub triad: bool,
     /// Names of the ball joints beside them.
     pub joint_names: bool,
+    /// Pins and rails of hinges and slides that the scene does not draw itself.
+    pub hinges: bool,
     /// Draw sockets; without them only the balls are shown.
     pub sockets: bool,
     /// Draw the caller's trail.
@@ -38,6 +40,7 @@ impl Default for ViewOptions {
             floor: true,
             triad: true,
             joint_names: true,
+            hinges: true,
             sockets: true,
             trail: true,
             wear: WearMap::Off,

@@ -1,12 +1,14 @@
 //! What the draw list guarantees.
 
+use std::sync::Arc;
+
 use glam::{Vec2, Vec3};
 
 use super::drawn::{self, Pose};
 use super::fixture;
 use super::*;
 use crate::scene::Scene;
-use crate::simulate::Frame;
+use crate::simulate::{Frame, Simulation};
 
 const SIZE: [u32; 2] = [1280, 720];
 
@@ -455,4 +457,132 @@ fn a_spring_is_in_the_picture_from_end_to_end() {
             "{at}"
         );
     }
+}
+
+/// A scene from its text and its first frame.
+fn started(text: &str, files: &[(&str, &str)]) -> (Scene, Frame) {
+    let files = files.iter();
+    let files = files.map(|(name, text)| ((*name).to_owned(), Arc::from(*text)));
+    let scene = Scene::parse_with(text, None, &files.collect(), &[]).unwrap();
+    let mut frame = Frame::default();
+    Simulation::new(&scene).unwrap().sample(0.0, &mut frame);
+    (scene, frame)
+}
+
+/// A hinge about y at the origin with an arm to x = 100 mm.
+const ARM: &str = r#"
+[[body]]
+name = "arm"
+mass = "1 kg"
+inertia = "1e-3 1e-3 1e-3 kg m^2"
+centre = "50 0 0 mm"
+shapes = [{ form = "box", centre = "50 0 0 mm", size = "100 20 10 mm" }]
+
+[[joint]]
+name = "hinge"
+kind = "revolute"
+child = "arm"
+axis = [0, 1, 0]
+"#;
+
+fn count(list: &DrawList, mesh: Mesh) -> usize {
+    list.solid.by_mesh[mesh.index()].len()
+}
+
+#[test]
+fn a_hinge_has_a_pin_unless_the_scene_draws_it() {
+    let (scene, frame) = started(ARM, &[]);
+    let options = ViewOptions::default();
+    let drawn = list(&scene, &frame, &options);
+    let [pin] = drawn.solid.by_mesh[Mesh::Cylinder.index()][..] else {
+        panic!("one pin");
+    };
+    // Through the whole arm, and out on both sides.
+    let row = pin.world_from_mesh[1];
+    let (from, to) = (row[3], row[3] + row[2]);
+    assert!(
+        (from + to).abs() < 1e-6 && (0.0101..0.02).contains(&to.abs()),
+        "{from} {to}"
+    );
+
+    let hidden = ViewOptions {
+        hinges: false,
+        ..Default::default()
+    };
+    assert_eq!(count(&list(&scene, &frame, &hidden), Mesh::Cylinder), 0);
+    let (scene, frame) = started(&format!("{ARM}drawn = false\n"), &[]);
+    assert_eq!(count(&list(&scene, &frame, &options), Mesh::Cylinder), 0);
+    let shaft = "\n[[fixed_shape]]\nform = \"cylinder\"\nfrom = \"0 -30 0 mm\"\nto = \"0 0 0 mm\"\nradius = \"4 mm\"\n";
+    let (scene, frame) = started(&format!("{ARM}{shaft}"), &[]);
+    let parts = list(&scene, &frame, &options);
+    assert_eq!(count(&parts, Mesh::Cylinder) + parts.faded.len(), 1);
+    // A disc is no pin.
+    let disc = shaft.replace("-30", "-1");
+    let (scene, frame) = started(&format!("{ARM}{disc}"), &[]);
+    let parts = list(&scene, &frame, &options);
+    assert_eq!(count(&parts, Mesh::Cylinder) + parts.faded.len(), 2);
+}
+
+#[test]
+fn a_slide_has_a_rail_beyond_what_slides_on_it() {
+    let text = ARM
+        .replace("revolute", "prismatic")
+        .replace("[0, 1, 0]", "[1, 0, 0]");
+    let (scene, frame) = started(&text, &[]);
+    let drawn = list(&scene, &frame, &ViewOptions::default());
+    let [rail, _sleeve] = drawn.solid.by_mesh[Mesh::Cylinder.index()][..] else {
+        panic!("a rail and a sleeve");
+    };
+    let row = rail.world_from_mesh[0];
+    assert!(row[3] < 0.0 && row[3] + row[2] > 0.1);
+    let rail = "\n[[fixed_shape]]\nrole = \"rail\"\nform = \"box\"\ncentre = \"0 0 -10 mm\"\nsize = \"1 1 1 mm\"\n";
+    let (scene, frame) = started(&format!("{text}{rail}"), &[]);
+    let drawn = list(&scene, &frame, &ViewOptions::default());
+    assert_eq!(count(&drawn, Mesh::Cylinder), 0);
+}
+
+#[test]
+fn a_body_without_shapes_is_seen() {
+    let shapes = ARM.lines().find(|line| line.starts_with("shapes")).unwrap();
+    let (scene, frame) = started(&ARM.replace(shapes, ""), &[]);
+    let view = SceneView::new(&scene, &frame);
+    assert!(
+        (0.03..0.1).contains(&view.bounds().radius),
+        "{:?}",
+        view.bounds()
+    );
+    let drawn = list(&scene, &frame, &ViewOptions::default());
+    assert!(count(&drawn, Mesh::Sphere) >= 1 && count(&drawn, Mesh::Cylinder) >= 2);
+}
+
+#[test]
+fn shapes_of_one_file_share_a_mesh_and_are_picked() {
+    let wedge = "v 0 -10 -10\nv 0 10 -10\nv 0 0 10\nv 30 0 0\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+    let mesh = "{ form = \"mesh\", file = \"a.obj\", unit = \"mm\"";
+    let two =
+        format!("shapes = [{mesh} }}, {mesh}, position = \"60 0 0 mm\", colour = \"#ff8000\" }}]");
+    let shapes = ARM.lines().find(|line| line.starts_with("shapes")).unwrap();
+    let (scene, frame) = started(&ARM.replace(shapes, &two), &[("a.obj", wedge)]);
+    let options = ViewOptions::default();
+    let drawn = list(&scene, &frame, &options);
+    let last = Mesh::Plate(drawn.plates.len() as u16 - 1);
+    let [near, far] = drawn.solid.by_mesh[last.index()][..] else {
+        panic!("two instances of one mesh");
+    };
+    assert!(far.colour == [1.0, 128.0 / 255.0, 0.0, 1.0] && near.colour != far.colour);
+    assert!((place(&far).x - 0.06).abs() < 1e-6);
+    let view = SceneView::new(&scene, &frame);
+    let marks = PeakMarks::new();
+    let camera = view.camera();
+    let shot = shot(&scene, &frame, &marks, &options, &camera);
+    let pixel = drawn.eye.project(Vec3::new(0.065, 0.0, 0.0), SIZE).unwrap();
+    let hit = view.pick(&shot, pixel).unwrap();
+    assert_eq!(hit.what, Picked::Body(0));
+    assert!((0.055..0.1).contains(&hit.point.x), "{:?}", hit.point);
+    // Past its edge there is nothing.
+    let pixel = drawn
+        .eye
+        .project(Vec3::new(0.045, 0.02, 0.0), SIZE)
+        .unwrap();
+    assert_eq!(view.pick(&shot, pixel), None);
 }

@@ -342,3 +342,43 @@ fn a_run_goes_on_only_with_the_files_that_its_scene_named() {
         assert!(!keys.into_iter().any(|key| key.starts_with("scene_files")));
     }
 }
+
+/// A mesh is no text: its bytes are kept with the state, and must be the same for the run to go on.
+#[test]
+fn a_state_belongs_to_the_mesh_that_its_scene_names() {
+    let folder = folder();
+    let write = |name: &str, bytes: &[u8]| fs::write(folder.path().join(name), bytes).unwrap();
+    let mut stl = vec![b's'; 80];
+    stl.extend(1_u32.to_le_bytes());
+    for x in [
+        0.0_f32, 0.0, 1.0, 0.0, 0.0, 0.0, 30.0, 0.0, 0.0, 0.0, 30.0, 0.0,
+    ] {
+        stl.extend(x.to_le_bytes());
+    }
+    stl.extend([0; 2]);
+    let pendulum = jointplay::scene::built_in_text("pendulum").unwrap();
+    let bar = "form = \"capsule\", from = \"0 0 92 mm\", to = \"0 0 -98 mm\", radius = \"4 mm\"";
+    let mesh = "form = \"mesh\", file = \"fin.stl\", unit = \"mm\"";
+    let fin = pendulum.replace(bar, mesh);
+    assert_ne!(fin, pendulum);
+    write("fin.toml", fin.as_bytes());
+    write("fin.stl", &stl);
+    let run = |more: &str| {
+        let line = format!("run fin.toml --summary json --quiet --force {more}");
+        jointplay(folder.path(), &line)
+    };
+    let first = run("--duration 3ms --save-state s").expect(0);
+    let checksum = format!("{:08x}", crc32fast::hash(&stl));
+    assert_eq!(first.json()["scene_files_crc32"]["fin.stl"], checksum);
+    let whole = run("--duration 6ms").expect(0).json();
+    let last = run("--duration 6ms --from-state s").expect(0).json();
+    assert_eq!(whole["state_hash"], last["state_hash"]);
+    stl[100] ^= 1;
+    write("fin.stl", &stl);
+    let other = run("--duration 6ms --from-state s").expect(2);
+    assert!(
+        other.stderr.contains("its file fin.stl"),
+        "{}",
+        other.stderr
+    );
+}

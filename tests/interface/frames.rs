@@ -31,7 +31,7 @@ fn jointplay(folder: &Path, line: &str) -> Output {
 }
 
 /// Draws one frame into `folder`/frames and returns its file.
-fn draw(folder: &Path, what: &str) -> PathBuf {
+pub fn draw(folder: &Path, what: &str) -> PathBuf {
     jointplay(
         folder,
         &format!("render {what} --out frames --quiet --force"),
@@ -39,13 +39,14 @@ fn draw(folder: &Path, what: &str) -> PathBuf {
     folder.join("frames/frame_00000.png")
 }
 
-struct Picture {
+/// A picture without its opacity.
+pub struct Picture {
     size: [u32; 2],
     rgb: Vec<u8>,
 }
 
 impl Picture {
-    fn read(path: &Path) -> Self {
+    pub fn read(path: &Path) -> Self {
         let file = fs::File::open(path).unwrap_or_else(|error| {
             panic!(
                 "{}: {error}; UPDATE_GOLDEN=1 cargo test --test interface frames::",
@@ -129,24 +130,31 @@ fn objection(actual: &Picture, golden: &Picture) -> Option<(String, Option<Pictu
 fn golden(name: &str, what: &str) {
     let folder = tempfile::tempdir().expect("a scratch folder");
     let actual = Picture::read(&draw(folder.path(), what));
-    let file = |ending: &str| {
-        Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/golden/{name}{ending}.png"))
-    };
-    for stale in [".actual", ".diff"] {
-        let _ = fs::remove_file(file(stale));
+    let words = format!("jointplay render {what}");
+    compare("tests/golden", name, &actual, &words);
+}
+
+/// Compares a picture with the one of that `name` in a `folder` of the repository; `what` says how it is made.
+#[track_caller]
+pub fn compare(folder: &str, name: &str, actual: &Picture, what: &str) {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let golden = root.join(format!("{folder}/{name}.png"));
+    let left = |ending: &str| root.join(format!("tests/golden/{name}.{ending}.png"));
+    for stale in ["actual", "diff"] {
+        let _ = fs::remove_file(left(stale));
     }
     if std::env::var_os("UPDATE_GOLDEN").is_some() {
-        fs::create_dir_all(file("").parent().expect("has one")).expect("writable");
-        actual.write(&file(""));
+        fs::create_dir_all(golden.parent().expect("has one")).expect("writable");
+        actual.write(&golden);
         return;
     }
-    if let Some((why, diff)) = objection(&actual, &Picture::read(&file(""))) {
-        actual.write(&file(".actual"));
+    if let Some((why, diff)) = objection(actual, &Picture::read(&golden)) {
+        actual.write(&left("actual"));
         if let Some(diff) = diff {
-            diff.write(&file(".diff"));
+            diff.write(&left("diff"));
         }
         panic!(
-            "golden frame {name}: {why}; see tests/golden/{name}.actual.png and .diff.png (jointplay render {what})"
+            "{folder}/{name}.png: {why}; see tests/golden/{name}.actual.png and .diff.png ({what})"
         );
     }
 }

@@ -12,6 +12,7 @@ mod headless_window;
 mod instruments;
 mod lecture;
 mod page;
+mod pictures;
 mod present;
 mod reload;
 mod window;

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use jointplay::cli::{reference, schema};
-use jointplay::scene::{Scene, Vec3, file_tables, reference_page};
+use jointplay::scene::{Role, Scene, Vec3, file_tables, reference_page};
 use jointplay::simulate::{Frame, Simulation};
 
 fn root() -> PathBuf {
@@ -38,6 +38,15 @@ fn example(line: &str) -> String {
     let blocks = examples();
     let found = blocks.into_iter().find(|block| block.contains(line));
     found.expect("a block of TOML")
+}
+
+#[test]
+fn the_page_of_scenes_says_what_each_role_is_for() {
+    let page = read("docs/scene-format.md");
+    let (_, table) = page.split_once("| role | for |\n|---|---|\n").unwrap();
+    let rows = table.lines().take_while(|line| line.starts_with('|'));
+    let roles: Vec<&str> = rows.filter_map(|row| row.split('`').nth(1)).collect();
+    assert_eq!(roles, Role::ALL.map(Role::word));
 }
 
 #[test]

@@ -4,5 +4,6 @@ mod documents;
 mod drives;
 mod format;
 mod house;
+mod meshes;
 mod scene_corpus;
 mod scene_errors;

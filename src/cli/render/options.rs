@@ -105,6 +105,7 @@ pub fn view_options(arguments: &RenderArguments) -> Result<ViewOptions, Failure>
         floor: shown(Hideable::Floor),
         triad: shown(Hideable::Triad),
         joint_names: shown(Hideable::Names),
+        hinges: shown(Hideable::Hinges),
         sockets: shown(Hideable::Sockets),
         trail: shown(Hideable::Trail),
         wear: match arguments.wear {

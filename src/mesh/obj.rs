@@ -1,0 +1,58 @@
+//! OBJ: vertices and faces; everything else is left aside.
+
+use super::{Builder, Fault, coordinate, offset, text};
+
+pub(super) fn read(bytes: &[u8]) -> Result<Builder, Fault> {
+    let text = text(bytes)?;
+    let mut out = Builder::default();
+    let mut vertices: Vec<u32> = Vec::new();
+    let mut corners: Vec<u32> = Vec::new();
+    for line in text.lines() {
+        let line = line.split('#').next().unwrap_or_default();
+        let mut words = line.split_ascii_whitespace();
+        let Some(word) = words.next() else {
+            continue;
+        };
+        let at = |why| Fault::at(offset(text, word), why);
+        match word {
+            "v" => {
+                // A weight or a colour may follow.
+                let numbers = words.take(3).map(|word| coordinate(text, word));
+                let numbers = numbers.collect::<Result<Vec<_>, _>>()?;
+                let place = <[f64; 3]>::try_from(numbers);
+                let place = place.map_err(|_| at("needs three coordinates".to_owned()))?;
+                vertices.push(out.vertex(place).map_err(at)?);
+            }
+            "f" => {
+                corners.clear();
+                for word in words {
+                    let corner = index(word, vertices.len()).map(|i| vertices[i]);
+                    let known = vertices.len();
+                    corners.push(corner.ok_or_else(|| {
+                        let why = format!(
+                            "is none of the {known} vertices before this line; allowed 1 to {known}, or -{known} to -1 \
+                             counted from the latest"
+                        );
+                        Fault::at(offset(text, word), why)
+                    })?);
+                }
+                if corners.len() < 3 {
+                    return Err(at("a face needs at least 3 vertices".to_owned()));
+                }
+                for pair in corners[1..].windows(2) {
+                    out.triangle([corners[0], pair[0], pair[1]]).map_err(at)?;
+                }
+            }
+            _ => {}
+        }
+    }
+    Ok(out)
+}
+
+/// Which of `known` vertices the corner `word`, such as `3/1/2`, of a face is.
+fn index(word: &str, known: usize) -> Option<usize> {
+    let number: i64 = word.split('/').next()?.parse().ok()?;
+    let from = if number < 0 { known as i64 } else { -1 };
+    let index = usize::try_from(number.checked_add(from)?).ok()?;
+    (index < known).then_some(index)
+}

@@ -1,0 +1,99 @@
+//! STL, text and binary.
+
+use super::{Builder, Fault, coordinate, offset, text};
+
+/// Bytes before the triangles of a binary file, and bytes of a triangle.
+const HEAD: usize = 84;
+const TRIANGLE: usize = 50;
+
+pub(super) fn read(bytes: &[u8]) -> Result<Builder, Fault> {
+    // Many binary files begin with `solid`, too: their length tells them apart.
+    let told = bytes.get(80..HEAD).and_then(|count| count.try_into().ok());
+    let told = told.map(|count| u32::from_le_bytes(count) as usize);
+    let length = |count: usize| count.saturating_mul(TRIANGLE).saturating_add(HEAD);
+    let begins = bytes.trim_ascii_start();
+    let begins = begins.get(..5).unwrap_or_default();
+    let solid = begins.eq_ignore_ascii_case(b"solid");
+    match told {
+        Some(count) if bytes.len() == length(count) => binary(bytes),
+        _ if solid => in_words(text(bytes)?),
+        _ if bytes.is_empty() => Err(Fault::at(0, "the file is empty")),
+        Some(count) => Err(Fault::at(
+            80,
+            format!(
+                "a binary STL file with {count} triangles, as it says here, has {} bytes, this file has {}",
+                length(count),
+                bytes.len()
+            ),
+        )),
+        None => Err(Fault::at(
+            0,
+            "neither a binary STL file nor one in text, which begins with `solid`",
+        )),
+    }
+}
+
+fn binary(bytes: &[u8]) -> Result<Builder, Fault> {
+    let mut out = Builder::default();
+    for (i, triangle) in bytes[HEAD..].chunks_exact(TRIANGLE).enumerate() {
+        let at = |why| Fault::at(HEAD + i * TRIANGLE, why);
+        let number = |k: usize| {
+            let place = 12 + 4 * k;
+            let bytes = [0, 1, 2, 3].map(|i| triangle[place + i]);
+            f64::from(f32::from_le_bytes(bytes))
+        };
+        let mut corners = [0; 3];
+        for (k, corner) in corners.iter_mut().enumerate() {
+            let place = [3 * k, 3 * k + 1, 3 * k + 2].map(number);
+            *corner = out.vertex(place).map_err(at)?;
+        }
+        out.triangle(corners).map_err(at)?;
+    }
+    Ok(out)
+}
+
+fn in_words(text: &str) -> Result<Builder, Fault> {
+    let mut out = Builder::default();
+    // Corners of the loop that is open.
+    let mut corners: Option<Vec<u32>> = None;
+    let mut ended = false;
+    for line in text.lines() {
+        let mut words = line.split_ascii_whitespace();
+        let Some(word) = words.next() else {
+            continue;
+        };
+        let at = |why: String| Fault::at(offset(text, word), why);
+        ended = false;
+        match (word.to_ascii_lowercase().as_str(), &mut corners) {
+            ("solid" | "facet" | "endfacet", None) => {}
+            ("endsolid", None) => ended = true,
+            ("outer", None) => corners = Some(Vec::new()),
+            ("vertex", Some(corners)) => {
+                let numbers = words.map(|word| coordinate(text, word));
+                let numbers = numbers.collect::<Result<Vec<_>, _>>()?;
+                let place = <[f64; 3]>::try_from(numbers);
+                let place = place.map_err(|_| at("needs three coordinates".to_owned()))?;
+                corners.push(out.vertex(place).map_err(at)?);
+            }
+            ("endloop", Some(found)) => {
+                let found = <[u32; 3]>::try_from(&found[..]);
+                let found = found.map_err(|_| at("a loop needs three vertices".to_owned()))?;
+                out.triangle(found).map_err(at)?;
+                corners = None;
+            }
+            (_, None) => {
+                return Err(at(
+                    "expected `solid`, `facet`, `outer loop`, `endfacet` or `endsolid`".to_owned(),
+                ));
+            }
+            (_, Some(_)) => return Err(at("expected `vertex` or `endloop`".to_owned())),
+        }
+    }
+    if !ended {
+        return Err(Fault::at(
+            text.len(),
+            "the file ends within a solid: no `endsolid`",
+        ));
+    }
+    Ok(out)
+}

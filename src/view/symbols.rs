@@ -1,0 +1,193 @@
+//! Pins and rails of hinges and slides that a scene does not draw itself.
+
+use glam::Vec3;
+use parry3d::query::Ray;
+
+use super::cast::cast;
+use super::drawn::{DrawnJoint, DrawnShape, Pose, Solid};
+use super::to_f32;
+use crate::scene::{Joint, JointKind, Role, Scene};
+use crate::simulate::Frame;
+
+/// Radii of a pin in parts of the hub's width, and, at most, of the scene's radius; without a hub.
+const IN_HUB: f32 = 0.2;
+const THICKEST: f32 = 0.04;
+const ALONE: f32 = 0.02;
+/// How far a rail reaches beyond what slides on it, in radii of the scene.
+const REACH: f32 = 0.25;
+/// Radii of a rail and its sleeve, in radii of the scene.
+const RAIL: [f32; 2] = [0.012, 0.022];
+/// Shapes of a body that are looked at for each of its joints: setting up takes time proportional to the scene.
+const MOST_SHAPES: usize = 500;
+/// Sine of the angle at which a bar still lies along an axis.
+const ALONG: f32 = 0.02;
+
+/// A round bar, in the frame of its body.
+pub(super) struct Symbol {
+    /// Body; `None` is the world.
+    pub body: Option<usize>,
+    pub from: Vec3,
+    pub to: Vec3,
+    pub radius: f32,
+    pub role: Role,
+}
+
+impl Symbol {
+    /// Its ends in `frame`, m, world axes.
+    pub fn ends(&self, frame: &Frame) -> [Vec3; 2] {
+        let pose = Pose::in_frame(frame, self.body);
+        [self.from, self.to].map(|end| pose.apply(end))
+    }
+}
+
+/// A joint at one instant, world axes.
+struct Place<'a> {
+    joint: &'a Joint,
+    /// The child's joint point, m.
+    point: Vec3,
+    /// Unit vector.
+    axis: Vec3,
+    /// Shapes of the world, of its parent and of its child.
+    shapes: [&'a [(Role, Solid<'a>)]; 3],
+}
+
+/// Symbols of the joints of `scene` in `frame`; `radius` is that of the scene, m.
+pub(super) fn symbols(
+    scene: &Scene,
+    parts: &[DrawnShape],
+    frame: &Frame,
+    joints: &[DrawnJoint],
+    radius: f32,
+) -> Vec<Symbol> {
+    let mut shapes: Vec<Vec<(Role, Solid<'_>)>> = Vec::new();
+    shapes.resize_with(scene.bodies.len() + 1, Vec::new);
+    // The world last.
+    let of = |body: Option<usize>| body.unwrap_or(scene.bodies.len());
+    for part in parts {
+        let shapes = &mut shapes[of(part.body)];
+        if shapes.len() < MOST_SHAPES {
+            shapes.push((part.role, part.place(frame, joints)));
+        }
+    }
+    let mut symbols = Vec::new();
+    for joint in scene.joints.iter().filter(|joint| joint.drawn) {
+        let (parent, child) = (
+            Pose::in_frame(frame, joint.parent),
+            Pose::in_frame(frame, Some(joint.child)),
+        );
+        let own: &[_] = match joint.parent {
+            Some(parent) => &shapes[parent],
+            None => &[],
+        };
+        let place = Place {
+            joint,
+            point: child.apply(to_f32(&joint.child_point)),
+            axis: (parent.rotation * to_f32(&joint.axis)).normalize_or(Vec3::X),
+            shapes: [&shapes[of(None)], own, &shapes[joint.child]],
+        };
+        if !place.point.is_finite() || !place.axis.is_finite() {
+            continue;
+        }
+        let mut bar = |body, [from, to]: [f32; 2], radius, role| {
+            let pose = Pose::in_frame(frame, body);
+            let local = |along: f32| {
+                pose.rotation.transpose() * (place.point + place.axis * along - pose.position)
+            };
+            let (from, to) = (local(from), local(to));
+            symbols.push(Symbol {
+                body,
+                from,
+                to,
+                radius,
+                role,
+            });
+        };
+        match joint.kind {
+            JointKind::Revolute if !place.has_pin() => {
+                let hub = place.hub(radius);
+                let thick = match hub {
+                    Some([low, high]) => (IN_HUB * (high - low)).min(THICKEST * radius),
+                    None => ALONE * radius,
+                };
+                let [low, high] = hub.unwrap_or_default();
+                let ends = [low - 1.5 * thick, high + 1.5 * thick];
+                bar(joint.parent, ends, thick, Role::Pin);
+            }
+            JointKind::Prismatic if !place.has_rail() => {
+                let [rail, sleeve] = RAIL.map(|part| part * radius);
+                let [low, high] = place.span();
+                let ends = [low - REACH * radius, high + REACH * radius];
+                bar(joint.parent, ends, rail, Role::Rail);
+                let ends = [-2.0 * sleeve, 2.0 * sleeve];
+                bar(Some(joint.child), ends, sleeve, Role::Slider);
+            }
+            _ => {}
+        }
+    }
+    symbols
+}
+
+impl Place<'_> {
+    /// Whether a bar of the scene, not a disc, lies on the joint's axis.
+    fn has_pin(&self) -> bool {
+        let along = |solid: &Solid<'_>| match *solid {
+            Solid::Bar {
+                from, to, radius, ..
+            } => {
+                let bar = (to - from).normalize_or_zero();
+                let off = (from - self.point).reject_from_normalized(self.axis);
+                let is_long = from.distance(to) > radius;
+                is_long && bar.cross(self.axis).length() < ALONG && off.length() < 0.5 * radius
+            }
+            _ => false,
+        };
+        let mut shapes = self.shapes.iter().copied().flatten();
+        shapes.any(|(_, solid)| along(solid))
+    }
+
+    /// Whether the scene draws what the child slides on.
+    fn has_rail(&self) -> bool {
+        let of_parent = match self.joint.parent {
+            Some(_) => self.shapes[1],
+            None => self.shapes[0],
+        };
+        of_parent.iter().any(|(role, _)| *role == Role::Rail) || self.has_pin()
+    }
+
+    /// From where to where on the axis the shapes of the two bodies lie, from the joint, m; seen from as far as `most`.
+    fn hub(&self, most: f32) -> Option<[f32; 2]> {
+        let mut ends: Option<[f32; 2]> = None;
+        for (_, solid) in self.shapes[1].iter().chain(self.shapes[2]) {
+            let (mut sum, mut count) = (Vec3::ZERO, 0.0);
+            solid.extent(|point, _| (sum, count) = (sum + point, count + 1.0));
+            let inwards = (sum / count - self.point).reject_from_normalized(self.axis);
+            // The joint may lie on the very edge of its hub.
+            for point in [self.point, self.point + inwards * 0.05] {
+                let reach = |out: Vec3| {
+                    let ray = Ray::new(point + out * most, -out);
+                    // What begins beyond is no hub.
+                    let met = cast(solid, &ray).filter(|distance| *distance > 0.0)?;
+                    Some(most - met)
+                };
+                if let (Some(high), Some(low)) = (reach(self.axis), reach(-self.axis)) {
+                    let [lowest, highest] = ends.unwrap_or([-low, high]);
+                    ends = Some([lowest.min(-low), highest.max(high)]);
+                }
+            }
+        }
+        ends
+    }
+
+    /// How far the child's shapes reach along the axis, from its joint, m.
+    fn span(&self) -> [f32; 2] {
+        let (mut low, mut high) = (0.0_f32, 0.0_f32);
+        for (_, solid) in self.shapes[2] {
+            solid.extent(|point, radius| {
+                let along = (point - self.point).dot(self.axis);
+                low = low.min(along - radius);
+                high = high.max(along + radius);
+            });
+        }
+        [low, high]
+    }
+}

@@ -1,0 +1,283 @@
+//! Shapes from files beside a scene, roles and colours.
+
+use std::fs;
+
+use jointplay::scene::{Geometry, LARGEST_MESH, Role, Scene, file_bytes};
+
+/// A body whose only shape is `shape`, with other keys.
+fn scene(shape: &str, keys: &str) -> String {
+    format!(
+        "[[body]]\nname = \"arm\"\n{keys}\nshapes = [{{ {shape} }}]\n\n\
+         [[joint]]\nname = \"hinge\"\nkind = \"revolute\"\nchild = \"arm\"\naxis = [0, 1, 0]\n"
+    )
+}
+
+const HEAVY: &str = "density = \"2 g/cm^3\"";
+const GIVEN: &str = "mass = \"1 kg\"\ninertia = \"1e-3 1e-3 1e-3 kg m^2\"";
+const OBJ: &str = "form = \"mesh\", file = \"arm.obj\", unit = \"mm\"";
+
+/// A box of 10 x 20 x 30 mm in one corner, as OBJ; without its last side it is open.
+const BOX: &str = "v 0 0 0\nv 10 0 0\nv 0 20 0\nv 10 20 0\nv 0 0 30\nv 10 0 30\nv 0 20 30\nv 10 20 30\n\
+                   f 1 5 7 3\nf 2 4 8 6\nf 1 2 6 5\nf 3 7 8 4\nf 1 3 4 2\nf 5 6 8 7\n";
+
+/// A binary STL file of one triangle, with so many bytes left out at its end.
+fn stl(missing: usize) -> Vec<u8> {
+    let mut bytes = vec![b's'; 80];
+    bytes.extend(1_u32.to_le_bytes());
+    let numbers = [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+    bytes.extend(numbers.iter().flat_map(|x: &f32| x.to_le_bytes()));
+    bytes.extend([0; 2]);
+    bytes.truncate(bytes.len() - missing);
+    bytes
+}
+
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn with(files: &[(&str, &[u8])]) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, content) in files {
+            fs::write(folder.path().join(name), content).unwrap();
+        }
+        Self(folder)
+    }
+
+    fn read(&self, text: &str) -> Result<Scene, String> {
+        let read = Scene::parse_in_folder(text, Some("scene.toml"), self.0.path(), &[]);
+        read.map_err(|error| error.to_string())
+    }
+}
+
+#[test]
+fn a_body_weighs_what_its_mesh_encloses() {
+    let folder = Folder::with(&[("arm.obj", BOX.as_bytes())]);
+    let place = format!(
+        "{OBJ}, position = \"0 5 0 mm\", rotation = {{ axis = [0, 0, 1], angle = \"90 deg\" }}"
+    );
+    let scene = folder.read(&scene(&place, HEAVY)).unwrap();
+    let body = &scene.bodies[0];
+    assert!((body.mass - 0.012).abs() < 1e-12, "{}", body.mass);
+    let centre = jointplay::scene::Vec3::new(-0.01, 0.01, 0.015);
+    assert!((body.centre - centre).norm() < 1e-12, "{}", body.centre);
+    let (x, y, z) = (20e-3_f64, 10e-3_f64, 30e-3_f64);
+    let about = [y * y + z * z, x * x + z * z, x * x + y * y].map(|sum| 0.012 * sum / 12.0);
+    for (i, wanted) in about.into_iter().enumerate() {
+        assert!((body.inertia[(i, i)] / wanted - 1.0).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn a_mesh_is_read_once() {
+    let bytes = stl(0);
+    let folder = Folder::with(&[("arm.stl", &bytes)]);
+    let shape = "form = \"mesh\", file = \"arm.stl\", unit = \"mm\"";
+    let first = folder.read(&scene(shape, GIVEN)).unwrap();
+    assert_eq!(*file_bytes(&first.source.beside["arm.stl"]), bytes);
+    // What it was then is used again, whatever became of the file.
+    drop(folder);
+    let source = &first.source;
+    let again = Scene::parse_with(&source.text, Some("scene.toml"), &source.beside, &[]).unwrap();
+    assert_eq!(again.bodies, first.bodies);
+    assert_eq!(first.to_toml().unwrap(), source.text);
+    let Geometry::Mesh { mesh, unit, .. } = &again.bodies[0].shapes[0].geometry else {
+        panic!("a mesh");
+    };
+    assert_eq!((mesh.triangles().len(), *unit), (1, 1e-3));
+}
+
+#[test]
+fn shapes_of_one_file_share_its_triangles() {
+    let folder = Folder::with(&[("arm.obj", BOX.as_bytes())]);
+    let shapes = format!("{OBJ} }}, {{ {OBJ}, position = \"1 0 0 m\"");
+    let scene = folder.read(&scene(&shapes, GIVEN)).unwrap();
+    let meshes: Vec<_> = scene.bodies[0]
+        .shapes
+        .iter()
+        .map(|shape| &shape.geometry)
+        .collect();
+    let [
+        Geometry::Mesh { mesh: a, .. },
+        Geometry::Mesh { mesh: b, .. },
+    ] = meshes[..]
+    else {
+        panic!("two meshes");
+    };
+    assert!(std::sync::Arc::ptr_eq(a, b));
+}
+
+#[test]
+fn a_fixed_mesh_follows_a_pattern() {
+    let folder = Folder::with(&[("arm.obj", BOX.as_bytes())]);
+    let text = format!(
+        "{}\n[[pattern]]\nname = \"ring\"\ncount = 2\nabout = {{ axis = [0, 0, 1] }}\n\n\
+         [[pattern.fixed_shape]]\nform = \"mesh\"\nfile = \"arm.obj\"\nunit = \"1 cm\"\nposition = \"2 0 0 m\"\n",
+        scene(OBJ, GIVEN)
+    );
+    let scene = folder.read(&text).unwrap();
+    let Geometry::Mesh {
+        position,
+        rotation,
+        unit,
+        ..
+    } = scene.fixed_shapes[1].geometry
+    else {
+        panic!("a mesh");
+    };
+    assert!(
+        (position.x + 2.0).abs() < 1e-12 && (rotation.angle() - std::f64::consts::PI).abs() < 1e-12
+    );
+    assert_eq!(unit, 0.01);
+}
+
+#[test]
+fn what_is_wrong_with_a_mesh_is_said_with_its_place() {
+    let bad = BOX.replace("v 10 20 30", "v 10 2O 30");
+    let open = BOX.replace("f 5 6 8 7\n", "");
+    let cut = stl(7);
+    let large = vec![b'#'; LARGEST_MESH as usize + 1];
+    let folder = Folder::with(&[
+        ("arm.obj", BOX.as_bytes()),
+        ("bad.obj", bad.as_bytes()),
+        ("open.obj", open.as_bytes()),
+        ("cut.stl", &cut),
+        ("large.obj", &large),
+        ("arm.gltf", b"{\n \"asset\": }"),
+    ]);
+    let mesh = |file: &str, more: &str| format!("form = \"mesh\", file = \"{file}\"{more}");
+    let mm = ", unit = \"mm\"";
+    for (shape, keys, wanted) in [
+        (
+            mesh("bad.obj", mm),
+            GIVEN,
+            &["bad.obj:8:6: is not a number", "v 10 2O 30"][..],
+        ),
+        (
+            mesh("cut.stl", mm),
+            GIVEN,
+            &["cut.stl: byte 80: ", "has 134 bytes, this file has 127"],
+        ),
+        (
+            mesh("arm.gltf", ""),
+            GIVEN,
+            &["arm.gltf: no glTF file: ", "line 2 column"],
+        ),
+        (
+            mesh("large.obj", mm),
+            GIVEN,
+            &["shapes[0].file", "at most 8 MiB in all meshes"],
+        ),
+        (
+            mesh("arm.obj", ""),
+            GIVEN,
+            &["shapes[0].unit: missing", "unit = \"mm\""],
+        ),
+        (
+            mesh("arm.obj", ", unit = \"kg\""),
+            GIVEN,
+            &["shapes[0].unit", "mm"],
+        ),
+        (
+            mesh("arm.obj", ", unit = \"50 m\""),
+            GIVEN,
+            &["reaches 1500 m far", "up to 1000 m"],
+        ),
+        (
+            mesh("arm.step", mm),
+            GIVEN,
+            &["shapes[0].file", ".stl, .obj, .gltf, .glb"],
+        ),
+        (
+            mesh("none.obj", mm),
+            GIVEN,
+            &["shapes[0].file", "cannot read this file"],
+        ),
+        (
+            mesh("../arm.obj", mm),
+            GIVEN,
+            &["shapes[0].file", "without `..`"],
+        ),
+        (
+            mesh("arm.obj", ", unit = \"mm\", size = \"1 1 1 mm\""),
+            GIVEN,
+            &["a mesh has file, unit"],
+        ),
+        (
+            mesh("open.obj", mm),
+            HEAVY,
+            &["body.arm.shapes[0]", "not closed", "(0, 0, 30)", "`mass`"],
+        ),
+    ] {
+        let error = folder.read(&scene(&shape, keys)).unwrap_err();
+        for part in wanted {
+            assert!(error.contains(part), "{error}\nlacks {part}");
+        }
+    }
+    // Open, it may still be looked at.
+    assert!(folder.read(&scene(&mesh("open.obj", mm), GIVEN)).is_ok());
+    let nowhere = Scene::parse(&scene(OBJ, GIVEN), None, &[]).unwrap_err();
+    assert!(nowhere.to_string().contains("no folder"), "{nowhere}");
+}
+
+#[test]
+fn colours_are_read_and_refused() {
+    let sphere = |colour: &str| {
+        let shape = format!(
+            "form = \"sphere\", centre = [0, 0, 0], radius = \"1 mm\", colour = \"{colour}\""
+        );
+        Scene::parse(&scene(&shape, GIVEN), None, &[])
+    };
+    let read = sphere("#C2255c").unwrap();
+    assert_eq!(read.bodies[0].shapes[0].colour, Some([0xc2, 0x25, 0x5c]));
+    for bad in [
+        "red", "#12345", "#1234567", "#+12345", "#é2345", "123456", "",
+    ] {
+        let error = sphere(bad).unwrap_err().to_string();
+        assert!(
+            error.contains("no colour; allowed `#` and six"),
+            "{bad}: {error}"
+        );
+    }
+}
+
+#[test]
+fn without_a_role_a_shape_has_that_of_its_body() {
+    let body = |name: &str| format!("[[body]]\nname = \"{name}\"\n{GIVEN}\n");
+    let joint = |name: &str, kind: &str, more: &str| {
+        format!("[[joint]]\nname = \"{name}\"\nchild = \"{name}\"\nkind = \"{kind}\"\n{more}\n")
+    };
+    let names = [
+        "crank", "pump", "free", "ram", "hinged", "foot", "base", "last",
+    ];
+    let drive = |speed: &str| {
+        format!("axis = [0, 0, 1]\ndrive = {{ law = \"constant\", velocity = \"{speed}\" }}")
+    };
+    let axis = "axis = [0, 0, 1]";
+    let mut text: String = names.iter().map(|name| body(name)).collect();
+    text += &joint("crank", "revolute", &drive("1 rad/s"));
+    text += &joint("pump", "prismatic", &drive("1 m/s"));
+    text += &joint("free", "free", "start = { position = [0, 0, 0] }");
+    text += &joint("ram", "prismatic", axis);
+    text += &joint("hinged", "revolute", axis);
+    text += &joint("foot", "fixed", "parent = \"crank\"");
+    text += &joint("base", "fixed", "");
+    text += &joint("last", "revolute", axis);
+    let scene = Scene::parse(&text, None, &[]).unwrap();
+    let roles = scene.body_roles();
+    let of = |name: &str| {
+        let body = scene.bodies.iter().position(|body| body.name == name);
+        roles[body.unwrap()]
+    };
+    let wanted = [
+        Role::DrivingRod,
+        Role::Slider,
+        Role::DrivenRod,
+        Role::Slider,
+        Role::DrivenRod,
+        Role::DrivingRod,
+        Role::Frame,
+        Role::Platform,
+    ];
+    for (name, wanted) in names.iter().zip(wanted) {
+        assert_eq!(of(name), wanted, "{name}");
+    }
+}
