@@ -3,5 +3,6 @@
 mod documents;
 mod drives;
 mod house;
+mod joints;
 mod scene_corpus;
 mod scene_errors;

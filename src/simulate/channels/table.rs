@@ -3,9 +3,9 @@
 
 use Quantity as Q;
 use Take::{
-    Angles, Axes, BodyAxes, Element, ElementValue, FirstTurn, Given, Hinge, HingeCoordinate, Joint,
-    JointAxes, OtherAngles, OtherAxes, ProbeError, SecondTurn, Slide, SlideCoordinate, Taken,
-    TurnRate, Whole,
+    Angles, Axes, BodyAxes, Closing, Element, ElementValue, FirstTurn, Given, Hinge,
+    HingeCoordinate, Joint, JointAxes, OtherAngles, OtherAxes, ProbeError, SecondTurn, Slide,
+    SlideCoordinate, Taken, TurnRate, Whole,
 };
 
 use crate::scene::Vec3;
@@ -246,6 +246,8 @@ pub(super) enum Take {
     /// The same of a universal joint about its axis in the parent, and about that in the child.
     FirstTurn(usize),
     SecondTurn(usize),
+    /// Of each joint that closes a loop, from force and torque on its child, along x, y, z.
+    Closing(fn(&[Vec3; 2]) -> Vec3),
     /// Of each ball joint.
     Joint(fn(&JointReport) -> f64),
     /// Of each ball joint, along x, y, z.
@@ -277,6 +279,8 @@ pub(super) enum Each {
     Body,
     /// Coordinates of joints that slide or turn.
     Coordinate,
+    /// Joints that close loops.
+    Closing,
     /// Ball joints.
     Joint,
     /// Driven joints.
@@ -292,6 +296,7 @@ impl Take {
     pub(super) fn each(&self) -> Each {
         match self {
             Joint(_) | JointAxes(_) => Each::Joint,
+            Closing(_) => Each::Closing,
             Slide | Hinge => Each::Drive,
             Element(_) | ElementValue(_) => Each::Element,
             Axes(_) | Angles(_) => Each::Output,
@@ -305,9 +310,8 @@ impl Take {
 
     pub(super) fn components(&self) -> Components {
         match self {
-            Axes(_) | BodyAxes(_) | OtherAxes(_) | JointAxes(_) | ProbeError | Element(_) => {
-                &[("x", "x"), ("y", "y"), ("z", "z")]
-            }
+            Axes(_) | BodyAxes(_) | OtherAxes(_) | JointAxes(_) | Closing(_) | ProbeError
+            | Element(_) => &[("x", "x"), ("y", "y"), ("z", "z")],
             Angles(_) | OtherAngles(_) => &[("α", "alpha"), ("β", "beta"), ("γ", "gamma")],
             _ => &[("", "")],
         }
@@ -337,6 +341,7 @@ impl Take {
             | FirstTurn(order)
             | SecondTurn(order) => frame.coordinates.get(part).map(|c| c[*order]),
             TurnRate => frame.coordinates.get(part).map(|c| c[1]),
+            Closing(of) => frame.closing.get(part).map(|load| of(load)[component]),
             Joint(of) => frame.joints.get(part).map(of),
             JointAxes(of) => frame.joints.get(part).map(|joint| of(joint)[component]),
             Slide | Hinge => frame.actuators.get(part).copied(),
@@ -477,6 +482,9 @@ pub(super) const TABLE: &[Signal] = &[
     asked("@.angle_rate", "@_angle_rate_rad_s", FirstTurn(1), "rate of that angle"),
     asked("@.child_angle", "@_child_angle_rad", SecondTurn(0), "angle of the joint about its axis in the child"),
     asked("@.child_angle_rate", "@_child_angle_rate_rad_s", SecondTurn(1), "rate of that angle"),
+
+    asked("@.force.#", "@_force_#_N", Closing(|load| load[0]), "force of the joint that closes a loop on its child, at its point there"),
+    asked("@.torque.#", "@_torque_#_Nm", Closing(|load| load[1]), "torque of the joint that closes a loop on its child"),
 
     asked("@.gap", "@_gap_m", Joint(|joint| -joint.penetration), "gap between ball and socket wall; negative in contact"),
     asked("@.clearance", "@_clearance_m", Joint(|joint| joint.clearance), "radial clearance in force"),
