@@ -91,6 +91,16 @@ fn report(
     if !scene.closing_joints.is_empty() {
         line("Close loops", &joints(&scene.closing_joints));
     }
+    for (joint, [force, torque]) in scene.closing_joints.iter().zip(&start.closing) {
+        let unique = !begun.reactions.contains(&joint.name);
+        let words = format!(
+            "reaction at the start {} N and {} N m{}",
+            significant(force.norm(), 6),
+            significant(torque.norm(), 6),
+            if unique { "" } else { " (not unique)" }
+        );
+        line(&format!("  {}", joint.name), &words);
+    }
     line(
         "Ball joints",
         &format!(
@@ -327,6 +337,14 @@ fn work(scene: &Scene, contents: &Summary) -> (Vec<String>, Vec<String>) {
         format!("reactions of the ideal joints at {}", with(true)),
         "reactions of ideal joints: no ball joint is ideal",
     );
+    if contents.closing_joints > 0 {
+        let closing = names(scene.closing_joints.iter().map(|joint| &joint.name));
+        sort(
+            true,
+            format!("reactions of the joints that close loops at {closing}"),
+            "",
+        );
+    }
     sort(
         contents.drives > 0,
         format!(

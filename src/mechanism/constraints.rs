@@ -342,6 +342,11 @@ impl Constraints {
         }
     }
 
+    /// Force, N, and torque, N m, of the `c`-th joint that closes a loop on its child.
+    pub fn closure_load(&self, c: usize) -> [Vec3; 2] {
+        [2 * c, 2 * c + 1].map(|unit| self.units[unit].load(&self.multipliers))
+    }
+
     /// Computes the Jacobians and factors J M^-1 J^T for a tree that has been moved forward and assembled at (t, q); does
     /// nothing if the latest call was for the same (t, q).
     fn factor(&mut self, model: &Model, tree: &Tree, t: f64, q: &[f64]) {

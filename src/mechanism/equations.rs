@@ -130,7 +130,11 @@ pub(super) trait Equations: Send {
     /// Whether that reaction is unique.
     fn is_reaction_unique(&self, k: usize) -> bool;
 
-    /// Whether that of the `c`-th joint that closes a loop is.
+    /// Force, N, at the child's point and torque, N m, that the `c`-th joint that closes a loop exerts on its child at the latest
+    /// evaluation.
+    fn closure_load(&self, model: &Model, c: usize) -> [Vec3; 2];
+
+    /// Whether these are unique.
     fn is_closure_unique(&self, model: &Model, c: usize) -> bool;
 
     /// Force (N) or torque (N m) of every actuator, given true accelerations in [`Self::motion`]. May change the loads.

@@ -237,6 +237,13 @@ impl Equations for Forest {
         self.constraints.as_ref().is_none_or(|c| c.is_unique(k))
     }
 
+    fn closure_load(&self, _: &Model, c: usize) -> [Vec3; 2] {
+        let constraints = self.constraints.as_ref();
+        constraints.map_or([Vec3::zeros(); 2], |constraints| {
+            constraints.closure_load(c)
+        })
+    }
+
     fn is_closure_unique(&self, model: &Model, c: usize) -> bool {
         self.is_reaction_unique(model.ideal_joints.len() + c)
     }

@@ -189,6 +189,13 @@ impl Lagrange {
         }
     }
 
+    /// Rows of the `c`-th joint that closes a loop.
+    fn closure_rows(&self, model: &Model, c: usize) -> std::ops::Range<usize> {
+        let rows = model.closures[c].rows();
+        let count: usize = rows.iter().flatten().map(Rows::count).sum();
+        self.closure_row[c]..self.closure_row[c] + count
+    }
+
     /// J_i M^-1 J_j^T.
     #[inline]
     fn mobility(&self, model: &Model, i: usize, j: usize) -> f64 {
@@ -493,11 +500,18 @@ impl Equations for Lagrange {
         self.matrix.is_unique(self.ideal_row[k], 3)
     }
 
+    fn closure_load(&self, model: &Model, c: usize) -> [Vec3; 2] {
+        let mut load = [Vec3::zeros(); 2];
+        for i in self.closure_rows(model, c) {
+            let part = usize::from(self.groups[self.group_of[i]].rows.turns());
+            load[part] += self.rows[i].child[part] * self.multipliers[i];
+        }
+        load
+    }
+
     fn is_closure_unique(&self, model: &Model, c: usize) -> bool {
-        let first = self.closure_row[c];
-        let rows = model.closures[c].rows();
-        let count = rows.iter().flatten().map(Rows::count).sum();
-        self.matrix.is_unique(first, count)
+        let rows = self.closure_rows(model, c);
+        self.matrix.is_unique(rows.start, rows.len())
     }
 
     fn actuators(&mut self, _: &Model, _: &Vec3, out: &mut [f64]) {

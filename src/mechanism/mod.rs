@@ -532,6 +532,13 @@ impl Mechanism {
         }
     }
 
+    /// Of each joint that closes a loop, the force, N, at the child's point and the torque, N m, that it exerts on its child at the
+    /// latest evaluation.
+    pub fn closing_loads(&self) -> impl Iterator<Item = [Vec3; 2]> {
+        let all = 0..self.model.closures.len();
+        all.map(|c| self.equations.closure_load(&self.model, c))
+    }
+
     /// Number of joints at which trees are cut: ball joints, then joints that close loops.
     pub fn cut_joints(&self) -> usize {
         self.model.joints.len() + self.model.closures.len()

@@ -57,6 +57,11 @@ impl Rows {
         }
     }
 
+    /// Whether it is about orientation, not points.
+    pub fn turns(&self) -> bool {
+        matches!(self, Self::Perpendicular { .. } | Self::Angle { .. })
+    }
+
     /// Calls `found` with each row's number, its Jacobian, and its violation with the first and second time derivatives, for the
     /// motion of child and parent and the driven coordinates.
     #[inline(always)]
@@ -315,14 +320,10 @@ impl Pair {
         let [c, p] = self.ends(motion);
         let rates = self.rows().map(|rows| {
             let mut sum = Vec3::zeros();
-            for row in rows {
-                row.linearise(c, p, &[], |_, row, [_, rate, _]| {
-                    let along = if row.child[0] == Vec3::zeros() {
-                        row.child[1]
-                    } else {
-                        row.child[0]
-                    };
-                    sum += along * rate;
+            for rows in rows {
+                let part = usize::from(rows.turns());
+                rows.linearise(c, p, &[], |_, row, [_, rate, _]| {
+                    sum += row.child[part] * rate
                 });
             }
             sum

@@ -197,6 +197,10 @@ fn parts_of(scene: &Scene, each: Each) -> Vec<(&str, Option<Freedom>)> {
             .flat_map(|j| coordinates(j).map(|freedom| (j.name.as_str(), freedom)))
             .collect(),
         Each::Holding => holding.map(|j| (j.name.as_str(), None)).collect(),
+        Each::Closing => {
+            let closing = scene.closing_joints.iter();
+            closing.map(|joint| (joint.name.as_str(), None)).collect()
+        }
         Each::Joint => joints.map(|name| (name, None)).collect(),
         Each::Drive => driven
             .flat_map(|j| coordinates(j).map(|freedom| (j.name.as_str(), freedom)))

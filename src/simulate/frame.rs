@@ -15,6 +15,8 @@ pub struct Frame {
     pub bodies: Vec<BodyMotion>,
     /// Ball joints in scene order.
     pub joints: Vec<JointReport>,
+    /// Joints that close loops in scene order: force, N, at the child's point and torque, N m, on the child.
+    pub closing: Vec<[Vec3; 2]>,
     /// Force elements in scene order.
     pub elements: Vec<ElementReport>,
     /// The hand that pulls, if any: force from the hand on the grasped point. Only set in the displayed frame.

@@ -34,6 +34,8 @@ pub(super) fn fill(
         out.joints
             .push(joint_report(mechanism, joint, &memory[j], j));
     }
+    out.closing.clear();
+    out.closing.extend(mechanism.closing_loads());
     out.elastic = mechanism.elastic_energy(time);
     out.elements.clear();
     out.elements.extend(mechanism.element_reports(time));

@@ -4,6 +4,7 @@ mod documents;
 mod drives;
 mod format;
 mod house;
+mod joints;
 mod meshes;
 mod scene_corpus;
 mod scene_errors;

@@ -3,9 +3,9 @@
 
 use Quantity as Q;
 use Take::{
-    Angles, Axes, BodyAxes, Element, ElementValue, FirstTurn, Given, Hinge, HingeCoordinate, Joint,
-    JointAxes, OtherAngles, OtherAxes, ProbeError, Reaction, SecondTurn, Slide, SlideCoordinate,
-    Taken, TurnRate, Whole,
+    Angles, Axes, BodyAxes, Closing, Element, ElementValue, FirstTurn, Given, Hinge,
+    HingeCoordinate, Joint, JointAxes, OtherAngles, OtherAxes, ProbeError, Reaction, SecondTurn,
+    Slide, SlideCoordinate, Taken, TurnRate, Whole,
 };
 
 use crate::scene::Vec3;
@@ -248,6 +248,8 @@ pub(super) enum Take {
     SecondTurn(usize),
     /// Of each joint that holds its child: the force on that, or the torque, along x, y, z.
     Reaction(usize),
+    /// Of each joint that closes a loop, from force and torque on its child, along x, y, z.
+    Closing(fn(&[Vec3; 2]) -> Vec3),
     /// Of each ball joint.
     Joint(fn(&JointReport) -> f64),
     /// Of each ball joint, along x, y, z.
@@ -281,6 +283,8 @@ pub(super) enum Each {
     Coordinate,
     /// These and fixed ones.
     Holding,
+    /// Joints that close loops.
+    Closing,
     /// Ball joints.
     Joint,
     /// Driven joints.
@@ -296,6 +300,7 @@ impl Take {
     pub(super) fn each(&self) -> Each {
         match self {
             Joint(_) | JointAxes(_) => Each::Joint,
+            Closing(_) => Each::Closing,
             Slide | Hinge => Each::Drive,
             Element(_) | ElementValue(_) => Each::Element,
             Axes(_) | Angles(_) => Each::Output,
@@ -310,8 +315,8 @@ impl Take {
 
     pub(super) fn components(&self) -> Components {
         match self {
-            Axes(_) | BodyAxes(_) | OtherAxes(_) | JointAxes(_) | Reaction(_) | ProbeError
-            | Element(_) => &[("x", "x"), ("y", "y"), ("z", "z")],
+            Axes(_) | BodyAxes(_) | OtherAxes(_) | JointAxes(_) | Reaction(_) | Closing(_)
+            | ProbeError | Element(_) => &[("x", "x"), ("y", "y"), ("z", "z")],
             Angles(_) | OtherAngles(_) => &[("α", "alpha"), ("β", "beta"), ("γ", "gamma")],
             _ => &[("", "")],
         }
@@ -345,6 +350,7 @@ impl Take {
                 let of_part = frame.reactions.as_ref()?.get(part)?;
                 Some(of_part[*which][component])
             }
+            Closing(of) => frame.closing.get(part).map(|load| of(load)[component]),
             Joint(of) => frame.joints.get(part).map(of),
             JointAxes(of) => frame.joints.get(part).map(|joint| of(joint)[component]),
             Slide | Hinge => frame.actuators.get(part).copied(),
@@ -488,6 +494,8 @@ pub(super) const TABLE: &[Signal] = &[
 
     asked("@.reaction.#", "@_reaction_#_N", Reaction(0), "force of the joint on its child, its drive's included"),
     asked("@.reaction_torque.#", "@_reaction_torque_#_Nm", Reaction(1), "torque of the joint on its child about its joint point, its drive's included"),
+    asked("@.reaction.#", "@_reaction_#_N", Closing(|load| load[0]), "force of the joint on its child"),
+    asked("@.reaction_torque.#", "@_reaction_torque_#_Nm", Closing(|load| load[1]), "torque of the joint on its child about its joint point"),
 
     asked("@.gap", "@_gap_m", Joint(|joint| -joint.penetration), "gap between ball and socket wall; negative in contact"),
     asked("@.clearance", "@_clearance_m", Joint(|joint| joint.clearance), "radial clearance in force"),

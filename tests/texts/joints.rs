@@ -1,0 +1,158 @@
+//! Joints of two degrees and joints that close loops, as a file gives them: what is refused says why and what is allowed.
+
+use jointplay::scene::{JointKind, JointStart, Scene};
+
+/// An arm on a hinge, a rod that hangs free, and the joint `j` between them.
+fn text(joint: &str) -> String {
+    let body = |name: &str| {
+        format!("[[body]]\nname = \"{name}\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n")
+    };
+    format!(
+        "{}{}[[joint]]\nname = \"hinge\"\nkind = \"revolute\"\nchild = \"arm\"\naxis = [0, 1, 0]\n\
+         [[joint]]\nname = \"free\"\nkind = \"free\"\nchild = \"rod\"\nstart = {{ position = [0, 0, 0] }}\n\
+         [[joint]]\nname = \"j\"\nparent = \"arm\"\nchild = \"rod\"\n{joint}",
+        body("arm"),
+        body("rod")
+    )
+}
+
+/// The same where the rod hangs on `j`.
+fn hung(joint: &str) -> String {
+    let free = "[[joint]]\nname = \"free\"\nkind = \"free\"\nchild = \"rod\"\nstart = { position = [0, 0, 0] }\n";
+    text(joint).replace(free, "")
+}
+
+fn parse(text: &str) -> Result<Scene, String> {
+    Scene::parse(text, Some("my.toml"), &[]).map_err(|error| error.to_string())
+}
+
+fn refused(text: &str, words: &[&str]) {
+    let error = parse(text).expect_err(words[0]);
+    for words in words.iter().chain(&["my.toml:"]) {
+        assert!(error.contains(words), "`{words}` is not in:\n{error}");
+    }
+}
+
+#[test]
+fn a_joint_that_closes_a_loop_is_no_part_of_the_tree() {
+    let scene = parse(&text(
+        "kind = \"revolute\"\naxis = [0, 1, 0]\ncloses_loop = true\n",
+    ))
+    .unwrap();
+    assert_eq!((scene.joints.len(), scene.closing_joints.len()), (2, 1));
+    let joint = &scene.closing_joints[0];
+    assert_eq!(
+        (joint.kind, joint.parent, joint.child),
+        (JointKind::Revolute, Some(0), 1)
+    );
+    assert_eq!(scene.cut_joints().collect::<Vec<_>>(), ["j"]);
+    // Written out, the default.
+    let hung = hung("kind = \"revolute\"\naxis = [0, 1, 0]\ncloses_loop = false\n");
+    assert_eq!(parse(&hung).unwrap().closing_joints.len(), 0);
+}
+
+#[test]
+fn start_values_of_two_degrees_are_keys() {
+    let joint = "kind = \"universal\"\naxis = [0, 2, 0]\nchild_axis = [0, 0, 3]\n\
+                 start = { angle = \"10 deg\", child_angular_velocity = \"60 rpm\" }\n";
+    let mut scene = parse(&hung(joint)).unwrap();
+    scene.set("joint.j.start.angle", "0.5 rad").unwrap();
+    let JointStart::Pair { position, velocity } = scene.joints[1].start else {
+        panic!("{:?}", scene.joints[1].start);
+    };
+    assert_eq!(position, [0.5, 0.0]);
+    assert!(velocity[0] == 0.0 && (velocity[1] - std::f64::consts::TAU).abs() < 1e-12);
+    assert_eq!(scene.joints[1].child_axis.as_slice(), [0.0, 0.0, 1.0]);
+    let error = scene.set("joint.j.start.child_angle", "0.5 m").unwrap_err();
+    assert!(error.to_string().contains("angle"), "{error}");
+}
+
+#[test]
+fn what_is_refused_says_what_is_allowed() {
+    let hinge = "kind = \"revolute\"\naxis = [0, 1, 0]\n";
+    refused(
+        &text(hinge),
+        &[
+            "joint.j.child = \"rod\"",
+            "already the child of joint `free`",
+            "`closes_loop = true`",
+        ],
+    );
+    let closing = |more: &str| text(&format!("{hinge}closes_loop = true\n{more}"));
+    refused(
+        &closing("drive = { law = \"constant\", velocity = \"1 rad/s\" }\n"),
+        &["joint.j.drive", "a joint that closes a loop has no drive"],
+    );
+    refused(
+        &closing("start = { position = \"1 deg\" }\n"),
+        &["joint.j.start", "starts where"],
+    );
+    refused(
+        &closing("stiffness = 1\n"),
+        &["joint.j.stiffness", "unknown key"],
+    );
+    refused(
+        &closing("").replace(
+            "parent = \"arm\"\nchild = \"rod\"",
+            "parent = \"rod\"\nchild = \"rod\"",
+        ),
+        &["joint.j.child", "parent and child are the same body"],
+    );
+    refused(&text("closes_loop = 1\n"), &["joint.j.kind", "missing"]);
+    refused(
+        &text(&format!("{hinge}closes_loop = \"yes\"\n")),
+        &["joint.j.closes_loop", "true or false"],
+    );
+    refused(
+        &text("kind = \"free\"\ncloses_loop = true\n"),
+        &[
+            "joint.j.kind",
+            "allowed fixed, prismatic, revolute, cylindrical, universal",
+        ],
+    );
+    refused(
+        &hung("kind = \"cylindrical\"\n"),
+        &["joint.j.axis", "missing"],
+    );
+    refused(
+        &hung("kind = \"universal\"\naxis = [0, 1, 0]\n"),
+        &["joint.j.child_axis", "missing"],
+    );
+    refused(
+        &hung("kind = \"universal\"\naxis = [0, 1, 0]\nchild_axis = [0, 1, 1]\n"),
+        &["joint.j.child_axis", "perpendicular to `axis`", "45"],
+    );
+    refused(
+        &hung("kind = \"revolute\"\naxis = [0, 1, 0]\nchild_axis = [0, 0, 1]\n"),
+        &["joint.j.child_axis", "only a universal joint"],
+    );
+    for kind in ["cylindrical", "universal"] {
+        let joint = format!(
+            "kind = \"{kind}\"\naxis = [0, 1, 0]\ndrive = {{ law = \"constant\", velocity = 1 }}\n"
+        );
+        let words =
+            format!("a {kind} joint has no drive; allowed on prismatic and revolute joints");
+        refused(&hung(&joint), &["joint.j.drive", &words]);
+    }
+    refused(
+        &hung("kind = \"cylindrical\"\naxis = [0, 1, 0]\nstart = { child_angle = \"1 deg\" }\n"),
+        &["joint.j.start.child_angle", "unknown key"],
+    );
+    let stop = "[[stop]]\nname = \"s\"\njoint = \"j\"\nlower = \"1 mm\"\nforce = \"1 N\"\ndepth = \"1 mm\"\n";
+    refused(
+        &(hung("kind = \"cylindrical\"\naxis = [0, 1, 0]\n") + stop),
+        &[
+            "stop.s.joint",
+            "a cylindrical joint is neither a slide nor a hinge",
+            "allowed hinge",
+        ],
+    );
+    refused(
+        &(closing("") + stop),
+        &[
+            "stop.s.joint",
+            "closes a loop has no coordinate to act on",
+            "allowed hinge",
+        ],
+    );
+}
