@@ -93,38 +93,57 @@ fn keys(table: &FileTable) -> String {
             value(key, table),
             absent(key),
             key.frame.to_owned(),
-            sentence(key.help).to_owned(),
+            what(key),
         ])
     };
-    let own = table.keys.iter().filter(|key| !of_contact(key, table));
+    let shared = |key: &&FileKey| {
+        table
+            .also
+            .is_some_and(|also| also.key(key.name, None).is_some())
+    };
+    let own = table.keys.iter().filter(|key| !shared(key));
     let mut rows: Vec<Vec<String>> = own.map(row).collect();
-    if rows.len() < table.keys.len() {
-        let cells = [
-            "any key of `[contact]`",
-            "",
-            "as there",
-            "as there",
-            "",
-            "for this joint alone",
-        ];
-        rows.push(shown(cells.map(str::to_owned)));
+    if let Some(also) = table.also {
+        let any = format!("any key of {}", called(also));
+        let there = || "as there".to_owned();
+        let own = String::new;
+        rows.push(shown([
+            any,
+            own(),
+            there(),
+            there(),
+            own(),
+            "For this one alone".to_owned(),
+        ]));
     }
     let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
     markdown(&heads, rows)
 }
 
-/// Whether a key is one of `[contact]` that another table has, too.
-fn of_contact(key: &FileKey, table: &FileTable) -> bool {
-    let contact = |parameter: &str| parameter.starts_with("contact.");
-    matches!(key.takes, Takes::Parameter(parameter) if contact(parameter))
-        && table.name != "contact"
+/// What a key is: of a parameter, whose page says more, the first sentence.
+fn what(key: &FileKey) -> String {
+    match key.takes {
+        Takes::Parameter(_) => {
+            let (first, _) = key.help.split_once(". ").unwrap_or((key.help, ""));
+            first.trim_end_matches('.').to_owned()
+        }
+        _ => capital(key.help),
+    }
 }
 
-/// The first sentence of a text.
-fn sentence(text: &str) -> &str {
-    text.split_once(". ")
-        .map_or(text, |(first, _)| first)
-        .trim_end_matches('.')
+/// A text with a capital letter first.
+pub fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().into_iter().flat_map(char::to_uppercase);
+    first.chain(letters).collect()
+}
+
+/// What a table is called in Markdown.
+fn called(table: &FileTable) -> String {
+    match table.head.starts_with('[') {
+        true => format!("`{}`", table.head),
+        false => table.head.to_owned(),
+    }
 }
 
 /// What a key of `table` takes, in words.
@@ -164,12 +183,11 @@ pub fn value(key: &FileKey, table: &FileTable) -> String {
                 Kind::Choice(of) => words(of),
             })
         }
-        Takes::Table(of) if of.head.starts_with('[') => format!("`{}`", of.head),
-        Takes::Table(of) => of.head.to_owned(),
+        Takes::Table(of) => called(of),
         Takes::List(of, _) if table.head.starts_with("[[") && of.head.starts_with("[[") => {
             format!("`[[{}.{}]]`", table.name, key.name)
         }
-        Takes::List(of, _) if of.head.starts_with("[[") => format!("`{}`", of.head),
+        Takes::List(of, _) if of.head.starts_with("[[") => called(of),
         Takes::List(_, many) => format!("list of {}", many.what),
         Takes::Vectors(of, _) => format!("list of vectors, {}", number(of)),
         Takes::Pairs([first, second], many) => format!(
@@ -231,8 +249,8 @@ fn laws() -> String {
 fn elements() -> String {
     let tables = FILE.keys.iter().filter_map(FileKey::table);
     let part = |table: &FileTable| {
-        let head = table.head;
-        format!("### `{head}`\n\nA {}.\n\n{}", table.help, keys(table))
+        let (head, help) = (called(table), capital(table.help));
+        format!("### {head}\n\n{help}.\n\n{}", keys(table))
     };
     let parts: Vec<String> = tables.filter(|table| is_element(table)).map(part).collect();
     parts.join("\n")
@@ -249,12 +267,8 @@ fn frames() -> String {
                 None => own.push((key.frame, vec![key.name])),
             }
         }
-        let head = match table.head.starts_with('[') {
-            true => format!("`{}`", table.head),
-            false => table.head.to_owned(),
-        };
         for (frame, names) in own {
-            let keys = format!("`{}` of {head}", names.join("`, `"));
+            let keys = format!("`{}` of {}", names.join("`, `"), called(table));
             match frames.iter_mut().find(|(of, _)| *of == frame) {
                 Some((_, all)) => all.push(keys),
                 None => frames.push((frame, vec![keys])),

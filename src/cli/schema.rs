@@ -3,7 +3,7 @@
 
 use serde_json::{Map, Value as Json, json};
 
-use super::reference::{absent, value};
+use super::reference::{absent, capital, value};
 use crate::scene::{
     ABOVE_ZERO, Absent, Dimension, FILE, FileKey, FileTable, Kind, Takes, Variants, file_tables,
     find, unit_names,
@@ -36,47 +36,73 @@ fn merge(to: &mut Json, more: Json) {
     }
 }
 
+/// A table: all its keys, so that an editor knows them, and rules about those that only some of its variants have.
 fn of_table(table: &FileTable) -> Json {
-    let description = json!({ "description": capital(table.help) });
-    let mut schema = description;
-    match table.words() {
-        [] => merge(&mut schema, of_variant(table, None)),
-        words => {
-            let variants = words.iter().map(|word| of_variant(table, Some(word)));
-            merge(
-                &mut schema,
-                json!({ "oneOf": variants.collect::<Vec<_>>() }),
-            );
+    let mut properties = Map::new();
+    for key in table.keys {
+        let mut schema = of_key(key, table);
+        if let Some(Json::Object(other)) = properties.get(key.name) {
+            // What it takes, its variant says.
+            let both = [&other["description"], &schema["description"]];
+            let both = both.map(|text| text.as_str().unwrap_or_default());
+            schema = json!({ "description": both.join("\n\n") });
         }
+        properties.insert(key.name.to_owned(), schema);
+    }
+    let mut schema = json!({
+        "description": capital(table.help),
+        "type": "object",
+        "properties": properties,
+        "additionalProperties": false,
+    });
+    let common = table.keys.iter().filter(|key| key.of.is_empty());
+    merge(&mut schema, needs(&common.collect::<Vec<_>>()));
+    let mut rules = schema["allOf"].as_array().cloned().unwrap_or_default();
+    if let Some(variants) = table.variants {
+        let words = table.words();
+        rules.extend(words.iter().map(|word| {
+            let condition = match variants {
+                Variants::Presence(_) => json!({ "required": [word] }),
+                Variants::Word(by, _) => json!({
+                    "properties": { by: { "const": word } }, "required": [by]
+                }),
+            };
+            json!({ "if": condition, "then": of_variant(table, word) })
+        }));
+        if let Variants::Presence(_) = variants {
+            let one = words.iter().map(|word| json!({ "required": [word] }));
+            rules.push(json!({ "anyOf": one.collect::<Vec<_>>() }));
+        }
+    }
+    if !rules.is_empty() {
+        schema["allOf"] = rules.into();
     }
     schema
 }
 
-/// The keys of one variant of a table, or of a table without variants.
-fn of_variant(table: &FileTable, word: Option<&'static str>) -> Json {
-    let by = match table.variants {
-        Some(Variants::Word(by, _)) => by,
-        _ => "",
-    };
-    let keys: Vec<&FileKey> = table.of(word).collect();
+/// What distinguishes one variant of a table.
+fn of_variant(table: &FileTable, word: &'static str) -> Json {
     let mut properties = Map::new();
-    for key in &keys {
-        let mut schema = of_key(key, table);
-        if let (true, Some(word)) = (key.name == by, word) {
-            schema["enum"] = json!([word]);
+    for key in table.keys {
+        let rows = table.keys.iter().filter(|other| other.name == key.name);
+        match (key.is_of(word), rows.count()) {
+            (true, 1) => {}
+            (true, _) => drop(properties.insert(key.name.to_owned(), of_key(key, table))),
+            (false, _) => drop(properties.entry(key.name).or_insert(false.into())),
         }
-        properties.insert(key.name.to_owned(), schema);
     }
+    let own = table.of(Some(word)).filter(|key| !key.of.is_empty());
+    let mut schema = json!({ "properties": properties });
+    merge(&mut schema, needs(&own.collect::<Vec<_>>()));
+    schema
+}
+
+/// Which of `keys` must be given.
+fn needs(keys: &[&FileKey]) -> Json {
     let needed = keys
         .iter()
         .filter(|key| matches!(key.absent, Absent::Fault));
     let needed: Vec<&str> = needed.map(|key| key.name).collect();
-    let mut schema = json!({
-        "type": "object",
-        "properties": properties,
-        "additionalProperties": false,
-        "required": needed,
-    });
     let either = keys.iter().filter_map(|key| match key.absent {
         Absent::Or(other) => Some(json!({
             "anyOf": [{ "required": [key.name] }, { "required": [other] }]
@@ -84,10 +110,10 @@ fn of_variant(table: &FileTable, word: Option<&'static str>) -> Json {
         _ => None,
     });
     let either: Vec<Json> = either.collect();
-    if !either.is_empty() {
-        schema["allOf"] = either.into();
+    match either.is_empty() {
+        true => json!({ "required": needed }),
+        false => json!({ "required": needed, "allOf": either }),
     }
-    schema
 }
 
 fn of_key(key: &FileKey, table: &FileTable) -> Json {
@@ -106,7 +132,10 @@ fn of_key(key: &FileKey, table: &FileTable) -> Json {
     if !units.is_empty() {
         description += &format!("; units {}", units.join(", "));
     }
-    description += &format!(".\nIf left out: {}.", absent(key));
+    description += &match key.absent {
+        Absent::Fault | Absent::Or(_) => format!(".\n{}.", capital(&absent(key))),
+        _ => format!(".\nIf left out: {}.", absent(key)),
+    };
     if !key.frame.is_empty() {
         description += &format!("\nFrame: {}.", key.frame);
     }
@@ -194,13 +223,6 @@ fn numbers(count: usize, items: Json) -> Json {
 
 fn whole(least: u64, most: u64) -> Json {
     json!({ "type": ["integer", "string"], "minimum": least, "maximum": most, "pattern": "^\\s*\\+?[0-9]+\\s*$" })
-}
-
-/// A text with a capital letter first.
-fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    let first = letters.next().into_iter().flat_map(char::to_uppercase);
-    first.chain(letters).collect()
 }
 
 /// A value as a scene file writes it, as JSON.

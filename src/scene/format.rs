@@ -115,7 +115,7 @@ pub static FILE: LazyLock<FileTable> = LazyLock::new(|| {
             "files beside this one, whose lists belong to the scene, too",
         ),
     ]
-    .map(|key| key.absent("none"));
+    .map(|key| key.absent("nothing of it"));
     FileTable::new(
         "scene",
         "the file",
@@ -209,14 +209,14 @@ static VIEW: LazyLock<FileTable> = LazyLock::new(|| {
             "yaw",
             number(D::Angle),
             "\"-35 deg\"",
-            "of the isometric view, about the vertical; with `pitch`",
+            "azimuth of the isometric view, with `pitch`",
         )
         .absent("the usual one"),
         key(
             "pitch",
             number(D::Angle),
             "\"12 deg\"",
-            "of the isometric view, above the horizon; with `yaw`",
+            "elevation of the isometric view, with `yaw`",
         )
         .absent("the usual one"),
     ];
@@ -263,9 +263,9 @@ static SPCMM: LazyLock<FileTable> = LazyLock::new(|| {
             "the platform's constant angle",
         )
         .fixed(),
-        length("hinge_radius", "b: from the platform's middle to a hinge"),
-        length("driving_rod", "L1: from a slider to its socket"),
-        length("driven_rod", "L2: from ball to hinge"),
+        length("hinge_radius", "from the platform's middle to a hinge, b"),
+        length("driving_rod", "from a slider to its socket, L1"),
+        length("driven_rod", "from ball to hinge, L2"),
     ];
     FileTable::new(
         "spcmm",
@@ -350,6 +350,7 @@ static CHAIN_JOINT: LazyLock<FileTable> = LazyLock::new(|| {
         "a ball joint of the chain that differs from the others",
         joined(&[&name, &contact_keys()]),
     )
+    .also(&CONTACT)
 });
 
 fn opening() -> FileKey {
@@ -370,7 +371,7 @@ static BODY: LazyLock<FileTable> = LazyLock::new(|| {
 /// What a body weighs and looks like.
 fn mass() -> [FileKey; 6] {
     [
-        key("mass", positive(D::Mass, MAX_MASS), "\"0.384 kg\"", "mass").or("density"),
+        key("mass", positive(D::Mass, MAX_MASS), "\"0.384 kg\"", "its mass").or("density"),
         key("centre", vector(D::Length), "\"14 0 0 mm\"", "its centroid")
             .zero()
             .frame("the body's"),
@@ -401,10 +402,10 @@ fn mass() -> [FileKey; 6] {
             "density",
             positive(D::Density, MAX_DENSITY),
             "\"7.85 g/cm^3\"",
-            "of its shapes, from which mass, centroid and inertia then follow; volumes in which shapes overlap count twice; \
+            "density of its shapes, of which mass, centroid and inertia then follow; volumes in which shapes overlap count twice; \
              `check` prints what follows",
         )
-        .absent("`mass` is given"),
+        .absent("`mass` and `inertia` are given"),
     ]
 }
 
@@ -418,7 +419,7 @@ static FIXED_SHAPE: LazyLock<FileTable> = LazyLock::new(|| {
         "whether it is moved along X by `spcmm.slider_plane`",
     )
     .absent("false")];
-    of_shape("fixed_shape", "[[fixed_shape]]", &own)
+    of_shape("fixed_shape", "[[fixed_shape]]", &own).also(&SHAPE)
 });
 
 fn of_shape(name: &'static str, head: &'static str, more: &[FileKey]) -> FileTable {
@@ -455,12 +456,12 @@ fn of_shape(name: &'static str, head: &'static str, more: &[FileKey]) -> FileTab
         .absent("the role's"),
         point("from", LONG, "one end of the axis; of a cone, its base"),
         point("to", LONG, "the other end; of a cone, its tip"),
+        point("centre", &["box", "sphere"], "its middle"),
         length(
             "radius",
             &["capsule", "cylinder", "cone", "sphere"],
             "radius; of a cone, that of its base",
         ),
-        point("centre", &["box", "sphere"], "centre"),
         key(
             "size",
             vector(D::Length),
@@ -773,6 +774,7 @@ static BALL_JOINT: LazyLock<FileTable> = LazyLock::new(|| {
         "a ball joint, which closes a loop: with play, or ideal where its `clearance` is 0",
         joined(&[&own, &contact_keys()]),
     )
+    .also(&CONTACT)
 });
 
 static ATTACHMENT: FileTable = FileTable::new(
@@ -820,7 +822,7 @@ static ROTATION: FileTable = FileTable::new(
             "quaternion",
             Takes::Numbers(4, D::None),
             "[1, 0, 0, 0]",
-            "w, x, y, z of a quaternion, of any length",
+            "a quaternion: w, x, y, z, of any length",
         )
         .of(&["quaternion"]),
     ],
@@ -836,7 +838,7 @@ static PARAMETER: FileTable = FileTable::new(
             "name",
             Takes::Name,
             "\"stroke\"",
-            "as expressions use it: letters, digits and `_`",
+            "its name in expressions: letters, digits and `_`",
         ),
         key("value", Takes::Quantity, "\"20 mm\"", "its value"),
         key("label", Takes::Text, "\"Stroke\"", "its name in the window").absent("`name`"),
@@ -849,7 +851,7 @@ static PARAMETER: FileTable = FileTable::new(
             "least and greatest value",
         )
         .absent("any value"),
-        key("help", Takes::Text, "\"How far it goes.\"", "what it is").absent("a general text"),
+        key("help", Takes::Text, "\"How far it goes.\"", "what it is").absent("none"),
     ],
 );
 

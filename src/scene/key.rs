@@ -25,6 +25,8 @@ pub struct FileTable {
     pub keys: &'static [FileKey],
     /// What decides which of them there are.
     pub variants: Option<Variants>,
+    /// Another table, all of whose keys are among its own.
+    pub also: Option<&'static FileTable>,
 }
 
 /// What decides which keys a table has.
@@ -146,7 +148,14 @@ impl FileTable {
             help,
             keys,
             variants: None,
+            also: None,
         }
+    }
+
+    /// With all keys of `other` among its own.
+    pub(super) const fn also(mut self, other: &'static Self) -> Self {
+        self.also = Some(other);
+        self
     }
 
     /// With variants.

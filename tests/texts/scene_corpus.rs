@@ -92,7 +92,7 @@ const TOKENS: [&str; 45] = [
     "1979-05-27",
 ];
 
-struct Numbers(u64);
+pub struct Numbers(pub u64);
 
 impl Numbers {
     fn next(&mut self) -> usize {
@@ -136,7 +136,7 @@ fn tokens(bytes: &[u8]) -> Vec<(usize, usize)> {
 }
 
 /// Breaks `text` in one or two ways.
-fn mutate(text: &[u8], numbers: &mut Numbers) -> Vec<u8> {
+pub fn mutate(text: &[u8], numbers: &mut Numbers) -> Vec<u8> {
     let mut bytes = text.to_vec();
     for _ in 0..=numbers.below(2) {
         let places = tokens(&bytes);
