@@ -911,6 +911,11 @@ fn help_version_and_the_reference_page_are_results() {
             .stdout
             .contains("render")
     );
+    let page = jointplay(folder.path(), "reference").expect(0).stdout;
+    assert!(page.contains("### `[[ball_joint]]`"));
+    let schema = jointplay(folder.path(), "schema").expect(0).stdout;
+    let schema: Json = serde_json::from_str(&schema).unwrap();
+    assert!(schema["properties"]["ball_joint"].is_object());
     let page = jointplay(folder.path(), "parameters").expect(0).stdout;
     for key in [
         "contact.clearance",

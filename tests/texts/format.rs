@@ -265,7 +265,7 @@ fn the_schema_takes_every_scene_and_refuses_bad_ones() {
 }
 
 /// Mutations of each scene.
-const MUTATIONS: u64 = 12;
+const MUTATIONS: u64 = 60;
 
 #[test]
 fn the_schema_takes_whatever_the_reader_takes() {
