@@ -96,12 +96,7 @@ fn keys(table: &FileTable) -> String {
             what(key),
         ])
     };
-    let shared = |key: &&FileKey| {
-        table
-            .also
-            .is_some_and(|also| also.key(key.name, None).is_some())
-    };
-    let own = table.keys.iter().filter(|key| !shared(key));
+    let own = own(table);
     let mut rows: Vec<Vec<String>> = own.map(row).collect();
     if let Some(also) = table.also {
         let any = format!("any key of {}", called(also));
@@ -118,6 +113,13 @@ fn keys(table: &FileTable) -> String {
     }
     let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
     markdown(&heads, rows)
+}
+
+/// Keys of a table but those that another has, too.
+fn own(table: &FileTable) -> impl Iterator<Item = &FileKey> {
+    let shared = |key: &FileKey| Some(table.also?.key(key.name, None).is_some());
+    let own = move |key: &&FileKey| shared(key) != Some(true);
+    table.keys.iter().filter(own)
 }
 
 /// What a key is: of a parameter, whose page says more, the first sentence.
@@ -260,14 +262,14 @@ fn elements() -> String {
 fn frames() -> String {
     let mut frames: Vec<(&str, Vec<String>)> = Vec::new();
     for table in file_tables() {
-        let mut own: Vec<(&str, Vec<&str>)> = Vec::new();
-        for key in table.keys.iter().filter(|key| !key.frame.is_empty()) {
-            match own.iter_mut().find(|(frame, _)| *frame == key.frame) {
+        let mut of_table: Vec<(&str, Vec<&str>)> = Vec::new();
+        for key in own(table).filter(|key| !key.frame.is_empty()) {
+            match of_table.iter_mut().find(|(frame, _)| *frame == key.frame) {
                 Some((_, names)) => names.push(key.name),
-                None => own.push((key.frame, vec![key.name])),
+                None => of_table.push((key.frame, vec![key.name])),
             }
         }
-        for (frame, names) in own {
+        for (frame, names) in of_table {
             let keys = format!("`{}` of {}", names.join("`, `"), called(table));
             match frames.iter_mut().find(|(of, _)| *of == frame) {
                 Some((_, all)) => all.push(keys),

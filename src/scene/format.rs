@@ -26,7 +26,7 @@ const LARGEST_SPCMM: f64 = 100.0;
 
 const WORLD: &str = "the world's";
 const PARENT: &str = "the parent's: the world's where there is no `parent`";
-const BODY_FRAME: &str = "that of the body; of a fixed shape, the world's";
+const BODY_FRAME: &str = "the body's; of a fixed shape, the world's";
 
 /// Rows one after the other.
 fn joined(rows: &[&[FileKey]]) -> &'static [FileKey] {
@@ -96,6 +96,9 @@ pub static FILE: LazyLock<FileTable> = LazyLock::new(|| {
             "{ body = \"rod\" }",
             OUTPUT.help,
         ),
+    ]
+    .map(|key| key.absent("the defaults"));
+    let others = [
         key(
             "spcmm",
             Takes::Table(&SPCMM),
@@ -115,12 +118,12 @@ pub static FILE: LazyLock<FileTable> = LazyLock::new(|| {
             "files beside this one, whose lists belong to the scene, too",
         ),
     ]
-    .map(|key| key.absent("nothing of it"));
+    .map(|key| key.absent("none"));
     FileTable::new(
         "scene",
         "the file",
         "a machine, and how it is simulated and shown",
-        joined(&[&names, &sections, &lists()]),
+        joined(&[&names, &sections, &others, &lists()]),
     )
 });
 
@@ -176,8 +179,12 @@ fn parts() -> Vec<FileKey> {
     parts.into_iter().chain(elements).collect()
 }
 
-/// A list of tables, each like the one in `like`, under the name of the table.
+/// A list of tables, each like the one in `like` if that is not empty, under the name of the table.
 fn list_of(table: &'static FileTable, many: Many, like: &'static str) -> FileKey {
+    let like = match like {
+        "" => "",
+        like => format!("[{like}]").leak(),
+    };
     key(table.name, Takes::List(table, many), like, table.help).absent("none")
 }
 
@@ -239,7 +246,7 @@ static OUTPUT: FileTable = FileTable::new(
             "a point of that body, reported as well",
         )
         .absent("none")
-        .frame("that of the body"),
+        .frame("the body's"),
     ],
 );
 
@@ -379,10 +386,10 @@ fn mass() -> [FileKey; 6] {
             "inertia",
             vector(D::Inertia),
             "\"1.58e-5 1.92e-3 1.93e-3 kg m^2\"",
-            "Ixx, Iyy and Izz about the centroid",
+            "Ixx, Iyy and Izz about the centroid, along these axes",
         )
         .or("density")
-        .frame("the body's axes"),
+        .frame("the body's"),
         key(
             "products",
             vector(D::Inertia),
@@ -390,7 +397,7 @@ fn mass() -> [FileKey; 6] {
             "integrals of xy, xz and yz over the mass, about the centroid",
         )
         .zero()
-        .frame("the body's axes"),
+        .frame("the body's"),
         key(
             "shapes",
             Takes::List(&SHAPE, many(MOST_SHAPES, "shapes")),
@@ -653,7 +660,7 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
 
 static START: FileTable = FileTable::new(
     "start",
-    "start of a slide or a hinge",
+    "`start` of a slide or a hinge",
     "where it starts",
     &[
         key("position", number(D::Length), "\"10 mm\"", "its coordinate")
@@ -715,7 +722,7 @@ static UNIVERSAL_START: FileTable = FileTable::new(
 
 static FREE_START: FileTable = FileTable::new(
     "free_start",
-    "start of a free joint",
+    "`start` of a free joint",
     "where a free body starts",
     &[
         key(
@@ -886,7 +893,7 @@ static PATTERN: LazyLock<FileTable> = LazyLock::new(|| {
 
 static ABOUT: FileTable = FileTable::new(
     "about",
-    "axis of a pattern",
+    "`about` of a pattern",
     "about which copies are turned",
     &[
         key(
@@ -961,6 +968,11 @@ fn of_element(kind: &'static ElementKind) -> FileTable {
             // On a hinge it has another key.
             Some(own) => {
                 let hinge = row(own.key, own.dimension, own.like);
+                let on = |row: FileKey, what| FileKey {
+                    help: format!("{}, on a {what}", number.help).leak(),
+                    ..row
+                };
+                let (slide, hinge) = (on(slide, "slide"), on(hinge, "hinge"));
                 keys.extend(match number.default {
                     None => [slide.or(own.key), hinge.or(number.key)],
                     Some(_) => [slide, hinge],

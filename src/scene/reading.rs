@@ -172,7 +172,10 @@ fn named<'a>(
 /// Whether a text is more than a number with its unit.
 fn operates(text: &str) -> bool {
     let rest = split_unit(text);
-    rest.starts_with(['/', '^']) || rest.contains(['*', '+', '-', '('])
+    // A unit has letters after its stroke: `m/s`.
+    let number = |part: &str| part.trim_start().starts_with(|c: char| c.is_ascii_digit());
+    let divides = rest.split('/').skip(1).any(number);
+    divides || rest.starts_with(['/', '^']) || rest.contains(['*', '+', '-', '('])
 }
 
 /// The text with the signs that only units may have spelt out.
