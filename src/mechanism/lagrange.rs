@@ -30,6 +30,14 @@ impl Group {
     }
 }
 
+/// One row.
+#[derive(Clone, Copy, Default)]
+struct Row {
+    j: JacobianRow,
+    /// Inverse inertia of child and parent times its angular parts; zero for the world.
+    turned: [Vec3; 2],
+}
+
 /// Equations of motion with multipliers.
 pub struct Lagrange {
     /// Bodies, then the world.
@@ -44,9 +52,7 @@ pub struct Lagrange {
     /// First row of each ideal ball joint, and of each joint that closes a loop.
     ideal_row: Vec<usize>,
     closure_row: Vec<usize>,
-    rows: Vec<JacobianRow>,
-    /// Of each row, inverse inertia of child and parent times its angular parts; zero for the world.
-    turned: Vec<[Vec3; 2]>,
+    rows: Vec<Row>,
     /// Group of each row.
     group_of: Vec<usize>,
     /// Pairs (i, j), j <= i, of rows that share a body.
@@ -175,8 +181,7 @@ impl Lagrange {
             driver_row,
             ideal_row,
             closure_row,
-            rows: vec![JacobianRow::ZERO; rows],
-            turned: vec![[Vec3::zeros(); 2]; rows],
+            rows: vec![Row::default(); rows],
             group_of,
             pairs,
             matrix: RowSystem::new(columns),
@@ -203,11 +208,11 @@ impl Lagrange {
             &self.groups[self.group_of[i]],
             &self.groups[self.group_of[j]],
         );
-        let (ri, rj, turned) = (&self.rows[i], &self.rows[j], &self.turned[j]);
+        let (ri, rj) = (&self.rows[i].j, &self.rows[j]);
         let mut sum = 0.0;
         let others = [
-            (gj.child, &rj.child[0], &turned[0]),
-            (gj.parent, &rj.parent[0], &turned[1]),
+            (gj.child, &rj.j.child[0], &rj.turned[0]),
+            (gj.parent, &rj.j.parent[0], &rj.turned[1]),
         ];
         for (bi, ji) in [(gi.child, &ri.child), (gi.parent, &ri.parent)] {
             if bi == model.bodies.len() {
@@ -228,7 +233,7 @@ impl Lagrange {
         for group in &self.groups {
             let (c, p) = (&self.motion[group.child], &self.motion[group.parent]);
             let found = |i: usize, row, [phi, rate, acceleration]: [f64; 3]| {
-                self.rows[group.first + i] = row;
+                self.rows[group.first + i].j = row;
                 self.residual[group.first + i] = stabilised(phi, rate, acceleration);
                 self.drift = self.drift.max(phi.abs());
             };
@@ -331,12 +336,12 @@ impl Equations for Lagrange {
             self.inverse_inertia[b] = m.rotation * body.inertia_inverse * m.rotation.transpose();
         }
         self.linearise();
-        let rows = self.rows.iter().zip(&mut self.turned);
-        for ((row, [of_child, of_parent]), &group) in rows.zip(&self.group_of) {
+        for (Row { j, turned }, &group) in self.rows.iter_mut().zip(&self.group_of) {
             let group = &self.groups[group];
+            let [of_child, of_parent] = turned;
             for (b, turned, j) in [
-                (group.child, of_child, row.child[1]),
-                (group.parent, of_parent, row.parent[1]),
+                (group.child, of_child, j.child[1]),
+                (group.parent, of_parent, j.parent[1]),
             ] {
                 if b < model.bodies.len() {
                     *turned = self.inverse_inertia[b] * j;
@@ -354,7 +359,7 @@ impl Equations for Lagrange {
         for (i, row) in self.rows.iter().enumerate() {
             let group = &self.groups[self.group_of[i]];
             let lambda = self.multipliers[i];
-            for (b, j) in [(group.child, &row.child), (group.parent, &row.parent)] {
+            for (b, j) in [(group.child, &row.j.child), (group.parent, &row.j.parent)] {
                 if b < model.bodies.len() {
                     let m = &mut self.motion[b];
                     m.acceleration += j[0] * (lambda / model.bodies[b].mass);
@@ -428,7 +433,7 @@ impl Equations for Lagrange {
         for (i, row) in self.rows.iter().enumerate() {
             let group = &self.groups[self.group_of[i]];
             let mut sum = 0.0;
-            for (b, j) in [(group.child, &row.child), (group.parent, &row.parent)] {
+            for (b, j) in [(group.child, &row.j.child), (group.parent, &row.j.parent)] {
                 if b < model.bodies.len() {
                     sum += j[0].dot(&part(x, b, 0)) + j[1].dot(&part(x, b, 3));
                 }
@@ -439,7 +444,7 @@ impl Equations for Lagrange {
         for (i, row) in self.rows.iter().enumerate() {
             let group = &self.groups[self.group_of[i]];
             let lambda = self.residual[i];
-            for (b, j) in [(group.child, &row.child), (group.parent, &row.parent)] {
+            for (b, j) in [(group.child, &row.j.child), (group.parent, &row.j.parent)] {
                 if b < model.bodies.len() {
                     let linear = j[0] * (lambda / model.bodies[b].mass);
                     let angular = self.inverse_inertia[b] * j[1] * lambda;
@@ -504,7 +509,7 @@ impl Equations for Lagrange {
         let mut load = [Vec3::zeros(); 2];
         for i in self.closure_rows(model, c) {
             let part = usize::from(self.groups[self.group_of[i]].rows.turns());
-            load[part] += self.rows[i].child[part] * self.multipliers[i];
+            load[part] += self.rows[i].j.child[part] * self.multipliers[i];
         }
         load
     }

@@ -30,21 +30,10 @@ pub enum Rows {
 }
 
 /// J of one row for its two bodies: (velocity, angular velocity) of the child, then of the parent.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub struct JacobianRow {
     pub child: [Vec3; 2],
     pub parent: [Vec3; 2],
-}
-
-impl JacobianRow {
-    /// Of a row that nothing moves.
-    pub const ZERO: Self = {
-        let zero = Vec3::new(0.0, 0.0, 0.0);
-        Self {
-            child: [zero; 2],
-            parent: [zero; 2],
-        }
-    };
 }
 
 impl Rows {
