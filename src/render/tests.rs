@@ -23,6 +23,7 @@ fn offscreen() -> Offscreen {
 fn bare() -> ViewOptions {
     let mut options = ViewOptions {
         triad: false,
+        hinges: false,
         magnification: 20.0,
         ..Default::default()
     };

@@ -200,7 +200,7 @@ pub(super) fn parts(scene: &Scene) -> (Vec<DrawnShape>, Vec<MeshData>) {
                 index,
                 role: shape
                     .role
-                    .unwrap_or(body.map_or(Role::Frame, |body| roles[body])),
+                    .unwrap_or_else(|| body.map_or(Role::Frame, |body| roles[body])),
                 colour: shape.colour.map(|[red, green, blue]| {
                     Colour::hex(u32::from_be_bytes([0, red, green, blue]))
                 }),

@@ -547,7 +547,7 @@ fn a_body_without_shapes_is_seen() {
     let (scene, frame) = started(&ARM.replace(shapes, ""), &[]);
     let view = SceneView::new(&scene, &frame);
     assert!(
-        (0.03..0.1).contains(&view.bounds().radius),
+        (0.025..0.05).contains(&view.bounds().radius),
         "{:?}",
         view.bounds()
     );
