@@ -16,18 +16,41 @@ use crate::scene_corpus::{Numbers, mutate};
 use toml_edit::{DocumentMut, Item, Value};
 
 /// A scene with a file beside it for each key that names one.
-const WITH_FILES: &str = r#"include = ["leg.toml"]
+const WITH_FILES: &str = r##"include = ["leg.toml"]
 [[joint]]
 name = "j"
 kind = "prismatic"
 child = "leg"
 axis = [0, 0, 1]
 drive = { law = "table", file = "bump.csv" }
-"#;
+[[spring]]
+name = "coil"
+from = { body = "world", at = "0 0 1 m" }
+to = { body = "leg" }
+length = "1 m"
+file = "coil.csv"
+[[joint_spring]]
+name = "buffer"
+joint = "j"
+file = "coil.csv"
+[[fixed_shape]]
+form = "mesh"
+colour = "#c2255c"
+file = "corner.stl"
+unit = "1 mm"
+position = "0 0 1 mm"
+rotation = { axis = [1, 0, 0], angle = "90 deg" }
+"##;
 
 fn beside() -> Texts {
-    let leg = "[[body]]\nname = \"leg\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n";
-    let files = [("leg.toml", leg), ("bump.csv", "t_s,z_mm\n0,0\n1,1\n")];
+    let leg = "[[body]]\nname = \"leg\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\nshapes = [{ form = \"mesh\", file = \"corner.stl\", unit = \"1 mm\", position = \"0 0 1 mm\", rotation = { axis = [1, 0, 0], angle = \"9 deg\" } }]\n";
+    let corner = "solid corner\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 9 0 0\nvertex 0 9 0\nendloop\nendfacet\nendsolid corner\n";
+    let files = [
+        ("leg.toml", leg),
+        ("bump.csv", "t_s,z_mm\n0,0\n1,1\n"),
+        ("coil.csv", "length_mm,force_N\n-1,-5\n0,0\n1,8\n"),
+        ("corner.stl", corner),
+    ];
     files
         .map(|(name, text)| (name.to_owned(), text.into()))
         .into()
