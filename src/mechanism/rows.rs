@@ -87,7 +87,7 @@ impl RowSystem {
     }
 
     /// Adds to entry (i, j), j <= i.
-    #[inline]
+    #[inline(always)]
     pub fn add(&mut self, i: usize, j: usize, value: f64) {
         self.skyline.add(i, j, value);
     }

@@ -107,7 +107,8 @@ impl Mechanism {
         let openings: Vec<(usize, Opening)> = (balls..).zip(openings).collect();
         for &(joint, opening) in &openings {
             let Opening { apart, turned } = opening;
-            if !assembled && !(apart.norm() <= OPEN_AS_GIVEN && turned <= TURNED_AS_GIVEN) {
+            let closed = apart.norm() <= OPEN_AS_GIVEN && turned <= TURNED_AS_GIVEN;
+            if !assembled && !closed {
                 let given = self.gap(joint, opening);
                 return Err(MechanismError::Open { given });
             }
@@ -230,7 +231,8 @@ impl Mechanism {
         }
         for (j, pair) in (self.model.joints.len()..).zip(&self.model.closures) {
             let rate = pair.opening_rate(&tree.motion);
-            if !(rate.apart.norm() <= HELD && rate.turned <= HELD) {
+            let held = rate.apart.norm() <= HELD && rate.turned <= HELD;
+            if !held {
                 let rate = self.gap(j, rate);
                 return Err(MechanismError::InconsistentDrives { rate });
             }

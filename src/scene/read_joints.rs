@@ -119,7 +119,7 @@ impl Joint {
     fn follow_in_child(&mut self, copy: &Copy) {
         self.child_point = copy.point(self.child_point);
         self.child_axis = copy.direction(self.child_axis);
-        self.rotation = self.rotation * copy.turn.inverse();
+        self.rotation *= copy.turn.inverse();
     }
 
     /// Follows a copy of a pattern that its parent does not belong to.
