@@ -531,7 +531,7 @@ impl Equations for Lagrange {
         let cut = self.ideal_row.iter().chain(&self.closure_row).next();
         let rows = &self.rows[..cut.copied().unwrap_or(self.rows.len())];
         for ((row, &group), lambda) in rows.iter().zip(&self.group_of).zip(&self.multipliers) {
-            let [along, about] = row.child;
+            let [along, about] = row.j.child;
             let load = &mut self.wrench[self.groups[group].child];
             load.force += along * *lambda;
             load.torque += about * *lambda;
