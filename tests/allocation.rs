@@ -79,6 +79,34 @@ fn laws_of_drives_allocate_nothing() {
 }
 
 #[test]
+fn curves_tyres_and_samples_of_reactions_allocate_nothing() {
+    for text in [
+        include_str!("fuzz/corpus/good-spring-curves.toml"),
+        include_str!("fuzz/corpus/good-tyre.toml"),
+    ] {
+        for form in ["tree", "lagrange"] {
+            let changes = [("formulation".to_owned(), form.to_owned())];
+            let scene = Scene::parse(text, None, &changes).unwrap();
+            let mut simulation = Simulation::new(&scene).unwrap();
+            let mut frame = Frame {
+                reactions: Some(Vec::new()),
+                ..Frame::default()
+            };
+            simulation.step().unwrap();
+            simulation.sample(simulation.time(), &mut frame);
+            let found = allocations(|| {
+                while simulation.time() < 0.05 {
+                    simulation.step().unwrap();
+                    simulation.sample(simulation.time(), &mut frame);
+                }
+            });
+            assert_eq!(found, 0, "{form}");
+            assert_eq!(frame.reactions.map(|all| all.len()), Some(1));
+        }
+    }
+}
+
+#[test]
 fn steps_samples_and_peaks_allocate_nothing() {
     for name in SCENES {
         for method in METHODS {

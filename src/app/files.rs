@@ -13,6 +13,7 @@ use super::replay::Verdict;
 use super::share::shown::Instruments;
 use super::share::{Link, SceneText, is_link, shown};
 use super::{App, Notice};
+use crate::simulate::Channel;
 
 /// Rows of a saved record.
 const ROWS: usize = 1000;
@@ -50,6 +51,7 @@ impl App {
             magnification: Some(self.viewport.options.magnification),
             follow: followed.and_then(|part| shown::name_followed(player.scene(), part)),
             plots,
+            channels: (!self.plots.picked.is_empty()).then(|| self.plots.picked.clone()),
             window,
             instruments: (instruments != Instruments::default()).then_some(instruments),
             playing: Some(player.is_playing()),
@@ -281,15 +283,25 @@ pub fn verdict_words(verdict: &Verdict) -> String {
 /// The record as a table: time, then the least and the greatest value of each channel since the row before; SI units.
 fn record_csv(player: &Player) -> String {
     let mut text = String::from("t_s");
-    for channel in player.channels().list() {
-        let column = channel.column();
+    let channels = player.channels();
+    let columns = channels.list().iter().map(Channel::column);
+    let picked = channels.picked().iter().map(|channel| &*channel.column);
+    // A picked channel may be one that is recorded anyway.
+    let places = (0..channels.len()).chain(player.picked());
+    let mut written: Vec<(&str, usize)> = Vec::new();
+    for (column, place) in columns.chain(picked).zip(places) {
+        if !written.iter().any(|(other, _)| *other == column) {
+            written.push((column, place));
+        }
+    }
+    for (column, _) in &written {
         // Writing to a String cannot fail.
         let _ = write!(text, ",{column}_min,{column}_max");
     }
     text.push('\n');
     for (time, values) in player.history().rows(ROWS) {
         let _ = write!(text, "{time:.9e}");
-        for (least, greatest) in values.iter().take(player.channels().len()) {
+        for (least, greatest) in written.iter().map(|(_, place)| &values[*place]) {
             if least > greatest {
                 // Nothing was recorded for it here.
                 text.push_str(",NaN,NaN");

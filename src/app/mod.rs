@@ -325,6 +325,9 @@ impl App {
         if let Some(chosen) = &link.plots {
             self.plots.chosen.clone_from(chosen);
         }
+        if let Some(channels) = &link.channels {
+            self.plots.picked.clone_from(channels);
+        }
         if let Some(window) = link.window {
             self.plots.window = window;
         }
@@ -557,6 +560,7 @@ impl App {
 
     /// Advances the state by `dt` seconds; returns whether it keeps moving by itself.
     pub fn advance(&mut self, dt: f64) -> bool {
+        self.player.pick(&self.plots.picked);
         if let Some(replay) = &mut self.replay {
             let may_step = replay_budget(self.player.clock);
             self.verdict = replay.advance(&mut self.player, may_step);

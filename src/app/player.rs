@@ -16,8 +16,8 @@ use super::watch::RunWatch;
 use crate::analysis::section::Schedule;
 use crate::scene::{SOLVER_KEYS, Scene, Value};
 use crate::simulate::{
-    ChangeError, Channels, Effect, Frame, History, Pacer, Peak, Pull, RECORDED_JOINTS, Simulation,
-    StartError, Stopped, Wear,
+    ChangeError, Channels, Effect, Frame, History, Listed, Pacer, Peak, Pull, RECORDED_JOINTS,
+    Simulation, StartError, Stopped, Wear,
 };
 use contact_history::ContactHistory;
 use keyframes::Keyframes;
@@ -55,7 +55,9 @@ pub struct Player {
     /// Peaks since the previous frame.
     passed: Vec<Peak>,
     channels: Channels,
-    /// Record of the channels, followed by the clearance of each recorded ball joint.
+    /// By what names channels are picked.
+    picks: Vec<String>,
+    /// Record of the channels, followed by the clearance of each recorded ball joint, and by the picked channels.
     history: History,
     /// Record, in full detail, of the past stretch that was last retraced.
     near: Option<Box<History>>,
@@ -139,6 +141,7 @@ impl Player {
             near: None,
             contact_history: ContactHistory::default(),
             channels,
+            picks: Vec::new(),
             recorded: Frame::default(),
             recorded_to: 0.0,
             values: Vec::new(),
@@ -197,7 +200,44 @@ impl Player {
 
     /// Channels of the record that hold the clearances of the ball joints in force at the time.
     pub fn clearances(&self) -> std::ops::Range<usize> {
-        self.channels.len()..self.history.channels()
+        self.channels.len()..self.history.channels() - self.channels.picked().len()
+    }
+
+    /// Channels of the record that hold the picked ones.
+    pub fn picked(&self) -> std::ops::Range<usize> {
+        self.clearances().end..self.history.channels()
+    }
+
+    /// Records the channels that match `patterns`, too, from now on; those of an earlier call that do not, no more.
+    pub fn pick(&mut self, patterns: &[String]) {
+        if self.picks == patterns {
+            return;
+        }
+        self.picks = patterns.to_vec();
+        let (first, channels) = (self.clearances().end, self.history.channels());
+        let old = self.channels.clone();
+        self.channels
+            .pick(self.simulation.running_scene(), &self.frame, patterns);
+        let place = |new: &Listed| {
+            let same = |old: &Listed| old.column == new.column;
+            old.picked().iter().position(same).map(|at| first + at)
+        };
+        let picked = self.channels.picked().iter().map(place);
+        let from: Vec<Option<usize>> = (0..first).map(Some).chain(picked).collect();
+        let left = self.left.as_mut().map(|left| &mut left.history);
+        let near = self.near.as_deref_mut();
+        for record in std::iter::once(&mut self.history).chain(near).chain(left) {
+            *record = record.rearranged(&from);
+        }
+        self.keyframes.rearrange(channels, &from);
+        self.channels.ask(&mut self.recorded);
+        // They begin with the instant on show.
+        let mut frame = std::mem::take(&mut self.recorded);
+        let time = self.recorded_to;
+        self.run_at(time).sample(time, &mut frame);
+        self.read(&frame);
+        self.recorded = frame;
+        self.push(time);
     }
 
     /// The record of the run, as far as it was ever displayed.
@@ -437,11 +477,20 @@ impl Player {
         self.sections = None;
         self.watch.begin(self.simulation.running_scene(), 0.0);
         self.restart_twin();
-        let channels = Channels::of(self.simulation.running_scene());
-        if channels.list() != self.channels.list() {
-            self.history = record_of(self.simulation.running_scene(), &channels);
-            self.channels = channels;
+        let mut first = Frame::default();
+        if !self.picks.is_empty() {
+            self.simulation.sample(0.0, &mut first);
         }
+        let scene = self.simulation.running_scene();
+        let mut channels = Channels::of(scene);
+        channels.pick(scene, &first, &self.picks);
+        if channels.list() != self.channels.list()
+            || channels.picked().len() != self.channels.picked().len()
+        {
+            self.history = record_of(scene, &channels);
+        }
+        channels.ask(&mut self.recorded);
+        self.channels = channels;
         self.start_record();
         Ok(())
     }
@@ -684,9 +733,7 @@ impl Player {
     fn record(&mut self, time: f64) {
         let mut frame = std::mem::take(&mut self.recorded);
         self.run_at(time).sample(time, &mut frame);
-        self.channels.read(&frame, &mut self.values);
-        let joints = frame.joints.iter().take(self.clearances().len());
-        self.values.extend(joints.map(|joint| joint.clearance));
+        self.read(&frame);
         for (joint, peak) in self.coming.iter().enumerate() {
             // The peak comes from the cubic of the step, not from the interpolated state.
             if peak.normal > 0.0
@@ -702,15 +749,28 @@ impl Player {
             let error = ideal.output_error(&frame).map_or(f64::NAN, |e| e.norm());
             self.values[self.channels.tip_error()] = error;
         }
-        self.history.push(time, &self.values);
-        if let Some(near) = &mut self.near {
-            near.push(time, &self.values);
-        }
+        self.push(time);
         self.contact_history.record(&frame);
         self.watch.record(&frame);
         self.settling.record(&frame);
         self.paths.record(&frame);
         self.recorded = frame;
+    }
+
+    /// Reads what is recorded of `frame`.
+    fn read(&mut self, frame: &Frame) {
+        self.channels.read(frame, &mut self.values);
+        let joints = frame.joints.iter().take(self.clearances().len());
+        self.values.extend(joints.map(|joint| joint.clearance));
+        self.channels.read_picked(frame, &mut self.values);
+    }
+
+    /// Adds what was read at `time`, s, to the record.
+    fn push(&mut self, time: f64) {
+        self.history.push(time, &self.values);
+        if let Some(near) = &mut self.near {
+            near.push(time, &self.values);
+        }
     }
 
     /// Adds the peaks up to `time`, s, to the record and to those of the frame.
@@ -795,10 +855,11 @@ impl Player {
     }
 }
 
-/// An empty record of `channels` and of the clearances.
+/// An empty record of `channels`, of the clearances, and of the picked channels.
 fn record_of(scene: &Scene, channels: &Channels) -> History {
     let joints = scene.ball_joints.len().min(RECORDED_JOINTS);
-    History::new(channels.len() + joints, FINEST_BIN)
+    let picked = channels.picked().len();
+    History::new(channels.len() + joints + picked, FINEST_BIN)
 }
 
 /// Instants of `schedule` up to `now`, s.

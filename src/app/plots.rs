@@ -1,6 +1,9 @@
-//! Live plots of the recorded channels: one plot per quantity, one line per joint, axis or kind.
+//! Live plots of the recorded channels: one plot per quantity, one line per joint, axis or kind; and one per name by which
+//! channels are picked, and unit.
 
-use eframe::egui::{self, ComboBox, Pos2, Rangef, RichText, Role, Ui, Vec2b, WidgetInfo, vec2};
+use eframe::egui::{
+    self, ComboBox, Pos2, Rangef, RichText, Role, ScrollArea, TextEdit, Ui, Vec2b, WidgetInfo, vec2,
+};
 use egui_plot::{
     AxisHints, FilledArea, GridInput, GridMark, HoverPosition, Plot, PlotPoint, PlotTransform,
 };
@@ -11,7 +14,7 @@ use super::player::Player;
 use super::stack::stack;
 use super::zoom::{self, Zoom};
 use super::{theme, value};
-use crate::simulate::{Bin, PlotKind, Quantity, RECORDED_JOINTS};
+use crate::simulate::{Bin, Listed, MOST_PICKED, PlotKind, Quantity, RECORDED_JOINTS, channels_of};
 
 /// Windows to choose from, s.
 const WINDOWS: [f64; 6] = [1e-3, 1e-2, 0.05, 0.1, 1.0, 10.0];
@@ -43,6 +46,11 @@ pub enum Window {
 pub struct Plots {
     /// Quantities shown, in the order of [`Quantity::ALL`].
     pub chosen: Vec<Quantity>,
+    /// Names, or patterns, of channels that are shown after them, as of `run --channels`.
+    pub picked: Vec<String>,
+    /// What is searched among the channels, and what was found.
+    search: String,
+    found: Option<(String, Vec<Entry>)>,
     /// Time window.
     pub window: Window,
     /// Channels whose lines are hidden.
@@ -51,10 +59,125 @@ pub struct Plots {
     traces: Vec<Trace>,
     levels: Vec<Trace>,
     readings: Vec<Vec<PlotPoint>>,
-    /// Latest place of each plot.
+    /// Latest place of each plot of a quantity.
     places: Vec<(Quantity, Place)>,
     /// Time range that the user has zoomed to, s, in place of the window.
     zoomed: Option<(f64, f64)>,
+}
+
+/// A name by which channels may be picked.
+struct Entry {
+    name: String,
+    /// Units of what it stands for, separated by commas.
+    units: String,
+}
+
+/// What one plot shows.
+struct Panel<'a> {
+    /// `None` where channels were picked by name.
+    quantity: Option<Quantity>,
+    label: &'a str,
+    help: &'a str,
+    /// Axis unit, and its value in SI units.
+    unit: (&'static str, f64),
+    kind: PlotKind,
+    /// Channels of the record, with their names.
+    members: Vec<(usize, &'a str)>,
+}
+
+impl<'a> Panel<'a> {
+    /// That of `quantity`; `None` if the scene has none of it.
+    fn of_quantity(quantity: Quantity, player: &'a Player) -> Option<Self> {
+        let list = player.channels().list().iter().enumerate();
+        let members: Vec<(usize, &str)> = list
+            .filter(|(_, channel)| channel.quantity == quantity)
+            .map(|(index, channel)| (index, channel.member.as_str()))
+            .collect();
+        (!members.is_empty()).then(|| Self {
+            quantity: Some(quantity),
+            label: quantity.label(),
+            help: quantity.help(),
+            unit: quantity.unit(),
+            kind: quantity.kind(),
+            members,
+        })
+    }
+
+    /// Those of the channels picked by `name`, one for each unit.
+    fn of_pick(name: &'a str, player: &'a Player) -> Vec<Self> {
+        let mut panels: Vec<Self> = Vec::new();
+        let picked = player.channels().picked().iter().zip(player.picked());
+        for (channel, index) in picked.filter(|(channel, _)| channel.is_chosen_by(name)) {
+            let rest = channel.name.strip_prefix(name);
+            let member = rest.and_then(|rest| rest.strip_prefix('.'));
+            let member = (index, member.unwrap_or(&channel.name));
+            let unit = axis_unit(channel);
+            match panels.iter_mut().find(|panel| panel.unit == unit) {
+                Some(panel) => panel.members.push(member),
+                None => panels.push(Self {
+                    quantity: None,
+                    label: name,
+                    help: channel.help,
+                    unit,
+                    kind: PlotKind::Curves,
+                    members: vec![member],
+                }),
+            }
+        }
+        panels
+    }
+
+    /// Label with the unit.
+    fn title(&self) -> String {
+        match self.unit.0 {
+            "" => self.label.to_owned(),
+            unit => format!("{}, {unit}", self.label),
+        }
+    }
+}
+
+/// Unit of the axis for a channel, and its value in SI units.
+fn axis_unit(channel: &Listed) -> (&'static str, f64) {
+    match channel.unit {
+        "m" => ("mm", 1e-3),
+        "m/s2" => ("m/s²", 1.0),
+        "rad/s2" => ("rad/s²", 1.0),
+        unit => (unit, 1.0),
+    }
+}
+
+/// Most entries of the list of channels.
+const MOST_FOUND: usize = 60;
+
+/// Names of channels that contain `search`, or match it as a pattern: without it, all groups of components.
+fn find(player: &Player, search: &str) -> Vec<Entry> {
+    let list = channels_of(player.scene(), player.frame());
+    let wanted = search.to_lowercase();
+    let mut entries: Vec<Entry> = Vec::new();
+    let mut add = |name: &str, unit: &'static str| {
+        if let Some(entry) = entries.iter_mut().find(|entry| entry.name == name) {
+            if !entry.units.split(", ").any(|own| own == unit) {
+                entry.units += &format!(", {unit}");
+            }
+        } else if entries.len() < MOST_FOUND {
+            entries.push(Entry {
+                name: name.to_owned(),
+                units: unit.to_owned(),
+            });
+        }
+    };
+    let pattern = search.contains(['*', '?']);
+    for channel in &list {
+        let unit = axis_unit(channel).0;
+        if pattern && channel.is_chosen_by(search) {
+            add(search, unit);
+        } else if channel.group().to_lowercase().contains(&wanted) {
+            add(channel.group(), unit);
+        } else if channel.name.to_lowercase().contains(&wanted) {
+            add(&channel.name, unit);
+        }
+    }
+    entries
 }
 
 /// Where a plot is on the screen, and its units in SI.
@@ -67,6 +190,9 @@ impl Default for Plots {
     fn default() -> Self {
         Self {
             chosen: vec![Quantity::NormalForce, Quantity::Eccentricity],
+            picked: Vec::new(),
+            search: String::new(),
+            found: None,
             window: Window::Automatic,
             hidden: Vec::new(),
             traces: Vec::new(),
@@ -154,11 +280,71 @@ impl Plots {
                 .weak(),
             );
         }
+        ui.separator();
+        self.channels(ui, player);
+    }
+
+    /// Picking channels by name.
+    fn channels(&mut self, ui: &mut Ui, player: &Player) {
+        ui.add(
+            TextEdit::singleline(&mut self.search)
+                .hint_text("Search channels: angle, *.force")
+                .desired_width(220.0),
+        )
+        .on_hover_text(
+            "Any channel by its name, as of `run --channels`. It is recorded from the moment it is picked; * stands for any \
+             characters, ? for one",
+        )
+        .accessible_name("Search channels");
+        let search = self.search.trim().to_owned();
+        if self.found.as_ref().is_none_or(|(of, _)| *of != search) {
+            self.found = Some((search.clone(), find(player, &search)));
+        }
+        let Self { picked, found, .. } = self;
+        let found = found.as_ref().map_or(&[][..], |(_, entries)| entries);
+        let own = picked
+            .iter()
+            .filter(|name| !found.iter().any(|entry| entry.name == **name));
+        let own: Vec<String> = own.cloned().collect();
+        let mut toggled = None;
+        ScrollArea::vertical()
+            .id_salt("channels")
+            .max_height(180.0)
+            .show(ui, |ui| {
+                let listed = found.iter().map(|entry| (&entry.name, &*entry.units));
+                for (name, units) in own.iter().map(|name| (name, "")).chain(listed) {
+                    let mut on = picked.contains(name);
+                    let label = match units {
+                        "" => name.clone(),
+                        units => format!("{name}, {units}"),
+                    };
+                    if ui.checkbox(&mut on, label).changed() {
+                        toggled = Some((name.clone(), on));
+                    }
+                }
+                if found.is_empty() {
+                    ui.label(RichText::new("No such channel").small().weak());
+                }
+            });
+        if player.channels().picked().len() == MOST_PICKED {
+            let note = format!("At most {MOST_PICKED} of them are recorded");
+            ui.label(RichText::new(note).small().weak());
+        }
+        if let Some((name, on)) = toggled {
+            // Their places in the record are about to change.
+            let first = player.picked().start;
+            self.hidden.retain(|channel| *channel < first);
+            self.picked.retain(|picked| *picked != name);
+            if on && self.picked.len() < MOST_PICKED {
+                self.picked.push(name);
+            }
+        }
     }
 
     /// Back to the chosen window.
     pub fn reset(&mut self) {
         self.zoomed = None;
+        self.found = None;
     }
 
     fn window_label(&self) -> String {
@@ -202,12 +388,12 @@ impl Plots {
     /// The chosen plots, side by side if there is room, otherwise stacked. Returns the instant that was clicked, s.
     pub fn ui(&mut self, ui: &mut Ui, player: &Player) -> Option<f64> {
         self.places.clear();
-        let chosen: Vec<Quantity> = self
-            .chosen
-            .iter()
-            .copied()
-            .filter(|q| player.channels().list().iter().any(|c| c.quantity == *q))
-            .collect();
+        let picked = self.picked.clone();
+        let of_quantity = |quantity: &Quantity| Panel::of_quantity(*quantity, player);
+        let mut chosen: Vec<Panel<'_>> = self.chosen.iter().filter_map(of_quantity).collect();
+        for name in &picked {
+            chosen.extend(Panel::of_pick(name, player));
+        }
         if chosen.is_empty() {
             ui.label(RichText::new("No plot chosen").weak());
             return None;
@@ -225,9 +411,9 @@ impl Plots {
             .show(ui, |ui| {
                 for row in chosen.chunks(columns) {
                     ui.horizontal_top(|ui| {
-                        for quantity in row {
+                        for panel in row {
                             let shown = ui.allocate_ui(vec2(width, height), |ui| {
-                                self.plot(ui, player, *quantity, vec2(width, height))
+                                self.plot(ui, player, panel, vec2(width, height))
                             });
                             asked = asked.or(shown.inner);
                         }
@@ -241,23 +427,16 @@ impl Plots {
         &mut self,
         ui: &mut Ui,
         player: &Player,
-        quantity: Quantity,
+        panel: &Panel<'_>,
         space: egui::Vec2,
     ) -> Option<f64> {
-        let (unit, size) = quantity.unit();
+        let (unit, size) = panel.unit;
         let (from, to) = self.range(player);
         let (length, now) = (to - from, player.pacer.shown());
         let (time_unit, time_size) = time_axis(length);
         let units = [time_size, size];
 
-        let members: Vec<(usize, &str)> = player
-            .channels()
-            .list()
-            .iter()
-            .enumerate()
-            .filter(|(_, channel)| channel.quantity == quantity)
-            .map(|(index, channel)| (index, channel.member.as_str()))
-            .collect();
+        let members = &panel.members;
         let dark = ui.visuals().dark_mode;
         let faint = ui.visuals().weak_text_color();
         // No bin is wider than a pixel column, as long as the record has such bins.
@@ -276,7 +455,7 @@ impl Plots {
             }
         }
         self.levels.clear();
-        let kind = quantity.kind();
+        let kind = panel.kind;
         if kind == PlotKind::FromZeroWithClearances {
             // As recorded: the present value says nothing about the past.
             for index in player.clearances() {
@@ -292,7 +471,7 @@ impl Plots {
             }
         }
         let bands = if kind == PlotKind::Bands {
-            self.bands(&members, units)
+            self.bands(members, units)
         } else {
             Vec::new()
         };
@@ -318,7 +497,7 @@ impl Plots {
         }
 
         ui.vertical(|ui| {
-            self.title(ui, quantity, &members);
+            self.title(ui, panel);
             let font = egui::TextStyle::Small.resolve(ui.style());
             let axis = |hints: AxisHints<'static>| {
                 hints.tick_label_color(faint).tick_label_font(font.clone())
@@ -363,7 +542,7 @@ impl Plots {
             };
             let finest = value::digits_within(greatest - least, least.abs().max(greatest.abs()));
             let earliest = value::digits_within(length, to);
-            let plot = Plot::new(("plot", quantity))
+            let plot = Plot::new(("plot", panel.label, unit))
                 .width(width)
                 .height((space.y - 20.0 - theme::side(ui, 18.0)).max(60.0))
                 .allow_drag(false)
@@ -433,13 +612,15 @@ impl Plots {
                     }
                 }
             });
-            let name = format!("Plot of {}", quantity.label());
+            let name = format!("Plot of {}", panel.label);
             shown
                 .response
                 .widget_info(|| WidgetInfo::labeled(Role::Image, true, &name));
             let transform = shown.transform;
             let asked = self.pointer(ui, &shown.response, &transform, time_size, player);
-            self.places.push((quantity, Place { transform, units }));
+            if let Some(quantity) = panel.quantity {
+                self.places.push((quantity, Place { transform, units }));
+            }
             let x = |time: f64| {
                 let point = PlotPoint::new(time / time_size, 0.0);
                 transform.position_from_point(&point).x
@@ -534,17 +715,17 @@ impl Plots {
         bands
     }
 
-    /// Quantity with its unit, and its members as switches in the colours of their lines.
-    fn title(&mut self, ui: &mut Ui, quantity: Quantity, members: &[(usize, &str)]) {
+    /// What is shown with its unit, and its members as switches in the colours of their lines.
+    fn title(&mut self, ui: &mut Ui, panel: &Panel<'_>) {
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             ui.spacing_mut().button_padding = vec2(4.0, 1.0);
             let height = theme::side(ui, 18.0);
             ui.spacing_mut().interact_size.y = height;
-            ui.label(RichText::new(format!("{}, {}", quantity.label(), quantity.unit().0)).small())
-                .on_hover_text(quantity.help());
+            ui.label(RichText::new(panel.title()).small())
+                .on_hover_text(panel.help);
             ui.add_space(4.0);
-            for (index, (channel, member)) in members.iter().enumerate() {
+            for (index, (channel, member)) in panel.members.iter().enumerate() {
                 let on = !self.hidden.contains(channel);
                 let colour = theme::series(index, ui.visuals().dark_mode);
                 let mut text = RichText::new(*member).small().strong().color(colour);

@@ -35,7 +35,7 @@ pub const ALIASES: [(&str, &str); 4] = [
 ];
 
 /// Words of a link that are not parameters.
-const WORDS: [&str; 18] = [
+const WORDS: [&str; 19] = [
     "scene",
     "file",
     "text",
@@ -48,6 +48,7 @@ const WORDS: [&str; 18] = [
     "magnification",
     "follow",
     "plots",
+    "channels",
     "window",
     "show",
     "play",
@@ -138,6 +139,8 @@ pub struct Link {
     pub follow: Option<String>,
     /// Plots shown.
     pub plots: Option<Vec<Quantity>>,
+    /// Names of the channels that plots of their own show.
+    pub channels: Option<Vec<String>>,
     /// Time that they show.
     pub window: Option<Window>,
     /// Instruments that are on.
@@ -244,6 +247,9 @@ impl Link {
                 }
                 "follow" => link.follow = Some(value.to_owned()),
                 "plots" => link.plots = Some(shown::read_plots(value).map_err(|m| wrong(&m))?),
+                "channels" => {
+                    link.channels = Some(shown::read_channels(value).map_err(|m| wrong(&m))?);
+                }
                 "window" => link.window = Some(shown::read_window(value).map_err(|m| wrong(&m))?),
                 "show" => {
                     link.instruments = Some(Instruments::read(value).map_err(|m| wrong(&m))?);
@@ -336,6 +342,8 @@ impl Link {
         );
         add("follow", self.follow.clone());
         add("plots", self.plots.as_deref().map(shown::write_plots));
+        let channels = self.channels.as_deref();
+        add("channels", channels.map(shown::write_channels));
         add("window", self.window.map(shown::write_window));
         add("show", self.instruments.as_ref().map(Instruments::write));
         add(

@@ -4,6 +4,7 @@ mod choice;
 mod table;
 
 pub use choice::{Listed, NoChannel, channels_of, chosen_columns};
+use table::TIME;
 pub use table::{PlotKind, Quantity};
 
 use super::Frame;
@@ -12,6 +13,9 @@ use table::{Each, Signal, TABLE, Take};
 
 /// Ball joints and drives that are recorded; in a longer chain the rest would cost more memory than it is worth.
 pub const RECORDED_JOINTS: usize = 12;
+
+/// Channels that are recorded because they were picked by name, at most: each costs as much memory as any other.
+pub const MOST_PICKED: usize = 32;
 
 /// Where a value is found in a frame.
 #[derive(Clone, Copy, Debug)]
@@ -65,6 +69,7 @@ impl Channel {
 #[derive(Clone, Debug, Default)]
 pub struct Channels {
     list: Vec<Channel>,
+    picked: Vec<Listed>,
 }
 
 impl Channels {
@@ -80,15 +85,36 @@ impl Channels {
                 reading: found.reading,
             }));
         });
-        Self { list }
+        Self {
+            list,
+            picked: Vec::new(),
+        }
     }
 
-    /// The channels in order.
+    /// Picks the channels of `scene` that match `patterns`, in place of those picked before; `first` as in [`run_columns`].
+    pub fn pick(&mut self, scene: &Scene, first: &Frame, patterns: &[String]) {
+        self.picked.clear();
+        if patterns.is_empty() {
+            return;
+        }
+        self.picked = channels_of(scene, first);
+        let matches = |channel: &Listed| patterns.iter().any(|p| channel.is_chosen_by(p));
+        self.picked
+            .retain(|channel| channel.name != TIME && matches(channel));
+        self.picked.truncate(MOST_PICKED);
+    }
+
+    /// The channels picked by name.
+    pub fn picked(&self) -> &[Listed] {
+        &self.picked
+    }
+
+    /// The channels in order, without the picked ones.
     pub fn list(&self) -> &[Channel] {
         &self.list
     }
 
-    /// Number of channels.
+    /// Number of these.
     pub fn len(&self) -> usize {
         self.list.len()
     }
@@ -110,7 +136,21 @@ impl Channels {
         self.list.iter().position(own).unwrap_or_default()
     }
 
-    /// Reads every channel from `frame` into `out`, SI units; NaN where the frame has no value.
+    /// Makes `frame` one that asks for the picked channels, and for nothing else.
+    pub fn ask(&self, frame: &mut Frame) {
+        frame.reactions = None;
+        self.picked
+            .iter()
+            .for_each(|channel| channel.reading.ask(frame));
+    }
+
+    /// Appends the picked channels to `out`, as [`Self::read`] does the others.
+    pub fn read_picked(&self, frame: &Frame, out: &mut Vec<f64>) {
+        let value = |channel: &Listed| channel.reading.read(frame).unwrap_or(f64::NAN);
+        out.extend(self.picked.iter().map(value));
+    }
+
+    /// Reads every channel but the picked ones from `frame` into `out`, SI units; NaN where the frame has no value.
     pub fn read(&self, frame: &Frame, out: &mut Vec<f64>) {
         out.clear();
         let value = |channel: &Channel| channel.reading.read(frame).unwrap_or(f64::NAN);

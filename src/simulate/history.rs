@@ -21,7 +21,7 @@ pub struct History {
     newest: [i64; LEVELS],
     /// Greatest index ever reached per level: anything more than `BINS` older has been overwritten.
     reached: [i64; LEVELS],
-    /// First value per channel. Differences from it are stored, so that a small motion far from zero keeps its digits.
+    /// First value per channel, NaN before there is one in a channel that came later. Differences from it are stored, so that a small motion far from zero keeps its digits.
     base: Vec<f64>,
     /// (least, greatest) per channel less its base, slot by slot, level by level.
     ranges: Vec<(f32, f32)>,
@@ -53,6 +53,25 @@ impl Mark {
     pub fn bytes(&self) -> usize {
         size_of::<Self>() + std::mem::size_of_val(self.ranges.as_slice())
     }
+
+    /// The same position in a record that was rearranged, as by [`History::rearranged`], from one of `channels`.
+    pub fn rearranged(&self, channels: usize, from: &[Option<usize>]) -> Self {
+        Self {
+            newest: self.newest,
+            ranges: rearranged(&self.ranges, channels, from),
+            span: self.span,
+        }
+    }
+}
+
+/// The ranges in slots of `channels`, in slots of the channels `from`.
+fn rearranged(ranges: &[(f32, f32)], channels: usize, from: &[Option<usize>]) -> Vec<(f32, f32)> {
+    let slots = ranges.chunks_exact(channels.max(1));
+    let slot = |slot: &[(f32, f32)]| {
+        let range = |channel: &Option<usize>| channel.map_or(NOTHING, |at| slot[at]);
+        from.iter().map(range).collect::<Vec<_>>()
+    };
+    slots.flat_map(slot).collect()
 }
 
 impl History {
@@ -72,6 +91,18 @@ impl History {
             ranges: vec![(0.0, 0.0); LEVELS * BINS * channels],
             start: None,
             end: 0.0,
+        }
+    }
+
+    /// The same record with other channels: each the one that `from` names, or one of which nothing is recorded so far.
+    pub fn rearranged(&self, from: &[Option<usize>]) -> Self {
+        let base = |channel: &Option<usize>| channel.map_or(f64::NAN, |at| self.base[at]);
+        Self {
+            channels: from.len(),
+            indices: self.indices.clone(),
+            base: from.iter().map(base).collect(),
+            ranges: rearranged(&self.ranges, self.channels, from),
+            ..*self
         }
     }
 
@@ -153,8 +184,12 @@ impl History {
             self.open(0, index);
         }
         let at = self.at(0, index);
-        let slot = self.ranges[at].iter_mut().zip(values).zip(&self.base);
-        for ((range, &value), &base) in slot {
+        let slot = self.ranges[at].iter_mut().zip(values).zip(&mut self.base);
+        for ((range, &value), base) in slot {
+            if base.is_nan() && value.is_finite() {
+                *base = value;
+            }
+            let base = *base;
             let kept = if value.is_nan() {
                 NOTHING
             } else {
@@ -504,6 +539,45 @@ mod tests {
         }
         let rows = history.rows(40);
         assert!(rows[0].1[1].0 > rows[0].1[1].1);
+    }
+
+    #[test]
+    fn a_channel_that_comes_later_has_no_past_and_the_others_keep_theirs() {
+        let mut history = History::new(2, 1e-5);
+        let mut straight = History::new(2, 1e-5);
+        let at = |n: u64| n as f64 * 1e-4;
+        let values = |n: u64| [wave(n), 0.2 + 1e-9 * wave(n)];
+        for n in 0..1000 {
+            history.push(at(n), &values(n));
+            straight.push(at(n), &values(n));
+        }
+        let mark = history.mark();
+        // The second first, then a new one, and the first no more.
+        let from = [Some(1), None];
+        let (mut history, mark) = (history.rearranged(&from), mark.rearranged(2, &from));
+        assert_eq!(history.channels(), 2);
+        let push = |history: &mut History, straight: &mut History| {
+            for n in 1000..3000 {
+                // Far from zero, and moving little.
+                history.push(at(n), &[values(n)[1], 7.0 + 1e-9 * wave(n)]);
+                straight.push(at(n), &values(n));
+            }
+        };
+        push(&mut history, &mut straight);
+        for most in [40, 900] {
+            let found = bins(&history, 1, 0.0, 0.3, most);
+            assert!(found[0].from <= 0.1 && found[0].to > 0.1);
+            assert!(found.iter().all(|b| (b.least - 7.0).abs() < 1.1e-9));
+            assert!(found.iter().any(|b| b.least > 7.0 + 0.9e-9));
+            assert!(found.iter().any(|b| b.greatest < 7.0 + 0.5e-9));
+            let other = bins(&history, 0, 0.0, 0.3, most);
+            assert!(other == bins(&straight, 1, 0.0, 0.3, most));
+        }
+        let later = bins(&history, 1, 0.0, 0.3, 40);
+        history.rewind(&mark);
+        assert!(bins(&history, 1, 0.0, 0.3, 40).is_empty());
+        push(&mut history, &mut straight);
+        assert!(bins(&history, 1, 0.0, 0.3, 40) == later);
     }
 
     #[test]

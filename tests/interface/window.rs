@@ -855,6 +855,44 @@ fn the_chosen_plots_are_shown_with_their_units() {
 }
 
 #[test]
+fn any_channel_is_found_by_name_plotted_and_carried_by_links() {
+    let mut harness = window("spcmm");
+    harness.get_by_label("Choose plots").click();
+    harness.run();
+    type_into(&mut harness, "Search channels", "rod1.po");
+    harness
+        .get_by_role_and_label(Role::CheckBox, "rod1.pose, mm, rad")
+        .click();
+    harness.run();
+    type_into(&mut harness, "Search channels", "*.reaction");
+    harness
+        .get_by_role_and_label(Role::CheckBox, "*.reaction, N")
+        .click();
+    harness.run();
+    harness.key_press(Key::Escape);
+    harness.run();
+    // One for each unit.
+    for title in ["rod1.pose, mm", "rod1.pose, rad", "*.reaction, N"] {
+        harness.get_by_role_and_label(Role::Label, title);
+    }
+    harness.get_by_label("gamma");
+    harness.state_mut().player_mut().run_to(9e-3);
+    harness.run();
+    let player = harness.state().player();
+    assert!(player.channels().picked().len() > 6);
+    let link = harness.state().link();
+    let names = ["rod1.pose".to_owned(), "*.reaction".to_owned()];
+    assert_eq!(link.channels.as_deref(), Some(&names[..]));
+    let link = link.format();
+    let mut other = window("pendulum");
+    let ctx = other.ctx.clone();
+    let opened = other.state_mut().open_link(&ctx, &format!("#{link}"));
+    assert_eq!(opened, Ok(()));
+    other.run_steps(40);
+    other.get_by_role_and_label(Role::Label, "rod1.pose, mm");
+}
+
+#[test]
 fn the_accuracy_of_the_running_scene_stands_beside_the_controls() {
     let mut harness = window("spcmm");
     harness.get_by_label("Accuracy");

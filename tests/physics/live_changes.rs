@@ -465,3 +465,31 @@ fn a_force_that_jumps_with_a_change_has_no_peak_that_never_was() {
         assert!(peak.normal < 1.001 * largest, "{} {largest}", peak.normal);
     }
 }
+
+#[test]
+fn a_contact_that_a_parameter_of_the_scene_gives_follows_it_at_the_reset() {
+    let text = "[[parameter]]\nname = \"gap\"\nvalue = \"0.1 mm\"\n[gravity]\nz = \"-9.81 m/s^2\"\n[contact]\nclearance = \"2 * gap\"\n\
+        [[body]]\nname = \"rod\"\nmass = \"0.384 kg\"\ninertia = \"1.92e-3 1.92e-3 1.58e-5 kg m^2\"\n\
+        [[joint]]\nname = \"free\"\nkind = \"free\"\nchild = \"rod\"\nchild_point = \"0 0 100 mm\"\nstart = { position = [0, 0, 0] }\n\
+        [[ball_joint]]\nname = \"S1\"\nsocket = { body = \"world\" }\nball = { body = \"rod\", at = \"0 0 100 mm\" }\n";
+    let clearance = |scene: &jointplay::scene::Scene| scene.ball_joints[0].contact.clearance;
+    let set = crate::common::parse(text, &[("parameter.gap", "0.2 mm")]);
+    assert_eq!(clearance(&set), 0.4e-3);
+    let mut simulation = Simulation::new(&crate::common::parse(text, &[])).unwrap();
+    simulation.advance_to(1e-3).unwrap();
+    let hash = simulation.state_hash();
+    let effect = simulation.set("parameter.gap", "0.2 mm").unwrap();
+    assert_eq!(effect, Effect::AtReset);
+    assert!(
+        simulation
+            .scene()
+            .parameter("parameter.gap")
+            .unwrap()
+            .at_reset
+    );
+    assert_eq!(clearance(simulation.scene()), 0.4e-3);
+    assert_eq!(clearance(simulation.running_scene()), 0.2e-3);
+    assert_eq!(simulation.state_hash(), hash);
+    simulation.reset().unwrap();
+    assert_eq!(clearance(simulation.running_scene()), 0.4e-3);
+}

@@ -115,6 +115,14 @@ impl Keyframes {
         self.forget_fine();
     }
 
+    /// The record was rearranged, as by [`History::rearranged`](crate::simulate::History::rearranged), from one of `channels`.
+    pub fn rearrange(&mut self, channels: usize, from: &[Option<usize>]) {
+        for mark in self.kept.iter_mut().filter_map(|kept| kept.record.as_mut()) {
+            *mark = mark.rearranged(channels, from);
+        }
+        self.bytes = self.kept.iter().map(Keyframe::bytes).sum();
+    }
+
     /// Approximate memory of all states, bytes.
     #[cfg(test)]
     pub fn bytes(&self) -> usize {

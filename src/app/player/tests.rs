@@ -219,6 +219,119 @@ fn another_number_of_links_is_recorded_after_the_reset() {
     assert!(!recorded(&player, Quantity::NormalForce, 0.01).is_empty());
 }
 
+/// What is recorded of the channel picked as `name`, as time and greatest value.
+fn picked(player: &Player, name: &str, to: f64) -> Vec<[f64; 2]> {
+    let mut channels = player.channels().picked().iter();
+    let index = channels.position(|c| c.name == name).expect("picked");
+    let mut bins = Vec::new();
+    let channel = player.picked().start + index;
+    player.history().bins(channel, 0.0, to, 400, &mut bins);
+    let points = bins.iter().map(|b| [0.5 * (b.from + b.to), b.greatest]);
+    points.collect()
+}
+
+fn names(names: &[&str]) -> Vec<String> {
+    names.iter().map(|&name| name.to_owned()).collect()
+}
+
+#[test]
+fn a_picked_channel_is_recorded_from_then_on_and_changes_no_bit() {
+    let [mut player, mut straight] = [0; 2].map(|_| self::player("slider-crank-driven"));
+    for player in [&mut player, &mut straight] {
+        player.run_to(8e-3);
+    }
+    let before = recorded(&player, Quantity::Position, 8e-3);
+    player.pick(&names(&["crank.reaction", "crank.angle"]));
+    let listed: Vec<&str> = player
+        .channels()
+        .picked()
+        .iter()
+        .map(|c| &*c.name)
+        .collect();
+    assert_eq!(
+        listed,
+        [
+            "crank.angle",
+            "crank.reaction.x",
+            "crank.reaction.y",
+            "crank.reaction.z"
+        ]
+    );
+    assert!(recorded(&player, Quantity::Position, 8e-3) == before);
+    // At once the instant on show, and the past not at all.
+    let first = picked(&player, "crank.angle", 1.0);
+    assert!(first.len() == 1 && first[0][0] > 7.9e-3, "{first:?}");
+    for player in [&mut player, &mut straight] {
+        player.run_to(16e-3);
+        player.advance(0.0);
+    }
+    assert_eq!(
+        player.simulation().state_hash(),
+        straight.simulation().state_hash()
+    );
+    let end = player.history().span().expect("recorded").1;
+    let angle = picked(&player, "crank.angle", end);
+    assert!(angle.len() > 5 && angle[0][0] > 7.9e-3);
+    let now = player.frame().coordinates[0][0];
+    assert!((angle[angle.len() - 1][1] - now).abs() < 1e-2);
+    let weight = picked(&player, "crank.reaction.z", end);
+    assert!(
+        weight
+            .iter()
+            .all(|point| point[1] != 0.0 && point[1].is_finite())
+    );
+    // The other way round they keep their past; what is no longer picked is gone.
+    player.pick(&names(&["crank.angle", "rod.pose.x"]));
+    assert!(picked(&player, "crank.angle", end) == angle);
+    assert_eq!(player.picked().len(), 2);
+    let position = |player: &Player| recorded(player, Quantity::Position, end);
+    assert!(position(&player) == position(&straight));
+}
+
+#[test]
+fn picked_channels_go_back_and_branch_with_the_rest() {
+    let mut player = player("slider-crank-driven");
+    player.run_to(4e-3);
+    player.pick(&names(&["crank.angle"]));
+    player.run_to(20e-3);
+    let reached = player.reached();
+    let all = picked(&player, "crank.angle", reached);
+    player.go_to(10e-3);
+    one_clock(&player);
+    // The stretch before it was picked is retraced with it.
+    player.go_to(2e-3);
+    let mut bins = Vec::new();
+    player.bins(player.picked().start, 0.0, 2e-3, 400, &mut bins);
+    assert!(!bins.is_empty());
+    player.go_to(10e-3);
+    player.set("contact.friction", "0.3").expect("in range");
+    let cut = picked(&player, "crank.angle", 1.0);
+    assert!(cut.iter().all(|point| point[0] < 10.1e-3));
+    player.run_to(20e-3);
+    let anew = picked(&player, "crank.angle", player.reached());
+    assert!((anew[anew.len() - 1][1] - all[all.len() - 1][1]).abs() < 2e-2);
+    player.reset().expect("starts");
+    player.run_to(5e-3);
+    assert!(picked(&player, "crank.angle", 5e-3)[0][0] < 1e-3);
+}
+
+#[test]
+fn only_so_many_picked_channels_are_recorded() {
+    let mut player = player("chain");
+    let before = player.history().channels();
+    player.pick(&names(&["*"]));
+    let most = crate::simulate::MOST_PICKED;
+    assert_eq!(player.channels().picked().len(), most);
+    assert_eq!(player.history().channels(), before + most);
+    assert_eq!(player.clearances().len(), 8);
+    player.pick(&names(&["no.such.channel"]));
+    assert_eq!(
+        (player.picked().len(), player.history().channels()),
+        (0, before)
+    );
+    player.run_to(1e-3);
+}
+
 #[test]
 fn single_steps_are_taken_back_bit_by_bit() {
     let mut player = player("spcmm");

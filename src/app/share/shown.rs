@@ -2,13 +2,15 @@
 
 use crate::app::plots::{Plots, Window};
 use crate::scene::{Dimension, Scene, parse_quantity};
-use crate::simulate::Quantity;
+use crate::simulate::{MOST_PICKED, Quantity};
 use crate::view::{Picked, WearMap};
 
 /// Longest window of the plots that a link asks for, s.
 const LONGEST_WINDOW: f64 = 1e4;
 /// Shortest one, s.
 const SHORTEST_WINDOW: f64 = 1e-6;
+/// Longest name of a channel, or pattern: bytes.
+const LONGEST_NAME: usize = 120;
 
 const IDEAL: &str = "ideal";
 const MICROSCOPE: &str = "microscope.";
@@ -102,6 +104,39 @@ pub fn write_plots(chosen: &[Quantity]) -> String {
     }
     let words: Vec<String> = chosen.iter().map(|quantity| word(*quantity)).collect();
     words.join(" ")
+}
+
+/// Reads names of channels, or patterns of them, separated by commas or spaces; `none` stands for none.
+pub fn read_channels(text: &str) -> Result<Vec<String>, String> {
+    let fine = |c: char| c.is_ascii_alphanumeric() || "_-.*?".contains(c);
+    let parts = text.split([',', ' ']).filter(|part| !part.is_empty());
+    let mut names: Vec<String> = Vec::new();
+    for part in parts.filter(|part| *part != "none") {
+        if part.len() > LONGEST_NAME || !part.chars().all(fine) {
+            return Err(
+                "no names of channels; allowed, separated by commas, are such as `jointplay check --channels` lists, with * for any \
+                 characters and ? for one"
+                    .to_owned(),
+            );
+        }
+        if !names.iter().any(|name| name == part) {
+            names.push(part.to_owned());
+        }
+    }
+    match names.len() {
+        0..=MOST_PICKED => Ok(names),
+        many => Err(format!(
+            "{many} names of channels; allowed at most {MOST_PICKED}"
+        )),
+    }
+}
+
+/// The reverse of [`read_channels`].
+pub fn write_channels(names: &[String]) -> String {
+    match names {
+        [] => "none".to_owned(),
+        names => names.join(" "),
+    }
 }
 
 /// Reads a span of time, `automatic` or `everything`.

@@ -84,6 +84,10 @@ impl Chance {
                     .filter(|q| c.below(3) == 0 || *q == one && c.below(2) == 0)
                     .collect()
             }),
+            channels: self.maybe(|c| {
+                let names = 0..c.below(4);
+                names.map(|n| format!("S{n}.*_-?x{}", c.below(9))).collect()
+            }),
             window: self.maybe(|c| match c.below(3) {
                 0 => Window::Automatic,
                 1 => Window::Everything,
@@ -205,6 +209,10 @@ fn what_is_wrong_in_a_link_is_said() {
         (
             "plots=speed",
             "no plot `speed`; allowed, separated by commas: normal-force,",
+        ),
+        (
+            "channels=S1.force+rod/1",
+            "no names of channels; allowed, separated by commas, are such as",
         ),
         (
             "show=telescope",

@@ -23,12 +23,20 @@ pub struct Listed {
     pub help: &'static str,
     /// Whether `run` writes it unasked.
     pub unasked: bool,
-    reading: Reading,
+    pub(super) reading: Reading,
 }
 
 impl Listed {
+    /// Its name without its component along an axis.
+    pub fn group(&self) -> &str {
+        match self.name.rsplit_once('.') {
+            Some((group, "x" | "y" | "z" | "alpha" | "beta" | "gamma")) => group,
+            _ => &self.name,
+        }
+    }
+
     /// Whether `pattern` matches its name, the beginning of that up to a dot, or its column.
-    fn is_chosen_by(&self, pattern: &str) -> bool {
+    pub fn is_chosen_by(&self, pattern: &str) -> bool {
         self.names().any(|name| matches(pattern, name)) || matches(pattern, &self.column)
     }
 
