@@ -639,10 +639,12 @@ impl Viewport {
             .on_hover_text("A ring of light about a joint when its ball has struck, brighter for a harder blow");
         ui.checkbox(&mut options.joint_names, "Joint names")
             .on_hover_text("Names beside the ball joints");
-        ui.checkbox(&mut options.hinges, "Hinges and slides")
-            .on_hover_text("Pins and rails where the scene draws none of its own");
-        ui.checkbox(&mut options.sockets, "Sockets")
-            .on_hover_text("The cut-open sockets; without them the balls stand free");
+        ui.horizontal(|ui| {
+            ui.checkbox(&mut options.sockets, "Sockets")
+                .on_hover_text("The cut-open sockets; without them the balls stand free");
+            ui.checkbox(&mut options.hinges, "Hinges and slides")
+                .on_hover_text("Pins and rails where the scene draws none of its own");
+        });
         ui.checkbox(&mut options.floor, "Floor grid")
             .on_hover_text("The floor with its grid and the shadows on it");
         ui.checkbox(&mut options.triad, "Axes and gravity")
