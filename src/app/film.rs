@@ -207,8 +207,8 @@ fn choice<T: Copy + PartialEq>(
 }
 
 impl App {
-    /// Asks what the film is to be: what was shown so far, unless it was chosen otherwise before.
-    pub(super) fn ask_for_film(&mut self) {
+    /// What the next film is to be: what was shown so far, unless it was chosen otherwise before.
+    pub(super) fn film_to_make(&self) -> Wanted {
         let reached = self.player.reached();
         let all = Wanted::all(reached, self.player.pacer.scale());
         let mut wanted = self.film_wanted.clone().unwrap_or(all);
@@ -216,7 +216,7 @@ impl App {
         if wanted.span[0] == wanted.span[1] {
             wanted.span = [0.0, reached];
         }
-        self.dialog = Some(super::dialogs::Dialog::Film { wanted });
+        wanted
     }
 
     /// Begins to make the film; it is saved when it is complete.

@@ -112,7 +112,8 @@ impl App {
         ui.separator();
         let help = "A film of a stretch of the timeline, MP4 or GIF";
         if ui.button("Film…").on_hover_text(help).clicked() {
-            self.ask_for_film();
+            let wanted = self.film_to_make();
+            self.dialog = Some(Dialog::Film { wanted });
             layout::close_menu(ui);
         }
         let help = "What the plots recorded since the reset, CSV";

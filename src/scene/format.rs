@@ -646,7 +646,6 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
             "true",
             "whether its child hangs on another joint, so that this one closes a loop; it then has neither `drive` nor `start`",
         )
-        .of(PLACED)
         .absent("false"),
     ];
     FileTable::new(

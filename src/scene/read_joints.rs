@@ -100,6 +100,12 @@ pub(super) fn read_joint<'d>(
 
 /// What a joint that closes a loop may be.
 fn check_closing(section: &Section<'_>, joint: &Joint) -> Result<(), SceneError> {
+    if joint.kind == JointKind::Free {
+        let node = section.require("kind")?;
+        return Err(node.error(
+            "a free joint holds nothing, so that it closes no loop; allowed fixed, prismatic, revolute, cylindrical, universal",
+        ));
+    }
     if joint.parent == Some(joint.child) {
         let node = section.require("child")?;
         return Err(

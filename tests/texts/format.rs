@@ -177,8 +177,8 @@ fn every_row_is_read_and_nothing_else_is() {
             read.insert(std::ptr::from_ref(row));
         }
         for (path, rows) in found.tables {
-            let error = parse(&changed(&text, &path, Some("colour"))).unwrap_err();
-            assert_eq!(last(&error), "colour", "{name}: {path:?}: {error}");
+            let error = parse(&changed(&text, &path, Some("hue"))).unwrap_err();
+            assert_eq!(last(&error), "hue", "{name}: {path:?}: {error}");
             assert!(
                 error.message.contains("unknown key"),
                 "{}: {error}",
@@ -323,7 +323,7 @@ fn the_schema_refuses_a_wrong_value_of_every_key_and_any_other_key() {
             assert!(schema.check(&wrong).is_err(), "{name}: {path:?}");
         }
         for (path, _) in &found.tables {
-            let wrong = changed(text, path, Some("colour"));
+            let wrong = changed(text, path, Some("hue"));
             assert!(schema.check(&wrong).is_err(), "{name}: {path:?}");
         }
     }

@@ -169,7 +169,7 @@ fn what_is_wrong_with_a_mesh_is_said_with_its_place() {
         (
             mesh("arm.obj", ""),
             GIVEN,
-            &["shapes[0].unit: missing", "unit = \"mm\""],
+            &["shapes[0].unit: missing", "unit = \"1 mm\""],
         ),
         (
             mesh("arm.obj", ", unit = \"kg\""),
