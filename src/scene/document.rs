@@ -149,8 +149,16 @@ impl<'d> Section<'d> {
         {
             let own = self.rows.of(self.word).filter(|key| !key.of.is_empty());
             let own: Vec<&str> = own.map(|key| key.name).collect();
-            let one = one.replace("{}", word);
-            return node.error(format!("not allowed here: a {one} has {}", own.join(", ")));
+            let rows = self.rows.keys.iter().filter(|key| key.name == name);
+            let words: Vec<&str> = rows.flat_map(|key| key.of).copied().collect();
+            let (one, its) = (
+                one.replace("{}", word),
+                one.replace("{}", &words.join(" or ")),
+            );
+            return node.error(format!(
+                "not allowed here: a {one} has {}; a {its} has `{name}`",
+                own.join(", ")
+            ));
         }
         let near = nearest(name, known.iter().copied());
         let message = format!("unknown key{near}; allowed here: {}", known.join(", "));

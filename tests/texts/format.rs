@@ -33,6 +33,15 @@ file = "coil.csv"
 name = "buffer"
 joint = "j"
 file = "coil.csv"
+[[body]]
+name = "base"
+mass = "1 kg"
+inertia = "1 1 1 kg m^2"
+shapes = [{ form = "mesh", file = "corner.stl", unit = "1 mm", position = "0 0 1 mm", rotation = { axis = [1, 0, 0], angle = "9 deg" } }]
+[[joint]]
+name = "base"
+kind = "fixed"
+child = "base"
 [[fixed_shape]]
 form = "mesh"
 colour = "#c2255c"
@@ -43,7 +52,7 @@ rotation = { axis = [1, 0, 0], angle = "90 deg" }
 "##;
 
 fn beside() -> Texts {
-    let leg = "[[body]]\nname = \"leg\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\nshapes = [{ form = \"mesh\", file = \"corner.stl\", unit = \"1 mm\", position = \"0 0 1 mm\", rotation = { axis = [1, 0, 0], angle = \"9 deg\" } }]\n";
+    let leg = "[[body]]\nname = \"leg\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n";
     let corner = "solid corner\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 9 0 0\nvertex 0 9 0\nendloop\nendfacet\nendsolid corner\n";
     let files = [
         ("leg.toml", leg),
