@@ -107,6 +107,32 @@ fn curves_tyres_and_samples_of_reactions_allocate_nothing() {
 }
 
 #[test]
+fn joints_of_two_degrees_and_those_that_close_loops_allocate_nothing() {
+    for text in [
+        include_str!("fuzz/corpus/good-universal.toml"),
+        include_str!("fuzz/corpus/good-loop-joints.toml"),
+    ] {
+        for method in METHODS {
+            for form in ["tree", "lagrange"] {
+                let changes = [("formulation", form), ("solver.method", method)];
+                let mut simulation = Simulation::new(&common::parse(text, &changes)).unwrap();
+                let mut frame = Frame::default();
+                simulation.step().unwrap();
+                simulation.sample(simulation.time(), &mut frame);
+                let made = allocations(|| {
+                    while simulation.time() < 4e-3 {
+                        simulation.step().unwrap();
+                        simulation.sample(simulation.time(), &mut frame);
+                    }
+                });
+                assert_eq!(made, 0, "{method} {form}");
+                assert!(!frame.coordinates.is_empty());
+            }
+        }
+    }
+}
+
+#[test]
 fn steps_samples_and_peaks_allocate_nothing() {
     for name in SCENES {
         for method in METHODS {

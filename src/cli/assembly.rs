@@ -24,7 +24,9 @@ const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
 /// Name of a joint at which trees are cut.
 fn cut_joint(scene: &Scene, joint: usize) -> &str {
-    scene.cut_joints().nth(joint).unwrap_or_default()
+    let closing = || &scene.closing_joints[joint - scene.ball_joints.len()].name;
+    let ball = scene.ball_joints.get(joint).map(|ball| &ball.name);
+    ball.unwrap_or_else(closing)
 }
 
 fn exceeds(a: &Placement, b: &Placement) -> bool {

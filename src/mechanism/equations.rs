@@ -132,10 +132,10 @@ pub(super) trait Equations: Send {
 
     /// Force, N, at the child's point and torque, N m, that the `c`-th joint that closes a loop exerts on its child at the latest
     /// evaluation.
-    fn closure_load(&self, model: &Model, c: usize) -> [Vec3; 2];
+    fn closure_load(&self, c: usize) -> [Vec3; 2];
 
     /// Whether these are unique.
-    fn is_closure_unique(&self, model: &Model, c: usize) -> bool;
+    fn is_closure_unique(&self, c: usize) -> bool;
 
     /// Force (N) or torque (N m) of every actuator, given true accelerations in [`Self::motion`]. May change the loads.
     fn actuators(&mut self, model: &Model, gravity: &Vec3, out: &mut [f64]);

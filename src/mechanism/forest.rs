@@ -237,15 +237,16 @@ impl Equations for Forest {
         self.constraints.as_ref().is_none_or(|c| c.is_unique(k))
     }
 
-    fn closure_load(&self, _: &Model, c: usize) -> [Vec3; 2] {
+    fn closure_load(&self, c: usize) -> [Vec3; 2] {
         let constraints = self.constraints.as_ref();
         constraints.map_or([Vec3::zeros(); 2], |constraints| {
             constraints.closure_load(c)
         })
     }
 
-    fn is_closure_unique(&self, model: &Model, c: usize) -> bool {
-        self.is_reaction_unique(model.ideal_joints.len() + c)
+    fn is_closure_unique(&self, c: usize) -> bool {
+        let constraints = self.constraints.as_ref();
+        constraints.is_none_or(|own| own.is_unique(own.joints().len() + c))
     }
 
     fn actuators(&mut self, model: &Model, gravity: &Vec3, out: &mut [f64]) {

@@ -11,6 +11,7 @@ use super::path::Path;
 use super::rows::RowSystem;
 use super::tree::visit_free;
 use crate::scene::{Mat3, Scene, Vec3};
+use std::ops::Range;
 
 /// Baumgarte parameters of the paper: Phi'' + 2 alpha Phi' + beta^2 Phi = 0, 1/s.
 const BAUMGARTE: (f64, f64) = (5.0, 5.0);
@@ -25,7 +26,7 @@ pub struct Group {
 
 impl Group {
     /// Indices of its rows.
-    pub fn rows(&self) -> std::ops::Range<usize> {
+    pub fn rows(&self) -> Range<usize> {
         self.first..self.first + self.rows.count()
     }
 }
@@ -49,9 +50,9 @@ pub struct Lagrange {
     groups: Vec<Group>,
     /// Row of each driven coordinate.
     driver_row: Vec<usize>,
-    /// First row of each ideal ball joint, and of each joint that closes a loop.
+    /// First row of each ideal ball joint, and the rows of each joint that closes a loop.
     ideal_row: Vec<usize>,
-    closure_row: Vec<usize>,
+    closure_rows: Vec<Range<usize>>,
     rows: Vec<Row>,
     /// Group of each row.
     group_of: Vec<usize>,
@@ -73,10 +74,10 @@ pub struct Layout {
     pub groups: Vec<Group>,
     /// Number of rows.
     rows: usize,
-    /// First row of each driven coordinate, of each ideal ball joint, and of each joint that closes a loop.
+    /// First row of each driven coordinate and of each ideal ball joint, and the rows of each joint that closes a loop.
     driver_row: Vec<usize>,
     ideal_row: Vec<usize>,
-    closure_row: Vec<usize>,
+    closure_rows: Vec<Range<usize>>,
 }
 
 impl Layout {
@@ -131,18 +132,20 @@ impl Layout {
                 add(point, joint.ball.body, joint.socket.body)
             })
             .collect();
-        let of_closure = |pair: &Pair| {
-            let rows = pair.rows().into_iter().flatten();
-            let first = rows.map(|rows| add(rows, pair.child.body, pair.parent.body));
-            first.reduce(usize::min).unwrap_or_default()
-        };
-        let closure_row = model.closures.iter().map(of_closure).collect();
+        let mut closure_rows = Vec::with_capacity(model.closures.len());
+        for pair in &model.closures {
+            let (child, parent) = (pair.child.body, pair.parent.body);
+            let own = pair.rows().into_iter().flatten();
+            let own = own.map(|of| (add(of, child, parent), of.count()));
+            let ends = own.map(|(first, count)| first..first + count);
+            closure_rows.extend(ends.reduce(|a, b| a.start..b.end));
+        }
         Self {
             groups,
             rows,
             driver_row,
             ideal_row,
-            closure_row,
+            closure_rows,
         }
     }
 }
@@ -155,7 +158,7 @@ impl Lagrange {
             rows,
             driver_row,
             ideal_row,
-            closure_row,
+            closure_rows,
         } = Layout::new(scene, model);
         let group_of: Vec<usize> = groups
             .iter()
@@ -180,7 +183,7 @@ impl Lagrange {
             groups,
             driver_row,
             ideal_row,
-            closure_row,
+            closure_rows,
             rows: vec![Row::default(); rows],
             group_of,
             pairs,
@@ -192,13 +195,6 @@ impl Lagrange {
             drift: 0.0,
             least_pivot: f64::INFINITY,
         }
-    }
-
-    /// Rows of the `c`-th joint that closes a loop.
-    fn closure_rows(&self, model: &Model, c: usize) -> std::ops::Range<usize> {
-        let rows = model.closures[c].rows();
-        let count: usize = rows.iter().flatten().map(Rows::count).sum();
-        self.closure_row[c]..self.closure_row[c] + count
     }
 
     /// J_i M^-1 J_j^T.
@@ -256,8 +252,9 @@ impl Equations for Lagrange {
     }
 
     fn treat_as_dependent(&mut self, rank: usize) {
-        let mut cut = self.ideal_row.iter().chain(&self.closure_row);
-        let cut = cut.next().copied().unwrap_or(self.rows.len());
+        let closures = self.closure_rows.iter().map(|rows| rows.start);
+        let mut cut = self.ideal_row.iter().copied().chain(closures);
+        let cut = cut.next().unwrap_or(self.rows.len());
         let group = |&g: &usize| self.groups[g].first;
         let group = self.group_of.iter().map(group).collect();
         self.matrix.treat_as_dependent(cut + rank, cut, group);
@@ -505,17 +502,17 @@ impl Equations for Lagrange {
         self.matrix.is_unique(self.ideal_row[k], 3)
     }
 
-    fn closure_load(&self, model: &Model, c: usize) -> [Vec3; 2] {
+    fn closure_load(&self, c: usize) -> [Vec3; 2] {
         let mut load = [Vec3::zeros(); 2];
-        for i in self.closure_rows(model, c) {
+        for i in self.closure_rows[c].clone() {
             let part = usize::from(self.groups[self.group_of[i]].rows.turns());
             load[part] += self.rows[i].j.child[part] * self.multipliers[i];
         }
         load
     }
 
-    fn is_closure_unique(&self, model: &Model, c: usize) -> bool {
-        let rows = self.closure_rows(model, c);
+    fn is_closure_unique(&self, c: usize) -> bool {
+        let rows = &self.closure_rows[c];
         self.matrix.is_unique(rows.start, rows.len())
     }
 

@@ -527,7 +527,7 @@ impl Mechanism {
                 .is_none_or(|k| self.equations.is_reaction_unique(k)),
             None => {
                 let c = j - self.model.joints.len();
-                self.equations.is_closure_unique(&self.model, c)
+                self.equations.is_closure_unique(c)
             }
         }
     }
@@ -536,7 +536,7 @@ impl Mechanism {
     /// latest evaluation.
     pub fn closing_loads(&self) -> impl Iterator<Item = [Vec3; 2]> {
         let all = 0..self.model.closures.len();
-        all.map(|c| self.equations.closure_load(&self.model, c))
+        all.map(|c| self.equations.closure_load(c))
     }
 
     /// Number of joints at which trees are cut: ball joints, then joints that close loops.
