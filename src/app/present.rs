@@ -149,6 +149,7 @@ impl App {
 /// lie over it.
 pub fn double_tapped(ui: &Ui) -> bool {
     let bar: Rect = ui.max_rect();
-    ui.interact(bar, ui.scope_id().with("double tap"), Sense::click())
-        .double_clicked()
+    let response = ui.interact(bar, ui.scope_id().with("double tap"), Sense::click());
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Toolbar, true, "Transport bar"));
+    response.double_clicked()
 }

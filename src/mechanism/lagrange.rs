@@ -525,8 +525,9 @@ impl Equations for Lagrange {
     /// From the multipliers of the joints' rows, which come before those of the joints that close loops.
     fn joint_loads(&mut self) -> (&[Kinematics], &[Wrench]) {
         self.wrench.fill(Wrench::zero());
-        let cut = self.ideal_row.iter().chain(&self.closure_row).next();
-        let rows = &self.rows[..cut.copied().unwrap_or(self.rows.len())];
+        let closures = self.closure_rows.iter().map(|rows| rows.start);
+        let cut = self.ideal_row.iter().copied().chain(closures).min();
+        let rows = &self.rows[..cut.unwrap_or(self.rows.len())];
         for ((row, &group), lambda) in rows.iter().zip(&self.group_of).zip(&self.multipliers) {
             let [along, about] = row.j.child;
             let load = &mut self.wrench[self.groups[group].child];
