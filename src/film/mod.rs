@@ -65,7 +65,7 @@ pub enum FilmError {
         /// What is allowed, in words.
         limit: &'static str,
     },
-    /// The file grows beyond [`MOST_BYTES`].
+    /// The file grows beyond 1 GiB.
     #[error("the film is larger than {} MB; make it shorter, smaller or with fewer frames a second", MOST_BYTES >> 20)]
     TooLong,
     /// No frame was added.
