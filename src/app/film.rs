@@ -74,9 +74,8 @@ impl Wanted {
                 "More than {MOST_FRAMES} frames: a shorter stretch, a faster time scale or fewer frames a second"
             ));
         }
-        Film::new(self.format, self.size, self.rate)
-            .err()
-            .map(|error| error.to_string())
+        let fault = self.format.check(self.size, self.rate).err();
+        fault.map(|error| error.to_string())
     }
 }
 
@@ -260,12 +259,12 @@ impl App {
     /// Gives up the film; nothing of it is left.
     pub(super) fn cancel_film(&mut self) {
         if let Some(making) = self.film.take() {
-            self.return_from_film(&making);
+            self.return_from_film(making.before);
         }
     }
 
-    fn return_from_film(&mut self, making: &Making) {
-        let (shown, scale, playing) = making.before;
+    /// The run as it was: instant shown, s, time scale, and whether it played.
+    fn return_from_film(&mut self, (shown, scale, playing): (f64, f64, bool)) {
         self.player.pacer.set_scale(scale);
         self.player.go_to(shown);
         self.player.set_playing(playing);
@@ -278,33 +277,31 @@ impl App {
             return;
         };
         ctx.request_repaint();
-        match self.film_on(ctx, &mut making) {
-            Ok(None) => self.film = Some(making),
-            Ok(Some(bytes)) => {
-                let format = making.wanted.format;
-                self.return_from_film(&making);
+        let going_on = self.film_on(ctx, &mut making);
+        if going_on == Ok(true) {
+            self.film = Some(making);
+            return;
+        }
+        self.return_from_film(making.before);
+        let format = making.wanted.format;
+        let finish = |_| making.film.finish().map_err(|error| error.to_string());
+        match going_on.and_then(finish) {
+            Ok(bytes) => {
                 self.save(vec![SaveFile {
                     name: format!("{}.{format}", self.player.scene().name),
                     mime: format.mime(),
                     bytes,
                 }]);
             }
-            Err(reason) => {
-                self.return_from_film(&making);
-                self.problem = Some(format!("The film cannot be made: {reason}"));
-            }
+            Err(reason) => self.problem = Some(format!("The film cannot be made: {reason}")),
         }
     }
 
-    /// One turn of `making`; returns the complete file.
-    fn film_on(
-        &mut self,
-        ctx: &egui::Context,
-        making: &mut Making,
-    ) -> Result<Option<Vec<u8>>, String> {
+    /// One turn of `making`; returns whether frames are missing.
+    fn film_on(&mut self, ctx: &egui::Context, making: &mut Making) -> Result<bool, String> {
         if let Some(pending) = &mut making.pending {
             let Some(image) = pending.take() else {
-                return Ok(None);
+                return Ok(true);
             };
             making.pending = None;
             let image = image.map_err(|error| error.to_string())?;
@@ -312,11 +309,7 @@ impl App {
             added.map_err(|error| error.to_string())?;
         }
         if making.next as f64 >= making.wanted.frames() {
-            let wanted = making.wanted.clone();
-            let empty = Film::new(wanted.format, wanted.size, wanted.rate);
-            let empty = empty.map_err(|error| error.to_string())?;
-            let film = std::mem::replace(&mut making.film, empty);
-            return film.finish().map(Some).map_err(|error| error.to_string());
+            return Ok(false);
         }
         let instant = making.wanted.instant(making.next);
         self.player.go_to(instant);
@@ -333,6 +326,6 @@ impl App {
         let size = making.wanted.size;
         making.pending = Some(self.draw_frame(ctx, &mut making.canvas, contents, size, first)?);
         making.next += 1;
-        Ok(None)
+        Ok(true)
     }
 }

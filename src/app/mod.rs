@@ -593,6 +593,8 @@ impl App {
 
     fn show_scene(&mut self, scene: &Scene) -> Result<(), String> {
         let mut player = Player::new(scene).map_err(|error| error.located(scene).to_string())?;
+        // Its time scale is not that of the run.
+        self.cancel_film();
         player.clock = self.player.clock;
         player.pacer.set_scale(self.player.pacer.scale());
         player.set_playing(self.player.is_playing() || self.player.stopped().is_some());
@@ -606,7 +608,6 @@ impl App {
         self.problem = None;
         self.replay = None;
         self.load = None;
-        self.film = None;
         self.film_wanted = None;
         self.verdict = None;
         Ok(())

@@ -21,25 +21,34 @@ pub struct Gif {
     changed: Vec<u8>,
 }
 
+/// Width and height of a film of `size` pixels with `rate` frames per second, as the file holds them.
+///
+/// # Errors
+/// More than a GIF holds.
+pub fn check([width, height]: [u32; 2], rate: f64) -> Result<[u16; 2], FilmError> {
+    let too_much = |limit| FilmError::TooMuch {
+        width,
+        height,
+        rate,
+        limit,
+    };
+    if !(rate > 0.0 && rate <= MOST_RATE) {
+        return Err(too_much("a GIF shows at most 50 frames a second"));
+    }
+    match (u16::try_from(width), u16::try_from(height)) {
+        (Ok(across), Ok(down)) => Ok([across, down]),
+        _ => Err(too_much("an edge of a GIF has at most 65535 pixels")),
+    }
+}
+
 impl Gif {
-    pub fn new([width, height]: [u32; 2], rate: f64) -> Result<Self, FilmError> {
-        let too_much = |limit| FilmError::TooMuch {
-            width,
-            height,
-            rate,
-            limit,
-        };
-        if !(rate > 0.0 && rate <= MOST_RATE) {
-            return Err(too_much("a GIF shows at most 50 frames a second"));
-        }
-        let (Ok(across), Ok(down)) = (u16::try_from(width), u16::try_from(height)) else {
-            return Err(too_much("an edge of a GIF has at most 65535 pixels"));
-        };
+    pub fn new(size: [u32; 2], rate: f64) -> Result<Self, FilmError> {
+        let [across, down] = check(size, rate)?;
         let mut encoder = Encoder::new(Vec::new(), across, down, &[]).map_err(refused)?;
         encoder.set_repeat(Repeat::Infinite).map_err(refused)?;
         Ok(Self {
             encoder,
-            size: [width as usize, height as usize],
+            size: size.map(|edge| edge as usize),
             rate,
             frames: 0,
             before: Vec::new(),

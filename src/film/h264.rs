@@ -53,19 +53,26 @@ pub struct H264 {
     frames: u64,
 }
 
+/// The level of a film of `size` pixels with `rate` frames per second.
+///
+/// # Errors
+/// H.264 has none for it.
+pub fn check([width, height]: [u32; 2], rate: f64) -> Result<u8, FilmError> {
+    if width == 0 || height == 0 || width % 2 == 1 || height % 2 == 1 {
+        return Err(FilmError::Odd { width, height });
+    }
+    let found = level([width, height], rate).filter(|_| rate > 0.0);
+    found.ok_or(FilmError::TooMuch {
+        width,
+        height,
+        rate,
+        limit: "H.264 allows 8192x4320 pixels with 120 frames a second, and fewer frames the larger they are",
+    })
+}
+
 impl H264 {
     pub fn new([width, height]: [u32; 2], rate: f64) -> Result<Self, FilmError> {
-        if width == 0 || height == 0 || width % 2 == 1 || height % 2 == 1 {
-            return Err(FilmError::Odd { width, height });
-        }
-        let Some(level) = level([width, height], rate).filter(|_| rate > 0.0) else {
-            return Err(FilmError::TooMuch {
-                width,
-                height,
-                rate,
-                limit: "H.264 allows 8192x4320 pixels with 120 frames a second, and fewer frames the larger they are",
-            });
-        };
+        let level = check([width, height], rate)?;
         let key_every = (KEY_INTERVAL * rate).ceil().max(1.0);
         let mut config = EncoderConfig::new(width as usize, height as usize);
         config.profile = Profile::Main;

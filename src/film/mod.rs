@@ -33,6 +33,17 @@ impl Format {
         Self::ALL.into_iter().find(|format| format.word() == ending)
     }
 
+    /// Whether it holds a film of `size` pixels with `rate` frames per second.
+    ///
+    /// # Errors
+    /// Why not.
+    pub fn check(self, size: [u32; 2], rate: f64) -> Result<(), FilmError> {
+        match self {
+            Self::Mp4 => h264::check(size, rate).map(drop),
+            Self::Gif => gif::check(size, rate).map(drop),
+        }
+    }
+
     /// Media type.
     pub fn mime(self) -> &'static str {
         match self {

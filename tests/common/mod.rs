@@ -59,6 +59,14 @@ pub fn scene(name: &str, changes: &Changes) -> Scene {
     Scene::load(name, &owned(changes)).unwrap()
 }
 
+/// Methods with formulations that between them have every kind of Jacobian and error control.
+pub const FOUR_WAYS: [(&str, &str); 4] = [
+    ("dopri5", "tree"),
+    ("radau5", "lagrange"),
+    ("automatic", "tree"),
+    ("rosenbrock", "tree"),
+];
+
 /// A scene from its text with changes.
 pub fn parse(text: &str, changes: &Changes) -> Scene {
     Scene::parse(text, None, &owned(changes)).unwrap()

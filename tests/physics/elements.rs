@@ -1,6 +1,6 @@
 //! Force elements against closed solutions, in every method and both formulations.
 
-use crate::common::{METHODS, parse};
+use crate::common::{FOUR_WAYS, METHODS, parse};
 use jointplay::scene::{Scene, Vec3};
 use jointplay::simulate::{Frame, Simulation};
 
@@ -399,12 +399,7 @@ length = \"100 mm\"
 stiffness = \"2 kN/m\"
 side = \"push\"
 ";
-    for (method, formulation) in [
-        ("dopri5", "tree"),
-        ("radau5", "lagrange"),
-        ("automatic", "tree"),
-        ("rosenbrock", "tree"),
-    ] {
+    for (method, formulation) in FOUR_WAYS {
         let changes = [
             ("solver.method", method),
             ("solver.tolerance", "1e-9"),

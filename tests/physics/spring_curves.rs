@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use crate::common::{METHODS, parse};
+use crate::common::{FOUR_WAYS, METHODS, parse};
 use crate::elements::{at, settings};
 use crate::joint_elements::FORMULATIONS;
 use jointplay::scene::Scene;
@@ -238,12 +238,7 @@ fn a_buffer_that_only_pushes_gives_back_what_it_took() {
         [[joint]]\nname = \"guide\"\nkind = \"prismatic\"\nchild = \"mass\"\naxis = [0, 0, 1]\nstart = { position = \"60 mm\" }\n\
         [[spring]]\nname = \"pad\"\nfrom = { body = \"world\" }\nto = { body = \"mass\" }\nlength = \"100 mm\"\nside = \"push\"\n\
         characteristic = [[\"-50 mm\", \"-200 N\"], [\"-30 mm\", \"-40 N\"], [\"-10 mm\", \"-5 N\"], [0, 0], [\"10 mm\", \"4 N\"]]\n";
-    for (method, formulation) in [
-        ("dopri5", "tree"),
-        ("radau5", "lagrange"),
-        ("automatic", "tree"),
-        ("rosenbrock", "tree"),
-    ] {
+    for (method, formulation) in FOUR_WAYS {
         let changes = [
             ("solver.method", method),
             ("solver.tolerance", "1e-9"),

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::common::{METHODS, parse};
+use crate::common::{FOUR_WAYS, METHODS, parse};
 use crate::elements::{at, settings};
 use crate::joint_elements::FORMULATIONS;
 use jointplay::scene::{Scene, Vec3};
@@ -96,12 +96,7 @@ fn a_wheel_rides_a_wavy_road_as_the_linear_solution_says() {
 #[test]
 fn a_wheel_that_falls_on_a_hard_tyre_flies_again() {
     let text = wheel(0.5, "");
-    for (method, formulation) in [
-        ("dopri5", "tree"),
-        ("radau5", "lagrange"),
-        ("automatic", "tree"),
-        ("rosenbrock", "tree"),
-    ] {
+    for (method, formulation) in FOUR_WAYS {
         let changes = [
             ("solver.method", method),
             ("solver.tolerance", "1e-9"),

@@ -96,3 +96,18 @@ test('the page makes a film of its timeline, and one that is given up leaves not
     assert.ok(Math.abs(film.duration - 7 / 30) < 1e-3, `${film.duration} s`);
     assert.ok(colours(film.pictures[0]) > 200, 'the film is empty');
 });
+
+test('F5 begins a presentation in place of loading the page anew, and Escape ends it', async () => {
+    const lab = await open('scene=pendulum&play=0', { backend: 'webgl' });
+    await lab.runTo(0.02);
+    const before = await lab.state();
+    await lab.page.evaluate(() => addEventListener('keydown', (event) => (globalThis.kept = event.defaultPrevented)));
+    await lab.key('F5');
+    await lab.find('Button', 'Leave');
+    assert.ok(!(await lab.widgets()).some(({ label }) => label === 'Save'), 'the panels are still there');
+    assert.equal(await lab.page.evaluate(() => globalThis.kept), true, 'the browser loads the page anew');
+    await lab.key('Escape');
+    await lab.find('Button', 'Save');
+    assert.equal((await lab.state()).state_hash, before.state_hash);
+    await lab.close();
+});
