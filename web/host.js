@@ -52,10 +52,11 @@ export function makeHost(laboratory, lost) {
     document.addEventListener('fullscreenchange', () => {
         if (!document.fullscreenElement) laboratory.page?.present(false);
     });
-    // It would load the page anew.
-    addEventListener('keydown', (event) => {
+    // It would load the page anew. On the way down: the canvas keeps its keys to itself.
+    const keep = (event) => {
         if (event.key === 'F5' && !event.ctrlKey && !event.shiftKey) event.preventDefault();
-    });
+    };
+    addEventListener('keydown', keep, { capture: true });
 
     return {
         address: () => location.origin + location.pathname,

@@ -101,7 +101,9 @@ test('F5 begins a presentation in place of loading the page anew, and Escape end
     const lab = await open('scene=pendulum&play=0', { backend: 'webgl' });
     await lab.runTo(0.02);
     const before = await lab.state();
-    await lab.page.evaluate(() => addEventListener('keydown', (event) => (globalThis.kept = event.defaultPrevented)));
+    await lab.page.evaluate(() => {
+        addEventListener('keydown', (event) => (globalThis.kept = event.defaultPrevented), { capture: true });
+    });
     await lab.key('F5');
     await lab.find('Button', 'Leave');
     assert.ok(!(await lab.widgets()).some(({ label }) => label === 'Save'), 'the panels are still there');
