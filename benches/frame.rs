@@ -1,5 +1,6 @@
-//! CPU cost of one frame of the window without stepping: interface, draw list, tessellation, encoding; and of the draw
-//! list alone. Target: at most 2 ms for the default scene.
+//! CPU cost of one frame of the window without stepping: interface, draw list, tessellation, encoding; of the draw list
+//! alone, and of recording it, also for the longest chain; and of what is heard of a frame. Targets: at most 2 ms for the
+//! default scene, of which a presentation and sound take less than 0.5 ms each.
 //!
 //! `cargo bench --bench frame`; without a GPU, drawing itself runs on the same processor and is waited for outside the
 //! measured time, but leaves cold caches and a driver that is part of the frame. Our own share alone, with a device that
@@ -9,9 +10,13 @@ use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use jointplay::app::{App, AppOptions, Headless};
+use eframe::egui;
+use jointplay::app::{
+    App, AppOptions, Click, Headless, MOST_CLICKS, PITCHES, Stretch, Voice, clicks,
+};
+use jointplay::render::Offscreen;
 use jointplay::scene::Scene;
-use jointplay::simulate::{Frame, Simulation};
+use jointplay::simulate::{Frame, Impact, Simulation};
 use jointplay::view::{DrawList, PeakMarks, SceneView, Shot, ViewOptions, WearMap};
 
 const SIZE: [u32; 2] = [1280, 800];
@@ -22,35 +27,50 @@ fn default_scene() -> Scene {
     Scene::load("spcmm", &[]).expect("built in")
 }
 
-/// As the window opens, and with every instrument on: microscope, ideal ghost, twin, wear map, an abandoned future, over a
-/// second of simulation.
+/// As the window opens, with the longest chain, and with every instrument on: microscope, ideal ghost, twin, wear map, an
+/// abandoned future, over a second of simulation.
 fn frames(c: &mut Criterion) {
-    frame(c, "frame of the window", |app| {
+    frame(c, "frame of the window", default_scene(), |app, _| {
         app.player_mut().run_to(TIME);
     });
-    frame(c, "frame with all instruments", |app| {
-        app.microscope_mut().set_open(true);
-        let player = app.player_mut();
-        player.set_ideal(true);
-        player.run_to(1.0);
-        player.set_twin(true);
-        player.go_to(0.5);
-        player.set("contact.friction", "0.2").expect("in range");
-        player.run_to(0.6);
-        player.go_to(0.55);
+    frame(c, "frame of a presentation", default_scene(), |app, ctx| {
+        app.player_mut().run_to(TIME);
+        app.present(ctx, true);
     });
+    frame(c, "frame of the longest chain", longest_chain(), |_, _| {});
+    frame(
+        c,
+        "frame with all instruments",
+        default_scene(),
+        |app, _| {
+            app.microscope_mut().set_open(true);
+            let player = app.player_mut();
+            player.set_ideal(true);
+            player.run_to(1.0);
+            player.set_twin(true);
+            player.go_to(0.5);
+            player.set("contact.friction", "0.2").expect("in range");
+            player.run_to(0.6);
+            player.go_to(0.55);
+        },
+    );
 }
 
-fn frame(c: &mut Criterion, name: &str, prepare: impl FnOnce(&mut App)) {
+fn frame(
+    c: &mut Criterion,
+    name: &str,
+    scene: Scene,
+    prepare: impl FnOnce(&mut App, &egui::Context),
+) {
     let mut headless = Headless::new().expect("a graphics adapter");
-    let mut options = AppOptions::new(default_scene());
+    let mut options = AppOptions::new(scene);
     options.view.wear = if name.contains("all") {
         WearMap::Impulse
     } else {
         WearMap::Off
     };
     let mut app = headless.app(options).expect("starts");
-    prepare(&mut app);
+    prepare(&mut app, headless.context());
     headless.app_frame(&mut app, SIZE, 1.0).expect("drawn");
     c.bench_function(name, |b| {
         b.iter_custom(|frames| {
@@ -66,37 +86,152 @@ fn frame(c: &mut Criterion, name: &str, prepare: impl FnOnce(&mut App)) {
     });
 }
 
+/// An instant of a scene, and the camera that shows it.
+struct Stage {
+    scene: Scene,
+    frame: Frame,
+    view: SceneView,
+    marks: PeakMarks,
+}
+
+impl Stage {
+    fn new(scene: Scene, time: f64) -> Self {
+        let mut simulation = Simulation::new(&scene).expect("starts");
+        simulation.advance_to(time).expect("runs");
+        let mut frame = Frame::default();
+        simulation.sample(time, &mut frame);
+        let mut marks = PeakMarks::new();
+        marks.update(&frame, &[], f64::INFINITY);
+        Self {
+            view: SceneView::new(&scene, &frame),
+            scene,
+            frame,
+            marks,
+        }
+    }
+
+    /// What a picture of `size` asks for, passed to `then` to be built.
+    fn shot(&self, size: [u32; 2], then: impl FnOnce(&Shot<'_>)) {
+        let options = ViewOptions {
+            magnification: 20.0,
+            ..ViewOptions::default()
+        };
+        let mut camera = self.view.camera();
+        self.view
+            .fit(&mut camera, &self.scene, &self.frame, &options, size);
+        then(&Shot {
+            scene: &self.scene,
+            frame: &self.frame,
+            marks: &self.marks,
+            options: &options,
+            camera: &camera,
+            trail: &[],
+            size,
+            pixels_per_point: 1.0,
+        });
+    }
+
+    fn list(&self, size: [u32; 2]) -> DrawList {
+        let mut list = DrawList::default();
+        self.shot(size, |shot| self.view.build(shot, &mut list));
+        list
+    }
+}
+
 fn draw_list(c: &mut Criterion) {
-    let scene = default_scene();
-    let mut simulation = Simulation::new(&scene).expect("starts");
-    simulation.advance_to(TIME).expect("runs");
-    let mut frame = Frame::default();
-    simulation.sample(TIME, &mut frame);
-    let view = SceneView::new(&scene, &frame);
-    let options = ViewOptions {
-        magnification: 20.0,
-        ..ViewOptions::default()
+    let mut bench = |name: &str, stage: &Stage| {
+        let mut list = DrawList::default();
+        stage.shot(SIZE, |shot| {
+            c.bench_function(name, |b| {
+                b.iter(|| stage.view.build(black_box(shot), &mut list))
+            });
+        });
     };
-    let mut marks = PeakMarks::new();
-    marks.update(&frame, &[], f64::INFINITY);
-    let camera = view.camera();
-    let mut list = DrawList::default();
-    c.bench_function("draw list alone", |b| {
-        b.iter(|| {
-            let shot = Shot {
-                scene: &scene,
-                frame: &frame,
-                marks: &marks,
-                options: &options,
-                camera: &camera,
-                trail: &[],
-                size: SIZE,
-                pixels_per_point: 1.0,
-            };
-            view.build(black_box(&shot), &mut list);
+    bench("draw list alone", &Stage::new(default_scene(), TIME));
+    bench(
+        "draw list of the longest chain",
+        &Stage::new(longest_chain(), 0.0),
+    );
+}
+
+/// As many links as a chain may have.
+fn longest_chain() -> Scene {
+    let links = ("chain.links".to_owned(), "4096".to_owned());
+    Scene::load("chain", &[links]).expect("as many are allowed")
+}
+
+/// What is done before the adapter begins to draw a list: a frame of the longest chain has 16 ms for that and its draw list.
+fn recording(c: &mut Criterion) {
+    let mut offscreen = Offscreen::new().expect("a graphics adapter");
+    let stage = Stage::new(longest_chain(), 0.0);
+    let list = stage.list(SIZE);
+    println!(
+        "the longest chain: {} triangles",
+        offscreen.triangles(&list)
+    );
+    c.bench_function("recording the longest chain", |b| {
+        b.iter_custom(|times| {
+            let time = |_| offscreen.time_to_record(&list).expect("drawn");
+            (0..times).map(time).sum()
         });
     });
 }
 
-criterion_group!(benches, frames, draw_list);
+/// The most that a frame can ask for: every impact that a run keeps, all as low and therefore as long as can be. The page computes
+/// the samples in its frame, the desktop in a thread of the system's.
+fn sound(c: &mut Criterion) {
+    let impacts: Vec<Impact> = (1..=64)
+        .map(|k| Impact {
+            start: TIME,
+            end: TIME + 0.5 / PITCHES.0 + 1e-6 * f64::from(k),
+            approach_speed: 0.1,
+            separation_speed: 0.1,
+            deepest: 1e-5,
+            peak: 10.0 * f64::from(k),
+            ..Impact::default()
+        })
+        .collect();
+    let stretch = Stretch {
+        from: TIME,
+        to: 2.0 * TIME,
+        lasts: 1.0 / 60.0,
+    };
+    let mut heard: Vec<Click> = Vec::new();
+    c.bench_function("clicks of a frame", |b| {
+        b.iter(|| clicks(black_box(&impacts).iter(), &stretch, 1.0, &mut heard));
+    });
+    clicks(impacts.iter(), &stretch, 1.0, &mut heard);
+    assert_eq!(heard.len(), MOST_CLICKS);
+    c.bench_function("samples of the clicks of a frame", |b| {
+        b.iter(|| -> usize {
+            let samples = |click| Voice::new(click, 48_000.0).collect::<Vec<f32>>().len();
+            black_box(&heard).iter().map(samples).sum()
+        });
+    });
+}
+
+/// Time of the graphics adapter alone, by scene and size, where it has timestamps. A software adapter's is the processor's.
+fn pictures(c: &mut Criterion) {
+    let mut offscreen = Offscreen::new().expect("a graphics adapter");
+    println!("drawn by {}", offscreen.adapter());
+    for name in ["spcmm", "chain", "hexapod"] {
+        let stage = Stage::new(Scene::load(name, &[]).expect("built in"), 0.0);
+        for size in [[1280, 720], [1920, 1080], [3840, 2160]] {
+            let list = stage.list(size);
+            if offscreen.time_of(&list).expect("drawn").is_none() {
+                println!("this adapter has no timestamps");
+                return;
+            }
+            let [width, height] = size;
+            c.bench_function(&format!("adapter: {name}, {width}x{height}"), |b| {
+                b.iter_custom(|times| {
+                    let time = |_| offscreen.time_of(&list).expect("drawn");
+                    (0..times).filter_map(time).sum()
+                });
+            });
+        }
+    }
+}
+
+criterion_group!(benches, frames, draw_list, recording, sound, pictures);
 criterion_main!(benches);

@@ -1,5 +1,5 @@
 // The picture: background, solids with one shadow, floor, lines, translucent sockets, marks in front of everything.
-// Input colours are sRGB-encoded and shaded in linear space; `finish` encodes, the only place that does.
+// Colours of the theme come linear, those of lines encoded. What a pass leaves is `left` of `linear.wgsl` or `encoded.wgsl`.
 
 struct Globals {
     clip_from_world: mat4x4<f32>,
@@ -9,9 +9,14 @@ struct Globals {
     light: vec4<f32>,
     // xyz: up; w: width of a shadow texel, m
     up: vec4<f32>,
+    // brightness of the key light, the ground, the sky and the studio's window
+    studio: vec4<f32>,
+    // xyz: towards the studio's strip
+    strip: vec4<f32>,
+    // w: comparisons for a shadow on either side of the middle one
     background_top: vec4<f32>,
     background_bottom: vec4<f32>,
-    // width and height of the picture, pixels; 1 / size of the shadow map
+    // width and height of the picture, pixels; 1 / size of the shadow map; half width of a shadow's edge, texels
     picture: vec4<f32>,
     // xyz: centre; w: radius
     floor_centre: vec4<f32>,
@@ -19,70 +24,40 @@ struct Globals {
     floor_along: vec4<f32>,
     floor_colour: vec4<f32>,
     floor_lines: vec4<f32>,
+    // of marks; w: width, pixels
+    outline: vec4<f32>,
+    // of a touching point; w: occlusion, 0 or 1
+    rim: vec4<f32>,
 }
 
 @group(0) @binding(0) var<uniform> globals: Globals;
 @group(1) @binding(0) var shadow_map: texture_depth_2d;
 @group(1) @binding(1) var shadow_sampler: sampler_comparison;
 
-fn to_linear(c: vec3<f32>) -> vec3<f32> {
-    return select(pow((c + 0.055) / 1.055, vec3<f32>(2.4)), c / 12.92, c <= vec3<f32>(0.04045));
+// A colour of the theme.
+fn given(colour: vec3<f32>, pixel: vec4<f32>, opacity: f32) -> vec4<f32> {
+    return left(colour, 1.0, pixel.xy, opacity);
 }
 
-// Encodes to sRGB, dithered by half a step against banding.
-fn finish(linear: vec3<f32>, pixel: vec2<f32>, opacity: f32) -> vec4<f32> {
-    let c = clamp(linear, vec3<f32>(0.0), vec3<f32>(1.0));
-    let encoded = select(1.055 * pow(c, vec3<f32>(1.0 / 2.4)) - 0.055, c * 12.92, c <= vec3<f32>(0.0031308));
-    let noise = fract(52.9829189 * fract(dot(floor(pixel), vec2<f32>(0.06711056, 0.00583715)))) - 0.5;
-    return vec4<f32>(encoded + noise / 255.0, opacity);
-}
-
-// Fraction of the key light that reaches a point: 3 x 3 filtered comparisons.
+// Fraction of the key light that reaches a point: 3 x 3 filtered comparisons, or one.
 fn lit(world: vec3<f32>, normal: vec3<f32>) -> f32 {
     let grazing = 1.0 - max(dot(normal, globals.light.xyz), 0.0);
-    let lifted = world + normal * globals.up.w * (1.0 + 2.5 * grazing);
+    let lifted = world + normal * globals.up.w * (SHADOW_LIFT.x + SHADOW_LIFT.y * grazing);
     let clip = globals.light_from_world * vec4<f32>(lifted, 1.0);
     let uv = vec2<f32>(0.5 + 0.5 * clip.x, 0.5 - 0.5 * clip.y);
     let depth = min(clip.z, 1.0);
+    let apart = globals.picture.w * globals.picture.z;
+    let outside = any(uv < vec2<f32>(0.0)) || any(uv > vec2<f32>(1.0));
+    // Nothing is compared beyond the map. Software adapters run both sides of a branch, but leave a loop that no pixel needs.
+    let around = select(i32(globals.background_top.w), -1, outside);
     var sum = 0.0;
-    for (var i = -1; i <= 1; i++) {
-        for (var j = -1; j <= 1; j++) {
-            let at = uv + vec2<f32>(f32(i), f32(j)) * 1.6 * globals.picture.z;
+    for (var i = -around; i <= around; i++) {
+        for (var j = -around; j <= around; j++) {
+            let at = uv + vec2<f32>(f32(i), f32(j)) * apart;
             sum += textureSampleCompareLevel(shadow_map, shadow_sampler, at, depth);
         }
     }
-    let outside = any(uv < vec2<f32>(0.0)) || any(uv > vec2<f32>(1.0));
-    return select(sum / 9.0, 1.0, outside);
-}
-
-// Environment light from a direction: bright above, with a studio window; dim below.
-fn surroundings(direction: vec3<f32>, roughness: f32) -> f32 {
-    let height = dot(direction, globals.up.xyz);
-    let sky = mix(0.22, 0.85, smoothstep(-0.5 - roughness, 0.6 + roughness, height));
-    let window = smoothstep(0.55 - 0.3 * roughness, 0.75 + 0.3 * roughness, height) * (1.0 - roughness);
-    return sky + 0.5 * window;
-}
-
-// Outgoing light of an opaque surface: hemisphere, key light (Lambert and GGX), a weak light from the eye.
-fn shade(base: vec3<f32>, roughness: f32, metal: f32, n: vec3<f32>, v: vec3<f32>, shadow: f32) -> vec3<f32> {
-    let l = globals.light.xyz;
-    let h = normalize(l + v);
-    let nl = max(dot(n, l), 0.0);
-    let nv = max(dot(n, v), 1e-3);
-    let nh = max(dot(n, h), 0.0);
-    let a2 = pow(roughness, 4.0);
-    let d = a2 / (3.14159265 * pow(nh * nh * (a2 - 1.0) + 1.0, 2.0));
-    let k = roughness * roughness * 0.5;
-    let g = 0.25 / ((nl * (1.0 - k) + k) * (nv * (1.0 - k) + k));
-    let f0 = mix(vec3<f32>(0.04), base, metal);
-    let f = f0 + (1.0 - f0) * pow(1.0 - max(dot(h, v), 0.0), 5.0);
-    let diffuse = base * (1.0 - metal);
-    let key = (diffuse * 0.30 + f * d * g * 0.95) * nl * 2.3 * shadow;
-    let fill = diffuse * 0.13 * nv;
-    let hemisphere = mix(0.17, 0.42, 0.5 + 0.5 * dot(n, globals.up.xyz));
-    let edge = f0 + (max(vec3<f32>(1.0 - roughness), f0) - f0) * pow(1.0 - nv, 5.0);
-    let mirror = edge * surroundings(reflect(-v, n), roughness) * mix(0.55, 1.0, shadow);
-    return (key + fill + diffuse * hemisphere + mirror * mix(0.6, 0.9, metal)) * globals.light.w;
+    return select(sum / f32((2 * around + 1) * (2 * around + 1)), 1.0, outside);
 }
 
 // ---- meshes
@@ -97,33 +72,73 @@ struct Vertex {
     @location(5) colour: vec4<f32>,
     // roughness, metal, inner radius
     @location(6) surface: vec4<f32>,
+    // The sphere that this one faces: from centre to centre, m; w: its radius, 0 without one
+    @location(7) other: vec4<f32>,
+    // xyz: from the ball's centre to where it touches; w: 1 while it does
+    @location(8) touch: vec4<f32>,
 }
 
 struct Surface {
     @builtin(position) clip: vec4<f32>,
     @location(0) world: vec3<f32>,
     @location(1) normal: vec3<f32>,
-    @location(2) colour: vec4<f32>,
-    // roughness, metal, 1 on a cut face
-    @location(3) surface: vec3<f32>,
+    @location(2) @interpolate(flat) colour: vec4<f32>,
+    // roughness, metal
+    @location(3) @interpolate(flat) surface: vec2<f32>,
 }
 
-fn place(in: Vertex) -> Surface {
-    let cut = step(1.5, in.position.w);
-    let inner = in.position.w - 2.0 * cut;
-    let p = vec4<f32>(in.position.xyz * mix(1.0, in.surface.z, inner), 1.0);
-    let world = vec3<f32>(dot(in.row_0, p), dot(in.row_1, p), dot(in.row_2, p));
-    // The cofactor matrix transforms normals correctly under any scaling.
+// Of a ball joint: the ball or its socket.
+struct Jointed {
+    @builtin(position) clip: vec4<f32>,
+    @location(0) world: vec3<f32>,
+    @location(1) normal: vec3<f32>,
+    @location(2) @interpolate(flat) colour: vec4<f32>,
+    // roughness, metal, 1 on a cut face
+    @location(3) @interpolate(flat) surface: vec3<f32>,
+    // From the mesh's origin, m.
+    @location(4) local: vec3<f32>,
+    @location(5) @interpolate(flat) other: vec4<f32>,
+    @location(6) @interpolate(flat) touch: vec4<f32>,
+}
+
+fn turned(in: Vertex, p: vec3<f32>) -> vec3<f32> {
+    return vec3<f32>(dot(in.row_0.xyz, p), dot(in.row_1.xyz, p), dot(in.row_2.xyz, p));
+}
+
+fn origin(in: Vertex) -> vec3<f32> {
+    return vec3<f32>(in.row_0.w, in.row_1.w, in.row_2.w);
+}
+
+// The cofactor matrix transforms normals correctly under any scaling.
+fn normal(in: Vertex) -> vec3<f32> {
     let x = in.row_0.xyz;
     let y = in.row_1.xyz;
     let z = in.row_2.xyz;
-    let n = vec3<f32>(dot(cross(y, z), in.normal), dot(cross(z, x), in.normal), dot(cross(x, y), in.normal));
+    return normalize(vec3<f32>(dot(cross(y, z), in.normal), dot(cross(z, x), in.normal), dot(cross(x, y), in.normal)));
+}
+
+fn place(in: Vertex) -> Surface {
     var out: Surface;
-    out.world = world;
-    out.clip = globals.clip_from_world * vec4<f32>(world, 1.0);
-    out.normal = normalize(n);
+    out.world = turned(in, in.position.xyz) + origin(in);
+    out.clip = globals.clip_from_world * vec4<f32>(out.world, 1.0);
+    out.normal = normal(in);
+    out.colour = in.colour;
+    out.surface = in.surface.xy;
+    return out;
+}
+
+@vertex fn vs_joint(in: Vertex) -> Jointed {
+    let cut = step(1.5, in.position.w);
+    let inner = in.position.w - 2.0 * cut;
+    var out: Jointed;
+    out.local = turned(in, in.position.xyz * mix(1.0, in.surface.z, inner));
+    out.world = out.local + origin(in);
+    out.clip = globals.clip_from_world * vec4<f32>(out.world, 1.0);
+    out.normal = normal(in);
     out.colour = in.colour;
     out.surface = vec3<f32>(in.surface.xy, cut);
+    out.other = in.other;
+    out.touch = in.touch;
     return out;
 }
 
@@ -164,68 +179,120 @@ fn before_all(clip: vec4<f32>, slice: f32) -> vec4<f32> {
     return globals.light_from_world * vec4<f32>(place(in).world, 1.0);
 }
 
-@fragment fn fs_solid(in: Surface) -> @location(0) vec4<f32> {
-    let n = normalize(in.normal);
-    let v = normalize(globals.eye.xyz - in.world);
-    let base = to_linear(in.colour.rgb);
-    let colour = shade(base, in.surface.x, in.surface.y, n, v, lit(in.world, n));
-    return finish(colour, in.clip.xy, in.colour.a);
+fn towards_eye(world: vec3<f32>) -> vec3<f32> {
+    return normalize(globals.eye.xyz - world);
 }
 
-// Marks keep their colour: just enough shading to show their shape.
-fn mark(in: Surface) -> vec3<f32> {
+// Light of something solid.
+fn solid(in: Surface) -> vec3<f32> {
     let n = normalize(in.normal);
-    let v = normalize(globals.eye.xyz - in.world);
-    return to_linear(in.colour.rgb) * (0.55 + 0.30 * max(dot(n, v), 0.0) + 0.30 * max(dot(n, globals.light.xyz), 0.0));
+    let finish = Finish(in.colour.rgb, in.surface.x, in.surface.y);
+    return shade(finish, n, towards_eye(in.world), lit(in.world, n), 1.0);
+}
+
+@fragment fn fs_solid(in: Surface) -> @location(0) vec4<f32> {
+    return left(solid(in), 0.0, in.clip.xy, 0.0);
+}
+
+@fragment fn fs_faded(in: Surface) -> @location(0) vec4<f32> {
+    return left(solid(in), 0.0, in.clip.xy, in.colour.a);
+}
+
+// Light of a ball: it shows how near its socket's wall is, and a rim where it touches.
+fn ball(in: Jointed) -> vec3<f32> {
+    let n = normalize(in.normal);
+    let cosine = dot(n, in.touch.xyz);
+    let ring = rim(cosine, fwidth(cosine), in.touch.w);
+    var open = 1.0;
+    if (in.other.w > 0.0) {
+        let gap = in.other.w - length(in.local);
+        open = left_by_wall(to_wall(in.local, n, in.other.xyz, in.other.w) / gap);
+    }
+    let finish = Finish(in.colour.rgb, in.surface.x, in.surface.y);
+    let light = shade(finish, n, towards_eye(in.world), lit(in.world, n), open);
+    return mix(light, globals.rim.rgb, ring);
+}
+
+@fragment fn fs_ball(in: Jointed) -> @location(0) vec4<f32> {
+    return left(ball(in), 0.0, in.clip.xy, 0.0);
+}
+
+@fragment fn fs_clear_ball(in: Jointed) -> @location(0) vec4<f32> {
+    return left(ball(in), 0.0, in.clip.xy, in.colour.a);
+}
+
+// Marks keep their colour within an outline; a little less where they turn away shows their shape.
+fn mark(in: Surface) -> vec3<f32> {
+    let facing = dot(normalize(in.normal), towards_eye(in.world));
+    let shape = mix(MARK_EDGE, 1.0, smoothstep(0.2, 0.75, facing));
+    // Pixels from the edge.
+    let inside = facing / max(fwidth(facing), 1e-6);
+    let width = globals.outline.w;
+    // A thin one keeps most of its width in colour.
+    let body = max(smoothstep(width - 0.5, width + 0.5, inside), smoothstep(0.45, 0.7, facing));
+    return mix(globals.outline.rgb, in.colour.rgb * shape, body);
+}
+
+// The triad lies on the background alone: it needs no outline.
+@fragment fn fs_overlay(in: Surface) -> @location(0) vec4<f32> {
+    let facing = dot(normalize(in.normal), towards_eye(in.world));
+    return given(in.colour.rgb * mix(MARK_EDGE, 1.0, smoothstep(0.2, 0.75, facing)), in.clip, 1.0);
 }
 
 @fragment fn fs_mark(in: Surface) -> @location(0) vec4<f32> {
-    return finish(mark(in), in.clip.xy, 1.0);
+    return given(mark(in), in.clip, 1.0);
 }
 
 @fragment fn fs_mark_behind(in: Surface) -> @location(0) vec4<f32> {
-    return finish(mark(in), in.clip.xy, 0.6);
+    return given(mark(in), in.clip, 0.6);
 }
 
 // A cell of a wear map: its colour is a value.
 @fragment fn fs_wear(in: Surface) -> @location(0) vec4<f32> {
-    return finish(to_linear(in.colour.rgb), in.clip.xy, 1.0);
+    return given(in.colour.rgb, in.clip, 1.0);
 }
 
 // The same where something is in front of it, or where it is seen from behind, through the wall.
 @fragment fn fs_wear_behind(in: Surface) -> @location(0) vec4<f32> {
-    return finish(to_linear(in.colour.rgb), in.clip.xy, 0.5);
+    return given(in.colour.rgb, in.clip, 0.5);
 }
 
 // Another state of the machine, translucent: most opaque along its edges.
 @fragment fn fs_ghost(in: Surface) -> @location(0) vec4<f32> {
-    let facing = max(dot(normalize(in.normal), normalize(globals.eye.xyz - in.world)), 0.0);
+    let facing = max(dot(normalize(in.normal), towards_eye(in.world)), 0.0);
     let edge = pow(1.0 - facing, 1.5);
-    return finish(to_linear(in.colour.rgb), in.clip.xy, in.colour.a * mix(0.3, 1.0, edge));
+    return given(in.colour.rgb, in.clip, in.colour.a * mix(0.5, 1.0, edge));
 }
 
 @fragment fn fs_ghost_edge(in: Surface) -> @location(0) vec4<f32> {
-    return finish(to_linear(in.colour.rgb), in.clip.xy, in.colour.a);
+    return given(in.colour.rgb, in.clip, in.colour.a);
 }
 
 // Halo of a joint that was hit: a ring outside its socket, which hides nothing of the contact.
 @fragment fn fs_halo(in: Surface) -> @location(0) vec4<f32> {
-    let facing = max(dot(normalize(in.normal), normalize(globals.eye.xyz - in.world)), 0.0);
+    let facing = max(dot(normalize(in.normal), towards_eye(in.world)), 0.0);
     // The socket's outline lies where this sphere, of 1.7 times its radius, has `facing` = 0.81.
     let ring = smoothstep(0.1, 0.65, facing) * (1.0 - smoothstep(0.7, 0.79, facing));
-    return finish(to_linear(in.colour.rgb) * 1.15, in.clip.xy, 0.85 * in.colour.a * ring);
+    return given(in.colour.rgb, in.clip, 0.85 * in.colour.a * ring);
 }
 
-@fragment fn fs_socket(in: Surface, @builtin(front_facing) front: bool) -> @location(0) vec4<f32> {
-    let n = normalize(select(-in.normal, in.normal, front));
-    let v = normalize(globals.eye.xyz - in.world);
-    let facing = max(dot(n, v), 0.0);
+// Glass, darker where the ball is near, with a rim where it touches.
+@fragment fn fs_socket(in: Jointed) -> @location(0) vec4<f32> {
+    let from_ball = in.local - in.other.xyz;
+    let cosine = dot(from_ball, in.touch.xyz) / max(length(from_ball), 1e-9);
+    let near = in.other.w / max(length(from_ball), 1e-9);
+    let ring = rim(cosine, fwidth(cosine), in.touch.w * smoothstep(0.9, 0.95, near));
     let cut = in.surface.z;
-    let rim = pow(1.0 - facing, 3.0);
-    let base = to_linear(in.colour.rgb);
-    let colour = shade(base, in.surface.x, in.surface.y, n, v, 1.0) + rim * 0.15;
-    let opacity = in.colour.a * mix(1.0 + 2.25 * rim, 3.6, cut);
-    return finish(colour, in.clip.xy, min(opacity, 0.95));
+    let n = normalize(in.normal);
+    let facing = max(dot(n, towards_eye(in.world)), 0.0);
+    let edge = (1.0 - facing) * (1.0 - facing) * (1.0 - facing);
+    let gap = max(length(in.local) - in.other.w, 1e-9);
+    let open = left_by_wall((length(from_ball) - in.other.w) / gap);
+    let finish = Finish(in.colour.rgb, in.surface.x, in.surface.y);
+    let light = shade(finish, n, towards_eye(in.world), 1.0, open) + edge * GLASS_EDGE_LIGHT;
+    let glass = in.colour.a * mix(1.0 + GLASS_EDGE * edge, GLASS_CUT, cut);
+    let opacity = min(glass + GLASS_OCCLUDED * (1.0 - open) * step(0.1, in.colour.a), GLASS_MOST);
+    return left(mix(light, globals.rim.rgb, ring), 0.0, in.clip.xy, max(opacity, ring));
 }
 
 // ---- background
@@ -238,7 +305,7 @@ fn mark(in: Surface) -> vec3<f32> {
 @fragment fn fs_background(@builtin(position) clip: vec4<f32>) -> @location(0) vec4<f32> {
     let height = smoothstep(0.0, 1.0, clip.y / globals.picture.y);
     let colour = mix(globals.background_top.rgb, globals.background_bottom.rgb, height);
-    return finish(to_linear(colour), clip.xy, 1.0);
+    return given(colour, clip, 1.0);
 }
 
 // ---- floor
@@ -260,27 +327,34 @@ struct FloorPoint {
     return out;
 }
 
-// Coverage by lines of a grid of the given spacing, `width` pixels wide; fades where lines crowd.
-fn grid(plane: vec2<f32>, spacing: f32, width: f32) -> f32 {
-    let at = plane / spacing;
-    let step = max(fwidth(at), vec2<f32>(1e-6));
-    let away = abs(fract(at - 0.5) - 0.5) / step;
-    let lines = clamp(vec2<f32>(0.5 + 0.5 * width) - away, vec2<f32>(0.0), vec2<f32>(1.0));
-    let room = 1.0 - smoothstep(vec2<f32>(0.08), vec2<f32>(0.35), step);
-    let seen = lines * room;
+// Coverage by lines of a grid of the given spacing, `width` pixels wide, over a pixel: the lines' share of it, not a sample, so
+// that there is no moire. `step` is the size of a pixel in spacings.
+fn grid(at: vec2<f32>, step: vec2<f32>, width: f32) -> f32 {
+    let line = min(step * width, vec2<f32>(1.0));
+    let reach = max(step, line);
+    let away = abs(fract(at - 0.5) - 0.5);
+    let near = clamp(0.5 + (0.5 * line - away) / reach, vec2<f32>(0.0), vec2<f32>(1.0));
+    // Where lines crowd: their mean, and then nothing.
+    let crowd = smoothstep(vec2<f32>(0.15), vec2<f32>(0.5), step);
+    let seen = mix(near, line, crowd) * (1.0 - smoothstep(vec2<f32>(0.3), vec2<f32>(0.9), step));
     return max(seen.x, seen.y);
 }
 
 @fragment fn fs_floor(in: FloorPoint) -> @location(0) vec4<f32> {
-    let thin = grid(in.plane, globals.floor_along.w, 1.0);
-    let thick = grid(in.plane, globals.floor_along.w * 10.0, 1.6);
+    let at = in.plane / globals.floor_along.w;
+    let step = max(length2(dpdx(at), dpdy(at)), vec2<f32>(1e-6));
+    let thin = grid(at, step, 1.0);
+    let thick = grid(at * 0.1, step * 0.1, 1.6);
     let above = dot(globals.eye.xyz - in.world, globals.up.xyz) > 0.0;
     let fade = 1.0 - smoothstep(0.25, 1.0, length(in.plane) / globals.floor_centre.w);
-    let light = mix(0.55, 1.0, lit(in.world, globals.up.xyz));
-    let plane = to_linear(globals.floor_colour.rgb) * light;
-    let lines = to_linear(globals.floor_lines.rgb) * light;
-    let colour = mix(plane, lines, max(0.25 * thin, 0.6 * thick));
-    return finish(colour, in.clip.xy, fade * select(0.3, 1.0, above));
+    let light = mix(FLOOR_IN_SHADOW, 1.0, lit(in.world, globals.up.xyz));
+    let colour = mix(globals.floor_colour.rgb, globals.floor_lines.rgb, max(0.25 * thin, 0.6 * thick));
+    return given(colour * light, in.clip, fade * select(0.3, 1.0, above));
+}
+
+// Change over a pixel of each component, whatever its direction.
+fn length2(x: vec2<f32>, y: vec2<f32>) -> vec2<f32> {
+    return sqrt(x * x + y * y);
 }
 
 // ---- lines
@@ -312,10 +386,11 @@ struct LinePoint {
     out.clip = select(a, b, at_end);
     out.clip.x += across.x * side * in.start.w / globals.picture.x * out.clip.w;
     out.clip.y += across.y * side * in.start.w / globals.picture.y * out.clip.w;
-    out.colour = select(in.start_colour, in.end_colour, at_end);
+    let colour = select(in.start_colour, in.end_colour, at_end);
+    out.colour = vec4<f32>(to_linear(colour.rgb), colour.a);
     return out;
 }
 
 @fragment fn fs_line(in: LinePoint) -> @location(0) vec4<f32> {
-    return finish(to_linear(in.colour.rgb), in.clip.xy, in.colour.a);
+    return given(in.colour.rgb, in.clip, in.colour.a);
 }

@@ -8,20 +8,38 @@ page_tool() {
 build_page() {
     prepare_wasm
     say "building the page (the first time takes some minutes)"
-    cargo rustc --locked --manifest-path "$root/Cargo.toml" --profile web --target $wasm_target --lib --crate-type cdylib
+    # What the optimiser would copy into its callers beyond this makes the page a twentieth heavier and nothing faster; what is
+    # marked #[inline], as all arithmetic is, has a limit of its own.
+    cargo rustc --locked --manifest-path "$root/Cargo.toml" --profile web --target $wasm_target --lib --crate-type cdylib -- \
+        -C llvm-args=-inline-threshold=25
     cargo build --locked --quiet --manifest-path "$root/tools/web/Cargo.toml" --target-dir "$root/target/tools"
     page_tool pack "$root/target/$wasm_target/web/jointplay.wasm" "$@"
 }
 
-# ./run web [--port PORT | --build FOLDER | --bench]
+# ./run web [--port PORT] [--host ADDRESS]
+serve_page() {
+    local folder=$root/target/page port=8420 host=127.0.0.1
+    while (($#)); do
+        case $1 in
+            --port) port=${2:?--port needs a number} ;;
+            --host) host=${2:?--host needs an address, such as 0.0.0.0} ;;
+            *)
+                say "./run web [--port PORT] [--host ADDRESS]"
+                exit 2
+                ;;
+        esac
+        shift 2
+    done
+    build_page "$folder"
+    say "the page, until Ctrl-C:"
+    page_tool serve "$folder" "$port" "$host"
+}
+
+# ./run web [--port PORT] [--host ADDRESS] | --build FOLDER | --bench
 run_web() {
     local folder=$root/target/page
     case ${1:-} in
-        "" | --port)
-            build_page "$folder"
-            say "the page, until Ctrl-C:"
-            page_tool serve "$folder" "${2:-8420}"
-            ;;
+        "" | --port | --host) serve_page "$@" ;;
         --build)
             if (($# != 2)); then
                 say "which folder? ./run web --build dist/"
@@ -33,11 +51,11 @@ run_web() {
         --bench)
             prepare_browser
             build_page "$folder"
-            cargo build --release --locked --manifest-path "$root/Cargo.toml"
+            cargo build --release --locked "${sound[@]}" --manifest-path "$root/Cargo.toml"
             node "$root/web/bench.mjs" "$folder" "$root/target/release/jointplay"
             ;;
         *)
-            say "./run web [--port PORT | --build FOLDER | --bench]"
+            say "./run web [--port PORT] [--host ADDRESS] | --build FOLDER | --bench"
             exit 2
             ;;
     esac

@@ -9,6 +9,11 @@ packages=(
     parallel
 )
 
+# What building with sound needs besides, which a machine can be without.
+sound_packages=(libasound2-dev pkg-config)
+# What cargo is told where they are there.
+sound=()
+
 say() {
     printf '== %s\n' "$*" >&2
 }
@@ -56,13 +61,18 @@ prepare_environment() {
     fi
 }
 
-# What the tests of the page need: Node, a browser, and the packages of web/package-lock.json.
+# What the tests of the page need: Node, Chromium, Firefox with a screen and what it decodes films with, and the packages of
+# web/package-lock.json.
 prepare_browser() {
-    local needed=() browser
+    local needed=() browser firefox
     command -v node > /dev/null || needed+=(nodejs)
     command -v npm > /dev/null || needed+=(npm)
     browser=$(command -v chromium || command -v chromium-browser || command -v google-chrome || true)
     [[ -n $browser ]] || needed+=(chromium)
+    firefox=$(command -v firefox-esr || command -v firefox || true)
+    [[ -n $firefox ]] || needed+=(firefox-esr)
+    command -v Xvfb > /dev/null || needed+=(xvfb)
+    /sbin/ldconfig -p | grep -q libavcodec.so || needed+=(libavcodec-extra)
     ((${#needed[@]} == 0)) || prepare_packages "${needed[@]}"
     for program in node npm; do
         if ! command -v $program > /dev/null; then
@@ -75,6 +85,11 @@ prepare_browser() {
         say "the tests of the page need Chromium: install it, or name it: CHROMIUM=/path/to/chromium"
         exit 1
     fi
+    export FIREFOX=${FIREFOX:-${firefox:-$(command -v firefox-esr || true)}}
+    if [[ -z $FIREFOX ]]; then
+        say "the tests of the page need Firefox: install it, or name it: FIREFOX=/path/to/firefox"
+        exit 1
+    fi
     if ! cmp -s "$root/web/package-lock.json" "$root/web/node_modules/.from"; then
         say "installing what the tests of the page use"
         npm ci --silent --no-audit --no-fund --prefix "$root/web"
@@ -82,8 +97,24 @@ prepare_browser() {
     fi
 }
 
+prepare_sound() {
+    case $(uname) in
+        # Sound needs nothing there.
+        Darwin | MINGW* | MSYS* | CYGWIN*) ;;
+        *)
+            prepare_packages "${sound_packages[@]}"
+            if ! pkg-config --exists alsa 2> /dev/null; then
+                say "building without sound: ${sound_packages[*]} are not there"
+                return
+            fi
+            ;;
+    esac
+    sound=(--features sound)
+}
+
 prepare() {
     prepare_packages "${packages[@]}"
+    prepare_sound
     prepare_rust
     prepare_environment
 }

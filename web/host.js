@@ -7,6 +7,8 @@ const $ = (id) => document.getElementById(id);
 const REPORT_INTERVAL = 10_000;
 /** Time that a download needs its data for, ms. */
 const KEEP = 60_000;
+/** From a frame to its sound, s: longer than it takes to hand it over, so that the clicks of a frame keep their distances. */
+const LATENCY = 0.04;
 
 /** `laboratory`: what web/main.js knows; `lost(start, why)`: called when the graphics of that start are gone. */
 export function makeHost(laboratory, lost) {
@@ -36,13 +38,14 @@ export function makeHost(laboratory, lost) {
 
     const picker = document.createElement('input');
     picker.type = 'file';
-    picker.accept = '.toml';
+    // A scene, and the files that it names.
+    picker.accept = '.toml,.csv,.txt,.stl,.obj,.gltf,.glb,.bin';
+    picker.multiple = true;
     picker.id = 'picker';
     picker.hidden = true;
     picker.addEventListener('change', () => {
-        const [file] = picker.files;
-        if (file) laboratory.page.openFile(file);
-        // The same file, changed meanwhile, can be chosen again.
+        if (picker.files.length > 0) laboratory.page.openFiles([...picker.files]);
+        // The same files, changed meanwhile, can be chosen again.
         picker.value = '';
         $('laboratory').focus();
     });
@@ -57,6 +60,15 @@ export function makeHost(laboratory, lost) {
         if (event.key === 'F5' && !event.ctrlKey && !event.shiftKey) event.preventDefault();
     };
     addEventListener('keydown', keep, { capture: true });
+    // A finger's comes before its touchstart, and for that moment eframe takes it for a mouse's; the touchstart tells it all.
+    const finger = (event) => event.pointerType === 'touch' && event.stopPropagation();
+    addEventListener('pointerdown', finger, { capture: true });
+
+    let audio;
+    let heard = false;
+    const resume = () => void (heard && audio.state !== 'running' && audio.resume().catch(() => {}));
+    // Browsers let sound begin with a gesture alone, some within its event alone.
+    for (const gesture of ['pointerup', 'keyup']) addEventListener(gesture, resume, { capture: true });
 
     return {
         address: () => location.origin + location.pathname,
@@ -113,6 +125,27 @@ export function makeHost(laboratory, lost) {
         endWork(number) {
             work.get(number)?.worker.terminate();
             work.delete(number);
+        },
+
+        sound(on) {
+            try {
+                audio ??= new AudioContext();
+            } catch (error) {
+                return typeof AudioContext === 'function' ? String(error) : 'this browser cannot make it';
+            }
+            heard = on;
+            if (on) resume();
+            else audio.suspend().catch(() => {});
+            return '';
+        },
+        soundRate: () => (audio?.state === 'running' ? audio.sampleRate : 0),
+        click(samples, after) {
+            const buffer = audio.createBuffer(1, samples.length, audio.sampleRate);
+            buffer.copyToChannel(samples, 0);
+            const source = audio.createBufferSource();
+            source.buffer = buffer;
+            source.connect(audio.destination);
+            source.start(audio.currentTime + LATENCY + after);
         },
 
         announce(text, event) {

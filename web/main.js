@@ -3,11 +3,17 @@
 const script = document.getElementById('program');
 const build = new URL(import.meta.url).search;
 const query = new URLSearchParams(location.search);
+/** With what the page was opened, and what the user has put there since: it leads to a start, the state may lead to what stopped it. */
+let opened = location.hash;
 const $ = (id) => document.getElementById(id);
 
 /** Losses of the graphics within `LOSS_SPAN`, ms, after which the page does not start them again by itself. */
 const MOST_LOSSES = 3;
 const LOSS_SPAN = 60_000;
+/** Where the tab keeps what no address holds: a large scene of the user's own, files that it names, very many changes. */
+const KEPT = `jointplay ${location.pathname}`;
+/** What gives an element the focus. */
+const { focus } = HTMLElement.prototype;
 /** Pauses before the attempts to start them again, ms: after a crash the browser needs a moment. */
 const PAUSES = [0, 500, 3000];
 
@@ -27,13 +33,38 @@ const LEFT_OUT = {
 /** The way to draw that the address asks for, if any. */
 const asked = () => new URLSearchParams(location.hash.slice(1)).get('renderer') ?? query.get('renderer');
 
+/** What the page is to open: the address from its `?` on, or what this tab has kept in its place. */
+function wanted() {
+    if (new URLSearchParams(location.hash.slice(1)).has('kept')) {
+        try {
+            const kept = sessionStorage.getItem(KEPT);
+            if (kept) return kept;
+        } catch {
+            // The laboratory says that it is not here.
+        }
+    }
+    return location.search + location.hash;
+}
+
+/** The fragment for a state as src/web/page.rs gives it; none where it does not fit and the browser does not keep it. */
+function fragmentOf(session) {
+    if (!session?.startsWith('kept:')) return session;
+    try {
+        sessionStorage.setItem(KEPT, session);
+        return 'kept=1';
+    } catch {
+        return null;
+    }
+}
+
 /**
- * Replaces whatever is on the page by a message; `report` is a text that the user can copy, `link` the fragment that leads
- * back to where the laboratory was.
+ * Replaces whatever is on the page by a message; `report` is a text that the user can copy, `session` what leads back to where
+ * the laboratory was.
  */
-function showTrouble(title, text, report, link) {
+function showTrouble(title, text, report, session) {
     // What went wrong first is the cause of the rest.
     if (laboratory.trouble) return;
+    const link = fragmentOf(session);
     laboratory.trouble = { title, text, report, link };
     $('trouble-title').textContent = title;
     $('trouble-text').textContent = text;
@@ -47,7 +78,7 @@ function showTrouble(title, text, report, link) {
     $('laboratory').hidden = true;
     $('notice').hidden = false;
     $('reload').textContent = link ? 'Start anew' : 'Reload';
-    (link ? $('again') : $('reload')).focus();
+    if (window === window.top) (link ? $('again') : $('reload')).focus();
     document.title = `${title} - Jointplay`;
 }
 
@@ -65,10 +96,10 @@ globalThis.jointplayCrashed = crashed;
 
 /** Loads the page anew, with another query or fragment. */
 function reload(search, fragment) {
-    history.replaceState(null, '', location.pathname + search + (fragment ? `#${fragment}` : ''));
+    history.replaceState(history.state, '', location.pathname + search + (fragment ? `#${fragment}` : ''));
     location.reload();
 }
-$('reload').addEventListener('click', () => reload(location.search, laboratory.trouble.link ? '' : location.hash.slice(1)));
+$('reload').addEventListener('click', () => reload(location.search, laboratory.trouble.link ? '' : opened.slice(1)));
 $('again').addEventListener('click', () => reload(location.search, laboratory.trouble.link));
 $('plainer').addEventListener('click', () => {
     query.set('renderer', 'webgl');
@@ -124,11 +155,13 @@ async function download(address, bytes) {
 /** Backends to try, best first. */
 async function backends() {
     const wanted = asked();
-    const webgl = Boolean(document.createElement('canvas').getContext('webgl2'));
+    const webgl = letGo(document.createElement('canvas').getContext('webgl2'));
     let webgpu = false;
     if (wanted !== 'webgl') {
         try {
-            webgpu = Boolean(await navigator.gpu?.requestAdapter());
+            const adapter = await navigator.gpu?.requestAdapter();
+            // Where the processor draws, it does so faster with WebGL2.
+            webgpu = Boolean(adapter) && !(adapter.info?.isFallbackAdapter && webgl && wanted !== 'webgpu');
         } catch {
             // A browser that has the object but no adapter for this page.
         }
@@ -158,11 +191,17 @@ async function begin(found) {
         laboratory.backend = backend;
         laboratory.starts += 1;
         try {
-            await page.start(freshCanvas(), backend, laboratory.starts, location.search + location.hash);
+            // A laboratory that starts takes the focus, which in a frame is another's.
+            if (window !== window.top) HTMLElement.prototype.focus = () => {};
+            await page.start(freshCanvas(), backend, laboratory.starts, wanted());
+            // What eframe takes typed text by is no stop of its own on the way of Tab.
+            for (const field of document.querySelectorAll('body > input')) field.tabIndex = -1;
             return null;
         } catch (error) {
             failures.push(`${backend}: ${error?.message ?? error}`);
             console.warn('no start with', failures.at(-1));
+        } finally {
+            HTMLElement.prototype.focus = focus;
         }
     }
     return failures.join('\n') || 'neither WebGPU nor WebGL2 is there';
@@ -179,7 +218,7 @@ async function firstPicture() {
     await frame();
     if (gone()) return;
     $('notice').hidden = true;
-    $('laboratory').focus();
+    if (window === window.top) $('laboratory').focus();
     laboratory.ready = true;
     performance.mark('first picture');
 }
@@ -187,6 +226,18 @@ async function firstPicture() {
 /** The graphics of start number `start` are gone: the laboratory goes on with others. */
 async function lost(start, why) {
     if (laboratory.trouble || start !== laboratory.starts) return;
+    restarting = true;
+    try {
+        await restart(why);
+    } finally {
+        restarting = false;
+    }
+}
+
+/** Whether lost graphics are being started again. */
+let restarting = false;
+
+async function restart(why) {
     const { page, losses } = laboratory;
     console.warn('graphics lost:', why);
     laboratory.ready = false;
@@ -210,14 +261,53 @@ async function lost(start, why) {
         `This browser took its graphics back and does not give them again (${failure}). The simulation is still there: ` +
             'reload to go on from the same state.',
         null,
-        page.link(),
+        page.session(),
     );
+}
+
+/** Without graphics while nobody sees it; the simulation waits. One after the other, however fast it comes and goes. */
+let change = Promise.resolve();
+function showOrHide(shown) {
+    change = change.then(async () => {
+        if (laboratory.trouble || restarting || shown === laboratory.ready) return undefined;
+        if (shown) {
+            const failure = await begin(await backends());
+            return failure ? showTrouble('The graphics were lost', failure, null, laboratory.page.session()) : firstPicture();
+        }
+        laboratory.ready = false;
+        // What still comes from these graphics is no news.
+        laboratory.starts += 1;
+        laboratory.page.suspend();
+        letGo($('laboratory').getContext('webgl2'));
+        return undefined;
+    });
+}
+
+/** A browser has only so many contexts, and takes one back long after it is forgotten. */
+function letGo(context) {
+    context?.getExtension('WEBGL_lose_context')?.loseContext();
+    return Boolean(context);
+}
+
+/** Begins to load the compiled code and the scripts around it, all at once. */
+function load() {
+    const code = download(`jointplay_bg.wasm${build}`, Number(script.dataset.wasmBytes));
+    const parts = Promise.all(['host', 'canvas', 'mirror', 'jointplay'].map((name) => import(`./${name}.js${build}`)));
+    // Should one fail before it is waited for: it is reported where it is.
+    for (const part of [code, parts]) part.catch(() => {});
+    return [code, parts];
 }
 
 async function main() {
     if (typeof WebAssembly !== 'object') return showTrouble('Something is missing', LEFT_OUT.wasm);
     $('loading').hidden = false;
     stage('Loading', 0);
+    const { framed, inSight, Messages, stayPolite } = await import(`./guest.js${build}`);
+    const messages = framed && new Messages(laboratory);
+    let started;
+    change = new Promise((done) => (started = done));
+    if (framed) await inSight(showOrHide);
+    const [code, parts] = load();
     const found = await backends();
     if (found.length === 0) {
         showTrouble('Something is missing', LEFT_OUT[asked()] ?? LEFT_OUT.graphics);
@@ -228,15 +318,11 @@ async function main() {
     let bindings;
     let Mirror;
     try {
-        const code = download(`jointplay_bg.wasm${build}`, Number(script.dataset.wasmBytes));
-        // Should it fail while the script is still on its way: it is reported where it is waited for.
-        code.catch(() => {});
-        const { makeHost } = await import(`./host.js${build}`);
-        const { CanvasObserver } = await import(`./canvas.js${build}`);
-        ({ Mirror } = await import(`./mirror.js${build}`));
+        const [{ makeHost }, { CanvasObserver }, mirror, glue] = await parts;
+        ({ Mirror } = mirror);
+        bindings = glue;
         globalThis.ResizeObserver = CanvasObserver;
         globalThis.jointplayHost = makeHost(laboratory, lost);
-        bindings = await import(`./jointplay.js${build}`);
         laboratory.code = await code;
         await bindings.default({ module_or_path: laboratory.code });
     } catch (error) {
@@ -248,12 +334,83 @@ async function main() {
     const failure = await begin(found);
     if (failure) return showTrouble('The laboratory could not start', failure);
     // Another link pasted into the address bar of the open page.
-    addEventListener('hashchange', () => {
+    addEventListener('hashchange', ({ newURL }) => {
+        // The address of the state may have been written over the link before this event came.
+        if (location.href !== newURL) history.replaceState(null, '', newURL);
+        opened = location.hash;
         // Another way to draw needs another start.
         if (['webgl', 'webgpu'].includes(asked()) && asked() !== laboratory.backend) location.reload();
-        else laboratory.page.openLink(location.search + location.hash);
+        else mendable = laboratory.page.openLink(wanted()) ? Date.now() + MENDABLE : 0;
     });
+    if (framed) stayPolite(laboratory.page);
     await firstPicture();
+    started();
+    if (framed) {
+        messages.begin();
+    } else {
+        keepForOffline();
+        keepSession();
+        askBeforeLeaving();
+    }
+}
+
+/** Words of an address that belong to the browser and are in no link that the laboratory makes. */
+const OWN_WORDS = ['renderer', 'theme'];
+/** How often the address follows what is shown, ms. */
+const SESSION_PACE = 1000;
+/** How long a link that could not be opened stays in the address, to be mended there, ms; until when it does. */
+const MENDABLE = 60_000;
+let mendable = 0;
+/** Pauses between two looks are so many times as long as one takes: a large scene takes a while to pack. */
+const SPARING = 20;
+
+/** Keeps the state in the address, or in the tab, so that loading the page anew, or coming back to it, goes on from there. */
+function keepSession() {
+    let told = false;
+    function keep() {
+        const { page } = laboratory;
+        if (!laboratory.ready || laboratory.trouble || Date.now() < mendable) return;
+        const session = page.session();
+        if (!session) return;
+        const fragment = fragmentOf(session);
+        if (!fragment) {
+            if (!told) page.say('This scene is too large for this browser to keep: loading the page anew loses it');
+            told = true;
+            return;
+        }
+        const words = [new URLSearchParams(location.hash.slice(1)), query];
+        const own = OWN_WORDS.map((word) => [word, words.map((from) => from.get(word)).find(Boolean)]);
+        const rest = own.filter(([, value]) => value).map(([word, value]) => `&${word}=${encodeURIComponent(value)}`);
+        const address = `#${fragment}${rest.join('')}`;
+        const unsaved = isUnsaved();
+        if (address === location.hash && unsaved === wasUnsaved()) return;
+        history.replaceState({ unsaved }, '', location.pathname + location.search + address);
+    }
+    function follow() {
+        const began = Date.now();
+        keep();
+        setTimeout(follow, Math.max(SESSION_PACE, SPARING * (Date.now() - began)));
+    }
+    setTimeout(follow, SESSION_PACE);
+    // What the tab keeps does not change by its address.
+    addEventListener('pagehide', () => void (location.hash.startsWith('#kept=') && keep()));
+}
+
+/** Whether the page was loaded with changes that were in no file; they still are until the laboratory knows better. */
+const wasUnsaved = () => Boolean(history.state?.unsaved);
+const isUnsaved = () => laboratory.page.unsaved() ?? wasUnsaved();
+
+/** Only a scene of the user's own can be lost; its changes may be in the address, which nobody takes for a file. */
+function askBeforeLeaving() {
+    addEventListener('beforeunload', (event) => {
+        if (!laboratory.trouble && isUnsaved()) event.preventDefault();
+    });
+}
+
+/** Where the browser offers it: over TLS, or on this machine. */
+function keepForOffline() {
+    if (!navigator.serviceWorker) return;
+    navigator.serviceWorker.register('offline.js').catch((error) => console.warn('not kept for offline:', error));
 }
 
 main();

@@ -1,7 +1,7 @@
 //! The period of a scene's drives, and a running scene as an [`Orbit`].
 
 use super::orbit::Orbit;
-use crate::mechanism::period_of;
+use crate::mechanism::periods_of;
 use crate::scene::Scene;
 use crate::simulate::{Frame, Pose, Simulation, StartError, Stopped};
 
@@ -36,8 +36,8 @@ pub enum NoPeriod {
 /// A scene without a common period.
 pub fn drive_period(scene: &Scene) -> Result<f64, NoPeriod> {
     let mut period: Option<f64> = None;
-    for joint in &scene.joints {
-        let own = period_of(scene, joint);
+    let joints = scene.joints.iter();
+    for own in joints.flat_map(|joint| periods_of(scene, joint)) {
         if !own.is_finite() {
             continue;
         }

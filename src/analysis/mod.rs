@@ -14,6 +14,7 @@ pub mod paper;
 pub mod point;
 pub mod presets;
 mod reach;
+pub mod ready;
 mod reference_solution;
 pub mod regime;
 pub mod reproduction;

@@ -36,6 +36,20 @@ pub struct SweepTask {
     pub exponent: bool,
 }
 
+/// Which of several computers of a sweep one is: its points are the same, whoever computes them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Share {
+    /// Its number, from 0.
+    pub index: usize,
+    /// How many there are.
+    pub of: usize,
+}
+
+impl Share {
+    /// The only one.
+    pub const WHOLE: Self = Self { index: 0, of: 1 };
+}
+
 /// One varied parameter of a running sweep.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Range {
@@ -90,9 +104,10 @@ pub(super) enum SweepMessage {
     Point(Box<SweptPoint>),
 }
 
-/// Computes a sweep point by point, from coarse to fine if points do not follow each other.
+/// Computes a share of a sweep point by point, from coarse to fine if points do not follow each other.
 pub(super) fn run(
     task: &SweepTask,
+    share: Share,
     tell: &mut dyn FnMut(SweepMessage) -> ControlFlow<()>,
 ) -> Result<(), TaskFault> {
     let mut say = |message| match tell(message) {
@@ -134,7 +149,8 @@ pub(super) fn run(
     say(SweepMessage::Ranges(ranges))?;
     let blocks = sweep.grid().blocks();
     let mut through = 0;
-    for b in coarse_first(blocks) {
+    let own = coarse_first(blocks).into_iter();
+    for b in own.skip(share.index).step_by(share.of.max(1)) {
         let mut block = Block::new(&sweep, b);
         while !block.run.is_done() {
             block.advance();
@@ -295,9 +311,13 @@ mod tests {
     }
 
     fn told(task: SweepTask, most: usize) -> Vec<Message> {
+        told_of(task, Share::WHOLE, most)
+    }
+
+    fn told_of(task: SweepTask, share: Share, most: usize) -> Vec<Message> {
         let mut said = Vec::new();
         // It travels as text, there and back.
-        let text = serde_json::to_string(&Job::Sweep(task)).expect("plain data");
+        let text = serde_json::to_string(&Job::Sweep(task, share)).expect("plain data");
         let job = serde_json::from_str(&text).expect("its own text");
         perform(&job, &mut || 0.0, &mut |message| {
             let text = serde_json::to_string(&message).expect("plain data");
@@ -356,6 +376,40 @@ mod tests {
             let pose = machine.frame().pose;
             let found = crate::analysis::drive::observed(&pose);
             assert_eq!(found[..6], *point.sections.last().expect("kept"));
+        }
+    }
+
+    #[test]
+    fn several_share_the_points_and_each_is_the_same_to_the_bit() {
+        // One for each of four, of whom two have nothing to do; and two blocks of points that follow each other.
+        let cold = task(&["contact.clearance=0.2mm..0.4mm:2"]);
+        let mut followed = task(&["contact.friction=0.1..0.3:30"]);
+        (followed.start, followed.periods, followed.discard) = (Start::FollowUp, 2, 1);
+        for task in [cold, followed] {
+            let mut whole: Vec<_> = told(task.clone(), usize::MAX);
+            let mut shared = Vec::new();
+            let mut done = 0.0;
+            for index in 0..4 {
+                let said = told_of(task.clone(), Share { index, of: 4 }, usize::MAX);
+                assert!(matches!(said[0], Message::Ranges(_)));
+                assert_eq!(said.last(), Some(&Message::Done));
+                done += said.iter().rev().find_map(progress).unwrap_or(0.0);
+                shared.extend(said);
+            }
+            assert!((done - 1.0).abs() < 1e-12, "{done}");
+            let sorted = |said: &mut Vec<Message>| {
+                let mut points: Vec<SweptPoint> = points(said).into_iter().cloned().collect();
+                points.sort_by_key(|point| point.index);
+                points
+            };
+            assert_eq!(sorted(&mut shared), sorted(&mut whole));
+        }
+    }
+
+    fn progress(message: &Message) -> Option<f64> {
+        match message {
+            Message::Progress(done) => Some(*done),
+            _ => None,
         }
     }
 

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::RunContext;
 use super::presets::{self, Measured};
 use super::source::{SceneSource, TaskFault};
-use super::sweep_task::{self, Range, SweepMessage, SweepTask, SweptPoint};
+use super::sweep_task::{self, Range, Share, SweepMessage, SweepTask, SweptPoint};
 use crate::scene::Preset;
 
 /// What to compute.
@@ -20,14 +20,14 @@ pub enum Job {
         /// Words of `solver.preset`.
         presets: Vec<String>,
     },
-    /// Points over a range of a parameter.
-    Sweep(SweepTask),
+    /// Points over a range of a parameter, or a share of them.
+    Sweep(SweepTask, Share),
 }
 
 /// Messages of a running computation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Message {
-    /// Fraction done, 0 to 1.
+    /// Fraction done, 0 to 1; of a share of a sweep as a fraction of the whole.
     Progress(f64),
     /// The requested presets, by their words.
     Presets(Vec<(String, Measured)>),
@@ -60,7 +60,9 @@ pub fn perform(
 ) {
     let outcome = match job {
         Job::Presets { scene, presets } => measure_presets(scene, presets, clock, tell),
-        Job::Sweep(task) => sweep_task::run(task, &mut |message| tell(message.into())),
+        Job::Sweep(task, share) => {
+            sweep_task::run(task, *share, &mut |message| tell(message.into()))
+        }
     };
     let last = match outcome {
         Ok(()) => Message::Done,

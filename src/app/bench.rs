@@ -1,5 +1,6 @@
 //! The chaos bench: phase portrait and Poincaré section of the running scene, sweeps in the background, and a twin run.
 
+mod asked;
 mod coordinate;
 mod diagram;
 mod divergence;
@@ -11,8 +12,10 @@ mod swept;
 use eframe::egui::{CollapsingHeader, RichText, Ui};
 
 use super::host::Host;
-use super::load::Load;
 use super::player::Player;
+use crate::analysis::ready::ReadySweep;
+use crate::scene::Scene;
+pub use asked::Asked;
 use coordinate::Coordinate;
 use portrait::Portrait;
 use sweep::SweepPanel;
@@ -32,6 +35,13 @@ impl Bench {
         self.sweep.update(host)
     }
 
+    /// Starts a ready sweep over `scene`, which is the one on show.
+    pub(super) fn start(&mut self, ready: &'static ReadySweep, scene: &Scene) {
+        // Its diagram is in the coordinate of the machine's travel.
+        self.coordinate = Coordinate::default();
+        self.sweep.start(ready, scene);
+    }
+
     /// The latest sweep.
     pub fn swept(&self) -> Option<&Swept> {
         self.sweep.swept()
@@ -42,13 +52,18 @@ impl Bench {
         self.sweep.is_running()
     }
 
+    /// What share of the diagram was in sight when it was last drawn, 0 to 1.
+    pub fn diagram_seen(&self) -> f32 {
+        self.sweep.diagram().seen()
+    }
+
     /// Where the diagram last drew a kept section of a point, points of the screen.
     pub fn place(&self, index: usize, section: usize) -> Option<eframe::egui::Pos2> {
         self.sweep.diagram().place(index, section)
     }
 
-    /// The whole bench; returns the run to a section that was clicked.
-    pub fn ui(&mut self, ui: &mut Ui, player: &mut Player) -> Option<Load> {
+    /// The whole bench; returns what was asked of the run.
+    pub fn ui(&mut self, ui: &mut Ui, player: &mut Player) -> Option<Asked> {
         ui.horizontal_wrapped(|ui| {
             ui.label(RichText::new("Chaos bench").strong());
             ui.label("Coordinate");

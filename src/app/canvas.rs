@@ -9,6 +9,7 @@ use eframe::egui::mutex::RwLock;
 use eframe::egui::{self, Ui, vec2};
 use eframe::egui_wgpu::{self, RenderState, RendererOptions, ScreenDescriptor};
 
+use super::theme;
 use crate::render::{self, Arrival, Image, Readback, RenderError, check_size, device_error, wgpu};
 
 /// Time between two passes, s.
@@ -27,8 +28,10 @@ impl Canvas {
     /// A canvas that draws with `state`, which is its own.
     pub fn new(state: RenderState) -> Self {
         render::install(&state);
+        let ctx = egui::Context::default();
+        ctx.set_fonts(theme::fonts());
         Self {
-            ctx: egui::Context::default(),
+            ctx,
             time: 0.0,
             state,
         }

@@ -70,21 +70,11 @@ impl Controls {
 
     /// All controls, one under the other.
     pub fn ui(&mut self, ui: &mut Ui, player: &mut Player, accuracy: &mut Accuracy) {
-        let table = player.wanted().parameters();
         ui.label(RichText::new(&player.scene().title).small().weak())
             .on_hover_text(&player.scene().description);
         ui.add_space(2.0);
-        for key in FIRST {
-            if let Some(parameter) = table.iter().find(|p| p.key == key) {
-                self.control(ui, player, parameter, key);
-                ui.add_space(4.0);
-            }
-        }
-        // What the scene's author chose to be changed.
-        for parameter in table.iter().filter(|p| p.scope == Scope::Own) {
-            self.control(ui, player, parameter, parameter.key);
-            ui.add_space(4.0);
-        }
+        self.few(ui, player);
+        let table = player.wanted().parameters();
         ui.separator();
         self.accuracy_ui(ui, player, accuracy, &table);
         self.one_joint(ui, player, &table);
@@ -109,6 +99,22 @@ impl Controls {
                     self.control(ui, player, parameter, parameter.key);
                 }
             });
+        }
+    }
+
+    /// The most important ones.
+    pub fn few(&mut self, ui: &mut Ui, player: &mut Player) {
+        let table = player.wanted().parameters();
+        for key in FIRST {
+            if let Some(parameter) = table.iter().find(|p| p.key == key) {
+                self.control(ui, player, parameter, key);
+                ui.add_space(4.0);
+            }
+        }
+        // What the scene's author chose to be changed.
+        for parameter in table.iter().filter(|p| p.scope == Scope::Own) {
+            self.control(ui, player, parameter, parameter.key);
+            ui.add_space(4.0);
         }
     }
 
@@ -494,7 +500,12 @@ fn tooltip(ui: &Ui, response: &Response, player: &Player, row: &Row) {
         ui.label(RichText::new(format!("Range {range}")).small());
         ui.label(RichText::new(format!("Key {key}")).small().weak());
         if parameter.at_reset {
-            ui.label(RichText::new("Applies at the next reset").small());
+            let when = if parameter.scope == Scope::Own {
+                "Applies at the next reset; at once where only contacts and gravity depend on it"
+            } else {
+                "Applies at the next reset"
+            };
+            ui.label(RichText::new(when).small());
         }
     });
 }

@@ -3,22 +3,27 @@
 use std::collections::VecDeque;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use eframe::egui;
 
 use super::background::Thread;
-use super::host::{Host, OpenedFile, Running, SaveFile};
+#[cfg(feature = "sound")]
+use super::click::Click;
+use super::host::{Dropped, Host, OpenedFile, Running, SaveFile};
 use super::saved::Watcher;
+#[cfg(feature = "sound")]
+use super::speaker::Speaker;
 use crate::analysis::task::Job;
 use crate::files::{FileError, OutputFile, publish};
-use crate::scene::{LARGEST_FILE, too_large};
+use crate::scene::{largest_file, too_large};
 
 /// Files of the desktop.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub struct DesktopHost {
-    opened: VecDeque<OpenedFile>,
+    opened: VecDeque<Vec<OpenedFile>>,
     watcher: Option<Watcher>,
+    #[cfg(feature = "sound")]
+    speaker: Option<Speaker>,
     page: String,
 }
 
@@ -63,22 +68,20 @@ impl Host for DesktopHost {
         Ok(format!("Saved {}", names.join(" and ")))
     }
 
-    fn read_dropped(&mut self, file: Arc<dyn egui::DroppedFile + Send + Sync>) {
-        let large = file
-            .path()
-            .metadata()
-            .is_ok_and(|file| file.len() > LARGEST_FILE);
-        self.opened.push_back(OpenedFile {
-            name: file.path().display().to_string(),
-            content: if large {
-                Err(too_large())
-            } else {
-                file.bytes()
-            },
-        });
+    fn read_dropped(&mut self, files: Vec<Dropped>) {
+        let read = |file: Dropped| {
+            let name = file.path().display().to_string();
+            let size = file.path().metadata().map_or(0, |file| file.len());
+            let content = match largest_file(&name) {
+                most if size > most => Err(too_large()),
+                _ => file.bytes(),
+            };
+            OpenedFile { name, content }
+        };
+        self.opened.push_back(files.into_iter().map(read).collect());
     }
 
-    fn opened(&mut self) -> Option<OpenedFile> {
+    fn opened(&mut self) -> Option<Vec<OpenedFile>> {
         self.opened.pop_front()
     }
 
@@ -97,7 +100,38 @@ impl Host for DesktopHost {
         self.watcher.as_ref()?.poll()
     }
 
+    fn workers(&self) -> usize {
+        // One core draws and steps.
+        let cores = std::thread::available_parallelism();
+        cores.map_or(1, |cores| (cores.get() - 1).max(1))
+    }
+
     fn start(&mut self, job: Job) -> Option<Box<dyn Running>> {
         Some(Box::new(Thread::start(job)?))
+    }
+
+    #[cfg(feature = "sound")]
+    fn sound(&mut self, on: bool) {
+        self.speaker = on.then(Speaker::open);
+    }
+
+    #[cfg(feature = "sound")]
+    fn click(&mut self, clicks: &[Click]) {
+        if let Some(speaker) = &self.speaker {
+            speaker.click(clicks);
+        }
+    }
+
+    #[cfg(feature = "sound")]
+    fn no_sound(&mut self) -> Option<String> {
+        self.speaker.as_ref()?.failed()
+    }
+
+    #[cfg(not(feature = "sound"))]
+    fn no_sound(&mut self) -> Option<String> {
+        Some(
+            "this program was built without it. ./run builds it with sound where libasound2-dev and pkg-config are installed"
+                .to_owned(),
+        )
     }
 }

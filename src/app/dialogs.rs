@@ -1,4 +1,4 @@
-//! The list of keys, the about box and the field that opens a file.
+//! The list of keys, the about box, the field that opens a file, the QR code.
 
 use eframe::egui::{self, Grid, Id, Modal, RichText, ScrollArea, TextEdit, Ui};
 
@@ -7,6 +7,9 @@ use super::host::SaveFile;
 use super::keys::{BINDINGS, POINTER};
 use super::load::Load;
 use super::player::Player;
+use code::Code;
+
+mod code;
 
 /// Below this width, points, keys and their descriptions are stacked.
 const NARROW: f32 = 480.0;
@@ -34,6 +37,13 @@ pub enum Dialog {
         /// Why they could not be saved.
         error: Option<String>,
     },
+    /// Shows a link as a QR code.
+    Code {
+        /// The whole link.
+        link: String,
+        /// Its code, or why it has none.
+        code: Result<Code, String>,
+    },
     /// Asks what a film is to be.
     Film {
         /// As chosen so far.
@@ -55,6 +65,7 @@ impl Dialog {
             Self::About => "About Jointplay",
             Self::Open { .. } => "Open a link or a scene",
             Self::Save { .. } => "Save as",
+            Self::Code { .. } => "QR code of the link",
             Self::Film { .. } => "Film",
             Self::Load { .. } => "Change what is on show?",
         }
@@ -64,7 +75,7 @@ impl Dialog {
     fn answer(&self) -> Option<(&'static str, Option<Answer>)> {
         let typed = |path: &str| Some(path.trim().to_owned()).filter(|path| !path.is_empty());
         match self {
-            Self::Help | Self::About => None,
+            Self::Help | Self::About | Self::Code { .. } => None,
             Self::Open { path, .. } => Some(("Open", typed(path).map(Answer::Open))),
             Self::Save { path, .. } => Some(("Save", typed(path).map(Answer::Save))),
             Self::Film { wanted } => {
@@ -99,7 +110,13 @@ pub fn ui(
     renderer: &str,
 ) -> Option<Answer> {
     let mut answer = None;
-    let widest = (ctx.content_rect().width() - 48.0).min(520.0);
+    // Title, buttons and frame stay visible on a low screen and in a dialog whose text grows.
+    let most = (ctx.content_rect().height() - 140.0).max(80.0);
+    let width = match dialog {
+        Dialog::Code { code: Ok(_), .. } => most.max(200.0),
+        _ => 520.0,
+    };
+    let widest = (ctx.content_rect().width() - 48.0).min(width);
     let frame = egui::Frame::window(&ctx.global_style());
     let modal = Modal::new(Id::unique("dialog"))
         .frame(frame)
@@ -107,8 +124,6 @@ pub fn ui(
             ui.set_width(widest);
             ui.heading(dialog.title());
             ui.add_space(6.0);
-            // Title, buttons and frame stay visible on a low screen and in a dialog whose text grows.
-            let most = (ctx.content_rect().height() - 140.0).max(80.0);
             let scrolled = ScrollArea::vertical()
                 .max_height(most)
                 .min_scrolled_height(most);
@@ -118,6 +133,7 @@ pub fn ui(
                     Dialog::About => about(ui, player, renderer),
                     Dialog::Open { path, error } => open(ui, path, error.as_deref()),
                     Dialog::Save { path, files, error } => save(ui, path, files, error.as_deref()),
+                    Dialog::Code { link, code } => code::ui(ui, link, code, most),
                     Dialog::Film { wanted } => film::choose(ui, wanted, player.reached()),
                     Dialog::Load { changes, .. } => load(ui, changes),
                 })
@@ -202,7 +218,7 @@ fn about(ui: &mut Ui, player: &Player, renderer: &str) -> bool {
 fn open(ui: &mut Ui, path: &mut String, error: Option<&str>) -> bool {
     ui.label(
         "A link, the path of a scene file (.toml), or the name of a built-in scene. A file can also be dropped on the window, \
-         and a link pasted into it.",
+         together with those that it names, and a link pasted into it.",
     );
     path_field(ui, path, "https://…#scene=…, scene.toml or pendulum", error)
 }

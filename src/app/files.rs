@@ -1,14 +1,16 @@
 //! Links and files, in and out.
 
 use std::fmt::Write as _;
+use std::path::Path;
 
 use eframe::egui;
 use serde_json::{Map, json};
 
 use super::dialogs::Dialog;
-use super::host::{Host, SaveFile};
+use super::host::{Host, OpenedFile, SaveFile};
+use super::lesson::Course;
 use super::player::Player;
-use super::reload::SceneFile;
+use super::reload::{Given, SceneFile};
 use super::replay::Verdict;
 use super::share::shown::Instruments;
 use super::share::{Link, SceneText, is_link, shown};
@@ -17,6 +19,9 @@ use crate::simulate::Channel;
 
 /// Rows of a saved record.
 const ROWS: usize = 1000;
+/// Media type of scene files.
+const SCENE_TYPE: &str = "application/toml";
+
 impl App {
     /// Gives the application the services of the platform it runs on.
     pub fn set_host(&mut self, host: Box<dyn Host>) {
@@ -26,7 +31,13 @@ impl App {
     /// A link to the present state.
     pub fn link(&self) -> Link {
         if let Some(replay) = &self.replay {
-            return replay.link().clone();
+            let (lesson, step) = self.course().and_then(Course::shared).unzip();
+            return Link {
+                lesson,
+                step,
+                embedded: self.embedded.clone(),
+                ..replay.link().clone()
+            };
         }
         let player = &self.player;
         let (plots, window) = shown::changed(&self.plots);
@@ -40,7 +51,10 @@ impl App {
             ideal: player.ideal().is_some(),
             wear: self.viewport.options.wear,
         };
+        let (lesson, step) = self.course().and_then(Course::shared).unzip();
         Link {
+            lesson,
+            step,
             scene: SceneText::of(player.wanted()),
             log: player.log(),
             steps: Some(player.steps()),
@@ -54,9 +68,11 @@ impl App {
             channels: (!self.plots.picked.is_empty()).then(|| self.plots.picked.clone()),
             window,
             instruments: (instruments != Instruments::default()).then_some(instruments),
+            embedded: self.embedded.clone(),
             playing: Some(player.is_playing()),
             theme: None,
             version: Some(crate::VERSION.to_owned()),
+            beside: player.wanted().source.beside.clone(),
         }
     }
 
@@ -64,6 +80,23 @@ impl App {
     /// [`super::AppOptions::from_link`] reads it back.
     pub fn share_state(&self) -> String {
         self.link().format()
+    }
+
+    /// The same where it also brings back what no address holds: a large scene, many changes, the files that a scene names.
+    /// [`super::AppOptions::from_link`] reads it back.
+    pub fn session(&self) -> String {
+        self.link().keep()
+    }
+
+    /// Whether the changes to a scene of the user's own, none of the built-in ones, would be lost with this window: not if they are in
+    /// a file or came with a link. `None` as long as nothing was changed or saved since the link that it was opened with.
+    pub fn unsaved(&self) -> Option<bool> {
+        let wanted = self.player.wanted();
+        if matches!(SceneText::of(wanted), SceneText::BuiltIn(_)) {
+            return Some(false);
+        }
+        let changed = !self.scene_file.is_saved_with(&wanted.changes)?;
+        (changed || self.scene_file.is_in_file()).then_some(changed)
     }
 
     /// Copies a link to the present state.
@@ -90,10 +123,15 @@ impl App {
     /// # Errors
     /// No text, or no scene.
     pub fn open_bytes(&mut self, name: &str, bytes: Vec<u8>) -> Result<(), String> {
+        self.open_given(name, bytes, &Given::new())
+    }
+
+    /// The same for one that may name the files `given` with it.
+    fn open_given(&mut self, name: &str, bytes: Vec<u8>, given: &Given) -> Result<(), String> {
         let opened = String::from_utf8(bytes)
             .map_err(|_| format!("{name}: not a text file"))
             .and_then(|text| {
-                self.parse_file(name, &text, &[])
+                self.parse_file(name, &text, given, &[])
                     .map_err(|error| error.to_string())
             })
             .and_then(|scene| self.show_scene(&scene));
@@ -136,21 +174,38 @@ impl App {
 
     /// Takes files that were dropped, or chosen earlier.
     pub(super) fn receive_files(&mut self, ctx: &egui::Context) {
-        // Of several dropped at once, the last one is shown.
-        for file in ctx.input(|input| input.raw.dropped_files.clone()) {
-            self.host.read_dropped(file);
+        let dropped = ctx.input(|input| input.raw.dropped_files.clone());
+        if !dropped.is_empty() {
+            self.host.read_dropped(dropped);
         }
-        while let Some(file) = self.host.opened() {
-            match file.content {
-                // The reason is shown.
-                Ok(bytes) => {
-                    if self.open_bytes(&file.name, bytes).is_ok() {
-                        self.scene_file = SceneFile::named(Some(file.name));
-                    }
-                }
-                Err(reason) => self.problem = Some(format!("{}: {reason}", file.name)),
+        while let Some(files) = self.host.opened() {
+            // The reason is shown.
+            if let Err(reason) = self.open_together(files) {
+                self.problem = Some(reason);
             }
         }
+    }
+
+    /// Opens files that were chosen or dropped at once: a scene, and those that it names.
+    fn open_together(&mut self, files: Vec<OpenedFile>) -> Result<(), String> {
+        let mut read = Vec::with_capacity(files.len());
+        for OpenedFile { name, content } in files {
+            let bytes = content.map_err(|reason| format!("{name}: {reason}"))?;
+            read.push((name, bytes));
+        }
+        let Some(scene) = scene_among(&read) else {
+            let names: Vec<&str> = read.iter().map(|(name, _)| name.as_str()).collect();
+            return Err(format!(
+                "{}: no scene among them; open the scene's .toml file with the files that it names",
+                names.join(", ")
+            ));
+        };
+        let (name, bytes) = read.swap_remove(scene);
+        let own = |(name, bytes): (String, Vec<u8>)| (own_name(&name).to_owned(), bytes);
+        let given: Given = read.into_iter().map(own).collect();
+        self.open_given(&name, bytes, &given)?;
+        self.scene_file = SceneFile::opened(name, given);
+        Ok(())
     }
 
     /// Gives files to the host, or asks for a path first.
@@ -163,7 +218,10 @@ impl App {
             });
         } else {
             match self.host.save(&files) {
-                Ok(done) => self.notice = Some(Notice::new(done)),
+                Ok(done) => {
+                    self.note_saved(&files);
+                    self.notice = Some(Notice::new(done));
+                }
                 Err(reason) => self.problem = Some(reason),
             }
         }
@@ -181,7 +239,10 @@ impl App {
             })
             .collect();
         match self.host.save(&renamed) {
-            Ok(done) => self.notice = Some(Notice::new(done)),
+            Ok(done) => {
+                self.note_saved(&files);
+                self.notice = Some(Notice::new(done));
+            }
             Err(reason) => {
                 self.dialog = Some(Dialog::Save {
                     path,
@@ -200,11 +261,19 @@ impl App {
                 let name = format!("{}.toml", scene.name);
                 self.save(vec![SaveFile {
                     name,
-                    mime: "application/toml",
+                    mime: SCENE_TYPE,
                     bytes: text.into_bytes(),
                 }]);
             }
             Err(error) => self.problem = Some(format!("The scene cannot be saved: {error}")),
+        }
+    }
+
+    /// The changes are in a file now, if the scene is among `files`.
+    fn note_saved(&mut self, files: &[SaveFile]) {
+        if files.iter().any(|file| file.mime == SCENE_TYPE) {
+            let changes = self.player.wanted().changes.clone();
+            self.scene_file.saved_with(changes);
         }
     }
 
@@ -258,6 +327,32 @@ impl App {
             (None, None) => String::new(),
         }
     }
+}
+
+/// Which of these files, names and contents, is the scene: the only one, or of those that end in `.toml` the last that no other
+/// one includes.
+fn scene_among(files: &[(String, Vec<u8>)]) -> Option<usize> {
+    if files.len() == 1 {
+        return Some(0);
+    }
+    let scenes = (0..files.len()).filter(|&i| files[i].0.ends_with(".toml"));
+    let scenes: Vec<usize> = scenes.collect();
+    let included = |&&i: &&usize| {
+        let named = format!("{}\"", own_name(&files[i].0));
+        let names = |&other: &usize| String::from_utf8_lossy(&files[other].1).contains(&named);
+        scenes.iter().any(|other| *other != i && names(other))
+    };
+    let mut last_first = scenes.iter().rev();
+    let found = last_first.find(|i| !included(i)).or(scenes.last());
+    found.copied()
+}
+
+/// A file's name without its folders.
+fn own_name(name: &str) -> &str {
+    Path::new(name)
+        .file_name()
+        .and_then(|own| own.to_str())
+        .unwrap_or(name)
 }
 
 /// A verdict in a sentence.

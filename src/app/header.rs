@@ -25,9 +25,15 @@ impl App {
                 return;
             }
             self.open_button(ui);
-            layout::menu(ui, "Save", true, |ui| self.save_menu(ui))
+            let save = |ui: &mut Ui| {
+                self.save_menu(ui);
+                self.code_button(ui);
+            };
+            layout::menu(ui, "Save", true, save)
                 .on_hover_text("Save a picture, the record or the scene");
             self.link_button(ui);
+            layout::menu(ui, "Lessons", false, |ui| self.lesson_menu(ui))
+                .on_hover_text("Ten lessons on play in joints, step by step");
             let bench = egui::Button::selectable(self.show_bench, "Bench");
             let help = "Chaos bench shown or hidden (key B): phase portrait, Poincaré section, sweeps, twin run";
             if ui.add(bench).on_hover_text(help).clicked() {
@@ -126,6 +132,12 @@ impl App {
             self.save_scene();
             layout::close_menu(ui);
         }
+        ui.separator();
+        let help = "Copies the line of HTML that shows this scene in this state and view within another page: course page, slides";
+        if ui.button("Embed").on_hover_text(help).clicked() {
+            self.copy_embedding(ui.ctx());
+            layout::close_menu(ui);
+        }
     }
 
     /// Everything that does not fit into a small header.
@@ -133,9 +145,13 @@ impl App {
         ui.set_min_width(180.0);
         self.open_button(ui);
         self.link_button(ui);
+        self.code_button(ui);
         ui.separator();
         ui.label(RichText::new("Save").small().weak());
         self.save_menu(ui);
+        ui.separator();
+        ui.label(RichText::new("Lessons").small().weak());
+        self.lesson_menu(ui);
         ui.separator();
         theme_box(ui);
         if ui.button("Keys").on_hover_text("Keys (?)").clicked() {

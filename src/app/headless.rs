@@ -1,27 +1,16 @@
 //! Pictures of the interface without a window: the same egui code, painted to a texture.
 
+use eframe::egui;
 use eframe::egui_wgpu::{self, RenderState, RendererOptions, WgpuConfiguration, WgpuSetup};
 
 use std::sync::Arc;
 
 use super::canvas::Canvas;
-use super::{App, AppOptions, overlay, theme};
+use super::overlay::{self, Overlay};
+use super::{App, AppOptions, theme};
 use crate::render::{self, Image, NoAdapter, RenderError, wgpu};
 use crate::simulate::StartError;
 use crate::view::{DrawList, Theme};
-
-/// What is written over a plain picture.
-#[derive(Clone, Debug, Default)]
-pub struct Overlay {
-    /// Simulated time, s.
-    pub time: Option<f64>,
-    /// Lines below the time, e.g. [`super::force_notes`].
-    pub notes: Vec<String>,
-    /// How to read the arrows.
-    pub legend: bool,
-    /// Names of joints and axes.
-    pub labels: bool,
-}
 
 /// An egui context and a device without a window.
 pub struct Headless {
@@ -80,6 +69,11 @@ impl Headless {
         self.canvas.paint(output, size, scale).wait()
     }
 
+    /// What its applications are drawn in.
+    pub fn context(&self) -> &egui::Context {
+        &self.canvas.ctx
+    }
+
     /// An application on this device.
     ///
     /// # Errors
@@ -100,28 +94,11 @@ impl Headless {
         scale: f32,
     ) -> Result<Image, RenderError> {
         theme::apply(&self.canvas.ctx);
-        let mut notes = vec![list.magnification_text.clone()];
-        notes.extend(overlay::wear_note(list));
-        notes.extend_from_slice(&overlay.notes);
         let output = self.canvas.pass(list.size, scale, |ui| {
             let rect = ui.max_rect();
             let painter = ui.painter_at(rect);
             painter.add(render::Viewport::shape(rect, list.clone()));
-            if overlay.labels {
-                overlay::labels(&painter, rect, scale, list);
-            }
-            if overlay.legend
-                && overlay::has_room(rect)
-                && let Some(legend) = &list.legend
-            {
-                overlay::legend(&painter, rect, scale, legend, theme);
-            }
-            if let Some(scale) = &list.wear_scale {
-                overlay::wear_scale(&painter, rect, scale, theme);
-            }
-            if let Some(time) = overlay.time {
-                overlay::time(&painter, rect, time, &notes, theme);
-            }
+            overlay::paint(&painter, rect, scale, list, theme, overlay, None);
         })?;
         self.canvas.paint(output, list.size, scale).wait()
     }

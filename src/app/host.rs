@@ -6,6 +6,7 @@ use std::sync::{Arc, OnceLock};
 use eframe::egui;
 use web_time::Instant;
 
+use super::click::Click;
 use crate::analysis::task::{Job, Message};
 
 /// Seconds since an arbitrary origin, to measure the stepping time of a frame.
@@ -46,6 +47,9 @@ pub struct OpenedFile {
     pub content: Result<Vec<u8>, String>,
 }
 
+/// A file that is dropped on the window.
+pub type Dropped = Arc<dyn egui::DroppedFile + Send + Sync>;
+
 /// Services of the desktop or the page. The application works without any ([`NoHost`]).
 ///
 /// Nothing here blocks: slow requests are answered later through [`Self::opened`], and the host then asks egui for a repaint.
@@ -74,16 +78,16 @@ pub trait Host {
         Err("Files cannot be saved here".to_owned())
     }
 
-    /// Lets the user choose a scene file; false if the application is to ask for a path instead.
+    /// Lets the user choose a scene file, and with it those that it names; false if the application is to ask for a path instead.
     fn pick_file(&mut self) -> bool {
         false
     }
 
-    /// Reads a dropped file, now or later.
-    fn read_dropped(&mut self, file: Arc<dyn egui::DroppedFile + Send + Sync>);
+    /// Reads files that were dropped at once, now or later.
+    fn read_dropped(&mut self, files: Vec<Dropped>);
 
-    /// The next file that was chosen, or dropped and read.
-    fn opened(&mut self) -> Option<OpenedFile>;
+    /// The next files that were chosen at once, or dropped and read.
+    fn opened(&mut self) -> Option<Vec<OpenedFile>>;
 
     /// Folder in which the scene file `name`, opened here, finds the files that it names; `None` where files have no folder.
     fn folder(&self, _name: &str) -> Option<PathBuf> {
@@ -100,6 +104,11 @@ pub trait Host {
         None
     }
 
+    /// How many background computations may run at once beside the picture.
+    fn workers(&self) -> usize {
+        1
+    }
+
     /// Starts a long background computation; `None` if that is not possible.
     fn start(&mut self, _job: Job) -> Option<Box<dyn Running>> {
         None
@@ -108,6 +117,17 @@ pub trait Host {
     /// Fills the screen with the window, or ends that.
     fn fill_screen(&mut self, ctx: &egui::Context, on: bool) {
         ctx.send_viewport_cmd(egui::ViewportCommand::Fullscreen(on));
+    }
+
+    /// Switches sound on or off; off at first.
+    fn sound(&mut self, _on: bool) {}
+
+    /// Sounds `clicks` of a frame that begins now.
+    fn click(&mut self, _clicks: &[Click]) {}
+
+    /// Why nothing is heard although sound is on, in words; `None` as long as nothing is known against it.
+    fn no_sound(&mut self) -> Option<String> {
+        Some("it cannot be made here".to_owned())
     }
 
     /// What is going on, for users who do not see the picture; the same sentences are in the accessibility tree. `event`:
@@ -120,9 +140,9 @@ pub trait Host {
 pub struct NoHost;
 
 impl Host for NoHost {
-    fn read_dropped(&mut self, _file: Arc<dyn egui::DroppedFile + Send + Sync>) {}
+    fn read_dropped(&mut self, _files: Vec<Dropped>) {}
 
-    fn opened(&mut self) -> Option<OpenedFile> {
+    fn opened(&mut self) -> Option<Vec<OpenedFile>> {
         None
     }
 }

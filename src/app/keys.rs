@@ -25,6 +25,7 @@ pub enum Action {
     /// Close-up of a ball joint, by index.
     CloseUp(usize),
     Magnify,
+    Sound,
     Microscope,
     IdealGhost,
     Arrows,
@@ -32,6 +33,10 @@ pub enum Action {
     Plots,
     Bench,
     Present,
+    /// To the next or the previous step of a lesson.
+    TurnPage {
+        forward: bool,
+    },
     Theme,
     Help,
     Close,
@@ -59,7 +64,7 @@ const fn bind(key: Key, action: Action, written: &'static str, help: &'static st
 }
 
 /// All keys.
-pub const BINDINGS: [Binding; 37] = [
+pub const BINDINGS: [Binding; 40] = [
     bind(Key::Space, Action::PlayPause, "Space", "Play or pause"),
     bind(
         Key::ArrowRight,
@@ -110,10 +115,16 @@ pub const BINDINGS: [Binding; 37] = [
     bind(Key::Num8, Action::CloseUp(3), "", ""),
     bind(Key::Num9, Action::CloseUp(4), "", ""),
     bind(
-        Key::M,
+        Key::X,
         Action::Magnify,
-        "M",
+        "X",
         "Next magnification of the play",
+    ),
+    bind(
+        Key::M,
+        Action::Sound,
+        "M",
+        "Sound on or off: a click for every impact",
     ),
     bind(
         Key::L,
@@ -137,6 +148,13 @@ pub const BINDINGS: [Binding; 37] = [
         "F5",
         "Presentation: the picture alone, large type, thick arrows",
     ),
+    bind(
+        Key::PageDown,
+        Action::TurnPage { forward: true },
+        "Page Down, Page Up",
+        "Next step of a lesson, and the one before: as a presenter's remote sends them",
+    ),
+    bind(Key::PageUp, Action::TurnPage { forward: false }, "", ""),
     bind(Key::T, Action::Theme, "T", "Light or dark"),
     bind(Key::Questionmark, Action::Help, "?", "This list"),
     bind(Key::Slash, Action::Help, "", ""),
@@ -181,9 +199,82 @@ pub const POINTER: [(&str, &str); 12] = [
 /// Where the focused slider is stored.
 const SLIDER: &str = "slider with the focus";
 
-/// A slider that keeps the arrow keys once dragged or reached by Tab, until something else is clicked.
+/// Way of a finger from which it is clear where it goes, points.
+const SLACK: f32 = 8.0;
+
+/// What a finger that came down on a slider does.
+#[derive(Clone, Copy, PartialEq)]
+enum Finger {
+    /// Not known yet.
+    Waits,
+    /// Sideways: it draws the handle. Up or down: it scrolls what the slider lies in.
+    Goes,
+}
+
+/// Leaves a finger that came down on the slider `own` to what the slider lies in, unless it goes sideways. `place`: where this
+/// is kept. To be called before the slider is added; whether that is to hear of what the finger has done so far.
+fn follow_finger(ui: &Ui, place: Id, own: Id) -> bool {
+    let (touched, origin, way) = ui.input(|input| {
+        let pointer = &input.pointer;
+        let way = pointer.total_drag_delta().unwrap_or_default();
+        (input.any_touches(), pointer.press_origin(), way)
+    });
+    if !touched {
+        ui.data_mut(|data| data.remove::<Finger>(place));
+        return true;
+    }
+    let ctx = ui.ctx();
+    let (now, hears) = match ui.data(|data| data.get_temp(place)) {
+        None if ctx.is_being_dragged(own) => {
+            ctx.stop_dragging();
+            (Finger::Waits, false)
+        }
+        Some(Finger::Waits) if way.length() >= SLACK => {
+            let sideways = way.x.abs() >= way.y.abs();
+            let below = origin.filter(|_| !sideways);
+            let below = below.and_then(|origin| scrolling_at(ui, origin));
+            if let Some(drawn) = below.or(sideways.then_some(own)) {
+                ctx.set_dragged_id(drawn);
+            }
+            (Finger::Goes, true)
+        }
+        _ => return true,
+    };
+    ui.data_mut(|data| data.insert_temp(place, now));
+    hears
+}
+
+/// What of all that `ui` lies in scrolls under a finger at `point`.
+fn scrolling_at(ui: &Ui, point: egui::Pos2) -> Option<Id> {
+    let layer = ui.layer_id();
+    ui.ctx().viewport(|viewport| {
+        // What a slider lies in has been added before it, and is for drags alone.
+        let widgets = viewport.this_pass.widgets.get_layer(layer);
+        let under = widgets.filter(|widget| {
+            let sense = widget.sense;
+            sense.senses_drag() && !sense.senses_click() && widget.interact_rect.contains(point)
+        });
+        under.last().map(|widget| widget.id)
+    })
+}
+
+/// A slider that keeps the arrow keys once dragged or reached by Tab, until something else is clicked. A finger moves it by a drag
+/// to the side alone.
 pub fn slider(ui: &mut Ui, slider: Slider<'_>) -> Response {
-    let response = ui.add(slider);
+    let place = ui.next_auto_id().with("finger");
+    let own = place.with("slider");
+    let before: Option<Id> = ui.data(|data| data.get_temp(own));
+    let hears = before.is_none_or(|before| follow_finger(ui, place, before));
+    let response = if hears {
+        ui.add(slider)
+    } else {
+        // It looks as always.
+        let faded = std::mem::replace(&mut ui.visuals_mut().disabled_alpha, 1.0);
+        let response = ui.add_enabled(false, slider);
+        ui.visuals_mut().disabled_alpha = faded;
+        response
+    };
+    ui.data_mut(|data| data.insert_temp(own, response.id));
     if response.drag_started() {
         response.request_focus();
     }

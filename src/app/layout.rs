@@ -7,6 +7,10 @@ use super::{App, present, theme, transport};
 /// Below this width or height the window is small, points.
 const NARROW: f32 = 760.0;
 const SHORT: f32 = 480.0;
+/// Below this width a picture has no room for time and buttons side by side, points.
+const SLIM: f32 = 250.0;
+/// Width of the panel of a lesson beside the picture, points.
+const LESSON: f32 = 340.0;
 
 /// Arrangement of the window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,10 +32,16 @@ pub enum Sheet {
     Plots,
     /// Chaos bench.
     Bench,
+    /// The lesson under way.
+    Lesson,
 }
 
-/// The entries of a menu; on a low screen they scroll.
+/// The entries of a menu; on a low screen they scroll, and a bar shows that they do.
 pub(super) fn entries(ui: &mut Ui, add: impl FnOnce(&mut Ui)) {
+    let bar = &mut ui.spacing_mut().scroll;
+    // At rest, too: a finger does not hover over it.
+    bar.dormant_handle_opacity = 0.6;
+    bar.floating_width = bar.bar_width;
     // Room for its frame and for a strip of what lies under it.
     let most = ui.ctx().content_rect().height() - 48.0;
     ScrollArea::vertical()
@@ -165,6 +175,13 @@ impl App {
         }
         if self.is_presenting() {
             self.presentation_ui(ui);
+            self.point_out(ui);
+            return self.dialog_ui(ui.ctx());
+        }
+        if self.embedded().is_some() {
+            let bar = Frame::side_top_panel(ui.style()).inner_margin(egui::Margin::symmetric(8, 4));
+            self.embedded_ui(ui, bar);
+            self.point_out(ui);
             return self.dialog_ui(ui.ctx());
         }
         let margin = if arrangement == Arrangement::Landscape {
@@ -181,10 +198,29 @@ impl App {
             Arrangement::Portrait => self.portrait(ui, bar),
             Arrangement::Landscape => self.landscape(ui, bar),
         }
+        self.point_out(ui);
         self.dialog_ui(ui.ctx());
     }
 
+    /// The panel of a lesson at the side of a wide window. Nothing of it on a small one, where it is a sheet.
+    pub(super) fn lesson_beside(&mut self, ui: &mut Ui, bar: Frame) {
+        if self.course().is_none() {
+            return;
+        }
+        let panel = if ui.available_width() > ui.available_height() {
+            let width = LESSON.min(0.42 * ui.available_width());
+            Panel::right("lesson").exact_size(width)
+        } else {
+            Panel::bottom("lesson").exact_size(0.42 * ui.available_height())
+        };
+        panel
+            .frame(bar)
+            .resizable(false)
+            .show(ui, |ui| self.lesson_ui(ui));
+    }
+
     fn side_by_side(&mut self, ui: &mut Ui, bar: Frame) {
+        self.lesson_beside(ui, bar);
         let free = !self.is_under_way();
         let Self {
             player,
@@ -212,7 +248,7 @@ impl App {
                     ui.add_enabled_ui(free, |ui| controls.ui(ui, player, accuracy));
                 });
             });
-        let load = Panel::right("bench")
+        let of_bench = Panel::right("bench")
             .frame(bar)
             .resizable(true)
             .default_size(400.0)
@@ -260,8 +296,8 @@ impl App {
         if present {
             self.present(ui.ctx(), true);
         }
-        if let Some(load) = load.and_then(|shown| shown.inner) {
-            self.start_load(load);
+        if let Some(wish) = of_bench.and_then(|shown| shown.inner) {
+            self.bench_asks(wish);
         }
     }
 
@@ -281,7 +317,11 @@ impl App {
                 present = present::double_tapped(ui);
                 ui.add_enabled_ui(free, |ui| self.timeline_ui(ui));
                 let asked = ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.player));
-                ui.horizontal(|ui| self.sheet_tabs(ui, false));
+                ui.horizontal(|ui| {
+                    self.sheet_tabs(ui, false);
+                    let backwards = egui::Layout::right_to_left(egui::Align::Center);
+                    ui.with_layout(backwards, |ui| transport::reached_beside(ui, &self.player));
+                });
                 asked.inner
             })
             .inner;
@@ -300,7 +340,15 @@ impl App {
                 present = present::double_tapped(ui);
                 ui.add_enabled_ui(free, |ui| self.timeline_ui(ui));
                 ui.horizontal(|ui| {
-                    let room = ui.available_width() - 270.0;
+                    let tabs = if self.course().is_some() {
+                        350.0
+                    } else {
+                        270.0
+                    };
+                    // Where they would cover the buttons, they are a menu.
+                    let folded = ui.available_width() < tabs + transport::LEAST;
+                    let tabs = if folded { 90.0 } else { tabs };
+                    let room = ui.available_width() - tabs;
                     let asked = ui
                         .allocate_ui(egui::vec2(room, ui.spacing().interact_size.y), |ui| {
                             ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.player))
@@ -308,7 +356,13 @@ impl App {
                         })
                         .inner;
                     let backwards = egui::Layout::right_to_left(egui::Align::Center);
-                    ui.with_layout(backwards, |ui| self.sheet_tabs(ui, true));
+                    ui.with_layout(backwards, |ui| {
+                        if folded {
+                            menu(ui, "Panels", false, |ui| self.sheet_tabs(ui, false));
+                        } else {
+                            self.sheet_tabs(ui, true);
+                        }
+                    });
                     asked
                 })
                 .inner
@@ -336,7 +390,7 @@ impl App {
         }
     }
 
-    fn timeline_ui(&mut self, ui: &mut Ui) {
+    pub(super) fn timeline_ui(&mut self, ui: &mut Ui) {
         let focus = self.viewport.focus();
         if self.timeline.ui(ui, &mut self.player, focus) {
             self.viewport.arrive(&self.player);
@@ -345,11 +399,14 @@ impl App {
 
     /// What the sheet shows; choosing the same again folds it away. `backwards` where the layout runs from right to left.
     fn sheet_tabs(&mut self, ui: &mut Ui, backwards: bool) {
-        let mut tabs = [
+        let mut tabs = vec![
             (Sheet::Controls, "Controls", "Parameters shown or hidden"),
             (Sheet::Plots, "Plots", "Plots shown or hidden"),
             (Sheet::Bench, "Bench", "Chaos bench shown or hidden"),
         ];
+        if self.course().is_some() {
+            tabs.insert(0, (Sheet::Lesson, "Lesson", "Lesson shown or hidden"));
+        }
         if backwards {
             tabs.reverse();
         }
@@ -368,6 +425,9 @@ impl App {
     }
 
     fn sheet(&mut self, ui: &mut Ui) {
+        if self.sheet == Some(Sheet::Lesson) {
+            return self.lesson_ui(ui);
+        }
         let free = !self.is_under_way();
         let Self {
             player,
@@ -379,7 +439,7 @@ impl App {
             viewport,
             ..
         } = self;
-        let mut load = None;
+        let mut of_bench = None;
         ScrollArea::vertical()
             .id_salt("sheet")
             .auto_shrink(false)
@@ -399,24 +459,34 @@ impl App {
                         }
                     }
                     Some(Sheet::Bench) => {
-                        load = ui.add_enabled_ui(free, |ui| bench.ui(ui, player)).inner;
+                        of_bench = ui.add_enabled_ui(free, |ui| bench.ui(ui, player)).inner;
                     }
-                    None => {}
+                    Some(Sheet::Lesson) | None => {}
                 }
             });
-        if let Some(load) = load {
-            self.start_load(load);
+        if let Some(wish) = of_bench {
+            self.bench_asks(wish);
         }
     }
 
     /// The 3D view with its buttons and, after a stop, the reason. Returns whether the user asked for a reset.
     pub(super) fn picture(&mut self, ui: &mut Ui) -> bool {
-        let area = ui.max_rect();
-        self.picture_rect = area;
         let plain = self.picture.is_plain();
-        let presenting = self.is_presenting();
+        if !plain {
+            self.microscope_beside(ui);
+        }
+        let area = ui.available_rect_before_wrap();
+        self.picture_rect = area;
+        let presenting = self.is_presenting() || self.embedded().is_some();
         self.player.place_ghost();
-        self.viewport.ui(ui, &self.player, plain);
+        let caption = self.is_presenting().then(|| self.caption_plate(ui));
+        let above = caption.flatten().map(|(_, plate)| plate);
+        self.viewport.ui(ui, &self.player, plain, above);
+        if let Some(joint) = self.viewport.take_clicked() {
+            self.focus(joint);
+            self.microscope.set_open(true);
+            ui.request_repaint();
+        }
         if let Some(pull) = self.viewport.take_pull()
             && !self.is_under_way()
             && let Err(error) = self.player.pull(pull)
@@ -430,9 +500,15 @@ impl App {
         let inner = area.shrink(10.0);
         let narrow = area.width() < 520.0;
         let row = egui::vec2(inner.width(), ui.spacing().interact_size.y);
+        // Beside the microscope of a phone the time needs all of the upper edge.
+        let edge = if area.width() < SLIM {
+            Align2::RIGHT_BOTTOM
+        } else {
+            Align2::RIGHT_TOP
+        };
         let backwards = egui::Layout::right_to_left(egui::Align::Center);
         let buttons = egui::UiBuilder::new()
-            .max_rect(egui::Rect::from_min_size(inner.min, row))
+            .max_rect(edge.align_size_within_rect(row, inner))
             .layout(backwards);
         ui.scope_builder(buttons, |ui| {
             if presenting {
@@ -453,7 +529,6 @@ impl App {
             }
         });
         drop_hint(ui, area);
-        self.inset(ui, inner);
         let messages = self.messages(ui, inner);
         self.notice_plate(ui, messages);
         let middle = egui::UiBuilder::new().max_rect(inner.shrink2(egui::vec2(0.0, 44.0)));

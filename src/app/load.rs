@@ -118,7 +118,7 @@ mod tests {
     use super::*;
     use crate::analysis::drive::observed;
     use crate::analysis::grid::Start;
-    use crate::analysis::sweep_task::SweepTask;
+    use crate::analysis::sweep_task::{Share, SweepTask};
     use crate::analysis::task::{Job, Message, perform};
     use crate::scene::Scene;
     use std::ops::ControlFlow;
@@ -137,13 +137,17 @@ mod tests {
             exponent: false,
         };
         let mut points = vec![None; 3];
-        perform(&Job::Sweep(task.clone()), &mut || 0.0, &mut |message| {
-            if let Message::Point(point) = message {
-                let index = point.index;
-                points[index] = Some(*point);
-            }
-            ControlFlow::Continue(())
-        });
+        perform(
+            &Job::Sweep(task.clone(), Share::WHOLE),
+            &mut || 0.0,
+            &mut |message| {
+                if let Message::Point(point) = message {
+                    let index = point.index;
+                    points[index] = Some(*point);
+                }
+                ControlFlow::Continue(())
+            },
+        );
         let find = |index: usize| points.get(index)?.as_ref();
         for (index, kept) in [(2, 0), (1, 1), (0, 0)] {
             let way = Load::new(&task.scene, find, index, task.discard + kept, 3);

@@ -1,10 +1,10 @@
-//! The microscope: an inset over the 3D view that magnifies one ball joint until its play is visible.
+//! The microscope: beside the 3D view it magnifies one ball joint until its play is visible.
 
 mod draw;
 mod sight;
 
 use eframe::egui::{
-    self, ComboBox, Grid, Id, Rect, RichText, Role, ScrollArea, Sense, Ui, WidgetInfo, vec2,
+    self, ComboBox, Frame, Grid, Panel, RichText, Role, ScrollArea, Sense, Ui, WidgetInfo, vec2,
 };
 use glam::Vec3;
 
@@ -15,10 +15,15 @@ pub use draw::Circle;
 use draw::{Plane, Sheet};
 use sight::Sight;
 
-/// Least size of the inset, points.
-const LEAST: egui::Vec2 = vec2(190.0, 170.0);
-/// Least width at which it opens unless there is no more room, points.
-const USUAL: f32 = 250.0;
+/// Least width and height, points.
+const LEAST: egui::Vec2 = vec2(200.0, 150.0);
+/// Share of the picture that it opens with, and the most points.
+const SHARE: f32 = 0.4;
+const USUAL: f32 = 330.0;
+/// Most of the picture that it takes, as a share.
+const MOST: f32 = 0.5;
+/// What it must leave of the picture, points: where there is less it waits for room.
+const LEFT: f32 = 120.0;
 /// Height of the section of the contact, points.
 const SECTION: f32 = 112.0;
 /// From this width on, pictures and numbers are side by side, points.
@@ -28,17 +33,13 @@ const NUMBERS: f32 = 215.0;
 /// Least reference speed of the velocity arrow, m/s.
 const SLOWEST: f64 = 1e-4;
 
-/// The inset and its choices.
+/// The panel and its choices.
 #[derive(Default)]
 pub struct Microscope {
     open: bool,
     joint: usize,
     plane: Plane,
     circle: Option<Circle>,
-    /// Room in the latest frame.
-    area: Option<Rect>,
-    /// It has had a place.
-    placed: bool,
 }
 
 impl Microscope {
@@ -67,38 +68,30 @@ impl Microscope {
         self.circle
     }
 
-    /// The inset within `area`; `view`: world vectors to the right and up in the 3D view. Returns a joint that was chosen in
-    /// it.
-    fn ui(
-        &mut self,
-        ctx: &egui::Context,
-        area: Rect,
-        player: &Player,
-        view: [Vec3; 2],
-        enabled: bool,
-    ) -> Option<usize> {
+    /// The panel, at the side of `ui` or below in a high one; `view`: world vectors to the right and up in the 3D view. Returns
+    /// a joint that was chosen in it.
+    fn ui(&mut self, ui: &mut Ui, player: &Player, view: [Vec3; 2]) -> Option<usize> {
         self.circle = None;
-        // It stays where it first opens: there the layout has to have settled, which takes a window some frames.
-        self.placed |= self.area.replace(area) == Some(area) && self.open;
-        if !self.open || !self.placed {
+        let room = ui.available_size();
+        let (room, least, panel) = if room.x > room.y {
+            (room.x, LEAST.x, Panel::right("microscope"))
+        } else {
+            (room.y, LEAST.y, Panel::bottom("microscope below"))
+        };
+        if !self.open || room < least + LEFT {
+            // The picture keeps its id.
+            ui.skip_ahead_auto_ids(1);
             return None;
         }
-        let size = vec2(
-            (0.42 * area.width()).clamp(USUAL.min(area.width()), 330.0),
-            (area.height() - 60.0).clamp(LEAST.y, 520.0),
-        );
-        let corner = area.right_top() + vec2(-size.x, 44.0);
-        let frame = egui::Frame::window(&ctx.global_style()).inner_margin(8.0);
-        let shown = egui::Window::new("Microscope")
-            .id(Id::unique("microscope"))
-            .enabled(enabled)
-            .title_bar(false)
-            .default_rect(Rect::from_min_size(corner, size))
-            .min_size(LEAST.min(area.size()))
-            .constrain_to(area)
-            .frame(frame)
-            .show(ctx, |ui| self.contents(ui, player, view));
-        shown.and_then(|shown| shown.inner).flatten()
+        let size = (SHARE * room).min(USUAL).max(least);
+        let panel = panel
+            .default_size(size)
+            .size_range(least..=(MOST * room).max(least));
+        panel
+            .resizable(true)
+            .frame(Frame::side_top_panel(ui.style()).inner_margin(8.0))
+            .show(ui, |ui| self.contents(ui, player, view))
+            .inner
     }
 
     fn contents(&mut self, ui: &mut Ui, player: &Player, view: [Vec3; 2]) -> Option<usize> {
@@ -217,7 +210,8 @@ impl Microscope {
 }
 
 fn scrolled(ui: &mut Ui, add: impl FnOnce(&mut Ui)) {
-    ScrollArea::vertical()
+    // Sideways, too: a long number must not widen the panel.
+    ScrollArea::both()
         .id_salt("under the microscope")
         .auto_shrink(false)
         .show(ui, |ui| {
@@ -400,17 +394,10 @@ impl App {
         self.viewport.centre(&self.player, joint);
     }
 
-    /// The inset, over the part `area` of the window.
-    pub(super) fn inset(&mut self, ui: &Ui, area: Rect) {
-        if let Some(joint) = self.viewport.take_clicked() {
-            self.focus(joint);
-            self.microscope.set_open(true);
-        }
+    /// The microscope beside the picture, which gets the rest of `ui`.
+    pub(super) fn microscope_beside(&mut self, ui: &mut Ui) {
         let view = self.viewport.across();
-        let enabled = self.dialog.is_none();
-        let (player, ctx) = (&self.player, ui.ctx());
-        let chosen = self.microscope.ui(ctx, area, player, view, enabled);
-        if let Some(joint) = chosen {
+        if let Some(joint) = self.microscope.ui(ui, &self.player, view) {
             self.focus(joint);
         }
     }
@@ -418,10 +405,13 @@ impl App {
     /// The instruments in the view menu.
     pub(super) fn instruments(&mut self, ui: &mut Ui) {
         ui.label("Instruments");
-        ui.checkbox(&mut self.microscope.open, "Microscope")
-            .on_hover_text(
-                "An inset with the play of the joint in focus: path of the ball, contact, impacts (key L)",
-            );
+        ui.horizontal(|ui| {
+            ui.checkbox(&mut self.microscope.open, "Microscope")
+                .on_hover_text(
+                    "The play of the joint in focus, magnified: path of the ball, contact, impacts (key L)",
+                );
+            self.sound_switch(ui);
+        });
         self.ideal_switch(ui);
     }
 }

@@ -8,11 +8,13 @@ mod announce;
 mod background;
 mod bench;
 mod canvas;
+mod click;
 mod controls;
 mod curve;
 #[cfg(not(target_arch = "wasm32"))]
 mod desktop;
 mod dialogs;
+mod embed;
 mod files;
 mod film;
 mod ghosts;
@@ -24,10 +26,12 @@ mod icons;
 mod ideal;
 mod keys;
 mod layout;
+mod lesson;
 mod load;
 mod log;
 mod microscope;
 mod overlay;
+mod pace;
 mod paths;
 mod picture;
 mod player;
@@ -40,6 +44,9 @@ mod replay;
 mod saved;
 mod settled;
 mod share;
+mod sound;
+#[cfg(all(feature = "sound", not(target_arch = "wasm32")))]
+mod speaker;
 mod stack;
 mod theme;
 mod timeline;
@@ -52,6 +59,8 @@ mod watch;
 mod window;
 mod zoom;
 
+use std::sync::Arc;
+
 use eframe::egui::{self, ThemePreference, Ui};
 use eframe::egui_wgpu;
 
@@ -59,31 +68,35 @@ use crate::analysis::source::SceneSource;
 use crate::render;
 use crate::scene::{DEFAULT_SCENE, Scene, Vec3};
 use crate::simulate::{Simulation, StartError};
-use crate::view::{Preset, ViewOptions};
+use crate::view::{Preset, Quality, ViewOptions};
 
 use accuracy::Accuracy;
 use announce::Announcer;
 use bench::Bench;
+pub use click::{Click, MOST_CLICKS, PITCHES, Stretch, Voice, clicks};
 use controls::Controls;
 #[cfg(not(target_arch = "wasm32"))]
 pub use desktop::DesktopHost;
 use dialogs::{Answer, Dialog};
+pub use embed::Embedded;
 pub use film::Wanted as WantedFilm;
 #[cfg(not(target_arch = "wasm32"))]
-pub use headless::{Headless, Overlay};
-pub use host::{Clock, Host, NoHost, OpenedFile, Running, SaveFile};
+pub use headless::Headless;
+pub use host::{Clock, Dropped, Host, NoHost, OpenedFile, Running, SaveFile};
 use keys::Action;
 use layout::Sheet;
+pub use lesson::{BUILT_IN_LESSONS, Course, Lesson, lesson_titles};
 use load::Load;
 pub use log::{Entry, Event, Log};
 pub use microscope::{Circle, Microscope};
-pub use overlay::{force_notes, plate};
+pub use overlay::{Overlay, force_notes, plate};
 use picture::Picture;
 pub use player::Player;
 pub use plots::{Plots, Window};
 use reload::SceneFile;
 pub use replay::{Replay, Verdict};
 pub use share::{CameraPose, LONGEST_LINK, Link, LinkError, SceneText};
+use sound::Sound;
 use timeline::Timeline;
 use viewport::Viewport;
 #[cfg(not(target_arch = "wasm32"))]
@@ -116,6 +129,10 @@ pub struct AppOptions {
     pub view: ViewOptions,
     /// The link that `scene` comes from: its state is reproduced.
     pub link: Option<Link>,
+    /// The lesson that goes with it, and its step, counted from 0.
+    pub lesson: Option<(Arc<Lesson>, usize)>,
+    /// Its panels within another page; `None` for a window of its own.
+    pub embedded: Option<Embedded>,
     /// A message to show at once, e.g. why a link could not be opened.
     pub problem: Option<String>,
     /// Clock that measures the stepping time of a frame.
@@ -135,8 +152,19 @@ impl AppOptions {
                 ..ViewOptions::default()
             },
             link: None,
+            lesson: None,
+            embedded: None,
             problem: None,
             clock: host::wall,
+        }
+    }
+
+    /// Begins `lesson` at step `step`, counted from 0.
+    pub fn of_lesson(lesson: Arc<Lesson>, step: usize) -> Self {
+        Self {
+            playing: false,
+            lesson: Some((lesson.clone(), step)),
+            ..Self::new(lesson.runs[0].scene.clone())
         }
     }
 
@@ -146,12 +174,27 @@ impl AppOptions {
     /// A link that cannot be read, or whose scene is invalid or cannot start; in words.
     pub fn from_link(text: &str) -> Result<Self, String> {
         let link = Link::parse(text).map_err(|error| error.to_string())?;
+        let lesson = link.lesson.as_deref().map(Lesson::built_in).transpose();
+        let lesson = lesson.map_err(|error| format!("link: {error}"))?;
+        let lesson = lesson.map(|lesson| (lesson, link.step.unwrap_or(1) - 1));
+        if let Some((lesson, step)) = &lesson
+            && !link.has_instant()
+            && link.log.base.is_empty()
+        {
+            return Ok(Self {
+                theme: link.theme.unwrap_or(ThemePreference::System),
+                embedded: link.embedded.clone(),
+                ..Self::of_lesson(lesson.clone(), *step)
+            });
+        }
         let scene = link.load().map_err(|error| format!("link: {error}"))?;
         Simulation::new(&scene).map_err(|error| format!("link: {}", error.located(&scene)))?;
         link.followed(&scene).map_err(|error| error.to_string())?;
         link.under_microscope(&scene)
             .map_err(|error| error.to_string())?;
         let mut options = Self::new(scene);
+        options.lesson = lesson;
+        options.embedded.clone_from(&link.embedded);
         options.playing = link.playing.unwrap_or(!link.has_instant());
         if let Some(scale) = link.time_scale {
             options.time_scale = scale;
@@ -236,6 +279,10 @@ pub struct App {
     /// How the last one was to be.
     film_wanted: Option<film::Wanted>,
     presentation: Option<present::Presentation>,
+    embedded: Option<Embedded>,
+    sound: Sound,
+    /// The lesson under way.
+    course: Option<Box<Course>>,
     /// Where the 3D view is, points.
     picture_rect: egui::Rect,
     /// The graphics adapter and its interface; "" without a window.
@@ -301,13 +348,20 @@ impl App {
             film: None,
             film_wanted: None,
             presentation: None,
+            embedded: options.embedded,
+            sound: Sound::default(),
+            course: None,
             picture_rect: egui::Rect::ZERO,
             renderer: String::new(),
             graphics: None,
             player,
         };
+        let begins = options.link.is_none();
         if let Some(link) = options.link {
             app.show_link(link);
+        }
+        if let Some((lesson, step)) = options.lesson {
+            app.join_lesson(lesson, step, begins);
         }
         app.attach(ctx, state, options.theme);
         Ok(app)
@@ -378,6 +432,17 @@ impl App {
         &mut self.player
     }
 
+    /// Lets slow frames lower the quality of the picture while it moves: for a window or page, whose pictures need not be the same
+    /// each time.
+    pub fn follow_frame_rate(&mut self) {
+        self.viewport.follow_frame_rate(true);
+    }
+
+    /// With which quality the latest picture was drawn.
+    pub fn picture_quality(&self) -> Quality {
+        self.viewport.quality()
+    }
+
     /// Where the camera is or is moving to; `None` before the first picture.
     pub fn camera_pose(&self) -> Option<CameraPose> {
         self.viewport.pose()
@@ -408,6 +473,20 @@ impl App {
     pub fn loading(&self) -> Option<f32> {
         let (load, _) = self.load.as_ref()?;
         Some(load.fraction(&self.player))
+    }
+
+    /// Does what was asked for in the bench.
+    fn bench_asks(&mut self, asked: bench::Asked) {
+        match asked {
+            bench::Asked::Section(load) => self.start_load(load),
+            bench::Asked::Ready(sweep) => {
+                let scene = sweep.scene().map_err(|error| error.to_string());
+                self.problem = scene.and_then(|scene| self.show_scene(&scene)).err();
+                if self.problem.is_none() {
+                    self.bench.start(sweep, self.player.wanted());
+                }
+            }
+        }
     }
 
     /// Runs to a section of a sweep; asks first if that changes more than the varied parameter.
@@ -536,14 +615,22 @@ impl App {
     pub fn open_link(&mut self, ctx: &egui::Context, text: &str) -> Result<(), String> {
         let opened = AppOptions::from_link(text).and_then(|options| {
             self.show_scene(&options.scene)?;
+            let begins = options.link.is_none();
             self.player.pacer.set_scale(options.time_scale);
             self.player.set_playing(options.playing);
+            // A window of its own remains one.
+            if let (Some(panels), Some(wanted)) = (&mut self.embedded, options.embedded) {
+                *panels = wanted;
+            }
             self.viewport.options.magnification = options.view.magnification;
             if let Some(link) = options.link {
                 if let Some(theme) = link.theme {
                     ctx.set_theme(theme);
                 }
                 self.show_link(link);
+            }
+            if let Some((lesson, step)) = options.lesson {
+                self.join_lesson(lesson, step, begins);
             }
             Ok(())
         });
@@ -578,7 +665,7 @@ impl App {
             return true;
         }
         let sought = self.player.is_seeking();
-        self.player.advance(dt);
+        self.advance_heard(dt);
         if sought && !self.player.is_seeking() {
             self.viewport.arrive(&self.player);
         }
@@ -674,11 +761,13 @@ impl App {
                 self.microscope.set_open(open);
             }
             Action::Magnify => self.viewport.next_magnification(),
+            Action::Sound => self.set_sound(!self.is_sounding()),
             Action::Arrows => {
                 let arrows = &mut self.viewport.options.arrows;
                 let on = !(arrows.normal || arrows.friction);
                 (arrows.normal, arrows.friction) = (on, on);
             }
+            Action::TurnPage { forward } => self.turn_page(forward),
             Action::Present => self.present(ctx, !self.is_presenting()),
             Action::Bench if self.compact => self.fold(Sheet::Bench),
             Action::Bench => self.show_bench = !self.show_bench,
@@ -790,6 +879,7 @@ impl eframe::App for App {
         self.receive_picture(ctx);
         self.advance_film(ctx);
         self.follow_screen(ctx);
+        self.check_sound();
         let measuring = self.accuracy.update(self.host.as_mut());
         if self.bench.update(self.host.as_mut()) || measuring {
             ctx.request_repaint_after(POLL);
@@ -798,6 +888,7 @@ impl eframe::App for App {
         if self.advance(f64::from(dt)) {
             ctx.request_repaint();
         }
+        self.advance_lesson(ctx);
         self.announce(ctx);
     }
 

@@ -1,7 +1,7 @@
 //! What the interface paints over a picture: labels, the legend of the arrows, the time. Used by the viewport and
 //! by headless frames.
 
-use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, pos2, vec2};
+use eframe::egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Shape, Stroke, Vec2, pos2, vec2};
 
 use super::value;
 use crate::scene::{Scene, format_quantity_digits};
@@ -45,31 +45,92 @@ pub fn has_room(rect: Rect) -> bool {
     rect.size().min_elem() >= SMALL
 }
 
-/// Plates in a picture beyond which further ones are left out, and how far one gives way to others, points: further away it
-/// would seem to belong to something else.
+/// Plates in a picture beyond which further ones are left out, names without room after which no more are tried, and how far
+/// one gives way to others, points: further away it would seem to belong to something else.
 const MOST_PLATES: usize = 256;
+const MOST_MISSED: usize = 256;
 const FURTHEST: f32 = 72.0;
+/// Distance of a plate from what it names beyond which a line leads there, points.
+const LED: f32 = 14.0;
 
-/// `place` moved down until it lies over none of `plates`; none where that is too far.
-fn clear_of(plates: &[Rect], mut place: Rect) -> Option<Rect> {
-    let furthest = place.min.y + FURTHEST;
-    while let Some(plate) = plates.iter().find(|plate| plate.intersects(place)) {
-        place = place.translate(vec2(0.0, plate.max.y + 1.0 - place.min.y));
-        if place.min.y > furthest {
-            return None;
-        }
-    }
-    Some(place)
+/// A place for a plate of `size` that is `anchor`ed `beside` a point, over none of `plates` and in `rect`: there, on another side
+/// of the point, or above and below, the nearest first.
+fn clear_of(
+    plates: &[Rect],
+    rect: Rect,
+    at: Pos2,
+    (anchor, beside): (Align2, Vec2),
+    size: Vec2,
+) -> Option<Rect> {
+    let first = anchor.anchor_size(at + beside, size).expand2(PAD);
+    let mirrored = first.translate(vec2(2.0 * (at.x - first.center().x), 0.0));
+    let row = first.height() + 1.0;
+    let rows = (FURTHEST / row) as i32;
+    let steps = (0..=rows).flat_map(|k| [-k, k].into_iter().skip(usize::from(k == 0)));
+    let places =
+        steps.flat_map(|k| [first, mirrored].map(|p| p.translate(vec2(0.0, k as f32 * row))));
+    let free = |place: &Rect| !plates.iter().any(|plate| plate.intersects(*place));
+    places.filter(|place| rect.contains_rect(*place)).find(free)
 }
 
-/// Names of joints and axes at their places.
-pub fn labels(painter: &Painter, rect: Rect, scale: f32, list: &DrawList) {
+/// Room about the words of a plate, points.
+const PAD: Vec2 = vec2(4.0, 1.0);
+
+/// What is written over a picture.
+#[derive(Clone, Debug, Default)]
+pub struct Overlay {
+    /// Simulated time, s.
+    pub time: Option<f64>,
+    /// Lines below the time, after those about the picture itself; e.g. [`force_notes`].
+    pub notes: Vec<String>,
+    /// How to read the arrows.
+    pub legend: bool,
+    /// Names of joints and axes.
+    pub labels: bool,
+}
+
+/// Writes over the picture of `list` in `rect`; `scale` is pixels per point. Names keep clear of the rest and of what is painted
+/// `above` all this.
+pub fn paint(
+    painter: &Painter,
+    rect: Rect,
+    scale: f32,
+    list: &DrawList,
+    theme: Theme,
+    overlay: &Overlay,
+    above: Option<Rect>,
+) {
+    let mut taken: Vec<Rect> = above.into_iter().collect();
+    if let Some(scale) = &list.wear_scale {
+        taken.extend(wear_scale(painter, rect, scale, theme));
+    }
+    if let Some(shown) = list
+        .legend
+        .as_ref()
+        .filter(|_| overlay.legend && has_room(rect))
+    {
+        taken.push(legend(painter, rect, scale, shown, theme));
+    }
+    if let Some(at) = overlay.time {
+        let notes = [Some(list.magnification_text.clone()), wear_note(list)];
+        let notes = notes.into_iter().flatten().chain(overlay.notes.clone());
+        taken.push(time(painter, rect, at, notes, theme));
+    }
+    if overlay.labels {
+        labels(painter, rect, scale, list, taken);
+    }
+}
+
+/// Names of joints and axes at their places, over none of what is `taken`.
+fn labels(painter: &Painter, rect: Rect, scale: f32, list: &DrawList, taken: Vec<Rect>) {
     if !has_room(rect) {
         return;
     }
     let halo = colour(list.background.bottom);
     let is_peak = |label: &&Label| matches!(label.kind, LabelKind::Peak(_));
-    let (mut names, mut peaks) = (Vec::new(), list.labels.iter().filter(is_peak));
+    let most = taken.len() + MOST_PLATES;
+    let (mut names, mut missed) = (taken, 0);
+    let mut peaks = list.labels.iter().filter(is_peak);
     // Peaks come and go, so they give way to the names.
     let mut labels = list.labels.iter().filter(|label| !is_peak(label));
     while let Some(label) = labels.next().or_else(|| peaks.next()) {
@@ -83,29 +144,24 @@ pub fn labels(painter: &Painter, rect: Rect, scale: f32, list: &DrawList) {
             LabelKind::Axis | LabelKind::Gravity => None,
         };
         if let Some((size, anchor, beside)) = plate {
-            if names.len() == MOST_PLATES {
+            if names.len() == most || missed == MOST_MISSED || !rect.contains(at) {
                 continue;
             }
             // On a plate of its own: it often lies over a dark part.
             let font = FontId::proportional(size);
             let words = painter.layout_no_wrap(label.text.to_string(), font, colour(label.colour));
-            let mut place = anchor.anchor_size(at + beside, words.size());
-            if rect.contains(at) {
-                let over = place.max.x + 6.0 - rect.max.x;
-                place = place.translate(vec2(-over.max(0.0), 0.0));
-            }
-            let Some(place) = clear_of(&names, place).filter(|place| rect.intersects(*place))
-            else {
+            let Some(plate) = clear_of(&names, rect, at, (anchor, beside), words.size()) else {
+                missed += 1;
                 continue;
             };
-            names.push(place.expand2(vec2(4.0, 1.0)));
-            let opacity = 0.8 * label.colour.0[3];
-            painter.rect_filled(
-                place.expand2(vec2(4.0, 1.0)),
-                4.0,
-                halo.gamma_multiply(opacity),
-            );
-            painter.galley(place.min, words, colour(label.colour));
+            let (opacity, ink) = (label.colour.0[3], colour(label.colour));
+            let end = plate.clamp(at);
+            if end.distance(at) > LED {
+                painter.line_segment([at, end], Stroke::new(1.0, ink.gamma_multiply(0.7)));
+            }
+            names.push(plate);
+            painter.rect_filled(plate, 4.0, halo.gamma_multiply(0.8 * opacity));
+            painter.galley(plate.min + PAD, words, ink);
             continue;
         }
         let ink = colour(label.colour);
@@ -121,8 +177,14 @@ pub fn labels(painter: &Painter, rect: Rect, scale: f32, list: &DrawList) {
     }
 }
 
-/// Simulated time in the upper left corner, with notes below it, on a plate of their own.
-pub fn time(painter: &Painter, rect: Rect, time: f64, notes: &[String], theme: Theme) {
+/// Simulated time in the upper left corner, with notes below it, on a plate of their own: where that is.
+fn time(
+    painter: &Painter,
+    rect: Rect,
+    time: f64,
+    notes: impl Iterator<Item = String>,
+    theme: Theme,
+) -> Rect {
     let palette = Palette::of(theme);
     let ink = colour(palette.text);
     let line =
@@ -135,12 +197,9 @@ pub fn time(painter: &Painter, rect: Rect, time: f64, notes: &[String], theme: T
     };
     let mut lines = vec![line(format!("t = {}", value::time(time)), size)];
     // The first note says how much the play is magnified: never left out for want of room alone.
-    let notes =
-        notes
-            .iter()
-            .filter(|note| !note.is_empty())
-            .take(if large { usize::MAX } else { 1 });
-    lines.extend(notes.map(|note| line(note.clone(), small_size)));
+    let notes = notes.filter(|note| !note.is_empty());
+    let notes = notes.take(if large { usize::MAX } else { 1 });
+    lines.extend(notes.map(|note| line(note, small_size)));
     lines.retain(|line| line.size().x + 2.0 * margin <= rect.width());
     let width = lines.iter().map(|l| l.size().x).fold(0.0, f32::max);
     let height: f32 = lines.iter().map(|l| l.size().y + 1.0).sum();
@@ -153,6 +212,7 @@ pub fn time(painter: &Painter, rect: Rect, time: f64, notes: &[String], theme: T
         painter.galley(at, line, ink);
         at.y += step;
     }
+    plate
 }
 
 /// Approximate width and height of the time with one note per joint, whatever the notes say; points.
@@ -188,8 +248,8 @@ pub fn force_notes(scene: &Scene, frame: &Frame) -> Vec<String> {
         .collect()
 }
 
-/// How to read the arrows, in the lower right corner.
-pub fn legend(painter: &Painter, rect: Rect, scale: f32, legend: &Legend, theme: Theme) {
+/// How to read the arrows, in the lower right corner: where that is.
+fn legend(painter: &Painter, rect: Rect, scale: f32, legend: &Legend, theme: Theme) -> Rect {
     let palette = Palette::of(theme);
     let (ink, halo) = (colour(palette.text), colour(palette.sky));
     let full = legend.pixels / scale;
@@ -204,6 +264,7 @@ pub fn legend(painter: &Painter, rect: Rect, scale: f32, legend: &Legend, theme:
         [pos2(left, axis), pos2(corner.x, axis)],
         Stroke::new(1.5, ink),
     );
+    let mut all = Rect::from_min_max(pos2(left, axis), corner + vec2(12.0, 0.0));
     let mut free_from = f32::NEG_INFINITY;
     for tick in legend
         .ticks
@@ -238,10 +299,9 @@ pub fn legend(painter: &Painter, rect: Rect, scale: f32, legend: &Legend, theme:
     if legend.clipped {
         title.push_str(", broken ones are longer");
     }
-    at.y = text(painter, at, Align2::RIGHT_BOTTOM, &title, 12.0, ink, halo)
-        .min
-        .y
-        - 2.0;
+    let placed = text(painter, at, Align2::RIGHT_BOTTOM, &title, 12.0, ink, halo);
+    all |= placed;
+    at.y = placed.min.y - 2.0;
     for (name, hue, hollow) in [
         ("friction", legend.friction, false),
         ("last peak", legend.normal.filter(|_| legend.peaks), true),
@@ -268,8 +328,10 @@ pub fn legend(painter: &Painter, rect: Rect, scale: f32, legend: &Legend, theme:
         } else {
             painter.arrow(tail, vec2(24.0, 0.0), Stroke::new(2.5, colour(hue)));
         }
+        all |= Rect::from_min_max(tail - vec2(0.0, 4.5), placed.max);
         at.y = placed.min.y - 1.0;
     }
+    all
 }
 
 /// What a wear map shows, and its unit.
@@ -282,7 +344,7 @@ fn wear_words(map: WearMap) -> Option<(&'static str, &'static str)> {
 }
 
 /// What the colours of `list` stand for, where it has a wear map.
-pub fn wear_note(list: &DrawList) -> Option<String> {
+fn wear_note(list: &DrawList) -> Option<String> {
     let scale = list.wear_scale?;
     let (what, unit) = wear_words(scale.map)?;
     Some(if scale.largest > 0.0 {
@@ -293,18 +355,17 @@ pub fn wear_note(list: &DrawList) -> Option<String> {
     })
 }
 
-/// How to read the colours of a wear map, at the right edge above the legend of the arrows; left out where there is no room.
-pub fn wear_scale(painter: &Painter, rect: Rect, scale: &WearScale, theme: Theme) {
+/// How to read the colours of a wear map, at the right edge above the legend of the arrows: where that is. Left out where there
+/// is no room.
+fn wear_scale(painter: &Painter, rect: Rect, scale: &WearScale, theme: Theme) -> Option<Rect> {
     const BAR: [f32; 2] = [12.0, 110.0];
     const PARTS: u32 = 48;
     // Above: its own title, the time with its notes, the buttons of the window. Below: the legend of the arrows.
     const FREE: [f32; 2] = [100.0, 122.0];
-    let Some((what, unit)) = wear_words(scale.map).filter(|_| scale.largest > 0.0) else {
-        return;
-    };
+    let (what, unit) = wear_words(scale.map).filter(|_| scale.largest > 0.0)?;
     let room = rect.height() - FREE[0] - FREE[1];
     if room < 0.5 * BAR[1] || !has_room(rect) {
-        return;
+        return None;
     }
     let palette = Palette::of(theme);
     let (ink, halo) = (colour(palette.text), colour(palette.sky));
@@ -324,13 +385,14 @@ pub fn wear_scale(painter: &Painter, rect: Rect, scale: &WearScale, theme: Theme
         bar.left_bottom(),
     ];
     painter.add(Shape::closed_line(outline.to_vec(), Stroke::new(1.0, ink)));
+    let mut all = bar;
     for tick in scale.ticks() {
         let y = at(scale.place(tick));
         let left = bar.min.x - 4.0;
         painter.line_segment([pos2(left, y), pos2(bar.min.x, y)], Stroke::new(1.0, ink));
         let words = format_quantity_digits(f64::from(tick), "", 1);
         let place = pos2(left - 3.0, y);
-        text(
+        all |= text(
             painter,
             place,
             Align2::RIGHT_CENTER,
@@ -340,21 +402,21 @@ pub fn wear_scale(painter: &Painter, rect: Rect, scale: &WearScale, theme: Theme
             halo,
         );
     }
-    if rect.width() < 520.0 {
-        // The note beside the time says what it is; the title would lie over a joint.
-        return;
+    // In a narrow picture the note beside the time says what it is; the title would lie over a joint.
+    if rect.width() >= 520.0 {
+        let title = format!("Wear: {what}, {unit}");
+        let place = pos2(bar.max.x, bar.min.y - 6.0);
+        all |= text(
+            painter,
+            place,
+            Align2::RIGHT_BOTTOM,
+            &title,
+            12.0,
+            ink,
+            halo,
+        );
     }
-    let title = format!("Wear: {what}, {unit}");
-    let place = pos2(bar.max.x, bar.min.y - 6.0);
-    text(
-        painter,
-        place,
-        Align2::RIGHT_BOTTOM,
-        &title,
-        12.0,
-        ink,
-        halo,
-    );
+    Some(all)
 }
 
 /// Lower right corner, `margin` points away from both edges.
@@ -365,8 +427,10 @@ pub(super) fn lower_right(rect: Rect, margin: f32) -> Pos2 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::app::theme;
+    use crate::view::{PeakMarks, SceneView, Shot, ViewOptions};
     use eframe::egui::{Context, LayerId, RawInput};
-    use glam::{Vec2, Vec3};
+    use glam::Vec3;
 
     /// Names of a column of `count` joints, `apart` points from each other, as they are painted.
     fn painted(count: usize, apart: f32) -> Vec<(String, Pos2)> {
@@ -374,7 +438,7 @@ mod tests {
             text: format!("J{joint}").into(),
             kind: LabelKind::Joint(joint),
             anchor: Vec3::ZERO,
-            pixel: Vec2::new(300.0, 100.0 + apart * joint as f32),
+            pixel: glam::Vec2::new(300.0, 100.0 + apart * joint as f32),
             colour: Palette::of(Theme::Light).text,
         };
         let list = DrawList {
@@ -382,19 +446,159 @@ mod tests {
             ..DrawList::default()
         };
         let rect = Rect::from_min_size(Pos2::ZERO, vec2(800.0, 600.0));
-        let mut output = Context::default().run_ui(RawInput::default(), |ui| {
-            let painter = Painter::new(ui.ctx().clone(), LayerId::background(), rect);
-            labels(&painter, rect, 1.0, &list);
-        });
-        // No texture is made of them.
-        output.textures_delta.clear();
-        let words = output.shapes.into_iter().filter_map(|shape| {
-            let Shape::Text(text) = shape.shape else {
+        let words = shapes_of(&list, rect).into_iter().filter_map(|shape| {
+            let Shape::Text(text) = shape else {
                 return None;
             };
             Some((text.galley.text().to_owned(), text.pos))
         });
         words.collect()
+    }
+
+    /// What is painted for the labels of `list`.
+    fn shapes_of(list: &DrawList, rect: Rect) -> Vec<Shape> {
+        shapes(rect, |painter| labels(painter, rect, 1.0, list, Vec::new()))
+    }
+
+    fn shapes(rect: Rect, paint: impl Fn(&Painter)) -> Vec<Shape> {
+        let ctx = Context::default();
+        theme::apply(&ctx);
+        let mut output = ctx.run_ui(RawInput::default(), |ui| {
+            paint(&Painter::new(ui.ctx().clone(), LayerId::background(), rect));
+        });
+        // No texture is made of them.
+        output.textures_delta.clear();
+        output.shapes.into_iter().map(|shape| shape.shape).collect()
+    }
+
+    #[test]
+    fn names_of_six_and_of_twelve_joints_lie_beside_each_other_and_lines_lead_from_them() {
+        for (scene, joints) in [("hexapod", 12), ("delta", 12)] {
+            let scene = Scene::load(scene, &[]).expect("built in");
+            let mut frame = Frame::default();
+            let mut simulation = crate::simulate::Simulation::new(&scene).expect("starts");
+            simulation.sample(0.0, &mut frame);
+            let view = SceneView::new(&scene, &frame);
+            let (options, marks, size) = (ViewOptions::default(), PeakMarks::new(), [640, 400]);
+            let mut camera = view.camera();
+            view.fit(&mut camera, &scene, &frame, &options, size);
+            let mut list = DrawList::default();
+            let shot = Shot {
+                scene: &scene,
+                frame: &frame,
+                marks: &marks,
+                options: &options,
+                camera: &camera,
+                trail: &[],
+                size,
+                pixels_per_point: 1.0,
+            };
+            view.build(&shot, &mut list);
+            let named = |kind| matches!(kind, LabelKind::Joint(_));
+            list.labels.retain(|label| named(label.kind));
+            assert_eq!(list.labels.len(), joints.min(scene.ball_joints.len()));
+            let rect = Rect::from_min_size(Pos2::ZERO, vec2(640.0, 400.0));
+            let (mut plates, mut ends) = (Vec::new(), Vec::new());
+            for shape in shapes_of(&list, rect) {
+                match shape {
+                    Shape::Rect(plate) => plates.push(plate.rect),
+                    Shape::LineSegment { points, .. } => ends.push(points),
+                    _ => {}
+                }
+            }
+            assert_eq!(plates.len(), list.labels.len(), "every joint is named");
+            for (i, plate) in plates.iter().enumerate() {
+                let others = &plates[i + 1..];
+                assert!(!others.iter().any(|other| other.intersects(*plate)), "{i}");
+                let at = list.labels[i].pixel;
+                let (at, led) = (
+                    pos2(at.x, at.y),
+                    plate.distance_to_pos(pos2(at.x, at.y)) > LED,
+                );
+                let line = ends.iter().find(|[from, _]| from.distance(at) < 0.01);
+                assert_eq!(line.is_some(), led, "{i}");
+                let arrives = line.is_none_or(|[_, to]| plate.distance_to_pos(*to) < 0.01);
+                assert!(arrives, "{i}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_name_keeps_clear_of_time_legend_and_caption() {
+        let rect = Rect::from_min_size(Pos2::ZERO, vec2(800.0, 600.0));
+        let caption = Rect::from_min_size(pos2(300.0, 12.0), vec2(200.0, 40.0));
+        let at = |x: f32, y: f32| Label {
+            text: "S1".into(),
+            kind: LabelKind::Joint(0),
+            anchor: Vec3::ZERO,
+            pixel: glam::Vec2::new(x, y),
+            colour: Palette::of(Theme::Light).text,
+        };
+        // Left of the time's plate's end, below the caption, at the legend.
+        let list = DrawList {
+            labels: vec![at(60.0, 45.0), at(400.0, 60.0), at(700.0, 575.0)],
+            legend: Some(Legend {
+                reference: 100.0,
+                pixels: 120.0,
+                scaling: Scaling::Linear,
+                clipped: false,
+                ticks: Vec::new(),
+                normal: Some(Palette::of(Theme::Light).text),
+                peaks: false,
+                friction: None,
+            }),
+            ..DrawList::default()
+        };
+        let overlay = Overlay {
+            time: Some(0.0),
+            legend: true,
+            labels: true,
+            ..Overlay::default()
+        };
+        let texts = |overlay: &Overlay| {
+            let shapes = shapes(rect, |painter| {
+                paint(
+                    painter,
+                    rect,
+                    1.0,
+                    &list,
+                    Theme::Light,
+                    overlay,
+                    Some(caption),
+                );
+            });
+            let texts = shapes.into_iter().filter_map(|shape| match shape {
+                Shape::Text(text) => {
+                    Some((text.galley.text().to_owned(), text.visual_bounding_rect()))
+                }
+                _ => None,
+            });
+            texts.collect::<Vec<_>>()
+        };
+        let all = texts(&overlay);
+        let (names, others): (Vec<_>, Vec<_>) = all.into_iter().partition(|(text, _)| text == "S1");
+        assert_eq!(names.len(), 3);
+        assert!(others.len() > 2);
+        for (_, name) in &names {
+            assert!(!name.intersects(caption));
+            for (other, place) in &others {
+                assert!(!name.intersects(*place), "over {other}");
+            }
+        }
+        // Without the rest they would stand there.
+        let alone = texts(&Overlay {
+            labels: true,
+            ..Overlay::default()
+        });
+        assert!(
+            alone[0].1.intersects(
+                others
+                    .iter()
+                    .find(|(text, _)| text.starts_with("t ="))
+                    .expect("time")
+                    .1
+            )
+        );
     }
 
     #[test]

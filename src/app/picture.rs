@@ -9,6 +9,7 @@ use super::canvas::{Canvas, Pending};
 use super::host::SaveFile;
 use super::layout;
 use super::overlay::SMALL;
+use super::theme;
 use crate::render::RenderError;
 
 /// Height of the plots below the view, points.
@@ -266,6 +267,8 @@ impl App {
             // Panels, collapsed parts and scroll positions are as in the window.
             let memory = ctx.memory(Clone::clone);
             canvas.ctx.memory_mut(|own| *own = memory);
+            // They were in what this has replaced.
+            canvas.ctx.set_fonts(theme::fonts());
             canvas.ctx.options_mut(|options| options.zoom_factor = 1.0);
             canvas.ctx.set_theme(ctx.theme());
             canvas.time = ctx.input(|input| input.time);

@@ -16,8 +16,8 @@ use super::watch::RunWatch;
 use crate::analysis::section::Schedule;
 use crate::scene::{SOLVER_KEYS, Scene, Value};
 use crate::simulate::{
-    ChangeError, Channels, Effect, Frame, History, Listed, Pacer, Peak, Pull, RECORDED_JOINTS,
-    Simulation, StartError, Stopped, Wear,
+    ChangeError, Channels, Effect, Frame, History, Limit, Listed, Pacer, Peak, Pull,
+    RECORDED_JOINTS, Simulation, StartError, Stopped, Wear,
 };
 use contact_history::ContactHistory;
 use keyframes::Keyframes;
@@ -408,8 +408,9 @@ impl Player {
                     break;
                 }
             }
-            self.measure(self.simulation.time() - before, (self.clock)() - start);
-            self.pacer.end(dt, target, self.simulation.time());
+            let spent = (self.clock)() - start;
+            self.measure(self.simulation.time() - before, spent);
+            self.pacer.end(dt, target, self.simulation.time(), spent);
             self.present();
         }
         self.hand_out_peaks();
@@ -424,6 +425,20 @@ impl Player {
     /// Recent simulated seconds per second of stepping, recording included; `None` until enough was stepped.
     pub fn capacity(&self) -> Option<f64> {
         (self.stepping > LEAST_MEASURED).then(|| self.stepped / self.stepping)
+    }
+
+    /// What keeps the run below the asked time scale; `None` while it keeps up.
+    pub fn limit(&self) -> Option<Limit> {
+        self.pacer.limit(self.capacity())
+    }
+
+    /// What the latest frame took beyond stepping, s, if it was `dt` s long.
+    pub fn drawing(&self, dt: f64) -> f64 {
+        if self.playing && !self.backwards {
+            self.pacer.drawing()
+        } else {
+            dt
+        }
     }
 
     /// One accepted step, shown at once.

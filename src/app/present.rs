@@ -1,8 +1,10 @@
 //! Presentation: the picture, large type and thick arrows, for a projector and the last row. It changes nothing of the run.
 
-use eframe::egui::{self, Align2, FontId, Frame, Id, Panel, Rect, Sense, Ui, vec2};
+use std::sync::Arc;
 
-use super::{App, theme, transport, value};
+use eframe::egui::{self, Align2, FontId, Frame, Galley, Id, Panel, Rect, Sense, Ui, Vec2, vec2};
+
+use super::{App, overlay, theme, transport, value};
 
 /// Least height of a text as a share of the screen's: what the last row of a lecture hall can read.
 const LEAST_TEXT: f32 = 1.0 / 40.0;
@@ -10,6 +12,10 @@ const LEAST_TEXT: f32 = 1.0 / 40.0;
 const SMALLEST: f32 = 11.0;
 /// Type of the caption, points.
 const CAPTION: f32 = 24.0;
+/// Room about its words, points.
+const PAD: Vec2 = vec2(12.0, 4.0);
+/// Width that the time takes in the corner of the picture, points.
+const TIME: f32 = 170.0;
 /// How much thicker arrows are.
 const THICKNESS: f32 = 2.0;
 /// Change of the screen's height that the type follows, as a share of it.
@@ -104,6 +110,7 @@ impl App {
                 .inner
             })
             .inner;
+        self.lesson_beside(ui, bar);
         self.central(ui, asked);
         self.caption(ui);
         if leave {
@@ -124,19 +131,43 @@ impl App {
         Some(format!("{name}, {force}, {} ms", value::number(lasted, 2)))
     }
 
-    fn caption(&self, ui: &mut Ui) {
-        let Some(words) = self.last_impact() else {
-            return;
-        };
+    /// The words of the caption and the plate they stand on.
+    pub(super) fn caption_plate(&self, ui: &Ui) -> Option<(Arc<Galley>, Rect)> {
         let area = self.picture_rect;
         let ink = ui.visuals().strong_text_color();
-        let painter = ui.painter_at(area);
-        let words = painter.layout_no_wrap(words, FontId::proportional(CAPTION), ink);
-        let place = Align2::CENTER_TOP.align_size_within_rect(words.size(), area.shrink(12.0));
-        let plate = place.expand2(vec2(12.0, 4.0));
+        let text = self.last_impact()?;
+        let lay = |size| {
+            let font = FontId::proportional(size);
+            ui.painter().layout_no_wrap(text.clone(), font, ink)
+        };
+        let mut inside = area.shrink(12.0);
+        let mut words = lay(CAPTION);
+        let room = inside.width() - 2.0 * PAD.x;
+        if words.size().x > room {
+            words = lay((CAPTION * room / words.size().x).max(SMALLEST));
+        }
+        let middle = Align2::CENTER_TOP.align_size_within_rect(words.size(), inside);
+        // Beside a lesson there is no room in the middle: the time stands on the left. Beside the microscope, too, there is
+        // room below the time alone.
+        let place = if middle.left() >= area.left() + TIME {
+            middle
+        } else {
+            if inside.right() - words.size().x < area.left() + TIME {
+                inside.min.y += overlay::plate(1)[1];
+            }
+            Align2::RIGHT_TOP.align_size_within_rect(words.size(), inside)
+        };
+        Some((words, place.expand2(PAD)))
+    }
+
+    fn caption(&self, ui: &mut Ui) {
+        let Some((words, plate)) = self.caption_plate(ui) else {
+            return;
+        };
+        let painter = ui.painter_at(self.picture_rect);
         painter.rect_filled(plate, 6.0, ui.visuals().window_fill.gamma_multiply(0.85));
         let text = words.text().to_owned();
-        painter.galley(place.min, words, ink);
+        painter.galley(plate.min + PAD, words, ui.visuals().strong_text_color());
         let response = ui.interact(plate, Id::unique("last impact"), Sense::hover());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Label, true, &text));
         response.on_hover_text(

@@ -1,5 +1,7 @@
 //! The scene file that is shown is loaded again when it, or a file that it names, is saved elsewhere.
 
+use std::collections::BTreeMap;
+
 use eframe::egui;
 
 use super::App;
@@ -17,7 +19,19 @@ pub(super) struct SceneFile {
     told: Option<Vec<String>>,
     /// The file beside it in which there is an error. The shown scene may be without it.
     wrong: Option<String>,
+    /// Files that were opened together with it.
+    given: Given,
+    /// The changes that are in a file, or came with the scene: those at the first look.
+    saved: Option<Changes>,
+    /// Whether the user has saved the scene here.
+    saved_here: bool,
 }
+
+/// Changed parameters with their values.
+type Changes = Vec<(String, String)>;
+
+/// Contents of files by their names without folders.
+pub(super) type Given = BTreeMap<String, Vec<u8>>;
 
 impl SceneFile {
     /// The file `name`, as the user named it; the host is to be told.
@@ -26,6 +40,30 @@ impl SceneFile {
             name,
             ..Self::default()
         }
+    }
+
+    /// The file `name`, opened together with those `given`.
+    pub(super) fn opened(name: String, given: Given) -> Self {
+        Self {
+            given,
+            ..Self::named(Some(name))
+        }
+    }
+
+    /// The scene is saved with `changes` in it.
+    pub(super) fn saved_with(&mut self, changes: Changes) {
+        self.saved = Some(changes);
+        self.saved_here = true;
+    }
+
+    /// Whether `changes` are those that are saved; `None` before the first look.
+    pub(super) fn is_saved_with(&self, changes: &Changes) -> Option<bool> {
+        Some(self.saved.as_ref()? == changes)
+    }
+
+    /// Whether there is a file with the scene.
+    pub(super) fn is_in_file(&self) -> bool {
+        self.saved_here || self.name.is_some()
     }
 
     /// The file.
@@ -37,8 +75,14 @@ impl SceneFile {
 impl App {
     /// Lets the host watch the files of the scene, and loads it again if one was saved.
     pub(super) fn receive_saved_scene(&mut self, ctx: &egui::Context) {
+        // The changes of a link come on its way.
+        let there = self.replay.is_none();
         let file = &mut self.scene_file;
-        let beside = &self.player.wanted().source.beside;
+        let wanted = self.player.wanted();
+        if there && file.saved.is_none() {
+            file.saved = Some(wanted.changes.clone());
+        }
+        let beside = &wanted.source.beside;
         let wrong = file.wrong.as_ref();
         let wrong = wrong.filter(|wrong| !beside.contains_key(*wrong));
         let names = beside.keys().chain(wrong).filter(|_| file.name.is_some());
@@ -58,17 +102,16 @@ impl App {
         }
     }
 
-    /// Parses `text`, which the file `name` holds, with the files that it names as they are now.
+    /// Parses `text`, which the file `name` holds, with the files that it names as they are now, or as they were `given` with it.
     pub(super) fn parse_file(
         &self,
         name: &str,
         text: &str,
+        given: &Given,
         changes: &[(String, String)],
     ) -> Result<Scene, SceneError> {
-        match self.host.folder(name) {
-            Some(folder) => Scene::parse_in_folder(text, Some(name), &folder, changes),
-            None => Scene::parse(text, Some(name), changes),
-        }
+        let folder = self.host.folder(name);
+        Scene::parse_given(text, Some(name), given, folder.as_deref(), changes)
     }
 
     /// Shows the scene of `file`, with what was changed here unless the file now says something else. View, plots and, if that
@@ -81,14 +124,15 @@ impl App {
         let source = &wanted.source;
         let again = |scene: Scene| scene.source.beside == source.beside;
         let same = text == source.text;
-        if same && (self.parse_file(&name, &text, &wanted.changes)).is_ok_and(again) {
+        let given = self.scene_file.given.clone();
+        if same && (self.parse_file(&name, &text, &given, &wanted.changes)).is_ok_and(again) {
             // Saved as it was, or back to it after an error.
             self.problem = None;
             self.scene_file.wrong = None;
             return Ok(());
         }
         let before = Scene::parse_with(&source.text, Some(&name), &source.beside, &[]);
-        let after = match self.parse_file(&name, &text, &[]) {
+        let after = match self.parse_file(&name, &text, &given, &[]) {
             Ok(after) => after,
             Err(error) => {
                 let file = error.file.clone();
@@ -102,7 +146,7 @@ impl App {
         };
         let mut changes = self.player.wanted().changes.clone();
         changes.retain(|(key, _)| stays(key));
-        let scene = self.parse_file(&name, &text, &changes);
+        let scene = self.parse_file(&name, &text, &given, &changes);
         let scene = scene.map_err(|error| error.to_string())?;
 
         let link = self.link();
@@ -111,9 +155,8 @@ impl App {
         let told = self.scene_file.told.clone();
         self.show_scene(&scene)?;
         self.scene_file = SceneFile {
-            name: Some(name),
             told,
-            wrong: None,
+            ..SceneFile::opened(name, given)
         };
         self.player.set_phase(phase);
         let reached = self.reach(time);

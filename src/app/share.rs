@@ -11,11 +11,12 @@ use base64::Engine as _;
 use base64::engine::general_purpose::URL_SAFE_NO_PAD as BASE64;
 use eframe::egui::ThemePreference;
 
+use super::embed::Embedded;
 use super::log::Log;
 use super::plots::Window;
 use crate::scene::{
-    DEFAULT_SCENE, Dimension, LARGEST_FILE, Scene, SceneError, built_in_text, parse_quantity,
-    visible, visible_line,
+    DEFAULT_SCENE, Dimension, LARGEST_FILE, Scene, SceneError, Texts, built_in_text,
+    parse_quantity, visible, visible_line,
 };
 use crate::simulate::{Quantity, SCALE_RANGE};
 use crate::view::Picked;
@@ -35,7 +36,7 @@ pub const ALIASES: [(&str, &str); 4] = [
 ];
 
 /// Words of a link that are not parameters.
-const WORDS: [&str; 19] = [
+const WORDS: [&str; 22] = [
     "scene",
     "file",
     "text",
@@ -51,6 +52,9 @@ const WORDS: [&str; 19] = [
     "channels",
     "window",
     "show",
+    "lesson",
+    "step",
+    "embed",
     "play",
     "version",
     "renderer",
@@ -145,12 +149,20 @@ pub struct Link {
     pub window: Option<Window>,
     /// Instruments that are on.
     pub instruments: Option<Instruments>,
+    /// Name of the built-in lesson that it belongs to.
+    pub lesson: Option<String>,
+    /// Step of it, counted from 1.
+    pub step: Option<usize>,
+    /// Its panels within another page.
+    pub embedded: Option<Embedded>,
     /// Whether the run plays once the state is reached; by default, only if the link names no instant.
     pub playing: Option<bool>,
     /// Light, dark, or as the system asks.
     pub theme: Option<ThemePreference>,
     /// Version of the program that made the link.
     pub version: Option<String>,
+    /// Texts of the files that the scene names: they are in no link, but kept with it ([`Self::keep`]).
+    pub beside: Texts,
 }
 
 /// Whether `text` is a link in one of the forms of [`Link::parse`], rather than the name of a scene or of a file.
@@ -168,18 +180,26 @@ fn is_file(text: &str) -> bool {
 
 impl Link {
     /// Reads a whole URL, a query (`?…`), a fragment (`#…`) or the bare pairs. A fragment that names a scene stands alone;
-    /// otherwise the query's pairs come first and the fragment's override them.
+    /// otherwise the query's pairs come first and the fragment's override them. Or what [`Self::keep`] gives.
     ///
     /// # Errors
     /// An unknown word, an invalid value, a packed part that does not unpack. Whether the scene has the parameters and allows
     /// the values is checked only in [`Self::load`].
     pub fn parse(text: &str) -> Result<Self, LinkError> {
         let text = text.trim();
+        if let Some(kept) = text.strip_prefix(kept::PREFIX) {
+            return kept::read(kept);
+        }
         let length = text.chars().count();
         if length > LONGEST_LINK {
             let message = format!("has {length} characters; allowed at most {LONGEST_LINK}");
             return Err(fault("", "", message));
         }
+        Self::read(text)
+    }
+
+    /// As [`Self::parse`], of any length.
+    fn read(text: &str) -> Result<Self, LinkError> {
         let (before, fragment) = text.split_once('#').unwrap_or((text, ""));
         let query = match before.split_once('?') {
             Some((_, query)) => query,
@@ -254,12 +274,27 @@ impl Link {
                 "show" => {
                     link.instruments = Some(Instruments::read(value).map_err(|m| wrong(&m))?);
                 }
+                "lesson" => link.lesson = Some(value.to_owned()),
+                "step" => {
+                    let step = value.parse().ok().filter(|step| *step > 0);
+                    link.step = Some(step.ok_or_else(|| wrong("allowed 1 and more"))?);
+                }
+                "embed" => link.embedded = Some(Embedded::read(value).map_err(|m| wrong(&m))?),
                 "play" => {
                     link.playing = Some(match value {
                         "1" => true,
                         "0" => false,
                         _ => return Err(wrong("allowed 0 (paused) and 1 (playing)")),
                     });
+                }
+                // An address that the page makes, `web/main.js`.
+                "kept" => {
+                    return Err(fault(
+                        "kept",
+                        "",
+                        "its scene is larger than an address can be, and was kept in the tab of the browser that showed it \
+                         alone; open the scene file here",
+                    ));
                 }
                 "version" => link.version = Some(value.chars().take(40).collect()),
                 "theme" => {
@@ -346,6 +381,9 @@ impl Link {
         add("channels", channels.map(shown::write_channels));
         add("window", self.window.map(shown::write_window));
         add("show", self.instruments.as_ref().map(Instruments::write));
+        add("lesson", self.lesson.clone());
+        add("step", self.step.map(|step| step.to_string()));
+        add("embed", self.embedded.as_ref().map(Embedded::write));
         add(
             "play",
             self.playing.map(|playing| u8::from(playing).to_string()),
@@ -410,7 +448,9 @@ impl Link {
     pub fn load(&self) -> Result<Scene, SceneError> {
         match &self.scene {
             SceneText::BuiltIn(name) => Scene::load(name, &self.log.base),
-            SceneText::File { name, text } => Scene::parse(text, Some(name), &self.log.base),
+            SceneText::File { name, text } => {
+                Scene::parse_with(text, Some(name), &self.beside, &self.log.base)
+            }
         }
     }
 
@@ -569,13 +609,19 @@ fn pack(text: &str) -> String {
 }
 
 fn unpack(key: &str, packed: &str) -> Result<String, LinkError> {
+    unpack_within(key, packed, LARGEST_UNPACKED)
+}
+
+/// The reverse of [`pack`] for a text of at most `most` bytes.
+fn unpack_within(key: &str, packed: &str, most: usize) -> Result<String, LinkError> {
     let damaged = || fault(key, "", "does not unpack: the link is cut short or damaged");
     let bytes = BASE64.decode(packed).map_err(|_| damaged())?;
-    let text = miniz_oxide::inflate::decompress_to_vec_with_limit(&bytes, LARGEST_UNPACKED)
-        .map_err(|_| damaged())?;
+    let text =
+        miniz_oxide::inflate::decompress_to_vec_with_limit(&bytes, most).map_err(|_| damaged())?;
     String::from_utf8(text).map_err(|_| damaged())
 }
 
+mod kept;
 pub mod shown;
 #[cfg(test)]
 mod tests;

@@ -1,8 +1,10 @@
 //! Look of the window: spacing, type sizes and the colours of both themes.
 
+use std::sync::Arc;
+
 use eframe::egui::{
-    self, Color32, CornerRadius, FontFamily, FontId, Margin, Response, RichText, Stroke, TextStyle,
-    Theme, Ui, Visuals, vec2,
+    self, Color32, CornerRadius, FontData, FontDefinitions, FontFamily, FontId, Margin, Response,
+    RichText, Stroke, TextStyle, Theme, Ui, Visuals, vec2,
 };
 
 /// Series colours for plots, dark enough on white and light enough on black; distinguishable for the colour-blind (after Okabe
@@ -72,8 +74,21 @@ pub fn error(ui: &mut Ui, words: impl Into<String>) -> Response {
     ui.label(RichText::new(words).small().color(colour))
 }
 
-/// Sets both themes' styles.
+/// One face for everything: its digits are equally wide, so that a clock in it stands still.
+pub fn fonts() -> FontDefinitions {
+    const NAME: &str = "Ubuntu-Light";
+    let mut fonts = FontDefinitions::empty();
+    let face = FontData::from_static(epaint_default_fonts::UBUNTU_LIGHT);
+    fonts.font_data.insert(NAME.to_owned(), Arc::new(face));
+    for family in fonts.families.values_mut() {
+        family.push(NAME.to_owned());
+    }
+    fonts
+}
+
+/// Sets the face of text and both themes' styles.
 pub fn apply(ctx: &egui::Context) {
+    ctx.set_fonts(fonts());
     apply_size(ctx, false);
     ctx.style_mut_of(Theme::Light, |style| style.visuals = visuals(false));
     ctx.style_mut_of(Theme::Dark, |style| style.visuals = visuals(true));
@@ -146,4 +161,45 @@ fn visuals(dark: bool) -> Visuals {
     visuals.menu_corner_radius = CornerRadius::same(8);
     visuals.slider_trailing_fill = true;
     visuals
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Texts of the files below `folder`.
+    fn texts(folder: &std::path::Path, out: &mut Vec<String>) {
+        for entry in std::fs::read_dir(folder).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            if path.is_dir() {
+                texts(&path, out);
+            } else if !path.ends_with("tests.rs") {
+                out.extend(std::fs::read_to_string(&path));
+            }
+        }
+    }
+
+    #[test]
+    fn the_face_has_every_character_that_is_shown() {
+        let ctx = eframe::egui::Context::default();
+        apply(&ctx);
+        let mut output = ctx.run_ui(Default::default(), |_| {});
+        output.textures_delta.clear();
+        let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+        let mut shown = vec![crate::scene::reference_page()];
+        for folder in ["src/app", "assets/scenes", "assets/lessons"] {
+            texts(&root.join(folder), &mut shown);
+        }
+        let shown: std::collections::BTreeSet<char> =
+            shown.iter().flat_map(|text| text.chars()).collect();
+        let shown = shown.into_iter().filter(|c| !c.is_control());
+        let font = FontId::proportional(14.0);
+        let missing: String = ctx.fonts_mut(|fonts| {
+            let missing = |c: &char| !fonts.has_glyph(&font, *c);
+            shown.filter(missing).collect()
+        });
+        assert_eq!(missing, "");
+        // It does not have everything.
+        assert!(!ctx.fonts_mut(|fonts| fonts.has_glyph(&font, '\u{6f22}')));
+    }
 }

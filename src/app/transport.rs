@@ -1,19 +1,26 @@
 //! Transport: play, step, reset, time scale, and how fast time really passes.
 
-use eframe::egui::{self, ComboBox, RichText, Sense, Slider, Ui, Vec2};
+use eframe::egui::{
+    self, ComboBox, RichText, Sense, Slider, TextStyle, TextWrapMode, Ui, Vec2, WidgetText,
+};
 
 use super::icons::{Icon, icon_button};
 use super::player::Player;
 use super::{keys, theme, value};
-use crate::simulate::SCALE_RANGE;
+use crate::simulate::{Limit, SCALE_RANGE};
 
 /// Time scales that a list offers.
 pub const SCALES: [f64; 8] = [1.0, 0.5, 0.1, 0.05, 0.02, 0.01, 1e-3, 1e-4];
 
 /// Width of the list of time scales, points: room for the longest.
 const SCALES_WIDTH: f32 = 94.0;
+/// Width of the time scale that is reached, points.
+const REACHED: f32 = 120.0;
 /// Length of a drag from one of them to the next, points.
 const SCALE_APART: f32 = 20.0;
+
+/// Width of [`row`] with its buttons and the list of time scales for fingers, points.
+pub const LEAST: f32 = 270.0;
 
 /// Size of the button that plays and pauses, points.
 pub const PLAY: f32 = 40.0;
@@ -72,7 +79,7 @@ pub fn row(ui: &mut Ui, player: &mut Player) -> bool {
             time(ui, player);
         }
         scales(ui, player);
-        if ui.available_width() > 120.0 {
+        if ui.available_width() > REACHED {
             reached(ui, player);
         }
         settled(ui, player);
@@ -198,7 +205,19 @@ fn scales(ui: &mut Ui, player: &mut Player) {
     ui.data_mut(|data| data.insert_temp(drag.id, way));
 }
 
-/// The time scale that the computer actually reaches.
+/// The time scale that is reached, in what is left of the row below a narrow [`row`], which has no room for it.
+pub fn reached_beside(ui: &mut Ui, player: &Player) {
+    if ui.available_width() < REACHED {
+        // Beside one tab more.
+        let styles = &mut ui.style_mut().text_styles;
+        if let Some(small) = styles.get(&egui::TextStyle::Small).cloned() {
+            styles.insert(egui::TextStyle::Body, small);
+        }
+    }
+    reached(ui, player);
+}
+
+/// The time scale that the computer actually reaches, and what keeps it from the one asked for.
 fn reached(ui: &mut Ui, player: &Player) {
     if !player.is_playing() {
         return;
@@ -207,14 +226,36 @@ fn reached(ui: &mut Ui, player: &Player) {
         return;
     };
     let words = format!("reached {}", value::time_scale(reached));
-    if reached < 0.97 * player.pacer.scale() {
-        ui.label(RichText::new(words).color(ui.visuals().warn_fg_color)).on_hover_text(
-            "This machine cannot follow the time scale that was asked for: the simulation runs slower, and skips \
-             nothing. A looser tolerance or the preview preset of the solver helps.",
-        );
-    } else {
+    let Some(limit) = player.limit() else {
         ui.label(RichText::new(words).weak())
             .on_hover_text("Simulated against real time, as measured");
+        return;
+    };
+    let (by, help) = match limit {
+        Limit::Computing => (
+            "limited by computing",
+            "This machine cannot step as fast as the time scale asks: the simulation runs slower, and skips nothing. A looser \
+             tolerance or the preview preset of the solver helps.",
+        ),
+        Limit::Drawing => (
+            "limited by drawing",
+            "Stepping alone would be faster, but pictures and panels take the time: the simulation runs slower, and skips \
+             nothing. A smaller window and fewer plots and instruments help.",
+        ),
+    };
+    let colour = ui.visuals().warn_fg_color;
+    ui.label(RichText::new(words).color(colour))
+        .on_hover_text(help);
+    let by = RichText::new(by).small().color(colour);
+    let by = WidgetText::from(by).into_galley(
+        ui,
+        Some(TextWrapMode::Extend),
+        f32::INFINITY,
+        TextStyle::Body,
+    );
+    // Where there is no room the tooltip says it.
+    if by.size().x < ui.available_width() {
+        ui.label(by).on_hover_text(help);
     }
 }
 

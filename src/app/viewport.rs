@@ -1,6 +1,8 @@
 //! The 3D viewport: camera by mouse, picking, and what the interface paints over the picture.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
 
 use eframe::egui::{
     self, Checkbox, PointerButton, Pos2, Rect, RectAlign, RichText, Role, Sense, Slider, Tooltip,
@@ -8,15 +10,17 @@ use eframe::egui::{
 };
 use glam::{Vec2, Vec3};
 
+use super::overlay::{self, Overlay};
+use super::pace::{Pace, Seen};
 use super::player::Player;
 use super::pull::Grip;
 use super::share::CameraPose;
-use super::{ghosts, keys, overlay, value, zoom};
+use super::{ghosts, keys, value, zoom};
 use crate::render;
 use crate::scene::Vec3 as Exact;
 use crate::simulate::{ContactState, Pull};
 use crate::view::{
-    Camera, DrawList, PeakMarks, Picked, Preset, SEEN, Scaling, SceneView, Shot, Theme,
+    Camera, DrawList, PeakMarks, Picked, Preset, Quality, SEEN, Scaling, SceneView, Shot, Theme,
     ViewOptions, WearMap, to_f32,
 };
 
@@ -60,7 +64,11 @@ pub struct Viewport {
     /// While a picture is drawn off screen: width over height of the view on the screen.
     frozen: Option<f32>,
     marks: PeakMarks,
+    /// What is shown; the one before, and room for the next.
     list: Arc<DrawList>,
+    next: DrawList,
+    /// Number of what is shown, another one for every other picture.
+    revision: u64,
     trail: Vec<Vec3>,
     followed: Option<Picked>,
     time: f64,
@@ -75,6 +83,8 @@ pub struct Viewport {
     pinched: bool,
     /// Ball joint that was clicked, until it is taken.
     clicked: Option<usize>,
+    /// What the frames on the screen allow; `None`: the options' quality, always.
+    pace: Option<Pace>,
 }
 
 impl Viewport {
@@ -91,6 +101,8 @@ impl Viewport {
             options,
             marks: PeakMarks::new(),
             list: Arc::new(DrawList::default()),
+            next: DrawList::default(),
+            revision: 0,
             trail: Vec::new(),
             followed: None,
             time: player.pacer.shown(),
@@ -100,6 +112,7 @@ impl Viewport {
             grip_changed: false,
             pinched: false,
             clicked: None,
+            pace: None,
         }
     }
 
@@ -135,7 +148,10 @@ impl Viewport {
 
     /// Shows another scene, or the same one after a reset that changed its shapes; the choices stay.
     pub fn show_scene(&mut self, player: &Player) {
-        *self = Self::new(player, self.options.clone());
+        *self = Self {
+            pace: self.pace.take().map(|_| Pace::default()),
+            ..Self::new(player, self.options.clone())
+        };
     }
 
     /// After a reset: the same shapes at t = 0.
@@ -231,6 +247,16 @@ impl Viewport {
         }
     }
 
+    /// Lets slow frames lower the quality while the picture moves, or does not.
+    pub fn follow_frame_rate(&mut self, on: bool) {
+        self.pace = on.then(Pace::default);
+    }
+
+    /// With which quality the latest picture was drawn.
+    pub fn quality(&self) -> Quality {
+        self.list.quality
+    }
+
     /// World vectors to the right and up in the picture.
     pub fn across(&self) -> [Vec3; 2] {
         let (right, up, _) = self.camera.axes();
@@ -304,14 +330,15 @@ impl Viewport {
     }
 
     /// The picture with its overlays, over all of `ui`; a `plain` one shows nothing about what is under the cursor.
-    pub fn ui(&mut self, ui: &mut Ui, player: &Player, plain: bool) {
+    /// Names keep clear of what is painted `above` it.
+    pub fn ui(&mut self, ui: &mut Ui, player: &Player, plain: bool, above: Option<Rect>) {
         let (rect, response) = ui.allocate_exact_size(
             ui.available_size().max(vec2(16.0, 16.0)),
             Sense::click_and_drag(),
         );
         response.widget_info(|| WidgetInfo::labeled(Role::Image, true, "3D view"));
         let screen = Screen::new(rect, ui.ctx().pixels_per_point());
-        let Screen { size, scale, .. } = screen;
+        let size = screen.size;
         self.options.theme = if ui.visuals().dark_mode {
             Theme::Dark
         } else {
@@ -344,53 +371,48 @@ impl Viewport {
         self.drag(ui, &response, player, &screen);
         let camera = self.framed(aspect);
         let shot = shot!(self, player, &camera, screen);
+        let pick = |pos: Pos2| self.view.pick(&shot, screen.pixel(pos));
         let hovered = response
             .hover_pos()
             .filter(|_| !plain && !response.dragged())
-            .and_then(|pos| self.view.pick(&shot, screen.pixel(pos)));
-        // egui has dropped the clone of the previous frame: nothing is copied.
-        self.view.build(&shot, Arc::make_mut(&mut self.list));
-        let list = Arc::make_mut(&mut self.list);
-        let said = ghosts::add(&self.view, &shot, player, list);
-        if let Some(wear) = player.wear() {
-            self.view.add_wear(&shot, wear, list);
-        }
-        if response.clicked() {
-            // A lifted finger does not hover.
-            let tapped = response
-                .interact_pointer_pos()
-                .and_then(|pos| self.view.pick(&shot, screen.pixel(pos)))
-                .map(|hit| hit.what);
-            if let Some(Picked::Joint(joint)) = tapped {
-                self.clicked = Some(joint);
-            } else if response.double_clicked() {
-                self.follow(tapped);
-            }
+            .and_then(pick);
+        // A lifted finger does not hover.
+        let tapped = response
+            .interact_pointer_pos()
+            .filter(|_| response.clicked())
+            .and_then(pick)
+            .map(|hit| hit.what);
+        let on_screen = !plain && self.frozen.is_none();
+        let follows = self.pace.is_some() && on_screen;
+        let said = if follows {
+            self.compose_paced(ui, player, &camera, &screen)
+        } else {
+            self.compose(player, &camera, &screen, self.options.quality)
+        };
+        if let Some(Picked::Joint(joint)) = tapped {
+            self.clicked = Some(joint);
+        } else if response.double_clicked() {
+            self.follow(tapped);
         }
         let painter = ui.painter_at(rect);
-        painter.add(render::Viewport::shape(rect, self.list.clone()));
-        overlay::labels(&painter, rect, scale, &self.list);
-        if let Some(legend) = &self.list.legend
-            && overlay::has_room(rect)
-        {
-            overlay::legend(&painter, rect, scale, legend, self.options.theme);
-        }
-        if let Some(scale) = &self.list.wear_scale {
-            overlay::wear_scale(&painter, rect, scale, self.options.theme);
-        }
-        let mut notes = vec![self.list.magnification_text.clone()];
-        notes.extend(overlay::wear_note(&self.list));
-        if let Some(name) = self.followed.and_then(|picked| name_of(player, picked)) {
-            notes.push(format!("following {name}"));
-        }
-        notes.extend(said);
-        overlay::time(
-            &painter,
-            rect,
-            player.pacer.shown(),
-            &notes,
-            self.options.theme,
-        );
+        let revision = follows.then_some(self.revision);
+        let list = self.list.clone();
+        painter.add(render::Viewport::revised(rect, list, revision));
+        // Of what was drawn, which may have fewer pixels than are shown.
+        let Screen { scale, .. } = screen.drawn_with(self.list.quality);
+        let following = self.followed.and_then(|picked| name_of(player, picked));
+        let overlay = Overlay {
+            time: Some(player.pacer.shown()),
+            notes: following
+                .map(|name| format!("following {name}"))
+                .into_iter()
+                .chain(said)
+                .collect(),
+            legend: true,
+            labels: true,
+        };
+        let theme = self.options.theme;
+        overlay::paint(&painter, rect, scale, &self.list, theme, &overlay, above);
         if let Some(hit) = hovered {
             // Away from the nearer edge: the transport below stays free.
             let low = response
@@ -405,6 +427,83 @@ impl Viewport {
             card.popup = card.popup.align(align);
             card.show(|ui| describe(ui, player, hit.what));
         }
+    }
+
+    /// Describes what `screen` shows with `quality` in `self.next`; returns what is said about ghosts.
+    fn list_next(
+        &mut self,
+        player: &Player,
+        camera: &Camera,
+        screen: &Screen,
+        quality: Quality,
+    ) -> Vec<String> {
+        let mut list = std::mem::take(&mut self.next);
+        let drawn = screen.drawn_with(quality);
+        let shot = shot!(self, player, camera, drawn);
+        self.view.build(&shot, &mut list);
+        list.quality = quality;
+        let said = ghosts::add(&self.view, &shot, player, &mut list);
+        if let Some(wear) = player.wear() {
+            self.view.add_wear(&shot, wear, &mut list);
+        }
+        self.next = list;
+        said
+    }
+
+    /// The same in `self.list`, as another picture.
+    fn compose(
+        &mut self,
+        player: &Player,
+        camera: &Camera,
+        screen: &Screen,
+        quality: Quality,
+    ) -> Vec<String> {
+        let said = self.list_next(player, camera, screen, quality);
+        self.show_next();
+        said
+    }
+
+    /// The same with what quality the frames allow; the picture before stays if nothing has changed.
+    fn compose_paced(
+        &mut self,
+        ui: &Ui,
+        player: &Player,
+        camera: &Camera,
+        screen: &Screen,
+    ) -> Vec<String> {
+        let before = self.list.quality;
+        let said = self.list_next(player, camera, screen, before);
+        // Bodies first: what mostly differs.
+        let moves = self.next.solid != self.list.solid || self.next != *self.list;
+        let Some(pace) = &mut self.pace else {
+            return said;
+        };
+        let (now, dt) = ui.input(|input| (input.time, f64::from(input.stable_dt)));
+        let quality = pace.frame(&Seen {
+            size: screen.size,
+            moves,
+            now,
+            dt,
+            drawing: player.drawing(dt),
+        });
+        if let Some(wait) = pace.until_still(now).filter(|_| quality != Quality::FULL) {
+            ui.ctx()
+                .request_repaint_after(Duration::from_secs_f64(wait));
+        }
+        if quality != before {
+            return self.compose(player, camera, screen, quality);
+        }
+        if moves {
+            self.show_next();
+        }
+        said
+    }
+
+    fn show_next(&mut self) {
+        static PICTURES: AtomicU64 = AtomicU64::new(0);
+        self.revision = PICTURES.fetch_add(1, Ordering::Relaxed);
+        // egui has dropped the clone of the previous frame: nothing is copied.
+        std::mem::swap(Arc::make_mut(&mut self.list), &mut self.next);
     }
 
     fn drag(&mut self, ui: &Ui, response: &egui::Response, player: &Player, screen: &Screen) {
@@ -581,7 +680,7 @@ impl Viewport {
         let options = &mut self.options;
         ui.label("Magnification of the play").on_hover_text(
             "Draws eccentricity and clearance larger than they are, together, so that the ball never leaves its \
-             socket. The motion of the machine stays as it is. Key M.",
+             socket. The motion of the machine stays as it is. Key X.",
         );
         let slider = Slider::new(&mut options.magnification, 1.0..=100.0)
             .logarithmic(true)
@@ -675,6 +774,18 @@ impl Viewport {
                     .accessible_name(format!("Wear map: {name}"));
             }
         });
+        let mut follows = self.pace.is_some();
+        let quality = ui
+            .checkbox(&mut follows, "Simpler when slow")
+            .on_hover_text(
+                "While the picture moves and its frames take longer than 1/24 s: without the shade between balls and sockets, \
+                 then with one sample per pixel instead of four, with coarser and hard shadows, and at last with fewer pixels, \
+                 down to half of them along each edge. With time to spare it has more again. At rest, in saved pictures and \
+                 films it has all of it.",
+            );
+        if quality.changed() {
+            self.follow_frame_rate(follows);
+        }
         if self.followed.is_some()
             && ui
                 .button("Stop following")
@@ -719,6 +830,11 @@ impl Screen {
             size: [pixels(rect.width()), pixels(rect.height())],
             scale,
         }
+    }
+
+    /// The same with the pixels that `quality` draws.
+    fn drawn_with(&self, quality: Quality) -> Self {
+        Self::new(self.rect, self.scale * quality.sharpness)
     }
 
     /// Pixel of the picture at `pos`, points of the window.
@@ -784,6 +900,7 @@ fn describe(ui: &mut Ui, player: &Player, picked: Picked) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::app::theme;
     use crate::scene::Scene;
 
     #[test]
@@ -792,8 +909,10 @@ mod tests {
         let player = Player::new(&scene).expect("starts");
         let mut viewport = Viewport::new(&player, ViewOptions::default());
         let draw = |viewport: &mut Viewport| {
-            let mut output = egui::Context::default().run_ui(egui::RawInput::default(), |ui| {
-                viewport.ui(ui, &player, true)
+            let ctx = egui::Context::default();
+            theme::apply(&ctx);
+            let mut output = ctx.run_ui(egui::RawInput::default(), |ui| {
+                viewport.ui(ui, &player, true, None)
             });
             // No texture is made of it.
             output.textures_delta.clear();

@@ -25,7 +25,7 @@ pub enum WindowError {
 ///
 /// # Errors
 /// A scene that cannot start, no graphics adapter, no display.
-pub fn run_native(options: AppOptions, page: String) -> Result<(), WindowError> {
+pub fn run_native(mut options: AppOptions, page: String) -> Result<(), WindowError> {
     let native = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
             .with_title("Jointplay")
@@ -34,11 +34,13 @@ pub fn run_native(options: AppOptions, page: String) -> Result<(), WindowError> 
             .with_min_inner_size([360.0, 480.0]),
         ..Default::default()
     };
+    options.embedded = None;
     // A scene error must keep its type and not become one of the window.
     Player::new(&options.scene).map_err(|error| error.located(&options.scene))?;
     let create: eframe::AppCreator<'_> = Box::new(|cc| {
         let mut app = App::new(cc, options)?;
         app.set_host(Box::new(DesktopHost::new(page)));
+        app.follow_frame_rate();
         Ok(Box::new(app))
     });
     eframe::run_native("Jointplay", native, create).map_err(|error| match error {

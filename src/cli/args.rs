@@ -25,6 +25,9 @@ pub enum Command {
     View(ViewArguments),
     /// List the built-in scenes.
     Scenes,
+    /// List the built-in lessons; or compute what a lesson measures, print it with its values and answers, and say what in it
+    /// does not hold.
+    Lessons(LessonArguments),
     /// Say what a scene contains, what will be computed and what will not.
     Check(CheckArguments),
     /// Simulate without a window and write rows at equal intervals.
@@ -59,6 +62,13 @@ pub struct SceneArguments {
     pub changes: Vec<(String, String)>,
 }
 
+/// `lessons`.
+#[derive(Debug, Args)]
+pub struct LessonArguments {
+    /// Name of a built-in lesson, or a file (contains `/` or ends in `.toml`).
+    pub lesson: Option<String>,
+}
+
 /// `check`.
 #[derive(Debug, Args)]
 pub struct CheckArguments {
@@ -83,6 +93,9 @@ pub struct ViewArguments {
     /// `#` is optional.
     #[arg(long, value_name = "LINK", conflicts_with_all = ["scene", "changes"])]
     pub link: Option<String>,
+    /// Begin a lesson, e.g. `rattle`: a built-in one by its name, or a file (contains `/` or ends in `.toml`).
+    #[arg(long, value_name = "NAME|FILE", conflicts_with_all = ["scene", "changes", "link"])]
+    pub lesson: Option<String>,
     /// Address of a page with the laboratory, e.g. `https://example.org/lab/`, to which `Copy link` appends its links
     /// [default: the environment variable JOINTPLAY_PAGE; without either a link begins with its `#`].
     #[arg(long, value_name = "URL")]
@@ -541,6 +554,7 @@ impl Default for ViewArguments {
             scene: super::DEFAULT_SCENE.into(),
             changes: Vec::new(),
             link: None,
+            lesson: None,
             page: None,
         }
     }

@@ -149,8 +149,7 @@ impl Start {
     pub fn of(simulation: &mut Simulation) -> Self {
         let loose = simulation.not_unique();
         let scene = simulation.scene();
-        let driven = scene.joints.iter().filter(|joint| joint.drive.is_some());
-        let driven: Vec<&String> = driven.map(|joint| &joint.name).collect();
+        let driven: Vec<&String> = scene.driven().map(|(joint, _)| &joint.name).collect();
         let reactions = loose.reactions.iter();
         Self {
             lines: lines(simulation),

@@ -180,7 +180,7 @@ fn joints(all: &[Joint]) -> String {
     for kind in kinds {
         for driven in [true, false] {
             let alike = || {
-                let alike = |j: &&Joint| j.kind == kind && j.drive.is_some() == driven;
+                let alike = |j: &&Joint| j.kind == kind && j.drives().next().is_some() == driven;
                 all.iter().filter(alike)
             };
             let count = alike().count();
@@ -349,13 +349,7 @@ fn work(scene: &Scene, contents: &Summary) -> (Vec<String>, Vec<String>) {
         contents.drives > 0,
         format!(
             "actuator forces at {}",
-            names(
-                scene
-                    .joints
-                    .iter()
-                    .filter(|j| j.drive.is_some())
-                    .map(|j| &j.name)
-            )
+            names(scene.driven().map(|(joint, _)| &joint.name))
         ),
         "actuator forces: nothing is driven",
     );

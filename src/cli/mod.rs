@@ -38,7 +38,7 @@ use std::num::NonZero;
 
 use clap::Parser;
 
-use self::args::{Arguments, Command, SceneArguments, ViewArguments};
+use self::args::{Arguments, Command, LessonArguments, SceneArguments, ViewArguments};
 pub use self::failure::Failure;
 pub use crate::scene::DEFAULT_SCENE;
 use crate::scene::{BUILT_IN, Scene, reference_page, visible};
@@ -76,6 +76,7 @@ fn dispatch(arguments: Arguments) -> Result<(), Failure> {
         None => view(&ViewArguments::default()),
         Some(Command::View(arguments)) => view(&arguments),
         Some(Command::Scenes) => print(&scenes()?),
+        Some(Command::Lessons(arguments)) => print(&lessons(&arguments)?),
         Some(Command::Check(arguments)) => check::check(&arguments),
         Some(Command::Run(arguments)) => run::run(&arguments),
         #[cfg(feature = "gui")]
@@ -98,12 +99,13 @@ fn dispatch(arguments: Arguments) -> Result<(), Failure> {
 
 #[cfg(feature = "gui")]
 fn view(arguments: &ViewArguments) -> Result<(), Failure> {
-    use crate::app::{AppOptions, WindowError, run_native};
+    use crate::app::{AppOptions, Lesson, WindowError, run_native};
     drivers::restart_with_runtime_dir();
     let page = page::address(arguments.page.as_deref())?;
-    let options = match &arguments.link {
-        Some(link) => AppOptions::from_link(link).map_err(Failure::usage)?,
-        None => AppOptions::new(Scene::load(&arguments.scene, &arguments.changes)?),
+    let options = match (&arguments.link, &arguments.lesson) {
+        (Some(link), _) => AppOptions::from_link(link).map_err(Failure::usage)?,
+        (_, Some(lesson)) => AppOptions::of_lesson(Lesson::load(lesson)?, 0),
+        (None, None) => AppOptions::new(Scene::load(&arguments.scene, &arguments.changes)?),
     };
     run_native(options, page).map_err(|error| {
         let code = match error {
@@ -147,6 +149,26 @@ fn scenes() -> Result<String, Failure> {
         let _ = writeln!(out, "{name:<22}{}", Scene::load(name, &[])?.title);
     }
     Ok(out)
+}
+
+#[cfg(feature = "gui")]
+fn lessons(arguments: &LessonArguments) -> Result<String, Failure> {
+    use crate::app::{Course, Lesson, lesson_titles};
+    if let Some(lesson) = &arguments.lesson {
+        let mut course = Course::new(Lesson::load(lesson)?, 0);
+        return course.print().map_err(Failure::usage);
+    }
+    let mut out = String::new();
+    for (name, title) in lesson_titles() {
+        // Writing to a String cannot fail.
+        let _ = writeln!(out, "{name:<22}{title}");
+    }
+    Ok(out)
+}
+
+#[cfg(not(feature = "gui"))]
+fn lessons(_arguments: &LessonArguments) -> Result<String, Failure> {
+    Err(no_graphics())
 }
 
 fn load(arguments: &SceneArguments) -> Result<Scene, Failure> {

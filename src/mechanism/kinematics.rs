@@ -290,6 +290,7 @@ pub struct Driven {
     pub coordinates: Vec<Jet>,
     /// The motion in closed form, where the scene follows one.
     pub closed: Option<ClosedMotion>,
+    /// Those bodies, parents before children.
     bodies: Vec<usize>,
 }
 
@@ -300,7 +301,7 @@ impl Driven {
             time: None,
             coordinates: vec![Jet::default(); model.drives.len()],
             closed: None,
-            bodies: (0..model.bodies.len())
+            bodies: (model.order.iter().copied())
                 .filter(|&b| model.bodies[b].driven_only)
                 .collect(),
         }

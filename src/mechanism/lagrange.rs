@@ -116,8 +116,12 @@ impl Layout {
             for rows in pair.rows().into_iter().flatten() {
                 add(rows, b, parent);
             }
-            if let Motion::Driven { drive, .. } = body.motion {
-                driver_row[drive] = add(pair.driven_row(drive), b, parent);
+            // Of two degrees the first belongs to the link.
+            let link = model.linked_at(b).map(|_| body.parent);
+            for (part, of) in link.into_iter().chain([b]).enumerate() {
+                if let Motion::Driven { drive, .. } = model.bodies[of].motion {
+                    driver_row[drive] = add(pair.driven_row(part, drive), b, parent);
+                }
             }
         }
         let ideal_row = model
@@ -547,7 +551,14 @@ impl Equations for Lagrange {
 
     fn drive_power(&mut self, model: &Model, _: &Vec3, _: &[f64], _: &[f64], _: bool) -> f64 {
         let each = model.drives.iter().zip(&self.driver_row);
-        each.map(|(drive, &row)| self.multipliers[row] * rate_of(model, &self.motion, drive.body))
+        let rate = |b: BodyIndex| match model.linked_at(b) {
+            Some((pair, part)) => {
+                let own = pair.coordinates(&self.motion).nth(part);
+                own.map_or(0.0, |[_, rate]| rate)
+            }
+            None => rate_of(model, &self.motion, b),
+        };
+        each.map(|(drive, &row)| self.multipliers[row] * rate(drive.body))
             .sum()
     }
 }

@@ -39,7 +39,7 @@ pub use crate::jet::Jet;
 pub use bounds::{Advice, CostOf, Counted};
 pub use closed_form::ClosedMotion;
 pub use contacts::{Contacts, Ramp};
-pub use drives::period_of;
+pub use drives::periods_of;
 pub use elements::{Counts, ElementReport, Gap, Powers, Pull, Touch, Touching};
 pub use flight::{Flight, Flyer};
 pub use kinematics::{Kinematics, Wrench};

@@ -7,7 +7,9 @@ use super::drives::{Course, Law, course_of};
 use super::factor::{NONE, Pattern};
 use super::spcmm::Trajectory;
 use crate::jet::Jet;
-use crate::scene::{Attachment, Joint, JointKind, JointStart, Mat3, Quat, Scene, StartRule, Vec3};
+use crate::scene::{
+    Attachment, Drive, Freedom, Joint, JointKind, JointStart, Mat3, Quat, Scene, StartRule, Vec3,
+};
 
 /// Index of a body: those of the scene, then massless links; one past the last stands for the world.
 pub type BodyIndex = usize;
@@ -201,56 +203,54 @@ impl Model {
             let parent_centre = joint
                 .parent
                 .map_or(Vec3::zeros(), |p| scene.bodies[p].centre);
-            let motion = match (joint.kind, &joint.drive) {
-                (JointKind::Fixed, _) => Motion::Fixed,
-                (JointKind::Prismatic | JointKind::Revolute, Some(drive)) => {
-                    drives.push(DriveLaw {
-                        course: course_of(drive, joint.kind),
-                        body: index,
-                    });
-                    Motion::Driven {
-                        drive: drives.len() - 1,
-                        revolute: joint.kind == JointKind::Revolute,
+            let mut moves = |freedom: Freedom, drive: &Option<Drive>, body| {
+                let revolute = freedom.turns();
+                match drive {
+                    Some(drive) => {
+                        let course = course_of(drive, revolute);
+                        drives.push(DriveLaw { course, body });
+                        let drive = drives.len() - 1;
+                        Motion::Driven { drive, revolute }
                     }
+                    // Numbered below, tree by tree.
+                    None if revolute => Motion::Revolute { q: 0, v: 0 },
+                    None => Motion::Prismatic { q: 0, v: 0 },
                 }
-                // Numbered below, tree by tree.
-                (JointKind::Prismatic, None) => Motion::Prismatic { q: 0, v: 0 },
-                (JointKind::Revolute | JointKind::Cylindrical | JointKind::Universal, _) => {
-                    Motion::Revolute { q: 0, v: 0 }
-                }
-                (JointKind::Free, _) => Motion::Free { q: 0, v: 0 },
             };
-            let moves_freely = matches!(
-                motion,
-                Motion::Prismatic { .. } | Motion::Revolute { .. } | Motion::Free { .. }
-            );
-            let parent_root = if parent == world {
+            let (mut of_link, link) = (None, massive + links.len());
+            let motion = match *joint.kind.freedoms() {
+                [only] => moves(only, &joint.drive, index),
+                [first, second] => {
+                    of_link = Some(moves(first, &joint.drive, link));
+                    moves(second, &joint.second_drive, index)
+                }
+                _ if joint.kind == JointKind::Fixed => Motion::Fixed,
+                _ => Motion::Free { q: 0, v: 0 },
+            };
+            let root_below = |above: usize, body: BodyIndex, motion: &Motion| match motion {
+                _ if above != usize::MAX => above,
+                Motion::Fixed | Motion::Driven { .. } => usize::MAX,
+                _ => body,
+            };
+            let mut above = if parent == world {
                 usize::MAX
             } else {
                 root[parent]
             };
-            root[index] = if parent_root != usize::MAX {
-                parent_root
-            } else if moves_freely {
-                index
-            } else {
-                usize::MAX
-            };
-            if parent != world && root[index] != usize::MAX {
+            if let Some(motion) = &of_link {
+                above = root_below(above, link, motion);
+                root[link] = above;
+            }
+            root[index] = root_below(above, index, &motion);
+            let moves_freely = root[index] != usize::MAX;
+            if parent != world && moves_freely {
                 bodies[parent].carries = true;
             }
             let rest = joint.rotation.to_rotation_matrix().into_inner();
             let from_parent = joint.parent_point - parent_centre;
             let to_centroid = body.centre - joint.child_point;
             let (mut hangs_on, mut from, mut axis) = (parent, from_parent, joint.axis);
-            if joint.kind.freedoms().len() == 2 {
-                let link = massive + links.len();
-                root[link] = if parent_root == usize::MAX {
-                    link
-                } else {
-                    parent_root
-                };
-                root[index] = root[link];
+            if let Some(motion) = of_link {
                 let child = Anchor {
                     body: index,
                     offset: -to_centroid,
@@ -260,7 +260,11 @@ impl Model {
                     offset: from_parent,
                 };
                 linked.push(Pair::new(joint, child, of_parent));
-                links.push(link_of(joint, parent, from_parent));
+                links.push(Body {
+                    driven_only: root[link] == usize::MAX,
+                    carries: moves_freely,
+                    ..link_of(joint, motion, parent, from_parent)
+                });
                 order.push(link);
                 (hangs_on, from) = (link, Vec3::zeros());
                 if joint.kind == JointKind::Universal {
@@ -509,8 +513,9 @@ fn turning(axis: &Vec3, rest: Mat3, turns: bool) -> [Mat3; 3] {
     ]
 }
 
-/// The massless link of a joint of two degrees: on a slide of a cylindrical joint, on the first hinge of a universal one.
-fn link_of(joint: &Joint, parent: BodyIndex, from_parent: Vec3) -> Body {
+/// The massless link of a joint of two degrees: on a slide of a cylindrical joint, on the first hinge of a universal one, which
+/// makes this motion.
+fn link_of(joint: &Joint, motion: Motion, parent: BodyIndex, from_parent: Vec3) -> Body {
     let slides = joint.kind == JointKind::Cylindrical;
     let [fixed, cosine, sine] = turning(&joint.axis, Mat3::identity(), !slides);
     Body {
@@ -518,11 +523,7 @@ fn link_of(joint: &Joint, parent: BodyIndex, from_parent: Vec3) -> Body {
         inertia: Mat3::zeros(),
         inertia_inverse: Mat3::zeros(),
         parent,
-        motion: if slides {
-            Motion::Prismatic { q: 0, v: 0 }
-        } else {
-            Motion::Revolute { q: 0, v: 0 }
-        },
+        motion,
         from_parent,
         to_centroid: Vec3::zeros(),
         axis: joint.axis,

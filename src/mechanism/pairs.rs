@@ -20,11 +20,13 @@ pub enum Rows {
         along: Vec3,
         drive: Option<usize>,
     },
-    /// Angle from the parent's `zero` to the child's `child` about `axis` is the driven coordinate: 1 row.
+    /// Angle from the parent's `zero` to the child's `child` about `axis`, of the parent or `in_child`, is the driven coordinate:
+    /// 1 row.
     Angle {
         child: Vec3,
         zero: Vec3,
         axis: Vec3,
+        in_child: bool,
         drive: usize,
     },
 }
@@ -118,12 +120,14 @@ impl Rows {
                 child,
                 zero: reference,
                 axis,
+                in_child,
                 drive,
             } => {
+                let of_axis = if in_child { c } else { p };
                 let (a, b, x) = (
                     c.rotation * child,
                     p.rotation * reference,
-                    p.rotation * axis,
+                    of_axis.rotation * axis,
                 );
                 let f = driven[drive];
                 let angle = libm::atan2(b.cross(&a).dot(&x), b.dot(&a));
@@ -132,7 +136,7 @@ impl Rows {
                 let phi = angle + turns * std::f64::consts::TAU - f.value;
                 let relative = wc - wp;
                 let acceleration = (c.angular_acceleration - p.angular_acceleration).dot(&x)
-                    + relative.dot(&wp.cross(&x))
+                    + relative.dot(&of_axis.angular_velocity.cross(&x))
                     - f.acceleration;
                 let row = JacobianRow {
                     child: [zero, x],
@@ -176,17 +180,35 @@ impl Pair {
         ]
     }
 
-    /// The row that prescribes its one coordinate.
-    pub fn driven_row(&self, drive: usize) -> Rows {
-        match self.kind {
-            JointKind::Prismatic => self.offset(&self.axes[0], Some(drive)),
-            _ => Rows::Angle {
-                child: self.seen[1],
-                zero: self.axes[1],
-                axis: self.axes[0],
+    /// The row that prescribes its coordinate `part`.
+    pub fn driven_row(&self, part: usize, drive: usize) -> Rows {
+        let about_axis = |child: Vec3, zero: Vec3| Rows::Angle {
+            child,
+            zero,
+            axis: self.axes[0],
+            in_child: false,
+            drive,
+        };
+        match (self.kind, part) {
+            (JointKind::Prismatic | JointKind::Cylindrical, 0) => {
+                self.offset(&self.axes[0], Some(drive))
+            }
+            (JointKind::Universal, 0) => about_axis(self.second, self.second_at_zero()),
+            (JointKind::Universal, _) => Rows::Angle {
+                child: self.seen[0],
+                zero: self.axes[0],
+                axis: self.second,
+                in_child: true,
                 drive,
             },
+            _ => about_axis(self.seen[1], self.axes[1]),
         }
+    }
+
+    /// The second axis of a universal joint where both angles are 0, as the parent sees it.
+    fn second_at_zero(&self) -> Vec3 {
+        let [x, y, z] = self.seen.map(|seen| seen.dot(&self.second));
+        self.axes[0] * x + self.axes[1] * y + self.axes[2] * z
     }
 
     fn point(&self) -> Rows {
@@ -258,9 +280,7 @@ impl Pair {
             JointKind::Cylindrical => [Some(slide()), Some(hinge())],
             JointKind::Universal => {
                 let second = c.rotation * self.second;
-                // Where both coordinates are 0, as the parent sees it.
-                let [x, y, z] = self.seen.map(|seen| seen.dot(&self.second));
-                let zero = p.rotation * (self.axes[0] * x + self.axes[1] * y + self.axes[2] * z);
+                let zero = p.rotation * self.second_at_zero();
                 let first = turn(&axis, &zero, &second);
                 [
                     Some(first),

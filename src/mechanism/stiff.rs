@@ -664,7 +664,23 @@ mod tests {
         }
     }
 
-    const LINKED: [(&str, &str); 6] = [
+    const LINKED: [(&str, &str); 7] = [
+        (
+            "coordinates of two degrees",
+            "[[body]]\nname = \"ring\"\nmass = \"1 kg\"\ninertia = \"2e-2 3e-2 4e-2 kg m^2\"\n\
+             [[body]]\nname = \"cross\"\nmass = \"1 kg\"\ninertia = \"3e-2 3e-2 4e-2 kg m^2\"\n\
+             [[joint]]\nname = \"ring\"\nkind = \"cylindrical\"\nparent = \"arm\"\nchild = \"ring\"\naxis = [2, 1, 0]\n\
+             parent_point = \"0 50 20 mm\"\nchild_point = \"10 -40 0 mm\"\nrotation = { axis = [1, 2, 0], angle = \"25 deg\" }\n\
+             start = { position = \"0.2 mm\", velocity = \"0.3 mm/s\", angle = \"0.2 mrad\", angular_velocity = \"1 mrad/s\" }\n\
+             [[joint]]\nname = \"cross\"\nkind = \"universal\"\nparent = \"wheel\"\nchild = \"cross\"\naxis = [1, 2, 0]\n\
+             child_axis = [0, 0, 1]\nparent_point = \"20 0 10 mm\"\nchild_point = \"0 30 20 mm\"\n\
+             start = { angle = \"0.3 mrad\", angular_velocity = \"1 mrad/s\", child_angle = \"-0.2 mrad\", child_angular_velocity = \"2 mrad/s\" }\n\
+             [[joint_spring]]\nname = \"t\"\njoint = \"ring\"\ncoordinate = \"position\"\nstiffness = \"900 N/mm\"\ndamping = \"7 kN s/m\"\n\
+             [[joint_spring]]\nname = \"u\"\njoint = \"ring\"\ncoordinate = \"angle\"\nstiffness = \"20 kN m/rad\"\ndamping = \"200 N m s/rad\"\n\
+             [[joint_spring]]\nname = \"v\"\njoint = \"cross\"\ncoordinate = \"angle\"\nstiffness = \"20 kN m/rad\"\ndamping = \"200 N m s/rad\"\n\
+             [[motor]]\nname = \"w\"\njoint = \"cross\"\ncoordinate = \"child_angle\"\nstiffness = \"20 kN m/rad\"\ndamping = \"200 N m s/rad\"\n\
+             target = { law = \"harmonic\", amplitude = \"0.5 mrad\", frequency = \"1 Hz\" }\n",
+        ),
         (
             // Near the lengths at which they carry little: large forces turn with the bodies, which is left out.
             "curves",

@@ -46,7 +46,10 @@ impl Summary {
             .collect();
         Self {
             bodies: model.massive,
-            driven_bodies: model.bodies.iter().filter(|b| b.driven_only).count(),
+            driven_bodies: model.bodies[..model.massive]
+                .iter()
+                .filter(|b| b.driven_only)
+                .count(),
             drives: model.drives.len(),
             velocity_coordinates,
             position_coordinates: equations.positions(model),

@@ -5,21 +5,32 @@ use std::sync::Arc;
 use eframe::egui;
 use eframe::egui_wgpu;
 
+use super::finish::Finish;
 use super::{RenderTarget, Renderer, wgpu};
 use crate::view::DrawList;
 
 /// Stored in egui's callback resources.
 struct Resources {
     renderer: Renderer,
-    blit: wgpu::RenderPipeline,
-    layout: wgpu::BindGroupLayout,
-    sampler: wgpu::Sampler,
-    shown: Option<(RenderTarget, wgpu::BindGroup)>,
+    finish: Finish,
+    shown: Option<Shown>,
+}
+
+/// What is drawn to, and which picture it holds.
+struct Shown {
+    target: RenderTarget,
+    group: wgpu::BindGroup,
+    revision: Option<u64>,
 }
 
 /// Creates the renderer and stores it in egui's callback resources. Call once, when the application starts.
 pub fn install(state: &egui_wgpu::RenderState) {
-    let resources = Resources::new(&state.device, state.target_format);
+    let renderer = Renderer::new(&state.device, &state.adapter);
+    let resources = Resources {
+        finish: renderer.finish(&state.device, state.target_format),
+        renderer,
+        shown: None,
+    };
     state.renderer.write().callback_resources.insert(resources);
 }
 
@@ -27,121 +38,42 @@ pub fn install(state: &egui_wgpu::RenderState) {
 ///
 /// ```ignore
 /// let list = Arc::make_mut(&mut self.list); // egui has dropped last frame's clone: no copy is made
-/// view.build(&shot, list);                  // shot.size: the rectangle in physical pixels
+/// view.build(&shot, list);                  // shot.size: the rectangle in physical pixels, or less of them
 /// ui.painter().add(Viewport::shape(rect, self.list.clone()));
 /// ```
 pub struct Viewport {
     list: Arc<DrawList>,
+    revision: Option<u64>,
 }
 
 impl Viewport {
     /// Shape for `egui::Painter::add`: draws `list` at `list.size` and shows it in `rect`.
     pub fn shape(rect: egui::Rect, list: Arc<DrawList>) -> egui::Shape {
-        egui_wgpu::Callback::new_paint_callback(rect, Self { list }).into()
+        Self::revised(rect, list, None)
+    }
+
+    /// The same; where the picture before had this `revision`, too, it is the same one and only shown again.
+    pub fn revised(rect: egui::Rect, list: Arc<DrawList>, revision: Option<u64>) -> egui::Shape {
+        egui_wgpu::Callback::new_paint_callback(rect, Self { list, revision }).into()
     }
 }
 
 impl Resources {
-    fn new(device: &wgpu::Device, surface: wgpu::TextureFormat) -> Self {
-        let shader = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some("blit.wgsl"),
-            source: wgpu::ShaderSource::Wgsl(include_str!("../../shaders/blit.wgsl").into()),
-        });
-        let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
-            binding,
-            visibility: wgpu::ShaderStages::FRAGMENT,
-            ty,
-            count: None,
-        };
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("blit"),
-            entries: &[
-                entry(
-                    0,
-                    wgpu::BindingType::Texture {
-                        sample_type: wgpu::TextureSampleType::Float { filterable: true },
-                        view_dimension: wgpu::TextureViewDimension::D2,
-                        multisampled: false,
-                    },
-                ),
-                entry(
-                    1,
-                    wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
-                ),
-            ],
-        });
-        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("blit"),
-            bind_group_layouts: &[Some(&layout)],
-            immediate_size: 0,
-        });
-        let blit = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some("blit"),
-            layout: Some(&pipeline_layout),
-            vertex: wgpu::VertexState {
-                module: &shader,
-                entry_point: Some("vs_blit"),
-                compilation_options: Default::default(),
-                buffers: &[],
-            },
-            primitive: Default::default(),
-            depth_stencil: None,
-            multisample: Default::default(),
-            fragment: Some(wgpu::FragmentState {
-                module: &shader,
-                entry_point: Some(if surface.is_srgb() {
-                    "fs_linear"
-                } else {
-                    "fs_copy"
-                }),
-                compilation_options: Default::default(),
-                targets: &[Some(surface.into())],
-            }),
-            multiview_mask: None,
-            cache: None,
-        });
-        let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
-            label: Some("blit"),
-            mag_filter: wgpu::FilterMode::Linear,
-            min_filter: wgpu::FilterMode::Linear,
-            ..Default::default()
-        });
-        Self {
-            renderer: Renderer::new(device),
-            blit,
-            layout,
-            sampler,
-            shown: None,
-        }
-    }
-
-    fn fit_target(&mut self, device: &wgpu::Device, size: [u32; 2]) {
+    /// What `list` is drawn to.
+    fn target_for(&mut self, device: &wgpu::Device, list: &DrawList) -> &mut Shown {
         // A window can briefly be 0 pixels wide, or wider than the largest texture.
         let limit = device.limits().max_texture_dimension_2d;
-        let size = size.map(|n| n.clamp(1, limit));
-        if self
-            .shown
-            .as_ref()
-            .is_some_and(|(target, _)| target.size() == size)
-        {
-            return;
-        }
-        let target = RenderTarget::new(device, size);
-        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("blit"),
-            layout: &self.layout,
-            entries: &[
-                wgpu::BindGroupEntry {
-                    binding: 0,
-                    resource: wgpu::BindingResource::TextureView(&target.picture_view),
-                },
-                wgpu::BindGroupEntry {
-                    binding: 1,
-                    resource: wgpu::BindingResource::Sampler(&self.sampler),
-                },
-            ],
+        let size = list.size.map(|n| n.clamp(1, limit));
+        let fits = |shown: &Shown| shown.target.fits(list, size);
+        let shown = self.shown.take().filter(fits).unwrap_or_else(|| {
+            let target = self.renderer.target(device, size, list.quality.samples);
+            Shown {
+                group: self.finish.group(device, &target.light),
+                target,
+                revision: None,
+            }
         });
-        self.shown = Some((target, group));
+        self.shown.insert(shown)
     }
 }
 
@@ -158,11 +90,17 @@ impl egui_wgpu::CallbackTrait for Viewport {
         let Some(resources) = resources.get_mut::<Resources>() else {
             return Vec::new();
         };
-        resources.fit_target(device, self.list.size);
-        if let Some((target, _)) = &resources.shown {
-            resources
-                .renderer
-                .draw(device, queue, encoder, target, &self.list);
+        let shown = resources.target_for(device, &self.list);
+        let before = std::mem::replace(&mut shown.revision, self.revision);
+        if (before.is_none() || before != self.revision)
+            && let Some(Shown { target, .. }) = &resources.shown
+        {
+            let renderer = &mut resources.renderer;
+            // The first picture comes as early as it can.
+            if before.is_some() {
+                renderer.make_another_pipeline(device, target);
+            }
+            renderer.draw(device, queue, encoder, target, &self.list);
         }
         Vec::new()
     }
@@ -176,11 +114,8 @@ impl egui_wgpu::CallbackTrait for Viewport {
         let Some(resources) = resources.get::<Resources>() else {
             return;
         };
-        let Some((_, group)) = &resources.shown else {
-            return;
-        };
-        pass.set_pipeline(&resources.blit);
-        pass.set_bind_group(0, group, &[]);
-        pass.draw(0..3, 0..1);
+        if let Some(shown) = &resources.shown {
+            resources.finish.draw(pass, &shown.group);
+        }
     }
 }

@@ -112,7 +112,7 @@ fn time() {
         };
         view.build(&shot, &mut list);
         build.push(start.elapsed());
-        record.push(offscreen.record_only(&list));
+        record.push(offscreen.time_to_record(&list).expect("drawn"));
     }
     build.sort();
     record.sort();

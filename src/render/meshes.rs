@@ -4,42 +4,35 @@ use std::f32::consts::{PI, TAU};
 
 use crate::view::{Mesh, MeshData};
 
-/// How finely the shared meshes are divided.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Detail {
-    /// No corner shows at any size.
-    Fine,
-    /// For radii of at most [`COARSE_PIXELS`].
-    Coarse,
-}
-
-/// Radius up to which [`Detail::Coarse`] serves, pixels: its sides lie within 0.08 pixels of the circle.
-pub(super) const COARSE_PIXELS: f32 = 4.0;
-
-impl Detail {
+/// How finely the shared meshes are divided, up to a radius on the screen.
+pub(super) struct Level {
     /// Around a bar or a sphere.
-    fn sectors(self) -> u32 {
-        match self {
-            Self::Fine => 64,
-            Self::Coarse => 16,
-        }
-    }
-
-    /// From pole to pole of a sphere.
-    fn stacks(self) -> u32 {
-        self.sectors() / 2
-    }
+    pub sectors: u32,
+    /// Largest radius, pixels: up to it no corner shows.
+    pub pixels: f32,
 }
 
-/// The shared meshes, by [`Mesh::index`].
-pub(super) fn shared(detail: Detail) -> [MeshData; Mesh::SHARED] {
-    let (nu, nv) = (detail.sectors(), detail.stacks());
+/// The finest first.
+pub(super) const LEVELS: [Level; 4] = [
+    level(64, f32::INFINITY),
+    level(32, 18.0),
+    level(16, 4.5),
+    level(8, 1.1),
+];
+
+const fn level(sectors: u32, pixels: f32) -> Level {
+    Level { sectors, pixels }
+}
+
+/// The shared meshes, by [`Mesh::index`], with so many sectors around.
+pub(super) fn shared(sectors: u32) -> [MeshData; Mesh::SHARED] {
+    let stacks = sectors / 2;
     [
-        sphere(nu, nv),
-        cylinder(nu),
-        cone(nu),
+        sphere(sectors, stacks),
+        cylinder(sectors),
+        cone(sectors),
         cube(),
-        socket(nu, nv / 2),
+        socket(sectors, stacks / 2),
     ]
 }
 
@@ -138,22 +131,61 @@ fn cube() -> MeshData {
     mesh
 }
 
-/// Half shell, open towards +z: outer face, inner face (fourth coordinate 1), cut face (2 outside, 3 inside).
+/// How deep a socket's cut face goes from its outer edge to its inner one, in inner radii: a ball before it stands clear of it.
+const CUT: f32 = 0.2;
+/// About the slope of the cut face.
+const CUT_NORMAL: [f32; 2] = [-0.6, 0.8];
+
+/// Half shell, open towards +z: outer face, inner face (fourth coordinate 1), cut face (2 outside, 3 inside). Each comes twice,
+/// to be seen from the front and from behind: in this order any sight passes them from far to near.
 fn socket(nu: u32, half: u32) -> MeshData {
-    let mut mesh = MeshData::default();
-    patch(&mut mesh, nu, half, |u, v| {
+    let face = |nv: u32, point: &dyn Fn(f32, f32) -> ([f32; 4], [f32; 3])| {
+        let mut mesh = MeshData::default();
+        patch(&mut mesh, nu, nv, point);
+        mesh
+    };
+    let brim = (-CUT).acos();
+    let rim = (1.0 - CUT * CUT).sqrt();
+    let outer = face(half, &|u, v| {
         let n = on_ball(u, v * PI / 2.0);
         ([n[0], n[1], n[2], 0.0], n)
     });
-    patch(&mut mesh, nu, half, |u, v| {
-        let n = on_ball(u, (1.0 - v) * PI / 2.0);
+    let inner = face(half, &|u, v| {
+        let n = on_ball(u, (1.0 - v) * (PI - brim));
         ([n[0], n[1], n[2], 1.0], n.map(|x| -x))
     });
-    patch(&mut mesh, nu, 1, |u, v| {
+    let cut = face(1, &|u, v| {
         let (x, y) = circle(u);
-        ([x, y, 0.0, 2.0 + v], [0.0, 0.0, 1.0])
+        let (r, z) = if v > 0.0 { (rim, -CUT) } else { (1.0, 0.0) };
+        let [out, up] = CUT_NORMAL;
+        ([r * x, r * y, z, 2.0 + v], [out * x, out * y, up])
     });
+    let mut mesh = MeshData::default();
+    for (face, from_behind) in [
+        (&outer, true),
+        (&inner, false),
+        (&cut, false),
+        (&cut, true),
+        (&inner, true),
+        (&outer, false),
+    ] {
+        append(&mut mesh, face, from_behind);
+    }
     mesh
+}
+
+/// Adds a face, or what is seen of it from behind.
+fn append(mesh: &mut MeshData, face: &MeshData, from_behind: bool) {
+    let first = mesh.vertices.len() as u32;
+    let side = if from_behind { -1.0 } else { 1.0 };
+    let vertices = face.vertices.iter();
+    mesh.vertices
+        .extend(vertices.map(|(place, normal)| (*place, normal.map(|x| side * x))));
+    for triangle in face.indices.chunks_exact(3) {
+        let [a, b, c] = [0, 1, 2].map(|k| first + triangle[k]);
+        mesh.indices
+            .extend(if from_behind { [a, c, b] } else { [a, b, c] });
+    }
 }
 
 #[cfg(test)]
@@ -162,20 +194,23 @@ mod tests {
     use glam::Vec3;
 
     #[test]
-    fn a_coarse_circle_keeps_within_a_tenth_of_a_pixel() {
-        let half_side = PI / Detail::Coarse.sectors() as f32;
-        assert!(COARSE_PIXELS * (1.0 - half_side.cos()) < 0.08);
+    fn no_circle_is_a_tenth_of_a_pixel_off() {
+        for level in &LEVELS[1..] {
+            let half_side = PI / level.sectors as f32;
+            assert!(level.pixels * (1.0 - half_side.cos()) < 0.09);
+        }
     }
 
     #[test]
     fn triangles_wind_counter_clockwise_seen_from_outside() {
-        let all = [Detail::Fine, Detail::Coarse].map(shared);
+        let all = LEVELS.map(|level| shared(level.sectors));
         for (i, mesh) in all.iter().flatten().enumerate() {
             for triangle in mesh.indices.chunks(3) {
                 let corner = |k: usize| {
                     let (p, n) = mesh.vertices[triangle[k] as usize];
                     // A socket's inner face and edge, at half the outer radius.
-                    let scale = if p[3] == 1.0 || p[3] == 3.0 { 0.5 } else { 1.0 };
+                    let inside = [1.0, 3.0].contains(&p[3]);
+                    let scale = if inside { 0.5 } else { 1.0 };
                     (Vec3::new(p[0], p[1], p[2]) * scale, Vec3::from(n))
                 };
                 let (a, b, c) = (corner(0), corner(1), corner(2));

@@ -1,18 +1,22 @@
 //! Draws a [`crate::view::DrawList`] to a texture with wgpu: the same path in a window, in the browser (WebGPU, WebGL2) and
 //! headless.
 //!
-//! The picture is gamma-encoded once, at the end of `shaders/scene.wgsl`; everything after that copies bytes.
+//! `passes.rs` lists the passes. They leave linear light (`target.rs`), which the last, `finish.rs`, tone-maps and encodes.
 
 mod callback;
+mod finish;
+mod fit;
 mod image;
 #[cfg(test)]
 mod look;
 mod meshes;
 #[cfg(not(target_arch = "wasm32"))]
 mod offscreen;
+mod passes;
 mod pipelines;
 mod readback;
 mod renderer;
+mod shaders;
 mod target;
 #[cfg(test)]
 mod tests;

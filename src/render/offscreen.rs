@@ -1,7 +1,11 @@
 //! Pictures without a window.
 
+use super::finish::Finish;
+use super::target::extent;
 use super::{Image, Readback, RenderError, RenderTarget, Renderer, check_size, device_error, wgpu};
 use crate::view::DrawList;
+#[cfg(test)]
+use wgpu::util::DeviceExt as _;
 
 /// No graphics adapter on this machine.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -16,8 +20,21 @@ pub struct Offscreen {
     device: wgpu::Device,
     queue: wgpu::Queue,
     renderer: Renderer,
-    frame: Option<(RenderTarget, Readback)>,
+    finish: Finish,
+    frame: Option<Frame>,
+    timer: Option<Timer>,
 }
+
+/// Where pictures of one size are drawn.
+struct Frame {
+    target: RenderTarget,
+    group: wgpu::BindGroup,
+    picture: wgpu::Texture,
+    readback: Readback,
+}
+
+/// Format of a picture. Not an sRGB one: the last pass encodes.
+const PICTURE: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
 impl Offscreen {
     /// Opens the best adapter: a GPU, otherwise software Vulkan, otherwise GL. `WGPU_BACKEND` restricts the choice.
@@ -46,13 +63,16 @@ impl Offscreen {
                 .request_device(&wgpu::DeviceDescriptor {
                     label: Some("offscreen"),
                     required_limits: limits,
+                    required_features: adapter.features() & Timer::FEATURES,
                     ..Default::default()
                 })
                 .await;
             match opened {
                 Ok((device, queue)) => {
-                    let renderer = Renderer::new(&device);
+                    let renderer = Renderer::new(&device, &adapter);
                     return Some(Self {
+                        finish: renderer.finish(&device, PICTURE),
+                        timer: Timer::new(&device),
                         adapter: adapter.get_info(),
                         device,
                         queue,
@@ -85,19 +105,14 @@ impl Offscreen {
     /// A size the device cannot draw, or a lost device.
     pub fn render(&mut self, list: &DrawList) -> Result<Image, RenderError> {
         self.check_size(list.size)?;
-        let fits = |frame: &(RenderTarget, Readback)| frame.0.size() == list.size;
-        let (target, readback) = match self.frame.take().filter(fits) {
-            Some(frame) => frame,
-            None => (
-                RenderTarget::new(&self.device, list.size),
-                Readback::new(&self.device, list.size),
-            ),
-        };
-        let (target, readback) = self.frame.insert((target, readback));
+        let frame = self.take_frame(list);
+        let frame = self.frame.insert(frame);
         let mut encoder = self.device.create_command_encoder(&Default::default());
         self.renderer
-            .draw(&self.device, &self.queue, &mut encoder, target, list);
-        readback.copy(&mut encoder, &target.picture);
+            .draw(&self.device, &self.queue, &mut encoder, &frame.target, list);
+        encode(&self.finish, &mut encoder, &frame.group, &frame.picture);
+        let readback = &frame.readback;
+        readback.copy(&mut encoder, &frame.picture);
         self.queue.submit([encoder.finish()]);
         let arrival = readback.request();
         self.device
@@ -111,19 +126,201 @@ impl Offscreen {
     }
 }
 
-#[cfg(test)]
+/// Measures the time of the adapter.
+struct Timer {
+    stamps: wgpu::QuerySet,
+    resolved: wgpu::Buffer,
+    read: wgpu::Buffer,
+}
+
+impl Timer {
+    const FEATURES: wgpu::Features =
+        wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS);
+
+    /// `None` where the device has no timestamps.
+    fn new(device: &wgpu::Device) -> Option<Self> {
+        if !device.features().contains(Self::FEATURES) {
+            return None;
+        }
+        let buffer = |usage| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("timestamps"),
+                size: 16,
+                usage,
+                mapped_at_creation: false,
+            })
+        };
+        use wgpu::BufferUsages as Usage;
+        Some(Self {
+            stamps: device.create_query_set(&wgpu::QuerySetDescriptor {
+                label: Some("timestamps"),
+                ty: wgpu::QueryType::Timestamp,
+                count: 2,
+            }),
+            resolved: buffer(Usage::QUERY_RESOLVE | Usage::COPY_SRC),
+            read: buffer(Usage::COPY_DST | Usage::MAP_READ),
+        })
+    }
+}
+
 impl Offscreen {
-    /// Records a picture without submitting it; returns the time taken.
-    pub(super) fn record_only(&mut self, list: &DrawList) -> std::time::Duration {
-        let target = RenderTarget::new(&self.device, list.size);
+    /// Draws `list` and tells how long the adapter took for it; `None` where it has no timestamps. For benchmarks.
+    ///
+    /// # Errors
+    /// A size the device cannot draw, or a lost device.
+    pub fn time_of(&mut self, list: &DrawList) -> Result<Option<std::time::Duration>, RenderError> {
+        self.check_size(list.size)?;
+        let frame = self.take_frame(list);
+        let Some(timer) = &self.timer else {
+            return Ok(None);
+        };
+        let mut encoder = self.device.create_command_encoder(&Default::default());
+        encoder.write_timestamp(&timer.stamps, 0);
+        self.renderer
+            .draw(&self.device, &self.queue, &mut encoder, &frame.target, list);
+        encode(&self.finish, &mut encoder, &frame.group, &frame.picture);
+        encoder.write_timestamp(&timer.stamps, 1);
+        encoder.resolve_query_set(&timer.stamps, 0..2, &timer.resolved, 0);
+        encoder.copy_buffer_to_buffer(&timer.resolved, 0, &timer.read, 0, 16);
+        self.queue.submit([encoder.finish()]);
+        timer.read.map_async(wgpu::MapMode::Read, .., |_| {});
+        self.device
+            .poll(wgpu::PollType::wait_indefinitely())
+            .map_err(device_error)?;
+        let ticks = {
+            let bytes = timer.read.get_mapped_range(..).map_err(device_error)?;
+            let stamps: &[u64] = bytemuck::cast_slice(&bytes);
+            stamps[1].saturating_sub(stamps[0])
+        };
+        timer.read.unmap();
+        self.frame = Some(frame);
+        let nanoseconds = ticks as f64 * f64::from(self.queue.get_timestamp_period());
+        Ok(Some(std::time::Duration::from_nanos(nanoseconds as u64)))
+    }
+
+    /// Triangles that a picture of `list` asks the adapter for, those of its shadows among them. For benchmarks.
+    pub fn triangles(&mut self, list: &DrawList) -> u64 {
+        self.renderer.triangles(list)
+    }
+
+    /// Draws `list` and tells how long that took here: sorting and packing instances, uploading them, recording the passes. What
+    /// the adapter does with them is waited for afterwards. For benchmarks.
+    ///
+    /// # Errors
+    /// A size the device cannot draw, or a lost device.
+    pub fn time_to_record(&mut self, list: &DrawList) -> Result<std::time::Duration, RenderError> {
+        self.check_size(list.size)?;
+        let frame = self.take_frame(list);
         let start = web_time::Instant::now();
         let mut encoder = self.device.create_command_encoder(&Default::default());
         self.renderer
-            .draw(&self.device, &self.queue, &mut encoder, &target, list);
-        let commands = encoder.finish();
+            .draw(&self.device, &self.queue, &mut encoder, &frame.target, list);
+        self.queue.submit([encoder.finish()]);
         let spent = start.elapsed();
-        self.queue.submit([commands]);
-        spent
+        self.frame = Some(frame);
+        self.device
+            .poll(wgpu::PollType::wait_indefinitely())
+            .map_err(device_error)?;
+        Ok(spent)
+    }
+
+    /// The frame that is kept, or a new one if `list` does not fit it.
+    fn take_frame(&mut self, list: &DrawList) -> Frame {
+        let fits = |frame: &Frame| frame.target.fits(list, list.size);
+        if let Some(frame) = self.frame.take().filter(fits) {
+            return frame;
+        }
+        let size = list.size;
+        let target = self
+            .renderer
+            .target(&self.device, size, list.quality.samples);
+        let picture = picture(&self.device, size);
+        Frame {
+            group: self.finish.group(&self.device, &target.light),
+            target,
+            picture,
+            readback: Readback::new(&self.device, size),
+        }
+    }
+}
+
+fn picture(device: &wgpu::Device, size: [u32; 2]) -> wgpu::Texture {
+    device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("picture"),
+        size: extent(size),
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: PICTURE,
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+        view_formats: &[],
+    })
+}
+
+/// The last pass, to `picture`.
+fn encode(
+    finish: &Finish,
+    encoder: &mut wgpu::CommandEncoder,
+    group: &wgpu::BindGroup,
+    picture: &wgpu::Texture,
+) {
+    let view = picture.create_view(&Default::default());
+    let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        label: Some("finish"),
+        color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+            view: &view,
+            depth_slice: None,
+            resolve_target: None,
+            ops: wgpu::Operations {
+                load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                store: wgpu::StoreOp::Store,
+            },
+        })],
+        ..Default::default()
+    });
+    finish.draw(&mut pass, group);
+}
+
+#[cfg(test)]
+impl Offscreen {
+    /// What the last pass makes of a row of texels: light, and the share of the theme's colours.
+    pub(super) fn finished(&self, texels: &[[f32; 4]]) -> Image {
+        // Only zero and normal numbers that 11 bits hold.
+        let half = |x: &f32| match x.to_bits() {
+            0 => 0,
+            bits => ((bits >> 13) - (112 << 10)) as u16,
+        };
+        let halves: Vec<u16> = texels.iter().flatten().map(half).collect();
+        let size = [texels.len() as u32, 1];
+        let texture = self.device.create_texture_with_data(
+            &self.queue,
+            &wgpu::TextureDescriptor {
+                label: Some("light"),
+                size: extent(size),
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: wgpu::TextureFormat::Rgba16Float,
+                usage: wgpu::TextureUsages::TEXTURE_BINDING,
+                view_formats: &[],
+            },
+            wgpu::util::TextureDataOrder::LayerMajor,
+            bytemuck::cast_slice(&halves),
+        );
+        let light = texture.create_view(&Default::default());
+        let group = self.finish.group(&self.device, &light);
+        let (picture, readback) = (
+            picture(&self.device, size),
+            Readback::new(&self.device, size),
+        );
+        let mut encoder = self.device.create_command_encoder(&Default::default());
+        encode(&self.finish, &mut encoder, &group, &picture);
+        readback.copy(&mut encoder, &picture);
+        self.queue.submit([encoder.finish()]);
+        let arrival = readback.request();
+        let done = self.device.poll(wgpu::PollType::wait_indefinitely());
+        assert!(done.is_ok() && matches!(arrival.get(), Some(Ok(()))));
+        readback.read().expect("a picture")
     }
 }
 

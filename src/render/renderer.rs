@@ -4,16 +4,23 @@ use std::mem::size_of;
 use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
-use glam::{Mat4, Vec3, Vec4};
+use glam::{Vec3, Vec4};
 use wgpu::util::DeviceExt as _;
 
-use super::meshes::{self, COARSE_PIXELS, Detail};
+use super::finish::Finish;
+use super::fit::{self, Ball, shadow_region};
+use super::meshes::{self, LEVELS};
+use super::passes::{Draws, Group, PASSES};
 use super::pipelines::{Pipelines, SHADOW};
+use super::target::{Keeping, extent};
 use super::{RenderTarget, wgpu};
-use crate::view::{DrawList, Eye, Instance, Layer, Line, Mesh, MeshData};
+use crate::view::{Colour, DrawList, Eye, Instance, Line, Mesh, MeshData};
 
 /// Side of the shadow map, pixels: within the 2048 that WebGL2 guarantees.
 const SHADOW_SIZE: u32 = 1536;
+/// Half width of a shadow's edge, in radii of the scene; and its limits in texels, within which nine comparisons are smooth.
+const SOFT: f32 = 0.003;
+const SOFT_TEXELS: [f32; 2] = [1.2, 2.5];
 
 /// `Globals` of `shaders/scene.wgsl`.
 #[repr(C)]
@@ -24,6 +31,8 @@ struct Globals {
     eye: [f32; 4],
     light: [f32; 4],
     up: [f32; 4],
+    studio: [f32; 4],
+    strip: [f32; 4],
     background_top: [f32; 4],
     background_bottom: [f32; 4],
     picture: [f32; 4],
@@ -31,6 +40,8 @@ struct Globals {
     floor_along: [f32; 4],
     floor_colour: [f32; 4],
     floor_lines: [f32; 4],
+    outline: [f32; 4],
+    rim: [f32; 4],
 }
 
 /// A mesh on the device.
@@ -38,6 +49,8 @@ struct Loaded {
     vertices: wgpu::Buffer,
     indices: wgpu::Buffer,
     count: u32,
+    /// Middle and half size of its box.
+    bounds: [Vec3; 2],
 }
 
 /// A buffer that grows as needed.
@@ -46,11 +59,51 @@ struct Growing {
     buffer: wgpu::Buffer,
 }
 
-/// Instances of one mesh within the instance buffer.
+/// The shadow map.
+struct Shadow {
+    /// Side, pixels.
+    size: u32,
+    map: wgpu::TextureView,
+    group: wgpu::BindGroup,
+}
+
+impl Shadow {
+    fn new(
+        device: &wgpu::Device,
+        layout: &wgpu::BindGroupLayout,
+        sampler: &wgpu::Sampler,
+        size: u32,
+    ) -> Self {
+        let map = device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("shadow map"),
+            size: extent([size; 2]),
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: SHADOW,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        });
+        let map = map.create_view(&Default::default());
+        let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
+        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("shadow"),
+            layout,
+            entries: &[
+                entry(0, wgpu::BindingResource::TextureView(&map)),
+                entry(1, wgpu::BindingResource::Sampler(sampler)),
+            ],
+        });
+        Self { size, map, group }
+    }
+}
+
+/// Instances of one mesh within the instance buffer: first those that are in view.
 struct Batch {
-    detail: Detail,
+    level: usize,
     mesh: usize,
     first: u64,
+    seen: u32,
     count: u32,
 }
 
@@ -59,23 +112,26 @@ pub struct Renderer {
     pipelines: Pipelines,
     globals: wgpu::Buffer,
     globals_group: wgpu::BindGroup,
-    shadow_map: wgpu::TextureView,
-    shadow_group: wgpu::BindGroup,
-    meshes: Vec<Loaded>,
-    /// The shared meshes for instances of a few pixels, by [`Mesh::index`].
-    coarse: Vec<Loaded>,
+    shadow: Shadow,
+    sampler: wgpu::Sampler,
+    /// The shared meshes by level of detail, the finest first and with the plates; then by [`Mesh::index`].
+    meshes: Vec<Vec<Loaded>>,
     plates: Arc<[MeshData]>,
     instances: Growing,
     lines: Growing,
     marks: Growing,
-    /// All instances of a picture, layer by layer.
+    /// All instances of a picture, group by group.
     packed: Vec<Instance>,
+    /// Solid things: where they are, and whether they are in view.
+    casters: Vec<(Ball, bool)>,
+    keeping: Keeping,
 }
 
 impl Renderer {
-    /// Creates pipelines and shared meshes on `device`.
-    pub fn new(device: &wgpu::Device) -> Self {
-        let pipelines = Pipelines::new(device);
+    /// Creates pipelines and shared meshes on `device`, which is `adapter`'s.
+    pub fn new(device: &wgpu::Device, adapter: &wgpu::Adapter) -> Self {
+        let keeping = Keeping::on(adapter);
+        let pipelines = Pipelines::new(device, keeping);
         let globals = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("globals"),
             size: size_of::<Globals>() as u64,
@@ -90,23 +146,6 @@ impl Renderer {
                 resource: globals.as_entire_binding(),
             }],
         });
-        let shadow_map = device
-            .create_texture(&wgpu::TextureDescriptor {
-                label: Some("shadow map"),
-                size: wgpu::Extent3d {
-                    width: SHADOW_SIZE,
-                    height: SHADOW_SIZE,
-                    depth_or_array_layers: 1,
-                },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format: SHADOW,
-                usage: wgpu::TextureUsages::RENDER_ATTACHMENT
-                    | wgpu::TextureUsages::TEXTURE_BINDING,
-                view_formats: &[],
-            })
-            .create_view(&Default::default());
         let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
             label: Some("shadow"),
             mag_filter: wgpu::FilterMode::Linear,
@@ -114,40 +153,38 @@ impl Renderer {
             compare: Some(wgpu::CompareFunction::LessEqual),
             ..Default::default()
         });
-        let shadow_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("shadow"),
-            layout: &pipelines.shadow,
-            entries: &[
-                wgpu::BindGroupEntry {
-                    binding: 0,
-                    resource: wgpu::BindingResource::TextureView(&shadow_map),
-                },
-                wgpu::BindGroupEntry {
-                    binding: 1,
-                    resource: wgpu::BindingResource::Sampler(&sampler),
-                },
-            ],
-        });
+        let shadow = Shadow::new(device, &pipelines.shadow, &sampler, SHADOW_SIZE);
         Self {
             globals,
             globals_group,
-            shadow_map,
-            shadow_group,
-            meshes: meshes::shared(Detail::Fine)
+            shadow,
+            sampler,
+            meshes: LEVELS
                 .iter()
-                .map(|mesh| load(device, mesh))
-                .collect(),
-            coarse: meshes::shared(Detail::Coarse)
-                .iter()
-                .map(|mesh| load(device, mesh))
+                .map(|level| {
+                    let shared = meshes::shared(level.sectors);
+                    shared.iter().map(|mesh| load(device, mesh)).collect()
+                })
                 .collect(),
             plates: Arc::new([]),
             instances: Growing::new(device, "instances"),
             lines: Growing::new(device, "lines"),
             marks: Growing::new(device, "marks"),
             packed: Vec::new(),
+            casters: Vec::new(),
+            keeping,
             pipelines,
         }
+    }
+
+    /// A target for pictures of `size` pixels with 4 samples or 1 in each.
+    pub fn target(&self, device: &wgpu::Device, size: [u32; 2], samples: u32) -> RenderTarget {
+        RenderTarget::new(device, size, samples, self.keeping)
+    }
+
+    /// What brings its targets to attachments of a `format`.
+    pub(super) fn finish(&self, device: &wgpu::Device, format: wgpu::TextureFormat) -> Finish {
+        Finish::new(device, self.keeping, format)
     }
 
     /// Records the passes that draw `list` to `target`. One picture per submission: the buffers are shared.
@@ -161,139 +198,181 @@ impl Renderer {
     ) {
         if !Arc::ptr_eq(&self.plates, &list.plates) {
             self.plates = list.plates.clone();
-            self.meshes.truncate(Mesh::SHARED);
-            self.meshes
-                .extend(list.plates.iter().map(|mesh| load(device, mesh)));
+            self.meshes[0].truncate(Mesh::SHARED);
+            self.meshes[0].extend(list.plates.iter().map(|mesh| load(device, mesh)));
         }
-        self.packed.clear();
-        let height = target.size()[1];
-        let pixels = |instance: &Instance| radius_on_screen(&list.eye, height, instance);
-        let solid = self.pack(&list.solid, pixels);
-        let faded = self.pack(&list.faded, pixels);
-        let ghost = self.pack(&list.ghost, pixels);
-        let ghost_edges = self.pack(&list.ghost_edges, pixels);
-        let arrows = self.pack(&list.arrows, pixels);
-        let overlay = self.pack(&list.overlay, pixels);
-        let halos = self.pack_mesh(Mesh::Sphere.index(), &list.halos, pixels);
-        let sockets = self.pack_mesh(Mesh::Socket.index(), &list.sockets, pixels);
-        let wear = self.pack(&list.wear, pixels);
-        let clear_balls = self.pack_mesh(Mesh::Sphere.index(), &list.clear_balls, pixels);
+        let fine = list.quality.fine_shadows;
+        let side = if fine { SHADOW_SIZE } else { SHADOW_SIZE / 2 };
+        if self.shadow.size != side {
+            self.shadow = Shadow::new(device, &self.pipelines.shadow, &self.sampler, side);
+        }
+        let batches = self.pack(list, target.size());
         self.instances
             .write(device, queue, bytemuck::cast_slice(&self.packed));
         self.lines
             .write(device, queue, bytemuck::cast_slice(&list.lines));
         self.marks
             .write(device, queue, bytemuck::cast_slice(&list.marks));
-        queue.write_buffer(
-            &self.globals,
-            0,
-            bytemuck::bytes_of(&globals(list, target.size())),
-        );
+        let globals = self.globals_of(list, target.size());
+        queue.write_buffer(&self.globals, 0, bytemuck::bytes_of(&globals));
 
+        let passes = PASSES
+            .iter()
+            .enumerate()
+            .filter(|(_, pass)| draws_something(pass.draws, list, &batches));
+        let (shadow, picture): (Vec<_>, Vec<_>) = passes.partition(|(_, pass)| pass.casts());
+        let pipeline = |index| self.pipelines.pass(device, target.samples(), index);
         {
             let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                 label: Some("shadow"),
                 color_attachments: &[],
                 depth_stencil_attachment: Some(depth_attachment(
-                    &self.shadow_map,
+                    &self.shadow.map,
                     wgpu::StoreOp::Store,
                 )),
                 ..Default::default()
             });
             pass.set_bind_group(0, &self.globals_group, &[]);
-            self.draw_meshes(&mut pass, &self.pipelines.cast_shadow, &solid);
-            self.draw_meshes(&mut pass, &self.pipelines.cast_shadow, &faded);
-            self.draw_meshes(&mut pass, &self.pipelines.cast_shadow, &clear_balls);
+            for (index, step) in shadow {
+                pass.set_pipeline(pipeline(index));
+                self.step(&mut pass, step.draws, list, &batches);
+            }
         }
-
+        let (view, resolve_target, store) = match &target.several {
+            Some(several) => (several, Some(&target.light), wgpu::StoreOp::Discard),
+            None => (&target.light, None, wgpu::StoreOp::Store),
+        };
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("picture"),
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: &target.samples,
+                view,
                 depth_slice: None,
-                resolve_target: Some(&target.picture_view),
+                resolve_target,
                 ops: wgpu::Operations {
                     load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                    store: wgpu::StoreOp::Discard,
+                    store,
                 },
             })],
             depth_stencil_attachment: Some(depth_attachment(&target.depth, wgpu::StoreOp::Discard)),
             ..Default::default()
         });
-        let pipelines = &self.pipelines;
         pass.set_bind_group(0, &self.globals_group, &[]);
-        pass.set_bind_group(1, &self.shadow_group, &[]);
-        pass.set_pipeline(&pipelines.background);
-        pass.draw(0..3, 0..1);
-        self.draw_meshes(&mut pass, &pipelines.solid, &solid);
-        if list.floor.is_some() {
-            pass.set_pipeline(&pipelines.floor);
-            pass.draw(0..4, 0..1);
+        pass.set_bind_group(1, &self.shadow.group, &[]);
+        for (index, step) in picture {
+            pass.set_pipeline(pipeline(index));
+            self.step(&mut pass, step.draws, list, &batches);
         }
-        draw_lines(&mut pass, &pipelines.line, &self.lines, &list.lines);
-        self.draw_meshes(&mut pass, &pipelines.faded, &faded);
-        self.draw_meshes(&mut pass, &pipelines.halo, &halos);
-        self.draw_meshes(&mut pass, &pipelines.socket_far, &sockets);
-        self.draw_meshes(&mut pass, &pipelines.socket_near, &sockets);
-        // After the sockets, whose glass would tint their colours.
-        self.draw_meshes(&mut pass, &pipelines.wear_behind, &wear);
-        self.draw_meshes(&mut pass, &pipelines.wear, &wear);
-        self.draw_meshes(&mut pass, &pipelines.faded, &clear_balls);
-        self.draw_meshes(&mut pass, &pipelines.ghost_depth, &ghost);
-        self.draw_meshes(&mut pass, &pipelines.ghost, &ghost);
-        self.draw_meshes(&mut pass, &pipelines.ghost_edge, &ghost_edges);
-        // After the sockets, so that glass does not dim a force.
-        draw_lines(&mut pass, &pipelines.outline, &self.marks, &list.marks);
-        self.draw_meshes(&mut pass, &pipelines.mark_behind, &arrows);
-        self.draw_meshes(&mut pass, &pipelines.mark, &arrows);
-        self.draw_meshes(&mut pass, &pipelines.overlay, &overlay);
     }
 
-    /// Packs all instances of `layer`; `pixels` gives an instance's radius on the screen.
-    fn pack(&mut self, layer: &Layer, pixels: impl Fn(&Instance) -> f32 + Copy) -> Vec<Batch> {
-        let meshes = layer.by_mesh.iter().enumerate();
-        meshes
-            .flat_map(|(mesh, instances)| self.pack_mesh(mesh, instances, pixels))
-            .collect()
+    /// Makes one of the pipelines that no picture for `target` has needed so far, so that none has to wait for it later.
+    pub(super) fn make_another_pipeline(&self, device: &wgpu::Device, target: &RenderTarget) {
+        self.pipelines.make_another(device, target.samples());
     }
 
-    /// Coarse instances, then fine ones; either may be none. Translucent lists run from far to near, and what is coarse is far.
-    fn pack_mesh(
-        &mut self,
-        mesh: usize,
-        instances: &[Instance],
-        pixels: impl Fn(&Instance) -> f32,
-    ) -> [Batch; 2] {
-        [Detail::Coarse, Detail::Fine].map(|detail| {
-            let first = self.packed.len();
-            let small =
-                |instance: &&Instance| mesh < Mesh::SHARED && pixels(instance) <= COARSE_PIXELS;
-            let of_detail = instances
+    /// Triangles of meshes that the passes of `list` draw.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub(super) fn triangles(&mut self, list: &DrawList) -> u64 {
+        let batches = self.pack(list, list.size);
+        let of = |group: Group, count: fn(&Batch) -> u32| {
+            let batches = batches[group as usize].iter();
+            let drawn = batches.filter_map(|batch| {
+                let mesh = self.meshes[batch.level].get(batch.mesh)?;
+                Some(u64::from(mesh.count / 3) * u64::from(count(batch)))
+            });
+            drawn.sum::<u64>()
+        };
+        let drawn = PASSES.iter().map(|pass| match pass.draws {
+            Draws::Meshes(Group::Casters) => CASTERS
                 .iter()
-                .filter(|instance| small(instance) == (detail == Detail::Coarse));
-            self.packed.extend(of_detail);
-            Batch {
-                detail,
-                mesh,
-                first: (first * size_of::<Instance>()) as u64,
-                count: (self.packed.len() - first) as u32,
+                .map(|group| of(*group, |batch| batch.count))
+                .sum(),
+            Draws::Meshes(group) => of(group, |batch| batch.seen),
+            _ => 0,
+        });
+        drawn.sum()
+    }
+
+    fn step(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        draws: Draws,
+        list: &DrawList,
+        batches: &[Vec<Batch>; Group::COUNT],
+    ) {
+        match draws {
+            Draws::Everywhere => pass.draw(0..3, 0..1),
+            Draws::Floor => pass.draw(0..4, 0..1),
+            Draws::Lines => draw_lines(pass, &self.lines, &list.lines),
+            Draws::Marks => draw_lines(pass, &self.marks, &list.marks),
+            Draws::Meshes(Group::Casters) => {
+                for group in CASTERS {
+                    self.draw_meshes(pass, &batches[group as usize], |batch| batch.count);
+                }
             }
-        })
+            Draws::Meshes(group) => {
+                self.draw_meshes(pass, &batches[group as usize], |batch| batch.seen);
+            }
+        }
+    }
+
+    /// Packs all instances of `list` for a picture of `size`, and notes what casts shadows.
+    fn pack(&mut self, list: &DrawList, size: [u32; 2]) -> [Vec<Batch>; Group::COUNT] {
+        let mut packing = Packing {
+            eye: &list.eye,
+            height: size[1],
+            meshes: &self.meshes,
+            packed: &mut self.packed,
+            casters: &mut self.casters,
+        };
+        packing.packed.clear();
+        packing.casters.clear();
+        let mut batches = [const { Vec::new() }; Group::COUNT];
+        for (group, layer) in [
+            (Group::Solid, &list.solid),
+            (Group::Faded, &list.faded),
+            (Group::Ghost, &list.ghost),
+            (Group::GhostEdges, &list.ghost_edges),
+            (Group::Arrows, &list.arrows),
+            (Group::Overlay, &list.overlay),
+            (Group::Wear, &list.wear),
+        ] {
+            let casts = CASTERS.contains(&group);
+            for (mesh, all) in layer.by_mesh.iter().enumerate() {
+                let plain = all
+                    .iter()
+                    .filter(|one| group != Group::Solid || !faces(one));
+                packing.mesh(mesh, plain, casts, &mut batches[group as usize]);
+            }
+        }
+        let sphere = Mesh::Sphere.index();
+        let solid = list.solid.by_mesh.get(sphere).map_or(&[][..], |all| all);
+        for (group, balls) in [
+            (Group::Balls, solid),
+            (Group::Halos, &list.halos[..]),
+            (Group::ClearBalls, &list.clear_balls[..]),
+        ] {
+            let casts = CASTERS.contains(&group);
+            let balls = balls
+                .iter()
+                .filter(|one| group != Group::Balls || faces(one));
+            packing.mesh(sphere, balls, casts, &mut batches[group as usize]);
+        }
+        packing.in_order(
+            Mesh::Socket.index(),
+            &list.sockets,
+            &mut batches[Group::Sockets as usize],
+        );
+        batches
     }
 
     fn draw_meshes(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
-        pipeline: &wgpu::RenderPipeline,
         batches: &[Batch],
+        count: impl Fn(&Batch) -> u32,
     ) {
-        pass.set_pipeline(pipeline);
-        for batch in batches.iter().filter(|batch| batch.count > 0) {
-            let meshes = match batch.detail {
-                Detail::Fine => &self.meshes,
-                Detail::Coarse => &self.coarse,
-            };
-            let Some(mesh) = meshes.get(batch.mesh) else {
+        for batch in batches.iter().filter(|batch| count(batch) > 0) {
+            let Some(mesh) = self.meshes[batch.level].get(batch.mesh) else {
                 continue;
             };
             pass.set_vertex_buffer(0, mesh.vertices.slice(..));
@@ -301,8 +380,151 @@ impl Renderer {
             let end = batch.first + u64::from(batch.count) * size_of::<Instance>() as u64;
             pass.set_vertex_buffer(1, self.instances.buffer.slice(batch.first..end));
             pass.set_index_buffer(mesh.indices.slice(..), wgpu::IndexFormat::Uint32);
-            pass.draw_indexed(0..mesh.count, 0, 0..batch.count);
+            pass.draw_indexed(0..mesh.count, 0, 0..count(batch));
         }
+    }
+
+    fn globals_of(&self, list: &DrawList, size: [u32; 2]) -> Globals {
+        let light = &list.light;
+        let floor = list.floor;
+        let with = |v: Vec3, w: f32| v.extend(w).to_array();
+        let coloured = |colour: Colour, w: f32| Vec3::from(colour.linear()).extend(w).to_array();
+        let plane = floor.map(|floor| (floor.centre, light.up));
+        let region = shadow_region(&self.casters, light.direction, plane, &list.eye);
+        let texels = self.shadow.size;
+        let texel = 2.0 * region.radius / texels as f32;
+        let soft = (SOFT * light.radius / texel).clamp(SOFT_TEXELS[0], SOFT_TEXELS[1]);
+        let flag = |on: bool| f32::from(u8::from(on));
+        let around = flag(list.quality.fine_shadows);
+        Globals {
+            clip_from_world: list.eye.clip_from_world.to_cols_array_2d(),
+            light_from_world: region
+                .light_from_world(light.direction, texels)
+                .to_cols_array_2d(),
+            eye: with(list.eye.position, 1.0),
+            light: with(light.direction, list.exposure),
+            up: with(light.up, texel),
+            studio: light.studio,
+            strip: with(light.strip, 0.0),
+            background_top: coloured(list.background.top, around),
+            background_bottom: coloured(list.background.bottom, 1.0),
+            picture: [size[0] as f32, size[1] as f32, 1.0 / texels as f32, soft],
+            floor_centre: floor.map_or([0.0; 4], |f| with(f.centre, f.radius)),
+            floor_along: floor.map_or([0.0; 4], |f| with(f.along, f.spacing)),
+            floor_colour: floor.map_or([0.0; 4], |f| coloured(f.colour, 1.0)),
+            floor_lines: floor.map_or([0.0; 4], |f| coloured(f.lines, 1.0)),
+            outline: coloured(list.outline, list.outline_width),
+            rim: coloured(list.rim, flag(list.quality.occlusion)),
+        }
+    }
+}
+
+/// Whether it is a ball that shows its socket's wall or where it touches.
+fn faces(instance: &&Instance) -> bool {
+    instance.other[3] > 0.0 || instance.touch[3] > 0.0
+}
+
+/// What casts shadows.
+const CASTERS: [Group; 4] = [Group::Solid, Group::Balls, Group::Faded, Group::ClearBalls];
+
+/// Sorts instances by mesh, level of detail and whether they are in view.
+struct Packing<'a> {
+    eye: &'a Eye,
+    height: u32,
+    meshes: &'a [Vec<Loaded>],
+    packed: &'a mut Vec<Instance>,
+    casters: &'a mut Vec<(Ball, bool)>,
+}
+
+impl Packing<'_> {
+    /// Those of one mesh in any order; unseen ones are kept only if they cast shadows.
+    fn mesh<'i>(
+        &mut self,
+        mesh: usize,
+        all: impl Iterator<Item = &'i Instance>,
+        casts: bool,
+        batches: &mut Vec<Batch>,
+    ) {
+        let Some(Loaded { bounds, .. }) = self.meshes[0].get(mesh) else {
+            return;
+        };
+        let sight = fit::Sight::new(self.eye);
+        let place = |instance: &'i Instance| {
+            let ball = Ball::around(instance, bounds, Mesh::is_round(mesh));
+            let seen = sight.shows(&ball);
+            (instance, self.level(mesh, instance, seen), seen, ball)
+        };
+        let places: Vec<(&Instance, usize, bool, Ball)> = all.map(place).collect();
+        if places.is_empty() {
+            return;
+        }
+        if casts {
+            self.casters
+                .extend(places.iter().map(|(.., seen, ball)| (*ball, *seen)));
+        }
+        for level in 0..LEVELS.len() {
+            let first = self.packed.len();
+            let mut count = 0;
+            for wanted in [true, false].into_iter().filter(|wanted| *wanted || casts) {
+                let chosen = places
+                    .iter()
+                    .filter(|(_, of, seen, _)| (*of, *seen) == (level, wanted));
+                self.packed
+                    .extend(chosen.map(|(instance, ..)| linear(instance)));
+                if wanted {
+                    count = self.packed.len() - first;
+                }
+            }
+            self.push(batches, level, mesh, first, count);
+        }
+    }
+
+    /// Those of one mesh as they come: translucent ones run from far to near.
+    fn in_order(&mut self, mesh: usize, all: &[Instance], batches: &mut Vec<Batch>) {
+        let sight = fit::Sight::new(self.eye);
+        let bounds = self.meshes[0][mesh].bounds;
+        let (mut first, mut run) = (self.packed.len(), 0);
+        for instance in all {
+            if !sight.shows(&Ball::around(instance, &bounds, Mesh::is_round(mesh))) {
+                continue;
+            }
+            let level = self.level(mesh, instance, true);
+            if level != run {
+                self.push(batches, run, mesh, first, self.packed.len() - first);
+                (first, run) = (self.packed.len(), level);
+            }
+            self.packed.push(linear(instance));
+        }
+        self.push(batches, run, mesh, first, self.packed.len() - first);
+    }
+
+    fn push(&self, batches: &mut Vec<Batch>, level: usize, mesh: usize, first: usize, seen: usize) {
+        batches.push(Batch {
+            level,
+            mesh,
+            first: (first * size_of::<Instance>()) as u64,
+            seen: seen as u32,
+            count: (self.packed.len() - first) as u32,
+        });
+    }
+
+    /// Level of detail for an instance: of those whose corners do not show the coarsest.
+    fn level(&self, mesh: usize, instance: &Instance, seen: bool) -> usize {
+        if mesh >= Mesh::SHARED {
+            return 0;
+        }
+        let radius = radius_on_screen(self.eye, self.height, instance, seen);
+        let fits = LEVELS.iter().rposition(|level| radius <= level.pixels);
+        fits.unwrap_or(0)
+    }
+}
+
+/// The instance with its colour linear.
+fn linear(instance: &Instance) -> Instance {
+    let [r, g, b] = Colour(instance.colour).linear();
+    Instance {
+        colour: [r, g, b, instance.colour[3]],
+        ..*instance
     }
 }
 
@@ -336,16 +558,22 @@ impl Growing {
     }
 }
 
-fn draw_lines(
-    pass: &mut wgpu::RenderPass<'_>,
-    pipeline: &wgpu::RenderPipeline,
-    buffer: &Growing,
-    lines: &[Line],
-) {
-    if lines.is_empty() {
-        return;
+/// Whether a pass over `draws` changes the picture: most have nothing to do in most pictures, and their pipelines take a software
+/// driver a tenth of a second each.
+fn draws_something(draws: Draws, list: &DrawList, batches: &[Vec<Batch>; Group::COUNT]) -> bool {
+    match draws {
+        Draws::Everywhere => true,
+        Draws::Floor => list.floor.is_some(),
+        Draws::Lines => !list.lines.is_empty(),
+        Draws::Marks => !list.marks.is_empty(),
+        Draws::Meshes(Group::Casters) => CASTERS
+            .iter()
+            .any(|group| batches[*group as usize].iter().any(|batch| batch.count > 0)),
+        Draws::Meshes(group) => batches[group as usize].iter().any(|batch| batch.seen > 0),
     }
-    pass.set_pipeline(pipeline);
+}
+
+fn draw_lines(pass: &mut wgpu::RenderPass<'_>, buffer: &Growing, lines: &[Line]) {
     let bytes = size_of_val(lines) as u64;
     pass.set_vertex_buffer(0, buffer.buffer.slice(..bytes));
     pass.draw(0..4, 0..lines.len() as u32);
@@ -390,63 +618,27 @@ fn load(device: &wgpu::Device, mesh: &MeshData) -> Loaded {
             wgpu::BufferUsages::INDEX,
         ),
         count: mesh.indices.len() as u32,
-    }
-}
-
-fn globals(list: &DrawList, size: [u32; 2]) -> Globals {
-    let light = &list.light;
-    let floor = list.floor;
-    let with = |v: Vec3, w: f32| v.extend(w).to_array();
-    Globals {
-        clip_from_world: list.eye.clip_from_world.to_cols_array_2d(),
-        light_from_world: light_from_world(light.direction, light.centre, light.radius)
-            .to_cols_array_2d(),
-        eye: with(list.eye.position, 1.0),
-        light: with(light.direction, list.exposure),
-        up: with(light.up, 2.0 * light.radius / SHADOW_SIZE as f32),
-        background_top: list.background.top.0,
-        background_bottom: list.background.bottom.0,
-        picture: [
-            size[0] as f32,
-            size[1] as f32,
-            1.0 / SHADOW_SIZE as f32,
-            0.0,
-        ],
-        floor_centre: floor.map_or([0.0; 4], |f| with(f.centre, f.radius)),
-        floor_along: floor.map_or([0.0; 4], |f| with(f.along, f.spacing)),
-        floor_colour: floor.map_or([0.0; 4], |f| f.colour.0),
-        floor_lines: floor.map_or([0.0; 4], |f| f.lines.0),
+        bounds: mesh.bounds(),
     }
 }
 
 /// Radius across an instance's axis, pixels, at the nearer of its origin and its tip (0, 0, 1): what its roundness is seen
-/// by. Infinite where either is not in front of the eye.
-fn radius_on_screen(eye: &Eye, height: u32, instance: &Instance) -> f32 {
+/// by. Infinite where either is not in front of the eye. Of one that is not `seen`, but casts a shadow, what it would be if it
+/// were looked at.
+fn radius_on_screen(eye: &Eye, height: u32, instance: &Instance, seen: bool) -> f32 {
     let rows = instance.world_from_mesh.map(Vec4::from);
     let column = |j: usize| Vec3::new(rows[0][j], rows[1][j], rows[2][j]);
-    let depth = |at: Vec3| eye.clip_from_world.row(3).dot(at.extend(1.0));
-    let nearest = depth(column(3)).min(depth(column(3) + column(2)));
+    let away = |at: Vec3| match seen {
+        true => eye.clip_from_world.row(3).dot(at.extend(1.0)),
+        false => at.distance(eye.position),
+    };
+    let nearest = away(column(3)).min(away(column(3) + column(2)));
     if nearest <= 0.0 {
         return f32::INFINITY;
     }
     let radius = column(0).length().max(column(1).length());
     let scale = eye.clip_from_world.row(1).truncate().length();
     radius * scale / nearest * 0.5 * height as f32
-}
-
-/// Orthographic view from the light onto the sphere that needs shadows.
-fn light_from_world(direction: Vec3, centre: Vec3, radius: f32) -> Mat4 {
-    let up = direction.any_orthonormal_vector();
-    let view =
-        glam::camera::rh::view::look_to_mat4(centre + direction * (2.0 * radius), -direction, up);
-    glam::camera::rh::proj::directx::orthographic(
-        -radius,
-        radius,
-        -radius,
-        radius,
-        0.5 * radius,
-        4.0 * radius,
-    ) * view
 }
 
 #[cfg(test)]
@@ -470,7 +662,7 @@ mod tests {
                 world_from_mesh: rows,
                 ..Instance::zeroed()
             };
-            radius_on_screen(&eye, SIZE[1], &instance)
+            [true, false].map(|seen| radius_on_screen(&eye, SIZE[1], &instance, seen))
         };
         let (right, _, back) = camera.axes();
         for radius in [1e-4_f32, 1e-3, 1e-2] {
@@ -478,9 +670,12 @@ mod tests {
             let [Some(from), Some(to)] = ends else {
                 panic!("the target is behind the eye");
             };
-            let (found, spanned) = (at(camera.target, radius), from.distance(to) / 2.0);
-            assert!((found / spanned - 1.0).abs() < 1e-2, "{found} {spanned}");
+            let spanned = from.distance(to) / 2.0;
+            for found in at(camera.target, radius) {
+                assert!((found / spanned - 1.0).abs() < 1e-2, "{found} {spanned}");
+            }
         }
-        assert!(at(camera.eye() + back, 1e-3).is_infinite());
+        let [seen, unseen] = at(camera.eye() + back, 1e-3);
+        assert!(seen.is_infinite() && unseen.is_finite());
     }
 }

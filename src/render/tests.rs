@@ -3,12 +3,12 @@
 use glam::Vec3;
 
 use super::wgpu::naga;
-use super::{Image, Offscreen, RenderError};
+use super::{Image, Offscreen, RenderError, shaders};
 use crate::scene::{Scene, Vec3 as Vec3d};
-use crate::simulate::{Frame, Simulation};
+use crate::simulate::{ContactState, Frame, Simulation};
 use crate::view::{
-    Camera, DrawList, Ghost, Palette, PeakMarks, Preset, SceneView, Shot, Theme, ViewOptions,
-    WearMap, WearScale, fixture, to_f32,
+    Camera, Colour, DrawList, Ghost, Palette, PeakMarks, Preset, SceneView, Shot, Theme,
+    ViewOptions, WearMap, WearScale, fixture, to_f32,
 };
 
 const SIZE: [u32; 2] = [480, 360];
@@ -91,20 +91,27 @@ fn difference(a: [u8; 3], b: [u8; 3]) -> u8 {
 #[test]
 fn every_shader_is_valid_and_translates_to_what_webgl2_runs() {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders");
-    let mut entries = 0;
+    let house = include_str!("../../ARCHITECTURE.md");
+    let modules = [shaders::LINEAR, shaders::ENCODED, shaders::FINISH];
     for file in std::fs::read_dir(folder).expect("the folder of shaders") {
-        let path = file.expect("an entry").path();
-        if path.extension().is_none_or(|ending| ending != "wgsl") {
-            continue;
-        }
-        let text = std::fs::read_to_string(&path).expect("a readable shader");
-        let module = naga::front::wgsl::parse_str(&text)
-            .unwrap_or_else(|error| panic!("{}: {}", path.display(), error.emit_to_string(&text)));
+        let name = file.expect("an entry").file_name();
+        let name = name.to_str().expect("ASCII");
+        let used = modules.iter().any(|module| module.files.contains(&name));
+        assert!(used, "no module has {name}");
+        assert!(
+            house.contains(&format!("`{name}`")),
+            "{name}: ARCHITECTURE.md"
+        );
+    }
+    let mut entries = 0;
+    for shaders::Module { name, text, .. } in modules {
+        let module = naga::front::wgsl::parse_str(text)
+            .unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(text)));
         // Core capabilities only: the web has no others.
         let flags = naga::valid::ValidationFlags::all();
         let info = naga::valid::Validator::new(flags, naga::valid::Capabilities::empty())
             .validate(&module)
-            .unwrap_or_else(|error| panic!("{}: {}", path.display(), error.emit_to_string(&text)));
+            .unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(text)));
         for entry in &module.entry_points {
             let options = naga::back::glsl::Options {
                 version: naga::back::glsl::Version::new_gles(300),
@@ -119,11 +126,11 @@ fn every_shader_is_valid_and_translates_to_what_webgl2_runs() {
             let policies = naga::proc::BoundsCheckPolicies::default();
             naga::back::glsl::Writer::new(&mut text, &module, &info, &options, &pipeline, policies)
                 .and_then(|mut writer| writer.write())
-                .unwrap_or_else(|error| panic!("{} {}: {error}", path.display(), entry.name));
+                .unwrap_or_else(|error| panic!("{name} {}: {error}", entry.name));
             entries += 1;
         }
     }
-    assert!(entries >= 15, "only {entries} entry points found");
+    assert!(entries >= 25, "only {entries} entry points found");
 }
 
 #[test]
@@ -232,7 +239,9 @@ fn a_socket_seen_through_another_looks_the_same_from_either_mesh() {
     camera.yaw += std::f32::consts::PI;
     let mut list = picture(&scene, &frame, &options, &camera, false);
     list.solid = Default::default();
-    let near = list.sockets[0];
+    // The half that is kept.
+    let opacity = |socket: &&crate::view::Instance| (socket.colour[3] * 1e6) as u32;
+    let near = *list.sockets.iter().max_by_key(opacity).expect("a socket");
     let centre = Vec3::from(near.world_from_mesh.map(|row| row[3]));
     let (right, _, back) = camera.axes();
     let behind = centre - camera.distance * back;
@@ -263,6 +272,155 @@ fn a_socket_seen_through_another_looks_the_same_from_either_mesh() {
         "{fine:?} {bare:?}: glass before it"
     );
     assert!(difference(coarse, fine) < 6, "{coarse:?} {fine:?}");
+}
+
+/// Sockets 0, 1 and 2 behind one another in the middle of the picture, listed in this `order`, each with a body of its own; and
+/// the camera, which has 2 nearest, or from `behind` 0.
+fn in_a_row(order: [usize; 3], behind: bool) -> (Scene, Frame, Camera) {
+    let (mut scene, mut frame) = fixture::pendulum();
+    let mut camera = SceneView::new(&scene, &frame).camera();
+    (camera.yaw, camera.pitch) = (0.4, 0.0);
+    (camera.target, camera.distance) = (Vec3::ZERO, 0.16);
+    let (right, up, back) = camera.axes();
+    // No cut in the middle of the picture.
+    let openings = [
+        right + up - back,
+        up - right + 0.5 * back,
+        right - 2.0 * up - 1.5 * back,
+    ];
+    let double = |v: Vec3| Vec3d::new(v.x.into(), v.y.into(), v.z.into());
+    let (joint, report) = (scene.ball_joints[0].clone(), frame.joints[0]);
+    let (body, motion) = (scene.bodies[0].clone(), frame.bodies[0]);
+    (scene.ball_joints, frame.joints) = Default::default();
+    (scene.bodies, frame.bodies) = Default::default();
+    for k in order {
+        let by = double(back * (0.05 * (k as f32 - 1.0)));
+        let mut joint = joint.clone();
+        joint.opening = double(openings[k].normalize());
+        joint.ball.body = Some(scene.bodies.len());
+        scene.ball_joints.push(joint);
+        let mut report = report;
+        report.socket_centre += by;
+        report.ball_centre += by;
+        report.contact_point += by;
+        frame.joints.push(report);
+        scene.bodies.push(body.clone());
+        let mut motion = motion;
+        motion.position += by;
+        frame.bodies.push(motion);
+    }
+    scene.fixed_shapes.clear();
+    if behind {
+        camera.yaw += std::f32::consts::PI;
+    }
+    (scene, frame, camera)
+}
+
+#[test]
+fn three_sockets_behind_one_another_are_blended_from_far_to_near_whatever_their_order() {
+    const ORDERS: [[usize; 3]; 6] = [
+        [0, 1, 2],
+        [0, 2, 1],
+        [1, 0, 2],
+        [1, 2, 0],
+        [2, 0, 1],
+        [2, 1, 0],
+    ];
+    // A colour for each, and its opacity.
+    let tints = [
+        [0.9, 0.6, 0.6, 0.4],
+        [0.6, 0.85, 0.6, 0.5],
+        [0.6, 0.7, 0.85, 0.3],
+    ];
+    let greys = [0.4, 0.75].map(|c| Colour([c, c, c, 1.0]));
+    let options = ViewOptions {
+        floor: false,
+        joint_names: false,
+        ..bare()
+    };
+    let mut device = offscreen();
+    for behind in [false, true] {
+        let mut whole = Vec::new();
+        let mut glass = DrawList::default();
+        let mut centres = Vec::new();
+        for order in ORDERS {
+            let (scene, frame, camera) = in_a_row(order, behind);
+            let mut list = picture(&scene, &frame, &options, &camera, false);
+            whole.push(device.render(&list).expect("a picture"));
+            list.solid = Default::default();
+            centres = vec![Vec3::ZERO; 3];
+            for (joint, k) in frame.joints.iter().zip(order) {
+                centres[k] = to_f32(&joint.socket_centre);
+            }
+            for half in &mut list.sockets {
+                let at = Vec3::from(half.world_from_mesh.map(|row| row[3]));
+                let k = centres.iter().position(|c| c.distance(at) < 1e-6);
+                let [r, g, b, opacity] = tints[k.expect("one of the three")];
+                // The half that is cut away stays the fainter one.
+                let kept = half.colour[3] > 0.1;
+                half.colour = [r, g, b, if kept { opacity } else { 0.15 * opacity }];
+            }
+            glass = list;
+        }
+        let same = whole.iter().all(|picture| *picture == whole[0]);
+        assert!(same, "the order in the scene is seen");
+
+        // Mean light of the middle on either grey.
+        let mut middle = |sockets: &dyn Fn(&crate::view::Instance) -> bool| {
+            greys.map(|grey| {
+                let mut list = glass.clone();
+                list.background.top = grey;
+                list.background.bottom = grey;
+                list.sockets.retain(sockets);
+                let image = device.render(&list).expect("a picture");
+                let around = |n: u32| n / 2 - 4..n / 2 + 4;
+                let mut sum = [0.0; 3];
+                for pixel in around(SIZE[1])
+                    .flat_map(|y| around(SIZE[0]).map(move |x| (x, y)))
+                    .map(|(x, y)| light_of(image.pixel(x, y)))
+                {
+                    sum = [0, 1, 2].map(|k| sum[k] + pixel[k] / 64.0);
+                }
+                // There the tone mapping takes away a constant part of what is shaded.
+                assert!(sum.iter().all(|c| (0.04..0.76).contains(c)), "{sum:?}");
+                sum
+            })
+        };
+        let given = middle(&|_| false);
+        // Of each socket alone, what it lets through, and its own light.
+        let alone: Vec<(f32, [f32; 3])> = centres
+            .iter()
+            .map(|centre| {
+                let [dark, bright] = middle(&|half| {
+                    let at = Vec3::from(half.world_from_mesh.map(|row| row[3]));
+                    centre.distance(at) < 1e-6
+                });
+                let through = (0..3).map(|k| (bright[k] - dark[k]) / (given[1][k] - given[0][k]));
+                let through = through.sum::<f32>() / 3.0;
+                let own = |k| dark[k] - through * given[0][k] + 0.04 * (1.0 - through);
+                (through, [0, 1, 2].map(own))
+            })
+            .collect();
+        let over = |order: [usize; 3], ground: [f32; 3]| {
+            let (light, share) = order.iter().fold((ground, 1.0), |(light, share), &k| {
+                let (through, own) = alone[k];
+                let light = [0, 1, 2].map(|c| own[c] + through * light[c]);
+                (light, share * through)
+            });
+            light.map(|c| c - 0.04 * (1.0 - share))
+        };
+        let off =
+            |a: [f32; 3], b: [f32; 3]| (0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f32::max);
+        let far_to_near = if behind { [2, 1, 0] } else { [0, 1, 2] };
+        for (seen, ground) in middle(&|_| true).into_iter().zip(given) {
+            let expected = over(far_to_near, ground);
+            assert!(off(seen, expected) < 0.004, "{seen:?} {expected:?}");
+            for wrong in ORDERS.into_iter().filter(|order| *order != far_to_near) {
+                let wrong = over(wrong, ground);
+                assert!(off(seen, wrong) > 0.012, "{seen:?} {wrong:?}");
+            }
+        }
+    }
 }
 
 #[test]
@@ -786,4 +944,289 @@ fn the_interface_shows_the_very_picture_that_is_drawn_without_a_window() {
         worst.is_some_and(|worst| worst <= 1),
         "bytes are copied: {worst:?}"
     );
+}
+
+/// Channel of a theme's colour as light.
+fn light_of(pixel: [u8; 3]) -> [f32; 3] {
+    let [r, g, b] = pixel.map(|c| f32::from(c) / 255.0);
+    Colour([r, g, b, 1.0]).linear()
+}
+
+#[test]
+fn arrows_and_outlines_have_the_themes_colours_on_any_ground() {
+    let mut device = offscreen();
+    for theme in [Theme::Light, Theme::Dark] {
+        let palette = Palette::of(theme);
+        let (scene, frame) = fixture::three_legs();
+        let mut options = ViewOptions { theme, ..bare() };
+        (options.arrows.normal, options.arrows.friction) = (true, true);
+        options.arrows.thickness = 2.0;
+        options.arrows.reference = Some(1.0);
+        let mut camera = SceneView::new(&scene, &frame).camera();
+        SceneView::new(&scene, &frame).fit(&mut camera, &scene, &frame, &options, SIZE);
+        let image = device
+            .render(&picture(&scene, &frame, &options, &camera, true))
+            .expect("a picture");
+        let count = |colour: Colour| {
+            let [r, g, b, _] = colour.to_rgba8();
+            let all = (0..SIZE[1]).flat_map(|y| (0..SIZE[0]).map(move |x| (x, y)));
+            all.filter(|(x, y)| difference(image.pixel(*x, *y), [r, g, b]) <= 2)
+                .count()
+        };
+        for colour in [palette.normal, palette.friction] {
+            let seen = count(colour);
+            assert!(seen > 60, "{theme:?} {colour:?}: {seen} pixels");
+        }
+    }
+}
+
+#[test]
+fn a_halo_joins_the_picture_in_linear_light() {
+    let options = ViewOptions {
+        floor: false,
+        ..bare()
+    };
+    let (scene, frame, camera) = close_up(&options);
+    let mut list = picture(&scene, &frame, &options, &camera, true);
+    list.background.top = list.background.bottom;
+    let mut device = offscreen();
+    let lit = device.render(&list).expect("a picture");
+    let halo = Colour(list.halos[0].colour).linear();
+    list.halos.clear();
+    let without = device.render(&list).expect("a picture");
+    let beside = to_f32(&frame.joints[0].socket_centre) + camera.axes().0 * 0.0215;
+    let (after, before) = (at(&lit, &camera, beside), at(&without, &camera, beside));
+    let [after, before] = [after, before].map(light_of);
+    // One opacity explains all three channels.
+    let share = |k: usize| (after[k] - before[k]) / (halo[k] - before[k]);
+    assert!(share(2) > 0.2, "{}", share(2));
+    for k in [0, 1] {
+        let expected = before[k] + share(2) * (halo[k] - before[k]);
+        assert!(
+            (after[k] - expected).abs() < 0.02,
+            "{k}: {after:?} {before:?} {halo:?}"
+        );
+    }
+}
+
+#[test]
+fn a_rim_is_seen_about_the_touching_point_and_only_while_it_touches() {
+    let options = ViewOptions {
+        floor: false,
+        sockets: false,
+        ..bare()
+    };
+    let (scene, touching, mut camera) = close_up(&options);
+    let report = &touching.joints[0];
+    let outwards = to_f32(&report.eccentricity).normalize();
+    // From where the touching point is in the middle.
+    let ball = to_f32(&(report.socket_centre + 20.0 * report.eccentricity));
+    camera.target = ball;
+    let mut best = camera;
+    for (yaw, pitch) in (0..64).flat_map(|i| (-8..=8).map(move |k| (i, k))) {
+        (camera.yaw, camera.pitch) = (yaw as f32 * 0.0982, pitch as f32 * 0.19);
+        if camera.axes().2.dot(outwards) > best.axes().2.dot(outwards) {
+            best = camera;
+        }
+    }
+    let mut device = offscreen();
+    let mut draw = |state: ContactState| {
+        let mut frame = touching.clone();
+        frame.joints[0].state = state;
+        let list = picture(&scene, &frame, &options, &best, false);
+        device.render(&list).expect("a picture")
+    };
+    let free = draw(ContactState::Free);
+    for state in [ContactState::Stick, ContactState::Slip] {
+        let seen = differing(&draw(state), &free, 12);
+        assert!(seen.len() > 60, "{state:?}: {} pixels", seen.len());
+        // A ring: nothing at the point itself, and nothing far from it.
+        let point = best.project(ball + outwards * 0.01, SIZE).expect("in view");
+        for [x, y] in seen {
+            let off = glam::Vec2::new(x as f32, y as f32).distance(point);
+            let radius = 0.01 / best.metres_per_pixel(SIZE);
+            assert!(
+                (0.25 * radius..0.65 * radius).contains(&off),
+                "{off} {radius}"
+            );
+        }
+    }
+    assert_eq!(draw(ContactState::Ideal), free);
+}
+
+#[test]
+fn a_ball_is_darker_the_nearer_its_wall_is() {
+    let options = ViewOptions {
+        floor: false,
+        ..bare()
+    };
+    let (scene, frame, camera) = close_up(&options);
+    let mut list = picture(&scene, &frame, &options, &camera, false);
+    let mut device = offscreen();
+    list.sockets.clear();
+    for ball in &mut list.solid.by_mesh[crate::view::Mesh::Sphere.index()] {
+        ball.touch = [0.0; 4];
+    }
+    let near = device.render(&list).expect("a picture");
+    for ball in &mut list.solid.by_mesh[crate::view::Mesh::Sphere.index()] {
+        ball.other = [0.0; 4];
+    }
+    let alone = device.render(&list).expect("a picture");
+    let report = &frame.joints[0];
+    let outwards = to_f32(&report.eccentricity).normalize();
+    let centre = to_f32(&(report.socket_centre + 20.0 * report.eccentricity));
+    let back = camera.axes().2;
+    let share = |part: f32| {
+        let side = (outwards * part + back * (1.0 - part.abs())).normalize();
+        let point = centre + 0.0099 * side;
+        let [a, b] = [&near, &alone].map(|image| brightness(at(image, &camera, point)) as f32);
+        a / b
+    };
+    let (touching, front, opposite) = (share(0.8), share(0.0), share(-0.8));
+    assert!(
+        touching < 0.85 * front && front < opposite && opposite > 0.9,
+        "{touching} {front} {opposite}"
+    );
+}
+
+/// The Khronos PBR Neutral tone mapper, from its specification:
+/// <https://github.com/KhronosGroup/ToneMapping/blob/main/PBR_Neutral/README.md>.
+fn neutral(light: [f64; 3]) -> [f64; 3] {
+    let least = light.into_iter().fold(f64::INFINITY, f64::min);
+    let offset = if least <= 0.08 {
+        least - 6.25 * least * least
+    } else {
+        0.04
+    };
+    let c = light.map(|x| x - offset);
+    let peak = c.into_iter().fold(0.0, f64::max);
+    let bends = 0.8 - 0.04;
+    if peak <= bends {
+        return c;
+    }
+    let bent = 1.0 - (1.0 - bends) * (1.0 - bends) / (peak + 1.0 - 2.0 * bends);
+    let white = 1.0 / (0.15 * (peak - bent) + 1.0);
+    c.map(|x| x * bent / peak * white + bent * (1.0 - white))
+}
+
+#[test]
+fn light_is_mapped_by_the_neutral_curve_and_given_colours_are_left() {
+    let values = [0.0, 0.0625, 0.125, 0.375, 0.75, 1.0, 2.5, 12.0];
+    let mut texels = Vec::new();
+    for r in values {
+        for g in [0.03125, 0.5, 4.0] {
+            for given in [0.0, 0.5, 1.0] {
+                texels.push([r, g, 0.25, given]);
+            }
+        }
+    }
+    let image = offscreen().finished(&texels);
+    for (i, [r, g, b, given]) in texels.into_iter().enumerate() {
+        let light = [r, g, b].map(f64::from);
+        let mapped = neutral(light);
+        let expected = [0, 1, 2].map(|k| {
+            let given = f64::from(given);
+            let c = (mapped[k] + given * (light[k] - mapped[k])).clamp(0.0, 1.0);
+            let encoded = if c <= 0.003_130_8 {
+                12.92 * c
+            } else {
+                1.055 * c.powf(1.0 / 2.4) - 0.055
+            };
+            (255.0 * encoded).round() as u8
+        });
+        let found = image.pixel(i as u32, 0);
+        assert!(
+            difference(found, expected) <= 1,
+            "{r} {g} {given}: {found:?} {expected:?}"
+        );
+    }
+}
+
+#[test]
+fn the_longest_chain_asks_for_few_triangles_from_afar_and_from_within() {
+    let links = [("chain.links".to_owned(), "4096".to_owned())];
+    let scene = Scene::load("chain", &links).expect("as many are allowed");
+    let mut frame = Frame::default();
+    let mut simulation = Simulation::new(&scene).expect("starts");
+    simulation.sample(0.0, &mut frame);
+    let (view, options) = (SceneView::new(&scene, &frame), bare());
+    let mut afar = view.camera();
+    view.fit(&mut afar, &scene, &frame, &options, SIZE);
+    let mut within = afar;
+    view.close_up(&mut within, 2048, &scene, &frame, &options);
+    let mut device = offscreen();
+    for camera in [afar, within] {
+        let list = picture(&scene, &frame, &options, &camera, false);
+        // Links of the finest meshes would take 100 million.
+        let triangles = device.triangles(&list);
+        println!("{triangles} triangles");
+        assert!((1_000..3_000_000).contains(&triangles), "{triangles}");
+    }
+}
+
+/// A scene and a frame of it, moved.
+fn moved(scene: &Scene, frame: &Frame, by: Vec3d) -> (Scene, Frame) {
+    use crate::scene::Geometry::{Box, Capsule, Cylinder};
+    let (mut scene, mut frame) = (scene.clone(), frame.clone());
+    for shape in &mut scene.fixed_shapes {
+        match &mut shape.geometry {
+            Capsule { from, to, .. } | Cylinder { from, to, .. } => {
+                *from += by;
+                *to += by;
+            }
+            Box { centre, .. } => *centre += by,
+            other => panic!("{other:?}"),
+        }
+    }
+    for joint in &mut scene.ball_joints {
+        for end in [&mut joint.socket, &mut joint.ball] {
+            if end.body.is_none() {
+                end.point += by;
+            }
+        }
+    }
+    frame.bodies.iter_mut().for_each(|body| body.position += by);
+    for joint in &mut frame.joints {
+        joint.socket_centre += by;
+        joint.ball_centre += by;
+        joint.contact_point += by;
+    }
+    (scene, frame)
+}
+
+#[test]
+fn a_machine_far_from_the_origin_has_the_picture_of_one_there_and_does_not_shake() {
+    let mut options = bare();
+    (options.arrows.normal, options.joint_names) = (true, false);
+    options.floor = false;
+    let mut device = offscreen();
+    let mut draw = |by: Vec3d| {
+        let (scene, frame) = fixture::pendulum();
+        let (scene, frame) = moved(&scene, &frame, by);
+        let view = SceneView::new(&scene, &frame);
+        let mut camera = view.camera();
+        view.close_up(&mut camera, 0, &scene, &frame, &options);
+        camera.distance *= 0.25;
+        let list = picture(&scene, &frame, &options, &camera, false);
+        (device.render(&list).expect("a picture"), list)
+    };
+    let (here, _) = draw(Vec3d::zeros());
+    for metres in [100.0, 1000.0] {
+        let (there, list) = draw(Vec3d::new(metres, -0.5 * metres, 0.25 * metres));
+        assert!(list.eye.position.length() < 1.0);
+        let off = differing(&here, &there, 24).len();
+        assert!(off < 200, "{metres} m: {off} pixels");
+    }
+    // A micrometre at a time: within half a pixel of where it belongs.
+    let ball = |list: &DrawList| {
+        let ball = list.solid.by_mesh[crate::view::Mesh::Sphere.index()][0];
+        let point = Vec3::from(ball.world_from_mesh.map(|row| row[3]));
+        list.eye.project(point, SIZE).expect("in view")
+    };
+    let (_, at_start) = draw(Vec3d::new(100.0, 0.0, 0.0));
+    for k in 1..8 {
+        let (_, list) = draw(Vec3d::new(100.0 + f64::from(k) * 1e-6, 0.0, 0.0));
+        let off = ball(&list).distance(ball(&at_start));
+        assert!(off < 0.25, "{k} um: {off} pixels");
+    }
 }

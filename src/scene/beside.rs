@@ -19,6 +19,14 @@ pub const LARGEST_FILE: u64 = 4 << 20;
 /// Largest file with a mesh, and all of them together, bytes.
 pub const LARGEST_MESH: u64 = 8 << 20;
 
+/// Largest size, bytes, of the file `name` where it was chosen or dropped.
+pub fn largest_file(name: &str) -> u64 {
+    match Format::of(name) {
+        Some(_) => LARGEST_MESH,
+        None => LARGEST_FILE,
+    }
+}
+
 /// Before the content of a file that is no text, or a text that begins so itself: base64 follows.
 const ENCODED: &str = "base64:";
 
@@ -65,10 +73,12 @@ enum Use {
 /// Where a scene finds the files that it names, and those that it has asked for.
 #[derive(Default)]
 pub(super) struct Beside<'d> {
-    /// Folder of a scene file that is being loaded; `None` where only `known` may be used.
+    /// Folder of a scene file that is being loaded; `None` where only `known` and `given` may be used.
     folder: Option<&'d Path>,
     /// Read before.
     known: Option<&'d Texts>,
+    /// Opened together with the scene, by their own names without a folder.
+    given: Option<&'d BTreeMap<String, Vec<u8>>>,
     asked: RefCell<Texts>,
     /// Bytes that were read for each [`Use`].
     held: [Cell<u64>; 2],
@@ -89,6 +99,15 @@ impl<'d> Beside<'d> {
     pub fn known(texts: &'d Texts) -> Self {
         Self {
             known: Some(texts),
+            ..Self::default()
+        }
+    }
+
+    /// Uses what was `given` with the scene, and its `folder`, if it has one.
+    pub fn given(given: &'d BTreeMap<String, Vec<u8>>, folder: Option<&'d Path>) -> Self {
+        Self {
+            folder,
+            given: Some(given),
             ..Self::default()
         }
     }
@@ -163,18 +182,6 @@ impl<'d> Beside<'d> {
                     .to_owned(),
             );
         }
-        let Some(folder) = self.folder else {
-            return Err(
-                "this scene has no folder in which to find a file: only a scene file that is loaded from a disk has one; \
-                 what the file holds can also be written into the scene itself"
-                    .to_owned(),
-            );
-        };
-        let path = folder.join(name);
-        if path.is_dir() {
-            return Err("this is a directory, not a file".to_owned());
-        }
-        let mut bytes = Vec::new();
         let (most, kind) = match what {
             Use::Text => (LARGEST_FILE, "files"),
             Use::Mesh => (LARGEST_MESH, "meshes"),
@@ -182,9 +189,7 @@ impl<'d> Beside<'d> {
         let held = &self.held[what as usize];
         let room = most.saturating_sub(held.get());
         // One byte more than allowed: a pipe or a device does not report its size.
-        std::fs::File::open(path)
-            .and_then(|file| file.take(room + 1).read_to_end(&mut bytes))
-            .map_err(|cause| format!("cannot read this file: {cause}"))?;
+        let bytes = self.bytes(Path::new(name), room + 1)?;
         if bytes.len() as u64 > room {
             let most = most >> 20;
             return Err(format!(
@@ -193,6 +198,34 @@ impl<'d> Beside<'d> {
         }
         held.set(held.get() + bytes.len() as u64);
         Ok(kept(bytes))
+    }
+
+    /// The first `most` bytes of the file `name`.
+    fn bytes(&self, name: &Path, most: u64) -> Result<Vec<u8>, String> {
+        let path = self.folder.map(|folder| folder.join(name));
+        // Only names come with a file that was dropped on a page.
+        let given = name
+            .file_name()
+            .and_then(|own| self.given?.get(own.to_str()?));
+        match (given, path) {
+            (Some(bytes), path) if !path.as_ref().is_some_and(|path| path.exists()) => {
+                let most = bytes.len().min(usize::try_from(most).unwrap_or(usize::MAX));
+                Ok(bytes[..most].to_vec())
+            }
+            (_, Some(path)) if path.is_dir() => Err("this is a directory, not a file".to_owned()),
+            (_, Some(path)) => {
+                let mut bytes = Vec::new();
+                std::fs::File::open(path)
+                    .and_then(|file| file.take(most).read_to_end(&mut bytes))
+                    .map_err(|cause| format!("cannot read this file: {cause}"))?;
+                Ok(bytes)
+            }
+            (_, None) => Err(
+                "this scene has no folder in which to find a file: choose or drop that file and the scene's at once, or load the \
+                 scene from a disk; what the file holds can also be written into the scene itself"
+                    .to_owned(),
+            ),
+        }
     }
 }
 

@@ -108,6 +108,7 @@ pub(super) fn expand<'d>(
             child_axis: Vec3::y(),
             rotation: Quat::identity(),
             drive: None,
+            second_drive: None,
             start: JointStart::Pose {
                 position: hang + step * index as f64 - rotation * ball,
                 rotation,

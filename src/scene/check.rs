@@ -172,7 +172,7 @@ impl Scene {
         for attachment in [&joint.ball, &joint.socket] {
             let Some(b) = attachment.body else { continue };
             let (body, hung) = (&self.bodies[b], &self.joints[b]);
-            if hung.drive.is_some() || hung.kind == JointKind::Fixed {
+            if hung.is_prescribed() {
                 continue;
             }
             let arm = (attachment.point - body.centre).norm_squared();

@@ -2,7 +2,7 @@
 
 use super::beside::Beside;
 use super::copy::Copy as PatternCopy;
-use super::error::{brief, line_text, nearest, place_of};
+use super::error::{brief, nearest};
 use super::given::{FileNumber, Place};
 use super::key::{ABOVE_ZERO, Absent, FileKey, FileTable, MAX_SI, Many, Takes, Variants};
 use super::parameters::{Kind, ValueFault};
@@ -77,15 +77,8 @@ impl<'d> Document<'d> {
         value: Option<&str>,
         message: impl Into<String>,
     ) -> SceneError {
-        let (line, column) = place_of(self.text, span.start);
-        let mut error = SceneError::about(key, value, message);
-        if key.is_empty() {
-            error.key = None;
-        }
-        error.file = self.file.map(str::to_owned);
-        error.position = Some((line, column));
-        error.line_text = line_text(self.text, line);
-        error
+        let key = Some(key).filter(|key| !key.is_empty());
+        SceneError::in_text(self.file, self.text, span.start, key, value, message)
     }
 
     /// The text of a value, truncated to fit on a line.

@@ -8,6 +8,8 @@ use super::*;
 
 /// Highest frequency of a harmonic drive, Hz.
 pub(super) const FASTEST_DRIVE: f64 = 1e4;
+/// Why the law spcmm drives nothing but a slide.
+pub(super) const SLIDERS_ONLY: &str = "the law spcmm drives prismatic joints only";
 /// Most terms of a sum of harmonics.
 const MOST_TERMS: usize = 100;
 
@@ -177,14 +179,10 @@ pub static DRIVE_KINDS: [DriveKind; 8] = [
     },
 ];
 
-/// The drive of a joint of `kind`, a slide or a hinge.
-pub(super) fn read_drive(
-    node: &Node<'_>,
-    kind: JointKind,
-    scene: &Scene,
-) -> Result<Drive, SceneError> {
+/// A law of a coordinate that is an angle if it `turns`.
+pub(super) fn read_drive(node: &Node<'_>, turns: bool, scene: &Scene) -> Result<Drive, SceneError> {
     let mut node = node.clone();
-    node.document.on_hinge = kind == JointKind::Revolute;
+    node.document.on_hinge = turns;
     let section = node.section()?;
     let law = section.require("law")?;
     let word = law.choice()?;
@@ -193,7 +191,7 @@ pub(super) fn read_drive(
     let numbers = row.numbers().map(|number| section.number(number.name));
     let numbers = numbers.collect::<Result<_, _>>()?;
     let data = match row.word {
-        "spcmm" => read_slider(&section, &law, kind, scene)?,
+        "spcmm" => read_slider(&section, &law, scene)?,
         "harmonics" => read_terms(&section)?,
         "table" => read_table(&section)?,
         "formula" => read_law_of_formula(&section)?,
@@ -217,11 +215,10 @@ fn coordinate(section: &Section<'_>) -> Dimension {
 fn read_slider(
     section: &Section<'_>,
     law: &Node<'_>,
-    kind: JointKind,
     scene: &Scene,
 ) -> Result<DriveData, SceneError> {
-    if kind != JointKind::Prismatic {
-        return Err(law.error("the law spcmm drives prismatic joints only"));
+    if section.document.on_hinge {
+        return Err(law.error(SLIDERS_ONLY));
     }
     if scene.spcmm.is_none() {
         return Err(law.error("the law spcmm needs a section [spcmm] in the file"));

@@ -8,7 +8,7 @@ use super::document::{Node, Section};
 use super::drives::{FASTEST_DRIVE, read_drive};
 use super::key::MAX_SI;
 use super::points::{Axis, Graph, read_file, read_points};
-use super::read_joints::{read_attachment, read_one_degree_joint, read_rotation};
+use super::read_joints::{read_attachment, read_coordinate, read_rotation};
 use super::*;
 use crate::words::Words;
 
@@ -190,7 +190,7 @@ pub static ELEMENT_KINDS: [ElementKind; 7] = [
     },
     ElementKind {
         section: "joint_spring",
-        help: "spring with a damper on a slide or a hinge, between the two bodies that it connects",
+        help: "spring with a damper on a coordinate of a joint, between the two bodies that it connects",
         joint: Some(ElementJoint::Any),
         numbers: &[
             ElementNumber {
@@ -248,7 +248,7 @@ pub static ELEMENT_KINDS: [ElementKind; 7] = [
     },
     ElementKind {
         section: "stop",
-        help: "stops at the ends of a slide or a hinge, which only push",
+        help: "stops at the ends of a coordinate of a joint, which only push",
         joint: Some(ElementJoint::Any),
         numbers: &[
             ElementNumber {
@@ -346,7 +346,7 @@ pub static ELEMENT_KINDS: [ElementKind; 7] = [
     },
     ElementKind {
         section: "motor",
-        help: "force or torque on a slide or a hinge without a drive, constant or towards a target",
+        help: "force or torque on a coordinate of a joint without a drive, constant or towards a target",
         joint: Some(ElementJoint::Undriven),
         numbers: &[
             ElementNumber {
@@ -590,9 +590,11 @@ pub(super) fn read_element<'d>(
     }
     let mut joint = None;
     if let Some(which) = kind.joint {
-        let index = read_one_degree_joint(&section, scene, joints)?;
-        let of = &scene.joints[index];
-        if which == ElementJoint::Undriven && of.drive.is_some() {
+        let (index, freedom) = read_coordinate(&section, scene, joints)?;
+        let mut of = scene.kinematic_joints().skip(index);
+        let of = of.next().expect("a joint of the scene");
+        let driven = of.drives().any(|(driven, _)| driven == freedom);
+        if which == ElementJoint::Undriven && driven {
             let why = format!(
                 "this joint has a drive, which leaves a {} nothing to move",
                 kind.section
@@ -600,9 +602,9 @@ pub(super) fn read_element<'d>(
             return Err(section.require("joint")?.error(why));
         }
         points = of.points().to_vec();
-        joint = Some(of);
+        joint = Some((index, freedom));
     }
-    let on_hinge = joint.is_some_and(|joint| joint.kind == JointKind::Revolute);
+    let on_hinge = joint.is_some_and(|(_, freedom)| freedom.turns());
     section.document.on_hinge = on_hinge;
     let number = |row: &ElementNumber| {
         let [key, other] = [on_hinge, !on_hinge].map(|hinge| row.on(hinge).0);
@@ -672,13 +674,12 @@ pub(super) fn read_element<'d>(
         .collect::<Result<_, SceneError>>()?;
     let curve = kind.curve.map(|row| read_curve(&section, row, on_hinge));
     let law = kind.law.and_then(|(key, _)| section.get(key));
-    let of_joint = joint.map_or(JointKind::Prismatic, |joint| joint.kind);
-    let law = law.map(|node| read_drive(&node, of_joint, scene));
+    let law = law.map(|node| read_drive(&node, on_hinge, scene));
     let element = Element {
         name,
         kind,
         points,
-        joint: joint.map(|joint| joint.child),
+        joint,
         on_hinge,
         numbers,
         vectors,

@@ -27,6 +27,27 @@ pub struct SceneError {
 impl std::error::Error for SceneError {}
 
 impl SceneError {
+    /// An error at byte `at` of `text`, of a file or built in; `key` and `value` where they are known.
+    pub fn in_text(
+        file: Option<&str>,
+        text: &str,
+        at: usize,
+        key: Option<&str>,
+        value: Option<&str>,
+        message: impl Into<String>,
+    ) -> Self {
+        let (line, column) = place_of(text, at);
+        Self {
+            file: file.map(str::to_owned),
+            position: Some((line, column)),
+            key: key.map(str::to_owned),
+            value: value.map(Box::from),
+            message: message.into(),
+            line_text: line_text(text, line),
+            unreadable: false,
+        }
+    }
+
     /// An error about a key and its value, outside any file.
     pub(super) fn about(key: &str, value: Option<&str>, message: impl Into<String>) -> Self {
         Self {

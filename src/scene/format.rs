@@ -601,6 +601,22 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
         .of(MOVES)
         .absent("it is free to move"),
         key(
+            "drive",
+            Takes::Table(&CYLINDRICAL_DRIVE),
+            "{ angle = { law = \"constant\", velocity = \"6 rad/s\" } }",
+            "the motions that it is forced to make",
+        )
+        .of(&["cylindrical"])
+        .absent("it is free to move"),
+        key(
+            "drive",
+            Takes::Table(&UNIVERSAL_DRIVE),
+            "{ angle = { law = \"constant\", velocity = \"6 rad/s\" } }",
+            "the motions that it is forced to make",
+        )
+        .of(&["universal"])
+        .absent("it is free to move"),
+        key(
             "start",
             Takes::Table(&START),
             "{ position = \"10 mm\" }",
@@ -620,7 +636,7 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
             "start",
             Takes::Table(&CYLINDRICAL_START),
             "{ position = \"10 mm\", angle = \"30 deg\" }",
-            "where it starts, and how fast",
+            "where it starts, and how fast; not what a drive moves",
         )
         .of(&["cylindrical"])
         .absent("0, at rest"),
@@ -628,7 +644,7 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
             "start",
             Takes::Table(&UNIVERSAL_START),
             "{ angle = \"10 deg\", child_angle = \"30 deg\" }",
-            "where it starts, and how fast",
+            "where it starts, and how fast; not what a drive moves",
         )
         .of(&["universal"])
         .absent("0, at rest"),
@@ -636,9 +652,9 @@ static JOINT: LazyLock<FileTable> = LazyLock::new(|| {
             "drawn",
             Takes::Flag,
             "false",
-            "whether a pin or a rail is drawn for it, where the scene's shapes show none",
+            "whether a pin, a rail or a cross is drawn for it, where the scene's shapes show none",
         )
-        .of(MOVES)
+        .of(TURNS)
         .absent("true"),
         key(
             "closes_loop",
@@ -688,6 +704,44 @@ static CYLINDRICAL_START: FileTable = FileTable::new(
         .zero(),
     ],
 );
+
+/// A motion of one of two coordinates.
+fn motion(freedom: Freedom, like: &'static str, help: &'static str) -> FileKey {
+    key(freedom.word(), Takes::Table(&DRIVE), like, help).absent("it is free to move")
+}
+
+const TURNING: &str = "{ law = \"constant\", velocity = \"6 rad/s\" }";
+
+static CYLINDRICAL_DRIVE: LazyLock<FileTable> = LazyLock::new(|| {
+    let sliding = "{ law = \"harmonic\", amplitude = \"10 mm\", frequency = \"1 Hz\" }";
+    let keys = [
+        motion(Freedom::Slide, sliding, "its motion along it"),
+        motion(Freedom::TurnOfSlide, TURNING, "its motion about it"),
+    ];
+    FileTable::new(
+        "cylindrical_drive",
+        "`drive` of a cylindrical joint",
+        "motions along its axis and about it, one or both",
+        keys.to_vec().leak(),
+    )
+});
+
+static UNIVERSAL_DRIVE: LazyLock<FileTable> = LazyLock::new(|| {
+    let keys = [
+        motion(Freedom::FirstTurn, TURNING, "its motion about `axis`"),
+        motion(
+            Freedom::SecondTurn,
+            TURNING,
+            "its motion about `child_axis`",
+        ),
+    ];
+    FileTable::new(
+        "universal_drive",
+        "`drive` of a universal joint",
+        "motions about its axes, one or both",
+        keys.to_vec().leak(),
+    )
+});
 
 static UNIVERSAL_START: FileTable = FileTable::new(
     "universal_start",
@@ -928,6 +982,9 @@ static DRIVE: LazyLock<FileTable> = LazyLock::new(|| {
     .by(Variants::Word("law", ""))
 });
 
+/// Names of coordinates.
+const COORDINATES: [&str; 3] = ["position", "angle", "child_angle"];
+
 /// Force elements, in the order of their rows.
 static ELEMENTS: LazyLock<Vec<FileTable>> =
     LazyLock::new(|| ELEMENT_KINDS.iter().map(of_element).collect());
@@ -936,17 +993,22 @@ fn of_element(kind: &'static ElementKind) -> FileTable {
     let name = key("name", Takes::Name, "\"s1\"", "its name, that of no joint");
     let joint = kind.joint.map(|which| {
         let help = match which {
-            ElementJoint::Any => "the slide or hinge on which it acts",
-            ElementJoint::Undriven => "the slide or hinge on which it acts, one without a drive",
+            ElementJoint::Any => "the joint on which it acts",
+            ElementJoint::Undriven => "the joint on which it acts, where that has no drive",
         };
-        key("joint", Takes::Joint, "\"crank\"", help)
+        let coordinate = "which coordinate of a joint that has two: `position` or `angle` of a cylindrical one, `angle` or \
+                          `child_angle` of a universal one";
+        [
+            key("joint", Takes::Joint, "\"crank\"", help),
+            key("coordinate", Takes::Word(&COORDINATES), "\"angle\"", coordinate).absent("the only one"),
+        ]
     });
     let point = |name: &&'static str| {
         let like = "{ body = \"rod\", at = \"0 0 100 mm\" }";
         key(name, Takes::Table(&ATTACHMENT), like, "where it holds")
     };
     let mut keys = vec![name];
-    keys.extend(joint);
+    keys.extend(joint.into_iter().flatten());
     keys.extend(kind.points.iter().map(point));
     for number in kind.numbers {
         let row = |name, dimension, like| FileKey {

@@ -41,7 +41,7 @@ mod value;
 mod visible;
 mod write;
 
-pub use beside::{LARGEST_FILE, LARGEST_MESH, file_bytes};
+pub use beside::{LARGEST_FILE, LARGEST_MESH, file_bytes, largest_file};
 pub use check::least_impact_steps;
 pub use doubt::{Doubt, Warning, WarningKind};
 pub use drives::DRIVE_KINDS;
@@ -56,6 +56,7 @@ pub use key::{ABOVE_ZERO, Absent, FileKey, FileTable, Many, Takes, Variants};
 pub use load::*;
 pub use model::*;
 pub use parameters::*;
+pub use quantity::{Quantity, evaluate};
 pub use table::{find, reference_page, table};
 pub use units::*;
 pub use value::Value;

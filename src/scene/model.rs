@@ -23,7 +23,7 @@ pub type Quat = nalgebra::UnitQuaternion<f64>;
 ///
 /// Cut every ball joint and every joint that closes a loop, and a forest remains: each body hangs on its parent by exactly one
 /// entry of `joints`, and parents come before children.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     /// Short name: that of the built-in scene, or of the file without its extension.
     pub name: String,
@@ -74,6 +74,17 @@ impl Scene {
         let balls = self.ball_joints.iter().map(|joint| joint.name.as_str());
         balls.chain(self.closing_joints.iter().map(|joint| joint.name.as_str()))
     }
+
+    /// Joints besides ball joints: those that bodies hang on, then those that close loops.
+    pub fn kinematic_joints(&self) -> impl Iterator<Item = &Joint> + Clone {
+        self.joints.iter().chain(&self.closing_joints)
+    }
+
+    /// Driven coordinates in the order in which they are counted, each with its joint.
+    pub fn driven(&self) -> impl Iterator<Item = (&Joint, Freedom)> {
+        let of = |joint| Joint::drives(joint).map(move |(freedom, _)| (joint, freedom));
+        self.joints.iter().flat_map(of)
+    }
 }
 
 /// How the start values of the joints are to be understood.
@@ -100,7 +111,7 @@ words!(StartRule {
 pub type Texts = BTreeMap<String, Arc<str>>;
 
 /// Where a scene's text came from.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Source {
     /// The file as the user named it; `None` for a built-in scene.
     pub file: Option<String>,
@@ -416,8 +427,10 @@ pub struct Joint {
     pub child_axis: Vec3,
     /// Child's orientation in the parent at q = 0.
     pub rotation: Quat,
-    /// Prescribes q(t); `None` leaves it to the dynamics.
+    /// Prescribes q(t), of two coordinates the first; `None` leaves it to the dynamics.
     pub drive: Option<Drive>,
+    /// Prescribes the second of two coordinates.
+    pub second_drive: Option<Drive>,
     /// Its start values; without meaning where a drive prescribes its motion.
     pub start: JointStart,
     /// Whether the view draws a pin or a rail for it.
@@ -438,9 +451,16 @@ impl Joint {
         [parent, child]
     }
 
-    /// Whether it is a slide or a hinge: one coordinate, driven or not, gives its position.
-    pub fn has_coordinate(&self) -> bool {
-        self.kind.freedoms().len() == 1
+    /// Its driven coordinates.
+    pub fn drives(&self) -> impl Iterator<Item = (Freedom, &Drive)> {
+        let drives = [&self.drive, &self.second_drive];
+        let coordinates = self.kind.freedoms().iter().zip(drives);
+        coordinates.filter_map(|(freedom, drive)| Some((*freedom, drive.as_ref()?)))
+    }
+
+    /// Whether time alone moves its child against its parent.
+    pub fn is_prescribed(&self) -> bool {
+        self.kind != JointKind::Free && self.drives().count() == self.kind.freedoms().len()
     }
 }
 
@@ -483,6 +503,22 @@ pub enum Freedom {
     FirstTurn,
     /// The same about its axis in the child.
     SecondTurn,
+}
+
+impl Freedom {
+    /// The coordinate's name in files and channels.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Slide => "position",
+            Self::Turn | Self::TurnOfSlide | Self::FirstTurn => "angle",
+            Self::SecondTurn => "child_angle",
+        }
+    }
+
+    /// Whether it is an angle.
+    pub fn turns(self) -> bool {
+        self != Self::Slide
+    }
 }
 
 impl JointKind {
@@ -672,10 +708,10 @@ pub struct ElementCurve {
 /// Names and dimensions of the two numbers of a curve, and an example of its points.
 pub type CurveAxes = ([(&'static str, Dimension); 2], &'static str);
 
-/// Joints that an element may act on.
+/// Coordinates of joints that an element may act on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ElementJoint {
-    /// Any slide or hinge.
+    /// Any.
     Any,
     /// One without a drive.
     Undriven,
@@ -778,7 +814,7 @@ pub struct ElementKind {
     pub help: &'static str,
     /// Points on bodies or the world, each `{ body, at }`.
     pub points: &'static [&'static str],
-    /// Of one that acts on a slide or a hinge, named by `joint`, instead of at points: which.
+    /// Of one that acts on a coordinate of a joint, named by `joint`, instead of at points: which.
     pub joint: Option<ElementJoint>,
     /// Its numbers.
     pub numbers: &'static [ElementNumber],
@@ -804,8 +840,14 @@ pub struct ElementKind {
     pub look: ElementLook,
 }
 
+impl PartialEq for ElementKind {
+    fn eq(&self, other: &Self) -> bool {
+        self.section == other.section
+    }
+}
+
 /// A force element of a scene, according to its row.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Element {
     /// Unique name.
     pub name: String,
@@ -813,9 +855,9 @@ pub struct Element {
     pub kind: &'static ElementKind,
     /// In the order of the row; of one that acts on a joint, the points of parent and child that the joint connects.
     pub points: Vec<Attachment>,
-    /// The slide or hinge that it acts on, by its index among the tree joints.
-    pub joint: Option<usize>,
-    /// Whether that is a hinge.
+    /// The coordinate that it acts on, with its joint by its index among [`Scene::kinematic_joints`].
+    pub joint: Option<(usize, Freedom)>,
+    /// Whether that is an angle.
     pub on_hinge: bool,
     pub(super) numbers: Vec<f64>,
     pub(super) vectors: Vec<Vec3>,

@@ -1,12 +1,12 @@
 //! Numbers with a dimension, as expressions of a scene file compute with them.
 
-use super::expression::{Binary, Number, Unary};
-use super::units::powers;
+use super::expression::{Binary, ExpressionError, Number, Program, Unary};
+use super::units::{all_units, powers, unit_at_start};
 use super::{Dimension, format_quantity, si_unit, unit_names};
 
 /// A number with its dimension, or the reason why it has none.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Quantity {
+pub struct Quantity {
     value: f64,
     /// Powers of kg, m, s and rad.
     powers: Result<[i8; 4], Fault>,
@@ -40,6 +40,11 @@ impl Quantity {
     /// Whether it is a number without a unit.
     pub fn is_pure(&self) -> bool {
         matches!(self.powers, Ok([0, 0, 0, 0]))
+    }
+
+    /// Powers of kg, m, s and rad; `None` where an operation made no sense.
+    pub fn powers(&self) -> Option<[i8; 4]> {
+        self.powers.ok()
     }
 
     /// Its SI value if it has this dimension. Radians come and go in products (omega r, 2 pi f) unless `exact`; a bare number for
@@ -76,6 +81,24 @@ impl Quantity {
             ),
         })
     }
+}
+
+/// The value of an expression, such as `first + 0.2 ms`, in which names stand for quantities.
+///
+/// # Errors
+/// Where the text is wrong, and why.
+pub fn evaluate(text: &str, names: &[(&str, Quantity)]) -> Result<Quantity, ExpressionError> {
+    let known: Vec<&str> = names.iter().map(|(name, _)| *name).collect();
+    let units = all_units().map(|(_, dimension, size)| Quantity::new(size, dimension));
+    let own = names.iter().map(|(_, quantity)| *quantity);
+    let values: Vec<Quantity> = own.chain(units).collect();
+    let program = Program::parse_with_units(
+        text,
+        |name| known.iter().position(|own| *own == name),
+        &known,
+        |rest| unit_at_start(rest).map(|(length, place)| (length, known.len() + place)),
+    )?;
+    Ok(program.eval(&values))
 }
 
 /// Powers of the base units in words: `kg m s^-2`.

@@ -48,6 +48,21 @@ impl Scene {
         Self::parse_beside(text, file, Beside::in_folder(folder), changes)
     }
 
+    /// As [`Self::parse`] for a text opened together with other files, `given` by their names without a folder; one that its
+    /// `folder` has as well is read there.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn parse_given(
+        text: &str,
+        file: Option<&str>,
+        given: &BTreeMap<String, Vec<u8>>,
+        folder: Option<&Path>,
+        changes: &[(String, String)],
+    ) -> Result<Self, SceneError> {
+        Self::parse_beside(text, file, Beside::given(given, folder), changes)
+    }
+
     /// As [`Self::parse`] for a text that names the files `beside` it.
     ///
     /// # Errors
@@ -396,12 +411,12 @@ fn read_mechanism<'d>(
     }
     // After the chain: they may be attached to its links.
     let by_name = indices_by_name(&scene.bodies);
-    let tree_joints = scene.joints.iter().zip(0..);
-    let tree_joints = tree_joints.map(|(joint, index)| (joint.name.clone(), index));
-    let tree_joints: BTreeMap<String, usize> = tree_joints.collect();
+    let joints = scene.kinematic_joints().zip(0..);
+    let joints = joints.map(|(joint, index)| (joint.name.clone(), index));
+    let joints: BTreeMap<String, usize> = joints.collect();
     for kind in &ELEMENT_KINDS {
         for node in list(kind.section)? {
-            let (element, section) = read_element(&node, kind, scene, &by_name, &tree_joints)?;
+            let (element, section) = read_element(&node, kind, scene, &by_name, &joints)?;
             // Joints and elements share one table of column names.
             joint_names.add(&section, "joint or force element", &element.name)?;
             scene.elements.push(element);

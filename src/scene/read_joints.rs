@@ -2,7 +2,7 @@
 
 use super::copy::Copy;
 use super::document::{Node, Section};
-use super::drives::read_drive;
+use super::drives::{SLIDERS_ONLY, read_drive};
 use super::error::{nearest, no_body};
 use super::table::contact_rows;
 use super::*;
@@ -63,6 +63,7 @@ pub(super) fn read_joint<'d>(
         child_axis: Vec3::y(),
         rotation: read_rotation(section.get("rotation"))?,
         drive: None,
+        second_drive: None,
         start: JointStart::Scalar {
             position: 0.0,
             velocity: 0.0,
@@ -80,7 +81,9 @@ pub(super) fn read_joint<'d>(
         JointKind::Free => read_free(&section, &mut joint)?,
         JointKind::Fixed => {}
         JointKind::Prismatic | JointKind::Revolute => read_moving(&section, scene, &mut joint)?,
-        JointKind::Cylindrical | JointKind::Universal => read_two_degrees(&section, &mut joint)?,
+        JointKind::Cylindrical | JointKind::Universal => {
+            read_two_degrees(&section, scene, &mut joint)?;
+        }
     }
     let own = |copy: &Copy| parent.is_some_and(|parent| copy.made(&bodies[parent]));
     if let Some(copy) = node.document.copy.filter(|copy| !own(copy)) {
@@ -173,7 +176,7 @@ fn read_free(section: &Section<'_>, joint: &mut Joint) -> Result<(), SceneError>
 fn read_moving(section: &Section<'_>, scene: &Scene, joint: &mut Joint) -> Result<(), SceneError> {
     if let Some(node) = section.get("drive") {
         section.refuse("start", "the drive says where the joint starts")?;
-        let drive = read_drive(&node, joint.kind, scene)?;
+        let drive = read_drive(&node, joint.kind == JointKind::Revolute, scene)?;
         let slider = drive.slider();
         joint.drive = Some(drive);
         if let (Some(coordinate), Some(spcmm)) = (slider, scene.spcmm.as_ref()) {
@@ -200,7 +203,11 @@ fn read_moving(section: &Section<'_>, scene: &Scene, joint: &mut Joint) -> Resul
 }
 
 /// A joint that slides and turns, or turns about two axes.
-fn read_two_degrees(section: &Section<'_>, joint: &mut Joint) -> Result<(), SceneError> {
+fn read_two_degrees(
+    section: &Section<'_>,
+    scene: &Scene,
+    joint: &mut Joint,
+) -> Result<(), SceneError> {
     let universal = joint.kind == JointKind::Universal;
     joint.axis = section.require("axis")?.direction()?;
     if universal {
@@ -216,21 +223,48 @@ fn read_two_degrees(section: &Section<'_>, joint: &mut Joint) -> Result<(), Scen
         let square = (second - joint.axis * along).normalize();
         joint.child_axis = joint.rotation.inverse() * square;
     }
-    let [first, second, rate, second_rate] = if universal {
-        [
-            "angle",
-            "child_angle",
-            "angular_velocity",
-            "child_angular_velocity",
-        ]
+    let rates = if universal {
+        ["angular_velocity", "child_angular_velocity"]
     } else {
-        ["position", "angle", "velocity", "angular_velocity"]
+        ["velocity", "angular_velocity"]
     };
+    let drive = section
+        .get("drive")
+        .map(|node| node.section())
+        .transpose()?;
+    let start = section
+        .get("start")
+        .map(|node| node.section())
+        .transpose()?;
     let (mut position, mut velocity) = ([0.0; 2], [0.0; 2]);
-    if let Some(node) = section.get("start") {
-        let start = node.section()?;
-        position = [start.number(first)?, start.number(second)?];
-        velocity = [start.number(rate)?, start.number(second_rate)?];
+    let drives = [&mut joint.drive, &mut joint.second_drive];
+    let coordinates = joint.kind.freedoms().iter().zip(rates).zip(drives);
+    for (part, ((freedom, rate), driven)) in coordinates.enumerate() {
+        let word = freedom.word();
+        if let Some(node) = drive.as_ref().and_then(|drive| drive.get(word)) {
+            let own = read_drive(&node, freedom.turns(), scene)?;
+            if own.slider().is_some() {
+                return Err(node.error(SLIDERS_ONLY));
+            }
+            *driven = Some(own);
+            for key in [word, rate] {
+                let why = "the drive of this coordinate says where it starts";
+                start
+                    .as_ref()
+                    .map_or(Ok(()), |start| start.refuse(key, why))?;
+            }
+        } else if let Some(start) = &start {
+            position[part] = start.number(word)?;
+            velocity[part] = start.number(rate)?;
+        }
+    }
+    if let (Some(drive), None) = (drive, joint.drives().next()) {
+        let words = joint.kind.freedoms().iter().map(|freedom| freedom.word());
+        let words: Vec<&str> = words.collect();
+        return Err(drive.error(
+            "",
+            format!("drives nothing: give `{}` or both", words.join("`, `")),
+        ));
     }
     joint.start = JointStart::Pair { position, velocity };
     Ok(())
@@ -411,48 +445,56 @@ pub(super) fn read_attachment(
     Ok(Attachment { body, point })
 }
 
-/// The slide or hinge that the key `joint` names; `joints` maps names to indices in the sorted scene.
-pub(super) fn read_one_degree_joint(
+/// The coordinate that the keys `joint` and `coordinate` name, with its joint by its index among the kinematic joints of `scene`,
+/// which `joints` finds by name.
+pub(super) fn read_coordinate(
     section: &Section<'_>,
     scene: &Scene,
     joints: &BTreeMap<String, usize>,
-) -> Result<usize, SceneError> {
+) -> Result<(usize, Freedom), SceneError> {
     const LISTED: usize = 12;
     let node = section.require("joint")?;
     let wanted = &*node.joint()?;
-    match joints.get(wanted) {
-        Some(&index) if scene.joints[index].has_coordinate() => Ok(index),
-        found => {
-            let wrong = match found {
-                Some(&index) => format!(
-                    "a {} joint is neither a slide nor a hinge",
-                    scene.joints[index].kind
-                ),
-                None if scene
-                    .closing_joints
-                    .iter()
-                    .any(|joint| joint.name == wanted) =>
-                {
-                    "a joint that closes a loop has no coordinate to act on".to_owned()
-                }
-                None => "no such tree joint".to_owned(),
-            };
-            let names = scene
-                .joints
-                .iter()
-                .filter(|joint| joint.has_coordinate())
-                .map(|joint| joint.name.as_str());
-            let near = nearest(wanted, names.clone());
-            let mut listed: Vec<&str> = names.take(LISTED + 1).collect();
-            if listed.len() > LISTED {
-                listed[LISTED] = "…";
-            }
-            let allowed = match listed.is_empty() {
-                true => "the scene has no prismatic or revolute joint".to_owned(),
-                false => format!("allowed {}", listed.join(", ")),
-            };
-            Err(node.error(format!("{wrong}{near}; {allowed}")))
+    let found = joints.get(wanted).copied();
+    let joint = found.and_then(|index| scene.kinematic_joints().nth(index));
+    let freedoms = joint.map_or(&[][..], |joint| joint.kind.freedoms());
+    let (Some(index), Some(joint), Some(first)) = (found, joint, freedoms.first()) else {
+        let wrong = match joint {
+            Some(joint) => format!("a {} joint is neither a slide nor a hinge", joint.kind),
+            None => "no such joint that slides or turns".to_owned(),
+        };
+        let moving = scene
+            .kinematic_joints()
+            .filter(|joint| !joint.kind.freedoms().is_empty());
+        let names = moving.map(|joint| joint.name.as_str());
+        let near = nearest(wanted, names.clone());
+        let mut listed: Vec<&str> = names.take(LISTED + 1).collect();
+        if listed.len() > LISTED {
+            listed[LISTED] = "…";
         }
+        let allowed = match listed.is_empty() {
+            true => "the scene has no joint that slides or turns".to_owned(),
+            false => format!("allowed {}", listed.join(", ")),
+        };
+        return Err(node.error(format!("{wrong}{near}; {allowed}")));
+    };
+    let words: Vec<&str> = freedoms.iter().map(|freedom| freedom.word()).collect();
+    let has = format!("a {} joint has {}", joint.kind, words.join(" and "));
+    match section.get("coordinate") {
+        Some(node) => {
+            let word = node.choice()?;
+            let found = freedoms.iter().find(|freedom| freedom.word() == word);
+            let freedom = found.ok_or_else(|| node.error(format!("no such coordinate: {has}")))?;
+            Ok((index, *freedom))
+        }
+        None if freedoms.len() == 1 => Ok((index, *first)),
+        None => Err(section.error(
+            "coordinate",
+            format!(
+                "missing: {has}; write for example `coordinate = \"{}\"`",
+                words[0]
+            ),
+        )),
     }
 }
 

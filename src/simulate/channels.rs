@@ -224,8 +224,6 @@ fn lay_out(
 fn parts_of(scene: &Scene, each: Each) -> Vec<(&str, Option<Freedom>)> {
     let joints = scene.ball_joints.iter().map(|joint| joint.name.as_str());
     let elements = scene.elements.iter().map(|element| element.name.as_str());
-    let driven = scene.joints.iter().filter(|joint| joint.drive.is_some());
-    let moving = scene.joints.iter().chain(&scene.closing_joints);
     let coordinates = |joint: &'_ Joint| joint.kind.freedoms().iter().map(|freedom| Some(*freedom));
     let holding = scene.joints.iter().filter(|j| j.kind != JointKind::Free);
     let bodies = scene.bodies.iter().map(|body| body.name.as_str());
@@ -233,7 +231,8 @@ fn parts_of(scene: &Scene, each: Each) -> Vec<(&str, Option<Freedom>)> {
         Each::Once => vec![("", None)],
         Each::Output => vec![(scene.bodies[scene.output.body].name.as_str(), None)],
         Each::Body => bodies.map(|name| (name, None)).collect(),
-        Each::Coordinate => moving
+        Each::Coordinate => scene
+            .kinematic_joints()
             .flat_map(|j| coordinates(j).map(|freedom| (j.name.as_str(), freedom)))
             .collect(),
         Each::Holding => holding.map(|j| (j.name.as_str(), None)).collect(),
@@ -242,8 +241,9 @@ fn parts_of(scene: &Scene, each: Each) -> Vec<(&str, Option<Freedom>)> {
             closing.map(|joint| (joint.name.as_str(), None)).collect()
         }
         Each::Joint => joints.map(|name| (name, None)).collect(),
-        Each::Drive => driven
-            .flat_map(|j| coordinates(j).map(|freedom| (j.name.as_str(), freedom)))
+        Each::Drive => scene
+            .driven()
+            .map(|(j, freedom)| (j.name.as_str(), Some(freedom)))
             .collect(),
         Each::Element => elements.map(|name| (name, None)).collect(),
     }
@@ -264,6 +264,8 @@ fn has(
         Take::HingeCoordinate(0) if freedom == Some(Freedom::TurnOfSlide) => true,
         Take::Hinge | Take::HingeCoordinate(_) => freedom == Some(Freedom::Turn),
         Take::TurnRate => freedom == Some(Freedom::TurnOfSlide),
+        Take::Turn => matches!(freedom, Some(Freedom::TurnOfSlide | Freedom::FirstTurn)),
+        Take::ChildTurn => freedom == Some(Freedom::SecondTurn),
         Take::FirstTurn(_) => freedom == Some(Freedom::FirstTurn),
         Take::SecondTurn(_) => freedom == Some(Freedom::SecondTurn),
         Take::OtherAxes(_) | Take::OtherAngles(_) => part != scene.output.body,

@@ -11,6 +11,8 @@ use crate::scene::{Mat3, Vec3};
 pub struct Frame {
     /// Simulated time, s.
     pub time: f64,
+    /// From where positions are measured, world axes, m: zero, unless the view has moved it.
+    pub origin: Vec3,
     /// Bodies in scene order.
     pub bodies: Vec<BodyMotion>,
     /// Ball joints in scene order.

@@ -22,7 +22,7 @@ pub use frame::*;
 pub use history::{Bin, History, Mark};
 pub use impacts::Impact;
 pub use ledger::Ledger;
-pub use pace::{LARGEST_BUDGET, LONGEST_FRAME, Pacer, SCALE_RANGE};
+pub use pace::{LONGEST_FRAME, Limit, Pacer, REST, SCALE_RANGE};
 pub use simulation::ideal::{ProbeFault, closed};
 pub use simulation::live::ChangeError;
 pub use simulation::saved::{Misfit, SavedState};

@@ -1,11 +1,19 @@
-//! Pacing against the wall clock: how far the simulation should be after each frame. This module reads no clock; the caller
-//! measures and passes times in.
+//! Pacing against the wall clock: how far the simulation should be after each frame, how long it may step for that, and what keeps
+//! it from getting there. This module reads no clock; the caller measures and passes times in. How many steps a frame takes
+//! depends on them, the steps do not.
 
-/// Longest frame to catch up with, s: after a hitch or a hidden window the simulation continues instead of racing.
+/// Longest frame to catch up with, s, unless the one before was as long: after a hitch or a hidden window the simulation continues
+/// instead of racing.
 pub const LONGEST_FRAME: f64 = 0.25;
 
-/// Largest stepping budget per frame, s: what drawing leaves of a 60 Hz frame.
-pub const LARGEST_BUDGET: f64 = 0.012;
+/// A longer gap, s, is a rest and no frame.
+pub const REST: f64 = 2.0;
+
+/// Stepping budget of a frame of 1/60 s, s.
+pub const USUAL_BUDGET: f64 = 0.012;
+
+/// Largest stepping budget, s, however slow drawing is: the interface still answers.
+pub const LARGEST_BUDGET: f64 = 0.25;
 
 /// Averaging time of the achieved time scale, s.
 const AVERAGE: f64 = 0.5;
@@ -13,12 +21,35 @@ const AVERAGE: f64 = 0.5;
 /// Range of the time scale: from 1:10 000 slow motion to real time.
 pub const SCALE_RANGE: (f64, f64) = (1e-4, 1.0);
 
+/// Below this share of the asked time scale the run does not keep up.
+const KEPT_UP: f64 = 0.97;
+
+/// What keeps the run below the asked time scale.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Limit {
+    /// Stepping.
+    Computing,
+    /// Everything else in a frame.
+    Drawing,
+}
+
+/// Stepping budget, s, of a frame `dt` s after the last, of which drawing takes `drawing` s: as long as drawing does, with the same
+/// left over as in a frame of 1/60 s.
+fn budget(dt: f64, drawing: f64) -> f64 {
+    let usual = (0.75 * dt).clamp(0.002, USUAL_BUDGET);
+    (drawing - (1.0 / 60.0 - USUAL_BUDGET)).clamp(usual, LARGEST_BUDGET)
+}
+
 /// Keeps the displayed time in step with the wall clock as far as the machine can keep up.
 #[derive(Clone, Debug)]
 pub struct Pacer {
     scale: f64,
     shown: f64,
     budget: f64,
+    /// Length of the latest frame, stepping in it, and all else in the one before, s.
+    frame: f64,
+    spent: f64,
+    drawing: f64,
     advanced: f64,
     elapsed: f64,
 }
@@ -28,7 +59,10 @@ impl Default for Pacer {
         Self {
             scale: 0.02,
             shown: 0.0,
-            budget: LARGEST_BUDGET,
+            budget: USUAL_BUDGET,
+            frame: 0.0,
+            spent: 0.0,
+            drawing: 0.0,
             advanced: 0.0,
             elapsed: 0.0,
         }
@@ -57,18 +91,25 @@ impl Pacer {
     /// Displays `time`, as after a reset or a single step.
     pub fn jump(&mut self, time: f64) {
         self.shown = time;
+        (self.frame, self.spent, self.drawing) = (0.0, 0.0, 0.0);
         self.forget_average();
     }
 
     /// Starts a frame `dt` seconds after the last; returns the simulated time to reach.
     pub fn begin(&mut self, dt: f64) -> f64 {
-        let dt = if dt.is_finite() {
-            dt.clamp(0.0, LONGEST_FRAME)
-        } else {
-            0.0
-        };
-        self.budget = (0.75 * dt).clamp(0.002, LARGEST_BUDGET);
-        self.shown + dt * self.scale
+        let dt = if dt.is_finite() { dt.max(0.0) } else { 0.0 };
+        let frame = if dt < REST { dt } else { 0.0 };
+        let drawing = (frame - self.spent).max(0.0);
+        // One slow frame is a hitch: it takes two to tell.
+        self.budget = budget(dt, drawing.min(self.drawing));
+        let passed = dt.min(LONGEST_FRAME.max(self.frame));
+        (self.frame, self.drawing) = (frame, drawing);
+        self.shown + passed * self.scale
+    }
+
+    /// What the frame before the latest [`Self::begin`] took beyond stepping, s.
+    pub fn drawing(&self) -> f64 {
+        self.drawing
     }
 
     /// Whether another step may start after `spent` seconds of stepping in this frame.
@@ -77,11 +118,12 @@ impl Pacer {
     }
 
     /// Ends the frame begun `dt` seconds after the last: `target` is what [`Self::begin`] returned, `reached` the time of
-    /// the simulation. Any shortfall is dropped, not carried over.
-    pub fn end(&mut self, dt: f64, target: f64, reached: f64) {
+    /// the simulation, `spent` how long it stepped, s. Any shortfall is dropped, not carried over.
+    pub fn end(&mut self, dt: f64, target: f64, reached: f64, spent: f64) {
+        self.spent = spent;
         let shown = target.min(reached).max(self.shown);
         // So long a pause was no frame: it says nothing about the machine.
-        if dt.is_finite() && dt < 1.0 {
+        if dt.is_finite() && dt < REST {
             let keep = libm::exp(-dt / AVERAGE);
             self.advanced = self.advanced * keep + (shown - self.shown);
             self.elapsed = self.elapsed * keep + dt;
@@ -92,6 +134,20 @@ impl Pacer {
     /// Simulated seconds per second achieved lately; `None` before anything was measured.
     pub fn reached_scale(&self) -> Option<f64> {
         (self.elapsed > 0.05).then(|| self.advanced / self.elapsed)
+    }
+
+    /// What keeps the run below the asked scale on a machine that simulates `capacity` seconds per second of stepping; `None` while it
+    /// keeps up. Stepping takes it from the asked scale down to the capacity, drawing from there to the one reached: the greater
+    /// of these ratios is the limit.
+    pub fn limit(&self, capacity: Option<f64>) -> Option<Limit> {
+        let reached = self.reached_scale()?;
+        let slow = capacity.is_some_and(|capacity| capacity * capacity < self.scale * reached);
+        let limit = if slow {
+            Limit::Computing
+        } else {
+            Limit::Drawing
+        };
+        (reached < KEPT_UP * self.scale).then_some(limit)
     }
 
     fn forget_average(&mut self) {
@@ -115,10 +171,10 @@ mod tests {
                 spent += step / speed;
             }
             assert!(
-                spent < LARGEST_BUDGET + step / speed,
+                spent < USUAL_BUDGET + step / speed,
                 "a frame never steps longer than its budget"
             );
-            pacer.end(dt, target, time);
+            pacer.end(dt, target, time, spent);
         }
         time
     }
@@ -170,7 +226,7 @@ mod tests {
             while time < target {
                 time += step;
             }
-            pacer.end(1.0 / 60.0, target, time);
+            pacer.end(1.0 / 60.0, target, time, 0.0);
             let moved = pacer.shown() - last;
             assert!(
                 (moved - 1e-4 / 60.0).abs() < 1e-12,
@@ -189,7 +245,101 @@ mod tests {
         let mut pacer = Pacer::default();
         pacer.jump(0.2);
         let target = pacer.begin(f64::NAN);
-        pacer.end(f64::NAN, target, 0.1);
+        pacer.end(f64::NAN, target, 0.1, 0.0);
         assert_eq!(pacer.shown(), 0.2);
+    }
+
+    /// Runs `frames` frames in real time, of which drawing takes `drawing` s, on a machine that simulates `speed` seconds per second
+    /// of stepping, in steps of `step` s; returns the longest frame, s.
+    fn drawn(pacer: &mut Pacer, frames: usize, drawing: f64, speed: f64, step: f64) -> f64 {
+        let (mut time, mut dt, mut longest) = (pacer.shown(), 1.0 / 60.0, 0.0_f64);
+        for _ in 0..frames {
+            let (target, mut spent) = (pacer.begin(dt), 0.0);
+            while time < target && pacer.may_step(spent) {
+                time += step;
+                spent += step / speed;
+            }
+            pacer.end(dt, target, time, spent);
+            dt = drawing + spent;
+            longest = longest.max(dt);
+        }
+        longest
+    }
+
+    #[test]
+    fn where_drawing_is_slow_stepping_gets_as_long() {
+        // Three frames a second with the usual budget, of a chain that could run at 0.4 of real time.
+        let (drawing, speed, step) = (1.0 / 3.0 - USUAL_BUDGET, 0.4, 1e-4);
+        let mut pacer = Pacer::default();
+        pacer.set_scale(1.0);
+        let longest = drawn(&mut pacer, 100, drawing, speed, step);
+        assert!(
+            longest < drawing + LARGEST_BUDGET + step / speed,
+            "{longest}"
+        );
+        let reached = pacer.reached_scale().expect("measured");
+        let share = LARGEST_BUDGET / (LARGEST_BUDGET + drawing);
+        assert!((reached / speed - share).abs() < 0.01, "{reached}");
+        assert!(reached > 10.0 * speed * USUAL_BUDGET * 3.0, "{reached}");
+        assert_eq!(pacer.limit(Some(speed)), Some(Limit::Computing));
+        // At less than the bound the shares are equal, but for what a usual frame leaves over.
+        let mut pacer = Pacer::default();
+        pacer.set_scale(1.0);
+        drawn(&mut pacer, 100, 0.1, speed, step);
+        let reached = pacer.reached_scale().expect("measured");
+        assert!((reached / speed - 0.488).abs() < 0.01, "{reached}");
+    }
+
+    #[test]
+    fn slow_frames_in_succession_are_caught_up_with_whole() {
+        let mut pacer = Pacer::default();
+        pacer.set_scale(1.0);
+        drawn(&mut pacer, 20, 0.6, 1000.0, 1e-4);
+        let before = pacer.shown();
+        drawn(&mut pacer, 11, 0.6, 1000.0, 1e-4);
+        // The first frame of the second call is a short one, and the next slow one again the first.
+        let passed = pacer.shown() - before;
+        assert!(
+            (passed - (1.0 / 60.0 + 0.25 + 9.0 * 0.6)).abs() < 0.02,
+            "{passed}"
+        );
+    }
+
+    #[test]
+    fn a_hitch_gives_stepping_no_more_than_usual() {
+        let mut pacer = Pacer::default();
+        pacer.set_scale(1.0);
+        for dt in [1.0 / 60.0, 1.0 / 60.0, 0.9, 1.0 / 60.0, 5.0, 5.0] {
+            let target = pacer.begin(dt);
+            assert!(!pacer.may_step(USUAL_BUDGET), "after {dt} s");
+            pacer.end(dt, target, target, 0.0);
+        }
+    }
+
+    #[test]
+    fn a_frame_of_an_ordinary_screen_is_shared_as_ever_and_a_faster_one_stays_fast() {
+        // The wait for the screen counts as drawing.
+        for (hertz, usual) in [(60.0, 0.012), (120.0, 0.00625), (30.0, 0.0286)] {
+            let dt = 1.0 / hertz;
+            assert!((budget(dt, dt) - usual).abs() < 1e-4, "{hertz} Hz");
+        }
+    }
+
+    #[test]
+    fn the_limit_is_what_takes_more_of_the_asked_scale() {
+        let limit = |asked, drawing, speed| {
+            let mut pacer = Pacer::default();
+            pacer.set_scale(asked);
+            drawn(&mut pacer, 200, drawing, speed, 1e-5);
+            pacer.limit(Some(speed))
+        };
+        assert_eq!(limit(1.0, 0.004, 10.0), None);
+        assert_eq!(limit(1.0, 0.004, 0.2), Some(Limit::Computing));
+        assert_eq!(limit(1.0, 0.1, 0.9), Some(Limit::Drawing));
+        assert_eq!(limit(1.0, 0.1, 1.5), Some(Limit::Drawing));
+        // What is not computed at all cannot be the limit.
+        let mut pacer = Pacer::default();
+        run(&mut pacer, 10, 1.0 / 60.0, 1e-3, 1e-5);
+        assert_eq!(pacer.limit(None), Some(Limit::Drawing));
     }
 }

@@ -16,7 +16,7 @@ pub(super) const ARROW_LENGTH: f32 = 0.22;
 /// Longest arrow, in reference lengths.
 const LONGEST_ARROW: f32 = 2.5;
 /// Radius of the thickest shaft, as a fraction of the picture height.
-const THICKEST: f32 = 0.0045;
+const THICKEST: f32 = 0.0055;
 /// Shortest arrow with the full thickness, in shaft radii; a shorter one is proportionally thinner.
 const STOUTEST: f32 = 10.0;
 /// Length and radius of a head, in radii of the shaft.

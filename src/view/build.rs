@@ -11,6 +11,7 @@ use super::coil::push_coil;
 use super::drawn::{self, BarKind, DrawnJoint, DrawnShape, Solid};
 use super::ground::push_ground;
 use super::instances::{self, bar, placed, push_label};
+use super::near::Near;
 use super::symbols::{Symbol, symbols};
 use super::theme::Material;
 use super::{
@@ -18,7 +19,7 @@ use super::{
     MeshData, Palette, Shot, ViewOptions, WearMap, to_f32,
 };
 use crate::scene::{ElementLook, Role, Scene, SignedAxis};
-use crate::simulate::Frame;
+use crate::simulate::{ContactState, Frame, JointReport};
 
 /// What the view precomputes for a scene: built once per scene, and again when its bodies or shapes change.
 pub struct SceneView {
@@ -42,10 +43,16 @@ pub struct SceneView {
 
 /// Smallest picture edge that leaves room for the triad, points.
 const SMALLEST_WITH_TRIAD: f32 = 200.0;
+/// Smallest width that leaves room for gravity between axes and legend, points.
+const SMALLEST_WITH_GRAVITY: f32 = 300.0;
 /// Radius of the halo of a joint that was hit, in radii of its socket.
 const HALO: f32 = 1.7;
 /// Opacity of a ball in front of a wear map.
 const CLEAR_BALL: f32 = 0.25;
+/// Points of moving parts that a fixed part may hide: rays are cast to all of them in every frame.
+const MOST_WATCHED: usize = 600;
+/// Width of an arrow's outline, points.
+const OUTLINE: f32 = 1.1;
 /// Radius of a drawn spring, in radii of the scene.
 const COIL: f32 = 0.025;
 /// Radius of the ring that marks the ground under a tyre, in the same.
@@ -84,6 +91,8 @@ impl SceneView {
             watched.extend(ends.into_iter().take(2).filter(|_| part.is_bar()));
         }
         watched.retain(|point| point.is_finite());
+        let apart = watched.len().div_ceil(MOST_WATCHED).max(1);
+        let watched = watched.into_iter().step_by(apart).collect();
         Self {
             room,
             watched,
@@ -203,6 +212,8 @@ impl SceneView {
 
     /// Rebuilds `out`, reusing its buffers.
     pub fn build(&self, shot: &Shot<'_>, out: &mut DrawList) {
+        let near = Near::of(shot);
+        let shot = &near.as_ref().map_or(*shot, |near| near.shot(shot));
         let Shot {
             scene,
             frame,
@@ -219,7 +230,7 @@ impl SceneView {
         let joints = drawn::joints(scene, frame, m);
         let eye = camera.eye();
         for (i, part) in self.parts.iter().enumerate() {
-            let opacity = self.opacity(i, eye);
+            let opacity = self.opacity(i, eye + to_f32(&frame.origin));
             let layer = if opacity < 1.0 {
                 &mut out.faded
             } else {
@@ -237,7 +248,12 @@ impl SceneView {
             );
         }
         for (i, joint) in joints.iter().enumerate() {
-            let ball = instances::ball(joint.ball_centre, joint.ball_radius, palette.ball);
+            let wall = if options.sockets { joint.inner } else { 0.0 };
+            let ball = Instance {
+                other: joint.ball_to_socket().extend(wall).to_array(),
+                touch: touch(&frame.joints[i]),
+                ..instances::ball(joint.ball_centre, joint.ball_radius, palette.ball)
+            };
             if options.wear == WearMap::Off || frame.joints[i].clearance == 0.0 {
                 out.solid.push(Mesh::Sphere, ball);
             } else {
@@ -254,36 +270,10 @@ impl SceneView {
                 let halo = instances::ball(joint.socket_centre, HALO * joint.outer, light);
                 out.halos.push(halo);
             }
-            if options.sockets {
-                let half = |opening, material| {
-                    let turn = Mat3::from_quat(Quat::from_rotation_arc(Vec3::Z, opening));
-                    let socket = placed(turn * joint.outer, joint.socket_centre, material);
-                    Instance {
-                        inner_radius: joint.inner / joint.outer,
-                        ..socket
-                    }
-                };
-                out.sockets.push(half(joint.opening, palette.socket));
-                // The half that is cut away stays faintly visible: a ball in contact there is still in its socket.
-                let colour = palette
-                    .socket
-                    .colour
-                    .with_opacity(0.15 * palette.socket.colour.0[3]);
-                out.sockets.push(half(
-                    -joint.opening,
-                    Material {
-                        colour,
-                        ..palette.socket
-                    },
-                ));
-            }
         }
-        let distance = |socket: &Instance| {
-            let [x, y, z] = socket.world_from_mesh;
-            Vec3::new(x[3], y[3], z[3]).distance_squared(eye)
-        };
-        out.sockets
-            .sort_by(|a, b| distance(b).total_cmp(&distance(a)));
+        if options.sockets {
+            push_sockets(frame, &joints, eye, palette.socket, &mut out.sockets);
+        }
 
         for (element, report) in scene.elements.iter().zip(&frame.elements) {
             let [from, to] = report.points.map(|point| to_f32(&point));
@@ -345,6 +335,9 @@ impl SceneView {
             bottom: palette.ground,
         };
         out.exposure = palette.exposure;
+        out.quality = shot.options.quality;
+        (out.outline, out.rim) = (palette.outline, palette.rim);
+        out.outline_width = OUTLINE * shot.pixels_per_point * shot.options.arrows.thickness;
         if !Arc::ptr_eq(&out.plates, &self.plates) {
             out.plates = self.plates.clone();
         }
@@ -353,18 +346,23 @@ impl SceneView {
         let (up, right) = (shot.camera.up(), shot.camera.front_right());
         let back = right.cross(up);
         // From above, the left and the front: fixed to the scene, so that shadows do not move with the camera.
+        let key = (up - 0.45 * right + 0.55 * back).normalize();
+        let across = 2.0 * key.dot(up) * up - key;
         out.light = Light {
-            direction: (up - 0.45 * right + 0.55 * back).normalize(),
+            direction: key,
+            // Low on the other side.
+            strip: (across - 0.5 * up).normalize(),
             up,
-            centre,
-            radius: 1.25 * radius,
+            radius,
+            studio: palette.studio,
         };
         out.floor = shot.options.floor.then(|| {
             let spacing = 10_f32.powf(radius.log10().floor() - 1.0);
             let snap = |x: f32| (x / (10.0 * spacing)).round() * 10.0 * spacing;
             Floor {
                 centre: right * snap(centre.dot(right)) + back * snap(centre.dot(back))
-                    - up * self.floor,
+                    - up * self.floor
+                    - to_f32(&shot.frame.origin),
                 along: right,
                 spacing,
                 radius: 4.5 * radius,
@@ -411,7 +409,8 @@ impl SceneView {
                 colour,
             );
         }
-        if let Some(gravity) = to_f32(&shot.scene.gravity).try_normalize() {
+        let gravity = to_f32(&shot.scene.gravity).try_normalize();
+        if let Some(gravity) = gravity.filter(|_| points[0] >= SMALLEST_WITH_GRAVITY) {
             let length = gravity * (34.0 * scale);
             let start = corner + right * (74.0 * scale) - length * 0.5;
             push_arrow(
@@ -548,6 +547,50 @@ pub(super) fn push_solid(layer: &mut Layer, solid: &Solid<'_>, material: Materia
         Solid::Own { mesh, pose, .. } => {
             layer.push(mesh, placed(pose.rotation, pose.position, material))
         }
+    }
+}
+
+/// Unit vector from a joint's ball to where it touches, and 1 while it does.
+fn touch(report: &JointReport) -> [f32; 4] {
+    let touches = matches!(report.state, ContactState::Stick | ContactState::Slip);
+    let outwards = to_f32(&report.eccentricity).normalize_or_zero();
+    outwards.extend(f32::from(u8::from(touches))).to_array()
+}
+
+/// The halves of all sockets, from far to near as `eye` sees them.
+fn push_sockets(
+    frame: &Frame,
+    joints: &[DrawnJoint],
+    eye: Vec3,
+    glass: Material,
+    out: &mut Vec<Instance>,
+) {
+    // The half that is cut away stays faintly visible: a ball in contact there is still in its socket.
+    let cut_away = glass.with_opacity(0.15 * glass.colour.0[3]);
+    // Of two spheres that do not meet, the one with the shorter tangent from the eye is in front: the eye is on its side of
+    // the plane between them.
+    let tangent =
+        |joint: &DrawnJoint| joint.socket_centre.distance_squared(eye) - joint.outer * joint.outer;
+    let mut far_first: Vec<_> = joints.iter().zip(&frame.joints).collect();
+    far_first.sort_by(|(a, _), (b, _)| tangent(b).total_cmp(&tangent(a)));
+    for (joint, report) in far_first {
+        let half = |opening, material| {
+            let turn = Mat3::from_quat(Quat::from_rotation_arc(Vec3::Z, opening));
+            Instance {
+                inner_radius: joint.inner / joint.outer,
+                other: (-joint.ball_to_socket())
+                    .extend(joint.ball_radius)
+                    .to_array(),
+                touch: touch(report),
+                ..placed(turn * joint.outer, joint.socket_centre, material)
+            }
+        };
+        let mut halves = [half(joint.opening, glass), half(-joint.opening, cut_away)];
+        // The half on the eye's side of the cut is seen last.
+        if (eye - joint.socket_centre).dot(joint.opening) < 0.0 {
+            halves.reverse();
+        }
+        out.extend(halves);
     }
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat4, Vec2, Vec3};
 
-use super::{Colour, WearMap};
+use super::{Colour, Quality, WearMap};
 
 /// A mesh shared by many instances.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -27,6 +27,11 @@ pub enum Mesh {
 impl Mesh {
     /// Number of shared meshes, before the first plate.
     pub const SHARED: usize = 5;
+
+    /// Whether the shared mesh of this index is a part of the unit sphere.
+    pub fn is_round(index: usize) -> bool {
+        index == Self::Sphere.index() || index == Self::Socket.index()
+    }
 
     /// Index in [`Layer`]: shared meshes first, then plates.
     pub fn index(self) -> usize {
@@ -51,6 +56,20 @@ pub struct MeshData {
     pub indices: Vec<u32>,
 }
 
+impl MeshData {
+    /// Middle and half size of the smallest box about it.
+    pub fn bounds(&self) -> [Vec3; 2] {
+        let points = || {
+            self.vertices
+                .iter()
+                .map(|(p, _)| Vec3::new(p[0], p[1], p[2]))
+        };
+        let low = points().reduce(Vec3::min).unwrap_or_default();
+        let high = points().reduce(Vec3::max).unwrap_or_default();
+        [(low + high) / 2.0, (high - low) / 2.0]
+    }
+}
+
 /// One placed mesh.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
@@ -67,6 +86,11 @@ pub struct Instance {
     pub inner_radius: f32,
     /// Unused.
     pub pad: f32,
+    /// The sphere that this one faces, of a ball its socket's inner face, of a socket its ball: from centre to centre, m, and
+    /// its radius, m; 0 without one.
+    pub other: [f32; 4],
+    /// Unit vector from the ball's centre to where it touches its socket, and 1 while it does.
+    pub touch: [f32; 4],
 }
 
 /// Instances by mesh ([`Mesh::index`]).
@@ -133,7 +157,7 @@ impl Line {
 pub struct Eye {
     /// World to clip space (z in 0..1, y up).
     pub clip_from_world: Mat4,
-    /// Eye point, m.
+    /// Eye point, m. Far from the world's origin all points of a list are measured from the camera's target.
     pub position: Vec3,
 }
 
@@ -142,12 +166,14 @@ pub struct Eye {
 pub struct Light {
     /// Unit vector from the scene towards the light.
     pub direction: Vec3,
+    /// Unit vector towards the strip of the studio that things reflect.
+    pub strip: Vec3,
     /// Unit vector up: the direction of sky light.
     pub up: Vec3,
-    /// Centre of the region that needs shadows, m.
-    pub centre: Vec3,
-    /// Radius of the region that needs shadows, m.
+    /// Radius of the scene, m.
     pub radius: f32,
+    /// Brightness of the key light, and of the ground, the sky and the window that things reflect.
+    pub studio: [f32; 4],
 }
 
 /// Background of the picture.
@@ -200,7 +226,7 @@ pub struct Label {
     pub text: Arc<str>,
     /// What it names.
     pub kind: LabelKind,
-    /// World point, m.
+    /// Point, m, as [`DrawList::eye`] sees it.
     pub anchor: Vec3,
     /// Pixel of the anchor, from the top left; labels outside the picture are left out.
     pub pixel: Vec2,
@@ -260,6 +286,14 @@ pub struct DrawList {
     pub background: Background,
     /// Factor on all light.
     pub exposure: f32,
+    /// Outline of arrows.
+    pub outline: Colour,
+    /// Its width, pixels.
+    pub outline_width: f32,
+    /// Rim about a touching point.
+    pub rim: Colour,
+    /// What the picture may cost.
+    pub quality: Quality,
     /// Floor, if any.
     pub floor: Option<Floor>,
     /// The scene's own meshes; shared, so that a renderer can tell by pointer whether it has loaded them.
@@ -276,7 +310,7 @@ pub struct DrawList {
     pub ghost_edges: Layer,
     /// Halos of joints that were hit.
     pub halos: Vec<Instance>,
-    /// Sockets, farthest first: for each the half that is kept and, fainter, the half that is cut away.
+    /// Sockets in the order in which they are seen, farthest first: of each the half that is kept and, fainter, the half that is cut away.
     pub sockets: Vec<Instance>,
     /// Cells of wear maps, in their own colours whatever the light; fainter where something, or the wall, is in front of
     /// them.
@@ -313,15 +347,20 @@ impl Default for DrawList {
             },
             light: Light {
                 direction: Vec3::Z,
+                strip: Vec3::Z,
                 up: Vec3::Z,
-                centre: Vec3::ZERO,
                 radius: 1.0,
+                studio: [1.0; 4],
             },
             background: Background {
                 top: ground,
                 bottom: ground,
             },
             exposure: 1.0,
+            outline: Colour::hex(0),
+            outline_width: 1.0,
+            rim: ground,
+            quality: Quality::FULL,
             floor: None,
             plates: Arc::new([]),
             solid: Layer::default(),

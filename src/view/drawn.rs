@@ -101,6 +101,13 @@ pub(super) struct DrawnJoint {
     pub opening: Vec3,
 }
 
+impl DrawnJoint {
+    /// From the ball's centre to the socket's, m.
+    pub fn ball_to_socket(&self) -> Vec3 {
+        self.socket_centre - self.ball_centre
+    }
+}
+
 /// A placed part, world axes.
 pub(super) enum Solid<'a> {
     /// `capped[i]`: whether end i of a capsule shows its hemisphere.
@@ -162,8 +169,12 @@ impl Pose {
     }
 
     pub fn in_frame(frame: &Frame, body: Option<usize>) -> Self {
+        let world = Self {
+            position: -to_f32(&frame.origin),
+            ..Self::WORLD
+        };
         body.and_then(|b| frame.bodies.get(b))
-            .map_or(Self::WORLD, Self::of_body)
+            .map_or(world, Self::of_body)
     }
 
     pub fn apply(&self, point: Vec3) -> Vec3 {

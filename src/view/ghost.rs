@@ -5,6 +5,7 @@ use glam::Vec3;
 use super::arrows::push_error;
 use super::build::{self, push_solid};
 use super::instances::ball;
+use super::near::Near;
 use super::theme::{Ghost, GhostLook, Material};
 use super::{Colour, DrawList, Mesh, Palette, SceneView, Shot, drawn, to_f32};
 use crate::scene::{Output, format_quantity_digits};
@@ -42,6 +43,10 @@ impl SceneView {
         which: Ghost,
         out: &mut DrawList,
     ) -> bool {
+        let near = Near::of(shot);
+        let moved = near.as_ref().map(|near| near.frame(ghost));
+        let shot = &near.as_ref().map_or(*shot, |near| near.shot(shot));
+        let ghost = moved.as_ref().unwrap_or(ghost);
         let look = Palette::of(shot.options.theme).ghost(which);
         let at = |frame| drawn::joints(shot.scene, frame, out.magnification);
         let (here, there) = (at(shot.frame), at(ghost));
@@ -86,6 +91,10 @@ impl SceneView {
     /// Adds the arrow of the output point's error, starting where `ideal` has the point: magnified as much as the play is
     /// drawn, unless that does not fit. Its label gives the length and, if magnified, the factor.
     pub fn add_output_error(&self, shot: &Shot<'_>, ideal: &Frame, out: &mut DrawList) {
+        let near = Near::of(shot);
+        let moved = near.as_ref().map(|near| near.frame(ideal));
+        let shot = &near.as_ref().map_or(*shot, |near| near.shot(shot));
+        let ideal = moved.as_ref().unwrap_or(ideal);
         let output = &shot.scene.output;
         let (Some(from), Some(to)) = (
             output_point(output, ideal),

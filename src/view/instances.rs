@@ -17,6 +17,8 @@ pub(super) fn placed(linear: Mat3, at: Vec3, material: Material) -> Instance {
         metal: material.metal,
         inner_radius: 0.0,
         pad: 0.0,
+        other: [0.0; 4],
+        touch: [0.0; 4],
     }
 }
 

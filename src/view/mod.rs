@@ -21,6 +21,7 @@ pub(crate) mod fixture;
 mod ghost;
 mod ground;
 mod instances;
+mod near;
 mod options;
 mod peaks;
 mod pick;
@@ -41,7 +42,7 @@ pub use draw_list::{
     MeshData, Tick, WearScale,
 };
 pub use ghost::output_point;
-pub use options::{ArrowOptions, Scaling, ViewOptions, WearMap};
+pub use options::{ArrowOptions, Quality, Scaling, ViewOptions, WearMap};
 pub use peaks::{Mark, PeakMarks, SEEN};
 pub use pick::{Hit, Picked};
 pub use shot::Shot;

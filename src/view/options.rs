@@ -24,6 +24,8 @@ pub struct ViewOptions {
     pub hinges: bool,
     /// Draw sockets; without them only the balls are shown.
     pub sockets: bool,
+    /// What the picture may cost.
+    pub quality: Quality,
     /// Draw the caller's trail.
     pub trail: bool,
     /// Quantity shown on the sockets' inner faces; balls then become translucent.
@@ -42,8 +44,46 @@ impl Default for ViewOptions {
             joint_names: true,
             hinges: true,
             sockets: true,
+            quality: Quality::FULL,
             trail: true,
             wear: WearMap::Off,
+        }
+    }
+}
+
+/// What a picture may cost.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Quality {
+    /// Shade between balls and sockets.
+    pub occlusion: bool,
+    /// Samples per pixel, 4 or 1.
+    pub samples: u32,
+    /// The whole shadow map, with soft edges; otherwise half of its side, with hard ones.
+    pub fine_shadows: bool,
+    /// Pixels drawn along each edge of the picture, as a share of those that it has.
+    pub sharpness: f32,
+}
+
+impl Quality {
+    /// Everything.
+    pub const FULL: Self = Self::LADDER[0];
+
+    /// What a slow window leaves out, one thing more in each row.
+    pub const LADDER: [Self; 6] = [
+        Self::row(true, 4, true, 1.0),
+        Self::row(false, 4, true, 1.0),
+        Self::row(false, 1, true, 1.0),
+        Self::row(false, 1, false, 1.0),
+        Self::row(false, 1, false, 0.75),
+        Self::row(false, 1, false, 0.5),
+    ];
+
+    const fn row(occlusion: bool, samples: u32, fine_shadows: bool, sharpness: f32) -> Self {
+        Self {
+            occlusion,
+            samples,
+            fine_shadows,
+            sharpness,
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Pins and rails of hinges and slides that a scene does not draw itself.
+//! Pins, rails and crosses of joints that a scene does not draw itself, whether a body hangs on them or they close a loop.
 
 use glam::Vec3;
 use parry3d::query::Ray;
@@ -17,6 +17,10 @@ const ALONE: f32 = 0.02;
 const REACH: f32 = 0.25;
 /// Radii of a rail and its sleeve, in radii of the scene.
 const RAIL: [f32; 2] = [0.012, 0.022];
+/// Half the length and radius of a bearing, and radius, half the length and distance from it of the pin across its shaft, which
+/// shows that it turns; in radii of the shaft.
+const BEARING: [f32; 2] = [1.5, 1.35];
+const ACROSS: [f32; 3] = [0.3, 1.6, 0.6];
 /// Shapes of a body that are looked at for each of its joints: setting up takes time proportional to the scene.
 const MOST_SHAPES: usize = 500;
 /// Sine of the angle at which a bar still lies along an axis.
@@ -41,6 +45,7 @@ impl Symbol {
 }
 
 /// A joint at one instant, world axes.
+#[derive(Clone, Copy)]
 struct Place<'a> {
     joint: &'a Joint,
     /// The child's joint point, m.
@@ -70,7 +75,8 @@ pub(super) fn symbols(
         }
     }
     let mut symbols = Vec::new();
-    for joint in scene.joints.iter().filter(|joint| joint.drawn) {
+    let joined = scene.joints.iter().chain(&scene.closing_joints);
+    for joint in joined.filter(|joint| joint.drawn) {
         let (parent, child) = (
             Pose::in_frame(frame, joint.parent),
             Pose::in_frame(frame, Some(joint.child)),
@@ -88,12 +94,10 @@ pub(super) fn symbols(
         if !place.point.is_finite() || !place.axis.is_finite() {
             continue;
         }
-        let mut bar = |body, [from, to]: [f32; 2], radius, role| {
+        let mut bar = |body, ends: [Vec3; 2], radius, role| {
             let pose = Pose::in_frame(frame, body);
-            let local = |along: f32| {
-                pose.rotation.transpose() * (place.point + place.axis * along - pose.position)
-            };
-            let (from, to) = (local(from), local(to));
+            let local = |point: Vec3| pose.rotation.transpose() * (point - pose.position);
+            let [from, to] = ends.map(local);
             symbols.push(Symbol {
                 body,
                 from,
@@ -111,47 +115,111 @@ pub(super) fn symbols(
                 };
                 let [low, high] = hub.unwrap_or_default();
                 let ends = [low - 1.5 * thick, high + 1.5 * thick];
-                bar(joint.parent, ends, thick, Role::Pin);
+                bar(joint.parent, place.on_axis(ends), thick, Role::Pin);
             }
             JointKind::Prismatic if !place.has_rail() => {
-                let [rail, sleeve] = RAIL.map(|part| part * radius);
-                let [low, high] = place.span();
-                let ends = [low - REACH * radius, high + REACH * radius];
-                bar(joint.parent, ends, rail, Role::Rail);
-                let ends = [-2.0 * sleeve, 2.0 * sleeve];
-                bar(Some(joint.child), ends, sleeve, Role::Slider);
+                place.slide(radius, &mut bar);
             }
-            _ => {}
+            JointKind::Cylindrical if !place.parent_has_rail() => {
+                // A shaft of the child needs a bearing.
+                let (thick, beside) = match place.bar_on_axis(place.shapes[2]) {
+                    Some(shaft) => {
+                        let [half, sleeve] = BEARING.map(|part| part * shaft);
+                        let ends = place.on_axis([-half, half]);
+                        bar(joint.parent, ends, sleeve, Role::Rail);
+                        let [low, high] = place.span();
+                        (shaft, (half + ACROSS[2] * shaft).copysign(low + high))
+                    }
+                    None => {
+                        place.slide(radius, &mut bar);
+                        (RAIL[1] * radius, 0.0)
+                    }
+                };
+                let across = place.axis.any_orthonormal_vector() * ACROSS[1] * thick;
+                let [at, _] = place.on_axis([beside, beside]);
+                let ends = [at - across, at + across];
+                bar(Some(joint.child), ends, ACROSS[0] * thick, Role::Pin);
+            }
+            JointKind::Universal => {
+                let second = child.rotation * to_f32(&joint.child_axis);
+                let pins = [place.axis, second].map(|axis| Place { axis, ..place });
+                let reach = |pin: &Place<'_>| {
+                    let [low, high] = pin.hub(radius).unwrap_or_default();
+                    high.max(-low)
+                };
+                let half = reach(&pins[0]).max(reach(&pins[1]));
+                let (thick, out) = match half > 0.0 {
+                    true => ((2.0 * IN_HUB * half).min(THICKEST * radius), 1.5),
+                    false => (ALONE * radius, 4.0),
+                };
+                let end = half + out * thick;
+                for (pin, body) in pins.iter().zip([joint.parent, Some(joint.child)]) {
+                    if !pin.has_pin() {
+                        bar(body, pin.on_axis([-end, end]), thick, Role::Pin);
+                    }
+                }
+            }
+            JointKind::Revolute | JointKind::Prismatic | JointKind::Cylindrical => {}
+            JointKind::Fixed | JointKind::Free => {}
         }
     }
     symbols
 }
 
 impl Place<'_> {
-    /// Whether a bar of the scene, not a disc, lies on the joint's axis.
-    fn has_pin(&self) -> bool {
-        let along = |solid: &Solid<'_>| match *solid {
+    /// Points of the axis at these distances from the joint.
+    fn on_axis(&self, along: [f32; 2]) -> [Vec3; 2] {
+        along.map(|along| self.point + self.axis * along)
+    }
+
+    /// A rail on the parent and a sleeve on the child; `radius` is that of the scene.
+    fn slide(&self, radius: f32, bar: &mut impl FnMut(Option<usize>, [Vec3; 2], f32, Role)) {
+        let [rail, sleeve] = RAIL.map(|part| part * radius);
+        let [low, high] = self.span();
+        let ends = [low - REACH * radius, high + REACH * radius];
+        bar(self.joint.parent, self.on_axis(ends), rail, Role::Rail);
+        let ends = self.on_axis([-2.0 * sleeve, 2.0 * sleeve]);
+        bar(Some(self.joint.child), ends, sleeve, Role::Slider);
+    }
+
+    /// Radius of a bar among `shapes`, not a disc, that lies on the joint's axis, m.
+    fn bar_on_axis(&self, shapes: &[(Role, Solid<'_>)]) -> Option<f32> {
+        let along = |(_, solid): &(Role, Solid<'_>)| match *solid {
             Solid::Bar {
                 from, to, radius, ..
             } => {
                 let bar = (to - from).normalize_or_zero();
                 let off = (from - self.point).reject_from_normalized(self.axis);
                 let is_long = from.distance(to) > radius;
-                is_long && bar.cross(self.axis).length() < ALONG && off.length() < 0.5 * radius
+                let lies =
+                    is_long && bar.cross(self.axis).length() < ALONG && off.length() < 0.5 * radius;
+                lies.then_some(radius)
             }
-            _ => false,
+            _ => None,
         };
-        let mut shapes = self.shapes.iter().copied().flatten();
-        shapes.any(|(_, solid)| along(solid))
+        shapes.iter().find_map(along)
+    }
+
+    /// Whether a bar of the scene lies on the joint's axis.
+    fn has_pin(&self) -> bool {
+        let mut shapes = self.shapes.iter();
+        shapes.any(|shapes| self.bar_on_axis(shapes).is_some())
+    }
+
+    /// Shapes of the parent, or of the world in its place.
+    fn of_parent(&self) -> &[(Role, Solid<'_>)] {
+        self.shapes[usize::from(self.joint.parent.is_some())]
     }
 
     /// Whether the scene draws what the child slides on.
     fn has_rail(&self) -> bool {
-        let of_parent = match self.joint.parent {
-            Some(_) => self.shapes[1],
-            None => self.shapes[0],
-        };
-        of_parent.iter().any(|(role, _)| *role == Role::Rail) || self.has_pin()
+        self.parent_has_rail() || self.has_pin()
+    }
+
+    /// The same where it slides with a bar of its own.
+    fn parent_has_rail(&self) -> bool {
+        let parent = self.of_parent();
+        parent.iter().any(|(role, _)| *role == Role::Rail) || self.bar_on_axis(parent).is_some()
     }
 
     /// From where to where on the axis the shapes of the two bodies lie, from the joint, m; seen from as far as `most`.

@@ -379,6 +379,17 @@ fn labels_name_the_axes_gravity_and_the_joints_where_they_are() {
         (corner - Vec2::new(62.0, 720.0 - 62.0)).length() < 1.0,
         "in the lower left corner: {corner}"
     );
+    let view = SceneView::new(&scene, &frame);
+    let marks = PeakMarks::new();
+    let (options, camera) = (ViewOptions::default(), view.camera());
+    let narrow = Shot {
+        size: [240, 320],
+        ..shot(&scene, &frame, &marks, &options, &camera)
+    };
+    let mut list = DrawList::default();
+    view.build(&narrow, &mut list);
+    let texts: Vec<&str> = list.labels.iter().map(|label| &*label.text).collect();
+    assert!(texts.contains(&"Z") && !texts.contains(&"g"), "{texts:?}");
 }
 
 #[test]
@@ -539,6 +550,102 @@ fn a_slide_has_a_rail_beyond_what_slides_on_it() {
     let (scene, frame) = started(&format!("{text}{rail}"), &[]);
     let drawn = list(&scene, &frame, &ViewOptions::default());
     assert_eq!(count(&drawn, Mesh::Cylinder), 0);
+}
+
+/// Ends of the bars that are drawn, world axes, m: first those along `axis`, then the others.
+fn bars(list: &DrawList, axis: Vec3) -> [Vec<[Vec3; 2]>; 2] {
+    let bars = &list.solid.by_mesh[Mesh::Cylinder.index()];
+    let ends = bars.iter().map(|bar| {
+        let [x, y, z] = bar.world_from_mesh;
+        let from = Vec3::new(x[3], y[3], z[3]);
+        [from, from + Vec3::new(x[2], y[2], z[2])]
+    });
+    let along = |[from, to]: &[Vec3; 2]| (*to - *from).normalize().cross(axis).length() < 1e-5;
+    let (along, others) = ends.partition(along);
+    [along, others]
+}
+
+#[test]
+fn a_universal_joint_is_a_cross_of_two_pins() {
+    let text = ARM.replace("revolute", "universal")
+        + "child_axis = [0, 0, 1]\nstart = { angle = \"30 deg\", child_angle = \"20 deg\" }\n";
+    let (scene, frame) = started(&text, &[]);
+    let [first, second] = bars(&list(&scene, &frame, &ViewOptions::default()), Vec3::Y);
+    let ([[from, to]], [[low, high]]) = (&first[..], &second[..]) else {
+        panic!("a pin along each axis: {first:?} {second:?}");
+    };
+    // Both go as far through the arm, which is 20 mm wide, and cross in the joint at a right angle.
+    assert!((0.0101..0.02).contains(&to.y.abs()), "{to}");
+    assert!((from.distance(*to) - low.distance(*high)).abs() < 1e-6);
+    assert!((*from + *to).length() < 1e-6 && (*low + *high).length() < 1e-6);
+    // The second turns with the child: about y by the first angle, as the other angle is about itself.
+    let axis = Vec3::new(0.5, 0.0, 0.75_f32.sqrt());
+    assert!((*high - *low).normalize().cross(axis).length() < 1e-5);
+    let (scene, frame) = started(&format!("{text}drawn = false\n"), &[]);
+    let hidden = list(&scene, &frame, &ViewOptions::default());
+    assert_eq!(count(&hidden, Mesh::Cylinder), 0);
+}
+
+#[test]
+fn a_cylindrical_joint_is_a_rail_and_a_sleeve_with_a_pin_across_or_the_bearing_of_a_shaft() {
+    let text = ARM
+        .replace("revolute", "cylindrical")
+        .replace("[0, 1, 0]", "[1, 0, 0]");
+    let (scene, frame) = started(&text, &[]);
+    let options = ViewOptions::default();
+    let [along, across] = bars(&list(&scene, &frame, &options), Vec3::X);
+    assert_eq!((along.len(), across.len()), (2, 1));
+    // It turns with the child, from where it is first seen.
+    let turned = text + "start = { angular_velocity = \"1000 rad/s\" }\n";
+    let (scene, first) = started(&turned, &[]);
+    let view = SceneView::new(&scene, &first);
+    let (mut simulation, mut frame) = (Simulation::new(&scene).unwrap(), Frame::default());
+    simulation.advance_to(1e-3).unwrap();
+    simulation.sample(1e-3, &mut frame);
+    let (marks, camera, mut drawn) = (PeakMarks::new(), view.camera(), DrawList::default());
+    view.build(&shot(&scene, &frame, &marks, &options, &camera), &mut drawn);
+    let [_, after] = bars(&drawn, Vec3::X);
+    let along = |[from, to]: [Vec3; 2]| (to - from).normalize();
+    let cosine = along(across[0]).dot(along(after[0]));
+    assert!((cosine - 1_f32.cos()).abs() < 1e-3, "{cosine}");
+
+    let shaft =
+        "{ form = \"cylinder\", from = \"0 0 0 mm\", to = \"100 0 0 mm\", radius = \"8 mm\" }";
+    let shapes = turned.lines().find(|l| l.starts_with("shapes")).unwrap();
+    let turned = turned.replace(shapes, &format!("shapes = [{shaft}]"));
+    let (scene, frame) = started(&turned, &[]);
+    let [along, across] = bars(&list(&scene, &frame, &options), Vec3::X);
+    // The shaft, and its bearing around the joint, shorter than it.
+    assert_eq!((along.len(), across.len()), (2, 1));
+    let lengths = along.iter().map(|[from, to]| from.distance(*to));
+    let shortest = lengths.fold(f32::INFINITY, f32::min);
+    assert!((0.02..0.03).contains(&shortest), "{along:?}");
+    assert!(across[0][0].x > 0.5 * shortest, "beside it: {across:?}");
+}
+
+#[test]
+fn joints_that_close_loops_are_drawn_like_those_that_do_not() {
+    let closing = |kind: &str| {
+        let text = format!(
+            "{ARM}drawn = false\n[[joint]]\nname = \"closes\"\nkind = \"{kind}\"\nchild = \"arm\"\n\
+             axis = [0, 1, 0]\nparent_point = \"60 0 0 mm\"\nchild_point = \"60 0 0 mm\"\ncloses_loop = true\n"
+        );
+        let second = match kind {
+            "universal" => "child_axis = [0, 0, 1]\n",
+            _ => "",
+        };
+        let (scene, frame) = started(&(text + second), &[]);
+        let [along, others] = bars(&list(&scene, &frame, &ViewOptions::default()), Vec3::Y);
+        for [from, to] in &along {
+            let off = (*from + *to) * 0.5 - Vec3::new(0.06, 0.0, 0.0);
+            assert!(off.length() < 1e-6, "{kind}: {from} {to}");
+        }
+        [along.len(), others.len()]
+    };
+    assert_eq!(closing("revolute"), [1, 0]);
+    assert_eq!(closing("prismatic"), [2, 0]);
+    assert_eq!(closing("cylindrical"), [2, 1]);
+    assert_eq!(closing("universal"), [1, 1]);
 }
 
 #[test]

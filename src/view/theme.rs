@@ -27,6 +27,18 @@ impl Colour {
         ])
     }
 
+    /// Red, green and blue as light.
+    pub fn linear(self) -> [f32; 3] {
+        let [r, g, b, _] = self.0;
+        [r, g, b].map(|c| {
+            if c > 0.04045 {
+                ((c + 0.055) / 1.055).powf(2.4)
+            } else {
+                c / 12.92
+            }
+        })
+    }
+
     /// The same colour with another opacity.
     pub const fn with_opacity(self, opacity: f32) -> Self {
         Self([self.0[0], self.0[1], self.0[2], opacity])
@@ -67,6 +79,26 @@ const fn material(rgb: u32, roughness: f32, metal: f32) -> Material {
     }
 }
 
+/// Bare steel.
+const fn metal(rgb: u32) -> Material {
+    material(rgb, 0.30, 0.85)
+}
+
+/// Aluminium with a coloured skin.
+const fn anodised(rgb: u32) -> Material {
+    material(rgb, 0.38, 0.45)
+}
+
+/// Paint.
+const fn painted(rgb: u32) -> Material {
+    material(rgb, 0.48, 0.0)
+}
+
+/// Clear glass with a tint.
+const fn glass(rgb: u32, opacity: f32) -> Material {
+    material(rgb, 0.12, 0.0).with_opacity(opacity)
+}
+
 /// Which other state a ghost shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ghost {
@@ -93,14 +125,14 @@ const fn twin(fill: u32, opacity: f32, edge: u32) -> GhostLook {
     GhostLook {
         fill: Colour::hex(fill).with_opacity(opacity),
         edge: Colour::hex(edge),
-        width: 1.4,
+        width: 1.9,
         slice: 0.0,
     }
 }
 
 const fn ideal(fill: u32, opacity: f32, edge: u32) -> GhostLook {
     GhostLook {
-        width: 2.4,
+        width: 2.9,
         slice: 1.0,
         ..twin(fill, opacity, edge)
     }
@@ -141,10 +173,16 @@ pub struct Palette {
     ghosts: [GhostLook; 2],
     /// Factor on all light.
     pub exposure: f32,
+    /// Brightness of the key light, and of the ground, the sky and the window of the studio that things reflect.
+    pub studio: [f32; 4],
+    /// Outline of arrows.
+    pub outline: Colour,
+    /// Rim about a touching point.
+    pub rim: Colour,
 }
 
 impl Palette {
-    /// Colours of `theme`. Orange and blue remain distinct for the colour-blind.
+    /// Colours of `theme`. Those of forces remain distinct from each other and from an amber rod for the colour-blind.
     pub const fn of(theme: Theme) -> Self {
         match theme {
             Theme::Light => Self {
@@ -153,7 +191,7 @@ impl Palette {
                 floor: Colour::hex(0xE3E8ED),
                 grid: Colour::hex(0x8C99A6),
                 text: Colour::hex(0x1E2A36),
-                normal: Colour::hex(0xD9480F),
+                normal: Colour::hex(0xB83818),
                 friction: Colour::hex(0x1769C9),
                 outside: Colour::hex(0x00796B),
                 flash: Colour::hex(0xFFC61A),
@@ -165,12 +203,15 @@ impl Palette {
                 ],
                 trail: Colour::hex(0xA61E4D),
                 ball: material(0xD8DCE0, 0.22, 0.75),
-                socket: material(0x6FA8DC, 0.15, 0.0).with_opacity(0.20),
+                socket: glass(0x6FA8DC, 0.20),
                 ghosts: [
                     twin(0x7B2FBE, 0.85, 0x5A189A),
                     ideal(0xFFFFFF, 0.9, 0x2F4858),
                 ],
                 exposure: 1.0,
+                studio: [1.0, 0.42, 0.95, 2.2],
+                outline: Colour::hex(0x20262C),
+                rim: Colour::hex(0xFFD43B),
             },
             Theme::Dark => Self {
                 sky: Colour::hex(0x2A3138),
@@ -178,7 +219,7 @@ impl Palette {
                 floor: Colour::hex(0x2A323A),
                 grid: Colour::hex(0x697785),
                 text: Colour::hex(0xE6EBF0),
-                normal: Colour::hex(0xFF7A33),
+                normal: Colour::hex(0xFF6B6B),
                 friction: Colour::hex(0x4DABF7),
                 outside: Colour::hex(0x2FD6BE),
                 flash: Colour::hex(0xFFE27A),
@@ -190,12 +231,15 @@ impl Palette {
                 ],
                 trail: Colour::hex(0xF783AC),
                 ball: material(0xE3E7EB, 0.22, 0.75),
-                socket: material(0x8CC4F0, 0.15, 0.0).with_opacity(0.17),
+                socket: glass(0x8CC4F0, 0.17),
                 ghosts: [
                     twin(0xC9A0FF, 0.85, 0xE0C3FF),
                     ideal(0xFFFFFF, 0.5, 0xFFFFFF),
                 ],
                 exposure: 0.92,
+                studio: [1.0, 0.16, 0.62, 2.6],
+                outline: Colour::hex(0x0B0E11),
+                rim: Colour::hex(0xFFF6C2),
             },
         }
     }
@@ -208,14 +252,85 @@ impl Palette {
     /// Material of a shape by its role; the same in both themes, so that a part keeps its colour.
     pub const fn material(&self, role: Role) -> Material {
         match role {
-            Role::Slider => material(0x4C6A88, 0.45, 0.25),
-            Role::DrivingRod => material(0x9AA9B8, 0.35, 0.55),
-            Role::DrivenRod => material(0xE0A030, 0.40, 0.25),
-            Role::Platform => material(0x2F9E8F, 0.50, 0.10),
-            Role::Pin => material(0x59636E, 0.30, 0.70),
-            Role::Probe => material(0xC2255C, 0.35, 0.10),
-            Role::Rail => material(0x8A949E, 0.35, 0.60),
-            Role::Frame => material(0x6C7680, 0.60, 0.20),
+            Role::Slider => anodised(0x4C6A88),
+            Role::DrivingRod => metal(0x9AA9B8),
+            Role::DrivenRod => anodised(0xE0A030),
+            Role::Platform => painted(0x2F9E8F),
+            Role::Pin => metal(0x6B7580),
+            Role::Probe => painted(0xC2255C),
+            Role::Rail => metal(0x8A949E),
+            Role::Frame => painted(0x6C7680),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a dichromat sees, of light: G. M. Machado, M. M. Oliveira, L. A. F. Fernandes, A Physiologically-based Model for
+    /// Simulation of Color Vision Deficiency, IEEE TVCG 15 (2009), severity 1.0.
+    const SIGHTS: [(&str, [[f32; 3]; 3]); 3] = [
+        ("full", [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
+        (
+            "protanopia",
+            [
+                [0.152286, 1.052583, -0.204868],
+                [0.114503, 0.786281, 0.099216],
+                [-0.003882, -0.048116, 1.051998],
+            ],
+        ),
+        (
+            "deuteranopia",
+            [
+                [0.367322, 0.860646, -0.227968],
+                [0.280085, 0.672501, 0.047413],
+                [-0.011820, 0.042940, 0.968881],
+            ],
+        ),
+    ];
+
+    /// Least CIE 1976 difference: a difference of 2.3 can just be seen side by side.
+    const TOLD_APART: f32 = 25.0;
+
+    fn product(rows: [[f32; 3]; 3], v: [f32; 3]) -> [f32; 3] {
+        rows.map(|row| (0..3).map(|i| row[i] * v[i]).sum())
+    }
+
+    /// CIE L*a*b* under D65 of linear sRGB.
+    fn lab(light: [f32; 3]) -> [f32; 3] {
+        const XYZ: [[f32; 3]; 3] = [
+            [0.412_456_4, 0.357_576_1, 0.180_437_5],
+            [0.212_672_9, 0.715_152_2, 0.072_175],
+            [0.019_333_9, 0.119_192, 0.950_304_1],
+        ];
+        let [x, y, z] = product(XYZ, light.map(|c| c.clamp(0.0, 1.0)));
+        let [x, y, z] = [x / 0.95047, y, z / 1.08883].map(|t| {
+            if t > 216.0 / 24389.0 {
+                t.cbrt()
+            } else {
+                (24389.0 / 27.0 * t + 16.0) / 116.0
+            }
+        });
+        [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
+    }
+
+    #[test]
+    fn forces_are_told_apart_and_from_an_amber_rod_by_every_eye() {
+        for theme in [Theme::Light, Theme::Dark] {
+            let palette = Palette::of(theme);
+            let rod = palette.material(Role::DrivenRod).colour;
+            let marks = [palette.normal, palette.friction, palette.outside, rod];
+            for (eye, sight) in SIGHTS {
+                let seen = marks.map(|colour| lab(product(sight, colour.linear())));
+                for (i, a) in seen.iter().enumerate() {
+                    for (j, b) in seen.iter().enumerate().skip(i + 1) {
+                        let squares = (0..3).map(|k| (a[k] - b[k]).powi(2));
+                        let apart = squares.sum::<f32>().sqrt();
+                        assert!(apart > TOLD_APART, "{theme:?} {eye} {i} {j}: {apart}");
+                    }
+                }
+            }
         }
     }
 }

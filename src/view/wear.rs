@@ -4,6 +4,7 @@ use glam::{Mat3, Vec3};
 
 use super::drawn::{self, Pose};
 use super::instances::placed;
+use super::near::Near;
 use super::theme::Material;
 use super::{Colour, DrawList, Mesh, SceneView, Shot, WearMap, WearScale};
 use crate::simulate::{Cell, Wear};
@@ -69,6 +70,8 @@ impl SceneView {
         if map == WearMap::Off {
             return;
         }
+        let near = Near::of(shot);
+        let shot = &near.as_ref().map_or(*shot, |near| near.shot(shot));
         let joints = 0..shot.scene.ball_joints.len().min(shot.frame.joints.len());
         let value = |joint: usize, cell: &Cell| map.value(cell, wear.area(joint));
         let values = joints

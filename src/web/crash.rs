@@ -38,13 +38,18 @@ pub fn explain_panics() {
     }));
 }
 
-/// Notes what is running, for a report. `link`: the fragment that leads back to it.
+/// Notes what is running, for a report. `link`: the fragment that leads back to it ([`super::Page::session`]).
 pub fn note(scene: &Scene, renderer: &str, link: String) {
     let mut text = format!("scene: {}\n", scene.name);
     for (key, value) in &scene.changes {
         let (key, value) = (visible_line(key), visible_line(value));
         text.push_str(&format!("changed: {key} = {value}\n"));
     }
-    text.push_str(&format!("renderer: {renderer}\nstate: #{link}"));
+    let state = if link.starts_with("kept:") {
+        "larger than an address"
+    } else {
+        &link
+    };
+    text.push_str(&format!("renderer: {renderer}\nstate: #{state}"));
     RUNNING.set((text, link));
 }

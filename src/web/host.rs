@@ -3,7 +3,6 @@
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
-use std::sync::Arc;
 
 use eframe::egui;
 use eframe::web_sys::{File, js_sys::Uint8Array};
@@ -11,8 +10,8 @@ use wasm_bindgen::prelude::*;
 
 use super::work::Worker;
 use crate::analysis::task::Job;
-use crate::app::{Host, OpenedFile, Running, SaveFile};
-use crate::scene::{LARGEST_FILE, too_large};
+use crate::app::{Click, Dropped, Host, OpenedFile, Running, SaveFile, Voice};
+use crate::scene::{largest_file, too_large};
 
 #[wasm_bindgen]
 extern "C" {
@@ -28,6 +27,15 @@ extern "C" {
     fn fill_screen(on: bool);
     #[wasm_bindgen(js_namespace = jointplayHost)]
     fn announce(text: &str, event: bool);
+    /// Switches sound on or off; returns why it cannot be made, or "".
+    #[wasm_bindgen(js_namespace = jointplayHost)]
+    fn sound(on: bool) -> String;
+    /// Samples a second; 0 while nothing can be heard.
+    #[wasm_bindgen(js_namespace = jointplayHost, js_name = soundRate)]
+    fn sound_rate() -> f64;
+    /// Plays `samples` so many seconds from now.
+    #[wasm_bindgen(js_namespace = jointplayHost)]
+    fn click(samples: &[f32], after: f64);
     /// Reports that the graphics of start number `start` are lost.
     #[wasm_bindgen(js_namespace = jointplayHost, js_name = graphicsLost)]
     pub fn graphics_lost(start: u32, why: &str);
@@ -39,7 +47,7 @@ extern "C" {
 /// Incoming files, and the window to wake for them.
 #[derive(Default)]
 pub struct Inbox {
-    files: RefCell<VecDeque<OpenedFile>>,
+    files: RefCell<VecDeque<Vec<OpenedFile>>>,
     ctx: RefCell<egui::Context>,
 }
 
@@ -54,25 +62,29 @@ impl Inbox {
         self.ctx.borrow().clone()
     }
 
-    /// A file has come.
-    pub fn put(&self, file: OpenedFile) {
-        self.files.borrow_mut().push_back(file);
+    /// Files have come at once.
+    pub fn put(&self, files: Vec<OpenedFile>) {
+        self.files.borrow_mut().push_back(files);
         self.ctx().request_repaint();
     }
 
-    /// Reads a file of the browser's and puts it in; a large one is not even read: a page has little memory.
-    pub fn take(self: Rc<Self>, file: File) {
+    /// Reads files of the browser's and puts them in; a large one is not even read: a page has little memory.
+    pub fn take(self: Rc<Self>, files: Vec<File>) {
         wasm_bindgen_futures::spawn_local(async move {
-            let content = if file.size() > LARGEST_FILE as f64 {
-                Err(too_large())
-            } else {
-                match file.array_buffer().await {
-                    Ok(bytes) => Ok(Uint8Array::new(&bytes).to_vec()),
-                    Err(_) => Err("cannot be read; it may be a folder".to_owned()),
-                }
-            };
-            let name = file.name();
-            self.put(OpenedFile { name, content });
+            let mut read = Vec::with_capacity(files.len());
+            for file in files {
+                let name = file.name();
+                let content = if file.size() > largest_file(&name) as f64 {
+                    Err(too_large())
+                } else {
+                    match file.array_buffer().await {
+                        Ok(bytes) => Ok(Uint8Array::new(&bytes).to_vec()),
+                        Err(_) => Err("cannot be read; it may be a folder".to_owned()),
+                    }
+                };
+                read.push(OpenedFile { name, content });
+            }
+            self.put(read);
         });
     }
 }
@@ -81,6 +93,8 @@ impl Inbox {
 pub struct WebHost {
     /// Incoming files.
     pub inbox: Rc<Inbox>,
+    /// Why there is no sound.
+    pub no_sound: Option<String>,
 }
 
 impl Host for WebHost {
@@ -106,14 +120,20 @@ impl Host for WebHost {
         true
     }
 
-    fn read_dropped(&mut self, file: Arc<dyn egui::DroppedFile + Send + Sync>) {
-        if let Some(file) = file.web_file() {
-            self.inbox.clone().take(file.clone());
-        }
+    fn read_dropped(&mut self, files: Vec<Dropped>) {
+        let files = files.iter().filter_map(|file| file.web_file().cloned());
+        self.inbox.clone().take(files.collect());
     }
 
-    fn opened(&mut self) -> Option<OpenedFile> {
+    fn opened(&mut self) -> Option<Vec<OpenedFile>> {
         self.inbox.files.borrow_mut().pop_front()
+    }
+
+    fn workers(&self) -> usize {
+        // One core draws and steps.
+        let cores =
+            eframe::web_sys::window().map(|window| window.navigator().hardware_concurrency());
+        (cores.unwrap_or(1.0) as usize).saturating_sub(1).max(1)
     }
 
     fn start(&mut self, job: Job) -> Option<Box<dyn Running>> {
@@ -122,6 +142,24 @@ impl Host for WebHost {
 
     fn fill_screen(&mut self, _ctx: &egui::Context, on: bool) {
         fill_screen(on);
+    }
+
+    fn sound(&mut self, on: bool) {
+        self.no_sound = Some(sound(on)).filter(|why| !why.is_empty());
+    }
+
+    fn click(&mut self, clicks: &[Click]) {
+        let rate = sound_rate();
+        if rate > 0.0 {
+            for one in clicks {
+                let samples: Vec<f32> = Voice::new(one, rate).collect();
+                click(&samples, one.after);
+            }
+        }
+    }
+
+    fn no_sound(&mut self) -> Option<String> {
+        self.no_sound.take()
     }
 
     fn announce(&mut self, text: &str, event: bool) {

@@ -36,7 +36,7 @@ impl egui::Plugin for Mirror {
 
 impl Mirror {
     /// Controls and texts in reading order, as JSON: `[{"id", "role", "label", "text", "value", "min", "max", "step", "on",
-    /// "expanded", "disabled", "focused", "rect": [x0, y0, x1, y1]}, …]`; places are in CSS pixels of the canvas, `zoom` of
+    /// "expanded", "disabled", "focusable", "focused", "rect": [x0, y0, x1, y1]}, …]`; places are in CSS pixels of the canvas, `zoom` of
     /// them to a point. Empty before the first frame.
     pub fn widgets(&self, zoom: f32) -> String {
         let Some(tree) = &self.tree else {
@@ -100,6 +100,7 @@ fn describe(
         "on": node.toggled().map(|on| on == accesskit::Toggled::True),
         "expanded": node.is_expanded(),
         "disabled": node.is_disabled(),
+        "focusable": node.supports_action(accesskit::Action::Focus),
         "focused": id == focus,
         "rect": rect.map(|x| x * zoom),
     }))

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use eframe::egui::{self, accesskit::ActionData};
 use eframe::egui_wgpu::{RenderState, WgpuConfiguration, WgpuSetupCreateNew};
+use eframe::web_sys::js_sys::Array;
 use eframe::web_sys::{File, HtmlCanvasElement};
 use serde_json::json;
 use wasm_bindgen::prelude::*;
@@ -58,7 +59,7 @@ impl Page {
     }
 
     /// Draws on `canvas` with `backend` (`webgpu` or `webgl`) from now on; `start` counts the starts. The first one opens
-    /// `link`: the address from its `?` on. What is wrong in it is shown beside the default scene.
+    /// `link`: the address from its `?` on, or what [`Self::session`] gave. What is wrong in it is shown beside the default scene.
     ///
     /// # Errors
     /// Text: the backend does not work here. A laboratory that was running is still there for the next attempt.
@@ -119,20 +120,30 @@ impl Page {
         self.with(|laboratory| laboratory.app.share_state())
     }
 
-    /// Opens the address from its `?` on, after the user has changed it.
-    #[wasm_bindgen(js_name = openLink)]
-    pub fn open_link(&self, link: &str) {
-        self.with(|laboratory| {
-            // The reason is shown.
-            let _ = laboratory.app.open_link(&laboratory.ctx, link);
-            laboratory.ctx.request_repaint();
-        });
+    /// As [`Self::link`]; where no address holds it, a text of any length after `kept:`. [`Self::start`] takes either.
+    pub fn session(&self) -> Option<String> {
+        self.with(|laboratory| laboratory.app.session())
     }
 
-    /// Opens a file that was chosen.
-    #[wasm_bindgen(js_name = openFile)]
-    pub fn open_file(&self, file: File) {
-        self.inbox.clone().take(file);
+    /// Whether changes of the user's own scene are in no file; nothing where none were made since the start.
+    pub fn unsaved(&self) -> Option<bool> {
+        self.with(|laboratory| laboratory.app.unsaved())?
+    }
+
+    /// Opens the address from its `?` on, after the user has changed it; returns why not, or nothing. The reason is shown, too.
+    #[wasm_bindgen(js_name = openLink)]
+    pub fn open_link(&self, link: &str) -> Option<String> {
+        self.with(|laboratory| {
+            laboratory.ctx.request_repaint();
+            laboratory.app.open_link(&laboratory.ctx, link).err()
+        })?
+    }
+
+    /// Opens files, an array of the browser's, that were chosen at once.
+    #[wasm_bindgen(js_name = openFiles)]
+    pub fn open_files(&self, files: &Array) {
+        let files = files.iter().filter_map(|file| file.dyn_into::<File>().ok());
+        self.inbox.clone().take(files.collect());
     }
 
     /// Tells the user something, for a few seconds.
@@ -148,6 +159,47 @@ impl Page {
         self.with(|laboratory| {
             laboratory.app.present(&laboratory.ctx, on);
             laboratory.ctx.request_repaint();
+        });
+    }
+
+    /// Gives the parameter `key` a value with its unit; returns why not, or nothing.
+    pub fn set(&self, key: &str, value: &str) -> Option<String> {
+        self.with(|laboratory| {
+            laboratory.ctx.request_repaint();
+            let set = laboratory.app.player_mut().set(key, value);
+            set.err().map(|error| error.to_string())
+        })?
+    }
+
+    /// Plays, or pauses.
+    pub fn play(&self, on: bool) {
+        self.with(|laboratory| {
+            laboratory.app.player_mut().set_playing(on);
+            laboratory.ctx.request_repaint();
+        });
+    }
+
+    /// Back to t = 0.
+    pub fn reset(&self) {
+        self.with(|laboratory| {
+            laboratory.app.reset();
+            laboratory.ctx.request_repaint();
+        });
+    }
+
+    /// The impacts shown that have ended after `time`, s, as JSON.
+    pub fn impacts(&self, time: f64) -> Option<String> {
+        self.with(|laboratory| laboratory.impacts(time))
+    }
+
+    /// Forgets which control has the keyboard: the page has given it to something else.
+    pub fn release(&self) {
+        self.with(|laboratory| {
+            laboratory.ctx.memory_mut(|memory| {
+                if let Some(focused) = memory.focused() {
+                    memory.surrender_focus(focused);
+                }
+            });
         });
     }
 
@@ -234,7 +286,11 @@ impl Laboratory {
         inbox: Rc<Inbox>,
     ) -> Result<Self, Box<dyn std::error::Error + Send + Sync>> {
         let mut app = App::new(cc, AppOptions::from_link_or_default(link))?;
-        app.set_host(Box::new(WebHost { inbox }));
+        app.set_host(Box::new(WebHost {
+            inbox,
+            no_sound: None,
+        }));
+        app.follow_frame_rate();
         Ok(Self {
             app,
             ctx: cc.egui_ctx.clone(),
@@ -260,8 +316,28 @@ impl Laboratory {
         if self.noted.is_none_or(|noted| now - noted > NOTE_INTERVAL) {
             self.noted = Some(now);
             let scene = self.app.player().wanted();
-            crash::note(scene, &self.renderer, self.app.share_state());
+            crash::note(scene, &self.renderer, self.app.session());
         }
+    }
+
+    fn impacts(&self, time: f64) -> String {
+        let player = self.app.player();
+        let joints = &player.scene().ball_joints;
+        let shown = player.pacer.shown();
+        let ended = player.simulation().impacts();
+        let ended = ended.filter(|impact| impact.end > time && impact.end <= shown);
+        let impacts = ended.map(|impact| {
+            json!({
+                "joint": joints[impact.joint].name,
+                "start_s": impact.start,
+                "end_s": impact.end,
+                "approach_m_s": impact.approach_speed,
+                "separation_m_s": impact.separation_speed,
+                "peak_N": impact.peak,
+                "deepest_m": impact.deepest,
+            })
+        });
+        serde_json::Value::Array(impacts.collect()).to_string()
     }
 
     fn state(&self) -> String {

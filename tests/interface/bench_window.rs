@@ -13,20 +13,26 @@ use egui_kittest::{
     kittest::{NodeT as _, Queryable as _},
 };
 use jointplay::analysis::drive::observed;
+use jointplay::analysis::ready::READY;
 use jointplay::analysis::task::{Job, Message, perform};
 use jointplay::app::{App, DesktopHost, Host, Link, OpenedFile, Player, Replay, Running, Verdict};
 
-/// Computes at once, and is heard of as many points of a sweep as the test allows: it is neither too quick nor too slow.
-struct Held(Rc<Cell<usize>>);
+/// Computes at once, shared by so many, and is heard of as many points of a sweep as the test allows: it is neither too quick nor
+/// too slow.
+struct Held(Rc<Cell<usize>>, usize);
 
 /// A computation of it: what it says, and of how many points still.
 struct Saying(VecDeque<Message>, Rc<Cell<usize>>);
 
 impl Host for Held {
-    fn read_dropped(&mut self, _file: Arc<dyn egui::DroppedFile + Send + Sync>) {}
+    fn read_dropped(&mut self, _files: Vec<Arc<dyn egui::DroppedFile + Send + Sync>>) {}
 
-    fn opened(&mut self) -> Option<OpenedFile> {
+    fn opened(&mut self) -> Option<Vec<OpenedFile>> {
         None
+    }
+
+    fn workers(&self) -> usize {
+        self.1
     }
 
     fn start(&mut self, job: Job) -> Option<Box<dyn Running>> {
@@ -55,8 +61,14 @@ impl Running for Saying {
 
 /// Gives the window a host that is held, and the number of points that it may still tell.
 fn hold(harness: &mut Harness<'_, App>) -> Rc<Cell<usize>> {
+    hold_shared(harness, 1)
+}
+
+/// The same, of a host that shares sweeps among so many.
+fn hold_shared(harness: &mut Harness<'_, App>, workers: usize) -> Rc<Cell<usize>> {
     let points = Rc::new(Cell::new(0));
-    harness.state_mut().set_host(Box::new(Held(points.clone())));
+    let host = Held(points.clone(), workers);
+    harness.state_mut().set_host(Box::new(host));
     points
 }
 
@@ -191,6 +203,55 @@ fn a_sweep_fills_the_diagram_and_a_click_loads_the_section() {
     assert!(matches!(verdict, Verdict::Agrees(_)), "{verdict:?}");
     assert!(passed, "bit by bit the section that was clicked");
     assert!(again.simulation().time() < 0.7, "it plays from there");
+}
+
+#[test]
+fn several_workers_share_a_sweep_and_one_bad_range_is_told_once() {
+    let mut harness = window("spcmm", &[FAST]);
+    let points = hold_shared(&mut harness, 4);
+    sweep(&mut harness, "0.2 mm", "0.4", 5.0);
+    points.set(2);
+    harness.run_steps(3);
+    harness.get_by_label("2 of 5 values");
+    assert!(harness.state().bench().is_sweeping());
+    let bar = harness.get_by_label("Swept so far");
+    let done = bar.accesskit_node().numeric_value().expect("a number");
+    assert!((40.0..100.0).contains(&done), "{done}");
+    points.set(3);
+    harness.run_steps(3);
+    harness.get_by_label("5 of 5 values");
+    assert!(!harness.state().bench().is_sweeping());
+    sweep(&mut harness, "0.4 mm", "0.2", 5.0);
+    harness.run_steps(3);
+    harness.get_by_label_contains("The range is reversed");
+    assert!(!harness.state().bench().is_sweeping());
+}
+
+#[test]
+fn the_diagram_comes_into_sight_when_a_sweep_starts() {
+    for size in [[1280.0, 800.0], [420.0, 800.0], [844.0, 390.0]] {
+        let mut harness = sized("spcmm", &[FAST], size, egui::Theme::Light);
+        hold(&mut harness);
+        for (label, number) in [("Values", 3.0), ("Periods", 4.0), ("Discard", 1.0)] {
+            set_number(&mut harness, label, number);
+        }
+        let start = harness.get_by_role_and_label(Role::Button, "Start sweep");
+        start.scroll_to_me();
+        harness.run_steps(60);
+        // Nothing of it is there yet; no point comes meanwhile.
+        assert_eq!(harness.state().bench().diagram_seen(), 0.0);
+        click(&mut harness, Role::Button, "Start sweep");
+        harness.run_steps(60);
+        assert!(harness.state().bench().is_sweeping());
+        let seen = harness.state().bench().diagram_seen();
+        assert!(seen > 0.99, "{size:?}: {seen} of it");
+        // Later it stays where the user scrolls it to.
+        let top = harness.get_by_role_and_label(Role::ComboBox, "Coordinate");
+        top.scroll_to_me();
+        harness.run_steps(60);
+        let seen = harness.state().bench().diagram_seen();
+        assert!(seen < 0.5, "{size:?}: {seen} of it");
+    }
 }
 
 #[test]
@@ -421,4 +482,79 @@ fn every_control_of_the_bench_has_a_name() {
         assert!(!is_control || named, "{:?}", node.role());
     }
     assert!(controls > 30, "{controls}");
+}
+
+/// Says which sweep was asked for, and computes nothing.
+struct Asking(Rc<std::cell::RefCell<Vec<Job>>>);
+
+impl Host for Asking {
+    fn read_dropped(&mut self, _files: Vec<Arc<dyn egui::DroppedFile + Send + Sync>>) {}
+
+    fn opened(&mut self) -> Option<Vec<OpenedFile>> {
+        None
+    }
+
+    fn start(&mut self, job: Job) -> Option<Box<dyn Running>> {
+        self.0.borrow_mut().push(job);
+        Some(Box::new(Saying(VecDeque::new(), Rc::default())))
+    }
+}
+
+#[test]
+fn a_ready_sweep_says_what_it_shows_and_one_click_opens_its_scene_and_starts_it() {
+    // The pendulum has no drive, so no sweep of its own.
+    let mut harness = window("pendulum", &[]);
+    let asked = Rc::new(std::cell::RefCell::new(Vec::new()));
+    harness
+        .state_mut()
+        .set_host(Box::new(Asking(asked.clone())));
+    for ready in &READY {
+        harness.get_by_label(ready.shows);
+        click(&mut harness, Role::Button, ready.name);
+        harness.run_steps(2);
+        let player = harness.state().player();
+        assert_eq!(player.scene().name, ready.scene);
+        for (key, value) in ready.changes {
+            let changes = &player.scene().changes;
+            assert!(changes.iter().any(|(k, v)| k == key && v == value), "{key}");
+        }
+        let mut expected = ready.task(player.wanted());
+        let Some(Job::Sweep(task, _)) = asked.borrow_mut().pop() else {
+            panic!("{}: no sweep", ready.name);
+        };
+        assert_eq!(task, expected);
+        assert!(harness.state().bench().is_sweeping());
+        // The settings are its own: the same sweep again by hand.
+        click(&mut harness, Role::Button, "Cancel sweep");
+        click(&mut harness, Role::Button, "Start sweep");
+        let Some(Job::Sweep(again, _)) = asked.borrow_mut().pop() else {
+            panic!("{}: no second sweep", ready.name);
+        };
+        expected.vary.clone_from(&again.vary);
+        assert_eq!(again, expected);
+        let range = |vary: &[String]| vary[0].replace(' ', "");
+        assert_eq!(range(&again.vary), range(&task.vary));
+        click(&mut harness, Role::Button, "Cancel sweep");
+    }
+}
+
+#[test]
+fn from_the_start_of_the_window_chaos_is_two_gestures_away() {
+    let mut harness = sized("spcmm", &[], [1280.0, 800.0], egui::Theme::Light);
+    let asked = Rc::new(std::cell::RefCell::new(Vec::new()));
+    harness
+        .state_mut()
+        .set_host(Box::new(Asking(asked.clone())));
+    let screen = egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(1280.0, 800.0));
+    let within = |harness: &Harness<'_, App>, label: &str| {
+        let node = harness.get_by_role_and_label(Role::Button, label);
+        screen.contains_rect(node.rect())
+    };
+    // Key B has opened the bench.
+    assert!(within(&harness, READY[0].name));
+    click(&mut harness, Role::Button, READY[0].name);
+    harness.run_steps(60);
+    assert_eq!(asked.borrow().len(), 1);
+    // Its progress has come into sight.
+    assert!(within(&harness, "Cancel sweep"));
 }

@@ -162,15 +162,45 @@ pub fn compare(folder: &str, name: &str, actual: &Picture, what: &str) {
 /// The default scene in the middle of its first impacts.
 const IMPACT: &str = "spcmm --at 7.85ms --size 640x400 --magnification 20 --overlay";
 
+/// Every built-in scene: its instant, and how much its play is magnified.
+const SCENES: [(&str, &str, u32); 10] = [
+    ("spcmm", "7.85ms", 20),
+    ("pendulum", "0.1s", 1),
+    ("slider-crank", "0.1s", 1),
+    ("slider-crank-driven", "0.1s", 1),
+    ("chain", "0.1s", 1),
+    ("hexapod", "20ms", 10),
+    ("delta", "20ms", 10),
+    ("four-bar", "0.1s", 10),
+    ("suspension", "0.1s", 10),
+    ("press", "0.1s", 10),
+];
+
+/// Compares the pictures of every scene with these `options`, whose names have this `ending`.
+fn every_scene(options: &str, ending: &str) {
+    assert_eq!(SCENES.map(|(scene, ..)| scene), jointplay::scene::BUILT_IN);
+    for (scene, instant, magnification) in SCENES {
+        golden(
+            &format!("{}{ending}", scene.replace('-', "_")),
+            &format!("{scene} --at {instant} --magnification {magnification} {options}"),
+        );
+    }
+}
+
 #[test]
-fn spcmm_during_the_first_impacts() {
-    golden("spcmm", IMPACT);
+fn every_scene_is_drawn_as_it_was() {
+    every_scene("--size 640x400 --overlay", "");
+}
+
+#[test]
+fn every_scene_is_drawn_dark_as_it_was() {
+    every_scene("--size 400x250 --theme dark", "_dark");
 }
 
 #[test]
 fn spcmm_dark_near_a_ball_joint() {
     golden(
-        "spcmm_dark",
+        "spcmm_close_up_dark",
         "spcmm --at 7.85ms --size 480x300 --magnification 20 --close-up S1 --theme dark",
     );
 }
@@ -178,45 +208,6 @@ fn spcmm_dark_near_a_ball_joint() {
 #[test]
 fn spcmm_in_the_window() {
     golden("spcmm_window", "spcmm --at 7.85ms --size 800x500 --ui");
-}
-
-#[test]
-fn pendulum() {
-    golden("pendulum", "pendulum --at 0.1s --size 640x400 --overlay");
-}
-
-#[test]
-fn slider_crank() {
-    golden(
-        "slider_crank",
-        "slider-crank --at 0.1s --size 640x400 --overlay",
-    );
-}
-
-#[test]
-fn slider_crank_driven() {
-    golden(
-        "slider_crank_driven",
-        "slider-crank-driven --at 0.1s --size 640x400 --overlay",
-    );
-}
-
-#[test]
-fn chain() {
-    golden("chain", "chain --at 0.1s --size 640x400 --overlay");
-}
-
-#[test]
-fn machines() {
-    for (name, time) in crate::common::MACHINES
-        .iter()
-        .zip(["20ms", "20ms", "0.1s", "0.1s", "0.1s"])
-    {
-        golden(
-            &name.replace('-', "_"),
-            &format!("{name} --at {time} --size 640x400 --magnification 10 --overlay"),
-        );
-    }
 }
 
 #[test]

@@ -13,6 +13,18 @@ pub fn opened(
     theme: egui::Theme,
     clock: fn() -> f64,
 ) -> Harness<'static, App> {
+    paced(scene, changes, size, theme, clock, 1.0 / 60.0)
+}
+
+/// The same with frames `dt` s after each other.
+pub fn paced(
+    scene: &str,
+    changes: &[(&str, &str)],
+    size: [f32; 2],
+    theme: egui::Theme,
+    clock: fn() -> f64,
+    dt: f32,
+) -> Harness<'static, App> {
     let own = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
     let changes: Vec<_> = changes.iter().map(own).collect();
     let mut options = AppOptions::new(Scene::load(scene, &changes).expect("a built-in scene"));
@@ -22,7 +34,7 @@ pub fn opened(
     let mut harness = Harness::builder()
         .with_size(size)
         .with_theme(theme)
-        .with_step_dt(1.0 / 60.0)
+        .with_step_dt(dt)
         .with_max_steps(60)
         .wgpu()
         .build_eframe(move |cc| App::new(cc, options).expect("the scene starts"));

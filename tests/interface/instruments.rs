@@ -9,6 +9,7 @@ use jointplay::app::{App, Link};
 use jointplay::simulate::Quantity;
 
 use crate::hands::opened;
+use crate::page::click;
 use crate::window::pixels::Picture;
 
 const WIDE: [f32; 2] = [1280.0, 800.0];
@@ -262,10 +263,25 @@ fn every_control_of_the_microscope_has_a_name() {
             let named = node.label().is_some_and(|label| !label.trim().is_empty());
             assert!(!is_control || named, "{:?}", node.role());
         }
+        // Beside the picture, of which it covers nothing.
         let view = harness.get_by_label("3D view").rect();
-        let close = harness.get_by_role_and_label(Role::Button, "Close").rect();
-        assert!(view.contains_rect(close), "{size:?}");
+        let shown = harness.get_by_label_contains("under the microscope. ");
+        let close = harness.get_by_role_and_label(Role::Button, "Close");
+        for part in [shown.rect(), close.rect()] {
+            assert!(part.left() >= view.right(), "{size:?}: {part}, {view}");
+            assert!(part.right() <= size[0] && view.y_range().contains(part.top()));
+        }
     }
+    // Where both have no room it waits.
+    let mut harness = window("spcmm", &[], [400.0, 300.0], egui::Theme::Light);
+    harness.key_press(Key::L);
+    harness.run();
+    let microscope = |harness: &Harness<'_, App>| said(harness, "under the microscope. ");
+    assert!(!microscope(&harness), "beside the open sheet");
+    click(&mut harness, "Panels");
+    click(&mut harness, "Controls");
+    harness.run();
+    assert!(microscope(&harness), "with the sheet folded away");
 }
 
 #[test]

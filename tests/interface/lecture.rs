@@ -1,11 +1,19 @@
 //! The lecture instrument: what a teacher does in front of a class, each in at most three gestures.
 
+use std::cell::RefCell;
+use std::rc::Rc;
+use std::sync::Arc;
+
 use eframe::egui::{self, Key, PointerButton, Pos2, accesskit::Role, vec2};
 use egui_kittest::{Harness, SnapshotResults, kittest::Queryable as _};
-use jointplay::app::{App, Event, Link, Log, Player, Replay, SceneText, Verdict};
+use jointplay::analysis::task::{Job, Message};
+use jointplay::app::{
+    App, Event, Host, Link, Log, OpenedFile, Player, Replay, Running, SceneText, Verdict,
+};
 use jointplay::simulate::{ContactState, Quantity};
 
 use crate::hands::{fingers, fingers_down, lift};
+use crate::page::Calls;
 use crate::window::{CURVES, WHITE, click, picture, shown, sized, window};
 
 /// Where the timeline's strip stands.
@@ -394,6 +402,29 @@ fn platform(harness: &Harness<'_, App>) -> Pos2 {
     app.place_in_view(&body.position).expect("in sight")
 }
 
+/// Begins what it is asked to compute, and says nothing of it.
+struct Patient;
+
+impl Host for Patient {
+    fn read_dropped(&mut self, _files: Vec<Arc<dyn egui::DroppedFile + Send + Sync>>) {}
+
+    fn opened(&mut self) -> Option<Vec<OpenedFile>> {
+        None
+    }
+
+    fn start(&mut self, job: Job) -> Option<Box<dyn Running>> {
+        matches!(job, Job::Sweep(..)).then(|| Box::new(Self) as Box<dyn Running>)
+    }
+}
+
+impl Running for Patient {
+    fn poll(&mut self) -> Option<Message> {
+        None
+    }
+
+    fn cancel(&mut self) {}
+}
+
 /// A class watches: what was done so far for the task at hand.
 struct Lecture {
     harness: Harness<'static, App>,
@@ -444,6 +475,21 @@ impl Lecture {
         self.gestures += 1;
         fingers(&mut self.harness, paths);
         self.harness.run_steps(3);
+    }
+
+    /// The host of a page, that keeps what it is given.
+    fn share_with_page(&mut self) -> Rc<RefCell<Calls>> {
+        let (host, calls) = Calls::host();
+        self.harness.state_mut().set_host(host);
+        calls
+    }
+
+    /// Draws a control into sight that lies farther down.
+    fn draw_near(&mut self, role: Role, label: &str) {
+        self.gestures += 1;
+        let found = self.harness.get_by_role_and_label(role, label);
+        found.scroll_to_me();
+        self.harness.run_steps(10);
     }
 
     fn tap(&mut self, role: Role, label: &str) {
@@ -591,6 +637,49 @@ fn tasks_of_a_lecture_take_at_most_three_gestures() {
             .is_some_and(|twin| twin.distances().len() > 5)
     );
     class.done("a billionth apart");
+
+    // 9: where chaos begins: the bench, and a sweep over a parameter.
+    class.harness.state_mut().set_host(Box::new(Patient));
+    class.key(Key::B);
+    class.draw_near(Role::Button, "Start sweep");
+    class.click(Role::Button, "Start sweep");
+    assert!(class.app().bench().is_sweeping());
+    class.done("where chaos begins");
+    // Or step by step.
+    class.click(Role::Button, "Lessons");
+    class.click(Role::Button, "Where chaos begins");
+    class.frames(10);
+    assert!(class.app().player().twin().is_some());
+    class.done("where chaos begins, as a lesson");
+
+    // 10: to the class: link, picture, film.
+    to_the_class(&mut class, Lecture::click, None);
+}
+
+/// Link, picture and film by `press`, from the menu `all` or from those of their own.
+fn to_the_class(class: &mut Lecture, press: impl Fn(&mut Lecture, Role, &str), all: Option<&str>) {
+    let calls = class.share_with_page();
+    class.harness.state_mut().player_mut().run_to(10e-3);
+    if let Some(menu) = all {
+        press(class, Role::Button, menu);
+    }
+    press(class, Role::Button, "Copy link");
+    assert_eq!(calls.borrow().shared.len(), 1);
+    assert!(class.gestures <= 3);
+    for (entry, then, name) in [
+        ("Picture…", None, "png"),
+        ("Film…", Some("Make film"), "mp4"),
+    ] {
+        class.gestures = 0;
+        press(class, Role::Button, all.unwrap_or("Save"));
+        press(class, Role::Button, entry);
+        if let Some(then) = then {
+            press(class, Role::Button, then);
+        }
+        assert!(class.gestures <= 3, "{name}: {}", class.gestures);
+        let file = crate::page::next_file(&mut class.harness, &calls);
+        assert!(file.name.ends_with(name), "{}", file.name);
+    }
 }
 
 #[test]
@@ -699,6 +788,17 @@ fn fingers_take_at_most_three_gestures_for_them_on_a_phone() {
     let twin = class.app().player().twin();
     assert!(twin.is_some_and(|twin| twin.distances().len() > 5));
     class.done("a billionth apart");
+
+    // 9
+    class.tap(Role::Button, "Menu");
+    class.draw_near(Role::Button, "Where chaos begins");
+    class.tap(Role::Button, "Where chaos begins");
+    class.frames(10);
+    assert!(class.app().player().twin().is_some());
+    class.done("where chaos begins");
+
+    // 10
+    to_the_class(&mut class, Lecture::tap, Some("Menu"));
 }
 
 #[test]

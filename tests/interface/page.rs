@@ -21,17 +21,25 @@ use jointplay::app::{
     App, AppOptions, CameraPose, DesktopHost, Host, Link, OpenedFile, SaveFile, Verdict, Window,
 };
 use jointplay::cli::output::Table;
-use jointplay::scene::{DEFAULT_SCENE, Scene};
+use jointplay::scene::{DEFAULT_SCENE, DriveData, Scene, Value};
 use jointplay::simulate::{Channels, Frame, Quantity, Simulation};
 
 /// What a host was asked for.
 #[derive(Default)]
 pub struct Calls {
-    shared: Vec<String>,
+    pub shared: Vec<String>,
     pub saved: Vec<SaveFile>,
     announced: Vec<String>,
     picked: usize,
-    to_open: VecDeque<OpenedFile>,
+    to_open: VecDeque<Vec<OpenedFile>>,
+}
+
+impl Calls {
+    /// A host that notes what it is asked for.
+    pub fn host() -> (Box<dyn Host>, Rc<RefCell<Self>>) {
+        let calls = Rc::new(RefCell::new(Self::default()));
+        (Box::new(Page(calls.clone())), calls)
+    }
 }
 
 /// A page without a browser.
@@ -57,14 +65,16 @@ impl Host for Page {
         true
     }
 
-    fn read_dropped(&mut self, file: Arc<dyn egui::DroppedFile + Send + Sync>) {
-        self.0.borrow_mut().to_open.push_back(OpenedFile {
+    fn read_dropped(&mut self, files: Vec<Arc<dyn egui::DroppedFile + Send + Sync>>) {
+        let read = |file: &Arc<dyn egui::DroppedFile + Send + Sync>| OpenedFile {
             name: file.path().display().to_string(),
             content: file.bytes(),
-        });
+        };
+        let files = files.iter().map(read).collect();
+        self.0.borrow_mut().to_open.push_back(files);
     }
 
-    fn opened(&mut self) -> Option<OpenedFile> {
+    fn opened(&mut self) -> Option<Vec<OpenedFile>> {
         self.0.borrow_mut().to_open.pop_front()
     }
 
@@ -87,12 +97,11 @@ impl egui::DroppedFile for Dropped {
     }
 }
 
-fn open(options: AppOptions, size: [f32; 2]) -> (Harness<'static, App>, Rc<RefCell<Calls>>) {
+pub fn open(options: AppOptions, size: [f32; 2]) -> (Harness<'static, App>, Rc<RefCell<Calls>>) {
     let mut options = options;
     options.theme = egui::Theme::Light.into();
     options.clock = crate::common::looks::<10>;
-    let calls = Rc::new(RefCell::new(Calls::default()));
-    let page = Page(calls.clone());
+    let (page, calls) = Calls::host();
     let mut harness = Harness::builder()
         .with_size(size)
         .with_theme(egui::Theme::Light)
@@ -101,7 +110,7 @@ fn open(options: AppOptions, size: [f32; 2]) -> (Harness<'static, App>, Rc<RefCe
         .wgpu()
         .build_eframe(move |cc| {
             let mut app = App::new(cc, options).expect("the scene starts");
-            app.set_host(Box::new(page));
+            app.set_host(page);
             app
         });
     harness.run_steps(3);
@@ -583,10 +592,10 @@ fn a_file_held_over_the_window_and_a_large_one_are_told() {
     harness.step();
     assert_ne!(harness.render().expect("a picture"), picture);
     let before = hash(&harness);
-    calls.borrow_mut().to_open.push_back(OpenedFile {
+    calls.borrow_mut().to_open.push_back(vec![OpenedFile {
         name: "film.mp4".to_owned(),
         content: Err(jointplay::scene::too_large()),
-    });
+    }]);
     harness.step();
     harness.run_steps(3);
     assert!(label(&harness, "film.mp4: too large for a scene file"));
@@ -863,9 +872,11 @@ fn a_chosen_or_dropped_file_opens_and_a_bad_one_leaves_the_running_scene() {
     click(&mut harness, "Open…");
     assert_eq!(calls.borrow().picked, 1);
     assert!(harness.query_by_label("Path").is_none(), "the host asks");
-    let file = |name: &str, content| OpenedFile {
-        name: name.to_owned(),
-        content,
+    let file = |name: &str, content| {
+        vec![OpenedFile {
+            name: name.to_owned(),
+            content,
+        }]
     };
     for (bad, words) in [
         (Ok(b"name = [".to_vec()), "mine.toml:1"),
@@ -895,6 +906,80 @@ fn a_chosen_or_dropped_file_opens_and_a_bad_one_leaves_the_running_scene() {
     harness.run_steps(3);
     assert!(label(&harness, "bad.toml:2"));
     assert_eq!(harness.state().player().scene().name, "mine");
+}
+
+const LIFTED: &str = "name = \"lifted\"\ninclude = [\"own.toml\"]\n[[body]]\nname = \"a\"\nmass = \"1 kg\"\ninertia = \"1 1 1 kg m^2\"\n\
+    shapes = [{ form = \"mesh\", file = \"parts/a.obj\", unit = \"mm\" }]\n\
+    [[joint]]\nname = \"a\"\nkind = \"prismatic\"\nchild = \"a\"\naxis = [0, 0, 1]\ndrive = { law = \"table\", file = \"lift.csv\" }\n";
+
+#[test]
+fn a_scene_and_the_files_that_it_names_are_dropped_at_once() {
+    let (mut harness, calls) = window("pendulum", LARGE);
+    let all: [(&str, &'static [u8]); 4] = [
+        ("lifted.toml", LIFTED.as_bytes()),
+        ("lift.csv", b"time_s,position_mm\n0,0\n0.5,3\n1,0\n"),
+        (
+            "own.toml",
+            b"[[parameter]]\nname = \"reach\"\nvalue = \"2 mm\"\n",
+        ),
+        (
+            "a.obj",
+            b"v 0 -10 -10\nv 0 10 -10\nv 0 0 10\nv 30 0 0\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n",
+        ),
+    ];
+    let drop = |names: &[&str], harness: &mut Harness<'_, App>| {
+        for (name, bytes) in all.iter().filter(|(name, _)| names.contains(name)) {
+            let dropped = Dropped(PathBuf::from(name), bytes);
+            harness.input_mut().dropped_files.push(Arc::new(dropped));
+        }
+        harness.run_steps(3);
+    };
+    // What is missing is named, with what to do.
+    drop(&["lifted.toml", "a.obj", "own.toml"], &mut harness);
+    assert!(label(&harness, "joint.a.drive.file = \"lift.csv\""));
+    assert!(label(
+        &harness,
+        "choose or drop that file and the scene's at once"
+    ));
+    assert_eq!(harness.state().player().scene().name, "pendulum");
+    drop(&["lift.csv", "a.obj"], &mut harness);
+    assert!(label(&harness, "lift.csv, a.obj: no scene among them"));
+
+    drop(
+        &["lifted.toml", "lift.csv", "own.toml", "a.obj"],
+        &mut harness,
+    );
+    let scene = harness.state().player().scene().clone();
+    assert_eq!(scene.name, "lifted", "{}", harness.state().announcement());
+    assert_eq!(
+        scene.get("parameter.reach").expect("included"),
+        Value::Number(2e-3)
+    );
+    let names: Vec<&String> = scene.source.beside.keys().collect();
+    assert_eq!(names, ["lift.csv", "own.toml", "parts/a.obj"]);
+    let drive = scene.joints[0].drive.as_ref().expect("driven");
+    let DriveData::Points { points, .. } = &drive.data else {
+        panic!("{drive:?}");
+    };
+    assert_eq!(points[..], [[0.0, 0.0], [0.5, 3e-3], [1.0, 0.0]]);
+    // A reset reads them again, from what was dropped.
+    harness.key_press(Key::R);
+    harness.run_steps(3);
+    assert_eq!(
+        harness.state().player().scene().source.beside,
+        scene.source.beside
+    );
+    assert!(!label(&harness, "no folder"));
+
+    // Chosen in the host's own dialog, with another scene after it.
+    let mut files = all.map(|(name, bytes)| OpenedFile {
+        name: name.to_owned(),
+        content: Ok(bytes.to_vec()),
+    });
+    files[0].content = Ok(LIFTED.replace("lifted", "again").into_bytes());
+    calls.borrow_mut().to_open.push_back(files.to_vec());
+    harness.run_steps(3);
+    assert_eq!(harness.state().player().scene().name, "again");
 }
 
 #[test]

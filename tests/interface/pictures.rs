@@ -12,7 +12,7 @@ use jointplay::simulate::{Frame, Simulation};
 use crate::frames::{Picture, compare, draw};
 
 const FOLDER: &str = "docs/pictures";
-const SIZE: (u32, u32) = (560, 350);
+const SIZE: (u32, u32) = (512, 320);
 /// Largest file, bytes.
 const LARGEST: u64 = 60_000;
 

@@ -26,9 +26,9 @@ struct Calls {
 struct Desk(Rc<RefCell<Calls>>);
 
 impl Host for Desk {
-    fn read_dropped(&mut self, _file: Arc<dyn egui::DroppedFile + Send + Sync>) {}
+    fn read_dropped(&mut self, _files: Vec<Arc<dyn egui::DroppedFile + Send + Sync>>) {}
 
-    fn opened(&mut self) -> Option<OpenedFile> {
+    fn opened(&mut self) -> Option<Vec<OpenedFile>> {
         None
     }
 

@@ -467,29 +467,62 @@ fn a_force_that_jumps_with_a_change_has_no_peak_that_never_was() {
 }
 
 #[test]
-fn a_contact_that_a_parameter_of_the_scene_gives_follows_it_at_the_reset() {
-    let text = "[[parameter]]\nname = \"gap\"\nvalue = \"0.1 mm\"\n[gravity]\nz = \"-9.81 m/s^2\"\n[contact]\nclearance = \"2 * gap\"\n\
-        [[body]]\nname = \"rod\"\nmass = \"0.384 kg\"\ninertia = \"1.92e-3 1.92e-3 1.58e-5 kg m^2\"\n\
-        [[joint]]\nname = \"free\"\nkind = \"free\"\nchild = \"rod\"\nchild_point = \"0 0 100 mm\"\nstart = { position = [0, 0, 0] }\n\
-        [[ball_joint]]\nname = \"S1\"\nsocket = { body = \"world\" }\nball = { body = \"rod\", at = \"0 0 100 mm\" }\n";
+fn a_parameter_of_the_scene_acts_at_once_where_only_contacts_and_gravity_follow_it() {
+    let scene = |mass: &str| {
+        format!(
+            "[[parameter]]\nname = \"gap\"\nvalue = \"0.1 mm\"\n[[parameter]]\nname = \"weight\"\nvalue = 9.81\n\
+             [gravity]\nz = \"-weight * 1 m/s^2\"\n[contact]\nclearance = \"2 * gap\"\n\
+             [[body]]\nname = \"rod\"\nmass = \"{mass}\"\ninertia = \"1.92e-3 1.92e-3 1.58e-5 kg m^2\"\n\
+             [[joint]]\nname = \"free\"\nkind = \"free\"\nchild = \"rod\"\nchild_point = \"0 0 100 mm\"\n\
+             start = {{ position = [0, 0, 0] }}\n\
+             [[ball_joint]]\nname = \"S1\"\nsocket = {{ body = \"world\" }}\nball = {{ body = \"rod\", at = \"0 0 100 mm\" }}\n"
+        )
+    };
     let clearance = |scene: &jointplay::scene::Scene| scene.ball_joints[0].contact.clearance;
-    let set = crate::common::parse(text, &[("parameter.gap", "0.2 mm")]);
-    assert_eq!(clearance(&set), 0.4e-3);
-    let mut simulation = Simulation::new(&crate::common::parse(text, &[])).unwrap();
-    simulation.advance_to(1e-3).unwrap();
-    let hash = simulation.state_hash();
-    let effect = simulation.set("parameter.gap", "0.2 mm").unwrap();
-    assert_eq!(effect, Effect::AtReset);
-    assert!(
+    let run = |mass: &str| {
+        let mut simulation = Simulation::new(&crate::common::parse(&scene(mass), &[])).unwrap();
+        simulation.advance_to(1e-3).unwrap();
         simulation
-            .scene()
-            .parameter("parameter.gap")
-            .unwrap()
-            .at_reset
+    };
+    let set = crate::common::parse(&scene("0.384 kg"), &[("parameter.gap", "0.2 mm")]);
+    assert_eq!(clearance(&set), 0.4e-3);
+    // The bits of the same change without a parameter.
+    let mut by_parameter = run("0.384 kg");
+    let mut by_key = run("0.384 kg");
+    for (own, key, value) in [
+        ("0.2 mm", "contact.clearance", "0.4 mm"),
+        ("0.15 mm", "contact.clearance", "0.3 mm"),
+    ] {
+        assert_eq!(by_parameter.set("parameter.gap", own), Ok(Effect::Now));
+        assert_eq!(by_key.set(key, value), Ok(Effect::Now));
+        for simulation in [&mut by_parameter, &mut by_key] {
+            simulation.advance_to(simulation.time() + 5e-3).unwrap();
+        }
+        assert_eq!(by_parameter.state_hash(), by_key.state_hash());
+        assert_eq!(
+            clearance(by_parameter.running_scene()),
+            clearance(by_key.running_scene())
+        );
+    }
+    assert_eq!(
+        by_parameter.set("parameter.weight", "1.62"),
+        Ok(Effect::Now)
     );
-    assert_eq!(clearance(simulation.scene()), 0.4e-3);
-    assert_eq!(clearance(simulation.running_scene()), 0.2e-3);
-    assert_eq!(simulation.state_hash(), hash);
-    simulation.reset().unwrap();
-    assert_eq!(clearance(simulation.running_scene()), 0.4e-3);
+    assert_eq!(by_parameter.running_scene().gravity.z, -1.62);
+    by_parameter.advance_to(20e-3).unwrap();
+    // What else follows it waits, and the contact with it.
+    let mut waiting = run("0.384 kg * (1 + gap / 1 m)");
+    let hash = waiting.state_hash();
+    assert_eq!(waiting.set("parameter.gap", "0.2 mm"), Ok(Effect::AtReset));
+    assert_eq!(clearance(waiting.scene()), 0.4e-3);
+    assert_eq!(clearance(waiting.running_scene()), 0.2e-3);
+    assert_eq!(waiting.state_hash(), hash);
+    assert_eq!(waiting.set("body.rod.mass", "0.4 kg"), Ok(Effect::AtReset));
+    waiting.reset().unwrap();
+    assert_eq!(clearance(waiting.running_scene()), 0.4e-3);
+    // And an ideal joint is another machine.
+    assert_eq!(
+        by_parameter.set("parameter.gap", "0 mm"),
+        Ok(Effect::AtReset)
+    );
 }

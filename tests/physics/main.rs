@@ -4,6 +4,7 @@
 mod common;
 
 mod bushings;
+mod coordinates;
 mod corners;
 mod determinism;
 mod double_crossing;
@@ -30,6 +31,7 @@ mod pays_only;
 mod planar_loops;
 mod properties;
 mod reactions;
+mod ready_sweeps;
 mod reference;
 mod restitution;
 mod settled;

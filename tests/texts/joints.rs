@@ -1,6 +1,6 @@
 //! Joints of two degrees and joints that close loops, as a file gives them: what is refused says why and what is allowed.
 
-use jointplay::scene::{JointKind, JointStart, Scene};
+use jointplay::scene::{Freedom, JointKind, JointStart, Scene};
 
 /// An arm on a hinge, a rod that hangs free, and the joint `j` between them.
 fn text(joint: &str) -> String {
@@ -126,14 +126,6 @@ fn what_is_refused_says_what_is_allowed() {
         &hung("kind = \"revolute\"\naxis = [0, 1, 0]\nchild_axis = [0, 0, 1]\n"),
         &["joint.j.child_axis", "a universal joint has `child_axis`"],
     );
-    for kind in ["cylindrical", "universal"] {
-        let joint = format!(
-            "kind = \"{kind}\"\naxis = [0, 1, 0]\ndrive = {{ law = \"constant\", velocity = 1 }}\n"
-        );
-        let words = format!("a {kind} joint has axis, ");
-        let those = "a prismatic or revolute joint has `drive`";
-        refused(&hung(&joint), &["joint.j.drive", &words, those]);
-    }
     refused(
         &hung("kind = \"cylindrical\"\naxis = [0, 1, 0]\nstart = { child_angle = \"1 deg\" }\n"),
         &["joint.j.start.child_angle", "unknown key"],
@@ -142,17 +134,101 @@ fn what_is_refused_says_what_is_allowed() {
     refused(
         &(hung("kind = \"cylindrical\"\naxis = [0, 1, 0]\n") + stop),
         &[
-            "stop.s.joint",
-            "a cylindrical joint is neither a slide nor a hinge",
-            "allowed hinge",
+            "stop.s.coordinate",
+            "missing: a cylindrical joint has position and angle",
+            "coordinate = \"position\"",
+        ],
+    );
+    let of = |word: &str| stop.replace("lower", &format!("coordinate = \"{word}\"\nlower"));
+    refused(
+        &(hung("kind = \"cylindrical\"\naxis = [0, 1, 0]\n") + &of("child_angle")),
+        &[
+            "stop.s.coordinate = \"child_angle\"",
+            "no such coordinate: a cylindrical joint has position and angle",
         ],
     );
     refused(
+        &(closing("") + &of("position")),
+        &["no such coordinate: a revolute joint has angle"],
+    );
+    refused(
         &(closing("") + stop),
+        &["stop.s.lower", "wrong unit `mm`", "units of angle"],
+    );
+    refused(
+        &(hung("kind = \"cylindrical\"\naxis = [0, 1, 0]\n") + &of("angle")),
+        &["stop.s.lower", "wrong unit `mm`", "units of angle"],
+    );
+    refused(
+        &(closing("") + &stop.replace("\"j\"", "\"free\"")),
         &[
-            "stop.s.joint",
-            "closes a loop has no coordinate to act on",
-            "allowed hinge",
+            "a free joint is neither a slide nor a hinge",
+            "allowed hinge, j",
         ],
     );
+}
+
+#[test]
+fn drives_of_two_degrees_name_their_coordinates() {
+    let hung = |more: &str| hung(&format!("kind = \"cylindrical\"\naxis = [0, 1, 0]\n{more}"));
+    let slide = "{ law = \"constant\", velocity = \"2 mm/s\" }";
+    let turn = "{ law = \"constant\", velocity = \"3 rad/s\" }";
+    let mut scene = parse(&hung(&format!(
+        "drive = {{ angle = {turn} }}\nstart = {{ velocity = \"1 m/s\" }}\n"
+    )))
+    .unwrap();
+    let driven: Vec<_> = scene.driven().collect();
+    assert_eq!(driven, [(&scene.joints[1], Freedom::TurnOfSlide)]);
+    scene
+        .set("joint.j.drive.angle.velocity", "4 rad/s")
+        .unwrap();
+    scene.set("joint.j.start.velocity", "2 m/s").unwrap();
+    let both = format!("drive = {{ angle = {turn}, position = {slide} }}\n");
+    let scene = parse(&hung(&both)).unwrap();
+    assert!(scene.joints[1].is_prescribed() && scene.driven().count() == 2);
+    for (more, words) in [
+        (
+            format!("drive = {slide}\n"),
+            ["joint.j.drive.law", "unknown key"],
+        ),
+        (
+            format!("drive = {{ angle = {slide} }}\n"),
+            ["joint.j.drive.angle.velocity", "rad/s"],
+        ),
+        (
+            format!("drive = {{ child_angle = {turn} }}\n"),
+            ["joint.j.drive.child_angle", "unknown key"],
+        ),
+        (
+            "drive = { }\n".to_owned(),
+            [
+                "joint.j.drive",
+                "drives nothing: give `position`, `angle` or both",
+            ],
+        ),
+        (
+            format!("{both}start = {{ angle = \"1 deg\" }}\n"),
+            [
+                "joint.j.start.angle",
+                "the drive of this coordinate says where it starts",
+            ],
+        ),
+        (
+            format!("drive = {{ angle = {turn} }}\nstart = {{ angular_velocity = \"1 rad/s\" }}\n"),
+            ["joint.j.start.angular_velocity", "says where it starts"],
+        ),
+        (
+            "drive = { position = { law = \"spcmm\", slider = 1 } }\n".to_owned(),
+            ["joint.j.drive.position.law", "[spcmm]"],
+        ),
+    ] {
+        refused(&hung(&more), &words);
+    }
+    let motor =
+        "[[motor]]\nname = \"m\"\njoint = \"j\"\ncoordinate = \"angle\"\ntorque = \"1 N m\"\n";
+    refused(
+        &(hung(&format!("drive = {{ angle = {turn} }}\n")) + motor),
+        &["motor.m.joint", "has a drive"],
+    );
+    parse(&(hung(&format!("drive = {{ position = {slide} }}\n")) + motor)).unwrap();
 }

@@ -2,7 +2,12 @@
 
 import './assist.test.mjs';
 import './bits.test.mjs';
+import './embed.test.mjs';
 import './film.test.mjs';
+import './firefox.test.mjs';
+import './lessons.test.mjs';
 import './page.test.mjs';
+import './serving.test.mjs';
 import './session.test.mjs';
+import './sound.test.mjs';
 import './touch.test.mjs';

@@ -12,9 +12,9 @@ import { blank, colours, difference, native, open, quit } from './harness.mjs';
 
 after(quit);
 
-/** Loads a film into an empty page: its size and length, and its picture at each of `times`, s. */
-async function play(bytes, times) {
-    const page = await blank();
+/** Loads a film into an empty page of Chromium, or of Firefox: its size and length, and its picture at each of `times`, s. */
+async function play(bytes, times, firefox = false) {
+    const page = await blank(firefox);
     const film = `data:video/mp4;base64,${bytes.toString('base64')}`;
     const shown = await page.evaluate(async ([film, times]) => {
         const video = document.createElement('video');
@@ -33,7 +33,12 @@ async function play(bytes, times) {
             const there = heard('seeked');
             video.currentTime = time;
             await there;
-            context.drawImage(video, 0, 0);
+            // Some time after the seek the frame is decoded; until then nothing is drawn.
+            for (let looks = 0; looks < 200; looks += 1) {
+                context.drawImage(video, 0, 0);
+                if (context.getImageData(width >> 1, height >> 1, 1, 1).data[3] > 0) break;
+                await new Promise((done) => setTimeout(done, 50));
+            }
             pictures.push(canvas.toDataURL('image/png'));
         }
         return { width, height, duration, pictures };
@@ -51,14 +56,18 @@ test('a film of the program plays, and its frames are those that render draws', 
         await native(...line, '--film', path.join(folder, 'film.mp4'));
         const numbers = [0, 5, 12];
         // In the middle of the time that each is shown.
-        const film = await play(fs.readFileSync(path.join(folder, 'film.mp4')), numbers.map((k) => (k + 0.5) / 10));
-        assert.deepEqual([film.width, film.height], [640, 360]);
-        assert.ok(Math.abs(film.duration - 1.3) < 1e-3, `${film.duration} s`);
-        for (const [at, k] of numbers.entries()) {
-            const name = `frame_${String(k).padStart(5, '0')}.png`;
-            const frame = PNG.sync.read(fs.readFileSync(path.join(folder, 'frames', name)));
-            const share = difference(film.pictures[at], frame, `film_${k}`, 0.01);
-            assert.ok(share <= 0.01, `frame ${k}: ${share}`);
+        const bytes = fs.readFileSync(path.join(folder, 'film.mp4'));
+        for (const firefox of [false, true]) {
+            const where = firefox ? 'Firefox' : 'Chromium';
+            const film = await play(bytes, numbers.map((k) => (k + 0.5) / 10), firefox);
+            assert.deepEqual([film.width, film.height], [640, 360]);
+            assert.ok(Math.abs(film.duration - 1.3) < 1e-3, `${where}: ${film.duration} s`);
+            for (const [at, k] of numbers.entries()) {
+                const name = `frame_${String(k).padStart(5, '0')}.png`;
+                const frame = PNG.sync.read(fs.readFileSync(path.join(folder, 'frames', name)));
+                const share = difference(film.pictures[at], frame, `film_${where}_${k}`, 0.01);
+                assert.ok(share <= 0.01, `${where}, frame ${k}: ${share}`);
+            }
         }
     } finally {
         fs.rmSync(folder, { recursive: true });

@@ -8,7 +8,7 @@
 // Time stands still on an open page: it passes by the frames that a gesture or a wait of the test asks for, 50 ms each
 // (inside.mjs). Nothing passes by that a slow machine could miss.
 //
-// `PAGE`: folder of the page; `NATIVE`: the native program; `CHROMIUM`: the browser. ./test sets what it builds.
+// `PAGE`: folder of the page; `NATIVE`: the native program; `CHROMIUM`, `FIREFOX`: the browsers. ./test sets what it builds.
 
 import assert from 'node:assert/strict';
 import { spawn, execFile } from 'node:child_process';
@@ -21,6 +21,7 @@ import { promisify } from 'node:util';
 import pixelmatch from 'pixelmatch';
 import { chromium } from 'playwright-core';
 import { PNG } from 'pngjs';
+import puppeteer from 'puppeteer-core';
 
 import { driveTime } from './inside.mjs';
 
@@ -30,6 +31,9 @@ const NATIVE = process.env.NATIVE ?? path.join(ROOT, 'target/debug/jointplay');
 const TOOL = path.join(ROOT, 'target/tools/debug/jointplay-web');
 /** What a failed test leaves behind. */
 const FAILED = path.join(ROOT, 'web/failed');
+
+/** A name that leads to this machine: for the page an address that others find, too. */
+export const ELSEWHERE = 'laboratory.example';
 
 // One set for both backends. Without the Vulkan flags WebGPU starts and draws nothing.
 const FLAGS = [
@@ -43,6 +47,8 @@ const FLAGS = [
     '--disable-background-networking',
     '--disable-component-update',
     '--disable-sync',
+    `--host-resolver-rules=MAP ${ELSEWHERE} 127.0.0.1`,
+    '--no-proxy-server',
 ];
 
 /** Small, because a software adapter draws some hundred thousand pixels a second. */
@@ -57,19 +63,34 @@ const LOOKS = 100;
 
 let server;
 let browser;
+/** Firefox, and the screen it is on. */
+let fox;
 /** Pages that a failed test left open: they would take the time of the next. */
 const opened = new Set();
 
-/** Serves the page below a sub-path; the address of its folder. */
-async function serve() {
-    if (server) return server.address;
-    const child = spawn(TOOL, ['serve', path.dirname(PAGE)], { stdio: ['ignore', 'pipe', 'inherit'] });
-    const link = await new Promise((found, failed) => {
+/** Serves `folder`; `rest`: port, host. What it says first, and a function that ends it. */
+export async function serveFolder(folder, ...rest) {
+    const child = spawn(TOOL, ['serve', folder, ...rest.map(String)], { stdio: ['ignore', 'pipe', 'inherit'] });
+    const said = await new Promise((found, failed) => {
         child.once('error', failed);
         child.once('exit', (code) => failed(new Error(`${TOOL} ended with ${code}`)));
-        child.stdout.once('data', (text) => found(String(text).trim()));
+        child.stdout.once('data', (text) => found(String(text)));
     });
-    server = { child, address: `${link}${path.basename(PAGE)}/` };
+    child.removeAllListeners('exit');
+    const ended = new Promise((done) => child.once('exit', done));
+    const end = () => {
+        child.kill();
+        return ended;
+    };
+    return { said, address: said.split('\n')[0], end };
+}
+
+/** Serves the page below a sub-path; the address of its folder. */
+async function serve() {
+    if (!server) {
+        const { address, end } = await serveFolder(path.dirname(PAGE));
+        server = { end, address: `${address}${path.basename(PAGE)}/` };
+    }
     return server.address;
 }
 
@@ -79,32 +100,68 @@ async function launch() {
     return browser;
 }
 
-/** Ends browser and server; after the last test of all files that run together. */
+/** Firefox has WebGL2 on a screen alone, and Playwright drives none but its own build of it. */
+async function launchFirefox() {
+    if (fox) return fox.browser;
+    const screen = spawn('Xvfb', ['-displayfd', '1', '-screen', '0', '1280x1024x24'], { stdio: ['ignore', 'pipe', 'ignore'] });
+    const display = await new Promise((found, failed) => {
+        screen.once('error', failed);
+        screen.once('exit', (code) => failed(new Error(`Xvfb ended with ${code}`)));
+        screen.stdout.once('data', (text) => found(`:${String(text).trim()}`));
+    });
+    const started = await puppeteer.launch({
+        browser: 'firefox',
+        executablePath: process.env.FIREFOX ?? '/usr/bin/firefox-esr',
+        headless: false,
+        env: { ...process.env, DISPLAY: display, LIBGL_ALWAYS_SOFTWARE: '1', MOZ_CRASHREPORTER_DISABLE: '1' },
+        extraPrefsFirefox: { 'webgl.force-enabled': true },
+        protocolTimeout: 2 * PATIENCE,
+    });
+    fox = { browser: started, screen };
+    return started;
+}
+
+/** Ends browsers and server; after the last test of all files that run together. */
 export async function quit() {
     await browser?.close();
-    server?.child.removeAllListeners('exit');
-    server?.child.kill();
-    browser = server = undefined;
+    await fox?.browser.close();
+    fox?.screen.removeAllListeners('exit');
+    fox?.screen.kill();
+    await server?.end();
+    browser = fox = server = undefined;
+}
+
+/** An empty page of a browser of its own kind: its context and itself, and how a script is made to run in it before all others. */
+async function emptyPage(firefox, size, options) {
+    if (!firefox) {
+        const context = await (await launch()).newContext({ viewport: size, serviceWorkers: 'block', ...options });
+        const page = await context.newPage();
+        return { context, page, first: (script) => page.addInitScript(script) };
+    }
+    const context = await (await launchFirefox()).createBrowserContext();
+    const page = await context.newPage();
+    await page.setViewport(size);
+    return { context, page, first: (script) => page.evaluateOnNewDocument(script) };
 }
 
 /**
  * Opens the page. `query`: what follows `?`. Options: `backend` 'webgl' or 'webgpu' (appended to the query), `size`
  * {width, height}, `fragment` (what follows `#`), `before` (functions that run in the page before its scripts),
  * `context` (options of a Playwright context, e.g. {hasTouch: true}), `expectTrouble` (do not wait for a picture),
- * `ownTime` (time passes by the clock on the wall, as for a user).
+ * `ownTime` (time passes by the clock on the wall, as for a user), `firefox` (in place of Chromium; `page` is Puppeteer's then),
+ * `at` (the address of a page that the test serves itself).
  */
 export async function open(query = '', options = {}) {
-    const { backend, size = SIZE, fragment = '', before = [], context = {}, expectTrouble = false, ownTime = false } = options;
-    const address = await serve();
+    const { backend, size = SIZE, fragment = '', before = [], context = {}, expectTrouble = false, ownTime = false, firefox = false } = options;
+    const address = options.at ?? (await serve());
     for (const lab of opened) await lab.close({ errors: true });
-    const own = await (await launch()).newContext({ viewport: size, ...context });
-    const page = await own.newPage();
+    const { context: own, page, first } = await emptyPage(firefox, size, context);
     const lab = new Lab(own, page);
     opened.add(lab);
     // Of what Playwright waits for by itself.
     page.setDefaultTimeout(2 * PATIENCE);
     for (const script of ownTime ? [before] : [driveTime, before]) {
-        for (const part of [script].flat()) await page.addInitScript(part);
+        for (const part of [script].flat()) await first(part);
     }
     const parts = [query, backend ? `renderer=${backend}` : ''].filter(Boolean).join('&');
     await page.goto(`${address}${parts ? `?${parts}` : ''}${fragment ? `#${fragment}` : ''}`);
@@ -116,9 +173,9 @@ export async function open(query = '', options = {}) {
     return lab;
 }
 
-/** An empty page of the browser. */
-export async function blank() {
-    return (await launch()).newPage();
+/** An empty page of Chromium, or of Firefox. */
+export async function blank(firefox = false) {
+    return (await (firefox ? launchFirefox() : launch())).newPage();
 }
 
 /** A page under test. */
@@ -165,6 +222,11 @@ export class Lab {
             if (globalThis.drivenTime) return globalThis.drivenTime.step(count);
             for (; count > 0; count -= 1) await new Promise(requestAnimationFrame);
         }, count);
+    }
+
+    /** From here on each frame stands for so many milliseconds. */
+    async pace(milliseconds = 50) {
+        await this.ask((milliseconds) => (globalThis.drivenTime.frame = milliseconds), milliseconds);
     }
 
     /** What the laboratory is doing: see `state` in src/web/page.rs. */

@@ -158,9 +158,9 @@ test('a frame never steps longer than its share, however far behind the machine 
     await lab.frame(20);
     const later = await lab.state();
     assert.equal(later.frames - first.frames, 20, 'it draws all the while');
-    // The share is 12 ms.
+    // Drawing takes 50 ms here, and stepping gets as long but for the 4.7 ms that a frame of 1/60 s leaves over.
     const steps = (later.steps - first.steps) / 20;
-    assert.ok(steps > 200 && steps < 245, `${steps} steps a frame`);
+    assert.ok(steps > 890 && steps < 930, `${steps} steps a frame`);
     await lab.find('Button', 'Pause');
     assert.ok((await lab.widgets()).some((widget) => /^reached 1:/.test(widget.label)), 'nothing says how far it keeps up');
     await lab.close();
@@ -376,11 +376,11 @@ test('a crash leaves a report that names version, scene and renderer', async () 
     await lab.close({ errors: true });
 });
 
-test('the page weighs at most 3 MB as a browser downloads it', (t) => {
-    const LIMIT = 3_000_000;
-    const files = fs.readdirSync(PAGE).filter((file) => file.endsWith('.br'));
-    assert.equal(files.length, fs.readdirSync(PAGE).length / 2, 'every file is there compressed, too');
-    const sizes = files.map((file) => [file.slice(0, -3), fs.statSync(path.join(PAGE, file)).size]);
+test('the page weighs at most 2.5 MB as a browser downloads it', (t) => {
+    const LIMIT = 2_500_000;
+    const files = fs.readdirSync(PAGE).filter((file) => !/\.(br|gz)$/.test(file));
+    assert.ok(files.includes('jointplay_bg.wasm'));
+    const sizes = files.map((file) => [file, fs.statSync(path.join(PAGE, `${file}.br`)).size]);
     for (const [file, size] of sizes) t.diagnostic(`${file}: ${size} bytes with brotli`);
     const sum = sizes.reduce((sum, [, size]) => sum + size, 0);
     t.diagnostic(`together: ${sum} bytes of ${LIMIT}`);

@@ -84,12 +84,28 @@ test('on a screen with finer pixels the canvas has them all, and a finger hits w
     await lab.close();
 });
 
+test('a finger on a slider scrolls up and down, and moves it sideways', async () => {
+    const lab = await open('play=0', { backend, size: PHONE, context: { hasTouch: true } });
+    const slider = async () => (await lab.find('Slider', 'Clearance')).rect;
+    const changed = async () => (await lab.state()).changed_parameters['contact.clearance'];
+    const [x0, y0, x1, y1] = await slider();
+    const y = (y0 + y1) / 2;
+    const from = x0 + 0.3 * (x1 - x0);
+    await lab.fingers([0, 30, 60, 90].map((way) => [from + way, y]));
+    const value = await changed();
+    assert.match(value, /mm$/);
+    await lab.fingers([0, 15, 30, 45, 60].map((up) => [from, y - up]));
+    await lab.until(async () => y0 - (await slider())[1] > 40, 'the panel does not scroll');
+    assert.equal(await changed(), value);
+    await lab.close();
+});
+
 test('a menu that is longer than the screen scrolls under a finger', async () => {
     const size = { width: 844, height: 390 };
     const lab = await open('play=0', { backend, size, context: { hasTouch: true } });
     await lab.tap('Button', 'Menu');
     const [x, y] = middle(await lab.find('Button', 'Picture…'));
-    for (let swipe = 0; swipe < 3; swipe += 1) {
+    for (let swipe = 0; swipe < 6; swipe += 1) {
         await lab.fingers([0, 30, 60, 90, 120].map((up) => [x, y - up]));
     }
     const reached = async () => (await lab.find('Button', 'About')).rect[3] <= size.height;

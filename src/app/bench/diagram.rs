@@ -1,6 +1,6 @@
 //! The bifurcation diagram of a sweep and its other results at each value; a click picks a section.
 
-use eframe::egui::{ComboBox, Grid, Pos2, RichText, Sense, Ui};
+use eframe::egui::{ComboBox, Grid, Pos2, Rect, RichText, Sense, Ui};
 use egui_plot::{HLine, LineStyle, PlotPoint, PlotPoints, PlotTransform, Points, VLine};
 
 use super::coordinate::Coordinate;
@@ -70,6 +70,9 @@ pub struct Diagram {
     all: Vec<Mark>,
     diverged: Vec<f64>,
     transform: Option<PlotTransform>,
+    /// Where it was last drawn, points of the screen, and what share of that was in sight.
+    plane: Option<Rect>,
+    seen: f32,
     /// The latest pick.
     picked: Option<(usize, usize)>,
 }
@@ -90,6 +93,16 @@ impl Diagram {
         let is = |mark: &&Mark| (mark.1, mark.2) == (index, section);
         let (point, ..) = self.all.iter().find(is)?;
         Some(self.transform.as_ref()?.position_from_point(point))
+    }
+
+    /// Where it was last drawn, without its head and key, points of the screen.
+    pub fn plane(&self) -> Option<Rect> {
+        self.plane
+    }
+
+    /// What share of that was in sight.
+    pub fn seen(&self) -> f32 {
+        self.seen
     }
 
     /// The diagram of `swept`; returns the point and its kept section that were clicked.
@@ -153,6 +166,9 @@ impl Diagram {
         let clicked = response.response.clicked();
         let pointer = response.response.interact_pointer_pos();
         self.transform = Some(response.transform);
+        let plane = response.response.rect;
+        self.seen = plane.intersect(ui.clip_rect()).height().max(0.0) / plane.height();
+        self.plane = Some(plane);
         self.key(ui, swept, dark);
         let at = pointer.filter(|_| clicked)?;
         let nearest = self

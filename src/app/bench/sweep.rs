@@ -1,21 +1,23 @@
 //! A background sweep: its settings, its progress, and the points so far.
 
-use eframe::egui::{Button, ComboBox, DragValue, ProgressBar, RichText, TextEdit, Ui, vec2};
+use eframe::egui::{Align, Button, ComboBox, DragValue, ProgressBar, RichText, TextEdit, Ui, vec2};
 
+use super::asked::Asked;
 use super::coordinate::Coordinate;
 use super::diagram::Diagram;
 use super::swept::{Swept, start_word};
 use crate::analysis::grid::Start;
 use crate::analysis::point::LOOSEST_FOR_EXPONENT;
+use crate::analysis::ready::{READY, ReadySweep};
 use crate::analysis::source::SceneSource;
-use crate::analysis::sweep_task::SweepTask;
+use crate::analysis::sweep_task::{Share, SweepTask};
 use crate::analysis::task::{Job, Message};
 use crate::app::host::{Host, Running};
 use crate::app::layout::reserved;
 use crate::app::load::Load;
 use crate::app::player::Player;
 use crate::app::{theme, value};
-use crate::scene::{Kind, Parameter, Value};
+use crate::scene::{Kind, Parameter, Scene, Value};
 
 /// Parameter varied by default, and its range.
 const FIRST: (&str, &str, &str) = ("contact.clearance", "0.01 mm", "1 mm");
@@ -37,16 +39,32 @@ struct Settings {
     exponent: bool,
 }
 
+/// A sweep under way, shared by several computers.
+struct Sweeping {
+    task: SweepTask,
+    shares: Vec<Sharing>,
+    /// Its ranges are known.
+    begun: bool,
+}
+
+/// One of them, and what fraction of the whole it has done.
+struct Sharing {
+    running: Box<dyn Running>,
+    done: f64,
+    finished: bool,
+}
+
 /// The panel.
 #[derive(Default)]
 pub struct SweepPanel {
     settings: Option<Settings>,
     asked: Option<SweepTask>,
-    running: Option<(Box<dyn Running>, SweepTask)>,
-    progress: f64,
+    running: Option<Sweeping>,
     swept: Option<Swept>,
     problem: Option<String>,
     diagram: Diagram,
+    /// The diagram is to be scrolled into sight.
+    reveal: bool,
 }
 
 impl SweepPanel {
@@ -54,42 +72,51 @@ impl SweepPanel {
     pub fn update(&mut self, host: &mut dyn Host) -> bool {
         if let Some(task) = self.asked.take() {
             self.problem = None;
-            self.progress = 0.0;
-            match host.start(Job::Sweep(task.clone())) {
-                Some(running) => self.running = Some((running, task)),
-                None => self.problem = Some("Sweeps cannot be computed here".to_owned()),
+            self.running = Sweeping::start(task, host);
+            if self.running.is_none() {
+                self.problem = Some("Sweeps cannot be computed here".to_owned());
             }
         }
-        while let Some((running, task)) = &mut self.running {
-            match running.poll() {
-                None => return true,
-                Some(Message::Progress(done)) => self.progress = done,
-                Some(Message::Ranges(ranges)) => {
-                    self.swept = ranges.into_iter().next().map(|range| Swept {
-                        task: task.clone(),
-                        points: vec![None; range.count],
-                        scene: task.scene.scene().ok(),
-                        range,
-                    });
-                    self.diagram.clear();
-                }
-                Some(Message::Point(point)) => {
-                    if let Some(swept) = &mut self.swept
-                        && let Some(slot) = swept.points.get_mut(point.index)
-                    {
-                        *slot = Some(*point);
-                        self.diagram.renew();
+        let Some(sweeping) = &mut self.running else {
+            return false;
+        };
+        for sharing in &mut sweeping.shares {
+            while let Some(message) = sharing.running.poll() {
+                match message {
+                    Message::Progress(done) => sharing.done = done,
+                    Message::Ranges(ranges) if !sweeping.begun => {
+                        sweeping.begun = true;
+                        let task = &sweeping.task;
+                        self.swept = ranges.into_iter().next().map(|range| Swept {
+                            task: task.clone(),
+                            points: vec![None; range.count],
+                            scene: task.scene.scene().ok(),
+                            range,
+                        });
+                        self.diagram.clear();
+                    }
+                    Message::Point(point) => {
+                        if let Some(swept) = &mut self.swept
+                            && let Some(slot) = swept.points.get_mut(point.index)
+                        {
+                            *slot = Some(*point);
+                            self.diagram.renew();
+                        }
+                    }
+                    Message::Ranges(_) | Message::Presets(_) => {}
+                    Message::Done => sharing.finished = true,
+                    Message::Failed(why) => {
+                        self.problem = Some(in_words(&why, &sweeping.task));
+                        self.running = None;
+                        return false;
                     }
                 }
-                Some(Message::Presets(_)) => {}
-                Some(Message::Done) => self.running = None,
-                Some(Message::Failed(why)) => {
-                    self.problem = Some(in_words(&why, task));
-                    self.running = None;
-                }
             }
         }
-        false
+        if sweeping.shares.iter().all(|sharing| sharing.finished) {
+            self.running = None;
+        }
+        self.running.is_some()
     }
 
     /// Whether a sweep is running.
@@ -107,8 +134,27 @@ impl SweepPanel {
         &self.diagram
     }
 
-    /// Settings, progress and diagram; returns the run to a section that was clicked.
-    pub fn ui(&mut self, ui: &mut Ui, player: &Player, coordinate: Coordinate) -> Option<Load> {
+    /// Starts a ready sweep over its scene, `scene`, in place of any that runs.
+    pub fn start(&mut self, ready: &'static ReadySweep, scene: &Scene) {
+        self.settings = Some(Settings::of(ready));
+        self.asked = Some(ready.task(scene));
+        self.reveal = true;
+    }
+
+    /// Ready sweeps, settings, progress and diagram; returns what was asked of the run.
+    pub fn ui(&mut self, ui: &mut Ui, player: &Player, coordinate: Coordinate) -> Option<Asked> {
+        let ready = ready_ui(ui).map(Asked::Ready);
+        let load = self.sweep_ui(ui, player, coordinate);
+        ready.or(load.map(Asked::Section))
+    }
+
+    /// Whether the diagram is that of the sweep that was asked for, or none will come.
+    fn has_diagram(&self) -> bool {
+        self.asked.is_none() && self.running.as_ref().is_none_or(|sweeping| sweeping.begun)
+    }
+
+    fn sweep_ui(&mut self, ui: &mut Ui, player: &Player, coordinate: Coordinate) -> Option<Load> {
+        let mut progress = ui.cursor().top();
         match player.watch().period() {
             Err(why) => {
                 ui.label(RichText::new(format!("No sweep: {why}")).weak());
@@ -118,10 +164,31 @@ impl SweepPanel {
             }
             Ok(_) => {
                 self.settings_ui(ui, player);
+                progress = ui.cursor().top();
                 self.go_ui(ui, player);
             }
         }
         reserved(ui, "sweep says", 2, |ui| self.state_ui(ui, player));
+        let diagram = ui.cursor().top();
+        let load = self.swept_ui(ui, coordinate);
+        if self.reveal {
+            self.reveal = !self.has_diagram();
+            let room = ui.clip_rect().height();
+            let all = ui.min_rect().with_min_y(progress);
+            // With its progress and with what stands above and below it, where there is room for that.
+            let mut shown = vec![all, all.with_min_y(diagram)];
+            shown.extend(self.diagram.plane());
+            let fits = shown.iter().find(|rect| rect.height() <= room);
+            if let Some(rect) = fits.or(shown.last()) {
+                let top = (rect.height() > room).then_some(Align::TOP);
+                ui.scroll_to_rect(*rect, top);
+            }
+        }
+        load
+    }
+
+    /// The diagram; returns the section of it that was clicked.
+    fn swept_ui(&mut self, ui: &mut Ui, coordinate: Coordinate) -> Option<Load> {
         let swept = self.swept.as_ref()?;
         reserved(ui, "sweep of", 3, |ui| {
             ui.label(RichText::new(swept.caption()).small())
@@ -144,7 +211,7 @@ impl SweepPanel {
             theme::error(ui, problem);
             return;
         }
-        let running = self.running.as_ref().map(|(_, task)| task);
+        let running = self.running.as_ref().map(|sweeping| &sweeping.task);
         let swept = self.swept.as_ref();
         let Some(swept) = swept.filter(|swept| running.is_none_or(|task| *task == swept.task))
         else {
@@ -283,7 +350,8 @@ impl SweepPanel {
             let button = Button::new(name).min_size(vec2(GO, 0.0));
             let clicked = ui.add(button).on_hover_text(help).clicked();
             if running {
-                let bar = ProgressBar::new(self.progress as f32).show_percentage();
+                let done = self.running.as_ref().map_or(0.0, Sweeping::done);
+                let bar = ProgressBar::new(done as f32).show_percentage();
                 ui.add(bar.desired_width(ui.available_width()))
                     .accessible_name("Swept so far");
             }
@@ -296,6 +364,7 @@ impl SweepPanel {
             && let Some(settings) = &self.settings
             && let Ok(parameter) = player.wanted().parameter(settings.key)
         {
+            self.reveal = true;
             let end = |text: &str| value::completed(text, &parameter.kind);
             let Settings {
                 key,
@@ -317,7 +386,47 @@ impl SweepPanel {
     }
 }
 
+impl Sweeping {
+    /// Has `task` computed by as many as `host` offers; `None` if that is not possible.
+    fn start(task: SweepTask, host: &mut dyn Host) -> Option<Self> {
+        let of = host.workers().max(1);
+        let share = |index| {
+            let running = host.start(Job::Sweep(task.clone(), Share { index, of }))?;
+            Some(Sharing {
+                running,
+                done: 0.0,
+                finished: false,
+            })
+        };
+        let shares: Option<Vec<_>> = (0..of).map(share).collect();
+        Some(Self {
+            shares: shares?,
+            task,
+            begun: false,
+        })
+    }
+
+    /// Fraction of the points that are done, 0 to 1.
+    fn done(&self) -> f64 {
+        self.shares.iter().map(|sharing| sharing.done).sum()
+    }
+}
+
 impl Settings {
+    fn of(ready: &ReadySweep) -> Self {
+        Self {
+            scene: ready.scene.to_owned(),
+            key: ready.key,
+            from: ready.from.to_owned(),
+            to: ready.to.to_owned(),
+            values: ready.values,
+            periods: ready.periods,
+            discard: ready.discard,
+            start: Start::Cold,
+            exponent: false,
+        }
+    }
+
     fn new(scene: &str, parameters: &[&'static Parameter]) -> Option<Self> {
         let first = parameters.iter().find(|p| p.key == FIRST.0);
         let first = first.or_else(|| parameters.first())?;
@@ -349,6 +458,21 @@ impl Settings {
             Kind::Choice(_) => Default::default(),
         };
     }
+}
+
+/// The ready sweeps, each with what it will show; returns the one that was clicked.
+fn ready_ui(ui: &mut Ui) -> Option<&'static ReadySweep> {
+    let mut chosen = None;
+    for ready in &READY {
+        ui.horizontal_wrapped(|ui| {
+            let help = "Opens its scene in place of the running one, and starts the sweep";
+            if ui.small_button(ready.name).on_hover_text(help).clicked() {
+                chosen = Some(ready);
+            }
+            ui.label(RichText::new(ready.shows).small().weak());
+        });
+    }
+    chosen
 }
 
 /// Whether the scene has `parameter` as a number that affects its motion.

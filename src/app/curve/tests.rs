@@ -8,6 +8,7 @@ use egui_kittest::Harness;
 use egui_plot::Plot;
 
 use super::*;
+use crate::app::theme;
 use crate::simulate::History;
 
 #[path = "../../../tests/common/pixels.rs"]
@@ -57,6 +58,11 @@ fn drawn(
         .with_theme(Theme::Light)
         .wgpu()
         .build_ui(move |ui| {
+            // Its texts have a face from the second pass on.
+            if ui.ctx().cumulative_pass_nr() == 0 {
+                ui.ctx().set_fonts(theme::fonts());
+                return ui.ctx().request_repaint();
+            }
             let shown = Plot::new("curves").show_grid(false).show(ui, |plot| {
                 plot.set_plot_bounds_x(0.0..=length);
                 plot.set_plot_bounds_y(-50.0..=750.0);

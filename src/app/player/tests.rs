@@ -724,3 +724,31 @@ fn a_refused_value_changes_nothing() {
         .expect("the scene's own");
     assert_eq!(player.wanted().contact, before);
 }
+
+#[test]
+fn how_long_frames_take_changes_how_many_steps_they_take_and_no_bit() {
+    fn slow() -> f64 {
+        thread_local! {
+            static LOOKS: std::cell::Cell<f64> = const { std::cell::Cell::new(0.0) };
+        }
+        LOOKS.set(LOOKS.get() + 1e-3);
+        LOOKS.get()
+    }
+    let mut counts = Vec::new();
+    for frames in [&[1.0 / 60.0][..], &[0.4], &[0.9, 0.02, 3.0, 0.1, 0.1]] {
+        let mut player = player("spcmm");
+        player.clock = slow;
+        player.pacer.set_scale(1.0);
+        player.set_playing(true);
+        for dt in frames.iter().cycle().take(12) {
+            player.advance(*dt);
+        }
+        let mut straight = Simulation::new(player.scene()).expect("starts");
+        while straight.statistics().steps < player.steps() {
+            straight.step().expect("runs");
+        }
+        assert_eq!(player.simulation().state_hash(), straight.state_hash());
+        counts.push(player.steps());
+    }
+    assert!(counts[1] > 10 * counts[0], "{counts:?}");
+}

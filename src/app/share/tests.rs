@@ -98,9 +98,16 @@ impl Chance {
                 ideal: c.below(2) == 0,
                 wear: [WearMap::Off, WearMap::Impulse, WearMap::FrictionWork][c.below(3) as usize],
             }),
+            lesson: self.maybe(|c| format!("x{}x", c.text(9)).replace('\n', " ")),
+            step: self.maybe(|c| 1 + c.below(40) as usize),
+            embedded: self.maybe(|c| {
+                let words = ["", "controls", "timeline,bench", "controls,plots"];
+                Embedded::read(words[c.below(4) as usize]).expect("panels")
+            }),
             playing: self.maybe(|c| c.below(2) == 0),
             theme: self.maybe(|c| THEMES[c.below(3) as usize].1),
             version: self.maybe(|_| "0.1.0".to_owned()),
+            beside: Texts::new(),
         }
     }
 }
@@ -296,6 +303,47 @@ fn a_link_that_would_be_too_long_leaves_the_run_out_or_says_so() {
     };
     let error = link.format_short(&scene).expect_err("does not fit");
     assert!(error.contains("too large for a link"), "{error}");
+}
+
+#[test]
+fn what_no_address_holds_is_kept_and_read_back() {
+    let mut chance = Chance(5);
+    let (mut plain, mut packed) = (0, 0);
+    for _ in 0..100 {
+        let mut link = chance.link();
+        let fragment = link.format();
+        assert_eq!(link.keep(), fragment);
+        plain += 1;
+        link.beside
+            .insert("a lift.csv".to_owned(), "time_s,y_mm\n0,0\n".into());
+        assert_eq!(link.format(), fragment, "no link carries a file");
+        let kept = link.keep();
+        assert!(kept.starts_with("kept:"));
+        assert_eq!(Link::parse(&kept).expect("reads"), link);
+        packed += 1;
+    }
+    assert_eq!((plain, packed), (100, 100));
+    let noise: String = (0..60_000)
+        .map(|_| char::from(b'a' + chance.below(26) as u8))
+        .collect();
+    let (name, text) = ("mine.toml".to_owned(), noise);
+    let large = Link {
+        scene: SceneText::File { name, text },
+        ..Link::default()
+    };
+    assert!(Link::parse(&format!("#{}", large.format())).is_err());
+    let kept = large.keep();
+    assert_eq!(Link::parse(&kept).expect("reads"), large);
+    let error = Link::parse(&kept[..kept.len() / 2]).expect_err("cut");
+    assert!(
+        error.to_string().contains("cut short or damaged"),
+        "{error}"
+    );
+    let error = Link::parse("#kept=1").expect_err("elsewhere");
+    assert!(
+        error.to_string().contains("open the scene file here"),
+        "{error}"
+    );
 }
 
 #[test]

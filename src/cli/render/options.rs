@@ -7,7 +7,9 @@ use crate::cli::args::{
 use crate::cli::{Failure, quantity};
 use crate::scene::Scene;
 use crate::simulate::Frame;
-use crate::view::{ArrowOptions, Camera, Preset, Scaling, SceneView, Theme, ViewOptions, WearMap};
+use crate::view::{
+    ArrowOptions, Camera, Preset, Quality, Scaling, SceneView, Theme, ViewOptions, WearMap,
+};
 
 /// Point of view requested by `arguments`, at the frame of t = 0.
 ///
@@ -107,6 +109,8 @@ pub fn view_options(arguments: &RenderArguments) -> Result<ViewOptions, Failure>
         joint_names: shown(Hideable::Names),
         hinges: shown(Hideable::Hinges),
         sockets: shown(Hideable::Sockets),
+        // The same bytes each time.
+        quality: Quality::FULL,
         trail: shown(Hideable::Trail),
         wear: match arguments.wear {
             None => WearMap::Off,

@@ -11,7 +11,7 @@ use std::fmt::Debug;
 use std::sync::Arc;
 
 use crate::jet::Jet;
-use crate::scene::{Drive, Joint, JointKind, Scene};
+use crate::scene::{Drive, Joint, Scene};
 
 /// A coordinate, m or rad, as a function of time, s. Allocates nothing.
 pub trait Law: Debug + Send + Sync {
@@ -69,8 +69,8 @@ const NEAR: f64 = 1e-9;
 /// Parts into which a single ramp or pulse is stepped, at least.
 const PARTS: f64 = 50.0;
 
-/// What `drive` at a joint of `kind` follows.
-pub(super) fn course_of(drive: &Drive, kind: JointKind) -> Course {
+/// What a coordinate with this `drive` follows, an angle if it `turns`.
+pub(super) fn course_of(drive: &Drive, turns: bool) -> Course {
     if let Some(coordinate) = drive.slider() {
         return Course::ClosedForm(coordinate);
     }
@@ -78,13 +78,13 @@ pub(super) fn course_of(drive: &Drive, kind: JointKind) -> Course {
         .iter()
         .find(|(word, _)| *word == drive.kind.word)
         .expect("every law of the scene format has its motion");
-    Course::Own(make(drive, kind == JointKind::Revolute))
+    Course::Own(make(drive, turns))
 }
 
-/// Period of the motion that the drive of `joint` prescribes, s; infinite where it does not repeat or nothing moves.
-pub fn period_of(scene: &Scene, joint: &Joint) -> f64 {
-    joint.drive.as_ref().map_or(f64::INFINITY, |drive| {
-        let course = course_of(drive, joint.kind);
+/// Periods of the motions that drives of `joint` prescribe, s; infinite where one does not repeat or nothing moves.
+pub fn periods_of(scene: &Scene, joint: &Joint) -> impl Iterator<Item = f64> {
+    joint.drives().map(|(freedom, drive)| {
+        let course = course_of(drive, freedom.turns());
         course
             .law()
             .map_or_else(|| closed_period(scene), |law| law.period())

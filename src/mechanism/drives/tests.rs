@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 
-use super::{Course, Law, NEAR, course_of, period_of};
+use super::{Course, Law, NEAR, course_of, periods_of};
 use crate::scene::Scene;
 
 /// A body of 1 kg on a slide along x with this drive.
@@ -19,7 +19,8 @@ fn scene(drive: &str) -> Scene {
 
 fn law(drive: &str) -> Arc<dyn Law> {
     let joint = &scene(drive).joints[0];
-    match course_of(joint.drive.as_ref().expect("driven"), joint.kind) {
+    let (freedom, drive) = joint.drives().next().expect("driven");
+    match course_of(drive, freedom.turns()) {
         Course::Own(law) => law,
         Course::ClosedForm(_) => panic!("a law of its own"),
     }
@@ -215,7 +216,7 @@ fn the_period_of_a_law_is_the_time_after_which_it_repeats() {
         ),
     ] {
         let scene = scene(&text);
-        let found = period_of(&scene, &scene.joints[0]);
+        let found = periods_of(&scene, &scene.joints[0]).next().expect("driven");
         assert!(
             found == period || (found - period).abs() < 1e-9,
             "{text}: {found}"

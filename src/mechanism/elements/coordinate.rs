@@ -1,22 +1,24 @@
-//! Coordinate of a slide or a hinge from the motion of the two bodies that it connects, and a force along it. The same in
-//! every formulation: a force on the child and the opposite one on the parent at the same point, or a pair of torques.
+//! A coordinate of a joint from the motion of the two bodies that it connects, and a force along it. The same in every
+//! formulation: a force on the child and the opposite one on the parent at the same point, or a pair of torques. Both axes of a
+//! universal joint are perpendicular, so that torques about one do no work on the other.
 
 use std::f64::consts::TAU;
 
 use super::{Coupling, ElementReport, Turning, push};
 use crate::mechanism::kinematics::{Kinematics, Wrench};
-use crate::mechanism::model::{Anchor, Model};
-use crate::scene::{Element, JointKind, Mat3, Scene, Vec3};
+use crate::mechanism::model::Anchor;
+use crate::scene::{Element, Freedom, Mat3, Scene, Vec3};
 
-/// A slide or a hinge.
+/// A displacement along an axis or an angle about it.
 #[derive(Clone, Copy)]
 pub(super) struct Coordinate {
     parent: Anchor,
     child: Anchor,
-    hinge: bool,
-    /// Axis, in the parent's axes.
+    turns: bool,
+    /// Axis, in the parent's axes, or in the child's.
     axis: Vec3,
-    /// On a hinge: a direction across the axis, in the parent's axes; and in the child's, the one that coincides with it at
+    in_child: bool,
+    /// Of an angle: a direction across the axis, in the parent's axes; and in the child's, the one that coincides with it at
     /// coordinate 0.
     across: Vec3,
     seen: Vec3,
@@ -25,7 +27,7 @@ pub(super) struct Coordinate {
 /// A coordinate at one instant.
 #[derive(Clone, Copy)]
 pub(super) struct Place {
-    /// From the position asked about, m or rad; on a hinge within half a turn.
+    /// From the position asked about, m or rad; an angle within half a turn.
     pub off: f64,
     /// m/s or rad/s.
     pub rate: f64,
@@ -44,30 +46,41 @@ pub(super) struct Slopes {
 }
 
 impl Coordinate {
-    /// That of the joint on which `element` of `scene` acts; `ends` are the points that the joint connects.
-    pub fn of(scene: &Scene, model: &Model, element: &Element, ends: &[Anchor]) -> Option<Self> {
-        let joint = &scene.joints[element.joint?];
-        let axis = model.bodies[joint.child].axis;
-        let least = axis.iamin();
-        let across = axis.cross(&Vec3::ith(least, 1.0)).normalize();
+    /// The one on which `element` of `scene` acts; `ends` are the points that its joint connects.
+    pub fn of(scene: &Scene, element: &Element, ends: &[Anchor]) -> Option<Self> {
+        let (index, freedom) = element.joint?;
+        let joint = scene.kinematic_joints().nth(index)?;
+        let (axis, second, rest) = (joint.axis, joint.child_axis, joint.rotation);
+        let [across, seen] = match freedom {
+            Freedom::FirstTurn => [rest * second, second],
+            Freedom::SecondTurn => [axis, rest.inverse() * axis],
+            Freedom::Slide | Freedom::Turn | Freedom::TurnOfSlide => {
+                let least = axis.iamin();
+                let across = axis.cross(&Vec3::ith(least, 1.0)).normalize();
+                [across, rest.inverse() * across]
+            }
+        };
+        let in_child = freedom == Freedom::SecondTurn;
         Some(Self {
             parent: ends[0],
             child: ends[1],
-            hinge: joint.kind == JointKind::Revolute,
-            axis,
+            turns: freedom.turns(),
+            axis: if in_child { second } else { axis },
+            in_child,
             across,
-            seen: joint.rotation.inverse() * across,
+            seen,
         })
     }
 
     /// The coordinate from `position`, and its rate.
     pub fn place(&self, position: f64, motion: &[Kinematics]) -> Place {
         let (parent, child) = (&motion[self.parent.body], &motion[self.child.body]);
-        let along = parent.rotation * self.axis;
+        let of_axis = if self.in_child { child } else { parent };
+        let along = of_axis.rotation * self.axis;
         let arm = child.rotation * self.child.offset;
         let point = child.position + arm;
         let from_parent = point - parent.position;
-        let (off, rate) = if self.hinge {
+        let (off, rate) = if self.turns {
             let (zero, now) = (parent.rotation * self.across, child.rotation * self.seen);
             let angle = libm::atan2(zero.cross(&now).dot(&along), zero.dot(&now));
             let off = angle - position;
@@ -91,7 +104,7 @@ impl Coordinate {
     pub fn press(&self, place: &Place, force: f64, wrench: &mut [Wrench]) {
         let force = place.along * force;
         let [from_parent, arm] = &place.arms;
-        if self.hinge {
+        if self.turns {
             wrench[self.child.body].torque += force;
             wrench[self.parent.body].torque -= force;
         } else {
@@ -117,7 +130,7 @@ impl Coordinate {
         let (stiffness, damping) = (along * slopes.by_position, along * slopes.by_rate);
         let by_time = place.along * slopes.by_time;
         let ends = self.ends(motion);
-        if self.hinge {
+        if self.turns {
             let turning = Turning {
                 by_turn: stiffness,
                 by_spin: damping,
@@ -131,7 +144,7 @@ impl Coordinate {
     /// Report of a force along the axis.
     pub fn report(&self, place: &Place, force: f64, motion: &[Kinematics]) -> ElementReport {
         let force = place.along * force;
-        if self.hinge {
+        if self.turns {
             return ElementReport {
                 points: [place.point; 2],
                 force: Vec3::zeros(),

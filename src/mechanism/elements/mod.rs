@@ -24,7 +24,7 @@ use super::drives::{Law, course_of};
 use super::kinematics::{Kinematics, Wrench};
 use super::model::{Anchor, Model};
 use crate::contact::{Memory, Stiffness};
-use crate::scene::{Attachment, Element, JointKind, Mat3, Scene, Vec3};
+use crate::scene::{Attachment, Element, Mat3, Scene, Vec3};
 use coordinate::Coordinate;
 pub use pull::Pull;
 
@@ -295,7 +295,7 @@ pub(super) fn elements_of(scene: &Scene, model: &Model) -> Vec<Box<dyn SceneElem
             .find(|(section, _)| *section == element.kind.section)
             .expect("every kind of the scene format has its element");
         let site = Site {
-            coordinate: Coordinate::of(scene, model, element, &anchors),
+            coordinate: Coordinate::of(scene, element, &anchors),
             anchors: &anchors,
         };
         make(element, &site)
@@ -315,11 +315,7 @@ pub(super) fn hand(scene: &Scene, model: &Model, pull: Pull) -> Box<dyn SceneEle
 
 /// The law of time of `element`, if it has one.
 fn law_of(element: &Element) -> Option<Arc<dyn Law>> {
-    let kind = match element.on_hinge {
-        true => JointKind::Revolute,
-        false => JointKind::Prismatic,
-    };
-    let course = course_of(element.law.as_ref()?, kind);
+    let course = course_of(element.law.as_ref()?, element.on_hinge);
     course.law().cloned()
 }
 

@@ -3,9 +3,9 @@
 
 use Quantity as Q;
 use Take::{
-    Angles, Axes, BodyAxes, Closing, Element, ElementValue, FirstTurn, Given, Hinge,
+    Angles, Axes, BodyAxes, ChildTurn, Closing, Element, ElementValue, FirstTurn, Given, Hinge,
     HingeCoordinate, Joint, JointAxes, OtherAngles, OtherAxes, ProbeError, Reaction, SecondTurn,
-    Slide, SlideCoordinate, Taken, TurnRate, Whole,
+    Slide, SlideCoordinate, Taken, Turn, TurnRate, Whole,
 };
 
 use crate::scene::Vec3;
@@ -258,6 +258,9 @@ pub(super) enum Take {
     Slide,
     /// Actuator of each driven hinge.
     Hinge,
+    /// Actuator of each other driven angle: about the axis in the parent, and about that in the child.
+    Turn,
+    ChildTurn,
     /// A term of the energy balance that supplies energy, with its member name.
     Given(&'static str, fn(&Ledger) -> f64),
     /// A term that takes or stores energy.
@@ -301,7 +304,7 @@ impl Take {
         match self {
             Joint(_) | JointAxes(_) => Each::Joint,
             Closing(_) => Each::Closing,
-            Slide | Hinge => Each::Drive,
+            Slide | Hinge | Turn | ChildTurn => Each::Drive,
             Element(_) | ElementValue(_) => Each::Element,
             Axes(_) | Angles(_) => Each::Output,
             BodyAxes(_) | OtherAxes(_) | OtherAngles(_) => Each::Body,
@@ -353,7 +356,7 @@ impl Take {
             Closing(of) => frame.closing.get(part).map(|load| of(load)[component]),
             Joint(of) => frame.joints.get(part).map(of),
             JointAxes(of) => frame.joints.get(part).map(|joint| of(joint)[component]),
-            Slide | Hinge => frame.actuators.get(part).copied(),
+            Slide | Hinge | Turn | ChildTurn => frame.actuators.get(part).copied(),
             Given(_, of) | Taken(_, of) => frame.ledger.as_ref().map(of),
             ProbeError => frame.probe_error.map(|error| error[component]),
             Element(of) => frame.elements.get(part).and_then(of).map(|v| v[component]),
@@ -451,6 +454,8 @@ pub(super) const TABLE: &[Signal] = &[
 
     both(Q::ActuatorForce, 6, asked("@.actuator", "@_actuator_N", Slide, "force of the drive, positive along the joint's axis")),
     both(Q::ActuatorTorque, 6, asked("@.actuator", "@_actuator_Nm", Hinge, "torque of the drive, positive about the joint's axis")),
+    both(Q::ActuatorTorque, 6, asked("@.angle_actuator", "@_angle_actuator_Nm", Turn, "torque of the drive, positive about the joint's axis")),
+    both(Q::ActuatorTorque, 6, asked("@.child_angle_actuator", "@_child_angle_actuator_Nm", ChildTurn, "torque of the drive, positive about the joint's axis in the child")),
 
     both(Q::EnergyBalance, 10, asked("energy.drive_work", "drive_work_J", Given("drives", |ledger| ledger.drive_work), "supplied by the drives since the start")),
     both(Q::EnergyBalance, 10, asked("energy.gravity_work", "gravity_work_J", Given("gravity", |ledger| ledger.gravity_work), "supplied by gravity since the start")),

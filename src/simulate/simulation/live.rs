@@ -40,6 +40,20 @@ pub enum ChangeError {
     },
 }
 
+/// Whether `next` is what `running` is but for gravity and contacts, which take effect at once: a parameter of the scene's own may
+/// be used there alone.
+fn differs_in_conditions_alone(running: &Scene, next: &Scene) -> bool {
+    let mut like_next = Scene::clone(running);
+    like_next.gravity = next.gravity;
+    like_next.contact = next.contact;
+    for (joint, next) in like_next.ball_joints.iter_mut().zip(&next.ball_joints) {
+        joint.contact = next.contact;
+    }
+    like_next.source.clone_from(&next.source);
+    like_next.changes.clone_from(&next.changes);
+    like_next == *next
+}
+
 impl Simulation {
     /// Changes a parameter (`contact.clearance`, `joint.S1.friction`, …) to a value as a user writes it.
     ///
@@ -121,7 +135,8 @@ impl Simulation {
     ) -> Result<Effect, ChangeError> {
         let mut running = Scene::clone(&self.running);
         // What the running scene cannot accept may suit the waiting one, say a joint of a longer chain.
-        let waits = waits || change(&mut running).is_err();
+        let refused = change(&mut running).is_err();
+        let waits = refused || (waits && !differs_in_conditions_alone(&self.running, &running));
         // A joint that becomes ideal, or stops being so, changes the equations.
         let turns = |running: &Scene| {
             let pairs = self.running.ball_joints.iter().zip(&running.ball_joints);

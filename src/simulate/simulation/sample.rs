@@ -121,7 +121,7 @@ mod tests {
                 simulation.advance_to(time).expect("runs");
                 let mut frame = Frame::default();
                 simulation.sample(time, &mut frame);
-                let moving = scene.joints.iter().filter(|joint| joint.has_coordinate());
+                let moving = scene.joints.iter().flat_map(|joint| joint.kind.freedoms());
                 assert_eq!(frame.coordinates.len(), moving.count());
                 frame
             };

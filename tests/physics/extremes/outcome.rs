@@ -140,7 +140,8 @@ pub fn run(row: &Row, form: &str, column: &str) -> Outcome {
                 balance.watch(&frame);
             }
         }
-        pacer.end(FRAME, target.min(row.duration), simulation.time());
+        let target = target.min(row.duration);
+        pacer.end(FRAME, target, simulation.time(), spent);
         let reached = pacer.reached_scale();
         said_slow |= reached.is_some_and(|reached| reached < (1.0 - 1e-6) * ASKED);
         frames += 1.0;

@@ -1,16 +1,25 @@
 //! Makes and serves the page of Jointplay.
 //!
-//! `jointplay-web pack LIBRARY.wasm FOLDER [--compress]` writes the page; `jointplay-web serve FOLDER [PORT]` serves a folder on
-//! this machine until it is ended.
+//! `jointplay-web pack LIBRARY.wasm FOLDER [--compress]` writes the page; `jointplay-web serve FOLDER [PORT [HOST]]` serves a folder
+//! until it is ended: on this machine alone, or on the address HOST of it (0.0.0.0: on all).
 
 mod pack;
 mod serve;
 
+use std::net::{IpAddr, Ipv4Addr};
 use std::path::Path;
 use std::process::ExitCode;
 
 const USAGE: &str = "usage: jointplay-web pack LIBRARY.wasm FOLDER [--compress]
-       jointplay-web serve FOLDER [PORT]";
+       jointplay-web serve FOLDER [PORT [HOST]]";
+
+/// Where only this machine finds the page.
+const HERE: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
+
+fn number(port: &str) -> Result<u16, String> {
+    let wrong = |_| format!("`{port}` is no port: it must be 0 to 65535");
+    port.parse().map_err(wrong)
+}
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -20,11 +29,15 @@ fn main() -> ExitCode {
         ["pack", library, folder, "--compress"] => {
             pack::pack(Path::new(library), Path::new(folder), true)
         }
-        ["serve", folder] => serve::serve(Path::new(folder), 0),
-        ["serve", folder, port] => match port.parse() {
-            Ok(port) => serve::serve(Path::new(folder), port),
-            Err(_) => Err(format!("`{port}` is no port: it must be 0 to 65535")),
-        },
+        ["serve", folder] => serve::serve(Path::new(folder), HERE, 0),
+        ["serve", folder, port] => number(port)
+            .and_then(|port| serve::serve(Path::new(folder), HERE, port)),
+        ["serve", folder, port, host] => number(port).and_then(|port| {
+            let host = host.parse().map_err(|_| {
+                format!("`{host}` is no address of this machine: name it in numbers, 0.0.0.0 for all that it has")
+            });
+            serve::serve(Path::new(folder), host?, port)
+        }),
         _ => Err(USAGE.to_owned()),
     };
     match done {

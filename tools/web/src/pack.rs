@@ -4,26 +4,37 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use base64::Engine as _;
+use base64::prelude::BASE64_STANDARD;
+use flate2::{Compression, write::GzEncoder};
+use sha2::{Digest as _, Sha256};
 use wasm_bindgen_cli_support::Bindgen;
 
 /// Name of the files that the glue's generator writes.
 const NAME: &str = "jointplay";
 /// The page's own files, from the root of the project.
 const PAGE: &str = "index.html";
+/// What keeps the page for when there is no network: knows all its files.
+const KEEPER: &str = "web/offline.js";
 /// Scripts, style and icon beside it, copied as they are.
-const PARTS: [&str; 8] = [
+const PARTS: [&str; 10] = [
     "web/stuck.js",
     "web/main.js",
     "web/host.js",
     "web/canvas.js",
     "web/mirror.js",
+    "web/guest.js",
     "web/worker.js",
     "web/page.css",
     "web/icon.svg",
+    "web/page.webmanifest",
 ];
 
-/// Writes the page into `folder`, which is made anew and replaced only as a whole. `compress`: also each file as
-/// `<file>.br`, with a table of what weighs how much.
+/// Codings in which a file may lie beside itself, best first, with the ending that each has there.
+pub const CODINGS: [(&str, &str); 2] = [("br", "br"), ("gzip", "gz")];
+
+/// Writes the page into `folder`, which is made anew and replaced only as a whole: each file, and beside it
+/// `<file>.gz`. `compress`: also `<file>.br`, with a table of what weighs how much.
 pub fn pack(library: &Path, folder: &Path, compress: bool) -> Result<(), String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     check_replaceable(folder)?;
@@ -56,15 +67,22 @@ pub fn pack(library: &Path, folder: &Path, compress: bool) -> Result<(), String>
     }
     let from = root.join(PAGE);
     let page = fs::read_to_string(&from).map_err(|e| failed(&from, &e))?;
+    let from = root.join(KEEPER);
+    let keeper = fs::read_to_string(&from).map_err(|e| failed(&from, &e))?;
+    all.extend(page.bytes().chain(keeper.bytes()));
     // The build in every address: a browser never joins new scripts to old code from its cache.
+    let build = format!("{:016x}", hash(&all));
     let page = page
-        .replace("{{build}}", &format!("{:016x}", hash(&all)))
+        .replace("{{build}}", &build)
         .replace("{{wasm_bytes}}", &code.len().to_string());
     let to = scratch.join(PAGE);
     fs::write(&to, page).map_err(|e| failed(&to, &e))?;
-    if compress {
-        compress_all(&scratch)?;
-    }
+    let keeper = keeper
+        .replace("{{build}}", &build)
+        .replace("{{files}}", &integrity(&scratch)?);
+    let to = scratch.join(from.file_name().expect("a file"));
+    fs::write(&to, keeper).map_err(|e| failed(&to, &e))?;
+    compress_all(&scratch, compress)?;
     remove(folder)?;
     fs::rename(&scratch, folder).map_err(|e| failed(folder, &e))
 }
@@ -97,23 +115,60 @@ fn check_replaceable(folder: &Path) -> Result<(), String> {
     ))
 }
 
-fn compress_all(folder: &Path) -> Result<(), String> {
+/// The files of `folder`, in order.
+fn files(folder: &Path) -> Result<Vec<PathBuf>, String> {
     let entries = fs::read_dir(folder).map_err(|e| failed(folder, &e))?;
     let mut files: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
     files.sort();
-    let (mut raw, mut packed) = (0, 0);
-    println!("{:>10} {:>10}  file", "bytes", "brotli");
-    for file in files {
+    Ok(files)
+}
+
+/// What each file of `folder` must hold, in the words of the fields of a script's object.
+fn integrity(folder: &Path) -> Result<String, String> {
+    let mut words = Vec::new();
+    for file in files(folder)? {
         let bytes = fs::read(&file).map_err(|e| failed(&file, &e))?;
-        let small = brotli(&bytes).map_err(|e| failed(&file, &e))?;
         let name = file.file_name().expect("a file").to_string_lossy();
-        println!("{:>10} {:>10}  {name}", bytes.len(), small.len());
-        (raw, packed) = (raw + bytes.len(), packed + small.len());
-        let to = file.with_file_name(format!("{name}.br"));
-        fs::write(&to, small).map_err(|e| failed(&to, &e))?;
+        let sum = BASE64_STANDARD.encode(Sha256::digest(&bytes));
+        words.push(format!("    '{name}': 'sha256-{sum}',"));
     }
-    println!("{raw:>10} {packed:>10}  together");
+    Ok(words.join("\n"))
+}
+
+/// Writes every file of `folder` in the codings that browsers accept; brotli, which takes a minute, only where it is asked for.
+fn compress_all(folder: &Path, with_brotli: bool) -> Result<(), String> {
+    let (mut raw, mut small) = (0, 0);
+    if with_brotli {
+        println!("{:>10} {:>10}  file", "bytes", "brotli");
+    }
+    for file in files(folder)? {
+        let bytes = fs::read(&file).map_err(|e| failed(&file, &e))?;
+        for (coding, ending) in CODINGS {
+            let packed = match coding {
+                "br" if !with_brotli => continue,
+                "br" => brotli(&bytes),
+                _ => gzip(&bytes),
+            };
+            let packed = packed.map_err(|e| failed(&file, &e))?;
+            let to = file.with_added_extension(ending);
+            fs::write(&to, &packed).map_err(|e| failed(&to, &e))?;
+            if coding == "br" {
+                let name = file.file_name().expect("a file").to_string_lossy();
+                println!("{:>10} {:>10}  {name}", bytes.len(), packed.len());
+                (raw, small) = (raw + bytes.len(), small + packed.len());
+            }
+        }
+    }
+    if with_brotli {
+        println!("{raw:>10} {small:>10}  together");
+    }
     Ok(())
+}
+
+fn gzip(bytes: &[u8]) -> std::io::Result<Vec<u8>> {
+    let mut writer = GzEncoder::new(Vec::new(), Compression::default());
+    writer.write_all(bytes)?;
+    writer.finish()
 }
 
 fn brotli(bytes: &[u8]) -> std::io::Result<Vec<u8>> {
@@ -126,7 +181,7 @@ fn brotli(bytes: &[u8]) -> std::io::Result<Vec<u8>> {
 }
 
 /// FNV-1a, 64 bit.
-fn hash(bytes: &[u8]) -> u64 {
+pub fn hash(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
     })

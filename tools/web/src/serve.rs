@@ -1,48 +1,138 @@
-//! A static server for this machine only.
+//! A static server: for this machine, or for a room.
 
-use std::fs::{self, File};
+use std::fs;
+use std::io::{self, Write as _};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
 use std::path::{Component, Path, PathBuf};
 
-use tiny_http::{Header, Method, Request, Response, Server};
+use axum::Router;
+use axum::extract::Request;
+use axum::http::{HeaderName, Method, StatusCode, header};
+use axum::response::{IntoResponse as _, Response};
+use qrcodegen::{QrCode, QrCodeEcc};
+use tokio::net::TcpListener;
 
-/// Serves `folder` on 127.0.0.1 and prints the link; port 0 takes any free one.
-pub fn serve(folder: &Path, port: u16) -> Result<(), String> {
-    let folder = fs::canonicalize(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-    let server = Server::http(("127.0.0.1", port))
-        .map_err(|e| format!("cannot serve on 127.0.0.1, port {port}: {e}"))?;
-    let address = server.server_addr();
-    println!("http://{address}/");
-    for request in server.incoming_requests() {
-        let sent = match answer(&folder, &request) {
-            Ok(response) => request.respond(response),
-            Err((code, text)) => {
-                request.respond(Response::from_string(text).with_status_code(code))
-            }
-        };
-        // A browser may hang up at any time; that is its affair.
-        if let Err(error) = sent {
-            eprintln!("note: {error}");
-        }
-    }
-    Ok(())
+use crate::pack::{CODINGS, hash};
+
+/// Serves `folder` on an address of this machine and prints the link; port 0 takes any free one. An address that others reach is
+/// printed as a QR code, too.
+pub fn serve(folder: &Path, host: IpAddr, port: u16) -> Result<(), String> {
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .enable_io()
+        .build();
+    let runtime = runtime.map_err(|e| format!("cannot serve: {e}"))?;
+    runtime.block_on(give_out(folder, host, port))
 }
 
-fn answer(folder: &Path, request: &Request) -> Result<Response<File>, (u16, &'static str)> {
-    if !matches!(request.method(), Method::Get | Method::Head) {
-        return Err((405, "this server only gives files out"));
+async fn give_out(folder: &Path, host: IpAddr, port: u16) -> Result<(), String> {
+    let folder = fs::canonicalize(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    let listener = TcpListener::bind((host, port))
+        .await
+        .map_err(|e| format!("cannot serve on {host}, port {port}: {e}"))?;
+    let bound = listener.local_addr();
+    let port = bound.map_or(port, |address| address.port());
+    let seen = seen_from_outside(host);
+    let link = format!("http://{}/", SocketAddr::new(seen, port));
+    let code = if seen.is_loopback() {
+        String::new()
+    } else {
+        qr(&link)?
+    };
+    // In one piece, for a program that reads it.
+    let said = io::stdout().write_all(format!("{link}\n{code}").as_bytes());
+    said.map_err(|e| format!("standard output: {e}"))?;
+    let files = Router::new().fallback(async move |request: Request| answer(&folder, &request));
+    axum::serve(listener, files)
+        .await
+        .map_err(|e| format!("cannot serve any longer: {e}"))
+}
+
+/// The address at which others find a server on `host`: of every address of this machine, the one that leads out.
+fn seen_from_outside(host: IpAddr) -> IpAddr {
+    if !host.is_unspecified() {
+        return host;
     }
-    let path = request.url().split(['?', '#']).next().unwrap_or("/");
-    let file = locate(folder, path).ok_or((404, "no such file"))?;
-    let packed = file.with_added_extension("br");
-    let compressed = accepts_brotli(request) && packed.is_file();
-    let open = File::open(if compressed { &packed } else { &file });
-    let mut response = Response::from_file(open.map_err(|_| (404, "no such file"))?);
-    response.add_header(header("Content-Type", media_type(&file)));
-    response.add_header(header("Cache-Control", "no-cache"));
-    if compressed {
-        response.add_header(header("Content-Encoding", "br"));
+    // Nothing is sent: the system only looks up which way it would go. The addresses are those kept for documentation.
+    let (any, out): (IpAddr, IpAddr) = match host {
+        IpAddr::V4(_) => (
+            Ipv4Addr::UNSPECIFIED.into(),
+            Ipv4Addr::new(192, 0, 2, 1).into(),
+        ),
+        IpAddr::V6(_) => (
+            Ipv6Addr::UNSPECIFIED.into(),
+            Ipv6Addr::new(0x2001, 0xdb8, 0, 0, 0, 0, 0, 1).into(),
+        ),
+    };
+    let way = UdpSocket::bind((any, 0)).and_then(|socket| {
+        socket.connect((out, 9))?;
+        socket.local_addr()
+    });
+    match (way, host) {
+        (Ok(address), _) => address.ip(),
+        (Err(_), IpAddr::V4(_)) => Ipv4Addr::LOCALHOST.into(),
+        (Err(_), IpAddr::V6(_)) => Ipv6Addr::LOCALHOST.into(),
     }
-    Ok(response)
+}
+
+/// `text` as a QR code for a terminal: two rows of modules in a line, light ones drawn, so that it is read on a dark ground.
+fn qr(text: &str) -> Result<String, String> {
+    /// Light modules around it, which a reader needs.
+    const QUIET: i32 = 4;
+    let code = QrCode::encode_text(text, QrCodeEcc::Medium)
+        .map_err(|e| format!("no QR code of {text}: {e}"))?;
+    let size = code.size();
+    let light = |x, y| !code.get_module(x, y);
+    let mut lines = String::new();
+    for y in (-QUIET..size + QUIET).step_by(2) {
+        lines.extend(
+            (-QUIET..size + QUIET).map(|x| match (light(x, y), light(x, y + 1)) {
+                (true, true) => '█',
+                (true, false) => '▀',
+                (false, true) => '▄',
+                (false, false) => ' ',
+            }),
+        );
+        lines.push('\n');
+    }
+    Ok(lines)
+}
+
+fn answer(folder: &Path, request: &Request) -> Response {
+    const MISSING: (StatusCode, &str) = (StatusCode::NOT_FOUND, "no such file");
+    if !matches!(*request.method(), Method::GET | Method::HEAD) {
+        let refused = "this server only gives files out";
+        return (StatusCode::METHOD_NOT_ALLOWED, refused).into_response();
+    }
+    given(folder, request).unwrap_or_else(|| MISSING.into_response())
+}
+
+/// The file that `request` asks for; `None` if there is none.
+fn given(folder: &Path, request: &Request) -> Option<Response> {
+    let file = locate(folder, request.uri().path())?;
+    let mut packed = CODINGS.iter().filter_map(|(coding, ending)| {
+        let packed = file.with_added_extension(ending);
+        (accepts(request, coding) && packed.is_file()).then_some((*coding, packed))
+    });
+    let (coding, from) = match packed.next() {
+        Some((coding, packed)) => (Some(coding), packed),
+        None => (None, file.clone()),
+    };
+    let bytes = fs::read(from).ok()?;
+    let tag = format!("\"{:016x}\"", hash(&bytes));
+    let known = field(request, header::IF_NONE_MATCH)
+        .is_some_and(|known| known.split(',').any(|known| known.trim() == tag));
+    let fields = [
+        (header::CONTENT_TYPE, media_type(&file)),
+        (header::CACHE_CONTROL, "no-cache"),
+        (header::ETAG, &tag),
+        (header::VARY, "Accept-Encoding"),
+    ];
+    Some(if known {
+        (StatusCode::NOT_MODIFIED, fields).into_response()
+    } else {
+        let coding = coding.map(|coding| [(header::CONTENT_ENCODING, coding)]);
+        (fields, coding, bytes).into_response()
+    })
 }
 
 /// The file that `path` names inside `folder`; a folder's is its `index.html`.
@@ -65,12 +155,17 @@ fn locate(folder: &Path, path: &str) -> Option<PathBuf> {
     file.is_file().then_some(file)
 }
 
-fn accepts_brotli(request: &Request) -> bool {
-    request.headers().iter().any(|header| {
-        header.field.equiv("Accept-Encoding") && {
-            let value = header.value.as_str();
-            value.split(',').any(|coding| coding.trim() == "br")
-        }
+/// What `request` says in the field `name`.
+fn field(request: &Request, name: HeaderName) -> Option<&str> {
+    request.headers().get(name)?.to_str().ok()
+}
+
+fn accepts(request: &Request, coding: &str) -> bool {
+    field(request, header::ACCEPT_ENCODING).is_some_and(|accepted| {
+        accepted.split(',').any(|one| {
+            let (name, weight) = one.split_once(';').unwrap_or((one, ""));
+            name.trim() == coding && !matches!(weight.trim(), "q=0" | "q=0.0")
+        })
     })
 }
 
@@ -81,10 +176,7 @@ fn media_type(file: &Path) -> &'static str {
         Some("css") => "text/css; charset=utf-8",
         Some("svg") => "image/svg+xml",
         Some("wasm") => "application/wasm",
+        Some("webmanifest") => "application/manifest+json",
         _ => "application/octet-stream",
     }
-}
-
-fn header(name: &str, value: &str) -> Header {
-    Header::from_bytes(name, value).expect("plain ASCII")
 }

@@ -1,0 +1,337 @@
+//! Impacts as sound: which clicks a frame has, and their samples.
+//!
+//! A click follows its impact in three ways. It sounds at the instant at which the contact ended, as far into the frame as that
+//! instant is into the stretch of the run that the frame shows. Its pitch is that of a vibration of which the contact lasted
+//! half a period; the time is the run's own, so that slow motion spreads the clicks but leaves each as it is. Its loudness is a
+//! power below one of its impulse, so that soft impacts are heard beside hard ones.
+
+use crate::scene::Scene;
+use crate::simulate::Impact;
+
+/// Lowest and highest pitch, Hz: what small loudspeakers give and most ears hear.
+pub const PITCHES: (f64, f64) = (150.0, 8000.0);
+/// Speed at which all the mass of the scene would have to meet a wall to be as loud as a click can be, m/s.
+const LOUDEST_SPEED: f64 = 0.1;
+/// Power of the impulse that the loudness follows: ten times the impulse is two and a half times as loud.
+const COMPRESSION: f64 = 0.4;
+/// Amplitude of the loudest click, as a share of what a device takes: several may sound at once.
+const AMPLITUDE: f64 = 0.4;
+/// Most clicks of a frame; of more the loudest.
+pub const MOST_CLICKS: usize = 8;
+/// Vibrations until the amplitude has fallen to 1/e, and the least time for that, s.
+const VIBRATIONS: f64 = 3.0;
+const SHORTEST_DECAY: f64 = 4e-3;
+/// Share of its amplitude at which a click ends.
+const SILENCE: f64 = 3e-3;
+
+/// What is heard of one impact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Click {
+    /// When, from the beginning of the frame, s.
+    pub after: f64,
+    /// Frequency, Hz.
+    pub pitch: f64,
+    /// From 0 to 1.
+    pub loudness: f64,
+}
+
+/// A stretch of the run, and the time that it is given.
+#[derive(Clone, Copy, Debug)]
+pub struct Stretch {
+    /// From after this instant, s.
+    pub from: f64,
+    /// Up to this one, s.
+    pub to: f64,
+    /// Seconds that it is shown for.
+    pub lasts: f64,
+}
+
+/// Impulse of the blow, N s, from what the run knows of `impact`: the mass behind it from the elastic energy at the deepest point
+/// after Hertz, no more than `mass`, kg, which is all there is. What the balls press on each other while they stay together is no
+/// part of it: a ball that came down softly and leaves after a second makes no bang.
+pub fn impulse(impact: &Impact, mass: f64) -> f64 {
+    let energy = 0.4 * impact.peak * impact.deepest;
+    let behind = 2.0 * energy / (impact.approach_speed * impact.approach_speed);
+    behind.min(mass) * (impact.approach_speed + impact.separation_speed)
+}
+
+/// Mass of all bodies, kg.
+pub fn mass(scene: &Scene) -> f64 {
+    scene.bodies.iter().map(|body| body.mass).sum()
+}
+
+/// Writes the clicks of the `impacts` that ended within `stretch` to `out`, in their order; `mass` is that of all bodies, kg.
+pub fn clicks<'a>(
+    impacts: impl Iterator<Item = &'a Impact>,
+    stretch: &Stretch,
+    mass: f64,
+    out: &mut Vec<Click>,
+) {
+    out.clear();
+    let within = |impact: &&Impact| stretch.from < impact.end && impact.end <= stretch.to;
+    out.extend(impacts.filter(within).map(|impact| {
+        let part = (impact.end - stretch.from) / (stretch.to - stretch.from);
+        let lasted = impact.end - impact.start;
+        let loudness = impulse(impact, mass) / (mass * LOUDEST_SPEED);
+        Click {
+            after: part * stretch.lasts,
+            pitch: (0.5 / lasted).clamp(PITCHES.0, PITCHES.1),
+            loudness: libm::pow(loudness, COMPRESSION).min(1.0),
+        }
+    }));
+    if out.len() > MOST_CLICKS {
+        out.sort_by(|a, b| b.loudness.total_cmp(&a.loudness));
+        out.truncate(MOST_CLICKS);
+        out.sort_by(|a, b| a.after.total_cmp(&b.after));
+    }
+}
+
+/// The samples of a click: a vibration that fades.
+#[derive(Clone, Copy, Debug)]
+pub struct Voice {
+    /// The next sample is `turn` times the last less `fade` times the one before.
+    turn: f64,
+    fade: f64,
+    last: f64,
+    before: f64,
+    left: usize,
+}
+
+impl Voice {
+    /// Of `click`, `rate` samples a second.
+    pub fn new(click: &Click, rate: f64) -> Self {
+        // A device too slow for the pitch gets the highest that it has.
+        let pitch = click.pitch.min(0.45 * rate);
+        let decay = (VIBRATIONS / pitch).max(SHORTEST_DECAY);
+        let angle = std::f64::consts::TAU * pitch / rate;
+        let kept = libm::exp(-1.0 / (decay * rate));
+        Self {
+            turn: 2.0 * kept * libm::cos(angle),
+            fade: kept * kept,
+            last: 0.0,
+            // So that the next sample is that of the sine.
+            before: -AMPLITUDE * click.loudness * libm::sin(angle) / kept,
+            left: (-libm::log(SILENCE) * decay * rate) as usize,
+        }
+    }
+}
+
+impl Iterator for Voice {
+    type Item = f32;
+
+    fn next(&mut self) -> Option<f32> {
+        self.left = self.left.checked_sub(1)?;
+        let sample = self.last;
+        (self.last, self.before) = (self.turn * sample - self.fade * self.before, sample);
+        Some(sample as f32)
+    }
+
+    fn size_hint(&self) -> (usize, Option<usize>) {
+        (self.left, Some(self.left))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::{Frame, Simulation};
+
+    const RATE: f64 = 48_000.0;
+
+    fn impact(end: f64, lasted: f64, speed: f64) -> Impact {
+        // Half a kilogram that comes back as it came.
+        let deepest = 10e-6;
+        Impact {
+            start: end - lasted,
+            end,
+            approach_speed: speed,
+            separation_speed: speed,
+            deepest,
+            peak: 0.25 * speed * speed / (0.4 * deepest),
+            ..Impact::default()
+        }
+    }
+
+    fn of(impacts: &[Impact], stretch: Stretch) -> Vec<Click> {
+        let mut out = Vec::new();
+        clicks(impacts.iter(), &stretch, 5.0, &mut out);
+        out
+    }
+
+    const SECOND: Stretch = Stretch {
+        from: 1.0,
+        to: 2.0,
+        lasts: 0.05,
+    };
+
+    #[test]
+    fn a_stretch_has_the_impacts_that_ended_in_it_at_their_times() {
+        let ends = [0.5, 1.0, 1.25, 2.0, 2.5];
+        let impacts = ends.map(|end| impact(end, 1e-4, 0.01));
+        let heard = of(&impacts, SECOND);
+        let times: Vec<f64> = heard.iter().map(|click| click.after).collect();
+        assert_eq!(times, [0.0125, 0.05]);
+        // What one stretch leaves, the next has: none twice, none lost.
+        let next = Stretch {
+            from: 2.0,
+            to: 3.0,
+            ..SECOND
+        };
+        assert_eq!(of(&impacts, next).len(), 1);
+        let nothing = Stretch { to: 1.0, ..SECOND };
+        assert!(of(&impacts, nothing).is_empty());
+    }
+
+    #[test]
+    fn the_pitch_is_that_of_the_contact_at_any_speed_of_the_play() {
+        for lasted in [2e-4, 1e-3] {
+            for lasts in [1e-3, 50.0] {
+                let stretch = Stretch { lasts, ..SECOND };
+                let pitch = of(&[impact(1.5, lasted, 0.01)], stretch)[0].pitch;
+                assert!((pitch * 2.0 * lasted - 1.0).abs() < 1e-9, "{pitch} Hz");
+            }
+        }
+        assert_eq!(of(&[impact(1.5, 0.1, 0.01)], SECOND)[0].pitch, PITCHES.0);
+        assert_eq!(of(&[impact(1.5, 1e-6, 0.01)], SECOND)[0].pitch, PITCHES.1);
+    }
+
+    #[test]
+    fn the_loudness_rises_with_the_impulse_by_less_and_has_an_end() {
+        let loudness = |speed: f64| of(&[impact(1.5, 1e-4, speed)], SECOND)[0].loudness;
+        // 0.5 kg at 0.01 m/s and back, of 5 kg at 0.1 m/s.
+        assert!((loudness(0.01) - 0.02_f64.powf(0.4)).abs() < 1e-12);
+        assert!((loudness(0.1) / loudness(0.01) - 10_f64.powf(0.4)).abs() < 1e-9);
+        assert_eq!(loudness(100.0), 1.0);
+        assert!(loudness(1e-30) < 1e-9);
+    }
+
+    #[test]
+    fn of_many_impacts_the_loudest_are_heard_in_their_order() {
+        let impacts: Vec<Impact> = (1..=40)
+            .map(|k| {
+                impact(
+                    1.0 + f64::from(k) / 50.0,
+                    1e-4,
+                    1e-3 * f64::from(k * 7 % 41),
+                )
+            })
+            .collect();
+        let heard = of(&impacts, SECOND);
+        assert_eq!(heard.len(), MOST_CLICKS);
+        assert!(heard.is_sorted_by(|a, b| a.after < b.after));
+        let alone: Vec<Click> = impacts.iter().flat_map(|i| of(&[*i], SECOND)).collect();
+        let softest = heard.iter().map(|c| c.loudness).fold(1.0, f64::min);
+        let louder = alone.iter().filter(|click| click.loudness >= softest);
+        assert_eq!(louder.count(), MOST_CLICKS);
+        assert!(heard.iter().all(|click| alone.contains(click)));
+    }
+
+    #[test]
+    fn the_impulse_is_the_integral_of_the_force() {
+        let scene = Scene::load("pendulum", &[]).expect("built in");
+        let mut simulation = Simulation::new(&scene).expect("starts");
+        let mut impacts = Vec::new();
+        let mut frame = Frame::default();
+        let (mut sum, mut compared) = (0.0, 0);
+        while compared < 5 {
+            simulation.step().expect("runs");
+            let (from, to) = (simulation.step_start(), simulation.time());
+            // The force over the step, by Simpson's rule.
+            let parts = 8;
+            let width = (to - from) / f64::from(parts);
+            for part in 0..=parts {
+                let weight = match part {
+                    0 => 1.0,
+                    _ if part == parts => 1.0,
+                    _ if part % 2 == 1 => 4.0,
+                    _ => 2.0,
+                };
+                simulation.sample(from + width * f64::from(part), &mut frame);
+                sum += weight * width / 3.0 * frame.joints[0].normal_force.norm();
+            }
+            simulation.take_impacts(&mut impacts);
+            for impact in impacts.drain(..) {
+                let estimate = impulse(&impact, mass(&scene));
+                assert!(
+                    (estimate / sum - 1.0).abs() < 0.2,
+                    "{estimate} N s for {sum} N s, {impact:?}"
+                );
+                sum = 0.0;
+                compared += 1;
+            }
+        }
+    }
+
+    /// Share of the energy of `samples` within 20 % of `pitch`, Hz, and where the spectrum is largest.
+    fn spectrum(samples: &[f32], pitch: f64) -> (f64, f64) {
+        let (mut near, mut all, mut best) = (0.0, 0.0, (0.0, 0.0));
+        let step = 5.0;
+        for k in 1..4000 {
+            let frequency = step * f64::from(k);
+            let turn = std::f64::consts::TAU * frequency / RATE;
+            let (mut re, mut im) = (0.0, 0.0);
+            for (n, sample) in samples.iter().enumerate() {
+                let (sin, cos) = (turn * n as f64).sin_cos();
+                re += f64::from(*sample) * cos;
+                im += f64::from(*sample) * sin;
+            }
+            let power = re * re + im * im;
+            all += power;
+            if (frequency / pitch - 1.0).abs() < 0.2 {
+                near += power;
+            }
+            if power > best.0 {
+                best = (power, frequency);
+            }
+        }
+        (near / all, best.1)
+    }
+
+    #[test]
+    fn a_click_has_its_pitch_and_loudness_and_ends() {
+        for pitch in [100.0, 440.0, 2600.0, 8000.0] {
+            let click = Click {
+                after: 0.0,
+                pitch,
+                loudness: 1.0,
+            };
+            let samples: Vec<f32> = Voice::new(&click, RATE).collect();
+            assert_eq!(samples, Voice::new(&click, RATE).collect::<Vec<f32>>());
+            let (near, peak) = spectrum(&samples, pitch);
+            assert!(near > 0.7, "{pitch} Hz: {near}");
+            assert!((peak / pitch - 1.0).abs() < 0.05, "{pitch} Hz: {peak} Hz");
+            // The closed form of a sine that fades, at every sample.
+            let decay = (VIBRATIONS / pitch).max(SHORTEST_DECAY) * RATE;
+            for (n, sample) in samples.iter().enumerate() {
+                let (n, angle) = (n as f64, std::f64::consts::TAU * pitch / RATE);
+                let exact = AMPLITUDE * (-n / decay).exp() * (angle * n).sin();
+                assert!((f64::from(*sample) - exact).abs() < 1e-6);
+            }
+            assert!(samples.len() as f64 <= 0.3 * RATE);
+            let last = samples.last().copied().unwrap_or(1.0);
+            assert!(f64::from(last.abs()) <= 1.1 * SILENCE * AMPLITUDE);
+            // A quarter of the energy at half the loudness.
+            let energy = |loudness| -> f64 {
+                let voice = Voice::new(&Click { loudness, ..click }, RATE);
+                voice
+                    .map(|sample| f64::from(sample) * f64::from(sample))
+                    .sum()
+            };
+            let whole = 0.25 * AMPLITUDE * AMPLITUDE * decay;
+            assert!((energy(1.0) / whole - 1.0).abs() < 0.05, "{pitch} Hz");
+            assert!((energy(0.5) / energy(1.0) - 0.25).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn a_slow_device_gets_what_it_can_sound() {
+        let click = Click {
+            after: 0.0,
+            pitch: 8000.0,
+            loudness: 1.0,
+        };
+        let samples: Vec<f32> = Voice::new(&click, 8000.0).collect();
+        assert!(samples.iter().any(|sample| sample.abs() > 0.1));
+        assert!(samples.iter().all(|sample| sample.abs() <= 1.0));
+    }
+}

@@ -1,0 +1,189 @@
+//! The window within another page: the picture with a bar to play it, and the panels that its link asks for.
+
+use eframe::egui::{self, Frame, Panel, ScrollArea, Ui};
+
+use super::{App, transport};
+
+/// Width of the controls beside the picture, points.
+const CONTROLS: f32 = 250.0;
+/// Height of the plots, and of the controls below the picture, as shares of the window's.
+const PLOTS: f32 = 0.34;
+const BELOW: f32 = 0.4;
+/// Size of the frame that [`App::embedding`] writes, CSS pixels.
+const FRAME: [u32; 2] = [800, 500];
+
+/// A panel beside the picture of an embedded window.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Part {
+    Controls,
+    Timeline,
+    Plots,
+    Bench,
+}
+
+const PARTS: [(&str, Part); 4] = [
+    ("controls", Part::Controls),
+    ("timeline", Part::Timeline),
+    ("plots", Part::Plots),
+    ("bench", Part::Bench),
+];
+
+/// Which panels an embedded window has.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Embedded(Vec<Part>);
+
+impl Embedded {
+    /// Reads words separated by commas or spaces; none for the picture and its bar alone.
+    ///
+    /// # Errors
+    /// An unknown word; lists those there are.
+    pub fn read(text: &str) -> Result<Self, String> {
+        let words = text.split([',', ' ']).filter(|word| !word.is_empty());
+        let parts = words.map(|word| {
+            let known = PARTS.iter().find(|(own, _)| *own == word);
+            known.map(|(_, part)| *part).ok_or_else(|| {
+                let all = PARTS.map(|(word, _)| word).join(", ");
+                format!("no panel `{word}`; allowed, separated by commas: {all}")
+            })
+        });
+        Ok(Self(parts.collect::<Result<_, _>>()?))
+    }
+
+    /// The reverse of [`Self::read`].
+    pub fn write(&self) -> String {
+        let words = PARTS.iter().filter(|(_, part)| self.has(*part));
+        words.map(|(word, _)| *word).collect::<Vec<_>>().join(",")
+    }
+
+    fn has(&self, part: Part) -> bool {
+        self.0.contains(&part)
+    }
+}
+
+impl App {
+    /// The panels of an embedded window; `None` for a window of its own.
+    pub fn embedded(&self) -> Option<&Embedded> {
+        self.embedded.as_ref()
+    }
+
+    /// The whole of an embedded window.
+    pub(super) fn embedded_ui(&mut self, ui: &mut Ui, bar: Frame) {
+        let Some(panels) = self.embedded.clone() else {
+            return;
+        };
+        self.lesson_beside(ui, bar);
+        let free = !self.is_under_way();
+        let wide = ui.available_width() > ui.available_height();
+        let asked = Panel::bottom("transport")
+            .frame(bar)
+            .show(ui, |ui| {
+                if panels.has(Part::Timeline) {
+                    ui.add_enabled_ui(free, |ui| self.timeline_ui(ui));
+                }
+                ui.add_enabled_ui(free, |ui| transport::row(ui, &mut self.player))
+                    .inner
+            })
+            .inner;
+        if panels.has(Part::Controls) {
+            let panel = if wide {
+                Panel::left("controls").exact_size(CONTROLS.min(0.45 * ui.available_width()))
+            } else {
+                Panel::bottom("controls below").exact_size(BELOW * ui.available_height())
+            };
+            panel.frame(bar).resizable(false).show(ui, |ui| {
+                ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+                    ui.set_max_width(ui.available_width() - 10.0);
+                    ui.add_enabled_ui(free, |ui| self.controls.few(ui, &mut self.player));
+                });
+            });
+        }
+        if panels.has(Part::Bench) {
+            let panel = Panel::right("bench").exact_size(0.45 * ui.available_width());
+            let wish = panel.frame(bar).resizable(false).show(ui, |ui| {
+                ScrollArea::vertical()
+                    .id_salt("bench")
+                    .auto_shrink(false)
+                    .show(ui, |ui| {
+                        ui.set_max_width(ui.available_width() - 10.0);
+                        let bench = |ui: &mut Ui| self.bench.ui(ui, &mut self.player);
+                        ui.add_enabled_ui(free, bench).inner
+                    })
+                    .inner
+            });
+            if let Some(wish) = wish.inner {
+                self.bench_asks(wish);
+            }
+        }
+        if panels.has(Part::Plots) {
+            let panel = Panel::bottom("plots").exact_size(PLOTS * ui.available_height());
+            let asked = panel.frame(bar).resizable(false).show(ui, |ui| {
+                ui.take_available_space();
+                self.plots.ui(ui, &self.player)
+            });
+            if let Some(time) = asked.inner.filter(|_| free) {
+                self.player.go_to(time);
+                self.viewport.arrive(&self.player);
+            }
+        }
+        self.central(ui, asked);
+    }
+
+    /// The line of HTML that shows this state in a frame of another page, with the three most important controls.
+    ///
+    /// # Errors
+    /// Text: there is no page, or the state does not fit in a link.
+    pub fn embedding(&self) -> Result<String, String> {
+        let address = self.host.address();
+        if address.is_empty() {
+            let why = "There is no page to show in a frame: --page or JOINTPLAY_PAGE gives the address of one";
+            return Err(why.to_owned());
+        }
+        let panels = self.embedded.clone();
+        let mut link = self.link();
+        link.embedded = Some(panels.unwrap_or_else(|| Embedded(vec![Part::Controls])));
+        let (fragment, _) = link.format_short(self.player.wanted())?;
+        let text = |text: &str| {
+            let text = text.replace('&', "&amp;").replace('"', "&quot;");
+            text.replace('<', "&lt;")
+        };
+        let [width, height] = FRAME;
+        Ok(format!(
+            "<iframe src=\"{}\" width=\"{width}\" height=\"{height}\" style=\"border: 0\" loading=\"lazy\" \
+             allow=\"fullscreen; clipboard-write\" title=\"{}\"></iframe>",
+            text(&format!("{address}#{fragment}")),
+            text(&self.player.scene().title)
+        ))
+    }
+
+    /// Copies [`Self::embedding`].
+    pub(super) fn copy_embedding(&mut self, ctx: &egui::Context) {
+        match self.embedding() {
+            Ok(line) => {
+                ctx.copy_text(line);
+                self.say("Line for another page copied".to_owned());
+            }
+            Err(reason) => self.problem = Some(reason),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_say_which_panels_there_are() {
+        for words in ["", "controls", "controls,timeline,plots,bench"] {
+            assert_eq!(Embedded::read(words).expect("read").write(), words);
+        }
+        assert_eq!(
+            Embedded::read("plots controls").expect("read").write(),
+            "controls,plots"
+        );
+        let error = Embedded::read("slider").expect_err("no panel");
+        assert!(
+            error.contains("`slider`") && error.contains("controls"),
+            "{error}"
+        );
+    }
+}

@@ -1,0 +1,479 @@
+//! Lessons: steps with a text and a state of the machine, questions that the run answers, and what was to be seen.
+
+mod built_in;
+mod format;
+mod measure;
+mod names;
+mod panel;
+mod spots;
+#[cfg(test)]
+mod tests;
+mod text;
+
+use std::sync::Arc;
+
+use eframe::egui;
+
+use super::layout::Sheet;
+use super::log::Event;
+use super::player::Player;
+use super::replay::Verdict;
+use super::{App, replay_budget};
+pub use built_in::{BUILT_IN_LESSONS, lesson_titles};
+pub use format::Lesson;
+use format::{Look, PanelName, Step};
+use measure::Measured;
+use names::{Names, comparisons};
+use spots::Spots;
+
+/// A live change belongs to a step's run if it came at most this long after its instant, s: the longest step of a solver.
+const LATE: f64 = 10e-3;
+
+/// A lesson under way.
+pub struct Course {
+    lesson: Arc<Lesson>,
+    step: usize,
+    /// The machine is on its way to the state of the step.
+    sets: bool,
+    /// The choice that the class predicts.
+    predicted: Option<usize>,
+    /// The machine has come to the end of the step.
+    reached: bool,
+    /// What shows then has not been drawn yet.
+    fresh: bool,
+    measured: Measured,
+}
+
+impl Course {
+    /// At step `step`, counted from 0, or the last one.
+    pub fn new(lesson: Arc<Lesson>, step: usize) -> Self {
+        Self {
+            step: step.min(lesson.steps.len() - 1),
+            sets: false,
+            predicted: None,
+            reached: false,
+            fresh: false,
+            measured: Measured::new(lesson.clone()),
+            lesson,
+        }
+    }
+
+    /// The lesson.
+    pub fn lesson(&self) -> &Lesson {
+        &self.lesson
+    }
+
+    /// Index of the step.
+    pub fn step(&self) -> usize {
+        self.step
+    }
+
+    /// Name and step, counted from 1, for a link: only a built-in lesson is known elsewhere.
+    pub(super) fn shared(&self) -> Option<(String, usize)> {
+        let name = &self.lesson.name;
+        let known = BUILT_IN_LESSONS.iter().any(|(own, _)| own == name);
+        known.then(|| (name.clone(), self.step + 1))
+    }
+
+    fn now(&self) -> &Step {
+        &self.lesson.steps[self.step]
+    }
+
+    /// Whether the answer, and what was to be seen, is on show.
+    pub fn is_reached(&self) -> bool {
+        self.reached
+    }
+
+    /// Whether the machine is still being set.
+    pub fn is_busy(&self) -> bool {
+        self.sets
+    }
+
+    /// Computes everything that the lesson measures, however long that takes.
+    ///
+    /// # Errors
+    /// Why it cannot be computed.
+    pub fn measure(&mut self) -> Result<(), String> {
+        self.measured.advance(|| true);
+        self.measured
+            .fault()
+            .map_or(Ok(()), |why| Err(why.to_owned()))
+    }
+
+    /// Index of the right choice of the question of this step; `None` while it is not known.
+    pub fn right(&self) -> Option<usize> {
+        let names = self.measured.names();
+        let choices = &self.now().question.as_ref()?.choices;
+        choices
+            .iter()
+            .position(|choice| names.holds(&choice.when) == Some(true))
+    }
+
+    /// The instant to which the machine is to run, s.
+    pub fn until(&self) -> Option<f64> {
+        self.measured.names().time(self.now().until.as_ref()?)
+    }
+
+    /// What is wrong with the lesson, if it does not hold what it says: texts that cannot be filled in, claims that do not hold,
+    /// questions with no right choice or with several. Everything is computed first.
+    ///
+    /// # Errors
+    /// The first such fault, in words.
+    pub fn examine(&mut self) -> Result<(), String> {
+        self.measure()?;
+        let names = self.measured.names();
+        for (index, step) in self.lesson.steps.iter().enumerate() {
+            let at = |what: String| format!("{}, step {}: {what}", self.lesson.name, index + 1);
+            let question = step.question.as_ref();
+            let asked = question.into_iter().flat_map(|question| {
+                let choices = question.choices.iter().map(|choice| &choice.text);
+                std::iter::once(&question.ask).chain(choices)
+            });
+            for text in [&step.text, &step.seen].into_iter().chain(asked) {
+                text::fill(text, &names).map_err(at)?;
+            }
+            for claim in &step.claims {
+                if names.holds(claim) != Some(true) {
+                    let values = known_values(claim, &names);
+                    return Err(at(format!("`{claim}` does not hold: {values}")));
+                }
+            }
+            if let Some(question) = question {
+                let right = question
+                    .choices
+                    .iter()
+                    .filter(|c| names.holds(&c.when) == Some(true));
+                let right: Vec<&str> = right.map(|choice| &*choice.text).collect();
+                if right.len() != 1 {
+                    let values: Vec<String> = question
+                        .choices
+                        .iter()
+                        .map(|c| known_values(&c.when, &names))
+                        .collect();
+                    let values = values.join("; ");
+                    return Err(at(format!(
+                        "{} choices are right: {right:?}: {values}",
+                        right.len()
+                    )));
+                }
+            }
+            if let Some(until) = &step.until {
+                let begin = self.lesson.steps[self.lesson.beginning(index)].link.time;
+                if !names.time(until).is_some_and(|until| Some(until) > begin) {
+                    return Err(at(format!("`{until}` is no instant after its beginning")));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// What the right choice of the question says; `None` while it is not known.
+    pub fn answer(&self) -> Option<String> {
+        let choice = &self.now().question.as_ref()?.choices[self.right()?];
+        text::fill(&choice.text, &self.measured.names()).ok()
+    }
+
+    /// The whole lesson, with its values and its answers, after [`Self::examine`].
+    ///
+    /// # Errors
+    /// As [`Self::examine`].
+    pub fn print(&mut self) -> Result<String, String> {
+        self.examine()?;
+        let mut out = format!("{}\n", self.lesson.title);
+        let lesson = self.lesson.clone();
+        for (index, step) in lesson.steps.iter().enumerate() {
+            self.step = index;
+            let names = self.measured.names();
+            let words = |text: &str| {
+                let filled = text::fill(text, &names).unwrap_or_default();
+                let blocks = text::blocks(&filled);
+                let lines = blocks.iter().map(|block| {
+                    let letters: String = block.pieces.iter().map(|piece| &*piece.text).collect();
+                    format!("  {}{letters}\n", if block.entry { "- " } else { "" })
+                });
+                lines.collect::<String>()
+            };
+            out += &format!("\n{}. {}\n{}", index + 1, step.title, words(&step.text));
+            if let Some(question) = &step.question {
+                out += &words(&question.ask);
+                for (index, choice) in question.choices.iter().enumerate() {
+                    let mark = if self.right() == Some(index) {
+                        "x"
+                    } else {
+                        " "
+                    };
+                    out += &format!("  [{mark}]{}", words(&choice.text));
+                }
+            }
+            out += &words(&step.seen);
+        }
+        Ok(out)
+    }
+
+    /// Whether the run on show is that of the step: nobody has changed the machine.
+    fn is_own(&self, player: &Player) -> bool {
+        let run = &self.lesson.runs[self.now().run];
+        let log = player.log();
+        let begin = &self.lesson.steps[self.lesson.beginning(self.step)];
+        let same = (!begin.twin || player.twin().is_some())
+            && log.base == run.scene.changes
+            && player.scene().source.text == run.scene.source.text
+            && log.entries.len() == run.changes.len();
+        let mut pairs = log.entries.iter().zip(player.flags()).zip(&run.changes);
+        same && pairs.all(|((entry, flag), (time, key, value))| {
+            entry.event == Event::set(key, value) && (0.0..=LATE).contains(&(flag.time - time))
+        })
+    }
+}
+
+/// The sides of a condition with their values.
+fn known_values(condition: &str, names: &Names<'_>) -> String {
+    let mut out: Vec<String> = Vec::new();
+    for (left, _, right) in comparisons(condition).unwrap_or_default() {
+        for side in [left, right] {
+            let value = crate::scene::evaluate(side, &names.known)
+                .map_err(|error| error.to_string())
+                .and_then(|quantity| text::words(quantity, None));
+            out.push(format!("{side} is {}", value.unwrap_or_else(|why| why)));
+        }
+    }
+    out.join(", ")
+}
+
+impl App {
+    /// The lesson under way.
+    pub fn course(&self) -> Option<&Course> {
+        self.course.as_deref()
+    }
+
+    /// Goes on with `lesson` at step `step`, counted from 0; if it `begins` there, the machine is set for it.
+    pub(super) fn join_lesson(&mut self, lesson: Arc<Lesson>, step: usize, begins: bool) {
+        self.course = Some(Box::new(Course::new(lesson, step)));
+        self.sheet = Some(Sheet::Lesson);
+        if begins {
+            self.set_step();
+        }
+    }
+
+    /// Begins a built-in lesson.
+    pub(super) fn open_lesson(&mut self, name: &str) {
+        match Lesson::built_in(name) {
+            Ok(lesson) => self.join_lesson(lesson, 0, true),
+            Err(error) => self.problem = Some(error.to_string()),
+        }
+    }
+
+    /// Ends the lesson; the machine stays as it is.
+    pub(super) fn leave_lesson(&mut self) {
+        self.course = None;
+        if self.sheet == Some(Sheet::Lesson) {
+            self.sheet = None;
+        }
+    }
+
+    /// To the next step of the lesson, or to the one before.
+    pub(super) fn turn_page(&mut self, forward: bool) {
+        let Some(course) = &mut self.course else {
+            return;
+        };
+        let last = course.lesson.steps.len() - 1;
+        let step = match forward {
+            true if course.step < last => course.step + 1,
+            false if course.step > 0 => course.step - 1,
+            _ => return,
+        };
+        // A step that goes on needs no new state, as long as the machine is where the one before it left it: not short of where it
+        // ends, and not past where this one ends, which would give the answer away.
+        let shown = self.player.pacer.shown();
+        let end = |step: usize| {
+            let until = course.lesson.steps[step].until.as_ref();
+            until.and_then(|until| course.measured.names().time(until))
+        };
+        let in_place = end(course.step).is_none_or(|end| shown >= end)
+            && end(step).is_none_or(|end| shown < end);
+        let begins = course.lesson.steps[step].begins;
+        let goes_on = forward && !begins && in_place && course.is_own(&self.player);
+        (course.step, course.predicted, course.reached) = (step, None, false);
+        if goes_on {
+            self.player.set_playing(false);
+            self.look_at_step(false);
+        } else {
+            self.set_step();
+        }
+    }
+
+    /// Puts the machine in the state of the step: that with which its run begins, or where the step before it in that run ends.
+    pub(super) fn set_step(&mut self) {
+        let Some(course) = &mut self.course else {
+            return;
+        };
+        (course.sets, course.predicted, course.reached) = (true, None, false);
+        let begin = &course.lesson.steps[course.lesson.beginning(course.step)];
+        let (scene, link) = (
+            course.lesson.runs[begin.run].scene.clone(),
+            begin.link.clone(),
+        );
+        let before = &course.lesson.steps[course.lesson.beginning(course.step)..course.step];
+        let names = course.measured.names();
+        let mut ends = before.iter().rev().filter_map(|step| step.until.as_ref());
+        let whole = begin.twin || !course.lesson.runs[begin.run].changes.is_empty();
+        let left_at = ends.find_map(|until| names.time(until)).filter(|_| !whole);
+        let same = self.player.wanted().source.text == scene.source.text;
+        let pose = self
+            .viewport
+            .pose()
+            .filter(|_| same && link.camera.is_none());
+        self.problem = self.show_scene(&scene).err();
+        self.player.set_playing(false);
+        if let Some(pose) = pose {
+            self.viewport.set_pose(pose);
+        }
+        let mut link = link;
+        // What is changed live, or compared with a twin, has to be gone through from the beginning.
+        if let Some(end) = left_at {
+            link.time = Some(end);
+        }
+        link.instruments.get_or_insert_default();
+        self.set_look(&link);
+        self.show_link(link);
+    }
+
+    /// The settings of a link that [`Self::show_link`] leaves to who opens it.
+    fn set_look(&mut self, link: &super::Link) {
+        if let Some(scale) = link.time_scale {
+            self.player.pacer.set_scale(scale);
+        }
+        if let Some(magnification) = link.magnification {
+            self.viewport.options.magnification = magnification;
+        }
+    }
+
+    /// Shows what the step wants to be seen; the machine stays where it is. `anew`: it was just set, and what the steps before
+    /// asked for holds as well.
+    fn look_at_step(&mut self, anew: bool) {
+        let Some(course) = &self.course else {
+            return;
+        };
+        let (lesson, last) = (course.lesson.clone(), course.step);
+        let first = if anew { 0 } else { last };
+        let steps = &lesson.steps[first..=last];
+        let begin = if anew { lesson.beginning(last) } else { last };
+        for step in &lesson.steps[begin..=last] {
+            if !step.begins && step.link != super::Link::default() {
+                self.set_look(&step.link);
+                self.show_link(step.link.clone());
+            }
+        }
+        // The camera is where the latest of them wants it.
+        let places = |step: &&Step| step.view.is_some() || step.link.camera.is_some();
+        match steps.iter().rev().find(places).and_then(|step| step.view) {
+            Some(Look::From(preset)) => self.viewport.preset(preset),
+            Some(Look::At(joint)) => {
+                self.viewport.close_up(&self.player, joint);
+            }
+            None => {}
+        }
+        if let Some(open) = steps.iter().rev().find_map(|step| step.open.as_ref()) {
+            let is_open = |panel| open.contains(&panel);
+            self.show_controls = is_open(PanelName::Controls);
+            self.show_plots = is_open(PanelName::Plots);
+            self.show_bench = is_open(PanelName::Bench);
+        }
+    }
+
+    /// Goes on with what a lesson does beside the run: computes what it measures, and stops the machine where the step ends.
+    pub(super) fn advance_lesson(&mut self, ctx: &egui::Context) {
+        let Some(course) = &mut self.course else {
+            return;
+        };
+        if !course.measured.advance(replay_budget(self.player.clock)) {
+            ctx.request_repaint();
+        }
+        if course.sets {
+            if self.replay.is_some() {
+                return;
+            }
+            course.sets = false;
+            if self.verdict == Some(Verdict::Reached) {
+                self.verdict = None;
+            }
+            let begin = &course.lesson.steps[course.lesson.beginning(course.step)];
+            for (_, key, value) in &course.lesson.runs[begin.run].changes {
+                if let Err(error) = self.player.set(key, value) {
+                    self.problem = Some(error.to_string());
+                }
+            }
+            if begin.twin {
+                self.player.set_twin(true);
+            }
+            self.look_at_step(true);
+            ctx.request_repaint();
+            return;
+        }
+        if course.reached || self.is_under_way() {
+            return;
+        }
+        let Some(course) = &mut self.course else {
+            return;
+        };
+        if let Some(until) = course.until()
+            && self.player.pacer.shown() >= until
+        {
+            (course.reached, course.fresh) = (true, true);
+            if self.player.is_playing() {
+                self.player.go_to(until);
+                self.viewport.arrive(&self.player);
+            }
+            ctx.request_repaint();
+        }
+    }
+
+    /// Rings around what the step points at, over everything: they move nothing.
+    pub(super) fn point_out(&self, ui: &egui::Ui) {
+        let wanted = self
+            .course()
+            .map_or(&[][..], |course| &course.now().highlight);
+        let joints = &self.player.scene().ball_joints;
+        let joint = |name: &String| joints.iter().position(|joint| joint.name == *name);
+        let labels: Vec<String> = wanted
+            .iter()
+            .filter(|name| joint(name).is_none())
+            .cloned()
+            .collect();
+        let places = Spots::places(ui.ctx(), &labels);
+        let stroke = egui::Stroke::new(3.0, super::theme::series(1, ui.visuals().dark_mode));
+        let layer = egui::LayerId::new(egui::Order::Foreground, egui::Id::unique("rings"));
+        let painter = ui.ctx().layer_painter(layer);
+        for (_, rect) in places {
+            painter.rect_stroke(rect.expand(4.0), 8.0, stroke, egui::StrokeKind::Outside);
+        }
+        let inside = painter.with_clip_rect(self.picture_rect);
+        for joint in wanted.iter().filter_map(joint) {
+            let centre = self
+                .player
+                .frame()
+                .joints
+                .get(joint)
+                .map(|joint| joint.ball_centre);
+            if let Some(place) = centre.and_then(|centre| self.place_in_view(&centre)) {
+                inside.circle_stroke(place, 26.0, stroke);
+            }
+        }
+    }
+
+    /// Whether all that the step points at is in sight.
+    pub fn points_out(&self, ctx: &egui::Context) -> bool {
+        let Some(course) = self.course() else {
+            return true;
+        };
+        let wanted = &course.now().highlight;
+        let joints = &self.player.scene().ball_joints;
+        let is_joint = |name: &&String| joints.iter().any(|joint| joint.name == **name);
+        let labels: Vec<String> = wanted
+            .iter()
+            .filter(|name| !is_joint(name))
+            .cloned()
+            .collect();
+        Spots::places(ctx, &labels).len() == labels.len()
+    }
+}

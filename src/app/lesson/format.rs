@@ -1,0 +1,684 @@
+//! The file of a lesson: `docs/lessons.md` says what may stand in it.
+
+use std::collections::BTreeMap;
+use std::io::Read as _;
+use std::ops::Range;
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::names::{Names, comparisons, parameter};
+use super::text;
+use crate::app::share::{Link, SceneText};
+use crate::scene::{Dimension, LARGEST_FILE, Quantity, Scene, SceneError, suggest};
+use crate::view::Preset;
+
+/// Most steps of a lesson, measures, and choices of a question.
+const MOST_STEPS: usize = 40;
+const MOST_MEASURES: usize = 100;
+const MOST_CHOICES: usize = 6;
+
+/// Where the measures of a run end if nothing else is said.
+const END: &str = "120 s";
+const START: &str = "0 s";
+
+/// A lesson as it was read.
+#[derive(Clone, Debug)]
+pub struct Lesson {
+    /// Name of a built-in one, or the file.
+    pub name: String,
+    /// Title, in sentence case.
+    pub title: String,
+    /// The runs that its steps begin.
+    pub runs: Vec<Run>,
+    /// What is measured in them.
+    pub measures: Vec<Measure>,
+    /// In order.
+    pub steps: Vec<Step>,
+}
+
+/// A run that a step begins.
+#[derive(Clone, Debug)]
+pub struct Run {
+    /// Name of the step.
+    pub name: String,
+    /// Scene with the values that it begins with.
+    pub scene: Scene,
+    /// Live changes: time, s, key and value.
+    pub changes: Vec<(f64, String, String)>,
+}
+
+/// What is read from a run.
+#[derive(Clone, Debug)]
+pub struct Measure {
+    /// By this name expressions use it.
+    pub name: String,
+    /// Index of its run.
+    pub run: usize,
+    /// What it is.
+    pub kind: Kind,
+    /// Expressions of the instants from and up to which it is taken.
+    pub times: [String; 2],
+}
+
+/// Kinds of measures.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Kind {
+    /// A parameter of the scene, by its key.
+    Parameter(String),
+    /// An instant that texts and other measures name.
+    Instant,
+    /// Something of one impact of a ball joint, counted from 1.
+    Impact {
+        /// Its name, or `any`.
+        of: String,
+        /// Which one.
+        number: usize,
+        /// What of it.
+        its: Its,
+    },
+    /// Number of finished impacts of a ball joint, or of `any`.
+    Count {
+        /// Its name.
+        of: String,
+    },
+    /// Largest value of a channel.
+    Peak(String),
+    /// Smallest one.
+    Least(String),
+    /// Its mean over time.
+    Mean(String),
+    /// Its value at an instant.
+    At(String),
+    /// Distance of a twin run, in scales of the state.
+    Apart,
+}
+
+impl Kind {
+    /// Its dimension; of a channel none, that is known from the scene in motion.
+    pub fn dimension(&self) -> Dimension {
+        match self {
+            Self::Impact { its, .. } => match its {
+                Its::Start | Its::End | Its::Duration => Dimension::Time,
+                Its::Approach | Its::Rebound => Dimension::Speed,
+                Its::Force => Dimension::Force,
+                Its::Depth => Dimension::Length,
+            },
+            Self::Instant => Dimension::Time,
+            _ => Dimension::None,
+        }
+    }
+
+    /// The ball joint that it is about.
+    pub fn joint(&self) -> Option<&str> {
+        match self {
+            Self::Impact { of, .. } | Self::Count { of } => Some(of),
+            _ => None,
+        }
+    }
+
+    /// The channel that it reads.
+    pub fn channel(&self) -> Option<&str> {
+        match self {
+            Self::Peak(name) | Self::Least(name) | Self::Mean(name) | Self::At(name) => Some(name),
+            _ => None,
+        }
+    }
+}
+
+/// What can be asked of an impact.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[allow(missing_docs)]
+pub enum Its {
+    Start,
+    End,
+    Duration,
+    Approach,
+    Rebound,
+    Force,
+    Depth,
+}
+
+/// A step.
+#[derive(Clone, Debug)]
+pub struct Step {
+    /// Title, in sentence case.
+    pub title: String,
+    /// Markdown with placeholders.
+    pub text: String,
+    /// Index of the run that it is about.
+    pub run: usize,
+    /// Whether it begins that run anew, and at which instant it begins.
+    pub begins: bool,
+    /// What else its state says.
+    pub link: Link,
+    /// What the camera looks at.
+    pub view: Option<Look>,
+    /// Panels that are open; `None`: those that are.
+    pub open: Option<Vec<PanelName>>,
+    /// Whether a twin run begins with it.
+    pub twin: bool,
+    /// Labels of controls, and ball joints.
+    pub highlight: Vec<String>,
+    /// Expression of the instant to which the machine is to run.
+    pub until: Option<String>,
+    /// What the class predicts.
+    pub question: Option<Question>,
+    /// What it should have seen by then.
+    pub seen: String,
+    /// Conditions that hold.
+    pub claims: Vec<String>,
+}
+
+/// What a step's camera looks at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Look {
+    /// Everything, from there.
+    From(Preset),
+    /// A ball joint from close up, by its index.
+    At(usize),
+}
+
+/// A panel of the window.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[allow(missing_docs)]
+pub enum PanelName {
+    Controls,
+    Plots,
+    Bench,
+}
+
+/// A question that the run answers.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Question {
+    /// The question.
+    pub ask: String,
+    /// The choices.
+    pub choices: Vec<Choice>,
+}
+
+/// A choice.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Choice {
+    /// What it says.
+    pub text: String,
+    /// Condition under which it is right.
+    pub when: String,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    title: String,
+    scene: Spanned<String>,
+    #[serde(default)]
+    measure: BTreeMap<String, Spanned<MeasureRow>>,
+    step: Vec<Spanned<StepRow>>,
+}
+
+#[derive(Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MeasureRow {
+    parameter: Option<String>,
+    instant: Option<String>,
+    impact: Option<usize>,
+    its: Option<Its>,
+    of: Option<String>,
+    impacts: Option<String>,
+    peak: Option<String>,
+    least: Option<String>,
+    mean: Option<String>,
+    value: Option<String>,
+    twin: Option<String>,
+    from: Option<String>,
+    to: Option<String>,
+    at: Option<String>,
+    run: Option<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StepRow {
+    title: String,
+    name: Option<String>,
+    text: Spanned<String>,
+    state: Option<Spanned<String>>,
+    change: Option<Spanned<BTreeMap<String, String>>>,
+    view: Option<Spanned<String>>,
+    open: Option<Vec<PanelName>>,
+    #[serde(default)]
+    twin: bool,
+    #[serde(default)]
+    highlight: Vec<String>,
+    until: Option<Spanned<String>>,
+    question: Option<Spanned<Question>>,
+    seen: Option<Spanned<String>>,
+    #[serde(default)]
+    claims: Vec<Spanned<String>>,
+}
+
+/// A text of a lesson and where it comes from.
+struct Source<'t> {
+    file: Option<&'t str>,
+    text: &'t str,
+}
+
+impl Source<'_> {
+    /// An error at `span`; `key` if it is known.
+    fn error(&self, span: Range<usize>, key: &str, message: impl Into<String>) -> SceneError {
+        let value = self.text.get(span.clone()).unwrap_or_default();
+        let value = value
+            .lines()
+            .next()
+            .filter(|line| *line == value && line.len() < 60);
+        SceneError::in_text(self.file, self.text, span.start, Some(key), value, message)
+    }
+
+    /// An error at `part` within `span`.
+    fn within(&self, span: Range<usize>, part: &str, key: &str, message: String) -> SceneError {
+        let inside = self.text.get(span.clone()).unwrap_or_default();
+        let at = span.start + inside.find(part).unwrap_or(0);
+        SceneError::in_text(self.file, self.text, at, Some(key), None, message)
+    }
+}
+
+/// The key of the line in which `at` stands, for errors that do not know it.
+fn key_at(text: &str, at: usize) -> Option<&str> {
+    let begin = text.get(..at)?.rfind('\n').map_or(0, |line| line + 1);
+    let (key, _) = text.get(begin..)?.lines().next()?.split_once('=')?;
+    Some(key.trim()).filter(|key| !key.is_empty())
+}
+
+impl Lesson {
+    /// A file by its path.
+    ///
+    /// # Errors
+    /// A file that cannot be read, and as [`Self::parse`].
+    pub fn read(path: &str) -> Result<Self, SceneError> {
+        let wrong = |message: String| SceneError {
+            file: Some(path.to_owned()),
+            message,
+            unreadable: true,
+            ..SceneError::default()
+        };
+        let mut text = String::new();
+        // One byte more than allowed: a pipe does not report its size.
+        std::fs::File::open(path)
+            .and_then(|file| file.take(LARGEST_FILE + 1).read_to_string(&mut text))
+            .map_err(|why| wrong(format!("cannot read this lesson: {why}")))?;
+        if text.len() as u64 > LARGEST_FILE {
+            return Err(wrong(format!(
+                "more than {} MiB: no lesson",
+                LARGEST_FILE >> 20
+            )));
+        }
+        Self::parse(path, &text, Some(path))
+    }
+
+    /// Reads a lesson called `name`.
+    ///
+    /// # Errors
+    /// Whatever is wrong with it: file, line, column, key, and what is allowed.
+    pub fn parse(name: &str, text: &str, file: Option<&str>) -> Result<Self, SceneError> {
+        let source = Source { file, text };
+        let rows: File = toml::from_str(text).map_err(|error| {
+            let at = error.span().map_or(0, |span| span.start);
+            SceneError::in_text(file, text, at, key_at(text, at), None, error.message())
+        })?;
+        let whole = || rows.scene.span();
+        if !(1..=MOST_STEPS).contains(&rows.step.len()) {
+            let message = format!("{} steps; allowed 1 to {MOST_STEPS}", rows.step.len());
+            return Err(source.error(whole(), "step", message));
+        }
+        if rows.measure.len() > MOST_MEASURES {
+            let message = format!("{} measures; allowed {MOST_MEASURES}", rows.measure.len());
+            return Err(source.error(whole(), "measure", message));
+        }
+        let mut lesson = Self {
+            name: name.to_owned(),
+            title: rows.title.clone(),
+            runs: Vec::new(),
+            measures: Vec::new(),
+            steps: Vec::new(),
+        };
+        for row in &rows.step {
+            let step = lesson.step(&source, &rows.scene, row)?;
+            lesson.steps.push(step);
+        }
+        for (name, row) in &rows.measure {
+            let measure = lesson
+                .measure(name, row.get_ref())
+                .map_err(|message| source.error(row.span(), &format!("measure.{name}"), message))?;
+            lesson.measures.push(measure);
+        }
+        lesson.check(&source, &rows)?;
+        Ok(lesson)
+    }
+
+    /// Its measures, none of which is known yet.
+    pub fn names(&self) -> Names<'_> {
+        let one = |measure: &Measure| Quantity::new(1.0, measure.kind.dimension());
+        let all = self.measures.iter();
+        Names::to_come(
+            all.map(|measure| (measure.name.as_str(), one(measure)))
+                .collect(),
+        )
+    }
+
+    /// The last step up to `step` that begins a run: there the machine is set for it.
+    pub fn beginning(&self, step: usize) -> usize {
+        let before = self.steps[..=step].iter();
+        before
+            .rev()
+            .position(|step| step.begins)
+            .map_or(0, |back| step - back)
+    }
+
+    fn step(
+        &mut self,
+        source: &Source<'_>,
+        scene: &Spanned<String>,
+        row: &Spanned<StepRow>,
+    ) -> Result<Step, SceneError> {
+        let at = format!("step {}", self.steps.len() + 1);
+        let key = |name: &str| format!("{at}.{name}");
+        let span = row.span();
+        let row = row.get_ref();
+        let state = row.state.as_ref();
+        let words = state.map_or("", |state| state.get_ref());
+        let wrong = |message: String| {
+            let span = state.map_or(span.clone(), Spanned::span);
+            source.error(span, &key("state"), message)
+        };
+        let mut link = Link::parse(&format!("?{}", words.trim_start_matches(['?', '#'])))
+            .map_err(|error| wrong(error.to_string()))?;
+        if !link.log.entries.is_empty() {
+            let message =
+                "has changes made on the way packed in `log`; write them as `change` of a step";
+            return Err(wrong(message.to_owned()));
+        }
+        (link.steps, link.hash) = (None, None);
+        let named = words
+            .split(['&', '?'])
+            .any(|word| word.starts_with("scene="));
+        let first = self.runs.is_empty();
+        let begins = first || named || link.has_instant() || !link.log.base.is_empty();
+        if begins {
+            let argument = match &link.scene {
+                SceneText::BuiltIn(name) if named => name.clone(),
+                SceneText::BuiltIn(_) => beside(scene.get_ref(), source.file),
+                SceneText::File { .. } => {
+                    let message = "carries a scene file; name the file as `scene` of the lesson";
+                    return Err(wrong(message.to_owned()));
+                }
+            };
+            let loaded = Scene::load(&argument, &[])
+                .map_err(|error| source.error(scene.span(), "scene", error.to_string()))?;
+            let loaded = match &link.log.base[..] {
+                [] => loaded,
+                base => Scene::load(&argument, base).map_err(|error| wrong(error.to_string()))?,
+            };
+            link.time.get_or_insert(0.0);
+            // As long as the machine is being set, a link copied is this one.
+            link.scene = SceneText::of(&loaded);
+            let name = row.name.clone().unwrap_or_default();
+            let same = |run: &Run| !name.is_empty() && run.name == name;
+            if self.runs.iter().any(same) {
+                let message = format!("another step is called `{name}`");
+                return Err(source.error(span, &key("name"), message));
+            }
+            self.runs.push(Run {
+                name,
+                scene: loaded,
+                changes: Vec::new(),
+            });
+        } else if row.name.is_some() {
+            let message = "only a step whose state names an instant, a parameter or a scene begins a run that has a name";
+            return Err(source.error(span, &key("name"), message));
+        }
+        let index = self.runs.len() - 1;
+        let run = &mut self.runs[index];
+        let scene = run.scene.clone();
+        if let Some(change) = &row.change {
+            let wrong = |message: String| source.error(change.span(), &key("change"), message);
+            let Some(time) = link.time.filter(|_| begins) else {
+                return Err(wrong(
+                    "needs a state with an instant, such as `t=20ms`".to_owned(),
+                ));
+            };
+            let mut changed = scene.clone();
+            for (key, value) in change.get_ref() {
+                let done = changed.set(key, value);
+                done.map_err(|error| wrong(error.to_string()))?;
+                run.changes.push((time, key.clone(), value.clone()));
+            }
+        }
+        let followed = link.followed(&scene).and(link.under_microscope(&scene));
+        followed.map_err(|error| wrong(error.to_string()))?;
+        let view = row.view.as_ref().map(|view| {
+            look(view.get_ref(), &scene)
+                .map_err(|message| source.error(view.span(), &key("view"), message))
+        });
+        let view = view.transpose()?;
+        if let Some(question) = &row.question {
+            let wrong = |message: String| source.error(question.span(), &key("question"), message);
+            let count = question.get_ref().choices.len();
+            if !(2..=MOST_CHOICES).contains(&count) {
+                return Err(wrong(format!(
+                    "{count} choices; allowed 2 to {MOST_CHOICES}"
+                )));
+            }
+            if row.until.is_none() {
+                return Err(wrong(
+                    "needs `until`: the instant at which the answer shows".to_owned(),
+                ));
+            }
+        }
+        Ok(Step {
+            title: row.title.clone(),
+            text: row.text.get_ref().clone(),
+            run: index,
+            begins,
+            link,
+            view,
+            open: row.open.clone(),
+            twin: row.twin,
+            highlight: row.highlight.clone(),
+            until: row.until.as_ref().map(|until| until.get_ref().clone()),
+            question: row
+                .question
+                .as_ref()
+                .map(|question| question.get_ref().clone()),
+            seen: row
+                .seen
+                .as_ref()
+                .map_or(String::new(), |seen| seen.get_ref().clone()),
+            claims: row
+                .claims
+                .iter()
+                .map(|claim| claim.get_ref().clone())
+                .collect(),
+        })
+    }
+
+    fn measure(&self, name: &str, row: &MeasureRow) -> Result<Measure, String> {
+        const KINDS: &str = "parameter, instant, impact, impacts, peak, least, mean, value, twin";
+        let MeasureRow {
+            parameter: key,
+            instant,
+            impact,
+            its,
+            of,
+            impacts,
+            peak,
+            least,
+            mean,
+            value,
+            twin,
+            from,
+            to,
+            at,
+            run,
+        } = row.clone();
+        let given = [
+            key.map(Kind::Parameter),
+            instant.is_some().then_some(Kind::Instant),
+            impact.map(|number| Kind::Impact {
+                of: of.clone().unwrap_or_else(|| "any".to_owned()),
+                number,
+                its: its.unwrap_or(Its::Start),
+            }),
+            impacts.map(|of| Kind::Count { of }),
+            peak.map(Kind::Peak),
+            least.map(Kind::Least),
+            mean.map(Kind::Mean),
+            value.map(Kind::At),
+            twin.is_some().then_some(Kind::Apart),
+        ];
+        let given: Vec<Kind> = given.into_iter().flatten().collect();
+        let [kind] = &given[..] else {
+            return Err(format!(
+                "{} of these keys; allowed one: {KINDS}",
+                given.len()
+            ));
+        };
+        if matches!(kind, Kind::Impact { number: 0, .. }) {
+            return Err("impact = 0: allowed 1 and more; they count from 1".to_owned());
+        }
+        if (its.is_some() || of.is_some()) && !matches!(kind, Kind::Impact { .. }) {
+            return Err("`its` and `of` belong to `impact`".to_owned());
+        }
+        if at.is_some() != matches!(kind, Kind::At(_)) {
+            return Err("`value` needs `at`, the instant, and no other key takes it".to_owned());
+        }
+        let ends = match kind {
+            Kind::Peak(_) | Kind::Least(_) | Kind::Mean(_) | Kind::Count { .. } => to.is_some(),
+            _ => true,
+        };
+        if !ends {
+            return Err("needs `to`, the instant at which it ends".to_owned());
+        }
+        let run = match run {
+            None => 0,
+            Some(name) => self
+                .runs
+                .iter()
+                .position(|run| run.name == name)
+                .ok_or_else(|| {
+                    let names = self
+                        .runs
+                        .iter()
+                        .map(|run| &*run.name)
+                        .filter(|name| !name.is_empty());
+                    let near = suggest(&name, names.clone());
+                    let known: Vec<&str> = names.collect();
+                    format!(
+                        "no step that begins a run is called `{name}`{near}; allowed: {}",
+                        known.join(", ")
+                    )
+                })?,
+        };
+        let scene = &self.runs[run].scene;
+        if let Kind::Parameter(key) = kind {
+            parameter(scene, key)?;
+        }
+        if let Some(joint) = kind.joint().filter(|name| *name != "any") {
+            let mut names = scene.ball_joints.iter().map(|joint| &*joint.name);
+            if !names.clone().any(|name| name == joint) {
+                let known: Vec<&str> = names.by_ref().take(12).collect();
+                return Err(format!(
+                    "no ball joint `{joint}`; allowed: any, {}",
+                    known.join(", ")
+                ));
+            }
+        }
+        let or = |text: Option<String>, default: &str| text.unwrap_or_else(|| default.to_owned());
+        Ok(Measure {
+            name: name.to_owned(),
+            run,
+            kind: kind.clone(),
+            times: [or(from, START), or(at.or(twin).or(instant).or(to), END)],
+        })
+    }
+
+    /// Checks every expression: it may name measures and nothing else.
+    fn check(&self, source: &Source<'_>, rows: &File) -> Result<(), SceneError> {
+        let names = self.names();
+        for (measure, row) in self.measures.iter().zip(rows.measure.values()) {
+            for text in &measure.times {
+                names.check(text).map_err(|why| {
+                    let key = format!("measure.{}", measure.name);
+                    source.within(row.span(), text, &key, format!("`{text}` {why}"))
+                })?;
+            }
+        }
+        for (index, row) in rows.step.iter().enumerate() {
+            let row = row.get_ref();
+            let key = |name: &str| format!("step {}.{name}", index + 1);
+            let condition = |text: &str| {
+                let parts = comparisons(text).ok_or("compares nothing; allowed <, > and =")?;
+                let mut sides = parts.into_iter().flat_map(|(left, _, right)| [left, right]);
+                sides
+                    .try_for_each(|side| names.check(side).map_err(|why| format!("`{side}` {why}")))
+            };
+            let prose = |text: &str| text::fill(text, &names).map(|_| ());
+            for (name, text) in [("text", Some(&row.text)), ("seen", row.seen.as_ref())] {
+                if let Some(text) = text {
+                    prose(text.get_ref()).map_err(|why| {
+                        let part = why.split(':').next().unwrap_or_default();
+                        source.within(text.span(), part, &key(name), why.clone())
+                    })?;
+                }
+            }
+            if let Some(until) = &row.until {
+                let checked = names.check(until.get_ref());
+                checked.map_err(|why| source.error(until.span(), &key("until"), why))?;
+            }
+            for claim in &row.claims {
+                let checked = condition(claim.get_ref());
+                checked.map_err(|why| source.error(claim.span(), &key("claims"), why))?;
+            }
+            if let Some(question) = &row.question {
+                let wrong =
+                    |part: &str, why| source.within(question.span(), part, &key("question"), why);
+                let Question { ask, choices } = question.get_ref();
+                prose(ask).map_err(|why| wrong(ask, why))?;
+                for Choice { text, when } in choices {
+                    prose(text).map_err(|why| wrong(text, why))?;
+                    condition(when).map_err(|why| wrong(when, why))?;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A scene file that a lesson names stands beside it.
+fn beside(scene: &str, file: Option<&str>) -> String {
+    let is_file = scene.contains('/') || scene.ends_with(".toml");
+    let folder = file.and_then(|file| std::path::Path::new(file).parent());
+    match folder.filter(|_| is_file) {
+        // With its `/` it is a file, whatever its name.
+        Some(folder) => folder.join(scene).to_string_lossy().into_owned(),
+        None => scene.to_owned(),
+    }
+}
+
+/// What the camera looks at.
+fn look(word: &str, scene: &Scene) -> Result<Look, String> {
+    let joints = || scene.ball_joints.iter().map(|joint| &*joint.name);
+    if let Some(joint) = joints().position(|name| name == word) {
+        return Ok(Look::At(joint));
+    }
+    let name = |preset: &Preset| preset.label().to_lowercase();
+    let found = Preset::ALL.into_iter().find(|preset| name(preset) == word);
+    found.map(Look::From).ok_or_else(|| {
+        let presets = Preset::ALL.iter().map(name);
+        let known: Vec<String> = presets.chain(joints().map(str::to_owned)).collect();
+        format!("no such view; allowed: {}", known.join(", "))
+    })
+}

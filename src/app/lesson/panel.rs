@@ -1,0 +1,230 @@
+//! The panel of a lesson: its text, its question, and the buttons that turn its pages.
+
+use eframe::egui::{
+    self, Button, FontFamily, Layout, RadioButton, RichText, ScrollArea, TextFormat, TextStyle, Ui,
+    text::LayoutJob,
+};
+
+use super::names::Names;
+use super::text::{self, Block, Face};
+use super::{Course, lesson_titles};
+use crate::app::{App, layout, theme};
+
+/// Height of a choice where only the mouse reaches it, points.
+const LOW: f32 = 24.0;
+
+/// What the buttons of the panel ask for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Asked {
+    Nothing,
+    Turn(bool),
+    Set,
+    Leave,
+}
+
+impl App {
+    /// The menu of the built-in lessons.
+    pub(in crate::app) fn lesson_menu(&mut self, ui: &mut Ui) {
+        for (name, title) in lesson_titles() {
+            if ui
+                .button(title)
+                .on_hover_text(format!("Lesson {name}"))
+                .clicked()
+            {
+                self.open_lesson(name);
+                layout::close_menu(ui);
+            }
+        }
+    }
+
+    /// The whole panel.
+    pub(in crate::app) fn lesson_ui(&mut self, ui: &mut Ui) {
+        let Some(course) = &mut self.course else {
+            return;
+        };
+        let own = course.sets || course.is_own(&self.player);
+        // In a presentation the screen is low in points, but nobody's finger is on it.
+        let low = self.presentation.is_some() && !self.touched;
+        let backwards = Layout::bottom_up(egui::Align::Min);
+        let asked = ui
+            .with_layout(backwards, |ui| {
+                let asked = buttons(ui, course);
+                ui.with_layout(Layout::top_down(egui::Align::Min), |ui| {
+                    let id = (course.lesson.name.clone(), course.step);
+                    let page = ScrollArea::vertical().id_salt(id).auto_shrink(false);
+                    let set = page.show(ui, |ui| {
+                        // Room for the scroll bar.
+                        ui.set_max_width(ui.available_width() - 10.0);
+                        if low {
+                            ui.spacing_mut().interact_size.y = LOW;
+                            ui.spacing_mut().icon_width = LOW - 8.0;
+                        }
+                        course.page(ui, own)
+                    });
+                    if set.inner { Asked::Set } else { asked }
+                })
+                .inner
+            })
+            .inner;
+        match asked {
+            Asked::Nothing => {}
+            Asked::Turn(forward) => self.turn_page(forward),
+            Asked::Set => self.set_step(),
+            Asked::Leave => self.leave_lesson(),
+        }
+    }
+}
+
+/// Back, Next, how far, and Leave, in places of their own whatever the page says.
+fn buttons(ui: &mut Ui, course: &Course) -> Asked {
+    let mut asked = Asked::Nothing;
+    let last = course.lesson.steps.len() - 1;
+    ui.horizontal(|ui| {
+        for (forward, name, help, possible) in [
+            (false, "Back", "The step before (Page Up)", course.step > 0),
+            (
+                true,
+                "Next",
+                "The next step (Page Down)",
+                course.step < last,
+            ),
+        ] {
+            let button = ui
+                .add_enabled(possible, Button::new(name))
+                .on_hover_text(help);
+            if button.clicked() {
+                asked = Asked::Turn(forward);
+            }
+        }
+        ui.label(format!("Step {} of {}", course.step + 1, last + 1));
+        ui.with_layout(Layout::right_to_left(egui::Align::Center), |ui| {
+            let help = "Ends the lesson; the machine stays as it is";
+            let leave = ui.button("End").on_hover_text(help);
+            if leave.accessible_name("Leave the lesson").clicked() {
+                asked = Asked::Leave;
+            }
+        });
+    });
+    asked
+}
+
+impl Course {
+    /// Title, text, question and answer of the step; whether the machine is to be set anew. `own`: it runs as the step set it.
+    fn page(&mut self, ui: &mut Ui, own: bool) -> bool {
+        let lesson = self.lesson.clone();
+        let step = &lesson.steps[self.step];
+        let mut set = false;
+        {
+            let names = self.measured.names();
+            ui.label(RichText::new(&lesson.title).small().weak());
+            ui.label(RichText::new(&step.title).heading().strong());
+            if let Some(why) = self.measured.fault() {
+                theme::error(ui, format!("This lesson cannot be computed: {why}"));
+            }
+            prose(ui, &step.text, &names);
+        }
+        if let Some(question) = &step.question {
+            let (right, names) = (self.right(), self.measured.names());
+            let shows = self.reached && own;
+            let mut predicted = self.predicted;
+            ui.separator();
+            ui.label(RichText::new(filled(&question.ask, &names)).strong());
+            for (index, choice) in question.choices.iter().enumerate() {
+                let words = filled(&choice.text, &names);
+                let colour = ui.visuals().selection.stroke.color;
+                let words = match (shows, right == Some(index)) {
+                    (true, true) => RichText::new(words).strong().color(colour),
+                    (true, false) => RichText::new(words).weak(),
+                    (false, _) => RichText::new(words),
+                };
+                let chosen = predicted == Some(index);
+                let help = "What you predict; the run shows whether it is so";
+                let radio = ui
+                    .scope(|ui| {
+                        // The right one shall not fade with the others.
+                        ui.visuals_mut().disabled_alpha = 1.0;
+                        ui.add_enabled(!self.reached, RadioButton::new(chosen, words))
+                    })
+                    .inner;
+                if radio.on_hover_text(help).clicked() {
+                    predicted = Some(index).filter(|_| !chosen);
+                }
+            }
+            if shows && let Some(right) = right {
+                let words = filled(&question.choices[right].text, &names);
+                let colour = ui.visuals().selection.stroke.color;
+                let verdict = match predicted {
+                    Some(choice) if choice == right => format!("As predicted: {words}"),
+                    Some(_) => format!("Not as predicted. It is: {words}"),
+                    None => format!("It is: {words}"),
+                };
+                ui.label(RichText::new(verdict).strong().color(colour));
+            } else if !self.reached {
+                ui.label(RichText::new("Predict, then Play (space).").weak());
+            }
+            self.predicted = predicted;
+        } else if step.until.is_some() && !self.reached {
+            ui.label(RichText::new("Play (space).").weak());
+        }
+        if !own {
+            theme::warning(
+                ui,
+                "The machine was changed since this step began: what it says here is of the run as the step sets it.",
+            );
+            let help = "Puts the machine in the state of this step again";
+            set = ui
+                .button("Set the step again")
+                .on_hover_text(help)
+                .clicked();
+        }
+        if (self.reached || step.until.is_none()) && !step.seen.is_empty() {
+            ui.separator();
+            ui.label(RichText::new("What was to be seen").small().weak());
+            prose(ui, &step.seen, &self.measured.names());
+        }
+        if std::mem::take(&mut self.fresh) {
+            // The answer may stand below what fits.
+            ui.scroll_to_cursor(Some(egui::Align::BOTTOM));
+        }
+        set
+    }
+}
+
+/// `text` with its values; what is wrong in it instead, if it cannot be filled in.
+fn filled(text: &str, names: &Names<'_>) -> String {
+    text::fill(text, names).unwrap_or_else(|why| why)
+}
+
+/// Markdown with its values.
+fn prose(ui: &mut Ui, markdown: &str, names: &Names<'_>) {
+    for block in text::blocks(&filled(markdown, names)) {
+        if block.entry {
+            ui.horizontal_top(|ui| {
+                ui.label("•");
+                paragraph(ui, &block);
+            });
+        } else {
+            paragraph(ui, &block);
+        }
+    }
+}
+
+fn paragraph(ui: &mut Ui, block: &Block) {
+    let body = TextStyle::Body.resolve(ui.style());
+    let (plain, strong) = (ui.visuals().text_color(), ui.visuals().strong_text_color());
+    let mut job = LayoutJob::default();
+    for piece in &block.pieces {
+        let mut format = TextFormat::simple(body.clone(), plain);
+        match piece.face {
+            Face::Plain => {}
+            Face::Emphasis => format.italics = true,
+            Face::Strong => format.color = strong,
+            Face::Code => {
+                format.font_id.family = FontFamily::Monospace;
+                format.background = ui.visuals().code_bg_color;
+            }
+        }
+        job.append(&piece.text, 0.0, format);
+    }
+    ui.add(egui::Label::new(job).wrap());
+}

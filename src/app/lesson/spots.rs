@@ -1,0 +1,67 @@
+//! Where controls stand, by the names that they have for screen readers: what a lesson points at needs no other name.
+
+use std::sync::Arc;
+
+use eframe::egui::accesskit::{Node, Role, TreeUpdate};
+use eframe::egui::{self, Rect, pos2};
+
+/// Keeps where the controls of these names were drawn last.
+#[derive(Default)]
+pub struct Spots {
+    wanted: Arc<[String]>,
+    found: Vec<(String, Rect)>,
+}
+
+impl egui::Plugin for Spots {
+    fn debug_name(&self) -> &'static str {
+        "places of the controls that a lesson points at"
+    }
+
+    fn output_hook(&mut self, _ctx: &egui::Context, output: &mut egui::FullOutput) {
+        self.found.clear();
+        if let Some(tree) = &output.platform_output.accesskit_update
+            && !self.wanted.is_empty()
+        {
+            self.find(tree);
+        }
+    }
+}
+
+impl Spots {
+    /// Where controls called one of `wanted` stood in the frame before; the parts of one, such as slider and field, together.
+    pub fn places(ctx: &egui::Context, wanted: &[String]) -> Vec<(String, Rect)> {
+        let spots = ctx.plugin_or_default::<Self>();
+        let mut spots = spots.lock();
+        if *spots.wanted != *wanted {
+            spots.wanted = wanted.into();
+            if !wanted.is_empty() {
+                ctx.enable_accesskit();
+                ctx.request_repaint();
+            }
+        }
+        spots.found.clone()
+    }
+
+    fn find(&mut self, tree: &TreeUpdate) {
+        let named =
+            |node: &Node, name: &str| node.label() == Some(name) || node.value() == Some(name);
+        for name in self.wanted.iter() {
+            let all = || tree.nodes.iter().filter(|(_, node)| named(node, name));
+            let is_text = |node: &Node| matches!(node.role(), Role::Label | Role::TextRun);
+            // A text of that name counts only where no control has it.
+            let controls = all().any(|(_, node)| !is_text(node));
+            let rects = all()
+                .filter(|(_, node)| !controls || !is_text(node))
+                .filter_map(|(_, node)| node.bounds())
+                .map(|b| {
+                    Rect::from_min_max(
+                        pos2(b.x0 as f32, b.y0 as f32),
+                        pos2(b.x1 as f32, b.y1 as f32),
+                    )
+                });
+            if let Some(rect) = rects.reduce(|a, b| a.union(b)) {
+                self.found.push((name.clone(), rect));
+            }
+        }
+    }
+}

@@ -1,0 +1,246 @@
+//! Texts of lessons: a little Markdown, and placeholders such as `{first in us}` whose values are computed.
+
+use super::names::Names;
+use crate::app::value;
+use crate::scene::{Quantity, evaluate};
+
+/// What stands for a value that is not computed yet.
+const TO_COME: &str = "…";
+
+/// Digits of a value.
+const DIGITS: usize = 3;
+
+/// Units of one dimension, the largest first; a value is written in the first one of which it is at least 1.
+type Units = ([i8; 4], &'static [(&'static str, f64)]);
+
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
+
+/// By powers of kg, m, s and rad.
+const UNITS: [Units; 11] = [
+    ([0, 0, 1, 0], &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6)]),
+    ([0, 1, 0, 0], &[("m", 1.0), ("mm", 1e-3), ("um", 1e-6)]),
+    ([0, 1, -1, 0], &[("m/s", 1.0), ("mm/s", 1e-3)]),
+    ([0, 1, -2, 0], &[("m/s^2", 1.0)]),
+    ([1, 1, -2, 0], &[("N", 1.0), ("mN", 1e-3)]),
+    ([1, 2, -2, 0], &[("J", 1.0), ("mJ", 1e-3), ("uJ", 1e-6)]),
+    ([0, 0, -1, 0], &[("Hz", 1.0)]),
+    ([0, 0, -1, 1], &[("rad/s", 1.0)]),
+    ([0, 0, 0, 1], &[("°", DEGREE), ("mrad", 1e-3)]),
+    ([1, 0, 0, 0], &[("kg", 1.0), ("g", 1e-3)]),
+    ([0, 0, 0, 0], &[("", 1.0)]),
+];
+
+/// A run of letters in one face.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Piece {
+    /// The letters.
+    pub text: String,
+    /// Their face.
+    pub face: Face,
+}
+
+/// How letters look.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Face {
+    #[default]
+    Plain,
+    Emphasis,
+    Strong,
+    Code,
+}
+
+/// A paragraph, or an entry of a list.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Block {
+    /// Whether it is an entry of a list.
+    pub entry: bool,
+    /// What it says.
+    pub pieces: Vec<Piece>,
+}
+
+/// Paragraphs, and entries of lists (lines that begin with `- `), with `*emphasis*`, `**strong**` and `` `code` ``.
+pub fn blocks(markdown: &str) -> Vec<Block> {
+    let (mut blocks, mut lines) = (Vec::new(), Vec::new());
+    let mut entry = false;
+    for line in markdown.lines().map(str::trim).chain([""]) {
+        let begins = line.strip_prefix("- ");
+        if (line.is_empty() || begins.is_some()) && !lines.is_empty() {
+            let pieces = pieces(&std::mem::take(&mut lines).join(" "));
+            blocks.push(Block { entry, pieces });
+        }
+        entry = begins.is_some() || (entry && !line.is_empty());
+        lines.extend(Some(begins.unwrap_or(line)).filter(|line| !line.is_empty()));
+    }
+    blocks
+}
+
+fn pieces(line: &str) -> Vec<Piece> {
+    const MARKS: [(&str, Face); 3] = [
+        ("**", Face::Strong),
+        ("*", Face::Emphasis),
+        ("`", Face::Code),
+    ];
+    let (mut pieces, mut rest) = (Vec::new(), line);
+    let mut push = |text: &str, face| {
+        if !text.is_empty() {
+            let text = text.to_owned();
+            pieces.push(Piece { text, face });
+        }
+    };
+    // A mark without a second one stands for itself.
+    let mut from = 0;
+    while let Some(at) = rest[from..].find(['*', '`']).map(|at| from + at) {
+        let marked = MARKS.iter().find_map(|(mark, face)| {
+            let inside = rest[at..].strip_prefix(mark)?;
+            let end = inside.find(mark).filter(|end| *end > 0)?;
+            Some((mark.len(), &inside[..end], *face))
+        });
+        let Some((mark, inside, face)) = marked else {
+            from = at + 1;
+            continue;
+        };
+        push(&rest[..at], Face::Plain);
+        push(inside, face);
+        rest = &rest[at + 2 * mark + inside.len()..];
+        from = 0;
+    }
+    push(rest, Face::Plain);
+    pieces
+}
+
+/// Calls `take` with the inside of every placeholder of `text`, and gives the text with what that gives in their places.
+///
+/// # Errors
+/// The first error of `take`, or a brace without a second one.
+fn replace<E: From<String>>(
+    text: &str,
+    mut take: impl FnMut(&str) -> Result<String, E>,
+) -> Result<String, E> {
+    let (mut out, mut rest) = (String::new(), text);
+    while let Some((before, behind)) = rest.split_once('{') {
+        let Some((inside, after)) = behind.split_once('}') else {
+            return Err("has a `{` without a `}`".to_owned().into());
+        };
+        out += before;
+        out += &take(inside)?;
+        rest = after;
+    }
+    Ok(out + rest)
+}
+
+/// `text` with values in place of its placeholders; what is not in `names` is still to come.
+///
+/// # Errors
+/// A placeholder that cannot be computed, and why.
+pub fn fill(text: &str, names: &Names<'_>) -> Result<String, String> {
+    replace(text, |inside| {
+        let (expression, unit) = split(inside);
+        match evaluate(expression, &names.known) {
+            Ok(quantity) => words(quantity, unit).map_err(|why| format!("{{{inside}}}: {why}")),
+            Err(_) => names
+                .check(expression)
+                .map(|()| TO_COME.to_owned())
+                .map_err(|why| format!("{{{inside}}}: {why}")),
+        }
+    })
+}
+
+/// The expression of a placeholder, and the unit that it asks for.
+fn split(inside: &str) -> (&str, Option<&str>) {
+    match inside.rsplit_once(" in ") {
+        Some((expression, unit)) => (expression.trim(), Some(unit.trim())),
+        None => (inside.trim(), None),
+    }
+}
+
+/// A value with its unit: the one asked for, or one that suits its size.
+///
+/// # Errors
+/// A unit of another dimension, or a value without a unit.
+pub fn words(quantity: Quantity, unit: Option<&str>) -> Result<String, String> {
+    let powers = quantity
+        .powers()
+        .ok_or("adds or compares quantities of different dimensions")?;
+    let (_, units) = UNITS
+        .iter()
+        .find(|(own, _)| *own == powers)
+        .ok_or("gives a quantity of a dimension that texts do not write")?;
+    let value = quantity.value();
+    if !value.is_finite() {
+        return Err("is not a finite number".to_owned());
+    }
+    let chosen = match unit {
+        Some(asked) => units.iter().find(|(unit, _)| *unit == asked),
+        None if value == 0.0 => units.first(),
+        // Rounded, so that 999.9 µm is 1 mm.
+        None => units
+            .iter()
+            .find(|(_, size)| value.abs() * 1.000_6 >= *size)
+            .or(units.last()),
+    };
+    let Some((unit, size)) = chosen else {
+        let known: Vec<&str> = units.iter().map(|(unit, _)| *unit).collect();
+        return Err(format!("not in that unit; allowed: {}", known.join(", ")));
+    };
+    let number = match value / size {
+        extreme if unit.is_empty() && extreme != 0.0 && !(1e-3..1e6).contains(&extreme.abs()) => {
+            value::power_of_ten(extreme)
+        }
+        number => value::number(number, DIGITS),
+    };
+    Ok(match *unit {
+        "" => number,
+        "°" => number + "°",
+        unit => value::typeset(&format!("{number} {unit}")),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Dimension;
+
+    #[test]
+    fn markdown_has_paragraphs_lists_and_three_faces() {
+        let read =
+            blocks("One *two* **three**\nfour `a*b`.\n\n- first\n  goes on\n- second\n\n2 * 3 = 6");
+        let letters = |block: &Block| block.pieces.iter().map(|piece| &*piece.text).collect();
+        let words: Vec<(bool, String)> = read.iter().map(|b| (b.entry, letters(b))).collect();
+        let expected = [
+            (false, "One two three four a*b."),
+            (true, "first goes on"),
+            (true, "second"),
+            (false, "2 * 3 = 6"),
+        ];
+        assert_eq!(
+            words,
+            expected.map(|(entry, words)| (entry, words.to_owned()))
+        );
+        let faces: Vec<Face> = read[0].pieces.iter().map(|piece| piece.face).collect();
+        use Face::{Code, Emphasis, Plain, Strong};
+        assert_eq!(faces, [Plain, Emphasis, Plain, Strong, Plain, Code, Plain]);
+    }
+
+    #[test]
+    fn values_have_a_unit_that_suits_them() {
+        let write = |value, dimension, unit| words(Quantity::new(value, dimension), unit);
+        for (value, dimension, unit, expected) in [
+            (7.801_42e-3, Dimension::Time, None, "7.8 ms"),
+            (7.801_42e-3, Dimension::Time, Some("us"), "7800 µs"),
+            (3e-4, Dimension::Length, None, "300 µm"),
+            (3e-4, Dimension::Length, Some("mm"), "0.3 mm"),
+            (0.076_9, Dimension::Speed, None, "76.9 mm/s"),
+            (870.58, Dimension::Force, None, "871 N"),
+            (15f64.to_radians(), Dimension::Angle, None, "15°"),
+            (1e-9, Dimension::None, None, "1e-9"),
+            (3.97e7, Dimension::None, None, "4e7"),
+            (0.0, Dimension::Force, None, "0 N"),
+            (0.15, Dimension::None, None, "0.15"),
+        ] {
+            assert_eq!(write(value, dimension, unit).as_deref(), Ok(expected));
+        }
+        let wrong = write(1.0, Dimension::Force, Some("mm"));
+        assert_eq!(wrong, Err("not in that unit; allowed: N, mN".to_owned()));
+    }
+}

@@ -1,0 +1,80 @@
+//! Sound on or off, and what is heard while the run plays. It changes nothing of the run.
+
+use eframe::egui::Ui;
+
+use super::click::{Click, Stretch, clicks, mass};
+use super::{App, Notice};
+
+/// The switch.
+#[derive(Default)]
+pub struct Sound {
+    on: bool,
+    /// Those of the latest frame.
+    clicks: Vec<Click>,
+}
+
+impl App {
+    /// Whether impacts are heard.
+    pub fn is_sounding(&self) -> bool {
+        self.sound.on
+    }
+
+    /// Switches sound on or off.
+    pub fn set_sound(&mut self, on: bool) {
+        if on == self.sound.on {
+            return;
+        }
+        self.sound.on = on;
+        self.host.sound(on);
+        let words = if on { "Sound on" } else { "Sound off" };
+        self.notice = Some(Notice::new(words));
+    }
+
+    pub(super) fn sound_switch(&mut self, ui: &mut Ui) {
+        let mut on = self.sound.on;
+        let help = "A click for every impact that ends while the run plays forward: the louder, the larger its impulse; the \
+                    higher, the shorter the contact. Slow motion spreads the clicks and leaves their pitch (key M)";
+        if ui.checkbox(&mut on, "Sound").on_hover_text(help).clicked() {
+            self.set_sound(on);
+        }
+    }
+
+    /// Off again, with the reason, where nothing can be heard.
+    pub(super) fn check_sound(&mut self) {
+        if self.sound.on
+            && let Some(why) = self.host.no_sound()
+        {
+            self.sound.on = false;
+            self.host.sound(false);
+            self.notice = Some(Notice::new(format!("No sound: {why}")));
+        }
+    }
+
+    /// Advances the run by `dt` seconds, and lets the impacts be heard that end meanwhile. A way that is not played, as back in time
+    /// or on to an impact, is silent.
+    pub(super) fn advance_heard(&mut self, dt: f64) {
+        let player = &mut self.player;
+        let plays = player.is_playing() && !player.is_playing_backwards() && !player.is_seeking();
+        let from = player.pacer.shown();
+        player.advance(dt);
+        if !(self.sound.on && plays) {
+            return;
+        }
+        let stretch = Stretch {
+            from,
+            to: player.pacer.shown(),
+            lasts: dt,
+        };
+        // The simulation may be a step ahead of what is on show.
+        let impacts = player.simulation().impacts();
+        clicks(
+            impacts,
+            &stretch,
+            mass(player.scene()),
+            &mut self.sound.clicks,
+        );
+        if !self.sound.clicks.is_empty() {
+            self.host.click(&self.sound.clicks);
+        }
+    }
+}

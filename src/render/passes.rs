@@ -1,0 +1,238 @@
+//! The passes of a picture, in order: what each draws, with which shader, and how it meets what is already there.
+
+use super::wgpu;
+use wgpu::CompareFunction::{Always, Greater, Less, LessEqual};
+use wgpu::Face::{self, Back, Front};
+
+/// What a pass draws.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Draws {
+    /// The whole picture.
+    Everywhere,
+    /// The floor, where the list has one.
+    Floor,
+    /// Lines among the solid things.
+    Lines,
+    /// Lines before everything.
+    Marks,
+    /// Instances of meshes.
+    Meshes(Group),
+}
+
+/// Instances that are drawn together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Group {
+    Solid,
+    /// Solid balls in sockets.
+    Balls,
+    Faded,
+    Halos,
+    Sockets,
+    Wear,
+    ClearBalls,
+    Ghost,
+    GhostEdges,
+    Arrows,
+    Overlay,
+    /// What casts shadows: all solid, faded and clear things, seen from the light.
+    Casters,
+}
+
+impl Group {
+    /// How many there are.
+    pub const COUNT: usize = Self::Casters as usize + 1;
+}
+
+/// How a pass changes a pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Blend {
+    /// Depth only.
+    Nothing,
+    /// Replaces.
+    Opaque,
+    /// Light that was shaded, in proportion to its opacity.
+    Light,
+    /// A colour of the theme, in proportion to its opacity: the last pass leaves its share as it is.
+    Given,
+}
+
+/// One pass.
+#[derive(Debug)]
+pub(super) struct Pass {
+    pub label: &'static str,
+    pub draws: Draws,
+    pub vertex: &'static str,
+    /// `None`: depth seen from the light, to the shadow map.
+    pub fragment: Option<&'static str>,
+    pub blend: Blend,
+    pub cull: Option<Face>,
+    pub compare: wgpu::CompareFunction,
+    pub write_depth: bool,
+}
+
+/// Something solid: the nearest is seen.
+const fn solid(label: &'static str, group: Group, fragment: &'static str) -> Pass {
+    Pass {
+        label,
+        draws: Draws::Meshes(group),
+        vertex: "vs_mesh",
+        fragment: Some(fragment),
+        blend: Blend::Opaque,
+        cull: Some(Back),
+        compare: Less,
+        write_depth: true,
+    }
+}
+
+/// Something seen through.
+const fn clear(label: &'static str, group: Group, fragment: &'static str, blend: Blend) -> Pass {
+    Pass {
+        blend,
+        write_depth: false,
+        ..solid(label, group, fragment)
+    }
+}
+
+/// Something without a mesh.
+const fn flat(
+    label: &'static str,
+    draws: Draws,
+    vertex: &'static str,
+    fragment: &'static str,
+) -> Pass {
+    Pass {
+        draws,
+        vertex,
+        cull: None,
+        ..clear(label, Group::Solid, fragment, Blend::Given)
+    }
+}
+
+/// All passes: one to the shadow map, the others to the picture. The last, `shaders/finish.wgsl`, is `finish.rs`.
+pub(super) const PASSES: &[Pass] = &[
+    Pass {
+        vertex: "vs_shadow",
+        fragment: None,
+        ..solid("shadow", Group::Casters, "")
+    },
+    Pass {
+        blend: Blend::Opaque,
+        compare: Always,
+        ..flat(
+            "background",
+            Draws::Everywhere,
+            "vs_background",
+            "fs_background",
+        )
+    },
+    solid("solid", Group::Solid, "fs_solid"),
+    Pass {
+        vertex: "vs_joint",
+        ..solid("balls", Group::Balls, "fs_ball")
+    },
+    flat("floor", Draws::Floor, "vs_floor", "fs_floor"),
+    flat("lines", Draws::Lines, "vs_line", "fs_line"),
+    clear("faded", Group::Faded, "fs_faded", Blend::Light),
+    clear("halos", Group::Halos, "fs_halo", Blend::Given),
+    // The mesh has both sides of its faces, in the order in which any sight passes them.
+    Pass {
+        vertex: "vs_joint",
+        ..clear("sockets", Group::Sockets, "fs_socket", Blend::Light)
+    },
+    // After the sockets, whose glass would tint their colours.
+    Pass {
+        cull: None,
+        compare: Always,
+        ..clear(
+            "wear behind others",
+            Group::Wear,
+            "fs_wear_behind",
+            Blend::Given,
+        )
+    },
+    solid("wear", Group::Wear, "fs_wear"),
+    Pass {
+        vertex: "vs_joint",
+        ..clear(
+            "clear balls",
+            Group::ClearBalls,
+            "fs_clear_ball",
+            Blend::Light,
+        )
+    },
+    // Only its nearest surface is visible: its own back parts would show through in patches.
+    Pass {
+        vertex: "vs_ghost",
+        blend: Blend::Nothing,
+        ..solid("ghost, depth", Group::Ghost, "fs_ghost")
+    },
+    Pass {
+        vertex: "vs_ghost",
+        // The same vertices as in the depth pass.
+        compare: LessEqual,
+        ..clear("ghost", Group::Ghost, "fs_ghost", Blend::Given)
+    },
+    Pass {
+        vertex: "vs_ghost_edge",
+        cull: Some(Front),
+        blend: Blend::Given,
+        ..solid("ghost, outline", Group::GhostEdges, "fs_ghost_edge")
+    },
+    // After the sockets, so that glass does not dim a force.
+    Pass {
+        compare: Always,
+        ..flat("marks", Draws::Marks, "vs_line", "fs_line")
+    },
+    Pass {
+        compare: Greater,
+        ..clear(
+            "arrows behind others",
+            Group::Arrows,
+            "fs_mark_behind",
+            Blend::Given,
+        )
+    },
+    solid("arrows", Group::Arrows, "fs_mark"),
+    Pass {
+        vertex: "vs_overlay",
+        ..solid("overlay", Group::Overlay, "fs_overlay")
+    },
+];
+
+impl Pass {
+    /// Whether it draws to the shadow map.
+    pub fn casts(&self) -> bool {
+        self.fragment.is_none()
+    }
+
+    /// How its colour joins the one that is there. The fourth channel of the picture is the share of the theme's colours in it.
+    pub fn blend_state(&self) -> Option<wgpu::BlendState> {
+        let over = |source| wgpu::BlendComponent {
+            src_factor: source,
+            dst_factor: wgpu::BlendFactor::OneMinusSrcAlpha,
+            operation: wgpu::BlendOperation::Add,
+        };
+        let share = match self.blend {
+            Blend::Nothing | Blend::Opaque => return None,
+            Blend::Light => wgpu::BlendFactor::Zero,
+            Blend::Given => wgpu::BlendFactor::One,
+        };
+        Some(wgpu::BlendState {
+            color: over(wgpu::BlendFactor::SrcAlpha),
+            alpha: over(share),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shadow_comes_first_and_what_is_seen_through_after_what_is_not() {
+        assert!(PASSES[0].casts() && PASSES[1..].iter().all(|pass| !pass.casts()));
+        let place = |label| PASSES.iter().position(|pass| pass.label == label);
+        let order = ["background", "solid", "floor", "sockets", "arrows"].map(place);
+        assert!(order.iter().all(Option::is_some) && order.is_sorted());
+    }
+}

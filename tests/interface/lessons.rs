@@ -1,0 +1,385 @@
+//! Lessons in the window: every one is walked to its end.
+
+use eframe::egui::{Key, TextStyle, accesskit::Role, vec2};
+use egui_kittest::{Harness, SnapshotResults, kittest::Queryable as _};
+use jointplay::app::{App, AppOptions, BUILT_IN_LESSONS, Lesson, Link, Verdict};
+use jointplay::simulate::Simulation;
+
+use crate::hands::fingers;
+use crate::page;
+use crate::window::sized;
+
+const WIDE: [f32; 2] = [1280.0, 720.0];
+const PHONE: [f32; 2] = [390.0, 844.0];
+
+/// Most frames that a step may take to its end.
+const FRAMES: usize = 4000;
+
+/// The window in a lesson, set for step `step`, counted from 0.
+fn taught(name: &str, step: usize, size: [f32; 2]) -> Harness<'static, App> {
+    let lesson = Lesson::built_in(name).unwrap_or_else(|error| panic!("{error}"));
+    let (mut harness, _) = page::open(AppOptions::of_lesson(lesson, step), size);
+    settle(&mut harness);
+    harness
+}
+
+/// Until the machine is set for the step.
+fn settle(harness: &mut Harness<'_, App>) {
+    for _ in 0..FRAMES {
+        harness.step();
+        if harness
+            .state()
+            .course()
+            .is_none_or(|course| !course.is_busy())
+        {
+            // The camera glides, rings appear.
+            harness.run_steps(3);
+            return;
+        }
+    }
+    panic!("the machine is never set");
+}
+
+fn step(harness: &Harness<'_, App>) -> usize {
+    harness.state().course().expect("a lesson").step()
+}
+
+fn press(harness: &mut Harness<'_, App>, key: Key) {
+    harness.key_press(key);
+    settle(harness);
+}
+
+/// Plays to the end of the step, if it has one, and says whether.
+fn play(harness: &mut Harness<'_, App>) -> bool {
+    let Some(until) = harness.state().course().expect("a lesson").until() else {
+        return false;
+    };
+    press(harness, Key::Space);
+    for _ in 0..FRAMES {
+        if harness.state().course().expect("a lesson").is_reached() {
+            harness.run_steps(2);
+            let player = harness.state().player();
+            assert!(!player.is_playing());
+            assert_eq!(player.pacer.shown(), until);
+            return true;
+        }
+        harness.step();
+    }
+    panic!("{until} s is never reached");
+}
+
+/// The labels on show that say so.
+fn says(harness: &Harness<'_, App>, words: &str) -> bool {
+    harness.query_all_by_label_contains(words).next().is_some()
+}
+
+#[test]
+fn every_lesson_is_walked_to_its_end_by_page_down_and_play() {
+    for (name, _) in BUILT_IN_LESSONS {
+        let mut harness = taught(name, 0, WIDE);
+        let steps = harness
+            .state()
+            .course()
+            .expect("a lesson")
+            .lesson()
+            .steps
+            .len();
+        for k in 0..steps {
+            let at = format!("{name}, step {}", k + 1);
+            assert_eq!(step(&harness), k, "{at}");
+            assert!(
+                says(&harness, &format!("Step {} of {steps}", k + 1)),
+                "{at}"
+            );
+            assert!(
+                harness.state().points_out(&harness.ctx),
+                "{at}: something pointed at is not there"
+            );
+            assert!(
+                !says(&harness, "It is:"),
+                "{at}: the answer shows too early"
+            );
+            assert!(!says(&harness, "The machine was changed"), "{at}");
+            let asked = harness.state().course().expect("a lesson").lesson().steps[k]
+                .question
+                .clone();
+            if play(&mut harness) && asked.is_some() {
+                let course = harness.state().course().expect("a lesson");
+                let answer = course.answer().unwrap_or_else(|| panic!("{at}: no answer"));
+                assert!(
+                    says(&harness, &format!("It is: {answer}")),
+                    "{at}: {answer}"
+                );
+            }
+            press(&mut harness, Key::PageDown);
+        }
+        // There is nothing behind the last one.
+        assert_eq!(step(&harness), steps - 1);
+        harness.get_by_label("Leave the lesson").click();
+        harness.run_steps(2);
+        assert!(harness.state().course().is_none());
+    }
+}
+
+#[test]
+fn the_answer_is_what_the_run_on_show_gave() {
+    let mut harness = taught("rattle", 0, WIDE);
+    press(&mut harness, Key::PageDown);
+    harness
+        .get_by_role_and_label(Role::RadioButton, "S2")
+        .click();
+    harness.run_steps(2);
+    assert!(play(&mut harness));
+    let player = harness.state().player();
+    let touch = |joint| player.contact_history().touches(joint, 0.0, 1.0).next();
+    let touches: Vec<f64> = (0..3).map(|joint| touch(joint).expect("touched")).collect();
+    let first = (0..3)
+        .min_by(|a, b| touches[*a].total_cmp(&touches[*b]))
+        .expect("three");
+    let name = player.scene().ball_joints[first].name.clone();
+    harness.get_by_label(&format!("Not as predicted. It is: {name}"));
+    // Back, the class tries again.
+    press(&mut harness, Key::PageUp);
+    press(&mut harness, Key::PageDown);
+    harness
+        .get_by_role_and_label(Role::RadioButton, &name)
+        .click();
+    harness.run_steps(2);
+    play(&mut harness);
+    harness.get_by_label(&format!("As predicted: {name}"));
+
+    // The peaks of the run on show.
+    let mut harness = taught("rattle", 4, WIDE);
+    assert!(play(&mut harness));
+    let impacts = harness.state().player().simulation().impacts();
+    let of_second = impacts.filter(|impact| impact.joint == 1);
+    let peaks: Vec<f64> = of_second.map(|impact| impact.peak).collect();
+    assert!(peaks[1] > 1.05 * peaks[0], "{peaks:?}");
+    harness.get_by_label("It is: Harder than the first");
+    assert!(says(&harness, &format!("{:.0} N", peaks[1])), "{peaks:?}");
+}
+
+#[test]
+fn a_lecturer_may_play_with_any_control_and_next_sets_the_machine() {
+    let mut harness = taught("rattle", 1, WIDE);
+    let set = |harness: &mut Harness<'_, App>| {
+        let player = harness.state_mut().player_mut();
+        player.set("contact.friction", "0.4").expect("in range");
+    };
+    set(&mut harness);
+    harness.run_steps(2);
+    assert!(says(&harness, "The machine was changed"));
+    harness.get_by_label("Set the step again").click();
+    settle(&mut harness);
+    assert!(!says(&harness, "The machine was changed"));
+    assert_eq!(harness.state().player().scene().contact.friction, 0.15);
+    set(&mut harness);
+    press(&mut harness, Key::PageDown);
+    assert_eq!(step(&harness), 2);
+    assert_eq!(harness.state().player().scene().contact.friction, 0.15);
+    settle(&mut harness);
+    // Where the step before ends: just after the first impact of S1, which the view follows.
+    let mut alone = Simulation::new(harness.state().player().scene()).expect("starts");
+    alone.advance_to(20e-3).expect("runs");
+    let of_s1 = alone.impacts().filter(|impact| impact.joint == 0);
+    let [first, second] = of_s1.map(|impact| impact.start).take(2).collect::<Vec<_>>()[..] else {
+        panic!("two impacts of S1");
+    };
+    let shown = harness.state().player().pacer.shown();
+    assert!((shown - first - 0.15e-3).abs() < 1e-9, "{shown}, {first}");
+    // What a remote sends besides does what it always does.
+    press(&mut harness, Key::Period);
+    for _ in 0..100 {
+        harness.step();
+    }
+    let shown = harness.state().player().pacer.shown();
+    assert!((shown - second).abs() < 20e-6, "{shown}, {second}");
+    // Without a lesson these keys do nothing.
+    let mut harness = sized("pendulum", WIDE, eframe::egui::Theme::Light);
+    let before = harness.state().share_state();
+    harness.key_press(Key::PageDown);
+    harness.run_steps(2);
+    assert_eq!(harness.state().share_state(), before);
+}
+
+#[test]
+fn a_lesson_changes_no_bit_of_the_run() {
+    let mut harness = taught("rattle", 4, WIDE);
+    play(&mut harness);
+    let player = harness.state().player();
+    let mut alone = Simulation::new(player.scene()).expect("starts");
+    while alone.statistics().steps < player.steps() {
+        alone.step().expect("runs");
+    }
+    assert_eq!(player.simulation().state_hash(), alone.state_hash());
+}
+
+#[test]
+fn a_link_opens_the_lesson_at_its_step() {
+    let options = AppOptions::from_link("?lesson=rattle").expect("a link");
+    let (mut harness, _) = page::open(options, WIDE);
+    settle(&mut harness);
+    assert_eq!(step(&harness), 0);
+    press(&mut harness, Key::PageDown);
+    harness.state_mut().player_mut().run_to(3e-3);
+    harness.run_steps(2);
+    let link = harness.state().share_state();
+    assert!(link.contains("lesson=rattle&step=2"), "{link}");
+    let before = harness.state().player().simulation().state_hash();
+    let (mut harness, _) = page::open(
+        AppOptions::from_link(&format!("#{link}")).expect("a link"),
+        WIDE,
+    );
+    settle(&mut harness);
+    for _ in 0..100 {
+        harness.step();
+    }
+    assert_eq!(step(&harness), 1);
+    assert_eq!(harness.state().verdict(), Some(&Verdict::Agrees(before)));
+    assert!(!says(&harness, "The machine was changed"));
+    let (mut harness, _) = page::open(
+        AppOptions::from_link("?lesson=rattle&step=5").expect("a link"),
+        WIDE,
+    );
+    settle(&mut harness);
+    assert_eq!(step(&harness), 4);
+    assert!((harness.state().player().pacer.shown() - 9.5e-3).abs() < 1e-12);
+    for (text, wrong) in [
+        ("?lesson=ratle", "did you mean `rattle`?"),
+        ("?lesson=rattle&step=0", "allowed 1 and more"),
+    ] {
+        let error = AppOptions::from_link(text).expect_err(text);
+        assert!(error.contains(wrong), "{error}");
+    }
+    let link = Link::parse("?lesson=rattle&step=2").expect("a link");
+    assert_eq!(
+        (link.lesson.as_deref(), link.step),
+        (Some("rattle"), Some(2))
+    );
+}
+
+#[test]
+fn the_menu_lists_the_lessons_and_fingers_walk_one_on_a_phone() {
+    let mut harness = sized("spcmm", WIDE, eframe::egui::Theme::Light);
+    harness.get_by_label("Lessons").click();
+    harness.run_steps(3);
+    for (name, _) in BUILT_IN_LESSONS {
+        let title = &Lesson::built_in(name).expect("a lesson").title;
+        harness.get_by_role_and_label(Role::Button, title);
+    }
+    let title = &Lesson::built_in("first-impact").expect("a lesson").title;
+    harness.get_by_role_and_label(Role::Button, title).click();
+    settle(&mut harness);
+    assert_eq!(
+        harness.state().course().expect("a lesson").lesson().title,
+        *title
+    );
+
+    let tap = |harness: &mut Harness<'_, App>, role: Role, label: &str| {
+        let at = harness.get_by_role_and_label(role, label).rect().center();
+        fingers(harness, &[&[at]]);
+        settle(harness);
+    };
+    let mut harness = taught("rattle", 0, PHONE);
+    let next = harness.get_by_role_and_label(Role::Button, "Next").rect();
+    tap(&mut harness, Role::Button, "Next");
+    assert_eq!(step(&harness), 1);
+    assert_eq!(
+        harness.get_by_role_and_label(Role::Button, "Next").rect(),
+        next,
+        "nothing moves"
+    );
+    tap(&mut harness, Role::Button, "Play");
+    for _ in 0..FRAMES {
+        harness.step();
+        if harness.state().course().expect("a lesson").is_reached() {
+            break;
+        }
+    }
+    harness.run_steps(2);
+    assert!(says(&harness, "It is: S1"));
+    tap(&mut harness, Role::Button, "Back");
+    assert_eq!(step(&harness), 0);
+    // The sheet folds away, and comes back.
+    tap(&mut harness, Role::Button, "Lesson");
+    assert!(
+        harness
+            .query_by_role_and_label(Role::Button, "Next")
+            .is_none()
+    );
+    tap(&mut harness, Role::Button, "Lesson");
+    tap(&mut harness, Role::Button, "Leave the lesson");
+    assert!(harness.state().course().is_none());
+}
+
+/// Presses F5, and gives the window the points that are left at its new zoom.
+fn present(harness: &mut Harness<'_, App>, screen: [f32; 2]) {
+    harness.key_press(Key::F5);
+    harness.step();
+    let zoom = harness.ctx.zoom_factor();
+    harness.set_size(vec2(screen[0], screen[1]) / zoom);
+    harness.set_pixels_per_point(zoom);
+    settle(harness);
+}
+
+#[test]
+fn a_presented_lesson_is_legible_from_the_last_row() {
+    let mut harness = taught("rattle", 1, WIDE);
+    present(&mut harness, WIDE);
+    assert!(harness.state().is_presenting());
+    let zoom = harness.ctx.zoom_factor();
+    let styles = &harness.ctx.global_style().text_styles;
+    for style in [
+        TextStyle::Small,
+        TextStyle::Body,
+        TextStyle::Monospace,
+        TextStyle::Heading,
+    ] {
+        let share = styles[&style].size * zoom / WIDE[1];
+        assert!(share >= 1.0 / 40.0 - 1e-6, "{style:?}: {share}");
+    }
+    // Its lines are as high as that, too.
+    let line = harness.get_by_label("Step 2 of 6").rect().height();
+    assert!(line * zoom / WIDE[1] >= 1.0 / 40.0, "{line}");
+    press(&mut harness, Key::PageDown);
+    assert_eq!(step(&harness), 2);
+    assert!(play(&mut harness));
+    harness.key_press(Key::F5);
+    harness.run_steps(2);
+    assert!(!harness.state().is_presenting());
+    assert_eq!(step(&harness), 2, "the lesson goes on");
+}
+
+/// Which step of a lesson is drawn, counted from 0.
+const DRAWN: [(&str, usize); 10] = [
+    ("rattle", 1),
+    ("first-impact", 3),
+    ("clearance", 2),
+    ("friction", 1),
+    ("slow-motion", 2),
+    ("ideal", 2),
+    ("forces", 2),
+    ("twin", 2),
+    ("chaos", 3),
+    ("to-the-class", 4),
+];
+
+#[test]
+fn pictures_of_the_lessons() {
+    let mut results = SnapshotResults::new();
+    for (index, (name, step)) in DRAWN.into_iter().enumerate() {
+        let mut harness = taught(name, step, WIDE);
+        if index % 2 == 0 {
+            present(&mut harness, WIDE);
+        }
+        play(&mut harness);
+        harness.run_steps(60);
+        harness.snapshot(format!("lesson_{name}"));
+        results.extend_harness(&mut harness);
+    }
+    let mut harness = taught("rattle", 1, PHONE);
+    play(&mut harness);
+    harness.run_steps(60);
+    harness.snapshot("lesson_rattle_phone");
+    results.extend_harness(&mut harness);
+}

@@ -1,0 +1,193 @@
+//! Fingers on a small screen: what they scroll and what they move, and that nothing lies over another thing.
+
+use eframe::egui::{self, Pos2, Rect, accesskit::Role, vec2};
+use egui_kittest::{Harness, kittest::Queryable as _};
+use jointplay::app::App;
+
+use crate::hands::fingers;
+use crate::page::{click, label, window};
+
+const UPRIGHT: [f32; 2] = [390.0, 844.0];
+const LYING: [f32; 2] = [844.0, 390.0];
+/// A window that somebody has put beside three others.
+const SMALL: [f32; 2] = [400.0, 300.0];
+
+fn rect(harness: &Harness<'_, App>, role: Role, name: &str) -> Rect {
+    harness.get_by_role_and_label(role, name).rect()
+}
+
+fn clearance(harness: &Harness<'_, App>) -> f64 {
+    harness.state().player().wanted().contact.clearance
+}
+
+/// The way of a finger from `from` by `way`, in steps as short as a screen reports them; it rests at the end, so that nothing glides
+/// on.
+fn path(from: Pos2, way: egui::Vec2) -> Vec<Pos2> {
+    let parts = (0..=12).chain([12; 12]);
+    parts.map(|k| from + way * (k as f32 / 12.0)).collect()
+}
+
+#[test]
+fn a_finger_on_a_slider_scrolls_up_and_down_and_moves_it_sideways() {
+    let (mut harness, _) = window("spcmm", UPRIGHT);
+    harness.run();
+    let before = clearance(&harness);
+    let track = rect(&harness, Role::Slider, "Clearance");
+    // Not where the handle is: there nothing would move at first either.
+    let at = track.left_center() + vec2(0.7 * track.width(), 0.0);
+    fingers(&mut harness, &[&path(at, vec2(3.0, -90.0))]);
+    harness.run();
+    assert_eq!(clearance(&harness), before, "the swipe moves the slider");
+    let moved = track.top() - rect(&harness, Role::Slider, "Clearance").top();
+    assert!(moved > 60.0, "scrolled by {moved}");
+
+    // Back, sideways later on: what the finger does stays decided.
+    let there = rect(&harness, Role::Slider, "Friction coefficient").center();
+    let friction = harness.state().player().wanted().contact.friction;
+    let mut way = path(there, vec2(0.0, 90.0));
+    way.extend(path(there + vec2(0.0, 90.0), vec2(80.0, 60.0)));
+    fingers(&mut harness, &[&way]);
+    harness.run();
+    assert_eq!(harness.state().player().wanted().contact.friction, friction);
+    assert_eq!(rect(&harness, Role::Slider, "Clearance").top(), track.top());
+
+    // A tap is no drag.
+    fingers(&mut harness, &[&[at, at]]);
+    harness.run();
+    assert_eq!(clearance(&harness), before, "a tap moves the slider");
+
+    let from = track.left_center() + vec2(0.3 * track.width(), 0.0);
+    fingers(
+        &mut harness,
+        &[&path(from, vec2(0.4 * track.width(), 20.0))],
+    );
+    harness.run();
+    let part = clearance(&harness) / 1e-3;
+    assert!((0.6..0.8).contains(&part), "{part}");
+    assert_eq!(rect(&harness, Role::Slider, "Clearance").top(), track.top());
+
+    // A mouse still moves it at once.
+    harness.drag_at(track.left_center() + vec2(0.2 * track.width(), 0.0));
+    harness.step();
+    harness.drop_at(track.left_center() + vec2(0.2 * track.width(), 0.0));
+    harness.run();
+    assert!(clearance(&harness) < 0.4e-3, "{}", clearance(&harness));
+}
+
+/// Controls that do not scroll, by what they are called.
+const FIXED: [(Role, &str); 12] = [
+    (Role::ComboBox, "Scene"),
+    (Role::Button, "Menu"),
+    (Role::Button, "View options"),
+    (Role::Slider, "Timeline, s"),
+    (Role::Button, "Reset"),
+    (Role::Button, "Play"),
+    (Role::Button, "Step"),
+    (Role::ComboBox, "Time scale preset"),
+    (Role::Button, "Panels"),
+    (Role::Button, "Controls"),
+    (Role::Button, "Plots"),
+    (Role::Button, "Bench"),
+];
+
+#[test]
+fn nothing_covers_anything_however_small_the_window_is() {
+    for size in [SMALL, [320.0, 480.0], [480.0, 320.0], UPRIGHT, LYING] {
+        let (mut harness, _) = window("spcmm", size);
+        harness.run();
+        for fold in [false, true] {
+            if fold {
+                harness.key_press(egui::Key::C);
+                harness.run();
+            }
+            let shown: Vec<(&str, Rect)> = FIXED
+                .iter()
+                .filter_map(|&(role, name)| {
+                    let node = harness.query_by_role_and_label(role, name)?;
+                    Some((name, node.rect()))
+                })
+                .collect();
+            assert!(shown.len() >= 9, "{size:?}: {shown:?}");
+            let whole = Rect::from_min_size(Pos2::ZERO, size.into());
+            for (i, (name, rect)) in shown.iter().enumerate() {
+                assert!(
+                    whole.contains_rect(rect.shrink(0.5)),
+                    "{size:?}: {name} sticks out: {rect:?}"
+                );
+                for (other, there) in &shown[i + 1..] {
+                    assert!(
+                        !rect.shrink(1.0).intersects(there.shrink(1.0)),
+                        "{size:?}: {name} and {other}: {rect:?} {there:?}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn in_a_small_window_the_panels_are_behind_one_button() {
+    let (mut harness, _) = window("spcmm", SMALL);
+    harness.run();
+    harness.get_by_role_and_label(Role::Slider, "Clearance");
+    let choose = |harness: &mut Harness<'_, App>| {
+        click(harness, "Panels");
+        harness.get_by_role_and_label(Role::Button, "Plots").click();
+        harness.run();
+    };
+    choose(&mut harness);
+    harness.get_by_label("Choose plots");
+    if let Ok(p) = std::env::var("SHOW") {
+        harness.render().unwrap().save(p).unwrap();
+    }
+    choose(&mut harness);
+    assert!(harness.query_by_label("Choose plots").is_none());
+}
+
+#[test]
+fn a_phone_held_upright_shows_the_speed_that_is_reached() {
+    let (mut harness, _) = window("spcmm", UPRIGHT);
+    click(&mut harness, "Play");
+    harness.run_steps(90);
+    assert!(label(&harness, "reached 1:"));
+    let words = harness.get_by_label_contains("reached 1:").rect();
+    let bench = rect(&harness, Role::Button, "Bench");
+    assert!(
+        words.left() >= bench.right() && words.right() <= UPRIGHT[0],
+        "{words:?}"
+    );
+    assert!((words.center().y - bench.center().y).abs() < 4.0);
+}
+
+#[test]
+fn a_menu_that_is_cut_shows_that_it_scrolls() {
+    /// Rows with a bar along the right edge of the menu.
+    fn bar(harness: &mut Harness<'_, App>) -> usize {
+        let first = rect(harness, Role::Button, "Open…");
+        let all = harness.query_all_by_role(Role::Button);
+        let entries = all.map(|node| node.rect());
+        let entries = entries.filter(|rect| (rect.left() - first.left()).abs() < 2.0);
+        let right = entries.map(|rect| rect.right()).fold(0.0, f32::max);
+        let picture = harness.render().expect("a picture");
+        let fill = harness.ctx.global_style().visuals.window_fill;
+        let rows = first.top() as u32..(harness.ctx.content_rect().height() - 40.0) as u32;
+        // No text is that long.
+        rows.filter(|&y| {
+            let pixel = picture.get_pixel(right as u32 - 3, y);
+            let apart = (0..3).map(|k| pixel[k].abs_diff(fill.to_array()[k]));
+            apart.max().is_some_and(|most| most > 40)
+        })
+        .count()
+    }
+    for (size, cut) in [(LYING, true), ([390.0, 1600.0], false)] {
+        let (mut harness, _) = window("spcmm", size);
+        harness.run();
+        click(&mut harness, "Menu");
+        harness.remove_cursor();
+        harness.run();
+        let about = harness.get_by_label("About").rect();
+        assert_eq!(about.bottom() > size[1], cut, "{size:?}: {about:?}");
+        let seen = bar(&mut harness);
+        assert_eq!(seen > 60, cut, "{size:?}: {seen} rows");
+    }
+}

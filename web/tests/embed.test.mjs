@@ -1,0 +1,201 @@
+// The page within another one: what it shows, what it leaves to the page around it, what they say to each other.
+
+import assert from 'node:assert/strict';
+import fs from 'node:fs';
+import path from 'node:path';
+import { after, test } from 'node:test';
+import { deflateRawSync } from 'node:zlib';
+
+import { colours, open, quit, ROOT } from './harness.mjs';
+
+after(quit);
+
+const backend = 'webgl';
+const SLIDERS = ['Clearance', 'Friction coefficient', 'Restitution'];
+
+/** A page around frames: `body` with `{page}` for the address of the laboratory. Opened in a context of its own. */
+async function course(body, size = { width: 700, height: 500 }) {
+    // Its context, server and browser are what is wanted of it.
+    const lab = await open('scene=pendulum&play=0', { backend, size, ownTime: true });
+    const address = await lab.page.evaluate(() => location.origin + location.pathname);
+    const html = `<!doctype html><title>Course</title><style>body { margin: 0 } p { height: 120px } iframe { border: 0; display: block }</style>${body.replaceAll('{page}', address)}`;
+    await lab.page.route('**/course.html', (route) => route.fulfill({ contentType: 'text/html', body: html }));
+    await lab.page.goto(`${address}course.html`);
+    return lab;
+}
+
+/** What a frame says of its laboratory; undefined while it is not there. */
+const ready = (frame) => frame.evaluate(() => Boolean(globalThis.jointplay?.ready));
+
+/** The frames of a page, once as many as `count` are running. */
+async function running(lab, count = 1) {
+    const frames = lab.page.frames().slice(1);
+    await lab.until(async () => (await Promise.all(frames.map(ready))).filter(Boolean).length >= count, 'the frames do not start');
+    return frames;
+}
+
+test('embed shows picture and play button, and the panels that it names; links keep it', async () => {
+    const lab = await open('embed&scene=pendulum&play=0', { backend });
+    await lab.find('Button', 'Play');
+    const names = (await lab.widgets()).map(({ label }) => label);
+    for (const name of ['Save', 'Open…', 'Bench', ...SLIDERS]) assert.ok(!names.includes(name), `${name} is there`);
+    assert.match(await lab.page.evaluate(() => globalThis.jointplay.page.link()), /(^|&)embed=(&|$)/);
+    await lab.close();
+
+    const more = await open('embed=controls,timeline&scene=pendulum&play=0', { backend });
+    for (const name of SLIDERS) await more.find('Slider', name);
+    await more.find('Slider', 'Timeline, s');
+    assert.ok(!(await more.has('Button', 'Save')));
+    assert.match(await more.page.evaluate(() => globalThis.jointplay.page.link()), /(^|&)embed=controls%2Ctimeline(&|$)/);
+    await more.slide('Clearance', 0.9);
+    assert.ok((await more.state()).changed_parameters['contact.clearance']);
+    await more.close();
+
+    const wrong = await open('embed=sliders', { backend });
+    await wrong.says('no panel `sliders`; allowed, separated by commas: controls, timeline, plots, bench');
+    await wrong.close();
+});
+
+test('the menu gives the line for another page', async () => {
+    const context = { permissions: ['clipboard-read', 'clipboard-write'] };
+    const lab = await open('scene=pendulum&c=0.5mm&play=0', { backend, context });
+    await lab.runTo(0.01);
+    const { state_hash: hash } = await lab.state();
+    await lab.click('Button', 'Save');
+    await lab.click('Button', 'Embed');
+    const line = await lab.until(() => lab.page.evaluate(() => navigator.clipboard.readText()), 'nothing on the clipboard');
+    await lab.close();
+    const around = await course(line);
+    const [frame] = await running(around);
+    const shown = await frame.evaluate(() => JSON.parse(globalThis.jointplay.page.state()));
+    await around.until(async () => (await frame.evaluate(() => JSON.parse(globalThis.jointplay.page.state()).state_hash)) === hash, 'another state');
+    assert.equal(shown.scene, 'pendulum');
+    assert.equal(await frame.evaluate(() => document.querySelector('canvas').hidden), false);
+    await around.close();
+});
+
+test('a frame takes neither focus nor wheel nor Tab from the page around it', async () => {
+    const lab = await course(`<p><a id="before" href="#">before</a></p>
+        <iframe src="{page}?embed=controls&scene=pendulum&play=0&renderer=webgl" width="640" height="360"></iframe>
+        <p><a id="after" href="#">after</a></p><p style="height: 2000px">more</p>`);
+    const [frame] = await running(lab);
+    const { page } = lab;
+    const around = () => page.evaluate(() => [document.activeElement.tagName, document.activeElement.id, scrollY]);
+    assert.deepEqual(await around(), ['BODY', '', 0]);
+
+    // In, through its controls, and out again.
+    await page.focus('#before');
+    let tabs = 0;
+    const visited = new Set();
+    while ((await around())[1] !== 'after') {
+        tabs += 1;
+        const widgets = await frame.evaluate(() => JSON.parse(globalThis.jointplay.page.widgets() || '[]'));
+        const focused = widgets.find((widget) => widget.focused && widget.focusable);
+        if (focused) visited.add(focused.label);
+        assert.ok(tabs < 60, `Tab stays within: ${[...visited]}`);
+        await page.keyboard.press('Tab');
+        await lab.frame(3);
+    }
+    assert.ok(visited.has('Clearance') && visited.has('Play'), `${[...visited]}`);
+    await page.evaluate(() => scrollTo(0, 0));
+
+    // The wheel is the page's until the laboratory was clicked, and again after Escape.
+    const scrolls = async () => {
+        const [, , before] = await around();
+        await page.mouse.move(450, 250);
+        await page.mouse.wheel(0, 100);
+        for (let wait = 0; wait < 10; wait += 1) await lab.frame(2);
+        const [, , now] = await around();
+        await page.evaluate((before) => scrollTo(0, before), before);
+        return now !== before;
+    };
+    assert.ok(await scrolls(), 'the frame takes the wheel');
+    await page.mouse.click(450, 250);
+    assert.ok(!(await scrolls()), 'the frame does not take the wheel');
+    await page.keyboard.press('Escape');
+    assert.ok(await scrolls(), 'the frame keeps the wheel');
+    await lab.close();
+});
+
+test('the page around opens, sets, plays and pauses by messages, and hears what happens', async () => {
+    const lab = await course('<iframe src="{page}?embed&scene=pendulum&play=0&renderer=webgl" width="640" height="360"></iframe>');
+    await lab.page.evaluate(() => {
+        globalThis.heard = [];
+        addEventListener('message', ({ data }) => data.jointplay === 1 && heard.push(data));
+        globalThis.say = (message) => frames[0].postMessage({ jointplay: 1, ...message }, '*');
+    });
+    const [frame] = await running(lab);
+    const heard = (event) => lab.page.evaluate((event) => globalThis.heard.filter((message) => message.event === event), event);
+    const say = (message) => lab.page.evaluate((message) => globalThis.say(message), message);
+    const state = async () => {
+        const before = (await heard('state')).length;
+        await say({ do: 'state' });
+        return (await lab.until(async () => (await heard('state'))[before], 'no state')).state;
+    };
+    await say({ do: 'set', key: 'contact.clearance', value: '0.5 mm' });
+    await say({ do: 'set', key: 'contact.clearence', value: '0.5 mm' });
+    const [problem] = await lab.until(async () => ((await heard('problem')).length ? heard('problem') : null), 'no problem');
+    assert.match(problem.text, /contact\.clearance/);
+    await say({ do: 'jump' });
+    await say({ do: 'open', link: 'scene=pendulun' });
+    await lab.until(async () => (await heard('problem')).length === 3, 'an unknown message or a bad link is taken');
+    assert.match((await heard('problem'))[1].text, /open, set, play, pause, reset, state/);
+    assert.match((await heard('problem'))[2].text, /did you mean `pendulum`/);
+
+    await say({ do: 'open', link: 'scene=spcmm&scale=0.02&play=0' });
+    await lab.until(async () => (await state()).scene === 'spcmm', 'the link is not opened');
+    await say({ do: 'play' });
+    await lab.until(async () => (await heard('impact')).length > 0, 'no impact');
+    await say({ do: 'pause' });
+    await lab.until(async () => !(await state()).playing, 'it does not pause');
+    const { shown_s: shown } = await state();
+    await lab.until(async () => (await heard('time')).some(({ time_s: time, playing }) => time === shown && !playing), 'the last instant is not told');
+    const own = await frame.evaluate(() => JSON.parse(globalThis.jointplay.page.impacts(0)));
+    await lab.until(async () => (await heard('impact')).length === own.length, 'other impacts');
+    for (const [at, { joint, end_s: end, peak_N: peak }] of (await heard('impact')).entries()) {
+        assert.deepEqual([joint, end, peak], [own[at].joint, own[at].end_s, own[at].peak_N]);
+    }
+    await say({ do: 'reset' });
+    await lab.until(async () => (await state()).shown_s === 0, 'no reset');
+
+    // Changes of an own scene are the page's around it: nobody is asked on the way out.
+    const mine = fs.readFileSync(path.join(ROOT, 'assets/scenes/pendulum.toml'), 'utf8').replace(/^name = .*$/m, 'name = "mine"');
+    await say({ do: 'open', link: `file=mine.toml&text=${deflateRawSync(mine).toString('base64url')}&play=0` });
+    await lab.until(async () => (await state()).scene === 'mine', 'the own scene is not opened');
+    // What it was opened with is known from its first picture on.
+    await lab.frame(5);
+    await say({ do: 'set', key: 'contact.clearance', value: '0.4 mm' });
+    await lab.until(() => frame.evaluate(() => globalThis.jointplay.page.unsaved()), 'the change is not seen');
+    assert.ok(await frame.evaluate(() => dispatchEvent(new Event('beforeunload', { cancelable: true }))));
+    await lab.close();
+});
+
+test('of many frames those out of sight hold no graphics, and go on where they were when they are seen again', async () => {
+    const frame = '<iframe src="{page}?embed&scene=pendulum&t=10ms&renderer=webgl" width="300" height="200"></iframe>';
+    const lab = await course(frame.repeat(18), { width: 320, height: 300 });
+    const frames = await running(lab, 2);
+    assert.equal(frames.length, 18);
+    const holding = () => Promise.all(frames.map((frame) => frame.evaluate(() => {
+        // One that was never in sight has not asked for any, and must not get one by being asked here.
+        if (!globalThis.jointplay?.starts) return false;
+        return !document.getElementById('laboratory').getContext('webgl2').isContextLost();
+    })));
+    const count = async () => (await holding()).filter(Boolean).length;
+    await lab.until(async () => (await count()) === 2, 'not the two in sight alone');
+    assert.ok(colours(await lab.pixels()) > 200, 'they show nothing');
+    const state = () => frames[0].evaluate(() => JSON.parse(globalThis.jointplay.page.state()));
+    await lab.until(async () => (await state()).shown_s === 0.01, 'the instant is not reached');
+    const before = await state();
+    await lab.page.evaluate(() => scrollTo(0, document.body.scrollHeight));
+    await lab.until(async () => {
+        const now = await holding();
+        return now[17] && !now[0] && !now[1] && now.filter(Boolean).length <= 3;
+    }, 'those out of sight keep their graphics');
+    await lab.until(() => ready(frames[17]), 'the last does not draw');
+    await lab.page.evaluate(() => scrollTo(0, 0));
+    await lab.until(() => ready(frames[0]), 'the first does not come back');
+    assert.ok((await holding())[0]);
+    const { shown_s: shown, state_hash: hash } = await state();
+    assert.deepEqual([shown, hash], [before.shown_s, before.state_hash]);
+    await lab.close();
+});

@@ -1,0 +1,251 @@
+// How the page comes to a browser: over a network, packed, kept for when there is none, replaced by a newer one.
+
+import assert from 'node:assert/strict';
+import { createHash } from 'node:crypto';
+import fs from 'node:fs';
+import os from 'node:os';
+import path from 'node:path';
+import http from 'node:http';
+import { after, test } from 'node:test';
+
+import jsQR from 'jsqr';
+
+import { ELSEWHERE, open, PAGE, quit, ROOT, serveFolder } from './harness.mjs';
+
+after(quit);
+
+/** A file as the server sends it: nothing is unpacked. `path`: as it stands, in place of the address's. */
+function get(address, headers = {}, path = undefined) {
+    return new Promise((done, failed) => {
+        http.get(address, { headers, ...(path && { path }) }, (response) => {
+            const parts = [];
+            response.on('data', (part) => parts.push(part));
+            response.on('end', () => done({ status: response.statusCode, headers: response.headers, bytes: Buffer.concat(parts) }));
+        }).on('error', failed);
+    });
+}
+
+/** What a QR code of a terminal says: each sign is two modules, one above the other. */
+function read(lines) {
+    const [pixels, light] = [4, { '█': [1, 1], '▀': [1, 0], '▄': [0, 1], ' ': [0, 0] }];
+    const rows = lines.flatMap((line) => [0, 1].map((half) => [...line].map((sign) => light[sign][half])));
+    const [width, height] = [rows[0].length * pixels, rows.length * pixels];
+    const picture = new Uint8ClampedArray(4 * width * height).fill(255);
+    for (let at = 0; at < width * height; at += 1) {
+        const value = 255 * rows[Math.floor(at / width / pixels)][Math.floor((at % width) / pixels)];
+        picture.fill(value, 4 * at, 4 * at + 3);
+    }
+    return jsQR(picture, width, height)?.data;
+}
+
+test('the server packs as the browser accepts, and sends nothing twice', async () => {
+    const server = await serveFolder(PAGE);
+    try {
+        const plain = fs.readFileSync(path.join(PAGE, 'main.js'));
+        const address = `${server.address}main.js?build`;
+        const tags = new Set();
+        for (const [accepted, coding, ending] of [['identity', undefined, ''], ['gzip, deflate', 'gzip', '.gz'], ['gzip, deflate, br', 'br', '.br']]) {
+            const { status, headers, bytes } = await get(address, { 'Accept-Encoding': accepted });
+            assert.equal(status, 200);
+            assert.equal(headers['content-encoding'], coding);
+            assert.equal(headers['vary'], 'Accept-Encoding');
+            assert.match(headers['content-type'], /^text\/javascript/);
+            assert.deepEqual(bytes, ending ? fs.readFileSync(path.join(PAGE, `main.js${ending}`)) : plain);
+            tags.add(headers.etag);
+            const again = await get(address, { 'Accept-Encoding': accepted, 'If-None-Match': `"other", ${headers.etag}` });
+            assert.deepEqual([again.status, again.bytes.length, again.headers.etag], [304, 0, headers.etag]);
+        }
+        assert.equal(tags.size, 3, 'one tag for different bytes');
+        assert.equal((await get(server.address, {}, '/../main.js')).status, 404);
+    } finally {
+        await server.end();
+    }
+});
+
+test('every connection that is opened is answered, and kept', async () => {
+    // A browser opens six at once, and keeps them.
+    const count = 12;
+    for (let round = 0; round < 10; round += 1) {
+        const server = await serveFolder(PAGE);
+        const agent = new http.Agent({ keepAlive: true, maxSockets: count });
+        try {
+            const ask = () => new Promise((done, failed) => {
+                const request = http.get(`${server.address}main.js`, { agent }, (response) => {
+                    response.resume();
+                    response.on('end', () => done(request.reusedSocket));
+                });
+                request.setTimeout(20_000, () => request.destroy(new Error('a connection waits for good')));
+                request.on('error', failed);
+            });
+            const all = () => Promise.all(Array.from({ length: count }, ask));
+            assert.ok((await all()).every((reused) => !reused));
+            assert.ok((await all()).every((reused) => reused), 'a connection is not kept');
+        } finally {
+            agent.destroy();
+            await server.end();
+        }
+    }
+});
+
+test('what is no request for a file is answered, too', async () => {
+    const server = await serveFolder(PAGE);
+    const ask = (method, file) => new Promise((done, failed) => {
+        const request = http.request(`${server.address}${file}`, { method }, (response) => {
+            let length = 0;
+            response.on('data', (part) => (length += part.length));
+            response.on('end', () => done([response.statusCode, length > 0]));
+        });
+        request.on('error', failed);
+        request.end(method === 'POST' ? 'abc' : undefined);
+    });
+    try {
+        assert.deepEqual(await ask('POST', ''), [405, true]);
+        assert.deepEqual(await ask('GET', 'none'), [404, true]);
+        assert.deepEqual(await ask('GET', '../Cargo.toml'), [404, true]);
+        assert.deepEqual(await ask('GET', '%2e%2e/Cargo.toml'), [404, true]);
+        assert.deepEqual(await ask('HEAD', 'main.js'), [200, false]);
+        assert.equal((await get(server.address)).status, 200);
+    } finally {
+        await server.end();
+    }
+});
+
+test('a server for the room says its address in words and as a QR code, and is reached there', async () => {
+    const room = await serveFolder(PAGE, 0, '0.0.0.0');
+    const here = await serveFolder(PAGE);
+    try {
+        const [address, ...lines] = room.said.trimEnd().split('\n');
+        const { hostname, port } = new URL(address);
+        const own = Object.values(os.networkInterfaces()).flat().map((network) => network.address);
+        assert.ok(own.includes(hostname), `${hostname} is none of ${own}`);
+        for (const found of own.filter((ip) => !ip.includes(':'))) {
+            assert.equal((await get(`http://${found}:${port}/`)).status, 200, found);
+        }
+        if (hostname !== '127.0.0.1') {
+            assert.equal(read(lines), address);
+            // One that was not asked to is not found from there.
+            const closed = here.address.replace('127.0.0.1', hostname);
+            await assert.rejects(get(closed), /ECONNREFUSED/);
+        }
+        assert.equal(here.said.trim(), here.address);
+    } finally {
+        await Promise.all([room.end(), here.end()]);
+    }
+});
+
+test('where others find the page, its menu shows the link as a QR code, which a phone reads', async () => {
+    const server = await serveFolder(PAGE);
+    const at = server.address.replace('127.0.0.1', ELSEWHERE);
+    try {
+        const lab = await open('scene=pendulum&c=0.5mm&play=0', { at, backend: 'webgl', size: { width: 900, height: 800 } });
+        await lab.runTo(0.01);
+        const { state_hash: hash } = await lab.state();
+        const show = async () => {
+            await lab.click('Button', 'Save');
+            await lab.click('Button', 'QR code');
+        };
+        await show();
+        const { rect: [x0, y0, x1, y1] } = await lab.find('Image', 'QR code of the link');
+        await lab.still();
+        const picture = await lab.pixels({ x: Math.round(x0), y: Math.round(y0), width: Math.round(x1 - x0), height: Math.round(y1 - y0) });
+        const link = jsQR(new Uint8ClampedArray(picture.data), picture.width, picture.height)?.data;
+        assert.ok(link?.startsWith(`${at}#scene=pendulum&`), link);
+        await lab.click('Button', 'Close');
+
+        // Noise does not pack.
+        const noise = Array.from({ length: 40 }, (_, k) => createHash('sha256').update(String(k)).digest('base64')).join('');
+        await lab.drop('mine.toml', `${fs.readFileSync(path.join(ROOT, 'assets/scenes/pendulum.toml'), 'utf8')}\n# ${noise}\n`);
+        await lab.until(async () => (await lab.page.evaluate(() => globalThis.jointplay.page.link())).includes('mine.toml'), 'the file does not open');
+        await show();
+        await lab.says('1273 fit into a QR code');
+        assert.equal(await lab.has('Image', 'QR code of the link'), false);
+        await lab.close();
+
+        const phone = await open('', { backend: 'webgl', fragment: new URL(link).hash.slice(1) });
+        await phone.says(`hash ${hash} agrees`);
+        // This page is found by nobody else.
+        await phone.click('Button', 'Save');
+        await phone.find('Button', 'Embed');
+        assert.equal(await phone.has('Button', 'QR code'), false);
+        await phone.close();
+    } finally {
+        await server.end();
+    }
+});
+
+/** Another build in `folder`: as this one, but for a mark, and a worker that no page of this build may get. */
+function buildAnew(folder) {
+    const write = (name, change) => {
+        const file = path.join(folder, name);
+        const text = change(fs.readFileSync(file, 'utf8'));
+        fs.writeFileSync(file, text);
+        for (const ending of ['br', 'gz']) fs.rmSync(`${file}.${ending}`, { force: true });
+        return `sha256-${createHash('sha256').update(text).digest('base64')}`;
+    };
+    const [, old] = /main\.js\?([0-9a-f]+)/.exec(fs.readFileSync(path.join(folder, 'index.html'), 'utf8'));
+    const rename = (text) => text.replaceAll(old, `${old.slice(1)}0`);
+    const sums = {
+        'index.html': write('index.html', rename),
+        'main.js': write('main.js', (text) => `globalThis.secondBuild = true;\n${text}`),
+        'worker.js': write('worker.js', (text) => `if (!location.search.endsWith('0')) throw new Error('the worker of another build');\n${text}`),
+    };
+    write('offline.js', (text) => Object.entries(sums).reduce(
+        (text, [name, sum]) => text.replace(new RegExp(`('${name}': )'[^']*'`), `$1'${sum}'`),
+        rename(text),
+    ));
+}
+
+test('the page is there without a network, and a newer one replaces it whole', async () => {
+    const folder = fs.mkdtempSync(path.join(os.tmpdir(), 'jointplay-page-'));
+    fs.cpSync(PAGE, folder, { recursive: true });
+    let server = await serveFolder(folder);
+    const { address } = server;
+    const { port } = new URL(address);
+    const kept = (lab) => lab.page.evaluate(() => caches.keys());
+    const isSecond = (lab) => lab.page.evaluate(() => Boolean(globalThis.secondBuild));
+    const first = await open('scene=pendulum&c=0.2mm&play=0', { at: address, backend: 'webgl', context: { serviceWorkers: 'allow' }, size: { width: 800, height: 1000 } });
+    try {
+        await first.until(() => first.page.evaluate(() => Boolean(navigator.serviceWorker.controller)), 'nothing is kept');
+        assert.equal((await kept(first)).length, 1);
+
+        await server.end();
+        await first.page.reload();
+        await first.started();
+        assert.equal(await first.page.evaluate(() => globalThis.jointplay.trouble), null);
+        await first.runTo(0.01);
+        assert.ok((await first.state()).steps > 0);
+
+        buildAnew(folder);
+        server = await serveFolder(folder, port);
+        // The page that is open goes on with its own files: with the newer worker it would stop.
+        await first.page.evaluate(async () => (await navigator.serviceWorker.getRegistration()).update());
+        await first.click('Button', 'Measure preset');
+        await first.until(async () => (await first.widgets()).some(({ role, value }) => role === 'ProgressIndicator' && value > 0), 'no worker');
+        assert.equal(await isSecond(first), false);
+        await first.until(async () => (await kept(first)).length === 2, 'the newer one is not kept beside it');
+
+        // A second tab is the newer one, and it alone remains when the first is closed.
+        const second = await first.context.newPage();
+        await second.goto(`${address}?scene=pendulum&play=0&renderer=webgl`);
+        await second.waitForFunction(() => globalThis.jointplay?.ready);
+        assert.equal(await second.evaluate(() => globalThis.secondBuild), true);
+        await first.page.close();
+        // The browser takes a moment to see that a page is gone; one that comes meanwhile keeps the older worker.
+        let left;
+        for (let look = 0; look < 30 && left !== 1; look += 1) {
+            await second.goto('about:blank');
+            await new Promise((done) => setTimeout(done, 100));
+            await second.goto(`${address}?scene=pendulum&play=0&renderer=webgl`);
+            left = (await second.evaluate(() => caches.keys())).length;
+        }
+        assert.equal(left, 1, 'the older one stays');
+        await server.end();
+        await second.reload();
+        await second.waitForFunction(() => globalThis.jointplay?.ready);
+        assert.equal(await second.evaluate(() => globalThis.secondBuild), true);
+    } finally {
+        await first.close({ errors: true });
+        await server.end();
+        fs.rmSync(folder, { recursive: true });
+    }
+});
