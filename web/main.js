@@ -12,6 +12,8 @@ const MOST_LOSSES = 3;
 const LOSS_SPAN = 60_000;
 /** Where the tab keeps what no address holds: a large scene of the user's own, files that it names, very many changes. */
 const KEPT = `jointplay ${location.pathname}`;
+/** Where it keeps, for loading it anew, what was on the page that was left: the address follows once a second only. */
+const LEFT = `${KEPT} left`;
 /** What gives an element the focus. */
 const { focus } = HTMLElement.prototype;
 /** Pauses before the attempts to start them again, ms: after a crash the browser needs a moment. */
@@ -45,6 +47,22 @@ function wanted() {
     }
     return location.search + location.hash;
 }
+
+/** What was here when the page at this address was left, if it is loaded anew or come back to: for `Page.start`. */
+function takeLeft() {
+    if (window !== window.top) return null;
+    try {
+        const { address, session, unsaved } = JSON.parse(sessionStorage.getItem(LEFT)) ?? {};
+        sessionStorage.removeItem(LEFT);
+        // A link that is opened says itself what it leads to.
+        if (address !== location.href || performance.getEntriesByType('navigation')[0]?.type === 'navigate') return null;
+        history.replaceState({ unsaved }, '', address);
+        return session;
+    } catch {
+        return null;
+    }
+}
+const left = takeLeft();
 
 /** The fragment for a state as src/web/page.rs gives it; none where it does not fit and the browser does not keep it. */
 function fragmentOf(session) {
@@ -193,7 +211,7 @@ async function begin(found) {
         try {
             // A laboratory that starts takes the focus, which in a frame is another's.
             if (window !== window.top) HTMLElement.prototype.focus = () => {};
-            await page.start(freshCanvas(), backend, laboratory.starts, wanted());
+            await page.start(freshCanvas(), backend, laboratory.starts, left ?? wanted());
             // What eframe takes typed text by is no stop of its own on the way of Tab.
             for (const field of document.querySelectorAll('body > input')) field.tabIndex = -1;
             return null;
@@ -339,8 +357,10 @@ async function main() {
         if (location.href !== newURL) history.replaceState(null, '', newURL);
         opened = location.hash;
         // Another way to draw needs another start.
-        if (['webgl', 'webgpu'].includes(asked()) && asked() !== laboratory.backend) location.reload();
-        else mendable = laboratory.page.openLink(wanted()) ? Date.now() + MENDABLE : 0;
+        if (['webgl', 'webgpu'].includes(asked()) && asked() !== laboratory.backend) {
+            mendable = Infinity;
+            location.reload();
+        } else mendable = laboratory.page.openLink(wanted()) ? Date.now() + MENDABLE : 0;
     });
     if (framed) stayPolite(laboratory.page);
     await firstPicture();
@@ -367,21 +387,23 @@ const SPARING = 20;
 /** Keeps the state in the address, or in the tab, so that loading the page anew, or coming back to it, goes on from there. */
 function keepSession() {
     let told = false;
-    function keep() {
-        const { page } = laboratory;
-        if (!laboratory.ready || laboratory.trouble || Date.now() < mendable) return;
-        const session = page.session();
-        if (!session) return;
-        const fragment = fragmentOf(session);
-        if (!fragment) {
-            if (!told) page.say('This scene is too large for this browser to keep: loading the page anew loses it');
-            told = true;
-            return;
-        }
+    const present = () => (laboratory.trouble || Date.now() < mendable ? null : laboratory.page.session());
+    function withOwnWords(fragment) {
         const words = [new URLSearchParams(location.hash.slice(1)), query];
         const own = OWN_WORDS.map((word) => [word, words.map((from) => from.get(word)).find(Boolean)]);
         const rest = own.filter(([, value]) => value).map(([word, value]) => `&${word}=${encodeURIComponent(value)}`);
-        const address = `#${fragment}${rest.join('')}`;
+        return `#${fragment}${rest.join('')}`;
+    }
+    function keep() {
+        const session = laboratory.ready && present();
+        if (!session) return;
+        const fragment = fragmentOf(session);
+        if (!fragment) {
+            if (!told) laboratory.page.say('This scene is too large for this browser to keep: loading the page anew loses it');
+            told = true;
+            return;
+        }
+        const address = withOwnWords(fragment);
         const unsaved = isUnsaved();
         if (address === location.hash && unsaved === wasUnsaved()) return;
         history.replaceState({ unsaved }, '', location.pathname + location.search + address);
@@ -392,8 +414,16 @@ function keepSession() {
         setTimeout(follow, Math.max(SESSION_PACE, SPARING * (Date.now() - began)));
     }
     setTimeout(follow, SESSION_PACE);
-    // What the tab keeps does not change by its address.
-    addEventListener('pagehide', () => void (location.hash.startsWith('#kept=') && keep()));
+    addEventListener('pagehide', () => {
+        const now = present();
+        if (!now) return;
+        const session = now.startsWith('kept:') ? now : withOwnWords(now);
+        try {
+            sessionStorage.setItem(LEFT, JSON.stringify({ address: location.href, session, unsaved: isUnsaved() }));
+        } catch {
+            // What the last second brought is lost.
+        }
+    });
 }
 
 /** Whether the page was loaded with changes that were in no file; they still are until the laboratory knows better. */
