@@ -13,7 +13,7 @@ const LATENCY = 0.04;
 /** `laboratory`: what web/main.js knows; `lost(start, why)`: called when the graphics of that start are gone. */
 export function makeHost(laboratory, lost) {
     let reported = -Infinity;
-    /** Computations: number to {worker, messages}. */
+    /** Computations: number to {worker, messages, rest}. */
     const work = new Map();
     let works = 0;
 
@@ -35,6 +35,10 @@ export function makeHost(laboratory, lost) {
             return done;
         }
     }
+
+    /** Nothing moves on a page that is out of sight. */
+    const restAsTold = ({ worker, rest }) => worker.postMessage({ rest: document.hidden ? 0 : rest });
+    document.addEventListener('visibilitychange', () => work.forEach(restAsTold));
 
     const picker = document.createElement('input');
     picker.type = 'file';
@@ -118,10 +122,15 @@ export function makeHost(laboratory, lost) {
                 failed(error);
             }
             works += 1;
-            work.set(works, { worker, messages });
+            work.set(works, { worker, messages, rest: 0 });
             return works;
         },
         pollWork: (number) => work.get(number)?.messages.shift(),
+        restWork(number, rest) {
+            if (!work.has(number)) return;
+            work.get(number).rest = rest;
+            restAsTold(work.get(number));
+        },
         endWork(number) {
             work.get(number)?.worker.terminate();
             work.delete(number);

@@ -5,6 +5,7 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use crate::scene::{Kind, Scene, SceneError, Value, ValueError};
+use crate::simulate::differs_in_conditions_alone;
 
 /// Points per block in a `follow` sweep: each block starts cold at its first point, so that neither threads nor shards
 /// affect which point continues from which.
@@ -207,6 +208,19 @@ impl ParameterRange {
         }
     }
 
+    /// Whether its values take effect at a reset of `scene` only.
+    fn waits(&self, scene: &Scene) -> bool {
+        let at = |i| {
+            let mut scene = scene.clone();
+            let parameter = scene.set_value(&self.key, &self.parameter_value(i)).ok()?;
+            Some((parameter.at_reset, scene))
+        };
+        let ends = at(0).zip(at(self.count - 1));
+        ends.is_some_and(|((waits, first), (_, last))| {
+            waits && !differs_in_conditions_alone(&first, &last)
+        })
+    }
+
     /// All values in order, SI.
     pub fn values(&self) -> impl Iterator<Item = f64> + '_ {
         (0..self.count).map(|i| self.value(i))
@@ -282,10 +296,7 @@ impl Grid {
                 "the ranges have more than {MOST_POINTS} points together"
             ));
         }
-        let waits = scene
-            .parameter(&last.key)
-            .is_ok_and(|parameter| parameter.at_reset);
-        if start != Start::Cold && waits {
+        if start != Start::Cold && last.waits(scene) {
             return wrong(format!(
                 "--start {}: {} takes effect at the next reset only, so no state can be followed through its values; use \
                  --start cold{}",

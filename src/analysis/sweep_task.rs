@@ -104,11 +104,13 @@ pub(super) enum SweepMessage {
     Point(Box<SweptPoint>),
 }
 
-/// Computes a share of a sweep point by point, from coarse to fine if points do not follow each other.
-pub(super) fn run(
+/// Computes a share of a sweep point by point, from coarse to fine if points do not follow each other, and waits for `rest`
+/// every [`STEPS`] steps.
+pub(super) async fn run(
     task: &SweepTask,
     share: Share,
     tell: &mut dyn FnMut(SweepMessage) -> ControlFlow<()>,
+    rest: &mut impl AsyncFnMut(),
 ) -> Result<(), TaskFault> {
     let mut say = |message| match tell(message) {
         ControlFlow::Continue(()) => Ok(()),
@@ -153,6 +155,7 @@ pub(super) fn run(
     for b in own.skip(share.index).step_by(share.of.max(1)) {
         let mut block = Block::new(&sweep, b);
         while !block.run.is_done() {
+            rest().await;
             block.advance();
             if let Some(point) = block.latest() {
                 through += 1;
@@ -423,6 +426,32 @@ mod tests {
         assert_eq!(after, [(2, None), (1, Some(2)), (0, Some(1))]);
         let first: Vec<f64> = points.iter().map(|p| p.first).collect();
         assert!((first[1] - 0.65).abs() < 1e-12 && (first[2] - 1.25).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_parameter_of_the_scenes_own_is_followed_where_only_contacts_depend_on_it() {
+        let built_in = Scene::load("slider-crank-driven", &[]).expect("built in");
+        let own = "[[parameter]]\nname = \"gap\"\nvalue = \"0.2 mm\"\n";
+        let text = format!("{}\n{own}", built_in.source);
+        for (place, instead, followed) in [
+            ("clearance = \"0.3 mm\"", "clearance = \"gap\"", true),
+            ("mass = \"0.12 kg\"", "mass = \"gap * 600 kg / 1 m\"", false),
+        ] {
+            let text = text.replacen(place, instead, 1);
+            let scene = Scene::parse(&text, None, &[]).expect("a scene");
+            let mut task = task(&["parameter.gap=0.2mm..0.3mm:2"]);
+            (task.scene, task.start) = (SceneSource::of(&scene), Start::FollowUp);
+            let said = told(task, usize::MAX);
+            if followed {
+                let after: Vec<_> = points(&said).iter().map(|point| point.after).collect();
+                assert_eq!(after, [None, Some(0)]);
+            } else {
+                let [Message::Failed(why)] = &said[..] else {
+                    panic!("{said:?}");
+                };
+                assert!(why.contains("at the next reset"), "{why}");
+            }
+        }
     }
 
     #[test]

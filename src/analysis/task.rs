@@ -1,6 +1,9 @@
 //! Long computations as plain data, so that a thread on the desktop and a worker in the browser run the same code.
 
+use std::future::Future;
 use std::ops::ControlFlow;
+use std::pin::pin;
+use std::task::{Context, Poll, Waker};
 
 use serde::{Deserialize, Serialize};
 
@@ -58,10 +61,22 @@ pub fn perform(
     clock: &mut dyn FnMut() -> f64,
     tell: &mut dyn FnMut(Message) -> ControlFlow<()>,
 ) {
+    let performed = pin!(perform_with_rests(job, clock, tell, &mut async || {}));
+    let end = performed.poll(&mut Context::from_waker(Waker::noop()));
+    assert_eq!(end, Poll::Ready(()), "nothing in it waits");
+}
+
+/// As [`perform`]; a sweep waits for `rest` every few milliseconds.
+pub async fn perform_with_rests(
+    job: &Job,
+    clock: &mut dyn FnMut() -> f64,
+    tell: &mut dyn FnMut(Message) -> ControlFlow<()>,
+    rest: &mut impl AsyncFnMut(),
+) {
     let outcome = match job {
         Job::Presets { scene, presets } => measure_presets(scene, presets, clock, tell),
         Job::Sweep(task, share) => {
-            sweep_task::run(task, *share, &mut |message| tell(message.into()))
+            sweep_task::run(task, *share, &mut |message| tell(message.into()), rest).await
         }
     };
     let last = match outcome {
@@ -99,7 +114,10 @@ fn measure_presets(
 
 #[cfg(test)]
 mod tests {
+    use std::future::poll_fn;
+
     use super::*;
+    use crate::analysis::grid::Start;
     use crate::scene::Scene;
 
     fn job(changes: &[(&str, &str)], presets: &[&str]) -> Job {
@@ -147,6 +165,45 @@ mod tests {
             said.iter()
                 .any(|m| matches!(m, Message::Progress(p) if *p > 0.5))
         );
+    }
+
+    #[test]
+    fn a_sweep_that_rests_tells_the_same() {
+        let scene = Scene::load("slider-crank-driven", &[]).expect("built in");
+        let task = SweepTask {
+            scene: SceneSource::of(&scene),
+            vary: vec!["contact.clearance=0.2mm..0.4mm:2".to_owned()],
+            periods: 3,
+            discard: 1,
+            phase: 0.0,
+            start: Start::Cold,
+            exponent: false,
+        };
+        let job = Job::Sweep(task, Share::WHOLE);
+        let (mut said, mut rests, mut waits) = (Vec::new(), 0, 0);
+        let mut tell = |message| {
+            said.push(message);
+            ControlFlow::Continue(())
+        };
+        let mut rest = async || {
+            let mut woken = false;
+            rests += 1;
+            poll_fn(|_| match std::mem::replace(&mut woken, true) {
+                true => Poll::Ready(()),
+                false => Poll::Pending,
+            })
+            .await;
+        };
+        let mut clock = || 0.0;
+        {
+            let mut sweep = pin!(perform_with_rests(&job, &mut clock, &mut tell, &mut rest));
+            let mut context = Context::from_waker(Waker::noop());
+            while sweep.as_mut().poll(&mut context).is_pending() {
+                waits += 1;
+            }
+        }
+        assert!(rests > 2 && waits == rests, "{rests} rests, {waits} waits");
+        assert_eq!(said, messages(&job, usize::MAX));
     }
 
     #[test]

@@ -2,18 +2,24 @@
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
+use std::time::Duration;
 
 use web_time::Instant;
 
 use super::host::Running;
 use crate::analysis::task::{Job, Message, perform};
 
+/// How long it computes before it rests, if it is to.
+const SPELL: Duration = Duration::from_millis(40);
+
 /// A thread that computes a job. Dropping it ends the computation.
 pub struct Thread {
     messages: Option<Receiver<Message>>,
     cancelled: Arc<AtomicBool>,
+    /// Bits of the multiple of the time computed that it rests.
+    rest: Arc<AtomicU64>,
 }
 
 impl Thread {
@@ -22,16 +28,24 @@ impl Thread {
         let (sender, messages) = channel();
         let cancelled = Arc::new(AtomicBool::new(false));
         let asked = Arc::clone(&cancelled);
+        let rest = Arc::new(AtomicU64::new(0.0_f64.to_bits()));
+        let resting = Arc::clone(&rest);
         let work = move || {
             let start = Instant::now();
             let mut clock = move || start.elapsed().as_secs_f64();
+            let mut spell = start;
             perform(&job, &mut clock, &mut |message| {
                 // Nobody listens any more: the same as cancelled.
                 if asked.load(Ordering::Relaxed) || sender.send(message).is_err() {
-                    ControlFlow::Break(())
-                } else {
-                    ControlFlow::Continue(())
+                    return ControlFlow::Break(());
                 }
+                let computed = spell.elapsed();
+                if computed >= SPELL {
+                    let rest = f64::from_bits(resting.load(Ordering::Relaxed));
+                    std::thread::sleep(computed.mul_f64(rest));
+                    spell = Instant::now();
+                }
+                ControlFlow::Continue(())
             });
         };
         let builder = std::thread::Builder::new().name("computation".to_owned());
@@ -39,6 +53,7 @@ impl Thread {
         Some(Self {
             messages: Some(messages),
             cancelled,
+            rest,
         })
     }
 }
@@ -60,6 +75,10 @@ impl Running for Thread {
                 (!cancelled).then(|| Message::Failed("the computation broke off".to_owned()))
             }
         }
+    }
+
+    fn rest(&mut self, rest: f64) {
+        self.rest.store(rest.to_bits(), Ordering::Relaxed);
     }
 
     fn cancel(&mut self) {

@@ -8,6 +8,7 @@ mod plane;
 mod portrait;
 mod sweep;
 mod swept;
+mod throttle;
 
 use eframe::egui::{CollapsingHeader, RichText, Ui};
 
@@ -33,6 +34,11 @@ impl Bench {
     /// Takes messages from a sweep; returns whether one is running.
     pub fn update(&mut self, host: &mut dyn Host) -> bool {
         self.sweep.update(host)
+    }
+
+    /// Takes a frame at `now`, s; `moves`: whether the picture moves by itself.
+    pub fn seen(&mut self, now: f64, moves: bool) {
+        self.sweep.seen(now, moves);
     }
 
     /// Starts a ready sweep over `scene`, which is the one on show.

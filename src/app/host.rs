@@ -23,6 +23,9 @@ pub trait Running {
     /// Its next message, if any; none follows [`Message::Done`] or [`Message::Failed`].
     fn poll(&mut self) -> Option<Message>;
 
+    /// How long it is to rest from now on, as a multiple of the time that it computes; 0 at first.
+    fn rest(&mut self, rest: f64);
+
     /// Ends it; messages already sent can still be polled.
     fn cancel(&mut self);
 }

@@ -884,10 +884,12 @@ impl eframe::App for App {
         if self.bench.update(self.host.as_mut()) || measuring {
             ctx.request_repaint_after(POLL);
         }
-        let dt = ctx.input(|input| input.stable_dt);
-        if self.advance(f64::from(dt)) {
+        let (now, dt) = ctx.input(|input| (input.time, input.stable_dt));
+        let moves = self.advance(f64::from(dt));
+        if moves {
             ctx.request_repaint();
         }
+        self.bench.seen(now, moves);
         self.advance_lesson(ctx);
         self.announce(ctx);
     }

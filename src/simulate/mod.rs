@@ -24,7 +24,7 @@ pub use impacts::Impact;
 pub use ledger::Ledger;
 pub use pace::{LONGEST_FRAME, Limit, Pacer, REST, SCALE_RANGE};
 pub use simulation::ideal::{ProbeFault, closed};
-pub use simulation::live::ChangeError;
+pub use simulation::live::{ChangeError, differs_in_conditions_alone};
 pub use simulation::saved::{Misfit, SavedState};
 pub use simulation::{CLEARANCE_SPEED, LARGEST_DENSE, LARGEST_IMPLICIT, Simulation};
 pub use stopped::{StopAdvice, StopFault, Stopped};

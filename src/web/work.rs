@@ -3,6 +3,8 @@
 use std::ops::ControlFlow;
 
 use wasm_bindgen::prelude::*;
+use wasm_bindgen_futures::JsFuture;
+use wasm_bindgen_futures::js_sys::Promise;
 use web_time::Instant;
 
 use crate::analysis::task::{self, Job, Message};
@@ -13,12 +15,18 @@ extern "C" {
     /// In the worker: hands a message on to the page.
     #[wasm_bindgen(js_namespace = jointplayWork)]
     fn tell(message: &str);
+    /// In the worker: what to wait for before going on, if anything.
+    #[wasm_bindgen(js_namespace = jointplayWork)]
+    fn rest() -> Option<Promise>;
     /// On the page: starts a worker on a job; its number.
     #[wasm_bindgen(js_namespace = jointplayHost, js_name = startWork)]
     fn start_work(job: &str) -> Option<u32>;
     /// On the page: what a worker said next.
     #[wasm_bindgen(js_namespace = jointplayHost, js_name = pollWork)]
     fn poll_work(worker: u32) -> Option<String>;
+    /// On the page: how long a worker is to rest, as a multiple of the time that it computes.
+    #[wasm_bindgen(js_namespace = jointplayHost, js_name = restWork)]
+    fn rest_work(worker: u32, rest: f64);
     /// On the page: ends a worker.
     #[wasm_bindgen(js_namespace = jointplayHost, js_name = endWork)]
     fn end_work(worker: u32);
@@ -31,25 +39,30 @@ fn say(message: &Message) {
 
 /// In the worker: computes a job, given as JSON, and posts each message as JSON.
 #[wasm_bindgen]
-pub fn perform(job: &str) {
+pub async fn perform(job: String) {
     std::panic::set_hook(Box::new(|info| {
         say(&Message::Failed(format!(
             "the computation failed inside: {info}"
         )));
     }));
     let start = Instant::now();
-    match serde_json::from_str::<Job>(job) {
-        Ok(job) => task::perform(
-            &job,
-            &mut || start.elapsed().as_secs_f64(),
-            &mut |message| {
-                say(&message);
-                // The page ends the worker when it wants no more.
-                ControlFlow::Continue(())
-            },
-        ),
-        Err(error) => say(&Message::Failed(format!("not a computation: {error}"))),
-    }
+    let job = match serde_json::from_str::<Job>(&job) {
+        Ok(job) => job,
+        Err(error) => return say(&Message::Failed(format!("not a computation: {error}"))),
+    };
+    let mut clock = || start.elapsed().as_secs_f64();
+    let mut tell = |message| {
+        say(&message);
+        // The page ends the worker when it wants no more.
+        ControlFlow::Continue(())
+    };
+    let mut wait = async || {
+        if let Some(promise) = rest() {
+            // It is never rejected.
+            let _ = JsFuture::from(promise).await;
+        }
+    };
+    task::perform_with_rests(&job, &mut clock, &mut tell, &mut wait).await;
 }
 
 /// On the page: a worker at work. Dropping it ends it.
@@ -82,6 +95,10 @@ impl Running for Worker {
             end_work(self.number);
         }
         Some(message)
+    }
+
+    fn rest(&mut self, rest: f64) {
+        rest_work(self.number, rest);
     }
 
     fn cancel(&mut self) {

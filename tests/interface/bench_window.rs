@@ -54,6 +54,8 @@ impl Running for Saying {
         said.pop_front()
     }
 
+    fn rest(&mut self, _rest: f64) {}
+
     fn cancel(&mut self) {
         self.0.clear();
     }

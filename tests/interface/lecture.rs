@@ -422,6 +422,8 @@ impl Running for Patient {
         None
     }
 
+    fn rest(&mut self, _rest: f64) {}
+
     fn cancel(&mut self) {}
 }
 

@@ -6,6 +6,7 @@ use super::asked::Asked;
 use super::coordinate::Coordinate;
 use super::diagram::Diagram;
 use super::swept::{Swept, start_word};
+use super::throttle::Throttle;
 use crate::analysis::grid::Start;
 use crate::analysis::point::LOOSEST_FOR_EXPONENT;
 use crate::analysis::ready::{READY, ReadySweep};
@@ -45,6 +46,7 @@ struct Sweeping {
     shares: Vec<Sharing>,
     /// Its ranges are known.
     begun: bool,
+    throttle: Throttle,
 }
 
 /// One of them, and what fraction of the whole it has done.
@@ -117,6 +119,17 @@ impl SweepPanel {
             self.running = None;
         }
         self.running.is_some()
+    }
+
+    /// Takes a frame at `now`, s, so that a running sweep leaves the picture its time; `moves`: whether it moves by itself.
+    pub fn seen(&mut self, now: f64, moves: bool) {
+        if let Some(sweeping) = &mut self.running
+            && let Some(rest) = sweeping.throttle.frame(now, moves)
+        {
+            for sharing in &mut sweeping.shares {
+                sharing.running.rest(rest);
+            }
+        }
     }
 
     /// Whether a sweep is running.
@@ -353,6 +366,10 @@ impl SweepPanel {
                 let done = self.running.as_ref().map_or(0.0, Sweeping::done);
                 let bar = ProgressBar::new(done as f32).show_percentage();
                 ui.add(bar.desired_width(ui.available_width()))
+                    .on_hover_text(
+                        "Fraction of the points that are there. While the picture moves, a sweep leaves it time for 20 \
+                         frames a second, if it has them alone: paused, the sweep is faster",
+                    )
                     .accessible_name("Swept so far");
             }
             clicked
@@ -403,6 +420,7 @@ impl Sweeping {
             shares: shares?,
             task,
             begun: false,
+            throttle: Throttle::default(),
         })
     }
 

@@ -42,7 +42,7 @@ pub enum ChangeError {
 
 /// Whether `next` is what `running` is but for gravity and contacts, which take effect at once: a parameter of the scene's own may
 /// be used there alone.
-fn differs_in_conditions_alone(running: &Scene, next: &Scene) -> bool {
+pub fn differs_in_conditions_alone(running: &Scene, next: &Scene) -> bool {
     let mut like_next = Scene::clone(running);
     like_next.gravity = next.gravity;
     like_next.contact = next.contact;
