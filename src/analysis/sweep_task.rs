@@ -432,7 +432,7 @@ mod tests {
     fn a_parameter_of_the_scenes_own_is_followed_where_only_contacts_depend_on_it() {
         let built_in = Scene::load("slider-crank-driven", &[]).expect("built in");
         let own = "[[parameter]]\nname = \"gap\"\nvalue = \"0.2 mm\"\n";
-        let text = format!("{}\n{own}", built_in.source);
+        let text = format!("{}\n{own}", built_in.source.text);
         for (place, instead, followed) in [
             ("clearance = \"0.3 mm\"", "clearance = \"gap\"", true),
             ("mass = \"0.12 kg\"", "mass = \"gap * 600 kg / 1 m\"", false),

@@ -1,7 +1,9 @@
 //! How much of a machine a sweep takes while the picture moves: where drawing is the processor's work, too, it gives some back.
 
-/// Frames a second that the picture keeps if it has them without a sweep; with so many a sweep may take more again.
+/// Frames a second that the picture keeps if it has them without a sweep, and how many more are aimed at, as a count over a second is
+/// a whole number; with so many a sweep may take more again.
 const LEAST: f64 = 20.0;
+const MARGIN: f64 = 0.5;
 const AMPLE: f64 = 30.0;
 /// Frames are counted for so long, s; a gap of that between two says that nothing moved.
 const SPAN: f64 = 1.0;
@@ -56,7 +58,7 @@ impl Throttle {
         }
         if rate > AMPLE {
             self.rest = (self.rest - LESS).max(0.0);
-        } else if rate < 1.05 * LEAST {
+        } else if rate < LEAST + MARGIN {
             self.useless = self.rest >= MOST;
             self.rest = if self.useless { 0.0 } else { self.rest + MORE };
         }
