@@ -7,18 +7,18 @@ const MARGIN: f64 = 0.5;
 const AMPLE: f64 = 30.0;
 /// Frames are counted for so long, s; a gap of that between two says that nothing moved.
 const SPAN: f64 = 1.0;
-/// Steps up and down in what a sweep rests, as a multiple of the time that it computes, and the most. Where that does not
-/// help, the picture is slow by itself.
-const MORE: f64 = 1.0;
-const LESS: f64 = 0.25;
-const MOST: f64 = 4.0;
+/// Shortest and longest rest of a sweep, as multiples of the time that it computes; it is doubled and halved.
+const SHORTEST: f64 = 1.0;
+const LONGEST: f64 = 8.0;
+/// A picture that has fewer frames a second beside the longest rest, so many counts in succession, is slow by itself.
+const HOPELESS: (f64, u32) = (16.0, 3);
 
 /// Finds how long the computers of a sweep rest.
 #[derive(Debug, Default)]
 pub struct Throttle {
     rest: f64,
-    /// Resting has not helped since the picture began to move.
-    useless: bool,
+    /// Counts in succession beside the longest rest that were hopeless, since the picture began to move.
+    hopeless: u32,
     /// The latest frame, and the first of those that are counted, s; how many followed it.
     latest: Option<f64>,
     since: f64,
@@ -36,7 +36,7 @@ impl Throttle {
                 // At rest, or just begun: nothing is known yet.
                 (self.since, self.frames) = (now, 0);
                 if !moves {
-                    (self.rest, self.useless) = (0.0, false);
+                    (self.rest, self.hopeless) = (0.0, 0);
                 }
             }
             Some(_) => {
@@ -53,14 +53,24 @@ impl Throttle {
 
     /// Takes the number of frames in a second.
     fn judge(&mut self, rate: f64) {
-        if self.useless {
+        let (hopeless, patience) = HOPELESS;
+        if self.hopeless >= patience {
             return;
         }
+        if self.rest < LONGEST || rate >= hopeless {
+            self.hopeless = 0;
+        } else {
+            self.hopeless += 1;
+        }
         if rate > AMPLE {
-            self.rest = (self.rest - LESS).max(0.0);
+            let shorter = 0.5 * self.rest;
+            self.rest = if shorter < SHORTEST { 0.0 } else { shorter };
         } else if rate < LEAST + MARGIN {
-            self.useless = self.rest >= MOST;
-            self.rest = if self.useless { 0.0 } else { self.rest + MORE };
+            self.rest = if self.hopeless >= patience {
+                0.0
+            } else {
+                (2.0 * self.rest).clamp(SHORTEST, LONGEST)
+            };
         }
     }
 }
@@ -105,19 +115,19 @@ mod tests {
 
     #[test]
     fn a_picture_that_was_fast_enough_stays_so_and_the_sweep_goes_on() {
-        for (free, busy) in [(23.0, 15.0), (40.0, 5.0), (60.0, 19.0), (22.0, 21.5)] {
+        for (free, busy) in [(23.0, 15.0), (40.0, 5.0), (60.0, 19.0), (21.5, 15.0)] {
             let mut page = Page::new(free, busy);
-            page.draw(6.0);
+            page.draw(7.0);
             let rate = page.draw(60.0);
             assert!(rate >= LEAST, "{free}, {busy}: {rate}");
-            assert!(page.rest <= 3.0, "{free}, {busy}: {}", page.rest);
+            assert!(page.rest <= LONGEST, "{free}, {busy}: {}", page.rest);
         }
     }
 
     #[test]
     fn nothing_is_given_up_where_that_is_of_no_use_or_of_no_need() {
         let mut slow = Page::new(13.0, 9.0);
-        slow.draw(10.0);
+        slow.draw(12.0);
         for _ in 0..60 {
             slow.draw(1.0);
             assert_eq!(slow.rest, 0.0, "a picture that is slow by itself");
