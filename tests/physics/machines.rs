@@ -80,7 +80,11 @@ fn carriages_of_the_hexapod_stand_where_inverse_kinematics_wants_them() {
 
 #[test]
 fn arms_of_the_delta_stand_where_inverse_kinematics_wants_them() {
-    for (swing, lift) in [(0.25, 0.35), (0.5, 0.6)] {
+    // As its source tables them: sides of the triangles of base and platform, arms, rods.
+    let (base, platform, length, rod) = (0.567, 0.076, 0.524, 1.244_f64);
+    // From the platform's sockets outward to the motor's axis: radii of the inscribed and of the circumscribed circle.
+    let (motor, socket) = (base / 12_f64.sqrt(), platform / 3_f64.sqrt());
+    for (swing, lift) in [(0.25, 0.0), (0.5, 0.4)] {
         let (swing_text, lift_text) = (format!("{swing} rad"), format!("{lift} rad"));
         let changes = [
             ("parameter.swing", &*swing_text),
@@ -93,30 +97,34 @@ fn arms_of_the_delta_stand_where_inverse_kinematics_wants_them() {
             for arm in 0..3 {
                 let (outward, along) = around(120.0 * f64::from(arm));
                 // From the motor's axis to the sockets of the platform, in the arm's plane; and what of the rod lies in it.
-                let (x, z) = (centre.dot(&outward) + 0.045 - 0.120, centre.z);
-                let rod = 0.380_f64.powi(2) - centre.dot(&along).powi(2);
-                let (a, b) = (2.0 * 0.150 * x, -2.0 * 0.150 * z);
-                let c = x * x + z * z + 0.150_f64.powi(2) - rod;
+                let (x, z) = (centre.dot(&outward) + socket - motor, centre.z);
+                let flat = rod.powi(2) - centre.dot(&along).powi(2);
+                let (a, b) = (2.0 * length * x, -2.0 * length * z);
+                let c = x * x + z * z + length * length - flat;
                 let angle = on_circle(a, b, c, -1.0);
                 let phase = f64::from(arm) * TAU / 3.0;
                 let driven = lift + swing * (TAU * 1.5 * frame.time + phase).sin();
                 let off = angle - driven;
                 assert!(off.abs() < 1e-8, "arm {arm}, {} s: {off:e} rad", frame.time);
             }
+            // A circle, says its description; within a fiftieth.
+            let radius = centre.xy().norm();
+            assert!(lift != 0.0 || (radius / 0.215 - 1.0).abs() < 0.02);
         });
     }
 }
 
 #[test]
 fn the_springs_of_the_delta_quieten_its_rods() {
+    // After the first knocks, of the start.
     let knocks = |grip: &str| {
         let mut simulation = simulation("delta", &[("parameter.grip", grip)]);
-        simulation.advance_to(0.03).unwrap();
+        simulation.advance_to(0.1).unwrap();
         let before: u64 = simulation.statistics().impacts.iter().sum();
-        simulation.advance_to(0.06).unwrap();
+        simulation.advance_to(0.5).unwrap();
         simulation.statistics().impacts.iter().sum::<u64>() - before
     };
-    let (held, free) = (knocks("30 N"), knocks("0.001 N"));
+    let (held, free) = (knocks("50 N"), knocks("0.001 N"));
     assert!(
         2 * held < free,
         "{held} impacts with springs, {free} without"
