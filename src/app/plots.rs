@@ -526,7 +526,7 @@ impl Plots {
                 .label_spacing(Rangef::new(0.0, 1.0))
                 .formatter(|mark, range| {
                     let most = range.start().abs().max(range.end().abs());
-                    tick(mark.value, mark.step_size, most)
+                    short_tick(mark.value, mark.step_size, most)
                 });
             // Late times have long numbers, of which fewer fit side by side.
             let letters = |mark: &GridMark| time_mark(mark).chars().count();
@@ -853,6 +853,16 @@ pub(super) fn time_axis(length: f64) -> (&'static str, f64) {
 
 /// Label of a mark on an axis that reaches to `most` with marks `step` apart: enough digits to tell it from its neighbours.
 pub(super) fn tick(mark: f64, step: f64, most: f64) -> String {
+    written(mark, step, (1e-4..1e9).contains(&most))
+}
+
+/// The same beside a plot, where there is room for four digits: `2e4`. With more the plot would move when a peak is that high.
+fn short_tick(mark: f64, step: f64, most: f64) -> String {
+    written(mark, step, (1e-4..1e4).contains(&most))
+}
+
+/// A mark of an axis in digits, or else by a power of ten.
+fn written(mark: f64, step: f64, in_digits: bool) -> String {
     if mark.abs() < 1e-6 * step {
         return "0".to_owned();
     }
@@ -860,7 +870,7 @@ pub(super) fn tick(mark: f64, step: f64, most: f64) -> String {
     let power = step.log10().floor() as i32;
     let mantissa = step / 10_f64.powi(power);
     let last = power - i32::from((mantissa - mantissa.round()).abs() > 1e-6);
-    if (1e-4..1e9).contains(&most) {
+    if in_digits {
         return format!("{mark:.*}", (-last).max(0) as usize);
     }
     let digits = mark.abs().log10().floor() as i32 - last;
@@ -887,6 +897,15 @@ mod tests {
             .iter()
             .map(|m| tick(m.value, m.step_size, most))
             .collect()
+    }
+
+    #[test]
+    fn labels_beside_a_plot_have_four_digits_at_most() {
+        assert_eq!(short_tick(8000.0, 2000.0, 9900.0), "8000");
+        assert_eq!(short_tick(0.0, 2e4, 9.3e4), "0");
+        assert_eq!(short_tick(8e4, 2e4, 9.3e4), "8e4");
+        assert_eq!(short_tick(7.5e4, 2.5e4, 9.3e4), "7.5e4");
+        assert_eq!(short_tick(1e5, 2e4, 1.1e5), "1.0e5");
     }
 
     #[test]
