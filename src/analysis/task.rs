@@ -1,9 +1,8 @@
 //! Long computations as plain data, so that a thread on the desktop and a worker in the browser run the same code.
 
-use std::future::Future;
 use std::ops::ControlFlow;
 use std::pin::pin;
-use std::task::{Context, Poll, Waker};
+use std::task::{Context, Waker};
 
 use serde::{Deserialize, Serialize};
 
@@ -116,6 +115,7 @@ fn measure_presets(
 #[cfg(test)]
 mod tests {
     use std::future::poll_fn;
+    use std::task::Poll;
 
     use super::*;
     use crate::analysis::grid::Start;
