@@ -6,12 +6,14 @@ use crate::contact::{ApproachPiece, FrictionPiece, Memory};
 use crate::integrate::{Method, find_root};
 use crate::simulate::stepper::Member;
 
-/// Parts of a step at whose ends the sliding speed is checked.
+/// Parts of a step at whose ends sliding speed and penetration rate are checked.
 const PARTS: u32 = 4;
 /// A corner earlier than this fraction of the step was passed at its start: the step is repeated on the next piece.
 const AT_START: f64 = 1e-9;
 /// The same where a rate stops rising: it is stationary there, and the force agrees to second order on both pieces.
 const LEVEL_AT_START: f64 = 1e-3;
+/// A rate that falls over this last fraction of a step has passed its maximum inside the last part.
+const LAST: f64 = 1e-4;
 /// A rate that exceeds the largest so far by less than this fraction of it counts as equal.
 const NO_FASTER: f64 = 1e-6;
 /// Golden-section iterations over the two quarters of a step in which a rate is largest: to 2e-4 of the step.
@@ -161,7 +163,9 @@ impl Simulation {
         for n in 1..=PARTS {
             let end = f64::from(n) / f64::from(PARTS);
             let rate = self.rate_at(j, end, h);
-            if rate >= before {
+            // The next step would take a maximum that this one has left behind for the rate at its start.
+            let passed = n == PARTS && self.rate_at(j, end - LAST, h) > rate;
+            if rate >= before && !passed {
                 before = rate;
                 continue;
             }
