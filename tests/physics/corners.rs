@@ -41,6 +41,39 @@ fn settled_sliding_holds_its_piece_and_corners_cost_few_rejections() {
 }
 
 #[test]
+fn a_largest_rate_is_found_wherever_in_a_step_it_lies() {
+    // An impact that the spring goes on pushing: its rate rises at first. Steps of many tolerances have its maximum in many places.
+    let rate_in_memory = |tolerance: f64| {
+        let solver = [
+            ("solver.method", "dopri5"),
+            ("solver.tolerance", &tolerance.to_string()),
+        ];
+        let mut simulation = simulation("suspension", &solver);
+        let (mut largest, mut found) = (0.0_f64, Vec::new());
+        while simulation.time() < 0.015 {
+            simulation.step().unwrap();
+            let memory = simulation.contact_memory(0);
+            if memory.active {
+                largest = memory.approach_speed;
+            } else if largest > 0.0 {
+                found.push(std::mem::take(&mut largest));
+            }
+        }
+        found
+    };
+    let reference = rate_in_memory(1e-13);
+    assert!(reference.len() >= 3, "{reference:?}");
+    for n in 0..24 {
+        let tolerance = 1e-9 * f64::powf(10.0, -f64::from(n) / 8.0);
+        let found = rate_in_memory(tolerance);
+        for (found, reference) in std::iter::zip(&found, &reference) {
+            let off = (found - reference).abs() / reference;
+            assert!(off < 300.0 * tolerance, "{tolerance:e}: {off:e}");
+        }
+    }
+}
+
+#[test]
 fn methods_agree_where_friction_reads_a_part_of_the_velocity() {
     // Printed friction has corners of its own, at |e|/delta times the speeds of the others.
     let printed = ("contact.friction_velocity", "printed");

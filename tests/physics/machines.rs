@@ -199,62 +199,127 @@ fn play_lifts_the_ram_of_the_press_at_the_bottom() {
     assert!((2.0e-4..2.3e-4).contains(&lift), "{lift:e} m");
 }
 
-/// Masses, kg, with their centres; moments of inertia along the axes of a part, kg m^2, with these axes.
-type Centres = [(f64, Vec3); 5];
-type Turning = [(Vec3, Mat3); 4];
+/// Stiffnesses of the suspension's coil spring and tyre, N/m.
+const COIL: f64 = 167_062.0;
+const TYRE: f64 = 326_332.0;
 
-/// The suspension written down again: its energies for the height of the body and the angle of the lower arm.
+/// Masses, kg, with their centres; moments and products of inertia, kg m^2, with how far the part has turned.
+type Centres = [(f64, Vec3); 5];
+type Turning = [(Mat3, Mat3); 4];
+
+/// `point` turned by `angle` about the line through `on` along `axis`.
+fn turned(point: Vec3, on: Vec3, axis: Vec3, angle: f64) -> Vec3 {
+    on + turn(axis, angle) * (point - on)
+}
+
+fn turn(axis: Vec3, angle: f64) -> Mat3 {
+    *nalgebra::Rotation3::from_axis_angle(&nalgebra::Unit::new_normalize(axis), angle).matrix()
+}
+
+/// The least angle by which `point` turns about the line through `on` along `axis` until it is `distance` from `other`.
+fn until(distance: f64, other: Vec3, point: Vec3, on: Vec3, axis: Vec3) -> f64 {
+    let (axis, arm) = (axis.normalize(), point - on);
+    let along = axis * axis.dot(&arm);
+    let (across, seat) = (arm - along, on + along - other);
+    let c = distance * distance - seat.norm_squared() - across.norm_squared();
+    let (a, b) = (
+        2.0 * seat.dot(&across),
+        2.0 * seat.dot(&axis.cross(&across)),
+    );
+    [1.0, -1.0]
+        .map(|side| {
+            let angle = on_circle(a, b, c, side);
+            (angle + PI).rem_euclid(TAU) - PI
+        })
+        .into_iter()
+        .min_by(|a, b| a.abs().total_cmp(&b.abs()))
+        .unwrap()
+}
+
+/// The suspension written down again, from its source: its energies for the height of the body and the angle of the lower arm.
 struct Corner;
 
 impl Corner {
-    const SPRUNG: f64 = 50.0;
+    const SPRUNG: f64 = 538.9;
+    const LOWER_HINGE: Vec3 = Vec3::new(0.0, 0.307, 0.0);
+    const LOWER_BALL: Vec3 = Vec3::new(-0.036, 0.787, -0.118);
+    const UPPER_HINGE: Vec3 = Vec3::new(-0.048, 0.446, 0.245);
+    const UPPER_BALL: Vec3 = Vec3::new(-0.053, 0.716, 0.215);
+    const INNER: Vec3 = Vec3::new(-0.250, 0.448, 0.054);
+    const OUTER: Vec3 = Vec3::new(-0.176, 0.821, -0.016);
+    const WHEEL: Vec3 = Vec3::new(-0.040, 0.910, -0.026);
 
-    /// Centres of mass with their masses, and axes of the parts that turn with their moments of inertia.
+    /// Centres of mass with their masses, and how far the parts that turn have turned.
     fn parts(z: f64, theta: f64) -> (Centres, Turning) {
-        let turned =
-            |angle: f64| *nalgebra::Rotation3::from_axis_angle(&Vec3::x_axis(), angle).matrix();
-        let hinges = [Vec3::new(0.0, 0.300, z), Vec3::new(0.0, 0.400, z + 0.250)];
-        let lower_axes = turned(theta);
-        let lower = hinges[0] + lower_axes * Vec3::new(0.0, 0.350, 0.0);
-        // The upper ball lies on a circle, at the distance of the upright's two balls from the lower one.
-        let d = hinges[1] - lower;
-        let reach = 0.020_f64.powi(2) + 0.250_f64.powi(2) - d.norm_squared() - 0.230_f64.powi(2);
-        let phi = on_circle(2.0 * 0.230 * d.y, 2.0 * 0.230 * d.z, reach, 1.0);
-        // Of both solutions the upper arm takes the one that points outward.
-        let other = on_circle(2.0 * 0.230 * d.y, 2.0 * 0.230 * d.z, reach, -1.0);
-        let phi = if phi.cos() > other.cos() { phi } else { other };
-        let upper_axes = turned(phi);
-        let upper = hinges[1] + upper_axes * Vec3::new(0.0, 0.230, 0.0);
+        let up = Vec3::new(0.0, 0.0, z);
+        // All of it below the body, which goes up at the end.
+        let lower_axes = turn(Vec3::x(), theta);
+        let lower = Self::LOWER_HINGE + lower_axes * (Self::LOWER_BALL - Self::LOWER_HINGE);
+        let hinge = Vec3::new(0.220, -0.032, 0.049);
+        let apart = (Self::UPPER_BALL - Self::LOWER_BALL).norm();
+        let phi = until(apart, lower, Self::UPPER_BALL, Self::UPPER_HINGE, hinge);
+        let upper = turned(Self::UPPER_BALL, Self::UPPER_HINGE, hinge, phi);
         // The upright: tilted with the line of its balls, then turned about it until the tie rod has its length.
-        let line = (upper - lower).normalize();
-        let camber = (-line.y).atan2(line.z) - 0.020_f64.atan2(0.250);
-        let v = turned(camber) * Vec3::new(0.120, -0.020, 0.080);
-        let along = line * line.dot(&v);
-        let (across, side) = (v - along, line.cross(&v));
-        let inner = Vec3::new(0.120, 0.310, z + 0.080);
-        let seat = lower + along - inner;
-        let c = 0.320_f64.powi(2) - seat.norm_squared() - across.norm_squared();
-        let (a, b) = (2.0 * seat.dot(&across), 2.0 * seat.dot(&side));
-        let (one, two) = (on_circle(a, b, c, 1.0), on_circle(a, b, c, -1.0));
-        let steer = if one.abs() < two.abs() { one } else { two };
-        let unit = nalgebra::Unit::new_normalize(line);
-        let axes = nalgebra::Rotation3::from_axis_angle(&unit, steer).matrix() * turned(camber);
-        let outer = lower + axes * Vec3::new(0.120, -0.020, 0.080);
+        let line = upper - lower;
+        let before = Self::UPPER_BALL - Self::LOWER_BALL;
+        let tilt = nalgebra::Rotation3::rotation_between(&before, &line).unwrap();
+        let outer = lower + tilt * (Self::OUTER - Self::LOWER_BALL);
+        let length = (Self::OUTER - Self::INNER).norm();
+        let steer = until(length, Self::INNER, outer, lower, line);
+        let axes = turn(line, steer) * tilt.matrix();
+        let of_upright = |point: Vec3| up + lower + axes * (point - Self::LOWER_BALL);
         // The tie rod does not spin here; that would move nothing else.
-        let rod = nalgebra::Rotation3::rotation_between(&Vec3::y(), &(outer - inner)).unwrap();
+        let rod = turned(outer, lower, line, steer) - Self::INNER;
+        let along = Self::OUTER - Self::INNER;
+        let rod_axes = nalgebra::Rotation3::rotation_between(&along, &rod).unwrap();
+        let of_lower = |point: Vec3| turned(point, Self::LOWER_HINGE, Vec3::x(), theta);
+        let of_upper = |point: Vec3| turned(point, Self::UPPER_HINGE, hinge, phi);
+        // A flat part with this moment about any line in its plane, in which three points lie.
+        let plate = |moment: f64, a: Vec3, b: Vec3, c: Vec3| {
+            let normal = (b - a).cross(&(c - a)).normalize();
+            (Mat3::identity() + normal * normal.transpose()) * moment
+        };
+        let of_lower_arm = plate(
+            0.4,
+            Self::LOWER_HINGE,
+            Self::LOWER_HINGE + Vec3::x(),
+            Self::LOWER_BALL,
+        );
+        let of_upper_arm = plate(
+            0.03,
+            Self::UPPER_HINGE,
+            Self::UPPER_HINGE + hinge,
+            Self::UPPER_BALL,
+        );
+        // Upright; spindle, wheel and tyre 159 mm further out.
+        let (knuckle, rolling) = (19.45, 14.705 + 18.8 + 37.6);
+        let steiner = knuckle * rolling / (knuckle + rolling) * 0.159_f64.powi(2);
+        let across = 0.04117 + 0.4634 + 3.84 + steiner;
+        let of_wheel = Vec3::new(
+            0.1656 + across,
+            0.1934 + 0.07352 + 0.6243 + 6.69,
+            0.04367 + across,
+        );
+        let direction = along.normalize();
+        let thin = Mat3::identity() - direction * direction.transpose();
+        let of_rod = thin * (6.0 * length * length / 12.0 + 6.0 * 0.02_f64.powi(2) / 4.0)
+            + direction * direction.transpose() * (6.0 * 0.02_f64.powi(2) / 2.0);
         (
             [
-                (Self::SPRUNG, Vec3::new(0.0, 0.0, z)),
-                (0.8, hinges[0] + lower_axes * Vec3::new(0.0, 0.175, 0.0)),
-                (0.6, hinges[1] + upper_axes * Vec3::new(0.0, 0.115, 0.0)),
-                (12.0, lower + axes * Vec3::new(0.0, 0.030, 0.120)),
-                (0.2, 0.5 * (inner + outer)),
+                (Self::SPRUNG, up),
+                (23.965, up + of_lower(Vec3::new(0.0, 0.547, -0.059))),
+                (5.813, up + of_upper(Vec3::new(-0.106, 0.589, 0.218))),
+                (
+                    knuckle + rolling,
+                    of_upright(Self::WHEEL - Vec3::y() * (0.159 * knuckle / (knuckle + rolling))),
+                ),
+                (6.0, up + Self::INNER + 0.5 * rod),
             ],
             [
-                (Vec3::new(0.010, 0.002, 0.012), lower_axes),
-                (Vec3::new(0.0035, 0.0012, 0.0045), upper_axes),
-                (Vec3::new(0.18, 0.30, 0.18), axes),
-                (Vec3::new(1.8e-3, 1e-5, 1.8e-3), *rod.matrix()),
+                (of_lower_arm, lower_axes),
+                (of_upper_arm, turn(hinge, phi)),
+                (Mat3::from_diagonal(&of_wheel), axes),
+                (of_rod, *rod_axes.matrix()),
             ],
         )
     }
@@ -262,22 +327,42 @@ impl Corner {
     /// Where the wheel's middle is.
     fn wheel(z: f64, theta: f64) -> Vec3 {
         let (masses, turning) = Self::parts(z, theta);
-        masses[3].1 + turning[2].1 * Vec3::new(0.0, 0.020, 0.0)
+        let out = 0.159 * 19.45 / masses[3].0;
+        masses[3].1 + turning[2].1 * Vec3::new(0.0, out, 0.0)
+    }
+
+    /// Length of the coil spring.
+    fn coil(theta: f64) -> f64 {
+        let seat = turned(
+            Vec3::new(0.097, 0.543, -0.047),
+            Self::LOWER_HINGE,
+            Vec3::x(),
+            theta,
+        );
+        (seat - Vec3::new(0.104, 0.510, 0.197)).norm()
+    }
+
+    fn weight(z: f64, theta: f64) -> f64 {
+        let (masses, _) = Self::parts(z, theta);
+        masses.iter().map(|(mass, at)| mass * 9.81 * at.z).sum()
     }
 
     fn potential(z: f64, theta: f64) -> f64 {
-        let (masses, turning) = Self::parts(z, theta);
-        let weight: f64 = masses.iter().map(|(mass, at)| mass * 9.81 * at.z).sum();
-        let spring = |stiffness: f64, preload: f64, length: f64, points: [Vec3; 2]| {
-            let change = (points[1] - points[0]).norm() - length;
-            preload * change + 0.5 * stiffness * change * change
-        };
-        let seat = Vec3::new(0.0, 0.300, z) + turning[0].1 * Vec3::new(0.0, 0.250, 0.0);
-        let carried = -(Self::SPRUNG + 0.8) * 9.81 / 0.6618;
-        let top = Vec3::new(0.0, 0.420, z + 0.320);
-        // The tyre carries everything where the wheel's middle is 290 mm over the road, at -170 mm.
-        let pressed = 0.120 - Self::wheel(z, theta).z + (Self::SPRUNG + 13.6) * 9.81 / 100e3;
-        weight + spring(40e3, carried, 0.3454, [top, seat]) + 0.5 * 100e3 * pressed * pressed
+        // The tyre carries everything as designed; then virtual work says what the spring does.
+        let all: f64 = Self::parts(0.0, 0.0)
+            .0
+            .iter()
+            .map(|(mass, _)| mass * 9.81)
+            .sum();
+        let slope = |f: &dyn Fn(f64) -> f64| (f(1e-5) - f(-1e-5)) / 2e-5;
+        let raised = slope(&|theta| Self::weight(0.0, theta) - all * Self::wheel(0.0, theta).z);
+        let preload = -raised / slope(&Self::coil);
+        let change = Self::coil(theta) - Self::coil(0.0);
+        let pressed = all / TYRE - (Self::wheel(z, theta).z - Self::WHEEL.z);
+        Self::weight(z, theta)
+            + preload * change
+            + 0.5 * COIL * change * change
+            + 0.5 * TYRE * pressed * pressed
     }
 
     /// Masses and stiffnesses of small motion about the rest: (11, 12, 22) of each.
@@ -295,16 +380,16 @@ impl Corner {
             });
             let spins = std::array::from_fn::<_, 4, _>(|n| {
                 let turn: Mat3 = (after.1[n].1 - before.1[n].1) / (2.0 * h);
-                // In the axes of the part, which at rest are those of the world.
-                let spin = Vec3::new(turn[(2, 1)], turn[(0, 2)], turn[(1, 0)]);
-                spin.component_mul(&after.1[n].0.map(f64::sqrt))
+                Vec3::new(turn[(2, 1)], turn[(0, 2)], turn[(1, 0)])
             });
             (speeds, spins)
         };
+        let inertias = Self::parts(0.0, 0.0).1.map(|(inertia, _)| inertia);
         let (a, b) = (rates([1.0, 0.0]), rates([0.0, 1.0]));
         let product = |a: &([Vec3; 5], [Vec3; 4]), b: &([Vec3; 5], [Vec3; 4])| -> f64 {
             let speeds: f64 = a.0.iter().zip(&b.0).map(|(a, b)| a.dot(b)).sum();
-            speeds + a.1.iter().zip(&b.1).map(|(a, b)| a.dot(b)).sum::<f64>()
+            let spins = (0..4).map(|n| a.1[n].dot(&(inertias[n] * b.1[n])));
+            speeds + spins.sum::<f64>()
         };
         let v = |z: f64, theta: f64| Self::potential(z * 1e-4, theta * 1e-4) / 1e-8;
         let middle = v(0.0, 0.0);
@@ -344,14 +429,14 @@ fn the_suspension_swings_as_its_linear_model() {
         &[
             IDEAL,
             ("parameter.bump", "0 mm"),
-            ("spring.coil.damping", "0 N s/m"),
+            ("spring.damper.damping", "1e-6 N s/m"),
             ("tyre.tyre.damping", "0 N s/m"),
-            ("tyre.tyre.radius", "296 mm"),
+            ("tyre.tyre.radius", "468 mm"),
         ],
     );
     let scene = simulation.scene().clone();
     let mut frame = Frame::default();
-    let samples: Vec<[f64; 2]> = (0..=6000)
+    let samples: Vec<[f64; 2]> = (0..=12_000)
         .map(|n| {
             let time = f64::from(n) * 0.5e-3;
             simulation.advance_to(time).unwrap();
@@ -390,7 +475,7 @@ fn the_suspension_swings_as_its_linear_model() {
     }
     // What its help says.
     assert!(
-        (modes[0].0 - 2.7).abs() < 0.1 && (modes[1].0 - 15.0).abs() < 0.5,
+        (modes[0].0 - 1.1).abs() < 0.1 && (modes[1].0 - 9.3).abs() < 0.5,
         "{modes:?}"
     );
 }
@@ -398,11 +483,11 @@ fn the_suspension_swings_as_its_linear_model() {
 #[test]
 fn the_suspension_rests_as_drawn_and_play_lets_its_wheel_turn() {
     let still = [IDEAL, ("parameter.bump", "0 mm")];
-    for sprung in ["30 kg", "50 kg", "100 kg"] {
+    for sprung in ["400 kg", "538.9 kg", "800 kg"] {
         let changes = [&still[..], &[("parameter.sprung", sprung)]].concat();
         let mut simulation = simulation("suspension", &changes);
         run_until(&mut simulation, 0.5);
-        let moved = frame_now(&mut simulation).pose.position - Vec3::new(0.0, 0.650, 0.0);
+        let moved = frame_now(&mut simulation).pose.position;
         assert!(moved.norm() < 1e-6, "{sprung}: {moved:?}");
     }
     // Toe: the upright's angle about Z.
@@ -420,7 +505,7 @@ fn the_suspension_rests_as_drawn_and_play_lets_its_wheel_turn() {
         most - least
     };
     let (ideal, loose) = (toe(&[IDEAL]), toe(&[]));
-    let worn = toe(&[("joint.lower.clearance", "0.5 mm")]);
+    let worn = toe(&[("joint.outer.clearance", "1.5 mm")]);
     println!("toe moves by {ideal:e}, {loose:e}, {worn:e} rad");
     assert!(
         loose > 5.0 * ideal && worn > 1.2 * loose,
@@ -428,7 +513,7 @@ fn the_suspension_rests_as_drawn_and_play_lets_its_wheel_turn() {
     );
 }
 
-/// The longer tie rod turns the front of the wheel outward, as its help says.
+/// The longer tie rod turns the front of the wheel inward, as its help says.
 #[test]
 fn the_tie_rod_sets_the_toe() {
     let toe = |length: &str| {
@@ -437,8 +522,8 @@ fn the_tie_rod_sets_the_toe() {
         let axes = pose(&scene, &frame_now(&mut simulation), "upright").1;
         axes[(1, 0)].atan2(axes[(0, 0)])
     };
-    assert!(toe("320 mm").abs() < 1e-9);
-    assert!(toe("322 mm") > 0.01 && toe("318 mm") < -0.01);
+    assert!(toe("0 mm").abs() < 1e-9);
+    assert!(toe("-2 mm") > 0.01 && toe("2 mm") < -0.01);
 }
 
 #[test]

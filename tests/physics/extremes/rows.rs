@@ -331,7 +331,7 @@ pub fn rows() -> Vec<Row> {
         ("hexapod", "parameter.rate", "5 Hz", 0.01),
         ("delta", "parameter.rate", "3 Hz", 0.004),
         ("four-bar", "parameter.speed", "60 rad/s", DURATION),
-        ("suspension", "parameter.bump", "20 mm", DURATION),
+        ("suspension", "parameter.bump", "30 mm", DURATION),
         ("press", "parameter.speed", "400 rpm", DURATION),
     ] {
         let mut row = Row::new(&format!("{key} = {value}"), scene, &[(key, value)]);
