@@ -190,10 +190,14 @@ async function backends() {
     return found;
 }
 
+/** `drawLightly` of canvas.js, once it is there. */
+let lighten;
+
 /** A canvas keeps the kind of its first context: each attempt gets a fresh one. */
 function freshCanvas() {
     const old = $('laboratory');
     const canvas = old.cloneNode(false);
+    lighten(canvas);
     canvas.hidden = false;
     old.replaceWith(canvas);
     const start = laboratory.starts;
@@ -336,8 +340,9 @@ async function main() {
     let bindings;
     let Mirror;
     try {
-        const [{ makeHost }, { CanvasObserver }, mirror, glue] = await parts;
+        const [{ makeHost }, { CanvasObserver, drawLightly }, mirror, glue] = await parts;
         ({ Mirror } = mirror);
+        lighten = drawLightly;
         bindings = glue;
         globalThis.ResizeObserver = CanvasObserver;
         globalThis.jointplayHost = makeHost(laboratory, lost);

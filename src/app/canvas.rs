@@ -110,6 +110,8 @@ impl Canvas {
             size_in_pixels: size,
         };
         let primitives = self.ctx.tessellate(output.shapes, scale);
+        let fill = self.ctx.global_style().visuals.panel_fill;
+        let [r, g, b, a] = fill.to_normalized_gamma_f32().map(f64::from);
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
             label: Some("interface"),
         });
@@ -139,7 +141,7 @@ impl Canvas {
                         view: &view,
                         resolve_target: None,
                         ops: wgpu::Operations {
-                            load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                            load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a }),
                             store: wgpu::StoreOp::Store,
                         },
                         depth_slice: None,

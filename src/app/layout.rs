@@ -179,7 +179,7 @@ impl App {
             return self.dialog_ui(ui.ctx());
         }
         if self.embedded().is_some() {
-            let bar = Frame::side_top_panel(ui.style()).inner_margin(egui::Margin::symmetric(8, 4));
+            let bar = theme::panel(ui).inner_margin(egui::Margin::symmetric(8, 4));
             self.embedded_ui(ui, bar);
             self.point_out(ui);
             return self.dialog_ui(ui.ctx());
@@ -189,7 +189,7 @@ impl App {
         } else {
             egui::Margin::symmetric(12, 8)
         };
-        let bar = Frame::side_top_panel(ui.style()).inner_margin(margin);
+        let bar = theme::panel(ui).inner_margin(margin);
         Panel::top("header")
             .frame(bar)
             .show(ui, |ui| self.header(ui, compact));

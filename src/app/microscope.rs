@@ -4,12 +4,12 @@ mod draw;
 mod sight;
 
 use eframe::egui::{
-    self, ComboBox, Frame, Grid, Panel, RichText, Role, ScrollArea, Sense, Ui, WidgetInfo, vec2,
+    self, ComboBox, Grid, Panel, RichText, Role, ScrollArea, Sense, Ui, WidgetInfo, vec2,
 };
 use glam::Vec3;
 
 use super::player::Player;
-use super::{App, layout, value};
+use super::{App, layout, theme, value};
 use crate::simulate::ContactState;
 pub use draw::Circle;
 use draw::{Plane, Sheet};
@@ -89,7 +89,7 @@ impl Microscope {
             .size_range(least..=(MOST * room).max(least));
         panel
             .resizable(true)
-            .frame(Frame::side_top_panel(ui.style()).inner_margin(8.0))
+            .frame(theme::panel(ui).inner_margin(8.0))
             .show(ui, |ui| self.contents(ui, player, view))
             .inner
     }

@@ -1,7 +1,7 @@
 //! Pictures to save: the 3D view, the view with the plots below it, or the whole window, at any size. They are redrawn off
 //! screen at that size by the same code, so that labels and arrows are as sharp as the rest.
 
-use eframe::egui::{self, Button, CentralPanel, DragValue, Frame, Panel, RichText, Ui, Vec2, vec2};
+use eframe::egui::{self, Button, CentralPanel, DragValue, Panel, RichText, Ui, Vec2, vec2};
 use eframe::egui_wgpu::RenderState;
 
 use super::App;
@@ -295,7 +295,7 @@ impl App {
             return self.show(ui);
         }
         if contents == Contents::Plots {
-            let bar = Frame::side_top_panel(ui.style());
+            let bar = theme::panel(ui);
             Panel::bottom("plots of a picture")
                 .frame(bar.inner_margin(egui::Margin::symmetric(12, 8)))
                 .exact_size(PLOTS)

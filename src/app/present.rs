@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use eframe::egui::{self, Align2, FontId, Frame, Galley, Id, Panel, Rect, Sense, Ui, Vec2, vec2};
+use eframe::egui::{self, Align2, FontId, Galley, Id, Panel, Rect, Sense, Ui, Vec2, vec2};
 
 use super::{App, overlay, theme, transport, value};
 
@@ -88,7 +88,7 @@ impl App {
 
     /// The whole of the window.
     pub(super) fn presentation_ui(&mut self, ui: &mut Ui) {
-        let bar = Frame::side_top_panel(ui.style()).inner_margin(egui::Margin::symmetric(12, 4));
+        let bar = theme::panel(ui).inner_margin(egui::Margin::symmetric(12, 4));
         let free = !self.is_under_way();
         let mut leave = false;
         let asked = Panel::bottom("presentation")

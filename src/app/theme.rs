@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use eframe::egui::{
-    self, Color32, CornerRadius, FontData, FontDefinitions, FontFamily, FontId, Margin, Response,
-    RichText, Stroke, TextStyle, Theme, Ui, Visuals, vec2,
+    self, Color32, CornerRadius, FontData, FontDefinitions, FontFamily, FontId, Frame, Margin,
+    Response, RichText, Stroke, TextStyle, Theme, Ui, Visuals, vec2,
 };
 
 /// Series colours for plots, dark enough on white and light enough on black; distinguishable for the colour-blind (after Okabe
@@ -30,6 +30,17 @@ const fn rgb(hex: u32) -> Color32 {
 pub fn series(index: usize, dark: bool) -> Color32 {
     let (on_light, on_dark) = SERIES[index % SERIES.len()];
     if dark { on_dark } else { on_light }
+}
+
+/// The frame of a panel. The page's canvas is cleared to its colour, so that there it fills nothing: where the processor draws,
+/// that is half of what the interface costs.
+pub fn panel(ui: &Ui) -> Frame {
+    let frame = Frame::side_top_panel(ui.style());
+    if cfg!(target_arch = "wasm32") {
+        frame.fill(Color32::TRANSPARENT)
+    } else {
+        frame
+    }
 }
 
 /// Least side of a touch target, points.

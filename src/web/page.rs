@@ -397,4 +397,9 @@ impl eframe::App for OnCanvas {
             laboratory.frames = laboratory.frames.wrapping_add(1);
         }
     }
+
+    // What is left for panels, which fill nothing here: `theme::panel`.
+    fn clear_color(&self, visuals: &egui::Visuals) -> [f32; 4] {
+        visuals.panel_fill.to_normalized_gamma_f32()
+    }
 }

@@ -100,6 +100,23 @@ test('the timeline goes back to the same bits by key, click and finger', async (
     await lab.close();
 });
 
+test('a processor that draws runs no branch of the interface that is there for tests', async () => {
+    const record = () => {
+        globalThis.compiled = [];
+        const { shaderSource } = WebGL2RenderingContext.prototype;
+        WebGL2RenderingContext.prototype.shaderSource = function (shader, text) {
+            globalThis.compiled.push(text);
+            return shaderSource.call(this, shader, text);
+        };
+    };
+    const lab = await open('', { backend: 'webgl', before: [record] });
+    const texts = await lab.page.evaluate(() => globalThis.compiled);
+    // The switch is still called so, and no shader asks for it.
+    assert.ok(texts.some((text) => /uint predictable_texture_filtering;/.test(text)), 'another name?');
+    assert.ok(!texts.some((text) => /\.predictable_texture_filtering/.test(text)));
+    await lab.close();
+});
+
 test('what it draws changes while it plays', async () => {
     const lab = await open('theme=light&scale=1:1', { backend: 'webgl' });
     const view = { x: 320, y: 60, width: 460, height: 200 };
