@@ -154,26 +154,30 @@ fn the_rocker_of_the_four_bar_obeys_the_loop_equation() {
 
 #[test]
 fn the_ram_of_the_press_follows_from_two_circles() {
-    for crank in [0.020, 0.040, 0.044] {
+    // A quarter of the source's, m: both links, the connecting rod, and the crank's hinge from the upper link's.
+    const LINK: f64 = 0.830 / 4.0;
+    const ROD: f64 = 0.920 / 4.0;
+    const CRANK_HINGE: [f64; 2] = [0.730 / 4.0, -0.7375 / 4.0];
+    for crank in [0.020, 0.046875, 0.050] {
         let text = format!("{crank} m");
         let changes = [("parameter.crank", &*text)];
         ideally("press", &changes, 0.5, |scene, frame| {
             let (sin, cos) = (2.0 * TAU * frame.time).sin_cos();
             // The crank's pin; the knee lies on circles about it and about the crown, on the left of the line between them.
-            let pin = [0.330 + crank * cos, -0.190 + crank * sin];
-            let c = pin[0].powi(2) + pin[1].powi(2) + 0.2_f64.powi(2) - 0.288_f64.powi(2);
+            let pin = [CRANK_HINGE[0] - crank * cos, CRANK_HINGE[1] - crank * sin];
+            let c = pin[0].powi(2) + pin[1].powi(2) + LINK.powi(2) - ROD.powi(2);
             // From the vertical, to the right.
-            let swing = on_circle(-0.4 * pin[1], 0.4 * pin[0], c, -1.0);
-            let off = pose(scene, frame, "ram").0.z + 0.4 * swing.cos();
+            let swing = on_circle(-2.0 * LINK * pin[1], 2.0 * LINK * pin[0], c, -1.0);
+            let off = pose(scene, frame, "ram").0.z + 2.0 * LINK * swing.cos();
             assert!(off.abs() < 1e-9, "{} s: {off:e} m", frame.time);
             // The hinge that closes the loop of both.
             let (rod, link) = (
                 pose(scene, frame, "connecting-rod"),
                 pose(scene, frame, "upper-link"),
             );
-            let of_rod = rod.0 + rod.1 * Vec3::new(-0.288, 0.0, 0.0);
-            let of_link = link.0 + link.1 * Vec3::new(0.0, 0.0, -0.2);
-            let knee = Vec3::new(0.2 * swing.sin(), 0.0, -0.2 * swing.cos());
+            let of_rod = rod.0 + rod.1 * Vec3::new(-ROD, 0.0, 0.0);
+            let of_link = link.0 + link.1 * Vec3::new(0.0, 0.0, -LINK);
+            let knee = Vec3::new(LINK * swing.sin(), 0.0, -LINK * swing.cos());
             let off = (of_rod - knee).norm().max((of_link - knee).norm());
             assert!(off < 1e-9, "{} s: {off:e} m", frame.time);
         });
