@@ -53,26 +53,36 @@ fn around(degrees: f64) -> (Vec3, Vec3) {
 }
 
 #[test]
-fn carriages_of_the_hexapod_stand_where_inverse_kinematics_wants_them() {
-    for (stroke, rate) in [(0.015, 1.0), (0.035, 2.0)] {
-        let (stroke_text, rate_text) = (format!("{stroke} m"), format!("{rate} Hz"));
+fn cranks_of_the_hexapod_stand_where_inverse_kinematics_wants_them() {
+    // Twice its source's, m and degrees: radii of hinges and sockets with how far they are from the axis of their pair; crank, leg.
+    let (base, base_off) = (0.15399, 22.9492);
+    let (hub, hub_off) = (0.09961, 48.4099);
+    let (crank, leg) = (0.030, 0.280_f64);
+    for (swing, rate) in [(30.0_f64, 1.0), (45.0, 2.0)] {
+        let (swing_text, rate_text) = (format!("{swing} deg"), format!("{rate} Hz"));
         let changes = [
-            ("parameter.stroke", &*stroke_text),
+            ("parameter.swing", &*swing_text),
             ("parameter.rate", &*rate_text),
         ];
         ideally("hexapod", &changes, 1.0, |scene, frame| {
             let (centre, axes) = pose(scene, frame, "platform");
-            for leg in 1..=6 {
-                let slot = 60.0 * f64::from(leg - 1);
-                // Pairs: odd ones stand 8 degrees before their sixth of the circle and are held 16 degrees behind it.
-                let side = if leg % 2 == 1 { 1.0 } else { -1.0 };
-                let held = centre + axes * around(slot + side * 16.0).0 * 0.110;
-                let foot = around(slot - side * 8.0).0 * 0.250;
-                let flat = (held - foot).xy().norm();
-                let height = held.z + (0.30324_f64.powi(2) - flat * flat).sqrt();
-                let driven = stroke * (TAU * rate * frame.time + f64::from(leg) * PI / 3.0).sin();
-                let off = height - driven;
-                assert!(off.abs() < 1e-9, "leg {leg}, {} s: {off:e} m", frame.time);
+            for number in 1..=6 {
+                // Even ones come before the axis of their pair, at 90, 210 and 330 degrees, odd ones behind the next.
+                let side = if number % 2 == 1 { 1.0 } else { -1.0 };
+                let axis = 60.0 * f64::from(number - 1) - side * 30.0;
+                let held = centre + axes * around(axis + side * hub_off).0 * hub;
+                let hinge = around(axis + side * base_off).0 * base;
+                // A crank points along the tangent, towards the axis of its pair; its ball is a leg away from the one held.
+                let along = around(axis).1 * -side;
+                let from = held - hinge;
+                let c = from.norm_squared() + crank * crank - leg * leg;
+                let (a, b) = (2.0 * crank * from.dot(&along), 2.0 * crank * from.z);
+                let angle = on_circle(a, b, c, 1.0);
+                let angle = (angle + PI).rem_euclid(TAU) - PI;
+                let phase = f64::from(number) * PI / 3.0;
+                let driven = swing.to_radians() * (TAU * rate * frame.time + phase).sin();
+                let off = angle - driven;
+                assert!(off.abs() < 1e-8, "{number}, {} s: {off:e} rad", frame.time);
             }
         });
     }
