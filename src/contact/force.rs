@@ -52,6 +52,11 @@ pub struct Stiffness {
 }
 
 impl Stiffness {
+    /// Adds that the velocity used by friction has the derivative `by_normal` with respect to the normal, m/s.
+    pub fn add_turning_read(&mut self, by_normal: &Mat3) {
+        self.by_displacement += self.by_slip * by_normal * self.normal;
+    }
+
     /// For any force that acts between two points.
     pub fn between_points(by_displacement: Mat3, by_rate: Mat3) -> Self {
         Self {
@@ -96,6 +101,18 @@ impl Coefficients {
         let radius = self.ball_radius;
         velocity + ball.cross(&(normal * radius))
             - socket.cross(&(normal * (radius + self.clearance)))
+    }
+
+    /// Derivative of [`Self::friction_reads`] with respect to the normal, m/s. The play is so small that a ball which moves a
+    /// little there turns its normal a lot: where bodies spin, the surfaces then slide otherwise.
+    pub fn friction_reads_by_normal(&self, ball: &Vec3, socket: &Vec3) -> Mat3 {
+        match self.friction_velocity {
+            FrictionVelocity::Centres | FrictionVelocity::Printed => Mat3::zeros(),
+            FrictionVelocity::Surface => {
+                let radius = self.ball_radius;
+                ball.cross_matrix() * radius - socket.cross_matrix() * (radius + self.clearance)
+            }
+        }
     }
 
     /// Relative velocity used by friction, not yet projected onto the tangent plane, m/s; arguments as in
@@ -158,7 +175,7 @@ impl Coefficients {
         force
     }
 
-    /// Derivatives of `force`, the result of [`Self::force`] there, which must be > 0.
+    /// Derivatives of `force`, the result of [`Self::force`] there, which must be > 0, at the fixed velocity `read`.
     pub fn linearise(
         &self,
         memory: &Memory,
@@ -300,11 +317,11 @@ mod tests {
     const BALL: Vec3 = Vec3::new(0.3, -0.2, 0.5);
     const SOCKET: Vec3 = Vec3::new(-0.1, 0.4, 0.2);
 
-    /// Force on the ball. The surface velocity due to rotation is kept at the normal `n0`: its change with the arms is not stiff
-    /// and is left out of the derivatives.
-    fn on_ball(c: &Coefficients, memory: &Memory, e: &Vec3, v: &Vec3, n0: &Vec3) -> Vec3 {
+    /// Force on the ball.
+    fn on_ball(c: &Coefficients, memory: &Memory, e: &Vec3, v: &Vec3) -> Vec3 {
         let at = c.separation(e, v);
-        let force = c.force(memory, &at, || c.friction_reads(n0, v, &BALL, &SOCKET));
+        let read = || c.friction_reads(&at.normal, v, &BALL, &SOCKET);
+        let force = c.force(memory, &at, read);
         at.normal * -force.normal + force.friction
     }
 
@@ -328,14 +345,14 @@ mod tests {
                     let read = c.friction_reads(&at.normal, &v, &BALL, &SOCKET);
                     let force = c.force(&memory, &at, || read);
                     assert!(force.normal > 1.0 && force.friction.norm() > 0.01 * force.normal);
-                    let s = c.linearise(&memory, &at, &v, &read, &force, Slope::Tangent);
+                    let mut s = c.linearise(&memory, &at, &v, &read, &force, Slope::Tangent);
+                    s.add_turning_read(&c.friction_reads_by_normal(&BALL, &SOCKET));
                     let by_velocity = s.by_rate + s.by_slip;
-                    let n = at.normal;
                     for k in 0..3 {
                         let unit = Vec3::ith(k, 1.0);
                         let d = 1e-11;
-                        let difference = (on_ball(&c, &memory, &(e + unit * d), &v, &n)
-                            - on_ball(&c, &memory, &(e - unit * d), &v, &n))
+                        let difference = (on_ball(&c, &memory, &(e + unit * d), &v)
+                            - on_ball(&c, &memory, &(e - unit * d), &v))
                             / (2.0 * d);
                         let got: Vec3 = s.by_displacement.column(k).into();
                         let off = (got - difference).norm() / s.by_displacement.norm();
@@ -344,8 +361,8 @@ mod tests {
                             "{friction_velocity:?} {slip:?} {pace:?} e{k}: {off:e}"
                         );
                         let d = 1e-8 * speed;
-                        let difference = (on_ball(&c, &memory, &e, &(v + unit * d), &n)
-                            - on_ball(&c, &memory, &e, &(v - unit * d), &n))
+                        let difference = (on_ball(&c, &memory, &e, &(v + unit * d))
+                            - on_ball(&c, &memory, &e, &(v - unit * d)))
                             / (2.0 * d);
                         let got: Vec3 = by_velocity.column(k).into();
                         let off = (got - difference).norm() / by_velocity.norm();

@@ -188,7 +188,7 @@ impl ForceElement for Contact {
             friction: gap.friction,
             slip_speed: gap.slip_speed,
         };
-        let stiffness = self.law.linearise(
+        let mut stiffness = self.law.linearise(
             memory,
             &gap.separation,
             &gap.eccentricity_rate,
@@ -196,6 +196,8 @@ impl ForceElement for Contact {
             &force,
             Slope::Tangent,
         );
+        let [ball, socket] = self.spins(at.motion);
+        stiffness.add_turning_read(&self.law.friction_reads_by_normal(ball, socket));
         Some(Coupling {
             sides: contact_sides(&self.joint, &self.law),
             normal: n,
