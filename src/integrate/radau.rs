@@ -52,6 +52,9 @@ const T_INVERSE: [[f64; 3]; 3] = [
     ],
 ];
 const MOST_ITERATIONS: u32 = 7;
+/// Contraction rate of the iteration that steps aim at (Gustafsson & Söderlind, SIAM J. Sci. Comput. 18, 1997): it is about
+/// proportional to the step, and steps chosen by their error alone grow until every other iteration fails.
+const AIMED_CONTRACTION: f64 = 0.5;
 
 /// The latest step's collocation polynomial: the interpolant of that step and the starting guess for the next, so it is
 /// part of what a snapshot needs.
@@ -84,6 +87,8 @@ pub struct Radau {
     error: Vec<f64>,
     linearised_at: Option<f64>,
     previous: Polynomial,
+    /// Largest contraction rate seen in the latest attempt; 0 if none was measured.
+    contraction: f64,
 }
 
 impl Radau {
@@ -100,6 +105,7 @@ impl Radau {
             stage: vec![0.0; dimension],
             error: vec![0.0; dimension],
             linearised_at: None,
+            contraction: 0.0,
             previous: Polynomial {
                 h: 0.0,
                 end: 0.0,
@@ -139,13 +145,20 @@ impl Radau {
         tolerance: f64,
     ) -> f64 {
         let n = y.len();
-        if self.linearised_at != Some(t) {
+        if self.begin(t, h, n) {
+            // Where a contact's normal turns within the step, the Jacobian of its start fits its end badly. That of the
+            // guess for the second stage serves all three; the method's order does not depend on it.
+            for ((stage, y), z) in self.stage.iter_mut().zip(y).zip(&self.z[1]) {
+                *stage = y + z;
+            }
+            system.linearise(t + C[1] * h, &self.stage);
+            self.linearised_at = None;
+        } else if self.linearised_at != Some(t) {
             system.linearise(t, y);
             self.linearised_at = Some(t);
         }
         system.factor_shifted(REAL / h);
         system.factor_shifted_pair(PAIR.0 / h, PAIR.1 / h);
-        self.begin(t, h, n);
         if !self.iterate(system, t, h, y, tolerance) {
             return f64::INFINITY;
         }
@@ -158,8 +171,14 @@ impl Radau {
         error
     }
 
+    /// Factor for the next step or try that the iteration of the latest attempt asks for; infinite if it asks for none.
+    pub fn growth(&self) -> f64 {
+        AIMED_CONTRACTION / self.contraction
+    }
+
     /// Starting guess for the stages: the previous step's polynomial, extrapolated, or that of a longer attempt from here.
-    fn begin(&mut self, t: f64, h: f64, n: usize) {
+    /// Returns whether there is one.
+    fn begin(&mut self, t: f64, h: f64, n: usize) -> bool {
         let again =
             self.previous.h > 0.0 && (self.previous.end - self.previous.h - t).abs() <= 1e-9 * h;
         if !again && (self.previous.h == 0.0 || (self.previous.end - t).abs() > 1e-9 * h) {
@@ -167,7 +186,7 @@ impl Radau {
                 self.z[j].fill(0.0);
                 self.w[j].fill(0.0);
             }
-            return;
+            return false;
         }
         let ratio = h / self.previous.h;
         for i in 0..n {
@@ -182,6 +201,7 @@ impl Radau {
                 self.w[j][i] = (0..3).map(|m| T_INVERSE[j][m] * self.z[m][i]).sum();
             }
         }
+        true
     }
 
     /// Simplified Newton iteration on the transformed stages. Returns whether it converged.
@@ -200,6 +220,7 @@ impl Radau {
         // If previous steps converged fast, one iteration may be enough; that trust decays (Hairer & Wanner II, IV.8).
         let trusted = libm::pow(self.previous.contraction.max(f64::EPSILON), 0.8);
         self.previous.contraction = trusted;
+        self.contraction = 0.0;
         let mut before = 0.0;
         for iteration in 0..MOST_ITERATIONS {
             for j in 0..3 {
@@ -248,6 +269,7 @@ impl Radau {
                 }
             } else {
                 let theta = size / before;
+                self.contraction = self.contraction.max(theta);
                 // Rounding keeps the last corrections from shrinking further.
                 if size <= 0.1 * target {
                     return true;

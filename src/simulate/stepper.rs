@@ -91,6 +91,19 @@ impl AnyStepper {
         }
     }
 
+    /// Largest factor for the step after the latest attempt, besides what its error allows.
+    pub(super) fn growth(&self) -> f64 {
+        match self {
+            Self::Radau(s)
+            | Self::Automatic {
+                stiff: s,
+                member: Member::Implicit,
+                ..
+            } => s.growth(),
+            _ => f64::INFINITY,
+        }
+    }
+
     /// Step size times the largest eigenvalue seen in the step just attempted by an explicit adaptive method.
     pub(super) fn stiffness(&self, h: f64, y_end: &[f64], k_end: &[f64]) -> f64 {
         match self {
