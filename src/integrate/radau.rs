@@ -52,6 +52,8 @@ const T_INVERSE: [[f64; 3]; 3] = [
     ],
 ];
 const MOST_ITERATIONS: u32 = 7;
+/// The previous step's polynomial says nothing of a step so many times as long.
+const FURTHEST: f64 = 10.0;
 /// Contraction rate of the iteration that steps aim at (Gustafsson & Söderlind, SIAM J. Sci. Comput. 18, 1997): it is about
 /// proportional to the step, and steps chosen by their error alone grow until every other iteration fails.
 const AIMED_CONTRACTION: f64 = 0.5;
@@ -177,11 +179,14 @@ impl Radau {
     }
 
     /// Starting guess for the stages: the previous step's polynomial, extrapolated, or that of a longer attempt from here.
-    /// Returns whether there is one.
+    /// Returns whether it is the former: an attempt may have failed because it went astray.
     fn begin(&mut self, t: f64, h: f64, n: usize) -> bool {
         let again =
             self.previous.h > 0.0 && (self.previous.end - self.previous.h - t).abs() <= 1e-9 * h;
-        if !again && (self.previous.h == 0.0 || (self.previous.end - t).abs() > 1e-9 * h) {
+        let follows = self.previous.h > 0.0
+            && (self.previous.end - t).abs() <= 1e-9 * h
+            && h <= FURTHEST * self.previous.h;
+        if !again && !follows {
             for j in 0..3 {
                 self.z[j].fill(0.0);
                 self.w[j].fill(0.0);
@@ -201,7 +206,7 @@ impl Radau {
                 self.w[j][i] = (0..3).map(|m| T_INVERSE[j][m] * self.z[m][i]).sum();
             }
         }
-        true
+        !again
     }
 
     /// Simplified Newton iteration on the transformed stages. Returns whether it converged.
@@ -269,11 +274,11 @@ impl Radau {
                 }
             } else {
                 let theta = size / before;
-                self.contraction = self.contraction.max(theta);
                 // Rounding keeps the last corrections from shrinking further.
                 if size <= 0.1 * target {
                     return true;
                 }
+                self.contraction = self.contraction.max(theta);
                 if theta >= 0.99 {
                     return false;
                 }

@@ -15,9 +15,8 @@ const SHORTEST_FIRST: f64 = 1e-9;
 /// From this tolerance on a step that is cut at an event ends on the interpolant, whose error is about the estimate; with
 /// tighter ones it is repeated, which costs little beside their many steps.
 const END_ON_INTERPOLANT: f64 = 1e-5;
-/// Factors for the next step that an iteration may ask for are at least these: after one that failed, and after one that converged.
-const LEAST_FACTOR: f64 = 0.1;
-const LEAST_GROWTH: f64 = 0.3;
+/// Least and largest factor for the next try after one whose iteration failed.
+const AFTER_FAILURE: (f64, f64) = (0.1, 0.5);
 /// An error so many times the allowed one is no matter of accuracy: the step was unstable.
 const BLOWN_UP: f64 = 100.0;
 
@@ -85,7 +84,7 @@ impl Simulation {
             let factor = if error.is_finite() || growth.is_infinite() {
                 controller.after_reject(error)
             } else {
-                growth.clamp(LEAST_FACTOR, 0.5)
+                growth.clamp(AFTER_FAILURE.0, AFTER_FAILURE.1)
             };
             state.control.h_next = h * factor;
             if error > BLOWN_UP && self.turn_to_friction() {
@@ -94,7 +93,7 @@ impl Simulation {
             return None;
         }
         let factor = state.control.controller.after_accept(error);
-        let next = h * factor.min(growth.max(LEAST_GROWTH));
+        let next = h * factor.min(growth.max(1.0));
         // A step cut short is no evidence against the longer one.
         state.control.h_next = if cut {
             state.control.h_next.max(next)

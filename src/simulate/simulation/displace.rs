@@ -16,7 +16,10 @@ impl Simulation {
         for (y, offset) in state.now.y.iter_mut().zip(offset) {
             *y += offset;
         }
-        mechanism.project(state.now.t, &mut state.now.y);
+        // Normalising a unit quaternion may round it to another.
+        if offset.iter().any(|&offset| offset != 0.0) {
+            mechanism.project(state.now.t, &mut state.now.y);
+        }
         mechanism.measure(state.now.t, &state.now.y);
         for j in 0..state.now.memory.len() {
             if !mechanism.contacts.has_clearance(j) {
