@@ -57,6 +57,13 @@ const FURTHEST: f64 = 10.0;
 /// Contraction rate of the iteration that steps aim at (Gustafsson & Söderlind, SIAM J. Sci. Comput. 18, 1997): it is about
 /// proportional to the step, and steps chosen by their error alone grow until every other iteration fails.
 const AIMED_CONTRACTION: f64 = 0.5;
+/// After an iteration that failed, steps are held at this part of the one it failed with, and may grow by this factor each from
+/// there, until an iteration contracts faster than this rate.
+const HELD: f64 = 0.5;
+const RELEASE: f64 = 1.3;
+const FAST: f64 = 0.05;
+/// Largest part of the allowed error that the iteration may leave (Hairer & Wanner II, IV.8).
+const LEFT: f64 = 0.03;
 
 /// The latest step's collocation polynomial: the interpolant of that step and the starting guess for the next, so it is
 /// part of what a snapshot needs.
@@ -70,6 +77,8 @@ pub struct Polynomial {
     z: [Vec<f64>; 3],
     /// theta / (1 - theta) of the latest iteration that gave an estimate of its contraction rate theta.
     contraction: f64,
+    /// Longest step that the iteration is trusted with after it failed with a longer one, s.
+    held: Option<f64>,
 }
 
 impl Polynomial {
@@ -91,6 +100,8 @@ pub struct Radau {
     previous: Polynomial,
     /// Largest contraction rate seen in the latest attempt; 0 if none was measured.
     contraction: f64,
+    growth: f64,
+    factorisations: u32,
 }
 
 impl Radau {
@@ -108,11 +119,14 @@ impl Radau {
             error: vec![0.0; dimension],
             linearised_at: None,
             contraction: 0.0,
+            growth: f64::INFINITY,
+            factorisations: 0,
             previous: Polynomial {
                 h: 0.0,
                 end: 0.0,
                 z: triple(),
                 contraction: 1.0,
+                held: None,
             },
         }
     }
@@ -122,6 +136,7 @@ impl Radau {
         self.linearised_at = None;
         self.previous.h = 0.0;
         self.previous.contraction = 1.0;
+        self.previous.held = None;
     }
 
     /// What a resumed run needs to reproduce the same bits.
@@ -147,35 +162,48 @@ impl Radau {
         tolerance: f64,
     ) -> f64 {
         let n = y.len();
+        self.factorisations = 0;
         if self.begin(t, h, n) {
-            // Where a contact's normal turns within the step, the Jacobian of its start fits its end badly. That of the
-            // guess for the second stage serves all three; the method's order does not depend on it.
-            for ((stage, y), z) in self.stage.iter_mut().zip(y).zip(&self.z[1]) {
-                *stage = y + z;
+            self.linearise_within(system, t, h, y);
+        } else {
+            if self.linearised_at != Some(t) {
+                system.linearise(t, y);
+                self.linearised_at = Some(t);
             }
-            system.linearise(t + C[1] * h, &self.stage);
-            self.linearised_at = None;
-        } else if self.linearised_at != Some(t) {
-            system.linearise(t, y);
-            self.linearised_at = Some(t);
+            self.factor(system, h);
         }
-        system.factor_shifted(REAL / h);
-        system.factor_shifted_pair(PAIR.0 / h, PAIR.1 / h);
-        if !self.iterate(system, t, h, y, tolerance) {
+        let converged = self.iterate(system, t, h, y, tolerance);
+        self.growth = AIMED_CONTRACTION / self.contraction;
+        if !converged {
+            self.previous.held = Some(HELD * h);
             return f64::INFINITY;
+        }
+        if (f64::MIN_POSITIVE..FAST).contains(&self.contraction) {
+            self.previous.held = None;
+        } else if let Some(held) = &mut self.previous.held {
+            *held *= RELEASE;
+            self.growth = self.growth.min(*held / h);
         }
         for i in 0..n {
             y_end[i] = y[i] + self.z[2][i];
         }
         let error = self.estimate(system, t, h, y, k, tolerance);
         system.derivative(t + h, y_end, k_end);
-        self.remember(t, h);
+        // What went astray is no guess for the next try.
+        if error.is_finite() {
+            self.remember(t, h);
+        }
         error
     }
 
     /// Factor for the next step or try that the iteration of the latest attempt asks for; infinite if it asks for none.
     pub fn growth(&self) -> f64 {
-        AIMED_CONTRACTION / self.contraction
+        self.growth
+    }
+
+    /// How often the latest attempt factored its matrices.
+    pub fn factorisations(&self) -> u32 {
+        self.factorisations
     }
 
     /// Starting guess for the stages: the previous step's polynomial, extrapolated, or that of a longer attempt from here.
@@ -209,6 +237,24 @@ impl Radau {
         !again
     }
 
+    /// Takes the Jacobian at the second stage as far as it is known. Where a contact's normal turns within the step, that of its
+    /// start fits its end badly; this one serves all three stages, and the method's order does not depend on it.
+    fn linearise_within<S: StiffSystem>(&mut self, system: &mut S, t: f64, h: f64, y: &[f64]) {
+        for ((stage, y), z) in self.stage.iter_mut().zip(y).zip(&self.z[1]) {
+            *stage = y + z;
+        }
+        system.linearise(t + C[1] * h, &self.stage);
+        self.linearised_at = None;
+        self.factor(system, h);
+    }
+
+    /// Prepares the system to solve for the stages.
+    fn factor<S: StiffSystem>(&mut self, system: &mut S, h: f64) {
+        system.factor_shifted(REAL / h);
+        system.factor_shifted_pair(PAIR.0 / h, PAIR.1 / h);
+        self.factorisations += 1;
+    }
+
     /// Simplified Newton iteration on the transformed stages. Returns whether it converged.
     fn iterate<S: StiffSystem>(
         &mut self,
@@ -220,13 +266,14 @@ impl Radau {
     ) -> bool {
         let n = y.len();
         // The iteration's own error stays well below the step's.
-        let target = (10.0 * f64::EPSILON / tolerance).max(tolerance.sqrt().min(0.01));
+        let target = (10.0 * f64::EPSILON / tolerance).max(tolerance.sqrt().min(LEFT));
         let (real, alpha, beta) = (REAL / h, PAIR.0 / h, PAIR.1 / h);
         // If previous steps converged fast, one iteration may be enough; that trust decays (Hairer & Wanner II, IV.8).
         let trusted = libm::pow(self.previous.contraction.max(f64::EPSILON), 0.8);
         self.previous.contraction = trusted;
         self.contraction = 0.0;
         let mut before = 0.0;
+        let mut renewed = false;
         for iteration in 0..MOST_ITERATIONS {
             for j in 0..3 {
                 for ((stage, y), z) in self.stage.iter_mut().zip(y).zip(&self.z[j]) {
@@ -279,17 +326,24 @@ impl Radau {
                     return true;
                 }
                 self.contraction = self.contraction.max(theta);
-                if theta >= 0.99 {
-                    return false;
+                let mut fails = theta >= 0.99;
+                if !fails {
+                    self.previous.contraction = theta / (1.0 - theta);
+                    let left = self.previous.contraction * size;
+                    if left <= target {
+                        return true;
+                    }
+                    let remaining = (MOST_ITERATIONS - 1 - iteration) as i32;
+                    fails = left * theta.powi(remaining) > target;
                 }
-                self.previous.contraction = theta / (1.0 - theta);
-                let left = self.previous.contraction * size;
-                if left <= target {
-                    return true;
-                }
-                let remaining = (MOST_ITERATIONS - 1 - iteration) as i32;
-                if left * theta.powi(remaining) > target {
-                    return false;
+                if fails {
+                    // One that still shrinks has come closer: with the Jacobian there it mostly gets home, for less than
+                    // another try costs.
+                    if renewed || theta > 1.0 {
+                        return false;
+                    }
+                    renewed = true;
+                    self.linearise_within(system, t, h, y);
                 }
             }
             before = size;

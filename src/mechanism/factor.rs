@@ -323,10 +323,10 @@ impl Skyline {
     pub fn diagonal_and_pivot(&self, i: usize) -> (f64, f64) {
         let (i, row) = self.place[i];
         let (before, own) = self.blocks[self.offset[i]..].split_at(i - self.first[i]);
+        let pivot = 1.0 / (own[0][row][row] * own[0][row][row]);
         let entries = before.iter().flat_map(|block| &block[row]);
-        let entries = entries.chain(&own[0][row][..=row]);
-        let pivot = own[0][row][row] * own[0][row][row];
-        (entries.map(|l| l * l).sum(), pivot)
+        let entries = entries.chain(&own[0][row][..row]);
+        (entries.map(|l| l * l).sum::<f64>() + pivot, pivot)
     }
 
     /// Columns of the row of blocks i before its diagonal that are not zero.
@@ -394,7 +394,7 @@ impl Skyline {
                 for c in 0..r {
                     b[r] -= own[r][c] * b[c];
                 }
-                b[r] /= own[r][r];
+                b[r] *= own[r][r];
             }
             by_block[i] = b;
         }
@@ -403,7 +403,7 @@ impl Skyline {
             let own = &row[i - self.first[i]];
             let mut b = by_block[i];
             for r in (0..SIDE).rev() {
-                b[r] /= own[r][r];
+                b[r] *= own[r][r];
                 for c in 0..r {
                     b[c] -= own[r][c] * b[r];
                 }
@@ -437,7 +437,7 @@ fn subtract_product(block: &mut Block, l: &Block, m: &Block) {
     }
 }
 
-/// `block` = `block` L^-T for a lower triangle L.
+/// `block` = `block` L^-T for a lower triangle L, as [`factor_block`] leaves it.
 #[inline]
 fn divide(block: &mut Block, l: &Block) {
     for row in block {
@@ -445,12 +445,13 @@ fn divide(block: &mut Block, l: &Block) {
             for k in 0..c {
                 row[c] -= row[k] * l[c][k];
             }
-            row[c] /= l[c][c];
+            row[c] *= l[c][c];
         }
     }
 }
 
-/// Cholesky factor of a block of `size` rows, in place, and their pivots.
+/// Cholesky factor of a block of `size` rows, in place, with the inverses of its diagonal entries there, since solving divides by
+/// them; and their pivots.
 #[inline]
 fn factor_block(block: &mut Block, size: usize) -> [f64; SIDE] {
     let mut pivots = [1.0; SIDE];
@@ -460,14 +461,14 @@ fn factor_block(block: &mut Block, size: usize) -> [f64; SIDE] {
                 for k in 0..c {
                     block[r][c] -= block[r][k] * block[c][k];
                 }
-                block[r][c] /= block[c][c];
+                block[r][c] *= block[c][c];
             }
             pivots[r] = block[r][r];
             for k in 0..r {
                 pivots[r] -= block[r][k] * block[r][k];
             }
         }
-        block[r][r] = pivots[r].max(0.0).sqrt();
+        block[r][r] = 1.0 / pivots[r].max(0.0).sqrt();
     }
     pivots
 }

@@ -124,8 +124,9 @@ struct Attempt {
     strongest: Vec<(f64, f64)>,
     /// Step size times the largest eigenvalue seen; 0 if unknown.
     stiffness: f64,
-    /// Evaluations spent so far.
+    /// Evaluations spent so far, and factorisations.
     counts: Counts,
+    factorisations: u32,
 }
 
 /// What a snapshot copies.
@@ -287,6 +288,7 @@ impl Simulation {
                 strongest: vec![(0.0, 0.0); joints],
                 stiffness: 0.0,
                 counts: Counts::default(),
+                factorisations: 0,
             },
             scratch_y: vec![0.0; n],
             scratch_k: vec![0.0; n],
@@ -484,6 +486,7 @@ impl Simulation {
         );
         attempt.left_piece = evaluator.left_piece;
         attempt.counts += evaluator.counts;
+        attempt.factorisations += stepper.factorisations();
         attempt.stiffness = stepper.stiffness(h, &end.y, &end.k);
         error
     }

@@ -104,6 +104,18 @@ impl AnyStepper {
         }
     }
 
+    /// How often the latest attempt factored the matrices of all coordinates, if it did so to step with the automatic choice.
+    pub(super) fn factorisations(&self) -> u32 {
+        match self {
+            Self::Automatic {
+                stiff,
+                member: Member::Implicit,
+                ..
+            } => stiff.factorisations(),
+            _ => 0,
+        }
+    }
+
     /// Step size times the largest eigenvalue seen in the step just attempted by an explicit adaptive method.
     pub(super) fn stiffness(&self, h: f64, y_end: &[f64], k_end: &[f64]) -> f64 {
         match self {

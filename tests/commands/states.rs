@@ -232,7 +232,7 @@ fn a_state_that_does_not_belong_is_refused_in_words() {
     }
     for (text, words) in [
         (
-            good.replace("\"state_format\":1", "\"state_format\":2"),
+            good.replace("\"state_format\":2", "\"state_format\":3"),
             "format 2",
         ),
         ("{}".to_owned(), "not a state"),

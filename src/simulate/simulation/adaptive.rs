@@ -38,6 +38,7 @@ impl Simulation {
         self.stepper.choose(self.state.control.member);
         self.attempt.turned = false;
         self.attempt.counts = Counts::default();
+        self.attempt.factorisations = 0;
         let (t_end, h) = loop {
             if let Some(step) = self.attempt_adaptive(limit) {
                 break step;
@@ -59,7 +60,7 @@ impl Simulation {
             self.state.record.statistics.stability_limited_time += h;
         }
         if self.running.solver.method == Method::Automatic {
-            self.choose_member(h, stiffness, evaluations);
+            self.choose_member(h, stiffness, evaluations as f64);
         }
         Ok(())
     }

@@ -14,13 +14,15 @@ const LIMITED_STEPS: u32 = 8;
 /// Steps that must be limited by stability before friction is tried as the cause.
 const LIMITED_BEFORE_FRICTION: u32 = 2;
 const SETTLED_STEPS: u32 = 60;
-/// Over this many implicit steps the progress per cost must be this many times the explicit method's; otherwise the
-/// explicit one gets steps for this many times the cost of the trial, twice as many after each consecutive failed trial, at
-/// most so many times.
-const TRIAL_STEPS: u32 = 12;
+/// Over this many implicit steps the progress per cost must be this many times that of the explicit methods before; otherwise
+/// these get steps for this many times the cost of the trial, twice as many after each consecutive failed trial, at most so many
+/// times.
+const TRIAL_STEPS: u32 = 24;
 /// The first of them, in which the step still grows, do not count.
 const GROWING_STEPS: u32 = 8;
-const WORTH_IT: f64 = 1.3;
+const WORTH_IT: f64 = 0.7;
+/// How much of the progress and cost of the explicit methods counts a step later.
+const KEPT: f64 = 0.95;
 const EXPLICIT_TURN: f64 = 2.0;
 const MOST_DOUBLINGS: u32 = 3;
 /// Evaluations of one explicit step.
@@ -41,6 +43,9 @@ pub(super) struct Choice {
     pub(super) wait: u32,
     /// Explicit step size at the latest switch to the implicit method, s.
     pub(super) h_explicit: f64,
+    /// Time and cost, in evaluations, of the latest explicit steps.
+    pub(super) explicit_progress: f64,
+    pub(super) explicit_cost: f64,
     /// Time and cost, in evaluations, of the implicit steps on trial.
     pub(super) progress: f64,
     pub(super) cost: f64,
@@ -51,7 +56,7 @@ pub(super) struct Choice {
 
 impl Simulation {
     /// Which method of the automatic choice takes the next step, after one of size `h` that took so many evaluations.
-    pub(super) fn choose_member(&mut self, h: f64, stiffness: f64, evaluations: u64) {
+    pub(super) fn choose_member(&mut self, h: f64, stiffness: f64, evaluations: f64) {
         let before = self.state.control.member;
         let member = self.next_member(h, stiffness, evaluations);
         if member != before {
@@ -81,15 +86,16 @@ impl Simulation {
         turns
     }
 
-    fn next_member(&mut self, h: f64, stiffness: f64, evaluations: u64) -> Member {
+    fn next_member(&mut self, h: f64, stiffness: f64, evaluations: f64) -> Member {
         let velocities = self.state.now.y.len() - self.mechanism.positions();
-        let algebra = self.mechanism.implicit_algebra();
+        let algebra = f64::from(self.attempt.factorisations) * self.mechanism.implicit_algebra();
         let state = &mut self.state;
         let member = state.control.member;
         let choice = &mut state.control.choice;
         if state.control.contact_began {
             choice.since_contact = 0;
             choice.limited = 0;
+            (choice.explicit_progress, choice.explicit_cost) = (0.0, 0.0);
             // An impact is short and not stiff: the explicit method resolves it at less cost.
             let strikes = state.now.memory.iter().any(|m| m.active && !m.floored);
             return match member {
@@ -99,13 +105,13 @@ impl Simulation {
         }
         if member == Member::Implicit {
             choice.progress += h;
-            choice.cost += evaluations as f64 + algebra;
+            choice.cost += evaluations + algebra;
             choice.steps += 1;
             if choice.steps == GROWING_STEPS {
                 (choice.progress, choice.cost) = (0.0, 0.0);
             }
             if choice.steps >= TRIAL_STEPS {
-                let explicit = choice.h_explicit / EXPLICIT_EVALUATIONS;
+                let explicit = choice.explicit_progress / choice.explicit_cost;
                 let fails = choice.progress < WORTH_IT * explicit * choice.cost;
                 let per_step = choice.cost / f64::from(TRIAL_STEPS - GROWING_STEPS);
                 (choice.progress, choice.cost, choice.steps) = (0.0, 0.0, 0);
@@ -122,6 +128,8 @@ impl Simulation {
             return member;
         }
         choice.since_contact += 1;
+        choice.explicit_progress = KEPT * choice.explicit_progress + h;
+        choice.explicit_cost = KEPT * choice.explicit_cost + evaluations;
         let touches = state.now.memory.iter().any(|m| m.active);
         let mut next = member;
         if member == Member::Friction {
@@ -155,6 +163,8 @@ impl Simulation {
         if settled && velocities <= LARGEST_IMPLICIT {
             *choice = Choice {
                 h_explicit: h,
+                explicit_progress: choice.explicit_progress,
+                explicit_cost: choice.explicit_cost,
                 failures: choice.failures,
                 ..Choice::default()
             };

@@ -247,7 +247,8 @@ impl Simulation {
             contact.clearance
         };
         state.clearances[j] = clearance;
-        if state.now.memory[j].active && distance <= clearance {
+        // A ball that the wall has left; one just arriving, or leaving, stays as it is.
+        if clearance > now && state.now.memory[j].active && distance <= clearance {
             state.now.memory[j] = Memory::default();
         }
         state.record.impacts.change(j, state.now.memory[j].active);
