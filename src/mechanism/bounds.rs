@@ -249,7 +249,7 @@ pub fn evaluation_time(scene: &Scene, model: &Model) -> f64 {
 /// The same of the linear algebra of an implicit step with `velocities` velocity coordinates.
 pub fn algebra_time(velocities: usize) -> f64 {
     let n = velocities as f64;
-    500.0 + n * n * (3.0 + 0.16 * n)
+    500.0 + n * n * (4.0 + 0.2 * n)
 }
 
 /// Rejects a scene whose equations or whose assembly at the start exceed the limits.

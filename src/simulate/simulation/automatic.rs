@@ -20,7 +20,7 @@ const SETTLED_STEPS: u32 = 60;
 const TRIAL_STEPS: u32 = 24;
 /// The first of them, in which the step still grows, do not count.
 const GROWING_STEPS: u32 = 8;
-const WORTH_IT: f64 = 0.7;
+const WORTH_IT: f64 = 0.85;
 /// How much of the progress and cost of the explicit methods counts a step later.
 const KEPT: f64 = 0.95;
 const EXPLICIT_TURN: f64 = 2.0;
