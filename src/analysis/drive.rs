@@ -158,6 +158,10 @@ impl Orbit for Machine {
         self.simulation.displace(offset);
     }
 
+    fn step_like(&mut self, other: &Self) {
+        self.simulation.step_like(&other.simulation);
+    }
+
     /// Only while the same balls touch: otherwise one run is inside an impact that the other has before or behind it.
     fn comparable(&self, twin: &Self) -> bool {
         (0..self.simulation.running_scene().ball_joints.len()).all(|j| {

@@ -102,6 +102,9 @@ impl Benettin {
         while twin.time() < now {
             twin.step_until(now)?;
         }
+        if orbit.comparable(twin) {
+            twin.step_like(orbit);
+        }
         let before = self.latest;
         self.latest = distance(orbit, twin);
         if !self.latest.is_finite() || self.latest < VANISHED * self.separation {

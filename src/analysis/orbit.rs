@@ -35,6 +35,10 @@ pub trait Orbit: Sized {
         true
     }
 
+    /// Steps from here on as `other` is about to, a comparable run at the same time: what two runs differ by should be their
+    /// motion, not their errors.
+    fn step_like(&mut self, _other: &Self) {}
+
     /// Number of values that [`Self::observe`] writes.
     fn observables(&self) -> usize;
 

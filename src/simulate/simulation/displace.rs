@@ -45,8 +45,53 @@ impl Simulation {
         self.book_change();
     }
 
+    /// Steps from here on as `other` is about to, in the same state but for a little: with its step size and its member of the
+    /// automatic choice. Two runs that choose their own err differently, and seem to part.
+    pub fn step_like(&mut self, other: &Self) {
+        let turns = self.state.control.member != other.state.control.member;
+        self.state.control.clone_from(&other.state.control);
+        if turns {
+            self.hold_pieces(false);
+            self.stepper.invalidate();
+        }
+    }
+
     /// Scale of each component of [`Self::state`]: the error scales of the tolerance.
     pub fn scales(&self) -> &[f64] {
         self.mechanism.scale()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Scene;
+
+    #[test]
+    fn a_twin_that_steps_like_its_run_takes_the_same_steps() {
+        let change = ("solver.preset".to_owned(), "preview".to_owned());
+        let scene = Scene::load("four-bar", &[change]).expect("loads");
+        let mut run = Simulation::new(&scene).expect("starts");
+        run.advance_to(0.3).expect("runs");
+        let twin = |offset: f64| {
+            let mut twin = Simulation::of(&run.snapshot());
+            twin.displace(&[offset; 8]);
+            twin
+        };
+        let (mut follower, mut alone) = (twin(1e-9), twin(1e-9));
+        let before = run.statistics().steps;
+        for _ in 0..400 {
+            run.step().expect("runs");
+            for other in [&mut follower, &mut alone] {
+                while other.time() < run.time() {
+                    other.step_until(run.time()).expect("runs");
+                }
+            }
+            follower.step_like(&run);
+        }
+        // Rounding cuts some of its steps in two; one that chooses its own is cut at nearly every end of the run's.
+        let steps = |of: &Simulation| of.statistics().steps - before;
+        assert!(steps(&follower) < 600, "{}", steps(&follower));
+        assert!(steps(&alone) > 800, "{}", steps(&alone));
     }
 }
