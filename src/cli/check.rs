@@ -13,7 +13,7 @@ use crate::mechanism::Summary;
 use crate::scene::{
     BallJoint, Body, Formulation, Joint, JointKind, Scene, format_quantity, to_display,
 };
-use crate::simulate::{Frame, LARGEST_IMPLICIT, Listed, Simulation, channels_of};
+use crate::simulate::{Frame, Listed, Simulation, channels_of};
 
 /// Runs `check`.
 ///
@@ -261,11 +261,12 @@ fn method(scene: &Scene, contents: &Summary) -> String {
     let step = significant(scene.solver.step * 1e6, 6);
     let explicit = method == Method::Automatic
         && contents.solves_differential_equation
-        && contents.velocity_coordinates > LARGEST_IMPLICIT;
+        && contents.velocity_coordinates > contents.largest_implicit;
     if method.is_adaptive() {
         let alone = if explicit {
             format!(
-                "; explicit steps alone: the implicit ones take at most {LARGEST_IMPLICIT} velocity coordinates"
+                "; explicit steps alone: the implicit ones take at most {} velocity coordinates",
+                contents.largest_implicit
             )
         } else {
             String::new()

@@ -1,6 +1,7 @@
 //! Linear systems that are mostly zero, of a size known beforehand at most. Allocates nothing after `new`.
 
 use nalgebra::ComplexField;
+use std::ops::Range;
 
 /// With fewer rows, telling zeros apart costs more than multiplying them.
 const LEAST_SPARSE: usize = 16;
@@ -8,29 +9,41 @@ const LEAST_SPARSE: usize = 16;
 /// LU factorisation with partial pivoting, for real and complex numbers, that skips zeros: its cost follows the order of the
 /// rows, and is linear along a band or a border.
 pub struct Lu<X> {
+    /// Most rows, which is the distance between two.
+    most: usize,
     /// Rows in use.
     n: usize,
     rows: Vec<X>,
     pivots: Vec<usize>,
+    /// Columns of each row outside of which it is zero.
+    extents: Vec<Range<usize>>,
+    /// Last row that starts at or left of each column.
+    lowest: Vec<usize>,
     /// Nonzero factors left and right of the diagonal, row by row: where those of each row start, their columns and values.
     starts: Vec<usize>,
     columns: Vec<u32>,
     factors: Vec<X>,
     /// Nonzero columns of a pivot row.
     filled: Vec<usize>,
+    /// Products that the latest elimination took.
+    pub products: usize,
 }
 
 impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
     /// For at most `n` rows.
     pub fn new(n: usize) -> Self {
         Self {
+            most: n,
             n: 0,
             rows: vec![X::zero(); n * n],
             pivots: vec![0; n],
+            extents: vec![0..0; n],
+            lowest: vec![0; n],
             starts: Vec::with_capacity(2 * n + 1),
             columns: Vec::with_capacity(n * n),
             factors: Vec::with_capacity(n * n),
             filled: Vec::with_capacity(n),
+            products: 0,
         }
     }
 
@@ -41,34 +54,60 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
         entries: impl Iterator<Item = (usize, usize, X)>,
         diagonal: X,
     ) {
+        let stride = self.most;
+        let (a, extents) = (&mut self.rows[..], &mut self.extents[..]);
+        for (row, extent) in a
+            .chunks_exact_mut(stride.max(1))
+            .zip(&*extents)
+            .take(self.n)
+        {
+            row[extent.clone()].fill(X::zero());
+        }
         self.n = n;
-        let a = &mut self.rows[..n * n];
-        a.fill(X::zero());
+        for (i, extent) in extents[..n].iter_mut().enumerate() {
+            *extent = i..i + 1;
+        }
         for (i, j, entry) in entries {
-            a[i * n + j] = entry;
+            a[i * stride + j] = entry;
+            let extent = &mut extents[i];
+            *extent = extent.start.min(j)..extent.end.max(j + 1);
         }
         for i in 0..n {
-            a[i * n + i] += diagonal;
+            a[i * stride + i] += diagonal;
         }
+        let lowest = &mut self.lowest[..n];
+        lowest.fill(0);
+        for (i, extent) in extents[..n].iter().enumerate() {
+            lowest[extent.start] = i;
+        }
+        for k in 1..n {
+            lowest[k] = lowest[k].max(lowest[k - 1]);
+        }
+        self.products = 0;
         for k in 0..n {
-            let (mut best, mut largest) = (k, a[k * n + k].norm1());
-            for i in k + 1..n {
-                let size = a[i * n + k].norm1();
-                if size > largest {
-                    (best, largest) = (i, size);
+            let below = k + 1..lowest[k] + 1;
+            let (mut best, mut largest) = (k, a[k * stride + k].norm1());
+            for i in below.clone() {
+                if extents[i].contains(&k) {
+                    let size = a[i * stride + k].norm1();
+                    if size > largest {
+                        (best, largest) = (i, size);
+                    }
                 }
             }
             self.pivots[k] = best;
             if best != k {
-                let (top, bottom) = a.split_at_mut(best * n);
-                top[k * n..][..n].swap_with_slice(&mut bottom[..n]);
+                let part = extents[k].start.min(extents[best].start)
+                    ..extents[k].end.max(extents[best].end);
+                let (top, bottom) = a.split_at_mut(best * stride);
+                top[k * stride..][part.clone()].swap_with_slice(&mut bottom[part]);
+                extents.swap(k, best);
             }
-            let (top, bottom) = a.split_at_mut((k + 1) * n);
-            let pivot_row = &top[k * n..];
+            let (top, bottom) = a.split_at_mut((k + 1) * stride);
+            let pivot_row = &top[k * stride..];
             let inverse = X::one() / pivot_row[k];
-            let last = pivot_row.iter().rposition(|a| !a.is_zero());
-            let end = last.map_or(k, |last| last + 1);
-            let span = k + 1..end.max(k + 1);
+            let last = extents[k].clone().rev().find(|&j| !pivot_row[j].is_zero());
+            let span = k + 1..last.map_or(k, |last| last).max(k) + 1;
             self.filled.clear();
             if n >= LEAST_SPARSE {
                 let filled = span.clone().filter(|&j| !pivot_row[j].is_zero());
@@ -76,10 +115,22 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
             }
             // What lies side by side is taken several at a time.
             let together = n < LEAST_SPARSE || span.len() < 2 * self.filled.len();
-            for row in bottom.chunks_exact_mut(n) {
+            let width = if together {
+                span.len()
+            } else {
+                self.filled.len()
+            };
+            for i in below {
+                let extent = &mut extents[i];
+                if !extent.contains(&k) {
+                    continue;
+                }
+                let row = &mut bottom[(i - k - 1) * stride..][..n];
                 if row[k].is_zero() {
                     continue;
                 }
+                extent.end = extent.end.max(span.end);
+                self.products += 1 + width;
                 let factor = row[k] * inverse;
                 row[k] = factor;
                 if together {
@@ -103,8 +154,9 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
         self.starts.clear();
         self.columns.clear();
         self.factors.clear();
-        for (i, row) in self.rows[..n * n].chunks_exact(n).enumerate() {
-            for part in [0..i, i + 1..n] {
+        let rows = self.rows.chunks_exact(self.most.max(1));
+        for (i, (row, extent)) in rows.zip(&self.extents).take(n).enumerate() {
+            for part in [extent.start..i, i + 1..extent.end] {
                 self.starts.push(self.columns.len());
                 for j in part {
                     if !row[j].is_zero() {
@@ -123,7 +175,7 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
         let mut x = b[i];
         if self.n < LEAST_SPARSE {
             let part = [0..i, i + 1..self.n][right].clone();
-            let row = &self.rows[i * self.n..][..self.n];
+            let row = &self.rows[i * self.most..][..self.n];
             for (a, b) in row[part.clone()].iter().zip(&b[part]) {
                 x -= *a * *b;
             }
@@ -146,7 +198,7 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
             b[i] = self.reduced(i, 0, b);
         }
         for i in (0..n).rev() {
-            b[i] = self.reduced(i, 1, b) / self.rows[i * n + i];
+            b[i] = self.reduced(i, 1, b) / self.rows[i * self.most + i];
         }
     }
 }

@@ -36,7 +36,7 @@ mod systems;
 mod tree;
 
 pub use crate::jet::Jet;
-pub use bounds::{Advice, CostOf, Counted};
+pub use bounds::{Advice, CostOf, Counted, LARGEST_DENSE};
 pub use closed_form::ClosedMotion;
 pub use contacts::{Contacts, Ramp};
 pub use drives::periods_of;
@@ -700,10 +700,20 @@ impl Mechanism {
         self.friction.as_ref().map_or(0.0, |f| f.fastest())
     }
 
-    /// Approximate cost of an implicit step's linear algebra, in evaluations.
+    /// Approximate cost of the latest implicit step's linear algebra, in evaluations.
     pub fn implicit_algebra(&self) -> f64 {
         let velocities = self.dimension() - self.positions();
-        bounds::algebra_time(velocities) / self.evaluation_time
+        let products = self.stiff.as_ref().map_or(0, |stiff| stiff.products());
+        bounds::algebra_time(velocities, products) / self.evaluation_time
+    }
+
+    /// Most velocity coordinates with which the automatic choice steps implicitly, too.
+    pub fn largest_implicit(&self) -> usize {
+        if self.equations.is_block_diagonal() {
+            LARGEST_DENSE
+        } else {
+            bounds::LARGEST_COUPLED
+        }
     }
 
     /// Allocates what [`ContactSystem`](crate::integrate::ContactSystem) needs, so that no step does.

@@ -36,6 +36,11 @@ pub struct Stiff {
     /// Tree of each coordinate, in that order, and whether a coupling acts on it.
     tree_of: Vec<usize>,
     coupled: Vec<bool>,
+    /// Whether a coupling acts on both of two trees, row by row; and those that one acts on with another, scratch.
+    linked: Vec<bool>,
+    partners: Vec<usize>,
+    /// Place of each coupled tree's first coordinate among the coordinates.
+    first: Vec<usize>,
     /// Coordinates that couplings act on, in the order of elimination.
     coordinates: Vec<usize>,
     /// Where M^-1 K or M^-1 D have an entry: row and column in that order, and its index in both.
@@ -90,6 +95,9 @@ impl Stiff {
         Self {
             n,
             coupled: vec![false; trees.len()],
+            linked: vec![false; trees.len() * trees.len()],
+            partners: Vec::with_capacity(trees.len()),
+            first: vec![0; trees.len()],
             trees,
             tree_of,
             coordinates: Vec::with_capacity(n),
@@ -134,6 +142,7 @@ impl Stiff {
         }
         self.time_derivative.fill(0.0);
         self.coupled.fill(false);
+        self.linked.fill(false);
         self.empty = true;
         let at = At {
             t,
@@ -156,14 +165,30 @@ impl Stiff {
             }
             self.add(&coupling);
             self.add_drift(&coupling, i);
-            for column in &self.columns {
-                self.coupled[self.tree_of[column.coordinate]] = true;
-            }
+            self.link();
         }
         self.coordinates.clear();
-        for (tree, coupled) in self.trees.iter().zip(&self.coupled) {
-            if *coupled {
+        for (place, tree) in self.trees.iter().enumerate() {
+            if self.coupled[place] {
+                self.first[place] = self.coordinates.len();
                 self.coordinates.extend(tree.clone());
+            }
+        }
+    }
+
+    /// Notes which trees the coupling with these columns acts on.
+    fn link(&mut self) {
+        self.partners.clear();
+        for column in &self.columns {
+            let tree = self.tree_of[column.coordinate];
+            if !self.partners.contains(&tree) {
+                self.partners.push(tree);
+            }
+        }
+        for &one in &self.partners {
+            self.coupled[one] = true;
+            for &other in &self.partners {
+                self.linked[one * self.trees.len() + other] = true;
             }
         }
     }
@@ -256,35 +281,48 @@ impl Stiff {
             return;
         }
         let n = self.n;
-        let separate = self.trees.len() > 1;
-        for matrix in [&mut self.by_position, &mut self.by_velocity] {
-            for &c in &self.coordinates {
-                let column = &mut matrix[c * n..][..n];
-                if !separate {
-                    if column.iter().any(|force| *force != 0.0) {
-                        equations.apply_inverse_mass(model, column);
+        let count = self.trees.len();
+        self.entries.clear();
+        for (place, tree) in self.trees.iter().enumerate() {
+            if !self.coupled[place] {
+                continue;
+            }
+            let linked = &self.linked[place * count..][..count];
+            self.partners.clear();
+            self.partners
+                .extend((0..count).filter(|&other| linked[other]));
+            for (column, j) in tree.clone().zip(self.first[place]..) {
+                for matrix in [&mut self.by_position, &mut self.by_velocity] {
+                    let forces = &mut matrix[column * n..][..n];
+                    for &other in &self.partners {
+                        let Range { start, end } = self.trees[other].clone();
+                        if forces[start..end].iter().all(|force| *force == 0.0) {
+                            continue;
+                        }
+                        if count > 1 {
+                            equations.apply_inverse_mass_within(model, (start, end), forces);
+                        } else {
+                            equations.apply_inverse_mass(model, forces);
+                        }
                     }
-                    continue;
                 }
-                for (tree, _) in self.trees.iter().zip(&self.coupled).filter(|(_, c)| **c) {
-                    if column[tree.clone()].iter().any(|force| *force != 0.0) {
-                        let range = (tree.start, tree.end);
-                        equations.apply_inverse_mass_within(model, range, column);
+                for &other in &self.partners {
+                    for (row, i) in self.trees[other].clone().zip(self.first[other]..) {
+                        let at = column * n + row;
+                        if self.by_position[at] != 0.0 || self.by_velocity[at] != 0.0 {
+                            self.entries.push([i, j, at].map(|x| x as u32));
+                        }
                     }
                 }
             }
         }
         let positions = self.time_derivative.len() - n;
         equations.apply_inverse_mass(model, &mut self.time_derivative[positions..]);
-        self.entries.clear();
-        for (j, &column) in self.coordinates.iter().enumerate() {
-            for (i, &row) in self.coordinates.iter().enumerate() {
-                let at = column * n + row;
-                if self.by_position[at] != 0.0 || self.by_velocity[at] != 0.0 {
-                    self.entries.push([i, j, at].map(|x| x as u32));
-                }
-            }
-        }
+    }
+
+    /// Products that the latest elimination with a real shift took.
+    pub fn products(&self) -> usize {
+        self.lu.products
     }
 
     /// Prepares to solve with a real shift s: factors s I - M^-1 D - M^-1 K / s.

@@ -31,6 +31,8 @@ pub struct Summary {
     pub frictional_contacts: usize,
     /// Blocks of the mass matrix that are a single free body each.
     pub lone_bodies: usize,
+    /// Most velocity coordinates with which the method `automatic` steps implicitly, too.
+    pub largest_implicit: usize,
     /// Whether a differential equation is solved at all.
     pub solves_differential_equation: bool,
 }
@@ -64,6 +66,7 @@ impl Summary {
                 .count(),
             contacts: contacts.len(),
             lone_bodies: model.blocks.iter().filter(|b| b.lone.is_some()).count(),
+            largest_implicit: mechanism.largest_implicit(),
             solves_differential_equation: !mechanism.is_kinematic(),
         }
     }

@@ -26,7 +26,7 @@ pub use pace::{LONGEST_FRAME, Limit, Pacer, REST, SCALE_RANGE};
 pub use simulation::ideal::{ProbeFault, closed};
 pub use simulation::live::{ChangeError, differs_in_conditions_alone};
 pub use simulation::saved::{Misfit, SavedState};
-pub use simulation::{CLEARANCE_SPEED, LARGEST_DENSE, LARGEST_IMPLICIT, Simulation};
+pub use simulation::{CLEARANCE_SPEED, Simulation};
 pub use stopped::{StopAdvice, StopFault, Stopped};
 pub use wear::{Cell, Edges, Grid, Wear};
 

@@ -31,7 +31,6 @@ use crate::integrate::{Controller, System as _};
 use crate::mechanism::{Counts, Flight, Mechanism, MechanismError, Pull, Ramp, Touching};
 use crate::scene::Scene;
 use automatic::{Choice, controller_of, prepare_implicit};
-pub use automatic::{LARGEST_DENSE, LARGEST_IMPLICIT};
 use corners::Piece;
 use flights::put_flights;
 use ideal::{ProbeFault, Reference};

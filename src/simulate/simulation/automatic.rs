@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Simulation;
 use crate::integrate::{Controller, Method};
-use crate::mechanism::{Mechanism, MechanismError};
+use crate::mechanism::{LARGEST_DENSE, Mechanism, MechanismError};
 use crate::simulate::stepper::Member;
 
 /// h |lambda| beyond which an explicit step is limited by stability.
@@ -27,11 +27,6 @@ const EXPLICIT_TURN: f64 = 2.0;
 const MOST_DOUBLINGS: u32 = 3;
 /// Evaluations of one explicit step.
 const EXPLICIT_EVALUATIONS: f64 = 6.0;
-/// The implicit methods, which hold matrices over all coordinates, refuse more velocity coordinates than this.
-pub const LARGEST_DENSE: usize = 1024;
-/// With more velocity coordinates than this an implicit step costs more than many explicit ones: the automatic choice
-/// stays explicit.
-pub const LARGEST_IMPLICIT: usize = 96;
 
 /// State of the automatic pair.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -160,7 +155,7 @@ impl Simulation {
         let limited =
             choice.limited >= LIMITED_STEPS && (touches || self.mechanism.has_couplings());
         let settled = limited || (touches && choice.since_contact >= SETTLED_STEPS);
-        if settled && velocities <= LARGEST_IMPLICIT {
+        if settled && velocities <= self.mechanism.largest_implicit() {
             *choice = Choice {
                 h_explicit: h,
                 explicit_progress: choice.explicit_progress,
@@ -201,7 +196,8 @@ pub(super) fn prepare_implicit(
             most: LARGEST_DENSE,
         });
     }
-    if method.is_implicit() || (method == Method::Automatic && velocities <= LARGEST_IMPLICIT) {
+    let tries = method == Method::Automatic && velocities <= mechanism.largest_implicit();
+    if method.is_implicit() || tries {
         mechanism.prepare_linearisation();
     }
     if method == Method::Automatic {
