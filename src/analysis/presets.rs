@@ -6,6 +6,7 @@ use std::sync::OnceLock;
 
 use serde::{Deserialize, Serialize};
 
+use super::stretch::time_to;
 use super::work_precision::{Baseline, measure as measure_point};
 use super::{
     AnalysisError, Point, ReferenceSolution, RunContext, Setting, WorkBudget, WorkPrecision,
@@ -52,6 +53,59 @@ pub struct Record {
     pub points: BTreeMap<String, (String, f64)>,
     /// By scene, then by preset.
     pub scenes: BTreeMap<String, BTreeMap<String, Measured>>,
+    /// By scene: simulated seconds per clock second of the preset `real-time`, as by [`pace`].
+    pub pace: BTreeMap<String, f64>,
+}
+
+/// Span over which the preset `real-time` is measured, s.
+const PACED: f64 = 1.0;
+
+/// A scene that the preset `real-time`, asked for, did not keep up with when it was measured.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "solver.preset real-time does not keep up with {scene}: its first second, with the values it comes with, ran at {pace:.2} times \
+     real time on one core of {machine}; preview is faster"
+)]
+pub struct TooSlow {
+    /// Name of the scene.
+    pub scene: String,
+    /// Simulated seconds per clock second.
+    pub pace: f64,
+    /// Where it was measured.
+    pub machine: &'static str,
+}
+
+/// Whether `scene` is a built-in one that asks for the preset `real-time` and was slower than that when it was measured.
+pub fn too_slow(scene: &Scene) -> Option<TooSlow> {
+    let record = record();
+    let (method, _, tolerance) = Preset::RealTime.point();
+    let asks = scene.solver.preset == Some(Preset::RealTime)
+        && (scene.solver.method, scene.solver.tolerance) == (method, tolerance)
+        && scene.source.file.is_none();
+    let pace = record.pace.get(&scene.name).copied();
+    pace.filter(|pace| asks && *pace < 1.0).map(|pace| TooSlow {
+        scene: scene.name.clone(),
+        pace,
+        machine: &record.machine,
+    })
+}
+
+/// Simulated seconds per clock second of the preset `real-time` over the first second of `scene`.
+///
+/// # Errors
+/// As [`super::work_precision`].
+pub fn pace(
+    scene: &Scene,
+    budget: &WorkBudget,
+    context: &mut RunContext,
+) -> Result<f64, AnalysisError> {
+    let setting = Setting::of_preset(Preset::RealTime);
+    let budget = WorkBudget {
+        measured: budget.measured,
+        ..WorkBudget::REFERENCE
+    };
+    let seconds = time_to(PACED, &budget, context, |_| setting.start(scene))?;
+    Ok(PACED / seconds)
 }
 
 /// The stored record.
@@ -126,4 +180,36 @@ pub fn measure(
         points.push(point);
     }
     Ok(points)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::BUILT_IN;
+
+    #[test]
+    fn a_built_in_scene_says_beforehand_that_real_time_is_too_fast_for_it() {
+        const ASKED: (&str, &str) = ("solver.preset", "real-time");
+        let slow = |name: &str, changes: &[(&str, &str)]| {
+            let owned = |(key, value): &(&str, &str)| ((*key).to_owned(), (*value).to_owned());
+            let changes: Vec<_> = changes.iter().map(owned).collect();
+            too_slow(&Scene::load(name, &changes).expect("loads"))
+        };
+        for name in BUILT_IN {
+            let pace = *record().pace.get(name).unwrap_or_else(|| {
+                panic!("{name}: run `jointplay tradeoff --all --write .`");
+            });
+            let said = slow(name, &[ASKED]);
+            assert_eq!(
+                said.as_ref().map(|slow| slow.pace),
+                (pace < 1.0).then_some(pace)
+            );
+            if let Some(said) = said {
+                assert!(said.to_string().contains(name), "{said}");
+            }
+            // Not asked for, or not what was measured.
+            assert_eq!(slow(name, &[]), None);
+            assert_eq!(slow(name, &[ASKED, ("solver.tolerance", "1e-4")]), None);
+        }
+    }
 }

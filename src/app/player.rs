@@ -13,6 +13,7 @@ use super::paths::Paths;
 use super::settled::Settling;
 use super::twin::Twin;
 use super::watch::RunWatch;
+use crate::analysis::presets::too_slow;
 use crate::analysis::section::Schedule;
 use crate::scene::{SOLVER_KEYS, Scene, Value};
 use crate::simulate::{
@@ -105,7 +106,11 @@ const MOST_RECORDED: f64 = 64.0;
 /// The warnings of a scene, in sentences.
 fn sentences(scene: &Scene) -> Vec<String> {
     let warnings = scene.warnings().into_iter();
-    warnings.map(|warning| warning.to_string()).collect()
+    let slow = too_slow(scene).map(|slow| slow.to_string());
+    warnings
+        .map(|warning| warning.to_string())
+        .chain(slow)
+        .collect()
 }
 
 impl Player {

@@ -7,6 +7,7 @@ use super::assembly::Start;
 use super::output::significant;
 use super::summary::count;
 use super::{Failure, load, print, start};
+use crate::analysis::presets::too_slow;
 use crate::contact::FrictionLaw;
 use crate::integrate::Method;
 use crate::mechanism::Summary;
@@ -141,6 +142,7 @@ fn report(
     left_out.iter().for_each(|item| line("Not computed", item));
     let warnings = scene.warnings().into_iter().map(|w| w.to_string());
     warnings
+        .chain(too_slow(scene).map(|slow| slow.to_string()))
         .chain(near_singular(scene).map(|near| near.to_string()))
         .chain(begun.warnings.iter().cloned())
         .for_each(|warning| line("Warning", &warning));

@@ -14,6 +14,7 @@ use super::output::{NoRow, RowsFile, Table, check_distinct, check_size, signific
 use super::state::{self, Begun, StateFile};
 use super::summary::{self, Status, Stepping};
 use super::{Failure, interrupt, load, print, progress, quantity, start, warn, wear};
+use crate::analysis::presets::too_slow;
 use crate::files::{FileError, publish};
 use crate::scene::Scene;
 use crate::simulate::{Frame, Simulation};
@@ -171,6 +172,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), Failure> {
         }
         let warnings = scene.warnings().into_iter().map(|w| w.to_string());
         warnings
+            .chain(too_slow(&scene).map(|slow| slow.to_string()))
             .chain(begun.warnings.iter().cloned())
             .for_each(|warning| warn(&warning));
     }

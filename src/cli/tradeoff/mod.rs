@@ -13,7 +13,9 @@ use std::path::Path;
 
 use super::args::TradeoffArguments;
 use super::{Failure, interrupt, load, measuring, print, warn};
-use crate::analysis::{WorkBudget, WorkPrecision, model_costs, work_precision};
+use crate::analysis::{
+    RunContext, WorkBudget, WorkPrecision, model_costs, presets, work_precision,
+};
 use crate::cli::args::SceneArguments;
 use crate::files::Folder;
 use crate::scene::{BUILT_IN, Scene};
@@ -74,12 +76,15 @@ fn measure(scene: &Scene, budget: &WorkBudget, quiet: bool) -> Result<WorkPrecis
 fn all(root: &Path, quiet: bool, budget: &WorkBudget) -> Result<(), Failure> {
     let targets = page::Targets::claim(root)?;
     let mut found = Vec::with_capacity(BUILT_IN.len());
+    let mut paces = Vec::with_capacity(BUILT_IN.len());
     for name in BUILT_IN {
         let scene = Scene::load(name, &[])?;
         found.push(measure(&scene, &budget.of(&scene), quiet)?);
+        let pace = |context: &mut RunContext| presets::pace(&scene, budget, context);
+        paces.push((name, measuring::measure(quiet, Some(&scene), pace)?));
     }
     let costs = measuring::measure(quiet, None, |context| model_costs(budget, context))?;
-    targets.write(&found, &costs)?;
+    targets.write(&found, &paces, &costs)?;
     for found in &found {
         print(&words::text(found))?;
     }

@@ -40,11 +40,16 @@ impl Targets {
     }
 
     /// Writes everything; all texts are made before the first file changes.
-    pub(super) fn write(self, found: &[WorkPrecision], costs: &[CaseCost]) -> Result<(), Failure> {
+    pub(super) fn write(
+        self,
+        found: &[WorkPrecision],
+        paces: &[(&str, f64)],
+        costs: &[CaseCost],
+    ) -> Result<(), Failure> {
         let machine = machine::name();
         let scenes: String = found.iter().map(measured_scene).collect();
-        let page = page(&machine, found, &scenes, costs);
-        let record = serde_json::to_string_pretty(&record(found, &machine))
+        let page = page(&machine, found, paces, &scenes, costs);
+        let record = serde_json::to_string_pretty(&record(found, paces, &machine))
             .map_err(|error| Failure::io(error.to_string()))?;
         let mut drawn = Vec::with_capacity(found.len());
         for found in found {
@@ -68,9 +73,13 @@ fn diagram(name: &str) -> String {
     format!("tradeoff-{name}.svg")
 }
 
-fn record(found: &[WorkPrecision], machine: &str) -> Record {
+fn record(found: &[WorkPrecision], paces: &[(&str, f64)], machine: &str) -> Record {
+    let paces = paces.iter();
     let mut record = Record {
         machine: machine.to_owned(),
+        pace: paces
+            .map(|(scene, pace)| ((*scene).to_owned(), *pace))
+            .collect(),
         ..Record::default()
     };
     for found in found {
@@ -98,10 +107,16 @@ pub fn skeleton(scenes: &[&str]) -> String {
         .iter()
         .map(|name| scene(name, &[], &[], Vec::new()))
         .collect();
-    page("", &[], &scenes, &[])
+    page("", &[], &[], &scenes, &[])
 }
 
-fn page(machine: &str, found: &[WorkPrecision], scenes: &str, costs: &[CaseCost]) -> String {
+fn page(
+    machine: &str,
+    found: &[WorkPrecision],
+    paces: &[(&str, f64)],
+    scenes: &str,
+    costs: &[CaseCost],
+) -> String {
     let rows = found.iter().flat_map(|found| {
         let presets = Preset::ALL.into_iter();
         presets.filter_map(|preset| Some(preset_row(found, found.preset(preset)?, preset)))
@@ -122,6 +137,13 @@ fn page(machine: &str, found: &[WorkPrecision], scenes: &str, costs: &[CaseCost]
                 markdown(
                     "Scene | Preset | Ratio, impacts | Peak error | Position error (m) | Energy error | Ratio, settled | Force error | Held",
                     rows,
+                ),
+            ),
+            (
+                "paces",
+                markdown(
+                    "Scene | Speed | Keeps up",
+                    paces.iter().map(|(scene, pace)| pace_row(scene, *pace)),
                 ),
             ),
             ("scenes", scenes.to_owned()),
@@ -164,6 +186,12 @@ fn measured_scene(found: &WorkPrecision) -> String {
         &reading(found),
         rows,
     )
+}
+
+/// Whether the preset `real-time` keeps up with a scene.
+fn pace_row(scene: &str, pace: f64) -> Vec<String> {
+    let keeps = if pace >= 1.0 { "yes" } else { "no" };
+    vec![scene.to_owned(), times(Some(pace)), keeps.to_owned()]
 }
 
 /// What a preset is, the limit it must keep, and what this run would choose.
