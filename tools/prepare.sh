@@ -50,6 +50,11 @@ prepare_rust() {
         say "    curl --proto '=https' --tlsv1.2 -sSf https://sh.rustup.rs | sh"
         exit 1
     fi
+    # rustup fetches the compiler that rust-toolchain.toml names; without a network the one that is here has to do.
+    if ! (cd "$root" && rustc --version) > /dev/null 2>&1 && rustc +stable --version > /dev/null 2>&1; then
+        export RUSTUP_TOOLCHAIN=stable
+        say "the compiler that rust-toolchain.toml names is not to be had; going on with $(rustc --version)"
+    fi
 }
 
 # The software driver complains on every start without one.
