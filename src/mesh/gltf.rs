@@ -5,9 +5,7 @@ use base64::engine::general_purpose::STANDARD as BASE64;
 use nalgebra::{Matrix4, Quaternion, UnitQuaternion, Vector3};
 use serde_json::Value as Json;
 
-use super::{Builder, Fault};
-
-type Other<'o> = &'o dyn Fn(&str) -> Result<Vec<u8>, String>;
+use super::{Builder, Fault, MeshFault, Other};
 
 pub(super) fn read(bytes: &[u8], other: Other<'_>) -> Result<Builder, Fault> {
     let (text, binary) = if bytes.starts_with(b"glTF") {
@@ -16,8 +14,8 @@ pub(super) fn read(bytes: &[u8], other: Other<'_>) -> Result<Builder, Fault> {
     } else {
         (bytes, None)
     };
-    let json = serde_json::from_slice(text)
-        .map_err(|why| Fault::somewhere(format!("no glTF file: {why}")))?;
+    let json =
+        serde_json::from_slice(text).map_err(|why| Fault::somewhere(MeshFault::NotJson(why)))?;
     let mut file = File {
         json: &json,
         buffers: Vec::new(),
@@ -33,24 +31,22 @@ fn chunks(bytes: &[u8]) -> Result<(&[u8], &[u8]), Fault> {
     };
     match word(4) {
         Some(2) => {}
-        Some(other) => return Err(Fault::at(4, format!("version {other} of glTF; allowed 2"))),
-        None => return Err(Fault::at(bytes.len(), "the file ends within its head")),
+        Some(other) => return Err(Fault::at(4, MeshFault::Container(other))),
+        None => return Err(Fault::at(bytes.len(), MeshFault::EndsWithin("its head"))),
     }
-    let chunk = |at: usize, kind: &[u8; 4]| {
+    let chunk = |at: usize, kind: &[u8; 4], name| {
         let named = bytes.get(at + 4..at + 8) == Some(kind);
-        let name = || String::from_utf8_lossy(kind).replace('\0', "");
         let length = word(at).filter(|_| named);
-        let length =
-            length.ok_or_else(|| Fault::at(at, format!("expected the chunk {}", name())))?;
+        let length = length.ok_or(Fault::at(at, MeshFault::Expected(name)))?;
         let end = (at + 8).saturating_add(length);
-        let why = || format!("the chunk {} ends beyond the file", name());
-        bytes.get(at + 8..end).ok_or_else(|| Fault::at(at, why()))
+        let part = bytes.get(at + 8..end);
+        part.ok_or(Fault::at(at, MeshFault::LongChunk(name)))
     };
-    let text = chunk(12, b"JSON")?;
+    let text = chunk(12, b"JSON", "the chunk JSON")?;
     let next = 20 + text.len();
     // There need not be one.
     let binary = if next < bytes.len() {
-        chunk(next, b"BIN\0")?
+        chunk(next, b"BIN\0", "the chunk BIN")?
     } else {
         &[]
     };
@@ -71,31 +67,26 @@ struct Accessor<'f> {
 }
 
 impl<'f> File<'f> {
-    fn build(&mut self, binary: Option<&[u8]>, other: Other<'_>) -> Result<Builder, String> {
+    fn build(&mut self, binary: Option<&[u8]>, other: Other<'_>) -> Result<Builder, MeshFault> {
         let version = self.json["asset"]["version"].as_str().unwrap_or_default();
         if !version.starts_with("2.") {
-            return Err(format!(
-                "asset.version is `{version}`; allowed 2.0 and above"
-            ));
+            return Err(MeshFault::Version(version.to_owned()));
         }
         if let Some(needed) = self.list("extensionsRequired").first() {
-            return Err(format!(
-                "extensionsRequired: this program does not know {needed}; export the mesh without it"
-            ));
+            return Err(MeshFault::Extension(needed.to_string()));
         }
         for (i, buffer) in self.list("buffers").iter().enumerate() {
             let content = match (buffer["uri"].as_str(), binary) {
-                (None, Some(binary)) if i == 0 => Ok(binary.to_vec()),
-                (None, _) => Err("missing".to_owned()),
+                (None, Some(binary)) if i == 0 => binary.to_vec(),
+                (None, _) => return Err(MeshFault::NoUri(i)),
                 (Some(uri), _) => match uri.strip_prefix("data:") {
                     Some(data) => data
                         .split_once(";base64,")
                         .and_then(|(_, data)| BASE64.decode(data).ok())
-                        .ok_or_else(|| "holds no base64 data".to_owned()),
-                    None => other(uri),
+                        .ok_or(MeshFault::NotBase64(i))?,
+                    None => other(uri).map_err(|why| MeshFault::Other { buffer: i, why })?,
                 },
             };
-            let content = content.map_err(|why| format!("buffers[{i}].uri: {why}"))?;
             self.buffers.push(content);
         }
         let mut out = Builder::default();
@@ -113,9 +104,9 @@ impl<'f> File<'f> {
         while let Some((at, parent)) = open.pop() {
             let node = self.item("nodes", at)?;
             if std::mem::replace(&mut seen[at], true) {
-                return Err(format!("nodes[{at}] is there twice in the scene"));
+                return Err(MeshFault::Twice(at));
             }
-            let placed = parent * matrix(node).map_err(|why| format!("nodes[{at}].{why}"))?;
+            let placed = parent * matrix(node, at)?;
             for child in node["children"].as_array().into_iter().flatten() {
                 open.push((index(child, "nodes.children")?, placed));
             }
@@ -127,7 +118,7 @@ impl<'f> File<'f> {
     }
 
     /// Adds the triangles of a mesh.
-    fn mesh(&self, at: usize, placed: &Matrix4<f64>, out: &mut Builder) -> Result<(), String> {
+    fn mesh(&self, at: usize, placed: &Matrix4<f64>, out: &mut Builder) -> Result<(), MeshFault> {
         /// Kinds of primitives: up to this one, points and lines.
         const LINES: u64 = 3;
         const TRIANGLES: u64 = 4;
@@ -138,11 +129,7 @@ impl<'f> File<'f> {
             match part.get("mode").map_or(Some(TRIANGLES), Json::as_u64) {
                 Some(TRIANGLES) => {}
                 Some(..=LINES) => continue,
-                _ => {
-                    return Err(format!(
-                        "meshes[{at}]: strips and fans of triangles are not read; export single triangles"
-                    ));
-                }
+                _ => return Err(MeshFault::Strips(at)),
             }
             let places = index(&part["attributes"]["POSITION"], "attributes.POSITION")?;
             let places = self.accessor(places, &[5126], "VEC3")?;
@@ -163,9 +150,10 @@ impl<'f> File<'f> {
             for triangle in order.chunks_exact(3) {
                 let corner = |k: usize| {
                     let found = corners.get(triangle[k]).copied();
-                    found.ok_or_else(|| {
-                        let (which, known) = (triangle[k], corners.len());
-                        format!("meshes[{at}]: vertex {which} is none of its {known}")
+                    found.ok_or_else(|| MeshFault::NoCorner {
+                        mesh: at,
+                        vertex: triangle[k],
+                        known: corners.len(),
                     })
                 };
                 let [a, b, c] = [corner(0)?, corner(1)?, corner(2)?];
@@ -179,22 +167,28 @@ impl<'f> File<'f> {
         self.json[name].as_array().map_or(&[], Vec::as_slice)
     }
 
-    fn item(&self, list: &str, at: usize) -> Result<&'f Json, String> {
+    fn item(&self, list: &'static str, at: usize) -> Result<&'f Json, MeshFault> {
         let found = self.list(list).get(at);
-        found.ok_or_else(|| format!("{list}[{at}]: there is none"))
+        found.ok_or(MeshFault::NoItem { list, at })
     }
 
-    fn accessor(&self, at: usize, components: &[u64], kind: &str) -> Result<Accessor<'_>, String> {
+    fn accessor(
+        &self,
+        at: usize,
+        components: &'static [u64],
+        kind: &'static str,
+    ) -> Result<Accessor<'_>, MeshFault> {
         let json = self.item("accessors", at)?;
-        let wrong = |why: &str| format!("accessors[{at}] {why}");
         if json.get("sparse").is_some() {
-            return Err(wrong("is sparse, which this program does not read"));
+            return Err(MeshFault::Sparse(at));
         }
         let component = json["componentType"].as_u64().unwrap_or(0);
         if json["type"] != kind || !components.contains(&component) {
-            return Err(wrong(&format!(
-                "is not of type {kind} with a component type of {components:?}"
-            )));
+            return Err(MeshFault::Elements {
+                accessor: at,
+                kind,
+                components,
+            });
         }
         let width = match component {
             5121 => 1,
@@ -202,33 +196,40 @@ impl<'f> File<'f> {
             _ => 4,
         };
         let size = width * if kind == "VEC3" { 3 } else { 1 };
-        let count = size_of(json, "count").map_err(|why| wrong(&why))?;
+        let count = size_of(json, "accessors", at, "count")?;
         let view_at = index(&json["bufferView"], "accessors.bufferView")?;
         let view = self.item("bufferViews", view_at)?;
-        let of_view =
-            |name: &str| size_of(view, name).map_err(|why| format!("bufferViews[{view_at}] {why}"));
+        let of_view = |key| size_of(view, "bufferViews", view_at, key);
         let buffer = index(&view["buffer"], "bufferViews.buffer")?;
-        let buffer = self
-            .buffers
-            .get(buffer)
-            .ok_or_else(|| format!("buffers[{buffer}]: there is none"))?;
+        let none = MeshFault::NoItem {
+            list: "buffers",
+            at: buffer,
+        };
+        let buffer = self.buffers.get(buffer).ok_or(none)?;
         let (start, length) = (of_view("byteOffset")?, of_view("byteLength")?);
         let end = start.checked_add(length);
         let bytes = end.and_then(|end| buffer.get(start..end));
-        let bytes =
-            bytes.ok_or_else(|| format!("bufferViews[{view_at}] ends beyond its buffer"))?;
+        let bytes = bytes.ok_or(MeshFault::Beyond {
+            list: "bufferViews",
+            at: view_at,
+            whole: "buffer",
+        })?;
         let stride = match of_view("byteStride")? {
             0 => size,
             stride => stride,
         };
-        let offset = size_of(json, "byteOffset").map_err(|why| wrong(&why))?;
+        let offset = size_of(json, "accessors", at, "byteOffset")?;
         let bytes = bytes.get(offset..).unwrap_or_default();
         // The last one need not be followed by a whole stride.
         let last = count
             .checked_sub(1)
             .map_or(Some(0), |last| last.checked_mul(stride)?.checked_add(size));
         if last.is_none_or(|last| last > bytes.len()) {
-            return Err(wrong("ends beyond its buffer view"));
+            return Err(MeshFault::Beyond {
+                list: "accessors",
+                at,
+                whole: "buffer view",
+            });
         }
         Ok(Accessor {
             bytes,
@@ -260,43 +261,64 @@ impl Accessor<'_> {
     }
 }
 
-/// An index into a list; `what` names it in errors.
-fn index(json: &Json, what: &str) -> Result<usize, String> {
-    let number = json
-        .as_u64()
-        .and_then(|number| usize::try_from(number).ok());
-    number.ok_or_else(|| format!("{what} is {json}, must be a whole number"))
+fn whole(json: &Json) -> Option<usize> {
+    usize::try_from(json.as_u64()?).ok()
 }
 
-/// A number of bytes or elements, 0 if it is not given.
-fn size_of(json: &Json, name: &str) -> Result<usize, String> {
-    match json.get(name) {
-        None => Ok(0),
-        Some(number) => index(number, name),
-    }
+/// An index into a list; `key` names it in errors.
+fn index(json: &Json, key: &'static str) -> Result<usize, MeshFault> {
+    whole(json).ok_or_else(|| MeshFault::NotIndex {
+        key,
+        json: json.to_string(),
+    })
 }
 
-/// N numbers, if they are given.
-fn numbers<const N: usize>(json: &Json, name: &str) -> Result<Option<[f64; N]>, String> {
-    let Some(list) = json.get(name) else {
+/// A number of bytes or elements in item `at` of a list, 0 if it is not given.
+fn size_of(
+    item: &Json,
+    list: &'static str,
+    at: usize,
+    key: &'static str,
+) -> Result<usize, MeshFault> {
+    let Some(json) = item.get(key) else {
+        return Ok(0);
+    };
+    whole(json).ok_or_else(|| MeshFault::NotSize {
+        list,
+        at,
+        key,
+        json: json.to_string(),
+    })
+}
+
+/// N numbers of node `at`, if they are given.
+fn numbers<const N: usize>(
+    node: &Json,
+    at: usize,
+    key: &'static str,
+) -> Result<Option<[f64; N]>, MeshFault> {
+    let Some(list) = node.get(key) else {
         return Ok(None);
     };
     let list = list.as_array().into_iter().flatten().map(Json::as_f64);
     let list = list
         .collect::<Option<Vec<f64>>>()
         .and_then(|list| list.try_into().ok());
-    list.map(Some)
-        .ok_or_else(|| format!("{name} must be {N} numbers"))
+    list.map(Some).ok_or(MeshFault::NotNumbers {
+        node: at,
+        key,
+        count: N,
+    })
 }
 
-/// How a node places what hangs on it.
-fn matrix(node: &Json) -> Result<Matrix4<f64>, String> {
-    if let Some(columns) = numbers::<16>(node, "matrix")? {
+/// How node `at` places what hangs on it.
+fn matrix(node: &Json, at: usize) -> Result<Matrix4<f64>, MeshFault> {
+    if let Some(columns) = numbers::<16>(node, at, "matrix")? {
         return Ok(Matrix4::from_column_slice(&columns));
     }
-    let shift = Vector3::from(numbers(node, "translation")?.unwrap_or([0.0; 3]));
-    let scale = Vector3::from(numbers(node, "scale")?.unwrap_or([1.0; 3]));
-    let [x, y, z, w] = numbers(node, "rotation")?.unwrap_or([0.0, 0.0, 0.0, 1.0]);
+    let shift = Vector3::from(numbers(node, at, "translation")?.unwrap_or([0.0; 3]));
+    let scale = Vector3::from(numbers(node, at, "scale")?.unwrap_or([1.0; 3]));
+    let [x, y, z, w] = numbers(node, at, "rotation")?.unwrap_or([0.0, 0.0, 0.0, 1.0]);
     let turn = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
     let linear = turn.to_homogeneous() * Matrix4::new_nonuniform_scaling(&scale);
     Ok(Matrix4::new_translation(&shift) * linear)

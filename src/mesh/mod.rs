@@ -3,6 +3,7 @@
 //! Own readers of a few dozen lines each: those of `stl_io` and `tobj` name no line, `gltf` panics on accessors that lie, and
 //! what they can do beyond triangles would weigh on the page.
 
+mod fault;
 mod gltf;
 mod obj;
 mod stl;
@@ -10,29 +11,13 @@ mod triangles;
 
 use std::path::Path;
 
+use fault::NoFile;
+pub use fault::{Fault, MeshFault};
 use triangles::Builder;
 pub use triangles::{MOST_TRIANGLES, Mesh};
 
-/// What is wrong with a file.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Fault {
-    /// Offset in the file, bytes, where it is known.
-    pub at: Option<usize>,
-    /// What is wrong there.
-    pub why: String,
-}
-
-impl Fault {
-    fn at(at: usize, why: impl Into<String>) -> Self {
-        let (at, why) = (Some(at), why.into());
-        Self { at, why }
-    }
-
-    fn somewhere(why: impl Into<String>) -> Self {
-        let (at, why) = (None, why.into());
-        Self { at, why }
-    }
-}
+/// Gives what another file holds.
+type Other<'o> = &'o dyn Fn(&str) -> Result<Vec<u8>, NoFile>;
 
 /// Kinds of files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,11 +54,7 @@ impl Format {
     ///
     /// # Errors
     /// What is wrong with it.
-    pub fn read(
-        self,
-        bytes: &[u8],
-        other: &dyn Fn(&str) -> Result<Vec<u8>, String>,
-    ) -> Result<Mesh, Fault> {
+    pub fn read(self, bytes: &[u8], other: Other<'_>) -> Result<Mesh, Fault> {
         let mesh = match self {
             Self::Stl => stl::read(bytes)?,
             Self::Obj => obj::read(bytes)?,
@@ -85,14 +66,13 @@ impl Format {
 
 /// The file as text.
 fn text(bytes: &[u8]) -> Result<&str, Fault> {
-    std::str::from_utf8(bytes)
-        .map_err(|fault| Fault::at(fault.valid_up_to(), "this byte is no text in UTF-8"))
+    std::str::from_utf8(bytes).map_err(|fault| Fault::at(fault.valid_up_to(), MeshFault::NotText))
 }
 
 /// A coordinate written as a number.
 fn coordinate(text: &str, word: &str) -> Result<f64, Fault> {
     let number = word.parse::<f64>().ok();
-    number.ok_or_else(|| Fault::at(offset(text, word), "is not a number"))
+    number.ok_or_else(|| Fault::at(offset(text, word), MeshFault::NotNumber))
 }
 
 /// Where `word`, a part of `text`, begins, bytes.
@@ -106,8 +86,8 @@ mod tests {
     use proptest::prelude::*;
     use std::fmt::Write as _;
 
-    fn alone(_: &str) -> Result<Vec<u8>, String> {
-        Err("there is no other file".to_owned())
+    fn alone(_: &str) -> Result<Vec<u8>, NoFile> {
+        Err("there is no other file".into())
     }
 
     fn read(format: Format, bytes: &[u8]) -> Result<Mesh, Fault> {
@@ -291,11 +271,11 @@ mod tests {
     fn a_gltf_file_finds_its_buffer_beside_it() {
         let other = |name: &str| match name {
             "box.bin" => Ok(gltf_parts().1),
-            _ => Err("no such file".to_owned()),
+            _ => Err("no such file".into()),
         };
         assert!(Format::Gltf.read(&gltf_with("box.bin"), &other).is_ok());
         let fault = Format::Gltf.read(&gltf_with("bin"), &other).unwrap_err();
-        assert!(fault.why.contains("buffers[0].uri") && fault.why.contains("no such file"));
+        assert_eq!(fault.why.to_string(), "buffers[0].uri: no such file");
     }
 
     #[test]
@@ -328,7 +308,8 @@ mod tests {
         let at = |text: &str, part: &str| text.find(part);
         let check = |format, text: &str, place: Option<usize>, why: &str| {
             let fault = read(format, text.as_bytes()).unwrap_err();
-            assert!(fault.why.contains(why), "{fault:?}, wanted {why}");
+            let found = fault.why.to_string();
+            assert!(found.contains(why), "{fault:?}, wanted {why}");
             assert_eq!(fault.at, place, "{fault:?}");
         };
         let good = text_stl();
@@ -349,7 +330,8 @@ mod tests {
         short.truncate(200);
         let fault = read(Format::Stl, &short).unwrap_err();
         assert_eq!(fault.at, Some(80));
-        assert!(fault.why.contains("12 triangles") && fault.why.contains("684 bytes"));
+        let why = fault.why.to_string();
+        assert!(why.contains("12 triangles") && why.contains("684 bytes"));
         let good = obj();
         let bad = format!("{good}f 1 2 9\n");
         check(Format::Obj, &bad, bad.rfind('9'), "8 vertices");
@@ -359,16 +341,15 @@ mod tests {
         check(Format::Obj, "v 1 2 1e300\n", Some(0), "out of range");
         check(Format::Obj, "hello\n", None, "no triangles");
         let fault = read(Format::Gltf, b"{ \"asset\": ").unwrap_err();
-        assert!(fault.why.contains("line 1"), "{fault:?}");
+        assert!(fault.why.to_string().contains("line 1"), "{fault:?}");
         let gltf = |change: fn(&mut serde_json::Value)| {
             use base64::Engine as _;
             let (mut json, buffer) = gltf_parts();
             let data = base64::engine::general_purpose::STANDARD.encode(buffer);
             json["buffers"][0]["uri"] = format!("data:;base64,{data}").into();
             change(&mut json);
-            read(Format::Gltf, json.to_string().as_bytes())
-                .unwrap_err()
-                .why
+            let fault = read(Format::Gltf, json.to_string().as_bytes()).unwrap_err();
+            fault.why.to_string()
         };
         let why = gltf(|json| json["accessors"][0]["count"] = 9.into());
         assert!(why.contains("accessors[0]"), "{why}");
@@ -393,7 +374,7 @@ mod tests {
         }
         bytes[80..84].copy_from_slice(&(MOST_TRIANGLES as u32 + 1).to_le_bytes());
         let fault = read(Format::Stl, &bytes).unwrap_err();
-        assert!(fault.why.contains("200000"), "{fault:?}");
+        assert!(fault.why.to_string().contains("200000"), "{fault:?}");
     }
 
     proptest! {
@@ -433,7 +414,7 @@ mod tests {
                     prop_assert!(mesh.vertices().iter().flatten().all(|x| x.is_finite()));
                 }
                 Err(fault) => {
-                    prop_assert!(!fault.why.is_empty());
+                    prop_assert!(!fault.why.to_string().is_empty());
                     prop_assert!(fault.at.is_none_or(|at| at <= bytes.len()), "{fault:?}");
                 }
             }

@@ -1,6 +1,6 @@
 //! OBJ: vertices and faces; everything else is left aside.
 
-use super::{Builder, Fault, coordinate, offset, text};
+use super::{Builder, Fault, MeshFault, coordinate, offset, text};
 
 pub(super) fn read(bytes: &[u8]) -> Result<Builder, Fault> {
     let text = text(bytes)?;
@@ -20,7 +20,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Builder, Fault> {
                 let numbers = words.take(3).map(|word| coordinate(text, word));
                 let numbers = numbers.collect::<Result<Vec<_>, _>>()?;
                 let place = <[f64; 3]>::try_from(numbers);
-                let place = place.map_err(|_| at("needs three coordinates".to_owned()))?;
+                let place = place.map_err(|_| at(MeshFault::Coordinates))?;
                 vertices.push(out.vertex(place).map_err(at)?);
             }
             "f" => {
@@ -29,15 +29,11 @@ pub(super) fn read(bytes: &[u8]) -> Result<Builder, Fault> {
                     let corner = index(word, vertices.len()).map(|i| vertices[i]);
                     let known = vertices.len();
                     corners.push(corner.ok_or_else(|| {
-                        let why = format!(
-                            "is none of the {known} vertices before this line; allowed 1 to {known}, or -{known} to -1 \
-                             counted from the latest"
-                        );
-                        Fault::at(offset(text, word), why)
+                        Fault::at(offset(text, word), MeshFault::NoVertex { known })
                     })?);
                 }
                 if corners.len() < 3 {
-                    return Err(at("a face needs at least 3 vertices".to_owned()));
+                    return Err(at(MeshFault::Face));
                 }
                 for pair in corners[1..].windows(2) {
                     out.triangle([corners[0], pair[0], pair[1]]).map_err(at)?;

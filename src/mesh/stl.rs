@@ -1,6 +1,6 @@
 //! STL, text and binary.
 
-use super::{Builder, Fault, coordinate, offset, text};
+use super::{Builder, Fault, MeshFault, coordinate, offset, text};
 
 /// Bytes before the triangles of a binary file, and bytes of a triangle.
 const HEAD: usize = 84;
@@ -17,19 +17,16 @@ pub(super) fn read(bytes: &[u8]) -> Result<Builder, Fault> {
     match told {
         Some(count) if bytes.len() == length(count) => binary(bytes),
         _ if solid => in_words(text(bytes)?),
-        _ if bytes.is_empty() => Err(Fault::at(0, "the file is empty")),
+        _ if bytes.is_empty() => Err(Fault::at(0, MeshFault::Empty)),
         Some(count) => Err(Fault::at(
             80,
-            format!(
-                "a binary STL file with {count} triangles, as it says here, has {} bytes, this file has {}",
-                length(count),
-                bytes.len()
-            ),
+            MeshFault::Length {
+                triangles: count,
+                wanted: length(count),
+                bytes: bytes.len(),
+            },
         )),
-        None => Err(Fault::at(
-            0,
-            "neither a binary STL file nor one in text, which begins with `solid`",
-        )),
+        None => Err(Fault::at(0, MeshFault::NotStl)),
     }
 }
 
@@ -62,7 +59,7 @@ fn in_words(text: &str) -> Result<Builder, Fault> {
         let Some(word) = words.next() else {
             continue;
         };
-        let at = |why: String| Fault::at(offset(text, word), why);
+        let at = |why| Fault::at(offset(text, word), why);
         ended = false;
         match (word.to_ascii_lowercase().as_str(), &mut corners) {
             ("solid" | "facet" | "endfacet", None) => {}
@@ -72,27 +69,27 @@ fn in_words(text: &str) -> Result<Builder, Fault> {
                 let numbers = words.map(|word| coordinate(text, word));
                 let numbers = numbers.collect::<Result<Vec<_>, _>>()?;
                 let place = <[f64; 3]>::try_from(numbers);
-                let place = place.map_err(|_| at("needs three coordinates".to_owned()))?;
+                let place = place.map_err(|_| at(MeshFault::Coordinates))?;
                 corners.push(out.vertex(place).map_err(at)?);
             }
             ("endloop", Some(found)) => {
                 let found = <[u32; 3]>::try_from(&found[..]);
-                let found = found.map_err(|_| at("a loop needs three vertices".to_owned()))?;
+                let found = found.map_err(|_| at(MeshFault::Loop))?;
                 out.triangle(found).map_err(at)?;
                 corners = None;
             }
             (_, None) => {
-                return Err(at(
-                    "expected `solid`, `facet`, `outer loop`, `endfacet` or `endsolid`".to_owned(),
-                ));
+                return Err(at(MeshFault::Expected(
+                    "`solid`, `facet`, `outer loop`, `endfacet` or `endsolid`",
+                )));
             }
-            (_, Some(_)) => return Err(at("expected `vertex` or `endloop`".to_owned())),
+            (_, Some(_)) => return Err(at(MeshFault::Expected("`vertex` or `endloop`"))),
         }
     }
     if !ended {
         return Err(Fault::at(
             text.len(),
-            "the file ends within a solid: no `endsolid`",
+            MeshFault::EndsWithin("a solid: no `endsolid`"),
         ));
     }
     Ok(out)

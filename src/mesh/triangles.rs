@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
+use super::MeshFault;
+
 /// Most triangles of a file.
 pub const MOST_TRIANGLES: usize = 200_000;
 /// Most corners that a file lists.
@@ -85,17 +87,14 @@ pub(super) struct Builder {
 
 impl Builder {
     /// Index of the corner at a place.
-    pub fn vertex(&mut self, place: [f64; 3]) -> Result<u32, String> {
+    pub fn vertex(&mut self, place: [f64; 3]) -> Result<u32, MeshFault> {
         self.asked[0] += 1;
         if self.asked[0] > MOST_CORNERS {
-            return Err(format!(
-                "has too many vertices; allowed at most {MOST_CORNERS}"
-            ));
+            let (what, most) = ("vertices", MOST_CORNERS);
+            return Err(MeshFault::TooMany { what, most });
         }
         if !place.iter().all(|x| x.abs() <= LARGEST) {
-            return Err(format!(
-                "a coordinate is out of range; allowed -{LARGEST:e} to {LARGEST:e} in the unit of the file"
-            ));
+            return Err(MeshFault::OutOfRange { most: LARGEST });
         }
         // 0 and -0 are one place.
         let place = place.map(|x| x as f32 + 0.0);
@@ -108,12 +107,11 @@ impl Builder {
     }
 
     /// Adds a triangle, unless two of its corners are one.
-    pub fn triangle(&mut self, [a, b, c]: [u32; 3]) -> Result<(), String> {
+    pub fn triangle(&mut self, [a, b, c]: [u32; 3]) -> Result<(), MeshFault> {
         self.asked[1] += 1;
         if self.asked[1] > MOST_TRIANGLES {
-            return Err(format!(
-                "has too many triangles; allowed at most {MOST_TRIANGLES}"
-            ));
+            let (what, most) = ("triangles", MOST_TRIANGLES);
+            return Err(MeshFault::TooMany { what, most });
         }
         if a != b && b != c && c != a {
             self.triangles.push([a, b, c]);
@@ -122,9 +120,9 @@ impl Builder {
     }
 
     /// The mesh, its outside outside.
-    pub fn finish(self) -> Result<Mesh, String> {
+    pub fn finish(self) -> Result<Mesh, MeshFault> {
         if self.triangles.is_empty() {
-            return Err("holds no triangles".to_owned());
+            return Err(MeshFault::NoTriangles);
         }
         let open = open_edge(&self.triangles);
         let mut mesh = Mesh {

@@ -12,7 +12,7 @@ pub struct Readback {
 }
 
 /// Whether a picture has come back; empty until then.
-pub type Arrival = Arc<OnceLock<Result<(), String>>>;
+pub type Arrival = Arc<OnceLock<Result<(), wgpu::BufferAsyncError>>>;
 
 /// Largest side of a picture that the device can draw, pixels.
 ///
@@ -81,7 +81,7 @@ impl Readback {
         self.buffer
             .map_async(wgpu::MapMode::Read, .., move |result| {
                 // It is reported once.
-                let _ = report.set(result.map_err(|error| error.to_string()));
+                let _ = report.set(result);
             });
         arrival
     }

@@ -52,10 +52,42 @@ fn encoded(bytes: &[u8]) -> Arc<str> {
     format!("{ENCODED}{}", BASE64.encode(bytes)).into()
 }
 
+/// Why a scene does not get a file that it names.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum BesideFault {
+    #[error(
+        "is no file beside the scene; allowed the name of a file in the scene's folder, or below it, without `..`"
+    )]
+    NotBeside,
+    #[error(
+        "this scene has no folder in which to find a file: choose or drop that file and the scene's at once, or load the scene \
+         from a disk; what the file holds can also be written into the scene itself"
+    )]
+    NoFolder,
+    #[error("this is a directory, not a file")]
+    Directory,
+    #[error("cannot read this file: {0}")]
+    Unreadable(#[from] std::io::Error),
+    #[error("too large; allowed at most {} MiB in all {files} that a scene names", .limit >> 20)]
+    TooLarge {
+        /// Bytes of all files of this kind.
+        limit: u64,
+        /// The kind.
+        files: &'static str,
+    },
+    #[error("not a text file: it is not valid UTF-8")]
+    NotText,
+    #[error(
+        "is no file with a mesh; allowed names that end in {}",
+        Format::ENDINGS
+    )]
+    NotMesh,
+}
+
 /// Why a file gives no mesh.
 pub(super) enum NoMesh {
     /// It is not there, or not of a known kind.
-    Nowhere(String),
+    Nowhere(BesideFault),
     /// What is wrong in it, with its text if it is one.
     Within {
         text: Option<Arc<str>>,
@@ -116,10 +148,10 @@ impl<'d> Beside<'d> {
     ///
     /// # Errors
     /// Why there is none.
-    pub fn text(&self, name: &str) -> Result<Arc<str>, String> {
+    pub fn text(&self, name: &str) -> Result<Arc<str>, BesideFault> {
         let text = self.content(name, Use::Text)?;
         if text.starts_with(ENCODED) {
-            return Err("not a text file: it is not valid UTF-8".to_owned());
+            return Err(BesideFault::NotText);
         }
         Ok(text)
     }
@@ -132,12 +164,7 @@ impl<'d> Beside<'d> {
         if let Some(mesh) = self.meshes.borrow().get(name) {
             return Ok(mesh.clone());
         }
-        let format = Format::of(name).ok_or_else(|| {
-            NoMesh::Nowhere(format!(
-                "is no file with a mesh; allowed names that end in {}",
-                Format::ENDINGS
-            ))
-        })?;
+        let format = Format::of(name).ok_or(NoMesh::Nowhere(BesideFault::NotMesh))?;
         let text = self.content(name, Use::Mesh).map_err(NoMesh::Nowhere)?;
         // A file that this one names lies beside it.
         let other = |other: &str| {
@@ -157,7 +184,7 @@ impl<'d> Beside<'d> {
     }
 
     /// What the file `name` holds, as it is kept.
-    fn content(&self, name: &str, what: Use) -> Result<Arc<str>, String> {
+    fn content(&self, name: &str, what: Use) -> Result<Arc<str>, BesideFault> {
         let found = self.asked.borrow().get(name).cloned();
         let found = found.or_else(|| self.known?.get(name).cloned());
         let text = match found {
@@ -174,34 +201,28 @@ impl<'d> Beside<'d> {
         self.asked.into_inner()
     }
 
-    fn read(&self, name: &str, what: Use) -> Result<Arc<str>, String> {
+    fn read(&self, name: &str, what: Use) -> Result<Arc<str>, BesideFault> {
         let plain = |part: Component<'_>| matches!(part, Component::Normal(_));
         if name.is_empty() || !Path::new(name).components().all(plain) {
-            return Err(
-                "is no file beside the scene; allowed the name of a file in the scene's folder, or below it, without `..`"
-                    .to_owned(),
-            );
+            return Err(BesideFault::NotBeside);
         }
-        let (most, kind) = match what {
+        let (limit, files) = match what {
             Use::Text => (LARGEST_FILE, "files"),
             Use::Mesh => (LARGEST_MESH, "meshes"),
         };
         let held = &self.held[what as usize];
-        let room = most.saturating_sub(held.get());
+        let room = limit.saturating_sub(held.get());
         // One byte more than allowed: a pipe or a device does not report its size.
         let bytes = self.bytes(Path::new(name), room + 1)?;
         if bytes.len() as u64 > room {
-            let most = most >> 20;
-            return Err(format!(
-                "too large; allowed at most {most} MiB in all {kind} that a scene names"
-            ));
+            return Err(BesideFault::TooLarge { limit, files });
         }
         held.set(held.get() + bytes.len() as u64);
         Ok(kept(bytes))
     }
 
     /// The first `most` bytes of the file `name`.
-    fn bytes(&self, name: &Path, most: u64) -> Result<Vec<u8>, String> {
+    fn bytes(&self, name: &Path, most: u64) -> Result<Vec<u8>, BesideFault> {
         let path = self.folder.map(|folder| folder.join(name));
         // Only names come with a file that was dropped on a page.
         let given = name
@@ -212,19 +233,14 @@ impl<'d> Beside<'d> {
                 let most = bytes.len().min(usize::try_from(most).unwrap_or(usize::MAX));
                 Ok(bytes[..most].to_vec())
             }
-            (_, Some(path)) if path.is_dir() => Err("this is a directory, not a file".to_owned()),
+            (_, Some(path)) if path.is_dir() => Err(BesideFault::Directory),
             (_, Some(path)) => {
                 let mut bytes = Vec::new();
-                std::fs::File::open(path)
-                    .and_then(|file| file.take(most).read_to_end(&mut bytes))
-                    .map_err(|cause| format!("cannot read this file: {cause}"))?;
+                let file = std::fs::File::open(path)?;
+                file.take(most).read_to_end(&mut bytes)?;
                 Ok(bytes)
             }
-            (_, None) => Err(
-                "this scene has no folder in which to find a file: choose or drop that file and the scene's at once, or load the \
-                 scene from a disk; what the file holds can also be written into the scene itself"
-                    .to_owned(),
-            ),
+            (_, None) => Err(BesideFault::NoFolder),
         }
     }
 }

@@ -342,7 +342,7 @@ impl<'d> Node<'d> {
         let reading = self.document.reading;
         let value = reading
             .evaluate(text, dimension, self.document.copy)
-            .map_err(|message| self.error(message))?;
+            .map_err(|error| self.error(error.to_string()))?;
         self.limit(value, dimension)?;
         reading.record(&self.key, FileNumber::new(value, dimension, place, text));
         Ok(value)

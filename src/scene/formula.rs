@@ -96,7 +96,7 @@ pub(super) fn read_formula(
     let (program, of_quantities) = document
         .reading
         .formula(text, dimension, document.copy)
-        .map_err(|(at, why)| within(node, text, at, &why))?;
+        .map_err(|error| within(node, text, error.at(), &error.to_string()))?;
     if let Some(function) = program.kink() {
         let at = text.find(function).unwrap_or(0);
         let message = format!(

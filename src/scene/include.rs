@@ -23,7 +23,7 @@ pub(super) fn included_texts<'d>(
             return Err(node.error("this file is included already"));
         }
         let text = node.document.beside.text(name);
-        texts.push((name, text.map_err(|why| node.error(why))?));
+        texts.push((name, text.map_err(|fault| node.error(fault.to_string()))?));
     }
     Ok(texts)
 }

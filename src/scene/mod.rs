@@ -56,7 +56,7 @@ pub use key::{ABOVE_ZERO, Absent, FileKey, FileTable, Many, Takes, Variants};
 pub use load::*;
 pub use model::*;
 pub use parameters::*;
-pub use quantity::{Quantity, evaluate};
+pub use quantity::{DimensionError, Quantity, evaluate};
 pub use table::{find, reference_page, table};
 pub use units::*;
 pub use value::Value;

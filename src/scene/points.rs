@@ -4,7 +4,9 @@ use std::ops::Range;
 
 use super::document::{Document, Node};
 use super::key::MAX_SI;
-use super::{Dimension, SceneError, format_quantity, parse_quantity, si_unit, unit_names};
+use super::{
+    Dimension, QuantityError, SceneError, format_quantity, parse_quantity, si_unit, unit_names,
+};
 
 /// Shortest interval of a table, ramp or pulse, s.
 pub(super) const SHORTEST_PART: f64 = 1e-6;
@@ -14,6 +16,43 @@ pub(super) const MOST_POINTS: usize = 10_000;
 const CLOSED: f64 = 1e-9;
 
 type Points = Vec<[f64; 2]>;
+
+/// What is wrong with points.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+enum PointsFault {
+    #[error("has {count} points; allowed {least} to {MOST_POINTS}")]
+    Count { count: usize, least: usize },
+    #[error("{name}s must rise, by at least {least} from one point to the next")]
+    NotRising {
+        name: &'static str,
+        least: &'static str,
+    },
+    #[error("repeats, so the last position must be the first")]
+    NotClosed,
+    #[error(
+        "the first line names the columns with their units, as `{}`; units {}",
+        header(*.0),
+        unit_names(*.0).join(", ")
+    )]
+    Header(Dimension),
+    #[error("is not a number; its unit stands in the header")]
+    NotANumber,
+    #[error("out of range; allowed -{0} to {0}", format_quantity(*.limit, si_unit(*.dimension)))]
+    OutOfRange { limit: f64, dimension: Dimension },
+    #[error(transparent)]
+    Quantity(#[from] QuantityError),
+}
+
+/// An example of a column's header.
+fn header(dimension: Dimension) -> &'static str {
+    match dimension {
+        Dimension::Time => "time_s",
+        Dimension::Angle => "angle_deg",
+        Dimension::Force => "force_N",
+        Dimension::Torque => "torque [N m]",
+        _ => "position_mm",
+    }
+}
 
 /// One of the two numbers of a point.
 #[derive(Clone, Copy)]
@@ -62,13 +101,15 @@ impl Graph {
     }
 
     /// Whether the latest point comes after the one before.
-    fn check_rise(&self, points: &[[f64; 2]]) -> Result<(), String> {
+    fn check_rise(&self, points: &[[f64; 2]]) -> Result<(), PointsFault> {
         let (least, words) = self.rise;
         match points {
-            [.., [before, _], [now, _]] if !(now - before >= least) => Err(format!(
-                "{}s must rise, by at least {words} from one point to the next",
-                self.axes[0].name
-            )),
+            [.., [before, _], [now, _]] if !(now - before >= least) => {
+                Err(PointsFault::NotRising {
+                    name: self.axes[0].name,
+                    least: words,
+                })
+            }
             _ => Ok(()),
         }
     }
@@ -92,9 +133,11 @@ pub(super) fn read_points(node: &Node<'_>, graph: &Graph) -> Result<Points, Scen
         let value =
             |node: &Node<'_>, axis: Axis| node.within(axis.dimension, (-axis.most, axis.most));
         points.push([value(x, first)?, value(y, second)?]);
-        graph.check_rise(&points).map_err(|why| x.error(why))?;
+        let risen = graph.check_rise(&points);
+        risen.map_err(|fault| x.error(fault.to_string()))?;
     }
-    close(&mut points, graph.repeats).map_err(|why| node.error(why))?;
+    let closed = close(&mut points, graph.repeats);
+    closed.map_err(|fault| node.error(fault.to_string()))?;
     Ok(points)
 }
 
@@ -104,7 +147,8 @@ pub(super) fn read_file(node: &Node<'_>, graph: &Graph) -> Result<Points, SceneE
     let [first, second] = graph.axes;
     let name = node.text()?;
     let beside = node.document.beside;
-    let text = beside.text(name).map_err(|why| node.error(why))?;
+    let text = beside.text(name);
+    let text = text.map_err(|fault| node.error(fault.to_string()))?;
     let file = Document {
         file: Some(name),
         text: &text,
@@ -134,25 +178,28 @@ pub(super) fn read_file(node: &Node<'_>, graph: &Graph) -> Result<Points, SceneE
             let column = |cell: &Range<usize>, axis| {
                 let header = text[cell.clone()].trim_start_matches('\u{feff}');
                 let column = Column::new(header, axis);
-                column.map_err(|why| file.error(cell.clone(), "", None, why))
+                column.map_err(|fault| file.error(cell.clone(), "", None, fault.to_string()))
             };
             columns = Some((column(x, first)?, column(y, second)?));
             continue;
         };
         let value = |cell: &Range<usize>, column: Column<'_>| {
             let number = &text[cell.clone()];
-            let fault = |why| file.error(cell.clone(), column.header, Some(number), why);
-            column.read(number).map_err(fault)
+            let error = |fault: PointsFault| {
+                file.error(cell.clone(), column.header, Some(number), fault.to_string())
+            };
+            column.read(number).map_err(error)
         };
         points.push([value(x, of_x)?, value(y, of_y)?]);
         if points.len() > MOST_POINTS {
             let message = format!("too many points; allowed at most {MOST_POINTS}");
             return Err(file.error(span, "", None, message));
         }
-        let fault = |why| file.error(x.clone(), "", None, why);
-        graph.check_rise(&points).map_err(fault)?;
+        let risen = graph.check_rise(&points);
+        risen.map_err(|fault| file.error(x.clone(), "", None, fault.to_string()))?;
     }
-    close(&mut points, graph.repeats).map_err(|why| node.error(why))?;
+    let closed = close(&mut points, graph.repeats);
+    closed.map_err(|fault| node.error(fault.to_string()))?;
     Ok(points)
 }
 
@@ -179,7 +226,7 @@ struct Column<'t> {
 
 impl<'t> Column<'t> {
     /// With the unit in its header: in brackets, or after the last underscore.
-    fn new(header: &'t str, axis: Axis) -> Result<Self, String> {
+    fn new(header: &'t str, axis: Axis) -> Result<Self, PointsFault> {
         let dimension = axis.dimension;
         let bracketed = |open: char, close: char| {
             let inner = header.strip_suffix(close)?;
@@ -191,49 +238,35 @@ impl<'t> Column<'t> {
         let known = |unit: &&str| parse_quantity(&format!("1 {unit}"), dimension).is_ok();
         match unit.filter(known) {
             Some(unit) => Ok(Self { header, unit, axis }),
-            None => {
-                let example = match dimension {
-                    Dimension::Time => "time_s",
-                    Dimension::Angle => "angle_deg",
-                    Dimension::Force => "force_N",
-                    Dimension::Torque => "torque [N m]",
-                    _ => "position_mm",
-                };
-                Err(format!(
-                    "the first line names the columns with their units, as `{example}`; units {}",
-                    unit_names(dimension).join(", ")
-                ))
-            }
+            None => Err(PointsFault::Header(dimension)),
         }
     }
 
     /// A number of this column, SI.
-    fn read(&self, number: &str) -> Result<f64, String> {
+    fn read(&self, number: &str) -> Result<f64, PointsFault> {
         if number.parse::<f64>().is_err() {
-            return Err("is not a number; its unit stands in the header".to_owned());
+            return Err(PointsFault::NotANumber);
         }
         let Axis {
-            dimension, most, ..
+            dimension,
+            most: limit,
+            ..
         } = self.axis;
-        match parse_quantity(&format!("{number} {}", self.unit), dimension) {
-            Ok(value) if value.abs() <= most => Ok(value),
-            Ok(_) => {
-                let limit = format_quantity(most, si_unit(dimension));
-                Err(format!("out of range; allowed -{limit} to {limit}"))
-            }
-            Err(error) => Err(error.to_string()),
+        let value = parse_quantity(&format!("{number} {}", self.unit), dimension)?;
+        if value.abs() <= limit {
+            Ok(value)
+        } else {
+            Err(PointsFault::OutOfRange { limit, dimension })
         }
     }
 }
 
 /// Whether there are enough points, and whether they make a period; its ends are then made equal.
-fn close(points: &mut Points, repeats: bool) -> Result<(), String> {
+fn close(points: &mut Points, repeats: bool) -> Result<(), PointsFault> {
     let least = if repeats { 3 } else { 2 };
     if points.len() < least {
-        return Err(format!(
-            "has {} points; allowed {least} to {MOST_POINTS}",
-            points.len()
-        ));
+        let count = points.len();
+        return Err(PointsFault::Count { count, least });
     }
     if repeats {
         let places = || points.iter().map(|point| point[1]);
@@ -241,7 +274,7 @@ fn close(points: &mut Points, repeats: bool) -> Result<(), String> {
             places().fold(f64::NEG_INFINITY, f64::max) - places().fold(f64::INFINITY, f64::min);
         let (first, last) = (points[0][1], points[points.len() - 1][1]);
         if !((last - first).abs() <= CLOSED * range) {
-            return Err("repeats, so the last position must be the first".to_owned());
+            return Err(PointsFault::NotClosed);
         }
         if let Some(end) = points.last_mut() {
             end[1] = first;

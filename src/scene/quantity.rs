@@ -9,18 +9,34 @@ use super::{Dimension, format_quantity, si_unit, unit_names};
 pub struct Quantity {
     value: f64,
     /// Powers of kg, m, s and rad.
-    powers: Result<[i8; 4], Fault>,
+    powers: Result<[i8; 4], DimensionError>,
 }
 
-/// Why an operation makes no sense.
-#[derive(Clone, Copy, Debug)]
-enum Fault {
+/// Why a quantity has no value of the required dimension.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum DimensionError {
     /// Sum or comparison of different dimensions.
+    #[error("adds or compares quantities of different dimensions")]
     Mixed,
     /// A function of something that is not a pure number.
+    #[error("takes a function of a quantity that is not a pure number")]
     NotPure,
     /// A root or power that leaves no whole powers of the units.
+    #[error("takes a root or a power whose unit would not be whole")]
     Power,
+    /// Infinite or NaN.
+    #[error("is not a finite number")]
+    NotFinite,
+    /// A value of another dimension.
+    #[error("gives {}", foreign(*.value, *.powers, *.wanted))]
+    Foreign {
+        /// SI value.
+        value: f64,
+        /// Its powers of kg, m, s and rad.
+        powers: [i8; 4],
+        /// The dimension required.
+        wanted: Dimension,
+    },
 }
 
 impl Quantity {
@@ -52,33 +68,20 @@ impl Quantity {
     ///
     /// # Errors
     /// Why it has not, or that it is not finite.
-    pub fn of(self, dimension: Dimension, exact: bool) -> Result<f64, String> {
-        let found = self.powers.map_err(|fault| {
-            match fault {
-                Fault::Mixed => "adds or compares quantities of different dimensions",
-                Fault::NotPure => "takes a function of a quantity that is not a pure number",
-                Fault::Power => "takes a root or a power whose unit would not be whole",
-            }
-            .to_owned()
-        })?;
+    pub fn of(self, dimension: Dimension, exact: bool) -> Result<f64, DimensionError> {
+        let found = self.powers?;
         if !self.value.is_finite() {
-            return Err("is not a finite number".to_owned());
+            return Err(DimensionError::NotFinite);
         }
         let wanted = powers(dimension);
         let angle = !exact && wanted[..3] != [0; 3] || wanted[3] == found[3] || self.value == 0.0;
         if found[..3] == wanted[..3] && angle {
             return Ok(self.value + 0.0);
         }
-        let unit = unit_of(found);
-        let value = format_quantity(self.value, "");
-        Err(match unit_names(dimension).as_slice() {
-            [] => format!("gives {value} {unit}, but must be a pure number"),
-            units => format!(
-                "gives {value}{}{unit}, which is not in {}; units {}",
-                if unit.is_empty() { "" } else { " " },
-                si_unit(dimension),
-                units.join(", ")
-            ),
+        Err(DimensionError::Foreign {
+            value: self.value,
+            powers: found,
+            wanted: dimension,
         })
     }
 }
@@ -101,6 +104,20 @@ pub fn evaluate(text: &str, names: &[(&str, Quantity)]) -> Result<Quantity, Expr
     Ok(program.eval(&values))
 }
 
+/// A value with its unit, and what is wanted instead.
+fn foreign(value: f64, powers: [i8; 4], wanted: Dimension) -> String {
+    let (value, unit) = (format_quantity(value, ""), unit_of(powers));
+    match unit_names(wanted).as_slice() {
+        [] => format!("{value} {unit}, but must be a pure number"),
+        units => format!(
+            "{value}{}{unit}, which is not in {}; units {}",
+            if unit.is_empty() { "" } else { " " },
+            si_unit(wanted),
+            units.join(", ")
+        ),
+    }
+}
+
 /// Powers of the base units in words: `kg m s^-2`.
 fn unit_of(powers: [i8; 4]) -> String {
     let part = |(unit, power): (&str, i8)| match power {
@@ -117,23 +134,25 @@ fn unit_of(powers: [i8; 4]) -> String {
 }
 
 /// Powers of a sum. Beside other units, radians do not count.
-fn common(a: Quantity, b: Quantity) -> Result<[i8; 4], Fault> {
+fn common(a: Quantity, b: Quantity) -> Result<[i8; 4], DimensionError> {
     let (of_a, of_b) = (a.powers?, b.powers?);
     let zero = |q: Quantity, powers: [i8; 4]| q.value == 0.0 && powers == [0; 4];
     if zero(a, of_a) {
         return Ok(of_b);
     }
     let same = of_a == of_b || of_a[..3] == of_b[..3] && of_a[..3] != [0; 3];
-    (same || zero(b, of_b)).then_some(of_a).ok_or(Fault::Mixed)
+    (same || zero(b, of_b))
+        .then_some(of_a)
+        .ok_or(DimensionError::Mixed)
 }
 
 /// Powers times `factor`, if whole and small.
-fn scaled(powers: [i8; 4], factor: f64) -> Result<[i8; 4], Fault> {
+fn scaled(powers: [i8; 4], factor: f64) -> Result<[i8; 4], DimensionError> {
     let mut scaled = [0; 4];
     for (to, power) in scaled.iter_mut().zip(powers) {
         let value = f64::from(power) * factor;
         if value != libm::trunc(value) || value.abs() > 100.0 {
-            return Err(Fault::Power);
+            return Err(DimensionError::Power);
         }
         *to = value as i8;
     }
@@ -151,7 +170,7 @@ impl Number for Quantity {
     fn unary(self, operation: Unary) -> Self {
         let pure = |powers: [i8; 4]| match powers[..3] == [0; 3] {
             true => Ok([0; 4]),
-            false => Err(Fault::NotPure),
+            false => Err(DimensionError::NotPure),
         };
         let powers = self.powers.and_then(|powers| match operation {
             Unary::Negate | Unary::Abs => Ok(powers),
@@ -170,7 +189,7 @@ impl Number for Quantity {
             let (a, b) = (self.powers?, other.powers?);
             let mut powers = [0; 4];
             for (to, (a, b)) in powers.iter_mut().zip(a.into_iter().zip(b)) {
-                *to = combine(a, b).ok_or(Fault::Power)?;
+                *to = combine(a, b).ok_or(DimensionError::Power)?;
             }
             Ok(powers)
         };
@@ -181,7 +200,7 @@ impl Number for Quantity {
             Binary::Atan2 => common(self, other).map(|_| [0, 0, 0, 1]),
             Binary::Power => match (self.powers, other.powers) {
                 (Ok(base), Ok([0, 0, 0, 0])) => scaled(base, other.value),
-                (Ok(_), Ok(_)) => Err(Fault::NotPure),
+                (Ok(_), Ok(_)) => Err(DimensionError::NotPure),
                 (Err(fault), _) | (_, Err(fault)) => Err(fault),
             },
         };

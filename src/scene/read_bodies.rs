@@ -246,7 +246,7 @@ fn read_mesh(section: &Section<'_>, shift: Vec3) -> Result<Geometry, SceneError>
     let document = &file.document;
     let mesh = document.beside.mesh(name);
     let mesh = mesh.map_err(|why| match why {
-        NoMesh::Nowhere(why) => file.error(why),
+        NoMesh::Nowhere(fault) => file.error(fault.to_string()),
         NoMesh::Within { text, fault } => error_in(name, text.as_deref(), fault, document),
     })?;
     let own = Format::of(name).and_then(Format::unit);
@@ -282,13 +282,13 @@ fn error_in(name: &str, text: Option<&str>, fault: Fault, document: &Document<'_
                 text,
                 ..*document
             };
-            file.error(at..at, "", None, fault.why)
+            file.error(at..at, "", None, fault.why.to_string())
         }
         (_, at) => SceneError {
             file: Some(name.to_owned()),
             message: match at {
                 Some(at) => format!("byte {at}: {}", fault.why),
-                None => fault.why,
+                None => fault.why.to_string(),
             },
             ..SceneError::default()
         },

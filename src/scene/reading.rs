@@ -7,10 +7,33 @@ use toml::Spanned;
 use toml::de::DeValue;
 
 use super::copy::Copy;
-use super::expression::{Number as _, Program};
+use super::expression::{ExpressionError, Number as _, Program};
 use super::given::FileNumber;
-use super::quantity::Quantity;
-use super::units::{Dimension, all_units, parse_quantity, split_unit, unit_at_start};
+use super::quantity::{DimensionError, Quantity};
+use super::units::{
+    Dimension, QuantityError, all_units, parse_quantity, split_unit, unit_at_start,
+};
+
+/// Why a text is neither a quantity nor an expression that gives one.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub(super) enum ReadingError {
+    #[error(transparent)]
+    Quantity(#[from] QuantityError),
+    #[error(transparent)]
+    Expression(#[from] ExpressionError),
+    #[error(transparent)]
+    Dimension(#[from] DimensionError),
+}
+
+impl ReadingError {
+    /// Byte of the text at which it is wrong; 0 where all of it is.
+    pub fn at(&self) -> usize {
+        match self {
+            Self::Expression(error) => error.at,
+            Self::Quantity(_) | Self::Dimension(_) => 0,
+        }
+    }
+}
 
 /// What is known of a scene while it is being read.
 #[derive(Default)]
@@ -53,10 +76,10 @@ impl<'d> Reading<'d> {
         text: &str,
         dimension: Dimension,
         copy: Option<&Copy>,
-    ) -> Result<f64, String> {
+    ) -> Result<f64, ReadingError> {
         let error = match parse_quantity(text, dimension) {
             Ok(value) => return Ok(value),
-            Err(error) => error.to_string(),
+            Err(error) => error,
         };
         let plain = plain(text);
         let own = self.own.borrow();
@@ -75,14 +98,14 @@ impl<'d> Reading<'d> {
                 let uses_own = (0..first_unit).any(|own| program.uses(own));
                 if !uses_own && !operates(&plain) {
                     // A number with its unit: what is wrong with it, the first error knows better.
-                    return Err(error);
+                    return Err(error.into());
                 }
                 let value = program.eval(&values);
                 // A parameter alone is a quantity like any other, and no product in which radians come and go.
-                value.of(dimension, uses_own && program.length() == 1)
+                Ok(value.of(dimension, uses_own && program.length() == 1)?)
             }
-            Err(wrong) if may_be_meant && !names.is_empty() => Err(wrong.to_string()),
-            Err(_) => Err(error),
+            Err(wrong) if may_be_meant && !names.is_empty() => Err(wrong.into()),
+            Err(_) => Err(error.into()),
         }
     }
 
@@ -91,13 +114,13 @@ impl<'d> Reading<'d> {
     /// Otherwise all are pure numbers.
     ///
     /// # Errors
-    /// What is wrong with it, and at which byte.
+    /// What is wrong with it.
     pub fn formula(
         &self,
         text: &str,
         dimension: Dimension,
         copy: Option<&Copy>,
-    ) -> Result<(Program, bool), (usize, String)> {
+    ) -> Result<(Program, bool), ReadingError> {
         let own = self.own.borrow();
         let (mut names, mut values) = named(&own, copy);
         names.insert(0, "t");
@@ -121,12 +144,12 @@ impl<'d> Reading<'d> {
             Some((length, first_unit + place))
         };
         match Program::parse_with_units(&spelt, variable, &names, unit) {
-            Ok(program) => match program.eval(&values).of(dimension, false) {
-                Ok(_) => Ok((program.bound(&numbers), true)),
-                Err(why) => Err((0, why)),
-            },
+            Ok(program) => {
+                program.eval(&values).of(dimension, false)?;
+                Ok((program.bound(&numbers), true))
+            }
             // Without units in it, the first error knows better.
-            Err(wrong) => Err(bare.err().unwrap_or(wrong)).map_err(|e| (e.at, e.to_string())),
+            Err(wrong) => Err(bare.err().unwrap_or(wrong).into()),
         }
     }
 

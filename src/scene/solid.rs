@@ -322,7 +322,7 @@ mod tests {
 
     /// A shape of the OBJ file `text`, in millimetres, turned and shifted.
     fn of_file(text: &str) -> Geometry {
-        let alone = |_: &str| Err(String::new());
+        let alone = |_: &str| Err(String::new().into());
         let mesh = Format::Obj.read(text.as_bytes(), &alone).unwrap();
         assert_eq!(mesh.open_edge(), None);
         Geometry::Mesh {

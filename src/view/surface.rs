@@ -110,7 +110,7 @@ mod tests {
             text += &format!("f{}\n", ring(1).collect::<String>());
             text += &format!("f{}\n", ring(0).rev().collect::<String>());
         }
-        let alone = |_: &str| Err(String::new());
+        let alone = |_: &str| Err(String::new().into());
         Format::Obj.read(text.as_bytes(), &alone).unwrap()
     }
 

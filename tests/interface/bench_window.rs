@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 use std::rc::Rc;
 use std::sync::Arc;
 
-use crate::hands::{opened, type_over};
+use crate::hands::{compare_window, opened, type_over};
 use eframe::egui::{self, Key, accesskit::Role};
 use egui_kittest::{
     Harness, SnapshotResults,
@@ -442,7 +442,7 @@ fn pictures() {
         ("bench_lying", [844.0, 390.0], egui::Theme::Dark),
     ] {
         let mut harness = used(size, theme);
-        harness.snapshot(name);
+        compare_window(&mut harness, name);
         results.extend_harness(&mut harness);
     }
     // Parted long ago, seen from near.
@@ -452,14 +452,14 @@ fn pictures() {
     player.run_to(1.3);
     harness.key_press(Key::Num5);
     harness.run();
-    harness.snapshot("bench_ghost");
+    compare_window(&mut harness, "bench_ghost");
     results.extend_harness(&mut harness);
     let mut harness = window("spcmm", &[FAST]);
     sweep(&mut harness, "0.05 mm", "0.8 mm", 9.0);
     wait(&mut harness, |app| !app.bench().is_sweeping());
     harness.remove_cursor();
     harness.run();
-    harness.snapshot("bench_sweep");
+    compare_window(&mut harness, "bench_sweep");
     results.extend_harness(&mut harness);
 }
 

@@ -1,6 +1,8 @@
 //! The window as a user opens it, and gestures.
 
-use eframe::egui::{self, Event, Key, Modifiers, PointerButton, Pos2, TouchPhase, accesskit::Role};
+use eframe::egui::{
+    self, Event, Key, Modifiers, PointerButton, Pos2, Shape, TouchPhase, accesskit::Role,
+};
 use egui_kittest::{Harness, kittest::Queryable as _};
 use jointplay::app::{App, AppOptions};
 use jointplay::scene::Scene;
@@ -40,6 +42,35 @@ pub fn paced(
         .build_eframe(move |cc| App::new(cc, options).expect("the scene starts"));
     harness.run();
     harness
+}
+
+/// Compares the window with the stored picture `name`, and every text in it with those stored beside: a picture must leave room for
+/// other drivers, in which a digit would hide. `UPDATE_SNAPSHOTS=1` stores both.
+pub fn compare_window(harness: &mut Harness<'_, App>, name: &str) {
+    let path = format!("{}/tests/snapshots/{name}.txt", env!("CARGO_MANIFEST_DIR"));
+    let mut texts = String::new();
+    for part in &harness.output().shapes {
+        add_texts(&part.shape, part.clip_rect, &mut texts);
+    }
+    if std::env::var_os("UPDATE_SNAPSHOTS").is_some() {
+        std::fs::write(&path, &texts).expect("writes");
+    }
+    let stored = std::fs::read_to_string(&path).unwrap_or_default();
+    let differs = stored.lines().zip(texts.lines()).find(|(a, b)| a != b);
+    assert!(stored == texts, "{path}: {differs:?}");
+    harness.snapshot(name);
+}
+
+/// The texts of `shape` that are in sight within `clip`, a line each.
+fn add_texts(shape: &Shape, clip: egui::Rect, out: &mut String) {
+    match shape {
+        Shape::Vec(shapes) => shapes.iter().for_each(|shape| add_texts(shape, clip, out)),
+        Shape::Text(text) if clip.intersects(text.visual_bounding_rect()) => {
+            out.push_str(&text.galley.text().replace('\n', " / "));
+            out.push('\n');
+        }
+        _ => {}
+    }
 }
 
 /// Replaces what stands in a text field; nothing is entered yet.

@@ -8,7 +8,7 @@ use egui_kittest::{
 use jointplay::app::{App, Link};
 use jointplay::simulate::Quantity;
 
-use crate::hands::opened;
+use crate::hands::{compare_window, opened};
 use crate::page::click;
 use crate::window::pixels::Picture;
 
@@ -297,7 +297,7 @@ fn pictures() {
         harness.key_press(Key::Num7);
         harness.key_press(Key::L);
         harness.run();
-        harness.snapshot(name);
+        compare_window(&mut harness, name);
         results.extend_harness(&mut harness);
     }
     for (name, theme) in [
@@ -313,7 +313,7 @@ fn pictures() {
         player.set_twin(true);
         player.run_to(0.6);
         harness.run();
-        harness.snapshot(name);
+        compare_window(&mut harness, name);
         results.extend_harness(&mut harness);
     }
 }

@@ -12,7 +12,7 @@ use jointplay::app::{
 };
 use jointplay::simulate::{ContactState, Quantity};
 
-use crate::hands::{fingers, fingers_down, lift};
+use crate::hands::{compare_window, fingers, fingers_down, lift};
 use crate::page::Calls;
 use crate::window::{CURVES, WHITE, click, picture, shown, sized, window};
 
@@ -337,7 +337,7 @@ fn pictures_of_the_past() {
         player.run_to(40e-3);
         player.go_to(30e-3);
         harness.run();
-        harness.snapshot(name);
+        compare_window(&mut harness, name);
         results.extend_harness(&mut harness);
     }
 }
@@ -371,7 +371,7 @@ fn pictures_of_wear_and_of_a_pull() {
         let area = [0, 0, size[0] as usize, (0.6 * size[1]) as usize];
         let purple = picture(&mut harness).coloured(area, [0x47, 0x2D, 0x7B], 12);
         assert!(purple.len() > 30, "{name}: nothing is mapped");
-        harness.snapshot(name);
+        compare_window(&mut harness, name);
         results.extend_harness(&mut harness);
     }
     for (name, size, theme) in [
@@ -388,7 +388,7 @@ fn pictures_of_wear_and_of_a_pull() {
             harness.hover_at(platform + vec2(20.0 * step as f32, 0.0));
             harness.step();
         }
-        harness.snapshot(name);
+        compare_window(&mut harness, name);
         results.extend_harness(&mut harness);
     }
 }

@@ -5,7 +5,7 @@ use egui_kittest::{Harness, SnapshotResults, kittest::Queryable as _};
 use jointplay::app::{App, AppOptions, BUILT_IN_LESSONS, Lesson, Link, Verdict};
 use jointplay::simulate::Simulation;
 
-use crate::hands::fingers;
+use crate::hands::{compare_window, fingers};
 use crate::page;
 use crate::window::sized;
 
@@ -374,12 +374,12 @@ fn pictures_of_the_lessons() {
         }
         play(&mut harness);
         harness.run_steps(60);
-        harness.snapshot(format!("lesson_{name}"));
+        compare_window(&mut harness, &format!("lesson_{name}"));
         results.extend_harness(&mut harness);
     }
     let mut harness = taught("rattle", 1, PHONE);
     play(&mut harness);
     harness.run_steps(60);
-    harness.snapshot("lesson_rattle_phone");
+    compare_window(&mut harness, "lesson_rattle_phone");
     results.extend_harness(&mut harness);
 }

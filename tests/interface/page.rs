@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::sync::Arc;
 
-use crate::hands::type_over;
+use crate::hands::{compare_window, type_over};
 use eframe::egui::{
     self, Event, Key, Modifiers, PointerButton, Pos2, TouchDeviceId, TouchId, TouchPhase,
     accesskit::{Live, Role},
@@ -1065,7 +1065,7 @@ fn pictures() {
         let (mut harness, _) = window("spcmm", size);
         harness.state_mut().player_mut().run_to(7.85e-3);
         harness.run();
-        harness.snapshot(name);
+        compare_window(&mut harness, name);
         results.extend_harness(&mut harness);
     }
 }

@@ -5,6 +5,7 @@ use egui_kittest::{Harness, SnapshotResults, kittest::Queryable as _};
 use jointplay::app::App;
 use jointplay::simulate::Simulation;
 
+use crate::hands::compare_window;
 use crate::window::sized;
 
 const SCREEN: egui::Vec2 = vec2(1280.0, 720.0);
@@ -142,7 +143,7 @@ fn pictures_of_a_presentation() {
         let zoom = harness.ctx.zoom_factor();
         harness.set_pixels_per_point(zoom);
         harness.run();
-        harness.snapshot(name);
+        compare_window(&mut harness, name);
         results.extend_harness(&mut harness);
     }
 }

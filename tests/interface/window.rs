@@ -1,6 +1,6 @@
 //! The window, driven by role and label as a person with a screen reader would.
 
-use crate::hands::{opened, type_over};
+use crate::hands::{compare_window, opened, type_over};
 use eframe::egui::{self, Key, accesskit::Role};
 use egui_kittest::{
     Harness, SnapshotResults,
@@ -535,7 +535,7 @@ fn pictures() {
         let mut harness = sized("spcmm", size, theme);
         harness.state_mut().player_mut().run_to(7.85e-3);
         harness.run();
-        harness.snapshot(name);
+        compare_window(&mut harness, name);
         results.extend_harness(&mut harness);
     }
 }
@@ -945,7 +945,7 @@ fn the_energy_balance_is_stacked_from_both_sides() {
     harness.state_mut().player_mut().run_to(0.05);
     harness.run();
     harness.get_by_label("Energy balance, mJ");
-    harness.snapshot("energy_balance");
+    compare_window(&mut harness, "energy_balance");
 }
 
 #[test]
