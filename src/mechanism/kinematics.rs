@@ -293,44 +293,18 @@ pub struct Driven {
     pub closed: Option<ClosedMotion>,
     /// Those bodies, parents before children.
     bodies: Vec<usize>,
-    /// The latest instants that were computed, and which of them is overwritten next: every iteration of an implicit step
-    /// evaluates the same ones.
-    instants: [Instant; INSTANTS],
-    oldest: usize,
-}
-
-/// As many as Radau has stages.
-const INSTANTS: usize = 3;
-
-/// Prescribed motion at one instant.
-#[derive(Clone, Default)]
-struct Instant {
-    time: Option<f64>,
-    coordinates: Vec<Jet>,
-    closed: Option<ClosedMotion>,
-    /// Of those bodies.
-    motion: Vec<Kinematics>,
 }
 
 impl Driven {
     /// For `model`; nothing is computed yet.
     pub fn new(model: &Model) -> Self {
-        let coordinates = vec![Jet::default(); model.drives.len()];
-        let bodies: Vec<_> = (model.order.iter().copied())
-            .filter(|&b| model.bodies[b].driven_only)
-            .collect();
-        let instant = Instant {
-            coordinates: coordinates.clone(),
-            motion: vec![Kinematics::rest(); bodies.len()],
-            ..Instant::default()
-        };
         Self {
             time: None,
-            coordinates,
+            coordinates: vec![Jet::default(); model.drives.len()],
             closed: None,
-            bodies,
-            instants: std::array::from_fn(|_| instant.clone()),
-            oldest: 0,
+            bodies: (model.order.iter().copied())
+                .filter(|&b| model.bodies[b].driven_only)
+                .collect(),
         }
     }
 
@@ -352,28 +326,12 @@ impl Driven {
             return;
         }
         self.time = Some(t);
-        if let Some(known) = self.instants.iter().find(|at| at.time == self.time) {
-            self.closed = known.closed;
-            self.coordinates.copy_from_slice(&known.coordinates);
-            for (&b, known) in self.bodies.iter().zip(&known.motion) {
-                motion[b] = *known;
-            }
-            return;
-        }
         self.closed = model.closed_form.as_ref().map(|form| form.at(t));
         for i in 0..self.coordinates.len() {
             self.coordinates[i] = model.drive(i, t, self.closed.as_ref());
         }
         for &b in &self.bodies {
             self.move_body(model, b, motion);
-        }
-        let keep = &mut self.instants[self.oldest];
-        self.oldest = (self.oldest + 1) % INSTANTS;
-        keep.time = self.time;
-        keep.closed = self.closed;
-        keep.coordinates.copy_from_slice(&self.coordinates);
-        for (&b, keep) in self.bodies.iter().zip(&mut keep.motion) {
-            *keep = motion[b];
         }
     }
 

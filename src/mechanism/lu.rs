@@ -9,7 +9,7 @@ const LEAST_SPARSE: usize = 16;
 /// LU factorisation with partial pivoting, for real and complex numbers, that skips zeros: its cost follows the order of the
 /// rows, and is linear along a band or a border.
 pub struct Lu<X> {
-    /// Most rows, which is the distance between two.
+    /// Most rows.
     most: usize,
     /// Rows in use.
     n: usize,
@@ -25,7 +25,7 @@ pub struct Lu<X> {
     factors: Vec<X>,
     /// Nonzero columns of a pivot row.
     filled: Vec<usize>,
-    /// Products that the latest elimination took.
+    /// Products that the latest elimination took, where it looks for zeros.
     pub products: usize,
 }
 
@@ -54,36 +54,104 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
         entries: impl Iterator<Item = (usize, usize, X)>,
         diagonal: X,
     ) {
-        let stride = self.most;
-        let (a, extents) = (&mut self.rows[..], &mut self.extents[..]);
-        for (row, extent) in a
-            .chunks_exact_mut(stride.max(1))
-            .zip(&*extents)
-            .take(self.n)
-        {
-            row[extent.clone()].fill(X::zero());
-        }
+        self.clear();
         self.n = n;
-        for (i, extent) in extents[..n].iter_mut().enumerate() {
+        self.products = 0;
+        let stride = self.stride();
+        let (a, extents) = (&mut self.rows[..], &mut self.extents[..n]);
+        for (i, extent) in extents.iter_mut().enumerate() {
             *extent = i..i + 1;
         }
         for (i, j, entry) in entries {
             a[i * stride + j] = entry;
-            let extent = &mut extents[i];
-            *extent = extent.start.min(j)..extent.end.max(j + 1);
+            if n >= LEAST_SPARSE {
+                let extent = &mut extents[i];
+                *extent = extent.start.min(j)..extent.end.max(j + 1);
+            }
         }
         for i in 0..n {
             a[i * stride + i] += diagonal;
         }
+        if n < LEAST_SPARSE {
+            self.eliminate_all();
+        } else {
+            self.eliminate_filled();
+            self.pack();
+        }
+    }
+
+    /// Distance between two rows.
+    #[inline]
+    fn stride(&self) -> usize {
+        if self.n < LEAST_SPARSE {
+            self.n
+        } else {
+            self.most
+        }
+    }
+
+    /// Zeroes what the latest matrix filled.
+    fn clear(&mut self) {
+        let n = self.n;
+        if n < LEAST_SPARSE {
+            self.rows[..n * n].fill(X::zero());
+            return;
+        }
+        for (row, extent) in self
+            .rows
+            .chunks_exact_mut(self.most)
+            .zip(&self.extents[..n])
+        {
+            row[extent.clone()].fill(X::zero());
+        }
+    }
+
+    /// Eliminates as if nothing were zero but what is left of the diagonal.
+    fn eliminate_all(&mut self) {
+        let n = self.n;
+        let a = &mut self.rows[..n * n];
+        for k in 0..n {
+            let (mut best, mut largest) = (k, a[k * n + k].norm1());
+            for i in k + 1..n {
+                let size = a[i * n + k].norm1();
+                if size > largest {
+                    (best, largest) = (i, size);
+                }
+            }
+            self.pivots[k] = best;
+            if best != k {
+                let (top, bottom) = a.split_at_mut(best * n);
+                top[k * n..][..n].swap_with_slice(&mut bottom[..n]);
+            }
+            let (top, bottom) = a.split_at_mut((k + 1) * n);
+            let pivot_row = &top[k * n..];
+            let inverse = X::one() / pivot_row[k];
+            let last = pivot_row.iter().rposition(|a| !a.is_zero());
+            let span = k + 1..last.unwrap_or(k).max(k) + 1;
+            for row in bottom.chunks_exact_mut(n) {
+                if row[k].is_zero() {
+                    continue;
+                }
+                let factor = row[k] * inverse;
+                row[k] = factor;
+                let pairs = row[span.clone()].iter_mut().zip(&pivot_row[span.clone()]);
+                pairs.for_each(|(a, pivot)| *a -= factor * *pivot);
+            }
+        }
+    }
+
+    /// Eliminates where rows may differ from zero.
+    fn eliminate_filled(&mut self) {
+        let (n, stride) = (self.n, self.most);
+        let (a, extents) = (&mut self.rows[..], &mut self.extents[..n]);
         let lowest = &mut self.lowest[..n];
         lowest.fill(0);
-        for (i, extent) in extents[..n].iter().enumerate() {
+        for (i, extent) in extents.iter().enumerate() {
             lowest[extent.start] = i;
         }
         for k in 1..n {
             lowest[k] = lowest[k].max(lowest[k - 1]);
         }
-        self.products = 0;
         for k in 0..n {
             let below = k + 1..lowest[k] + 1;
             let (mut best, mut largest) = (k, a[k * stride + k].norm1());
@@ -107,14 +175,12 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
             let pivot_row = &top[k * stride..];
             let inverse = X::one() / pivot_row[k];
             let last = extents[k].clone().rev().find(|&j| !pivot_row[j].is_zero());
-            let span = k + 1..last.map_or(k, |last| last).max(k) + 1;
+            let span = k + 1..last.unwrap_or(k).max(k) + 1;
             self.filled.clear();
-            if n >= LEAST_SPARSE {
-                let filled = span.clone().filter(|&j| !pivot_row[j].is_zero());
-                self.filled.extend(filled);
-            }
+            let filled = span.clone().filter(|&j| !pivot_row[j].is_zero());
+            self.filled.extend(filled);
             // What lies side by side is taken several at a time.
-            let together = n < LEAST_SPARSE || span.len() < 2 * self.filled.len();
+            let together = span.len() < 2 * self.filled.len();
             let width = if together {
                 span.len()
             } else {
@@ -143,9 +209,6 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
                 }
             }
         }
-        if n >= LEAST_SPARSE {
-            self.pack();
-        }
     }
 
     /// Collects the nonzero factors.
@@ -154,7 +217,7 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
         self.starts.clear();
         self.columns.clear();
         self.factors.clear();
-        let rows = self.rows.chunks_exact(self.most.max(1));
+        let rows = self.rows.chunks_exact(self.most);
         for (i, (row, extent)) in rows.zip(&self.extents).take(n).enumerate() {
             for part in [extent.start..i, i + 1..extent.end] {
                 self.starts.push(self.columns.len());
@@ -175,7 +238,7 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
         let mut x = b[i];
         if self.n < LEAST_SPARSE {
             let part = [0..i, i + 1..self.n][right].clone();
-            let row = &self.rows[i * self.most..][..self.n];
+            let row = &self.rows[i * self.n..][..self.n];
             for (a, b) in row[part.clone()].iter().zip(&b[part]) {
                 x -= *a * *b;
             }
@@ -190,7 +253,7 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
 
     /// Solves with the factors in place.
     pub fn solve(&self, b: &mut [X]) {
-        let n = self.n;
+        let (n, stride) = (self.n, self.stride());
         for k in 0..n {
             b.swap(k, self.pivots[k]);
         }
@@ -198,7 +261,7 @@ impl<X: ComplexField<RealField = f64> + Copy> Lu<X> {
             b[i] = self.reduced(i, 0, b);
         }
         for i in (0..n).rev() {
-            b[i] = self.reduced(i, 1, b) / self.rows[i * self.most + i];
+            b[i] = self.reduced(i, 1, b) / self.rows[i * stride + i];
         }
     }
 }
