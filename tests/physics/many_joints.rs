@@ -1,5 +1,5 @@
-//! Machines with many loose joints: `automatic` steps friction implicitly while balls stick under load, at a part of the
-//! explicit pair's evaluations and with the same forces.
+//! Machines with many loose joints: `automatic` steps friction implicitly while balls stick under load, and all of a long chain at
+//! rest, at a part of the evaluations of explicit steps and with the same forces.
 
 use crate::common::{Changes, simulation};
 use jointplay::simulate::Impact;
@@ -51,4 +51,27 @@ fn friction_is_stepped_implicitly_where_it_holds_explicit_steps_back() {
             "{scene}: {evaluations} evaluations, {explicit} of dopri5"
         );
     }
+}
+
+#[test]
+fn a_long_chain_at_rest_in_its_sockets_is_stepped_implicitly() {
+    let run = |method: &str, tolerance: &str| {
+        let chain = [("chain.links", "32"), ("start", "settled")];
+        let solver = [("solver.method", method), ("solver.tolerance", tolerance)];
+        let mut simulation = simulation("chain", &[chain, solver].concat());
+        simulation.advance_to(10e-3).unwrap();
+        let peaks: Vec<f64> = (0..32).map(|j| simulation.peak(j).0).collect();
+        (peaks, simulation.statistics().evaluations)
+    };
+    let (reference, explicit) = run("dopri5", "1e-7");
+    let (found, evaluations) = run("automatic", "1e-5");
+    for (j, (force, peak)) in found.iter().zip(&reference).enumerate() {
+        let off = (force / peak - 1.0).abs();
+        assert!(off < 1e-4, "J{}: {force} N instead of {peak} N", j + 1);
+    }
+    // Friction's own member alone takes 5569.
+    assert!(
+        evaluations < 1500,
+        "{evaluations} evaluations, {explicit} of dopri5"
+    );
 }
