@@ -6,8 +6,10 @@ use crate::scene::Scene;
 
 /// Tolerance of the reference.
 const REFERENCE: f64 = 1e-9;
-/// Tolerances tried, from the loosest; and the relative error of the peaks that is good enough.
-const TOLERANCES: [f64; 5] = [1e-3, 1e-4, 1e-5, 1e-6, 1e-7];
+/// Tolerances tried, from the loosest that raises no doubt; and the relative error of the peaks that is good enough.
+const TOLERANCES: [f64; 13] = [
+    1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5, 5e-6, 2e-6, 1e-6, 5e-7, 2e-7, 1e-7,
+];
 const ALLOWED: f64 = 0.01;
 const BUDGET: WorkBudget = WorkBudget {
     measured: 0.1,

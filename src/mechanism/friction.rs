@@ -66,6 +66,11 @@ impl Touch {
         self.columns.iter().map(part).sum()
     }
 
+    /// Whether a tree feels both.
+    fn meets(&self, other: &Self) -> bool {
+        self.ranges.iter().any(|range| other.ranges.contains(range))
+    }
+
     /// W M^-1 S^T of another's forces.
     fn mobility(&self, other: &Self) -> Mat3 {
         let surfaces = self.law.uses_surface_velocity();
@@ -264,7 +269,9 @@ impl Friction {
         for i in 0..band.size {
             for j in band.row(i) {
                 let [one, other] = [i, j].map(|i| &self.touches[self.active[i]]);
-                self.mobility[band.at(i, j)] = one.mobility(other);
+                if one.meets(other) {
+                    self.mobility[band.at(i, j)] = one.mobility(other);
+                }
             }
         }
     }
@@ -278,8 +285,12 @@ impl Friction {
         }
         for i in 0..band.size {
             for j in band.row(i) {
-                let mut block =
-                    self.mobility[band.at(i, j)] * -self.touches[self.active[j]].resistance;
+                let mobility = &self.mobility[band.at(i, j)];
+                if i != j && *mobility == Mat3::zeros() {
+                    self.blocks[band.at(i, j)] = Mat3::zeros();
+                    continue;
+                }
+                let mut block = mobility * -self.touches[self.active[j]].resistance;
                 if i == j {
                     block += Mat3::identity() * shift;
                 }
@@ -294,8 +305,11 @@ impl Friction {
     pub fn fastest(&self) -> f64 {
         let band = self.band;
         let norm = |i: usize, j: usize| {
-            let resistance = self.touches[self.active[j]].resistance;
-            (self.mobility[band.at(i, j)] * resistance).norm()
+            let mobility = &self.mobility[band.at(i, j)];
+            if *mobility == Mat3::zeros() {
+                return 0.0;
+            }
+            (mobility * self.touches[self.active[j]].resistance).norm()
         };
         let row = |i: usize| band.row(i).map(|j| norm(i, j)).sum();
         (0..band.size).map(row).fold(0.0, f64::max)

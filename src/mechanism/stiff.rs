@@ -33,9 +33,8 @@ pub struct Stiff {
     /// Velocity coordinates of each tree, those with many joints last: eliminated first, they would couple all their
     /// neighbours.
     trees: Vec<Range<usize>>,
-    /// Tree of each coordinate, in that order, and whether a coupling acts on it.
+    /// Tree of each coordinate, in that order.
     tree_of: Vec<usize>,
-    coupled: Vec<bool>,
     /// Whether a coupling acts on both of two trees, row by row; and those that one acts on with another, scratch.
     linked: Vec<bool>,
     partners: Vec<usize>,
@@ -94,7 +93,6 @@ impl Stiff {
         }
         Self {
             n,
-            coupled: vec![false; trees.len()],
             linked: vec![false; trees.len() * trees.len()],
             partners: Vec::with_capacity(trees.len()),
             first: vec![0; trees.len()],
@@ -141,7 +139,6 @@ impl Stiff {
             (self.by_position[at], self.by_velocity[at]) = (0.0, 0.0);
         }
         self.time_derivative.fill(0.0);
-        self.coupled.fill(false);
         self.linked.fill(false);
         self.empty = true;
         let at = At {
@@ -169,11 +166,16 @@ impl Stiff {
         }
         self.coordinates.clear();
         for (place, tree) in self.trees.iter().enumerate() {
-            if self.coupled[place] {
+            if self.is_coupled(place) {
                 self.first[place] = self.coordinates.len();
                 self.coordinates.extend(tree.clone());
             }
         }
+    }
+
+    /// Whether a coupling acts on the tree in this place.
+    fn is_coupled(&self, place: usize) -> bool {
+        self.linked[place * (self.trees.len() + 1)]
     }
 
     /// Notes which trees the coupling with these columns acts on.
@@ -186,7 +188,6 @@ impl Stiff {
             }
         }
         for &one in &self.partners {
-            self.coupled[one] = true;
             for &other in &self.partners {
                 self.linked[one * self.trees.len() + other] = true;
             }
@@ -284,7 +285,7 @@ impl Stiff {
         let count = self.trees.len();
         self.entries.clear();
         for (place, tree) in self.trees.iter().enumerate() {
-            if !self.coupled[place] {
+            if !self.is_coupled(place) {
                 continue;
             }
             let linked = &self.linked[place * count..][..count];

@@ -244,11 +244,20 @@ fn long_list() -> Vec<Long> {
         CRANK_PERIOD,
         [None; 2],
     ));
+    // Twelve loose balls that never come to rest.
+    list.push(long("hexapod", "as it is", &[], 1.0, [None; 2]));
     list.push(long("pendulum", "as it is", &[], 1.0, [None; 2]));
     list.push(long(
         "slider-crank",
         "free, ideal",
         &[IDEAL],
+        1.0,
+        [None; 2],
+    ));
+    list.push(long(
+        "chain",
+        "16 links",
+        &[("chain.links", "16")],
         1.0,
         [None; 2],
     ));
