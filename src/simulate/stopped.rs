@@ -72,8 +72,11 @@ pub enum StopFault {
     #[error("the accelerations are not finite")]
     NotFinite,
     /// A step size as small as rounding.
-    #[error("the step size that the tolerance asks for fell below 1e-14 s")]
-    ShortStep,
+    #[error("the step size that the tolerance asks for fell below {shortest:.0e} s")]
+    ShortStep {
+        /// The shortest that is tried at this time, s.
+        shortest: f64,
+    },
 }
 
 /// What to try where a simulation stopped.

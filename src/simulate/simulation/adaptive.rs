@@ -20,6 +20,11 @@ const AFTER_FAILURE: (f64, f64) = (0.1, 0.5);
 /// An error so many times the allowed one is no matter of accuracy: the step was unstable.
 const BLOWN_UP: f64 = 100.0;
 
+/// Shortest step at time `t`, s, that still advances it.
+pub(super) fn shortest_step(t: f64) -> f64 {
+    SHORTEST_STEP.max(4.0 * f64::EPSILON * t)
+}
+
 /// A gap at one instant of a step, positive where it contradicts the recorded contact state.
 #[derive(Clone, Copy)]
 struct SignedGap {
@@ -44,13 +49,13 @@ impl Simulation {
                 break step;
             }
             self.state.record.statistics.rejected += 1;
-            let shortest = SHORTEST_STEP.max(4.0 * f64::EPSILON * self.state.now.t);
+            let shortest = shortest_step(self.state.now.t);
             if !(self.state.control.h_next >= shortest) {
                 self.state.record.statistics.count(self.attempt.counts);
                 self.state.control.h_next = self.running.solver.step;
                 let tolerance = self.running.solver.tolerance;
                 let advice = StopAdvice::LooserTolerance { tolerance };
-                return Err(self.stopped(StopFault::ShortStep, advice));
+                return Err(self.stopped(StopFault::ShortStep { shortest }, advice));
             }
         };
         let stiffness = self.attempt.stiffness;

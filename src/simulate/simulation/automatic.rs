@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::Simulation;
+use super::adaptive::shortest_step;
 use crate::integrate::{Controller, Method};
 use crate::mechanism::{LARGEST_DENSE, Mechanism, MechanismError};
 use crate::simulate::stepper::Member;
@@ -111,7 +112,8 @@ impl Simulation {
                 let per_step = choice.cost / f64::from(TRIAL_STEPS - GROWING_STEPS);
                 (choice.progress, choice.cost, choice.steps) = (0.0, 0.0, 0);
                 if fails {
-                    state.control.h_next = choice.h_explicit;
+                    // That step may have been cut at an event to next to nothing.
+                    state.control.h_next = choice.h_explicit.max(shortest_step(state.now.t));
                     let trial = per_step * f64::from(TRIAL_STEPS) / EXPLICIT_EVALUATIONS;
                     choice.wait =
                         ((EXPLICIT_TURN * trial) as u32) << choice.failures.min(MOST_DOUBLINGS);
@@ -205,4 +207,30 @@ pub(super) fn prepare_implicit(
         let _ = mechanism.prepare_friction();
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Scene;
+
+    #[test]
+    fn a_failed_trial_leaves_a_step_that_advances_time() {
+        let mut simulation = Simulation::new(&Scene::load("spcmm", &[]).unwrap()).unwrap();
+        simulation.advance_to(1.0).unwrap();
+        assert_eq!(simulation.state.control.member, Member::Implicit);
+        simulation.state.control.choice = Choice {
+            h_explicit: 1e-16,
+            explicit_progress: 1.0,
+            explicit_cost: 1e-3,
+            steps: TRIAL_STEPS - 1,
+            ..Choice::default()
+        };
+        simulation.choose_member(1e-3, 0.0, 10.0);
+        let (control, t) = (&simulation.state.control, simulation.state.now.t);
+        assert_eq!(control.member, Member::Explicit);
+        assert!(t + control.h_next > t);
+        assert!(control.h_next >= shortest_step(t));
+        simulation.advance_to(1.1).unwrap();
+    }
 }
