@@ -40,6 +40,8 @@ use ideal::{ProbeFault, Reference};
 pub const CLEARANCE_SPEED: f64 = 2e-3;
 /// Longest step of an adaptive method, s.
 const LONGEST_STEP: f64 = 10e-3;
+/// Shortest step of an adaptive method, s.
+const SHORTEST_STEP: f64 = 1e-14;
 /// A step that ends this much of its length before a limit ends at the limit.
 const NEARLY: f64 = 1e-6;
 /// An ideal motion farther than this from its closed form has changed to another branch of it, m.
@@ -50,6 +52,11 @@ const SHORTEST_KINEMATIC_STEP: f64 = 1e-5;
 const FIRST_CONTACT_STEP: f64 = 1e-5;
 /// Loops still open by more than this after projection have come apart, m.
 const OPEN_LOOP: f64 = 1e-7;
+
+/// Shortest adaptive step at time `t`, s, that still advances it.
+fn shortest_step(t: f64) -> f64 {
+    SHORTEST_STEP.max(4.0 * f64::EPSILON * t)
+}
 
 /// A scene in motion.
 ///

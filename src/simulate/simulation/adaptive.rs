@@ -2,14 +2,12 @@
 
 use super::automatic::STABILITY_LIMIT;
 use super::corners::Piece;
-use super::{LONGEST_STEP, NEARLY, Simulation};
+use super::{LONGEST_STEP, NEARLY, Simulation, shortest_step};
 use crate::integrate::{Method, find_root};
 use crate::mechanism::Counts;
 use crate::simulate::peaks::Approach;
 use crate::simulate::{StopAdvice, StopFault, Stopped};
 
-/// Shortest step of an adaptive method, s.
-const SHORTEST_STEP: f64 = 1e-14;
 /// Shortest first step after a contact begins, s.
 const SHORTEST_FIRST: f64 = 1e-9;
 /// From this tolerance on a step that is cut at an event ends on the interpolant, whose error is about the estimate; with
@@ -19,11 +17,6 @@ const END_ON_INTERPOLANT: f64 = 1e-5;
 const AFTER_FAILURE: (f64, f64) = (0.1, 0.5);
 /// An error so many times the allowed one is no matter of accuracy: the step was unstable.
 const BLOWN_UP: f64 = 100.0;
-
-/// Shortest step at time `t`, s, that still advances it.
-pub(super) fn shortest_step(t: f64) -> f64 {
-    SHORTEST_STEP.max(4.0 * f64::EPSILON * t)
-}
 
 /// A gap at one instant of a step, positive where it contradicts the recorded contact state.
 #[derive(Clone, Copy)]

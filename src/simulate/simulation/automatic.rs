@@ -2,8 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Simulation;
-use super::adaptive::shortest_step;
+use super::{Simulation, shortest_step};
 use crate::integrate::{Controller, Method};
 use crate::mechanism::{LARGEST_DENSE, Mechanism, MechanismError};
 use crate::simulate::stepper::Member;
