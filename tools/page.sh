@@ -12,8 +12,8 @@ build_page() {
     local sources=${CARGO_HOME:-$HOME/.cargo}/registry/src
     # What the optimiser would copy into its callers beyond this makes the page a twentieth heavier and nothing faster; what is
     # marked #[inline], as all arithmetic is, has a limit of its own.
-    RUSTFLAGS="${RUSTFLAGS:-} --remap-path-prefix=$sources=" cargo rustc --locked --manifest-path "$root/Cargo.toml" --profile web --target $wasm_target --lib --crate-type cdylib -- \
-        -C llvm-args=-inline-threshold=25
+    CARGO_ENCODED_RUSTFLAGS="--remap-path-prefix=$sources=" cargo rustc --locked --manifest-path "$root/Cargo.toml" --profile web \
+        --target $wasm_target --lib --crate-type cdylib -- -C llvm-args=-inline-threshold=25
     cargo build --locked --quiet --manifest-path "$root/tools/web/Cargo.toml" --target-dir "$root/target/tools"
     page_tool pack "$root/target/$wasm_target/web/jointplay.wasm" "$@"
 }

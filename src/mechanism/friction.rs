@@ -285,12 +285,8 @@ impl Friction {
         }
         for i in 0..band.size {
             for j in band.row(i) {
-                let mobility = &self.mobility[band.at(i, j)];
-                if i != j && *mobility == Mat3::zeros() {
-                    self.blocks[band.at(i, j)] = Mat3::zeros();
-                    continue;
-                }
-                let mut block = mobility * -self.touches[self.active[j]].resistance;
+                let mut block =
+                    self.mobility[band.at(i, j)] * -self.touches[self.active[j]].resistance;
                 if i == j {
                     block += Mat3::identity() * shift;
                 }
@@ -305,11 +301,8 @@ impl Friction {
     pub fn fastest(&self) -> f64 {
         let band = self.band;
         let norm = |i: usize, j: usize| {
-            let mobility = &self.mobility[band.at(i, j)];
-            if *mobility == Mat3::zeros() {
-                return 0.0;
-            }
-            (mobility * self.touches[self.active[j]].resistance).norm()
+            let resistance = self.touches[self.active[j]].resistance;
+            (self.mobility[band.at(i, j)] * resistance).norm()
         };
         let row = |i: usize| band.row(i).map(|j| norm(i, j)).sum();
         (0..band.size).map(row).fold(0.0, f64::max)
