@@ -3,71 +3,111 @@
 use crate::scene::{Mat3, Vec3};
 use std::ops::Range;
 
-/// Where the blocks of a banded matrix stand, row by row.
-#[derive(Clone, Copy, Default)]
+/// Which blocks of a banded matrix may differ from zero, before its elimination or after, and where they stand, row by row.
+#[derive(Default)]
 pub struct Band {
-    /// Rows of blocks.
-    pub size: usize,
-    /// Blocks further from the diagonal are zero.
-    pub reach: usize,
+    size: usize,
+    reach: usize,
+    filled: Vec<bool>,
 }
 
 impl Band {
-    /// Number of blocks.
-    pub fn len(self) -> usize {
+    /// With room for so many rows of blocks, none further than `reach` from the diagonal.
+    pub fn with_room(size: usize, reach: usize) -> Self {
+        Self {
+            filled: Vec::with_capacity(size * (2 * reach + 1)),
+            ..Self::default()
+        }
+    }
+
+    /// Takes a matrix of `size` rows, whose blocks (i, j) differ from zero where `coupled` says so, on the diagonal and at most
+    /// `reach` away from it. Two legs of a platform, say, couple through it alone.
+    pub fn arrange(&mut self, size: usize, reach: usize, coupled: impl Fn(usize, usize) -> bool) {
+        (self.size, self.reach) = (size, reach);
+        self.filled.clear();
+        self.filled.resize(self.len(), false);
+        for i in 0..size {
+            for j in i.saturating_sub(reach)..self.end(i) {
+                let at = self.at(i, j);
+                self.filled[at] = coupled(i, j);
+            }
+        }
+        for k in 0..size {
+            for i in k + 1..self.end(k) {
+                for j in k + 1..self.end(k) {
+                    let at = self.at(i, j);
+                    self.filled[at] |= self.filled[self.at(i, k)] && self.filled[self.at(k, j)];
+                }
+            }
+        }
+    }
+
+    /// Rows of blocks.
+    pub fn size(&self) -> usize {
+        self.size
+    }
+
+    /// Number of places for blocks.
+    pub fn len(&self) -> usize {
         self.size * (2 * self.reach + 1)
     }
 
     /// Place of block (`i`, `j`).
-    pub fn at(self, i: usize, j: usize) -> usize {
+    pub fn at(&self, i: usize, j: usize) -> usize {
         i * (2 * self.reach + 1) + j + self.reach - i
     }
 
-    /// Columns of row `i`.
-    pub fn row(self, i: usize) -> Range<usize> {
-        i.saturating_sub(self.reach)..self.end(i)
+    /// Columns of row `i` that may differ from zero.
+    pub fn row(&self, i: usize) -> impl Iterator<Item = usize> + '_ {
+        self.within(i, i.saturating_sub(self.reach)..self.end(i))
     }
 
-    fn end(self, i: usize) -> usize {
+    fn after(&self, k: usize) -> impl Iterator<Item = usize> + '_ {
+        self.within(k, k + 1..self.end(k))
+    }
+
+    fn within(&self, i: usize, columns: Range<usize>) -> impl Iterator<Item = usize> + '_ {
+        columns.filter(move |&j| self.filled[self.at(i, j)])
+    }
+
+    fn end(&self, i: usize) -> usize {
         (i + self.reach + 1).min(self.size)
     }
 
-    /// Factors `blocks`; they become NaN where a diagonal block is singular. Blocks that stay zero are skipped: two legs of a
-    /// platform couple through it alone.
-    pub fn factor(self, blocks: &mut [Mat3]) {
+    /// Factors `blocks`; they become NaN where a diagonal block is singular.
+    pub fn factor(&self, blocks: &mut [Mat3]) {
         for k in 0..self.size {
             let inverse = blocks[self.at(k, k)]
                 .try_inverse()
                 .unwrap_or_else(|| Mat3::from_element(f64::NAN));
             blocks[self.at(k, k)] = inverse;
             for i in k + 1..self.end(k) {
-                let lower = blocks[self.at(i, k)];
-                if lower == Mat3::zeros() {
+                let lower = self.at(i, k);
+                if !self.filled[lower] {
                     continue;
                 }
-                let factor = lower * inverse;
-                blocks[self.at(i, k)] = factor;
-                for j in k + 1..self.end(k) {
-                    let upper = blocks[self.at(k, j)];
-                    if upper != Mat3::zeros() {
-                        blocks[self.at(i, j)] -= factor * upper;
-                    }
+                let factor = blocks[lower] * inverse;
+                blocks[lower] = factor;
+                for j in self.after(k) {
+                    let by = factor * blocks[self.at(k, j)];
+                    blocks[self.at(i, j)] -= by;
                 }
             }
         }
     }
 
     /// Solves with factored `blocks`, in place.
-    pub fn solve(self, blocks: &[Mat3], x: &mut [Vec3]) {
-        for k in 0..self.size {
-            for i in k + 1..self.end(k) {
-                let above = x[k];
-                x[i] -= blocks[self.at(i, k)] * above;
+    pub fn solve(&self, blocks: &[Mat3], x: &mut [Vec3]) {
+        for i in 0..self.size {
+            let mut sum = x[i];
+            for k in self.within(i, i.saturating_sub(self.reach)..i) {
+                sum -= blocks[self.at(i, k)] * x[k];
             }
+            x[i] = sum;
         }
         for k in (0..self.size).rev() {
             let mut sum = x[k];
-            for j in k + 1..self.end(k) {
+            for j in self.after(k) {
                 sum -= blocks[self.at(k, j)] * x[j];
             }
             x[k] = blocks[self.at(k, k)] * sum;
@@ -82,15 +122,17 @@ mod tests {
     #[test]
     fn it_solves_what_it_was_given() {
         for (size, reach) in [(0, 0), (1, 0), (5, 1), (6, 5)] {
-            let band = Band { size, reach };
             let number = |n: usize| libm::sin(1.0 + n as f64);
+            // Some are zero, of which a few fill in.
+            let coupled = |i, j| i == j || (i + 2 * j) % 3 != 0;
+            let mut band = Band::with_room(size, reach);
+            band.arrange(size, reach, coupled);
             let mut blocks = vec![Mat3::zeros(); band.len()];
             for i in 0..size {
                 for j in band.row(i) {
                     let part = Mat3::from_fn(|a, b| number(9 * (size * i + j) + 3 * a + b));
                     let unit = if i == j { 9.0 } else { 0.0 };
-                    // Some that are zero, of which a few fill in.
-                    if i == j || (i + 2 * j) % 3 != 0 {
+                    if coupled(i, j) {
                         blocks[band.at(i, j)] = part + Mat3::identity() * unit;
                     }
                 }

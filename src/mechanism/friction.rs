@@ -21,6 +21,27 @@ use crate::contact::{Coefficients, Memory, Slope};
 use crate::integrate::Method;
 use crate::scene::{Mat3, Vec3};
 
+/// What a ball and one of the trees that it acts on do to each other.
+struct TreePart {
+    /// Coordinates of the tree.
+    range: (usize, usize),
+    /// Coordinates that move the contact, and the velocity that friction reads for their unit rates.
+    reads: Vec<(usize, Vec3)>,
+    /// M^-1 S^T.
+    weighted: Vec<Vec3>,
+}
+
+impl TreePart {
+    fn new(range: (usize, usize)) -> Self {
+        let n = range.1 - range.0;
+        Self {
+            range,
+            reads: Vec::with_capacity(n),
+            weighted: vec![Vec3::zeros(); n],
+        }
+    }
+}
+
 /// A ball with play.
 struct Touch {
     joint: usize,
@@ -30,10 +51,8 @@ struct Touch {
     eccentricity: Vec3,
     rate: Vec3,
     read: Vec3,
-    /// Coordinates of the trees that it acts on, and M^-1 S^T there, one after the other.
-    ranges: Vec<(usize, usize)>,
-    weighted: Vec<Vec3>,
-    columns: Vec<Column>,
+    /// Where it acts, with what friction reads per velocity coordinate and M^-1 S^T there.
+    trees: Vec<TreePart>,
     /// B, N s/m.
     resistance: Mat3,
 }
@@ -61,28 +80,40 @@ impl Touch {
 
     /// Velocity that friction reads for the velocities `x`.
     fn reading(&self, x: &[f64]) -> Vec3 {
-        let surfaces = self.law.uses_surface_velocity();
-        let part = |c: &Column| if surfaces { c.surface } else { c.centre } * x[c.coordinate];
-        self.columns.iter().map(part).sum()
+        let reads = self.trees.iter().flat_map(|tree| &tree.reads);
+        reads.fold(Vec3::zeros(), |sum, (coordinate, read)| {
+            sum + read * x[*coordinate]
+        })
+    }
+
+    /// Adds M^-1 S^T `force` to `x`.
+    fn push(&self, force: &Vec3, x: &mut [f64]) {
+        for tree in &self.trees {
+            let (first, end) = tree.range;
+            for (x, by) in x[first..end].iter_mut().zip(&tree.weighted) {
+                *x += by.dot(force);
+            }
+        }
+    }
+
+    fn on(&self, range: (usize, usize)) -> Option<&TreePart> {
+        self.trees.iter().find(|tree| tree.range == range)
     }
 
     /// Whether a tree feels both.
     fn meets(&self, other: &Self) -> bool {
-        self.ranges.iter().any(|range| other.ranges.contains(range))
+        self.trees.iter().any(|tree| other.on(tree.range).is_some())
     }
 
     /// W M^-1 S^T of another's forces.
     fn mobility(&self, other: &Self) -> Mat3 {
-        let surfaces = self.law.uses_surface_velocity();
         let mut sum = Mat3::zeros();
-        for c in &self.columns {
-            let mut offset = 0;
-            for &(first, end) in &other.ranges {
-                if (first..end).contains(&c.coordinate) {
-                    let read = if surfaces { c.surface } else { c.centre };
-                    sum += read * other.weighted[offset + c.coordinate - first].transpose();
-                }
-                offset += end - first;
+        for tree in &self.trees {
+            let Some(pushed) = other.on(tree.range) else {
+                continue;
+            };
+            for (coordinate, read) in &tree.reads {
+                sum += read * pushed.weighted[coordinate - tree.range.0].transpose();
             }
         }
         sum
@@ -97,6 +128,8 @@ pub struct Friction {
     /// Every ball with play, and which of them touch.
     touches: Vec<Touch>,
     active: Vec<usize>,
+    /// Those before.
+    arranged: Vec<usize>,
     /// Touches further apart in their order do not feel each other.
     band: Band,
     /// s I - H B, factored; H in the same places.
@@ -107,6 +140,7 @@ pub struct Friction {
     y: Vec<f64>,
     rate: Vec<f64>,
     scratch: Vec<f64>,
+    columns: Vec<Column>,
     /// First touch on every tree.
     first_on: Vec<usize>,
     /// df/dt: friction follows the state alone.
@@ -144,7 +178,7 @@ impl Friction {
             }
             ranges
         };
-        let width = |ranges: &[(usize, usize)]| ranges.iter().map(|(first, end)| end - first).sum();
+        let width = |&(first, end): &(usize, usize)| end - first;
         let loose = (0..contacts.len()).filter(|&j| contacts.has_clearance(j));
         let of: Vec<_> = loose.map(|j| (j, ranges(&model.joints[j]))).collect();
         let mut friction = Self {
@@ -152,6 +186,7 @@ impl Friction {
             within,
             touches: Vec::new(),
             active: (0..of.len()).collect(),
+            arranged: Vec::with_capacity(of.len()),
             band: Band::default(),
             blocks: Vec::new(),
             mobility: Vec::new(),
@@ -160,15 +195,14 @@ impl Friction {
             y: vec![0.0; dimension],
             rate: vec![0.0; dimension - velocities],
             scratch: vec![0.0; velocities],
+            columns: Vec::with_capacity(velocities),
             first_on: vec![usize::MAX; velocities + 1],
             time_derivative: vec![0.0; dimension],
             derivative: vec![0.0; dimension],
         };
-        let reach = reach_of(
-            of.iter().map(|(_, ranges)| &ranges[..]),
-            &mut friction.first_on,
-        );
-        let widths = of.iter().map(|(_, ranges)| width(ranges)).sum();
+        let trees = of.iter().map(|(_, ranges)| ranges.iter().copied());
+        let reach = reach_of(trees, &mut friction.first_on);
+        let widths = of.iter().flat_map(|(_, ranges)| ranges).map(width).sum();
         Cost::of_implicit_contacts(of.len(), reach, widths).check(
             CostOf::ImplicitContacts,
             Advice::Method(Method::DormandPrince5),
@@ -180,16 +214,11 @@ impl Friction {
             eccentricity: Vec3::zeros(),
             rate: Vec3::zeros(),
             read: Vec3::zeros(),
-            columns: Vec::with_capacity(width(&ranges)),
-            weighted: vec![Vec3::zeros(); width(&ranges)],
-            ranges,
+            trees: ranges.into_iter().map(TreePart::new).collect(),
             resistance: Mat3::zeros(),
         };
-        let size = Band {
-            size: of.len(),
-            reach,
-        }
-        .len();
+        friction.band = Band::with_room(of.len(), reach);
+        let size = of.len() * (2 * reach + 1);
         friction.touches = of.into_iter().map(touch).collect();
         friction.active.clear();
         friction.blocks.reserve_exact(size);
@@ -225,53 +254,60 @@ impl Friction {
             touch.rate = contact.gap.eccentricity_rate;
             touch.read = contact.friction_reads(&n, equations.motion());
             let sides = contact_sides(&contact.joint, &contact.law);
-            collect_columns(&mut touch.columns, model, equations, &sides, &n);
-            for i in 0..3 {
-                for &(first, end) in &touch.ranges {
+            collect_columns(&mut self.columns, model, equations, &sides, &n);
+            let surfaces = touch.law.uses_surface_velocity();
+            for tree in &mut touch.trees {
+                let (first, end) = tree.range;
+                let here = |c: &&Column| (first..end).contains(&c.coordinate);
+                let read = |c: &Column| if surfaces { c.surface } else { c.centre };
+                let columns = self.columns.iter().filter(here);
+                tree.reads.clear();
+                tree.reads
+                    .extend(columns.clone().map(|c| (c.coordinate, read(c))));
+                for i in 0..3 {
                     self.scratch[first..end].fill(0.0);
-                }
-                for column in &touch.columns {
-                    self.scratch[column.coordinate] = column.surface[i];
-                }
-                let mut offset = 0;
-                for &(first, end) in &touch.ranges {
+                    for column in columns.clone() {
+                        self.scratch[column.coordinate] = column.surface[i];
+                    }
                     if self.within {
                         equations.apply_inverse_mass_within(model, (first, end), &mut self.scratch);
                     } else {
                         equations.apply_inverse_mass(model, &mut self.scratch);
                     }
-                    for k in first..end {
-                        touch.weighted[offset + k - first][i] = self.scratch[k];
+                    for (weighted, x) in tree.weighted.iter_mut().zip(&self.scratch[first..end]) {
+                        weighted[i] = *x;
                     }
-                    offset += end - first;
                 }
             }
         }
-        let ranges = self
-            .active
-            .iter()
-            .map(|&slot| &self.touches[slot].ranges[..]);
-        self.band = Band {
-            size: self.active.len(),
-            reach: reach_of(ranges, &mut self.first_on),
-        };
+        if self.active != self.arranged {
+            self.arrange();
+        }
         self.couple();
     }
 
+    fn arrange(&mut self) {
+        let touch = |i: usize| &self.touches[self.active[i]];
+        let size = self.active.len();
+        let trees = (0..size).map(|i| touch(i).trees.iter().map(|tree| tree.range));
+        let reach = reach_of(trees, &mut self.first_on);
+        self.band
+            .arrange(size, reach, |i, j| touch(i).meets(touch(j)));
+        self.arranged.clone_from(&self.active);
+    }
+
     fn couple(&mut self) {
-        let band = self.band;
+        let band = &self.band;
         self.mobility.clear();
         self.mobility.resize(band.len(), Mat3::zeros());
         self.blocks.clear();
         self.blocks.resize(band.len(), Mat3::zeros());
         self.right.clear();
-        self.right.resize(band.size, Vec3::zeros());
-        for i in 0..band.size {
+        self.right.resize(band.size(), Vec3::zeros());
+        for i in 0..band.size() {
             for j in band.row(i) {
                 let [one, other] = [i, j].map(|i| &self.touches[self.active[i]]);
-                if one.meets(other) {
-                    self.mobility[band.at(i, j)] = one.mobility(other);
-                }
+                self.mobility[band.at(i, j)] = one.mobility(other);
             }
         }
     }
@@ -279,11 +315,11 @@ impl Friction {
     /// Prepares to solve with the shift s for a step of size `h`.
     pub fn factor(&mut self, shift: f64, h: f64) {
         self.shift = shift;
-        let band = self.band;
+        let band = &self.band;
         for &slot in &self.active {
             self.touches[slot].resist(h);
         }
-        for i in 0..band.size {
+        for i in 0..band.size() {
             for j in band.row(i) {
                 let mut block =
                     self.mobility[band.at(i, j)] * -self.touches[self.active[j]].resistance;
@@ -299,13 +335,13 @@ impl Friction {
     /// Bound on the rates at which friction damps sliding, 1/s, as factored last: the largest sum of norms in a row of H B
     /// (Gershgorin). The coupling of neighbours may double what a contact has on its own.
     pub fn fastest(&self) -> f64 {
-        let band = self.band;
+        let band = &self.band;
         let norm = |i: usize, j: usize| {
             let resistance = self.touches[self.active[j]].resistance;
             (self.mobility[band.at(i, j)] * resistance).norm()
         };
         let row = |i: usize| band.row(i).map(|j| norm(i, j)).sum();
-        (0..band.size).map(row).fold(0.0, f64::max)
+        (0..band.size()).map(row).fold(0.0, f64::max)
     }
 
     /// Solves (s I - J) x = b in place.
@@ -318,14 +354,7 @@ impl Friction {
         self.band.solve(&self.blocks, &mut self.right);
         for (&slot, w) in self.active.iter().zip(&self.right) {
             let touch = &self.touches[slot];
-            let force = touch.resistance * w;
-            let mut offset = 0;
-            for &(first, end) in &touch.ranges {
-                for (x, by) in b_v[first..end].iter_mut().zip(&touch.weighted[offset..]) {
-                    *x += by.dot(&force);
-                }
-                offset += end - first;
-            }
+            touch.push(&(touch.resistance * w), b_v);
         }
         for x in b_v.iter_mut() {
             *x /= self.shift;
@@ -338,18 +367,17 @@ impl Friction {
     }
 }
 
-/// How far apart in their order touches with these coordinates feel each other: through a tree that both act on. `first_on` is
-/// scratch, one entry a coordinate.
-fn reach_of<'a>(
-    touches: impl Iterator<Item = &'a [(usize, usize)]> + Clone,
+/// How far apart in their order touches that act on these trees feel each other. `first_on` is scratch, one entry a coordinate.
+fn reach_of(
+    touches: impl Iterator<Item = impl Iterator<Item = (usize, usize)>> + Clone,
     first_on: &mut [usize],
 ) -> usize {
-    for &(first, _) in touches.clone().flatten() {
+    for (first, _) in touches.clone().flatten() {
         first_on[first] = usize::MAX;
     }
     let mut reach = 0;
-    for (i, ranges) in touches.enumerate() {
-        for &(first, _) in ranges {
+    for (i, trees) in touches.enumerate() {
+        for (first, _) in trees {
             first_on[first] = first_on[first].min(i);
             reach = reach.max(i - first_on[first]);
         }

@@ -89,6 +89,7 @@ pub struct ImplicitContacts {
     ranges: Vec<(usize, usize)>,
     /// Joints further apart than this in their order are not coupled.
     reach: usize,
+    band: Band,
     touches: Vec<Touch>,
     columns: Vec<Vec<Column>>,
     /// M^-1 S^T, three columns per joint over its range, interleaved.
@@ -144,6 +145,7 @@ impl ImplicitContacts {
         Ok(Self {
             n,
             reach,
+            band: Band::with_room(joints, reach),
             touches: Vec::with_capacity(joints),
             columns: ranges
                 .iter()
@@ -297,8 +299,19 @@ impl ImplicitContacts {
 
     /// Computes how the contacts move each other.
     fn couple(&mut self) {
-        let band = self.band();
-        for i in 0..band.size {
+        let Self {
+            band,
+            touches,
+            ranges,
+            ..
+        } = self;
+        let range = |i: usize| ranges[touches[i].joint];
+        band.arrange(touches.len(), self.reach, |i, j| {
+            let [(first, end), (from, to)] = [i, j].map(range);
+            first < to && from < end
+        });
+        let band = &self.band;
+        for i in 0..band.size() {
             let touch = &self.touches[i];
             let columns = &self.columns[touch.joint];
             let surface = touch.law.uses_surface_velocity() && touch.law.friction > 0.0;
@@ -324,16 +337,9 @@ impl ImplicitContacts {
         }
     }
 
-    fn band(&self) -> Band {
-        Band {
-            size: self.touches.len(),
-            reach: self.reach,
-        }
-    }
-
     /// Velocities added at touch `i` by the forces in `right`.
     fn velocity_from_forces(&self, i: usize, h: f64) -> [Vec3; 2] {
-        let band = self.band();
+        let band = &self.band;
         let mut sum = [Vec3::zeros(); 2];
         for j in band.row(i) {
             let mobility = &self.mobility[band.at(i, j)];
@@ -346,7 +352,7 @@ impl ImplicitContacts {
 
     /// Contact forces of the next Newton iteration into `right`, by block elimination within the band.
     fn eliminate(&mut self, h: f64) {
-        let band = self.band();
+        let band = &self.band;
         for (i, touch) in self.touches.iter().enumerate() {
             for j in band.row(i) {
                 let unit = if i == j {
