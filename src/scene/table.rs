@@ -429,8 +429,9 @@ static TABLE: [Parameter; 29] = [
         logarithmic(D::None, 1e-13, 1e-2, "", (1e-12, 1e-3)),
         Value::Number(1e-6),
         Scope::Every,
-        "Relative error that an adaptive method allows itself in one step. The motion between impacts is sensitive: \
-         use 1e-9 or less to compare single impacts.",
+        "Relative error that an adaptive method allows itself in one step; where it is above 1e-5, automatic takes its explicit \
+         steps, those through impacts, with 1e-5. The motion between impacts is sensitive: use 1e-9 or less to compare single \
+         impacts.",
         "Solves paper eqs. (55), (58) in time",
     ),
     row(

@@ -24,6 +24,37 @@ fn run(name: &str, changes: &Changes, method: &str, tolerance: &str, end: f64) -
     (hits, simulation.statistics().evaluations)
 }
 
+/// Largest relative error of the peaks of the first six impacts of `reference`, all of which `found` must have within 10 us.
+fn off_at_first(found: &[Hit], reference: &[Hit]) -> f64 {
+    assert!(reference.len() >= 6);
+    let mut most = 0.0_f64;
+    // Two joints may be hit within a few nanoseconds, in either order.
+    for &(joint, before, start, peak) in &reference[..6] {
+        let same = |hit: &&Hit| (hit.0, hit.1) == (joint, before);
+        let &(.., at, force) = found.iter().find(same).expect("that impact");
+        assert!((at - start).abs() < 1e-5, "at {at} instead of {start}");
+        most = most.max((force / peak - 1.0).abs());
+    }
+    most
+}
+
+#[test]
+fn impacts_are_resolved_at_a_loose_tolerance() {
+    let cases = [
+        ("chain", 25e-3),
+        ("four-bar", 20e-3),
+        ("pendulum", 60e-3),
+        ("slider-crank", 60e-3),
+    ];
+    for (scene, end) in cases {
+        let (reference, _) = run(scene, &[], "dopri5", "1e-9", end);
+        let (found, _) = run(scene, &[], "automatic", "1e-3", end);
+        let off = off_at_first(&found, &reference);
+        println!("{scene}: {off}");
+        assert!(off < 0.01, "{scene}: {off}");
+    }
+}
+
 #[test]
 fn friction_is_stepped_implicitly_where_it_holds_explicit_steps_back() {
     let cases: [(&str, &Changes, f64, f64); 3] = [
@@ -34,16 +65,8 @@ fn friction_is_stepped_implicitly_where_it_holds_explicit_steps_back() {
     for (scene, changes, end, part) in cases {
         let (reference, _) = run(scene, changes, "dopri5", "1e-8", end);
         let (found, _) = run(scene, changes, "automatic", "1e-6", end);
-        assert!(reference.len() >= 6);
-        // Two joints may be hit within a few nanoseconds, in either order.
-        for &(joint, before, start, peak) in &reference[..6] {
-            let same = |hit: &&Hit| (hit.0, hit.1) == (joint, before);
-            let &(.., at, force) = found.iter().find(same).expect("that impact");
-            let off = (at - start).abs();
-            assert!(off < 1e-5, "{scene}: at {at} instead of {start}");
-            let off = (force / peak - 1.0).abs();
-            assert!(off < 0.01, "{scene}: {force} N instead of {peak} N");
-        }
+        let off = off_at_first(&found, &reference);
+        assert!(off < 0.01, "{scene}: {off}");
         let (_, explicit) = run(scene, changes, "dopri5", "1e-5", end);
         let (_, evaluations) = run(scene, changes, "automatic", "1e-5", end);
         assert!(

@@ -6,6 +6,7 @@ use super::{LONGEST_STEP, NEARLY, Simulation, shortest_step};
 use crate::integrate::{Method, find_root};
 use crate::mechanism::Counts;
 use crate::simulate::peaks::Approach;
+use crate::simulate::stepper::Member;
 use crate::simulate::{StopAdvice, StopFault, Stopped};
 
 /// Shortest first step after a contact begins, s.
@@ -13,6 +14,9 @@ const SHORTEST_FIRST: f64 = 1e-9;
 /// From this tolerance on a step that is cut at an event ends on the interpolant, whose error is about the estimate; with
 /// tighter ones it is repeated, which costs little beside their many steps.
 const END_ON_INTERPOLANT: f64 = 1e-5;
+/// What the explicit member of the automatic choice may err by where the tolerance is looser: it takes the steps through impacts,
+/// which decide all that follows and are few beside those in lasting contact.
+const OF_IMPACTS: f64 = 1e-5;
 /// Least and largest factor for the next try after one whose iteration failed.
 const AFTER_FAILURE: (f64, f64) = (0.1, 0.5);
 /// An error so many times the allowed one is no matter of accuracy: the step was unstable.
@@ -63,6 +67,15 @@ impl Simulation {
         Ok(())
     }
 
+    /// Scaled error that a step may have.
+    fn allowed_error(&self) -> f64 {
+        let solver = &self.running.solver;
+        match (solver.method, self.state.control.member) {
+            (Method::Automatic, Member::Explicit) => solver.tolerance.min(OF_IMPACTS),
+            _ => solver.tolerance,
+        }
+    }
+
     /// One attempt at a step with its event; `None` if it must be repeated with the smaller `h_next` it has set.
     fn attempt_adaptive(&mut self, limit: f64) -> Option<(f64, f64)> {
         let t = self.state.now.t;
@@ -75,7 +88,7 @@ impl Simulation {
             t_end = limit;
             h = limit - t;
         }
-        let error = self.try_step(h) / tolerance;
+        let error = self.try_step(h) / self.allowed_error();
         let growth = self.stepper.growth();
         let state = &mut self.state;
         if !(error <= 1.0) {
