@@ -15,7 +15,7 @@ impl Band {
     /// With room for so many rows of blocks, none further than `reach` from the diagonal.
     pub fn with_room(size: usize, reach: usize) -> Self {
         Self {
-            filled: Vec::with_capacity(size * (2 * reach + 1)),
+            filled: Vec::with_capacity(Self::places(size, reach)),
             ..Self::default()
         }
     }
@@ -47,9 +47,14 @@ impl Band {
         self.size
     }
 
+    /// Number of places for blocks of so many rows.
+    pub fn places(size: usize, reach: usize) -> usize {
+        size * (2 * reach + 1)
+    }
+
     /// Number of places for blocks.
     pub fn len(&self) -> usize {
-        self.size * (2 * self.reach + 1)
+        Self::places(self.size, self.reach)
     }
 
     /// Place of block (`i`, `j`).

@@ -128,7 +128,7 @@ pub struct Friction {
     /// Every ball with play, and which of them touch.
     touches: Vec<Touch>,
     active: Vec<usize>,
-    /// Those before.
+    /// Those that the band is arranged for.
     arranged: Vec<usize>,
     /// Touches further apart in their order do not feel each other.
     band: Band,
@@ -185,7 +185,7 @@ impl Friction {
             n: velocities,
             within,
             touches: Vec::new(),
-            active: (0..of.len()).collect(),
+            active: Vec::with_capacity(of.len()),
             arranged: Vec::with_capacity(of.len()),
             band: Band::default(),
             blocks: Vec::new(),
@@ -218,9 +218,8 @@ impl Friction {
             resistance: Mat3::zeros(),
         };
         friction.band = Band::with_room(of.len(), reach);
-        let size = of.len() * (2 * reach + 1);
+        let size = Band::places(of.len(), reach);
         friction.touches = of.into_iter().map(touch).collect();
-        friction.active.clear();
         friction.blocks.reserve_exact(size);
         friction.mobility.reserve_exact(size);
         Ok(friction)

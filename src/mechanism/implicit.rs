@@ -152,10 +152,10 @@ impl ImplicitContacts {
                 .map(|range| Vec::with_capacity(width(range)))
                 .collect(),
             weighted: ranges.iter().map(|r| vec![0.0; 3 * width(r)]).collect(),
-            blocks: vec![Mat3::zeros(); joints * (2 * reach + 1)],
+            blocks: vec![Mat3::zeros(); Band::places(joints, reach)],
             right: Vec::with_capacity(joints),
             before: Vec::with_capacity(joints),
-            mobility: vec![[Mat3::zeros(); 2]; joints * (2 * reach + 1)],
+            mobility: vec![[Mat3::zeros(); 2]; Band::places(joints, reach)],
             scratch: vec![0.0; n],
             ranges,
         })

@@ -24,35 +24,34 @@ fn run(name: &str, changes: &Changes, method: &str, tolerance: &str, end: f64) -
     (hits, simulation.statistics().evaluations)
 }
 
-/// Largest relative error of the peaks of the first six impacts of `reference`, all of which `found` must have within a thousandth of
-/// their time.
-fn off_at_first(found: &[Hit], reference: &[Hit]) -> f64 {
+/// Largest errors of `found` at the first six impacts of `reference`: of their starts, s, and relative, of their peaks.
+fn off_at_first(found: &[Hit], reference: &[Hit]) -> (f64, f64) {
     assert!(reference.len() >= 6);
-    let mut most = 0.0_f64;
+    let (mut late, mut off) = (0.0_f64, 0.0_f64);
     // Two joints may be hit within a few nanoseconds, in either order.
     for &(joint, before, start, peak) in &reference[..6] {
         let same = |hit: &&Hit| (hit.0, hit.1) == (joint, before);
         let &(.., at, force) = found.iter().find(same).expect("that impact");
-        let off = (at / start - 1.0).abs();
-        assert!(off < 1e-3, "at {at} instead of {start}");
-        most = most.max((force / peak - 1.0).abs());
+        late = late.max((at - start).abs());
+        off = off.max((force / peak - 1.0).abs());
     }
-    most
+    (late, off)
 }
 
 #[test]
 fn impacts_are_resolved_at_a_loose_tolerance() {
     let cases = [
-        ("chain", 25e-3),
-        ("four-bar", 20e-3),
-        ("pendulum", 60e-3),
-        ("slider-crank", 60e-3),
+        ("chain", 25e-3, 2e-6),
+        ("four-bar", 20e-3, 2e-6),
+        ("pendulum", 60e-3, 1e-5),
+        ("slider-crank", 60e-3, 3e-5),
     ];
-    for (scene, end) in cases {
+    for (scene, end, allowed) in cases {
         let (reference, _) = run(scene, &[], "dopri5", "1e-9", end);
         let (found, _) = run(scene, &[], "automatic", "1e-3", end);
-        let off = off_at_first(&found, &reference);
-        println!("{scene}: {off}");
+        let (late, off) = off_at_first(&found, &reference);
+        println!("{scene}: {late} {off}");
+        assert!(late < allowed, "{scene}: {late} s");
         assert!(off < 0.01, "{scene}: {off}");
     }
 }
@@ -67,7 +66,8 @@ fn friction_is_stepped_implicitly_where_it_holds_explicit_steps_back() {
     for (scene, changes, end, part) in cases {
         let (reference, _) = run(scene, changes, "dopri5", "1e-8", end);
         let (found, _) = run(scene, changes, "automatic", "1e-6", end);
-        let off = off_at_first(&found, &reference);
+        let (late, off) = off_at_first(&found, &reference);
+        assert!(late < 1e-5, "{scene}: {late} s");
         assert!(off < 0.01, "{scene}: {off}");
         let (_, explicit) = run(scene, changes, "dopri5", "1e-5", end);
         let (_, evaluations) = run(scene, changes, "automatic", "1e-5", end);
