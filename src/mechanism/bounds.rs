@@ -237,29 +237,23 @@ impl Cost {
     }
 }
 
-/// Approximate time of one evaluation with its part of a step, ns on one core of a server, as measured on chains, the paper's
-/// mechanism and machines with ideal joints: fixed, per velocity coordinate, per loose joint, and per multiplication in mass
-/// matrices and constraint rows. Only its ratio to the time of algebra counts.
+/// Approximate time of one evaluation, ns on one core of a server, as measured on chains, the paper's mechanism and machines
+/// with ideal joints: fixed, per velocity coordinate, per loose joint, and per multiplication in mass matrices and constraint
+/// rows. Only its ratio to the times of algebra counts.
 pub fn evaluation_time(scene: &Scene, model: &Model) -> f64 {
     let cost = Cost::of(scene.formulation, scene, model, &model.ideal_joints);
     let loose = model.joints.len() - model.ideal_joints.len();
-    1200.0 + 12.0 * model.nv as f64 + 120.0 * loose as f64 + 1.6 * cost.products as f64
+    600.0 + 6.0 * model.nv as f64 + 60.0 * loose as f64 + 0.8 * cost.products as f64
 }
 
-/// The same of the linear algebra of an implicit step with `velocities` velocity coordinates whose elimination took so many
-/// `products` for the real shift. Up to [`LARGEST_COUPLED`] it is counted as if all were coupled.
-pub fn algebra_time(velocities: usize, products: usize) -> f64 {
-    let n = velocities as f64;
-    if velocities <= LARGEST_COUPLED {
-        500.0 + n * n * (4.0 + 0.2 * n)
-    } else {
-        SPARSE_TIME[0] * n + SPARSE_TIME[1] * products as f64
-    }
+/// The same of linearising, factoring and solving an implicit step whose contacts and elements couple so many velocity
+/// `coordinates`, and whose elimination took so many `products` for the real shift.
+pub fn implicit_time(coordinates: usize, products: usize) -> f64 {
+    800.0 * coordinates as f64 + 6.0 * products as f64
 }
 
-/// Beyond that: per velocity coordinate and per product, as dear as keeps the first impacts of chains of 17 to 32 links from being
-/// slower than with explicit steps alone.
-const SPARSE_TIME: [f64; 2] = [800.0, 6.0];
+/// The same of a step with friction alone implicit, for every ball that touches.
+pub const FRICTION_TIME: f64 = 1200.0;
 
 /// The implicit methods refuse more velocity coordinates than this: they hold matrices over all of them.
 pub const LARGEST_DENSE: usize = 1024;

@@ -285,6 +285,11 @@ impl Friction {
         self.couple();
     }
 
+    /// Balls that touch.
+    pub fn touching(&self) -> usize {
+        self.active.len()
+    }
+
     fn arrange(&mut self) {
         let touch = |i: usize| &self.touches[self.active[i]];
         let size = self.active.len();

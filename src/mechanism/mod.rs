@@ -702,9 +702,15 @@ impl Mechanism {
 
     /// Approximate cost of the latest implicit step's linear algebra, in evaluations.
     pub fn implicit_algebra(&self) -> f64 {
-        let velocities = self.dimension() - self.positions();
-        let products = self.stiff.as_ref().map_or(0, |stiff| stiff.products());
-        bounds::algebra_time(velocities, products) / self.evaluation_time
+        let stiff = self.stiff.as_ref();
+        let [coordinates, products] = stiff.map_or([0; 2], |stiff| stiff.size());
+        bounds::implicit_time(coordinates, products) / self.evaluation_time
+    }
+
+    /// The same of the latest step with friction alone implicit.
+    pub fn friction_algebra(&self) -> f64 {
+        let touching = self.friction.as_ref().map_or(0, |f| f.touching());
+        bounds::FRICTION_TIME * touching as f64 / self.evaluation_time
     }
 
     /// Most velocity coordinates with which the automatic choice steps implicitly, too.

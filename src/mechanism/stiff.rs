@@ -321,10 +321,14 @@ impl Stiff {
         equations.apply_inverse_mass(model, &mut self.time_derivative[positions..]);
     }
 
-    /// Products that the latest elimination with a real shift took; 0 where there was nothing to eliminate.
-    pub fn products(&self) -> usize {
+    /// Coupled coordinates, and the products that their latest elimination with a real shift took; 0 where nothing is coupled.
+    pub fn size(&self) -> [usize; 2] {
         // What an earlier one left behind is no part of a snapshot.
-        if self.empty { 0 } else { self.lu.products }
+        if self.empty {
+            [0; 2]
+        } else {
+            [self.coordinates.len(), self.lu.products]
+        }
     }
 
     /// Prepares to solve with a real shift s: factors s I - M^-1 D - M^-1 K / s.

@@ -14,19 +14,20 @@ const LIMITED_STEPS: u32 = 8;
 /// Steps that must be limited by stability before friction is tried as the cause.
 const LIMITED_BEFORE_FRICTION: u32 = 2;
 const SETTLED_STEPS: u32 = 60;
-/// Over this many implicit steps the progress per cost must be this many times that of the explicit methods before; otherwise
-/// these get steps for this many times the cost of the trial, twice as many after each consecutive failed trial, at most so many
-/// times.
+/// Over this many implicit steps, or those until something strikes, the progress per cost must be this many times that of the
+/// explicit methods before; otherwise these get steps for this many times the cost of the trial, twice as many after each
+/// consecutive failed trial, at most so many times.
 const TRIAL_STEPS: u32 = 24;
-/// The first of them, in which the step still grows, do not count.
-const GROWING_STEPS: u32 = 8;
-const WORTH_IT: f64 = 0.85;
+/// The first of them, in which the step still grows, do not count where all are taken.
+const GROWING_STEPS: u32 = 4;
+const WORTH_IT: f64 = 0.7;
 /// How much of the progress and cost of the explicit methods counts a step later.
 const KEPT: f64 = 0.95;
-const EXPLICIT_TURN: f64 = 2.0;
+const EXPLICIT_TURN: f64 = 2.5;
 const MOST_DOUBLINGS: u32 = 3;
-/// Evaluations of one explicit step.
-const EXPLICIT_EVALUATIONS: f64 = 6.0;
+/// Cost of a step beside evaluations and algebra (events, peaks, energies), and of an explicit step in all, in evaluations.
+const STEP_COST: f64 = 6.0;
+const EXPLICIT_COST: f64 = STEP_COST + 6.0;
 
 /// State of the automatic pair.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -47,6 +48,23 @@ pub(super) struct Choice {
     pub(super) steps: u32,
     /// Consecutive failed trials.
     pub(super) failures: u32,
+}
+
+impl Choice {
+    /// Ends the trial of the implicit method; whether it failed.
+    fn judge(&mut self) -> bool {
+        let explicit = self.explicit_progress / self.explicit_cost;
+        let fails = self.progress < WORTH_IT * explicit * self.cost;
+        if fails {
+            let turn = EXPLICIT_TURN * self.cost / EXPLICIT_COST;
+            self.wait = (turn as u32) << self.failures.min(MOST_DOUBLINGS);
+            self.failures += 1;
+        } else {
+            self.failures = 0;
+        }
+        (self.progress, self.cost, self.steps) = (0.0, 0.0, 0);
+        fails
+    }
 }
 
 impl Simulation {
@@ -83,53 +101,55 @@ impl Simulation {
 
     fn next_member(&mut self, h: f64, stiffness: f64, evaluations: f64) -> Member {
         let velocities = self.state.now.y.len() - self.mechanism.positions();
-        let algebra = f64::from(self.attempt.factorisations) * self.mechanism.implicit_algebra();
+        let factorisations = f64::from(self.attempt.factorisations);
         let state = &mut self.state;
         let member = state.control.member;
+        let algebra = match member {
+            Member::Explicit => 0.0,
+            Member::Friction => self.mechanism.friction_algebra(),
+            Member::Implicit => factorisations * self.mechanism.implicit_algebra(),
+        };
+        let cost = evaluations + algebra + STEP_COST;
         let choice = &mut state.control.choice;
+        if member == Member::Implicit {
+            choice.progress += h;
+            choice.cost += cost;
+            choice.steps += 1;
+        }
         if state.control.contact_began {
             choice.since_contact = 0;
             choice.limited = 0;
-            (choice.explicit_progress, choice.explicit_cost) = (0.0, 0.0);
             // An impact is short and not stiff: the explicit method resolves it at less cost.
             let strikes = state.now.memory.iter().any(|m| m.active && !m.floored);
-            return match member {
-                Member::Implicit if strikes => Member::Explicit,
-                _ => member,
-            };
+            let leaves = member == Member::Implicit && strikes;
+            if leaves {
+                choice.judge();
+            }
+            (choice.explicit_progress, choice.explicit_cost) = (0.0, 0.0);
+            return if leaves { Member::Explicit } else { member };
         }
         if member == Member::Implicit {
-            choice.progress += h;
-            choice.cost += evaluations + algebra;
-            choice.steps += 1;
             if choice.steps == GROWING_STEPS {
                 (choice.progress, choice.cost) = (0.0, 0.0);
             }
             if choice.steps >= TRIAL_STEPS {
-                let explicit = choice.explicit_progress / choice.explicit_cost;
-                let fails = choice.progress < WORTH_IT * explicit * choice.cost;
-                let per_step = choice.cost / f64::from(TRIAL_STEPS - GROWING_STEPS);
-                (choice.progress, choice.cost, choice.steps) = (0.0, 0.0, 0);
-                if fails {
+                if choice.judge() {
                     // That step may have been cut at an event to next to nothing.
                     state.control.h_next = choice.h_explicit.max(shortest_step(state.now.t));
-                    let trial = per_step * f64::from(TRIAL_STEPS) / EXPLICIT_EVALUATIONS;
-                    choice.wait =
-                        ((EXPLICIT_TURN * trial) as u32) << choice.failures.min(MOST_DOUBLINGS);
-                    choice.failures += 1;
                     return Member::Explicit;
                 }
-                choice.failures = 0;
             }
             return member;
         }
         choice.since_contact += 1;
         choice.explicit_progress = KEPT * choice.explicit_progress + h;
-        choice.explicit_cost = KEPT * choice.explicit_cost + evaluations;
+        choice.explicit_cost = KEPT * choice.explicit_cost + cost;
         let touches = state.now.memory.iter().any(|m| m.active);
         let mut next = member;
         if member == Member::Friction {
-            if self.mechanism.friction_rate() * h < STABILITY_LIMIT {
+            // It costs more than an explicit step, which must be as much shorter.
+            let dearer = 1.0 + algebra / EXPLICIT_COST;
+            if self.mechanism.friction_rate() * h < STABILITY_LIMIT * dearer {
                 choice.limited = 0;
                 next = Member::Explicit;
             } else {
