@@ -132,12 +132,10 @@ impl Simulation {
             if choice.steps == GROWING_STEPS {
                 (choice.progress, choice.cost) = (0.0, 0.0);
             }
-            if choice.steps >= TRIAL_STEPS {
-                if choice.judge() {
-                    // That step may have been cut at an event to next to nothing.
-                    state.control.h_next = choice.h_explicit.max(shortest_step(state.now.t));
-                    return Member::Explicit;
-                }
+            if choice.steps >= TRIAL_STEPS && choice.judge() {
+                // That step may have been cut at an event to next to nothing.
+                state.control.h_next = choice.h_explicit.max(shortest_step(state.now.t));
+                return Member::Explicit;
             }
             return member;
         }
@@ -232,6 +230,34 @@ pub(super) fn prepare_implicit(
 mod tests {
     use super::*;
     use crate::scene::Scene;
+
+    #[test]
+    fn a_trial_that_a_strike_ends_is_judged_by_what_it_did() {
+        let mut simulation = Simulation::new(&Scene::load("spcmm", &[]).unwrap()).unwrap();
+        simulation.advance_to(1.0).unwrap();
+        simulation.state.now.memory[0].active = true;
+        simulation.state.now.memory[0].floored = false;
+        // Progress per cost over that of the explicit steps.
+        for (ratio, fails) in [(0.9 * WORTH_IT, true), (1.1 * WORTH_IT, false)] {
+            simulation.state.control.member = Member::Implicit;
+            simulation.state.control.contact_began = true;
+            simulation.state.control.choice = Choice {
+                explicit_progress: 1e-3,
+                explicit_cost: 1e3,
+                progress: ratio * 1e-2,
+                cost: 1e4,
+                steps: 7,
+                failures: 1,
+                ..Choice::default()
+            };
+            simulation.choose_member(1e-9, 0.0, 10.0);
+            let control = &simulation.state.control;
+            assert_eq!(control.member, Member::Explicit);
+            assert_eq!(control.choice.wait > 0, fails, "{ratio}");
+            assert_eq!(control.choice.failures, if fails { 2 } else { 0 });
+            assert_eq!(control.choice.steps, 0);
+        }
+    }
 
     #[test]
     fn a_failed_trial_leaves_a_step_that_advances_time() {
