@@ -18,7 +18,7 @@ const SETTLED_STEPS: u32 = 60;
 /// explicit methods before; otherwise these get steps for this many times the cost of the trial, twice as many after each
 /// consecutive failed trial, at most so many times.
 const TRIAL_STEPS: u32 = 24;
-/// The first of them, in which the step still grows, do not count where all are taken.
+/// The first of them, in which the step still grows, do not count once there are as many.
 const GROWING_STEPS: u32 = 4;
 const WORTH_IT: f64 = 0.7;
 /// How much of the progress and cost of the explicit methods counts a step later.
