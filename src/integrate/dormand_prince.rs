@@ -1,7 +1,7 @@
 //! Dormand-Prince 5(4) with its continuous extension of order 4
 //! (Hairer, Nørsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed., Table II.5.2 and II.6).
 
-use super::{Stepper, System, combine};
+use super::{Stepper, System, combine, copy};
 use std::ops::Range;
 
 const C: [f64; 5] = [0.2, 0.3, 0.8, 8.0 / 9.0, 1.0];
@@ -128,11 +128,11 @@ impl DormandPrince {
         }
     }
 
-    /// Estimate of h |lambda| for the step just attempted, from the two evaluations at its end; 0 if it was truncated. Beyond
-    /// about 3.25 the step is limited by stability, not accuracy (Hairer & Wanner II, IV.2, eq. (2.8)).
-    pub fn stiffness(&self, h: f64, y_end: &[f64], k_end: &[f64]) -> f64 {
+    /// Estimate of h |lambda| for the step just attempted, from the two evaluations at its end, in the `moving` components; 0 if
+    /// it was truncated. Beyond about 3.25 the step is limited by stability, not accuracy (Hairer & Wanner II, IV.2, eq. (2.8)).
+    pub fn stiffness(&self, moving: &[Range<usize>], h: f64, y_end: &[f64], k_end: &[f64]) -> f64 {
         let (mut rate, mut distance) = (0.0, 0.0);
-        for i in 0..y_end.len() {
+        for i in moving.iter().flat_map(Range::clone) {
             let (dk, dy) = (k_end[i] - self.k6[i], y_end[i] - self.stage[i]);
             rate += dk * dk;
             distance += dy * dy;
@@ -156,7 +156,6 @@ impl Stepper for DormandPrince {
         y_end: &mut [f64],
         k_end: &mut [f64],
     ) -> f64 {
-        let n = y.len();
         let Self {
             k2,
             k3,
@@ -170,14 +169,15 @@ impl Stepper for DormandPrince {
         } = self;
         *kept = 1.0;
         let [a2, a3, a4, a5, a6] = &A;
-        combine(stage, y, h, [(a2[0], k)]);
+        combine(system.moving(), stage, y, h, [(a2[0], k)]);
         system.derivative(t + C[0] * h, stage, k2);
-        combine(stage, y, h, [(a3[0], k), (a3[1], k2)]);
+        combine(system.moving(), stage, y, h, [(a3[0], k), (a3[1], k2)]);
         system.derivative(t + C[1] * h, stage, k3);
-        combine(stage, y, h, [(a4[0], k), (a4[1], k2), (a4[2], k3)]);
+        let terms = [(a4[0], k), (a4[1], k2), (a4[2], k3)];
+        combine(system.moving(), stage, y, h, terms);
         system.derivative(t + C[2] * h, stage, k4);
         let terms = [(a5[0], k), (a5[1], k2), (a5[2], k3), (a5[3], k4)];
-        combine(stage, y, h, terms);
+        combine(system.moving(), stage, y, h, terms);
         system.derivative(t + C[3] * h, stage, k5);
         let terms = [
             (a6[0], k),
@@ -186,29 +186,31 @@ impl Stepper for DormandPrince {
             (a6[3], k4),
             (a6[4], k5),
         ];
-        combine(stage, y, h, terms);
+        combine(system.moving(), stage, y, h, terms);
         system.derivative(t + C[4] * h, stage, k6);
         let terms = [(B[0], k), (B[1], k3), (B[2], k4), (B[3], k5), (B[4], k6)];
-        combine(y_end, y, h, terms);
+        combine(system.moving(), y_end, y, h, terms);
         system.derivative(t + h, y_end, k_end);
-        raw_end.copy_from_slice(y_end);
-        raw_k_end.copy_from_slice(k_end);
-        let [k, k3, k4, k5, k6, k_end, scale] =
-            [k, k3, k4, k5, k6, k_end, system.scale()].map(|x| &x[..n]);
+        copy(system.moving(), raw_end, y_end);
+        copy(system.moving(), raw_k_end, k_end);
         let mut error = 0.0;
-        for i in 0..n {
-            let e = h
-                * (E[0] * k[i]
-                    + E[1] * k3[i]
-                    + E[2] * k4[i]
-                    + E[3] * k5[i]
-                    + E[4] * k6[i]
-                    + E[5] * k_end[i])
-                    .abs();
-            let e = e / scale[i];
-            // `max` would drop a NaN.
-            if e > error || e.is_nan() {
-                error = e;
+        for part in system.moving() {
+            let [k, k3, k4, k5, k6, k_end, scale] =
+                [k, k3, k4, k5, k6, k_end, system.scale()].map(|x| &x[part.clone()]);
+            for i in 0..part.len() {
+                let e = h
+                    * (E[0] * k[i]
+                        + E[1] * k3[i]
+                        + E[2] * k4[i]
+                        + E[3] * k5[i]
+                        + E[4] * k6[i]
+                        + E[5] * k_end[i])
+                        .abs();
+                let e = e / scale[i];
+                // `max` would drop a NaN.
+                if e > error || e.is_nan() {
+                    error = e;
+                }
             }
         }
         error

@@ -20,6 +20,7 @@ pub use root::find_root;
 pub use rosenbrock::Rosenbrock;
 
 use crate::words::words;
+use std::ops::Range;
 
 /// Time-stepping method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,6 +72,9 @@ pub trait System {
     fn dimension(&self) -> usize;
     /// Number of leading components that are positions; the others are velocities.
     fn positions(&self) -> usize;
+    /// Components that steps move, in their order. A method need not look at the others: their derivatives are zero, and where
+    /// they are at a step's end is not its business.
+    fn moving(&self) -> &[Range<usize>];
     /// f(t, y) into `dy`.
     fn derivative(&mut self, t: f64, y: &[f64], dy: &mut [f64]);
     /// The position part of f alone, into the first [`System::positions`] components of `dy`; evaluates no force.
@@ -155,25 +159,64 @@ pub fn hermite(
     }
 }
 
-/// `out` = y + h (a_1 k_1 + a_2 k_2 + …) for the `terms` (a, k). All of one length as far as the compiler knows, so that it
-/// takes several components at a time.
-fn combine<const N: usize>(out: &mut [f64], y: &[f64], h: f64, terms: [(f64, &[f64]); N]) {
-    let y = &y[..out.len()];
-    let terms = terms.map(|(a, k)| (a, &k[..out.len()]));
-    for i in 0..out.len() {
-        let mut sum = terms[0].0 * terms[0].1[i];
-        for (a, k) in &terms[1..] {
-            sum += a * k[i];
+/// `out` = y + h (a_1 k_1 + a_2 k_2 + …) for the `terms` (a, k), in these `parts`. All of one length as far as the compiler
+/// knows, so that it takes several components at a time.
+fn combine<const N: usize>(
+    parts: &[Range<usize>],
+    out: &mut [f64],
+    y: &[f64],
+    h: f64,
+    terms: [(f64, &[f64]); N],
+) {
+    for part in parts {
+        let (out, y) = (&mut out[part.clone()], &y[part.clone()]);
+        let terms = terms.map(|(a, k)| (a, &k[part.clone()]));
+        for i in 0..out.len() {
+            let mut sum = terms[0].0 * terms[0].1[i];
+            for (a, k) in &terms[1..] {
+                sum += a * k[i];
+            }
+            out[i] = y[i] + h * sum;
         }
-        out[i] = y[i] + h * sum;
     }
 }
 
-/// `out` += a k.
-fn add_scaled(out: &mut [f64], a: f64, k: &[f64]) {
-    for (out, k) in out.iter_mut().zip(k) {
-        *out += a * k;
+/// `out` += a k, in these `parts`.
+pub(crate) fn add_scaled(parts: &[Range<usize>], out: &mut [f64], a: f64, k: &[f64]) {
+    for part in parts {
+        for (out, k) in out[part.clone()].iter_mut().zip(&k[part.clone()]) {
+            *out += a * k;
+        }
     }
+}
+
+/// `x` / s, in these `parts`.
+pub(crate) fn divide(parts: &[Range<usize>], x: &mut [f64], s: f64) {
+    for part in parts {
+        x[part.clone()].iter_mut().for_each(|x| *x /= s);
+    }
+}
+
+/// Copies these `parts`.
+pub(crate) fn copy(parts: &[Range<usize>], out: &mut [f64], from: &[f64]) {
+    for part in parts {
+        out[part.clone()].copy_from_slice(&from[part.clone()]);
+    }
+}
+
+/// Largest component relative to its scale in these `parts`; NaN if any is.
+fn largest(parts: &[Range<usize>], x: &[f64], scale: &[f64]) -> f64 {
+    let mut size: f64 = 0.0;
+    for part in parts {
+        for (x, s) in x[part.clone()].iter().zip(&scale[part.clone()]) {
+            let e = x.abs() / s;
+            // `max` would drop a NaN.
+            if e > size || e.is_nan() {
+                size = e;
+            }
+        }
+    }
+    size
 }
 
 #[cfg(test)]
@@ -189,6 +232,9 @@ mod tests {
         }
         fn positions(&self) -> usize {
             1
+        }
+        fn moving(&self) -> &[Range<usize>] {
+            std::slice::from_ref(&(0..2))
         }
         fn derivative(&mut self, _t: f64, y: &[f64], dy: &mut [f64]) {
             dy[0] = y[1];
@@ -228,6 +274,20 @@ mod tests {
         assert!((euler - 1.0).abs() < 0.1, "semi-implicit Euler: {euler}");
         assert!((rk4 - 4.0).abs() < 0.1, "Runge-Kutta 4: {rk4}");
         assert!((dopri - 5.0).abs() < 0.2, "Dormand-Prince: {dopri}");
+    }
+
+    #[test]
+    fn what_does_not_move_is_not_looked_at() {
+        let step = |y: &[f64], k: &mut [f64], end: &mut [f64], k_end: &mut [f64]| {
+            Oscillator.derivative(0.0, y, k);
+            DormandPrince::new(y.len()).attempt(&mut Oscillator, 0.0, 0.3, y, k, end, k_end)
+        };
+        let (mut alone, mut beside) = ([0.0; 2], [0.0; 3]);
+        let error = step(&[1.0, 0.2], &mut [0.0; 2], &mut alone, &mut [0.0; 2]);
+        let unknown = f64::NAN;
+        let y = [1.0, 0.2, unknown];
+        let same = step(&y, &mut [0.0, 0.0, unknown], &mut beside, &mut [0.0; 3]);
+        assert_eq!((error, &alone[..]), (same, &beside[..2]));
     }
 
     fn interpolation_error(h: f64) -> f64 {

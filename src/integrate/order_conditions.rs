@@ -134,6 +134,7 @@ struct Probe {
     /// Times and states of the evaluations.
     asked: Vec<(f64, Vec<f64>)>,
     scale: Vec<f64>,
+    all: Range<usize>,
     shift: f64,
     zero: Vec<f64>,
 }
@@ -147,6 +148,7 @@ impl Probe {
             calls: 1,
             asked: vec![(0.0, vec![0.0; n])],
             scale: vec![1.0; n],
+            all: 0..n,
             shift: 0.0,
             zero: vec![0.0; n],
         }
@@ -183,6 +185,9 @@ impl System for Probe {
     }
     fn positions(&self) -> usize {
         0
+    }
+    fn moving(&self) -> &[Range<usize>] {
+        std::slice::from_ref(&self.all)
     }
     fn derivative(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
         self.asked.push((t, y.to_vec()));
@@ -411,6 +416,9 @@ impl System for Falling {
     }
     fn positions(&self) -> usize {
         1
+    }
+    fn moving(&self) -> &[Range<usize>] {
+        std::slice::from_ref(&(0..2))
     }
     fn derivative(&mut self, _t: f64, y: &[f64], dy: &mut [f64]) {
         dy.copy_from_slice(&[y[1], self.0]);

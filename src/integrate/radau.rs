@@ -6,7 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::StiffSystem;
+use super::{StiffSystem, copy, largest};
 use std::ops::Range;
 
 const SQRT6: f64 = 2.449_489_742_783_178;
@@ -161,9 +161,8 @@ impl Radau {
         k_end: &mut [f64],
         tolerance: f64,
     ) -> f64 {
-        let n = y.len();
         self.factorisations = 0;
-        if self.begin(t, h, n) {
+        if self.begin(system.moving(), t, h) {
             self.linearise_within(system, t, h, y);
         } else {
             if self.linearised_at != Some(t) {
@@ -184,14 +183,12 @@ impl Radau {
             *held *= RELEASE;
             self.growth = self.growth.min(*held / h);
         }
-        for i in 0..n {
-            y_end[i] = y[i] + self.z[2][i];
-        }
+        add(system.moving(), y_end, y, &self.z[2]);
         let error = self.estimate(system, t, h, y, k, tolerance);
         system.derivative(t + h, y_end, k_end);
         // What went astray is no guess for the next try.
         if error.is_finite() {
-            self.remember(t, h);
+            self.remember(system.moving(), t, h);
         }
         error
     }
@@ -208,7 +205,7 @@ impl Radau {
 
     /// Starting guess for the stages: the previous step's polynomial, extrapolated, or that of a longer attempt from here.
     /// Returns whether it is the former: an attempt may have failed because it went astray.
-    fn begin(&mut self, t: f64, h: f64, n: usize) -> bool {
+    fn begin(&mut self, moving: &[Range<usize>], t: f64, h: f64) -> bool {
         let again =
             self.previous.h > 0.0 && (self.previous.end - self.previous.h - t).abs() <= 1e-9 * h;
         let follows = self.previous.h > 0.0
@@ -222,16 +219,19 @@ impl Radau {
             return false;
         }
         let ratio = h / self.previous.h;
-        for i in 0..n {
-            let z = std::array::from_fn(|j| self.previous.z[j][i]);
-            // The polynomial is in s = (time - step's end) / h_previous and gives increments from its own start.
-            let from = if again { -1.0 } else { 0.0 };
-            let start = polynomial(&z, from);
-            for j in 0..3 {
-                self.z[j][i] = polynomial(&z, from + C[j] * ratio) - start;
-            }
-            for j in 0..3 {
-                self.w[j][i] = (0..3).map(|m| T_INVERSE[j][m] * self.z[m][i]).sum();
+        // The polynomial is in s = (time - step's end) / h_previous and gives increments from its own start.
+        let from = if again { -1.0 } else { 0.0 };
+        let at = C.map(|c| from + c * ratio);
+        for part in moving {
+            let before = self.previous.z.each_ref().map(|z| &z[part.clone()]);
+            let [z1, z2, z3] = self.z.each_mut().map(|z| &mut z[part.clone()]);
+            let [w1, w2, w3] = self.w.each_mut().map(|w| &mut w[part.clone()]);
+            for i in 0..part.len() {
+                let course = Course::of(&before.map(|z| z[i]));
+                let start = course.at(from);
+                let z = at.map(|s| course.at(s) - start);
+                [z1[i], z2[i], z3[i]] = z;
+                [w1[i], w2[i], w3[i]] = times(&T_INVERSE, &z);
             }
         }
         !again
@@ -240,9 +240,7 @@ impl Radau {
     /// Takes the Jacobian at the second stage as far as it is known. Where a contact's normal turns within the step, that of its
     /// start fits its end badly; this one serves all three stages, and the method's order does not depend on it.
     fn linearise_within<S: StiffSystem>(&mut self, system: &mut S, t: f64, h: f64, y: &[f64]) {
-        for ((stage, y), z) in self.stage.iter_mut().zip(y).zip(&self.z[1]) {
-            *stage = y + z;
-        }
+        add(system.moving(), &mut self.stage, y, &self.z[1]);
         system.linearise(t + C[1] * h, &self.stage);
         self.linearised_at = None;
         self.factor(system, h);
@@ -264,7 +262,6 @@ impl Radau {
         y: &[f64],
         tolerance: f64,
     ) -> bool {
-        let n = y.len();
         // The iteration's own error stays well below the step's.
         let target = (10.0 * f64::EPSILON / tolerance).max(tolerance.sqrt().min(LEFT));
         let (real, alpha, beta) = (REAL / h, PAIR.0 / h, PAIR.1 / h);
@@ -276,40 +273,38 @@ impl Radau {
         let mut renewed = false;
         for iteration in 0..MOST_ITERATIONS {
             for j in 0..3 {
-                for ((stage, y), z) in self.stage.iter_mut().zip(y).zip(&self.z[j]) {
-                    *stage = y + z;
-                }
+                add(system.moving(), &mut self.stage, y, &self.z[j]);
                 system.derivative(t + C[j] * h, &self.stage, &mut self.f[j]);
             }
-            let [f1, f2, f3] = self.f.each_mut().map(|f| &mut f[..n]);
-            let [w1, w2, w3] = self.w.each_mut().map(|w| &mut w[..n]);
-            for i in 0..n {
-                let f = [f1[i], f2[i], f3[i]];
-                let a: [f64; 3] = std::array::from_fn(|j| {
-                    T_INVERSE[j][0] * f[0] + T_INVERSE[j][1] * f[1] + T_INVERSE[j][2] * f[2]
-                });
-                f1[i] = a[0] - real * w1[i];
-                f2[i] = a[1] - alpha * w2[i] + beta * w3[i];
-                f3[i] = a[2] - alpha * w3[i] - beta * w2[i];
+            for part in system.moving() {
+                let [f1, f2, f3] = self.f.each_mut().map(|f| &mut f[part.clone()]);
+                let [w1, w2, w3] = self.w.each_ref().map(|w| &w[part.clone()]);
+                for i in 0..part.len() {
+                    let a = times(&T_INVERSE, &[f1[i], f2[i], f3[i]]);
+                    f1[i] = a[0] - real * w1[i];
+                    f2[i] = a[1] - alpha * w2[i] + beta * w3[i];
+                    f3[i] = a[2] - alpha * w3[i] - beta * w2[i];
+                }
             }
+            let [f1, f2, f3] = &mut self.f;
             system.solve_shifted(f1);
             system.solve_shifted_pair(f2, f3);
-            let scale = &system.scale()[..n];
-            let z = self.z.each_mut().map(|z| &mut z[..n]);
             let mut size: f64 = 0.0;
-            for i in 0..n {
-                let mut largest: f64 = 0.0;
-                for (w, f) in [(&mut *w1, &*f1), (&mut *w2, &*f2), (&mut *w3, &*f3)] {
-                    w[i] += f[i];
-                    largest = largest.max(f[i].abs());
-                }
-                let w = [w1[i], w2[i], w3[i]];
-                for j in 0..3 {
-                    z[j][i] = T[j][0] * w[0] + T[j][1] * w[1] + T[j][2] * w[2];
-                }
-                let relative = largest / (tolerance * scale[i]);
-                if relative > size || relative.is_nan() {
-                    size = relative;
+            for part in system.moving() {
+                let scale = &system.scale()[part.clone()];
+                let [f1, f2, f3] = self.f.each_ref().map(|f| &f[part.clone()]);
+                let [w1, w2, w3] = self.w.each_mut().map(|w| &mut w[part.clone()]);
+                let [z1, z2, z3] = self.z.each_mut().map(|z| &mut z[part.clone()]);
+                for i in 0..part.len() {
+                    let f = [f1[i], f2[i], f3[i]];
+                    let w = [w1[i] + f[0], w2[i] + f[1], w3[i] + f[2]];
+                    [w1[i], w2[i], w3[i]] = w;
+                    [z1[i], z2[i], z3[i]] = times(&T, &w);
+                    let largest = 0.0_f64.max(f[0].abs()).max(f[1].abs()).max(f[2].abs());
+                    let relative = largest / (tolerance * scale[i]);
+                    if relative > size || relative.is_nan() {
+                        size = relative;
+                    }
                 }
             }
             if !size.is_finite() {
@@ -361,33 +356,33 @@ impl Radau {
         k: &[f64],
         tolerance: f64,
     ) -> f64 {
-        let n = y.len();
-        let weighted = |z: &[Vec<f64>; 3], i: usize| {
-            (ERROR[0] * z[0][i] + ERROR[1] * z[1][i] + ERROR[2] * z[2][i]) / h
-        };
-        for i in 0..n {
-            self.error[i] = weighted(&self.z, i) + k[i];
-        }
+        copy(system.moving(), &mut self.error, k);
+        self.add_weighted(system.moving(), h);
         system.solve_shifted(&mut self.error);
-        let mut error = largest(&self.error, system.scale());
+        let mut error = largest(system.moving(), &self.error, system.scale());
         if error > tolerance {
-            for i in 0..n {
-                self.stage[i] = y[i] + self.error[i];
-            }
-            let (stage, rate) = (&self.stage, &mut self.error);
-            system.derivative(t, stage, rate);
-            for i in 0..n {
-                self.error[i] += weighted(&self.z, i);
-            }
+            add(system.moving(), &mut self.stage, y, &self.error);
+            system.derivative(t, &self.stage, &mut self.error);
+            self.add_weighted(system.moving(), h);
             system.solve_shifted(&mut self.error);
-            error = largest(&self.error, system.scale());
+            error = largest(system.moving(), &self.error, system.scale());
         }
         error
     }
 
-    fn remember(&mut self, t: f64, h: f64) {
-        for j in 0..3 {
-            self.previous.z[j].copy_from_slice(&self.z[j]);
+    /// Adds the stages' part of the estimate to the derivative in `error`.
+    fn add_weighted(&mut self, moving: &[Range<usize>], h: f64) {
+        for part in moving {
+            let [z1, z2, z3] = self.z.each_ref().map(|z| &z[part.clone()]);
+            for (i, error) in self.error[part.clone()].iter_mut().enumerate() {
+                *error += (ERROR[0] * z1[i] + ERROR[1] * z2[i] + ERROR[2] * z3[i]) / h;
+            }
+        }
+    }
+
+    fn remember(&mut self, moving: &[Range<usize>], t: f64, h: f64) {
+        for (to, z) in self.previous.z.iter_mut().zip(&self.z) {
+            copy(moving, to, z);
         }
         self.previous.h = h;
         self.previous.end = t + h;
@@ -397,9 +392,9 @@ impl Radau {
     pub fn truncate(&mut self, theta: f64) {
         let n = self.stage.len();
         for i in 0..n {
-            let z = std::array::from_fn(|j| self.previous.z[j][i]);
+            let course = Course::of(&std::array::from_fn(|j| self.previous.z[j][i]));
             for j in 0..3 {
-                self.previous.z[j][i] = polynomial(&z, C[j] * theta - 1.0);
+                self.previous.z[j][i] = course.at(C[j] * theta - 1.0);
             }
         }
         self.previous.end -= (1.0 - theta) * self.previous.h;
@@ -411,33 +406,49 @@ impl Radau {
         let y = &y[part.clone()];
         let z = self.previous.z.each_ref().map(|z| &z[part.clone()]);
         for (i, out) in out[part].iter_mut().enumerate() {
-            *out = y[i] + polynomial(&z.map(|z| z[i]), theta - 1.0);
+            *out = y[i] + Course::of(&z.map(|z| z[i])).at(theta - 1.0);
         }
     }
 }
 
-/// Largest component relative to its scale; NaN if any is.
-fn largest(x: &[f64], scale: &[f64]) -> f64 {
-    let mut size: f64 = 0.0;
-    for (x, s) in x.iter().zip(scale) {
-        let e = x.abs() / s;
-        if e > size || e.is_nan() {
-            size = e;
+/// `out` = y + z in these `parts`.
+fn add(parts: &[Range<usize>], out: &mut [f64], y: &[f64], z: &[f64]) {
+    for part in parts {
+        let [y, z] = [y, z].map(|x| &x[part.clone()]);
+        for ((out, y), z) in out[part.clone()].iter_mut().zip(y).zip(z) {
+            *out = y + z;
         }
     }
-    size
 }
 
-/// Increment from the step's start at s = (time - step's end) / h: the cubic through 0 and the three stages.
-fn polynomial(z: &[f64; 3], s: f64) -> f64 {
-    let (c1, c2) = (C[0], C[1]);
-    let (c1m1, c2m1) = (c1 - 1.0, c2 - 1.0);
-    let a1 = (z[1] - z[2]) / c2m1;
-    let slope = (z[0] - z[1]) / (c1 - c2);
-    let a3 = (slope - z[0] / c1) / c2;
-    let a2 = (slope - a1) / c1m1;
-    let a3 = a2 - a3;
-    z[2] + s * (a1 + (s - c2m1) * (a2 + (s - c1m1) * a3))
+/// m x.
+#[inline(always)]
+fn times(m: &[[f64; 3]; 3], x: &[f64; 3]) -> [f64; 3] {
+    m.map(|row| row[0] * x[0] + row[1] * x[1] + row[2] * x[2])
+}
+
+/// Increment of one component from the step's start: the cubic through 0 and the three stages, in Newton's form.
+struct Course([f64; 4]);
+
+impl Course {
+    const NODES: [f64; 2] = [C[0] - 1.0, C[1] - 1.0];
+
+    #[inline(always)]
+    fn of(z: &[f64; 3]) -> Self {
+        let (c1, c2) = (C[0], C[1]);
+        let a1 = (z[1] - z[2]) / Self::NODES[1];
+        let slope = (z[0] - z[1]) / (c1 - c2);
+        let a3 = (slope - z[0] / c1) / c2;
+        let a2 = (slope - a1) / Self::NODES[0];
+        Self([z[2], a1, a2, a2 - a3])
+    }
+
+    /// At s = (time - step's end) / h.
+    #[inline(always)]
+    fn at(&self, s: f64) -> f64 {
+        let [a0, a1, a2, a3] = self.0;
+        a0 + s * (a1 + (s - Self::NODES[1]) * (a2 + (s - Self::NODES[0]) * a3))
+    }
 }
 
 /// Coefficient matrix behind the transformation, and the weights of the embedded method, that of the derivative at the
@@ -466,7 +477,7 @@ pub(super) fn weights_within(theta: f64, a: &[Vec<f64>; 3]) -> Vec<f64> {
     let unit = |i: usize| std::array::from_fn(|j| f64::from(u8::from(i == j)));
     let mut weights = vec![0.0; 3];
     for (i, row) in a.iter().enumerate() {
-        let part = polynomial(&unit(i), theta - 1.0);
+        let part = Course::of(&unit(i)).at(theta - 1.0);
         for (weight, a) in weights.iter_mut().zip(row) {
             *weight += part * a;
         }
@@ -505,6 +516,9 @@ mod tests {
         }
         fn positions(&self) -> usize {
             0
+        }
+        fn moving(&self) -> &[Range<usize>] {
+            std::slice::from_ref(&(0..2))
         }
         fn derivative(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
             dy[0] = y[1];
@@ -579,6 +593,30 @@ mod tests {
     }
 
     #[test]
+    fn what_does_not_move_is_not_looked_at() {
+        // Two steps: the second starts from the polynomial of the first.
+        let steps = |y: &[f64], k: &[f64]| {
+            let (mut y, mut k) = (y.to_vec(), k.to_vec());
+            let (mut y1, mut k1) = (y.clone(), k.clone());
+            let mut system = VanDerPol::new(0.1);
+            let mut method = Radau::new(y.len());
+            system.derivative(0.0, &y, &mut k);
+            let mut error = 0.0;
+            for n in 0..2 {
+                let t = 0.02 * f64::from(n);
+                error = method.attempt(&mut system, t, 0.02, &y, &k, &mut y1, &mut k1, 1e-9);
+                std::mem::swap(&mut y, &mut y1);
+                std::mem::swap(&mut k, &mut k1);
+            }
+            (error, y[..2].to_vec())
+        };
+        let unknown = f64::NAN;
+        let alone = steps(&[1.5, -1.0], &[0.0; 2]);
+        assert!(alone.0 > 0.0);
+        assert_eq!(alone, steps(&[1.5, -1.0, unknown], &[0.0, 0.0, unknown]));
+    }
+
+    #[test]
     fn transformation_and_its_inverse_belong_together() {
         for i in 0..3 {
             for j in 0..3 {
@@ -592,9 +630,10 @@ mod tests {
     #[test]
     fn polynomial_passes_through_its_stages() {
         let z = [0.3, -0.7, 1.1];
-        assert!(polynomial(&z, -1.0).abs() < 1e-15);
+        let course = Course::of(&z);
+        assert!(course.at(-1.0).abs() < 1e-15);
         for j in 0..3 {
-            assert!((polynomial(&z, C[j] - 1.0) - z[j]).abs() < 1e-14);
+            assert!((course.at(C[j] - 1.0) - z[j]).abs() < 1e-14);
         }
     }
 }

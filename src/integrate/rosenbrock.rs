@@ -5,7 +5,7 @@
 //! Written in the variables U = Gamma K, which need no product with the Jacobian
 //! (Hairer & Wanner, *Solving Ordinary Differential Equations II*, 2nd ed., IV.7, eq. (7.25)).
 
-use super::{StiffSystem, add_scaled};
+use super::{StiffSystem, add_scaled, copy};
 
 const STAGES: usize = 4;
 const GAMMA: f64 = 0.435_866_521_508_459;
@@ -128,7 +128,6 @@ impl Rosenbrock {
         y_end: &mut [f64],
         k_end: &mut [f64],
     ) -> f64 {
-        let n = y.len();
         if self.linearised_at != Some(t) {
             system.linearise(t, y);
             self.linearised_at = Some(t);
@@ -145,36 +144,39 @@ impl Rosenbrock {
             let (done, rest) = u.split_at_mut(i);
             let target = &mut rest[0];
             if i == 0 {
-                target.copy_from_slice(k);
+                copy(system.moving(), target, k);
             } else {
-                stage.copy_from_slice(y);
+                copy(system.moving(), stage, y);
                 for (j, uj) in done.iter().enumerate() {
-                    add_scaled(stage, table.a[i][j], uj);
+                    add_scaled(system.moving(), stage, table.a[i][j], uj);
                 }
                 system.derivative(t + table.alpha[i] * h, stage, rate);
-                target.copy_from_slice(rate);
+                copy(system.moving(), target, rate);
                 for (j, uj) in done.iter().enumerate() {
-                    add_scaled(target, table.c[i][j] / h, uj);
+                    add_scaled(system.moving(), target, table.c[i][j] / h, uj);
                 }
             }
-            add_scaled(target, table.gamma[i] * h, system.time_derivative());
+            let slope = system.time_derivative();
+            add_scaled(system.moving(), target, table.gamma[i] * h, slope);
             system.solve_shifted(target);
         }
         let mut error = 0.0;
-        let scale = &system.scale()[..n];
-        let u = u.each_ref().map(|u| &u[..n]);
-        let y_end = &mut y_end[..n];
-        for m in 0..n {
-            let (mut sum, mut e) = (y[m], 0.0);
-            for i in 0..STAGES {
-                sum += table.weights[i] * u[i][m];
-                e += table.error[i] * u[i][m];
-            }
-            y_end[m] = sum;
-            let e: f64 = e.abs() / scale[m];
-            // `max` would drop a NaN.
-            if e > error || e.is_nan() {
-                error = e;
+        for part in system.moving() {
+            let scale = &system.scale()[part.clone()];
+            let u = u.each_ref().map(|u| &u[part.clone()]);
+            let (y, y_end) = (&y[part.clone()], &mut y_end[part.clone()]);
+            for m in 0..part.len() {
+                let (mut sum, mut e) = (y[m], 0.0);
+                for i in 0..STAGES {
+                    sum += table.weights[i] * u[i][m];
+                    e += table.error[i] * u[i][m];
+                }
+                y_end[m] = sum;
+                let e: f64 = e.abs() / scale[m];
+                // `max` would drop a NaN.
+                if e > error || e.is_nan() {
+                    error = e;
+                }
             }
         }
         system.derivative(t + h, y_end, k_end);
@@ -186,6 +188,7 @@ impl Rosenbrock {
 mod tests {
     use super::*;
     use crate::integrate::System;
+    use std::ops::Range;
 
     /// Prothero & Robinson (1974) with a second, mildly nonlinear component: y0' = -L (y0 - sin t) + cos t,
     /// y1' = -y1^2 + t; `exact` uses the true Jacobian, else a crude one.
@@ -203,6 +206,9 @@ mod tests {
         }
         fn positions(&self) -> usize {
             0
+        }
+        fn moving(&self) -> &[Range<usize>] {
+            std::slice::from_ref(&(0..2))
         }
         fn derivative(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
             let (s, c) = libm::sincos(t);
@@ -275,6 +281,28 @@ mod tests {
     }
 
     #[test]
+    fn what_does_not_move_is_not_looked_at() {
+        let step = |y: &[f64], k: &[f64]| {
+            let mut problem = Problem {
+                stiffness: 50.0,
+                exact: true,
+                j: [0.0; 2],
+                shift: 0.0,
+                ft: [0.0; 2],
+            };
+            let (mut k, mut end, mut k_end) = (k.to_vec(), y.to_vec(), k.to_vec());
+            problem.derivative(0.0, y, &mut k);
+            let mut method = Rosenbrock::new(y.len());
+            let error = method.attempt(&mut problem, 0.0, 0.05, y, &k, &mut end, &mut k_end);
+            (error, end[..2].to_vec())
+        };
+        let unknown = f64::NAN;
+        let alone = step(&[0.1, 0.5], &[0.0; 2]);
+        assert!(alone.0 > 0.0);
+        assert_eq!(alone, step(&[0.1, 0.5, unknown], &[0.0, 0.0, unknown]));
+    }
+
+    #[test]
     fn a_very_stiff_component_is_followed_at_large_steps() {
         // L h = 5e8: an explicit method would need half a billion steps.
         let error = end_error(1e10, true, 20);
@@ -294,6 +322,9 @@ mod tests {
         }
         fn positions(&self) -> usize {
             0
+        }
+        fn moving(&self) -> &[Range<usize>] {
+            std::slice::from_ref(&(0..1))
         }
         fn derivative(&mut self, _t: f64, y: &[f64], dy: &mut [f64]) {
             dy[0] = (1.0 + self.off) * self.rate * y[0];

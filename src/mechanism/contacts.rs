@@ -159,11 +159,13 @@ impl Contacts {
         }
     }
 
-    /// Gaps of the joints that the latest evaluation, with `touching`, left out.
-    pub(super) fn measure_others(&mut self, touching: Touching<'_>, motion: &[Kinematics]) {
+    /// Completes the gaps of the latest evaluation, with `touching`, and measures those that it left out.
+    pub(super) fn finish_all(&mut self, touching: Touching<'_>, motion: &[Kinematics]) {
         for contact in &mut self.joints {
-            if !contact.may_press(touching) {
+            if self.only_touching && !contact.may_press(touching) {
                 contact.measure(motion);
+            } else {
+                contact.finish();
             }
         }
     }
@@ -193,12 +195,5 @@ impl Contacts {
         let at = &contact.gap.separation;
         let read = contact.friction_reads(&at.normal, motion);
         contact.law.sliding(at, &read).norm()
-    }
-
-    /// Completes the separation of every gap from the eccentricities of the latest evaluation.
-    pub fn finish(&mut self) {
-        for contact in &mut self.joints {
-            contact.finish();
-        }
     }
 }

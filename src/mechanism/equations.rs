@@ -39,8 +39,8 @@ pub(super) trait Equations: Send {
     fn update_kinematics(&mut self, model: &Model, t: f64, y: &[f64]);
 
     /// Lets evaluations leave out the bodies for which `asleep` holds, if [`Self::is_block_diagonal`]: free bodies, each a
-    /// tree of its own. Their derivatives are 0, and their motion that of the latest [`Self::update_kinematics`] or
-    /// [`Self::update_asleep`].
+    /// tree of its own. Their components of derivatives stay as they are, and their motion is that of the latest
+    /// [`Self::update_kinematics`] or [`Self::update_asleep`].
     fn put_to_sleep(&mut self, _asleep: &dyn Fn(BodyIndex) -> bool) {}
 
     /// [`Self::update_kinematics`] for the bodies that are awake.
@@ -99,7 +99,7 @@ pub(super) trait Equations: Send {
     /// Whether a force accelerates only the coordinates of the trees it acts on.
     fn is_block_diagonal(&self) -> bool;
 
-    /// Motion at (t, y), if bodies can move even with all velocities in `y` zero.
+    /// Motion at (t, y) of what is awake, if bodies can move even with all velocities in `y` zero.
     fn prescribed_motion(&mut self, model: &Model, t: f64, y: &[f64]) -> Option<&[Kinematics]>;
 
     /// Constraint rows.

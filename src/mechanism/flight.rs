@@ -68,6 +68,61 @@ impl Flyer {
     }
 }
 
+/// Components of a state that steps move: those of the bodies that do not fly.
+#[derive(Default)]
+pub(super) struct Moving {
+    /// In their order, positions first.
+    pub parts: Vec<Range<usize>>,
+    /// How many of them are positions.
+    of_positions: usize,
+}
+
+impl Moving {
+    /// With room to leave out so many flyers.
+    pub fn with_room(flyers: usize) -> Self {
+        Self {
+            parts: Vec::with_capacity(2 * (flyers + 1)),
+            of_positions: 0,
+        }
+    }
+
+    /// Those that are positions.
+    pub fn positions(&self) -> &[Range<usize>] {
+        &self.parts[..self.of_positions]
+    }
+
+    /// Those that are velocities.
+    pub fn velocities(&self) -> &[Range<usize>] {
+        &self.parts[self.of_positions..]
+    }
+
+    /// Of a state of `dimension` components, `positions` of them positions, of which the `flyers` are left out.
+    fn leave_out<'a>(
+        &mut self,
+        positions: usize,
+        dimension: usize,
+        flyers: impl Iterator<Item = &'a Flyer> + Clone,
+    ) {
+        self.parts.clear();
+        for (kind, all) in [0..positions, positions..dimension].into_iter().enumerate() {
+            let mut from = all.start;
+            for flyer in flyers.clone() {
+                let part = &flyer.parts()[kind];
+                if from < part.start {
+                    self.parts.push(from..part.start);
+                }
+                from = part.end;
+            }
+            if from < all.end {
+                self.parts.push(from..all.end);
+            }
+            if kind == 0 {
+                self.of_positions = self.parts.len();
+            }
+        }
+    }
+}
+
 /// A free body in free flight.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Flight {
@@ -190,16 +245,23 @@ impl Mechanism {
         };
         self.equations.put_to_sleep(&sleeps);
         self.contacts.only_touching = (0..flyers.len()).any(&asleep);
+        let left_out = flyers.iter().enumerate().filter(|(i, _)| asleep(*i));
+        let (positions, dimension) = (self.positions(), self.dimension());
+        let left_out = left_out.map(|(_, flyer)| flyer);
+        self.moving.leave_out(positions, dimension, left_out);
+    }
+
+    /// Components of the state that steps move.
+    pub fn moving(&self) -> &[Range<usize>] {
+        &self.moving.parts
     }
 
     /// Completes an evaluation at (t, y), with `touching`, by the motion of the bodies that it left out and all gaps.
     pub fn complete_gaps(&mut self, touching: Touching<'_>, y: &[f64]) {
         if self.contacts.only_touching {
             self.equations.update_asleep(&self.model, y);
-            let motion = self.equations.motion();
-            self.contacts.measure_others(touching, motion);
         }
-        self.contacts.finish();
+        self.contacts.finish_all(touching, self.equations.motion());
     }
 }
 
@@ -273,6 +335,35 @@ mod tests {
                     y[i]
                 );
             }
+        }
+    }
+
+    #[test]
+    fn what_flies_is_left_out_of_what_moves() {
+        let links = [("chain.links".to_owned(), "4".to_owned())];
+        let scene = Scene::load("chain", &links).expect("a scene");
+        let mut mechanism = Mechanism::new(&scene).expect("equations");
+        let dimension = mechanism.dimension();
+        for flying in [&[][..], &[1], &[0, 1, 3], &[0, 1, 2, 3]] {
+            mechanism.put_to_sleep(|flyer| flying.contains(&flyer));
+            let mut moves = vec![false; dimension];
+            for part in mechanism.moving().iter().cloned() {
+                assert!(!part.is_empty());
+                for i in part {
+                    assert!(!std::mem::replace(&mut moves[i], true), "{i} twice");
+                }
+            }
+            for (i, flyer) in mechanism.flyers().iter().enumerate() {
+                for component in flyer.parts().into_iter().flatten() {
+                    assert_eq!(moves[component], !flying.contains(&i), "{flying:?}");
+                }
+            }
+            let left_out = moves.iter().filter(|moves| !**moves).count();
+            assert_eq!(left_out, 13 * flying.len());
+            let of_positions = mechanism.moving.positions().last();
+            assert!(of_positions.is_none_or(|part| part.end <= mechanism.positions()));
+            let of_velocities = mechanism.moving.velocities().first();
+            assert!(of_velocities.is_none_or(|part| part.start >= mechanism.positions()));
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::constraints::Constraints;
 use super::equations::Equations;
-use super::kinematics::{Driven, Kinematics, Wrench, spin_of};
+use super::kinematics::{Driven, Kinematics, Wrench};
 use super::model::{BallJoint, BodyIndex, Model, Motion};
 use super::path::Path;
 use super::power::inverse_dynamics;
@@ -130,17 +130,7 @@ impl Equations for Forest {
     }
 
     fn velocities_of(&self, model: &Model, y: &[f64], rate: &[f64], out: &mut [f64]) {
-        for body in &model.bodies {
-            match body.motion {
-                Motion::Free { q, v } => {
-                    out[v..v + 3].copy_from_slice(&rate[q..q + 3]);
-                    out[v + 3..v + 6]
-                        .copy_from_slice(&spin_of(&y[q + 3..q + 7], &rate[q + 3..q + 7]));
-                }
-                Motion::Revolute { q, v } | Motion::Prismatic { q, v } => out[v] = rate[q],
-                Motion::Fixed | Motion::Driven { .. } => {}
-            }
-        }
+        self.tree.velocities_of(model, y, rate, out);
     }
 
     fn project(&mut self, model: &Model, t: f64, y: &mut [f64]) -> f64 {
@@ -191,7 +181,7 @@ impl Equations for Forest {
     }
 
     fn prescribed_motion(&mut self, model: &Model, t: f64, y: &[f64]) -> Option<&[Kinematics]> {
-        self.tree.update_kinematics(model, t, y);
+        self.tree.update_awake(model, t, y);
         Some(&self.tree.motion)
     }
 

@@ -16,9 +16,10 @@ use super::columns::{Column, collect_columns, contact_sides};
 use super::contacts::Contacts;
 use super::elements::Touching;
 use super::equations::Equations;
+use super::flight::Moving;
 use super::model::{BallJoint, Model};
 use crate::contact::{Coefficients, Memory, Slope};
-use crate::integrate::Method;
+use crate::integrate::{Method, add_scaled, copy, divide};
 use crate::scene::{Mat3, Vec3};
 
 /// What a ball and one of the trees that it acts on do to each other.
@@ -348,10 +349,16 @@ impl Friction {
         (0..band.size()).map(row).fold(0.0, f64::max)
     }
 
-    /// Solves (s I - J) x = b in place.
-    pub fn solve(&mut self, b: &mut [f64], equations: &dyn Equations, model: &Model) {
+    /// Solves (s I - J) x = b in place, for the components that move.
+    pub fn solve(
+        &mut self,
+        b: &mut [f64],
+        moving: &Moving,
+        equations: &dyn Equations,
+        model: &Model,
+    ) {
         let positions = b.len() - self.n;
-        let (b_q, b_v) = b.split_at_mut(positions);
+        let b_v = &mut b[positions..];
         for (&slot, right) in self.active.iter().zip(&mut self.right) {
             *right = self.touches[slot].reading(b_v);
         }
@@ -360,14 +367,11 @@ impl Friction {
             let touch = &self.touches[slot];
             touch.push(&(touch.resistance * w), b_v);
         }
-        for x in b_v.iter_mut() {
-            *x /= self.shift;
-        }
-        self.y[positions..].copy_from_slice(b_v);
+        divide(moving.velocities(), b, self.shift);
+        copy(moving.velocities(), &mut self.y, b);
         equations.position_rate(model, &self.y, &mut self.rate);
-        for (x, r) in b_q.iter_mut().zip(&self.rate) {
-            *x = (*x + r) / self.shift;
-        }
+        add_scaled(moving.positions(), b, 1.0, &self.rate);
+        divide(moving.positions(), b, self.shift);
     }
 }
 

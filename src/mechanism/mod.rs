@@ -41,6 +41,7 @@ pub use closed_form::ClosedMotion;
 pub use contacts::{Contacts, Ramp};
 pub use drives::periods_of;
 pub use elements::{Counts, ElementReport, Gap, Powers, Pull, Touch, Touching};
+use flight::Moving;
 pub use flight::{Flight, Flyer};
 pub use kinematics::{Kinematics, Wrench};
 pub use pairs::Opening;
@@ -309,6 +310,7 @@ pub struct Mechanism {
     /// ns, as by [`bounds::evaluation_time`].
     evaluation_time: f64,
     flyers: Vec<Flyer>,
+    moving: Moving,
 }
 
 impl Mechanism {
@@ -357,8 +359,11 @@ impl Mechanism {
             assembly: Assembly::default(),
             settled: None,
             flyers: Vec::new(),
+            moving: Moving::default(),
         };
         mechanism.flyers = Flyer::all(&mechanism, scene);
+        mechanism.moving = Moving::with_room(mechanism.flyers.len());
+        mechanism.put_to_sleep(|_| false);
         mechanism
     }
 

@@ -10,9 +10,11 @@ use super::columns::{Column, collect_columns, collect_relative_columns};
 use super::contacts::Contacts;
 use super::elements::{At, Coupling, ForceElement, SceneElement, Touching, Turning};
 use super::equations::Equations;
+use super::flight::Moving;
 use super::kinematics::Kinematics;
 use super::lu::Lu;
 use super::model::{BallJoint, Model};
+use crate::integrate::{add_scaled, copy, divide};
 use crate::scene::Vec3;
 use nalgebra::Complex;
 use std::ops::Range;
@@ -199,9 +201,13 @@ impl Stiff {
         &mut self,
         contacts: &Contacts,
         elements: &[Box<dyn SceneElement>],
+        touching: Touching<'_>,
         motion: &[Kinematics],
     ) {
-        let of_contacts = contacts.loose().map(|contact| contact.ends(motion));
+        let of_contacts = contacts.loose().map(|contact| {
+            let ends = contact.ends(motion);
+            ends.filter(|_| contact.may_press(touching))
+        });
         let of_elements = elements.iter().map(|element| element.ends(motion));
         for (drift, ends) in self.drift.iter_mut().zip(of_contacts.chain(of_elements)) {
             *drift = ends.map_or_else(Drift::default, |[socket, ball]| {
@@ -360,14 +366,20 @@ impl Stiff {
         self.lu_pair.factor(self.coordinates.len(), entries, shift);
     }
 
-    /// Solves (s I - J) x = b in place.
-    pub fn solve(&mut self, b: &mut [f64], equations: &dyn Equations, model: &Model) {
+    /// Solves (s I - J) x = b in place, for the components that move.
+    pub fn solve(
+        &mut self,
+        b: &mut [f64],
+        moving: &Moving,
+        equations: &dyn Equations,
+        model: &Model,
+    ) {
         let positions = b.len() - self.n;
-        let (b_q, b_v) = b.split_at_mut(positions);
         let s = self.shift;
         if self.empty {
-            b_v.iter_mut().for_each(|x| *x /= s);
+            divide(moving.velocities(), b, s);
         } else {
+            let (b_q, b_v) = b.split_at_mut(positions);
             equations.velocities_of(model, &self.y, b_q, &mut self.scratch);
             self.packed.clear();
             self.packed.extend(self.coordinates.iter().map(|&c| b_v[c]));
@@ -379,17 +391,16 @@ impl Stiff {
             }
             self.lu.solve(&mut self.packed);
             if self.coordinates.len() < self.n {
-                b_v.iter_mut().for_each(|x| *x /= s);
+                divide(moving.velocities(), b, s);
             }
             for (&c, x) in self.coordinates.iter().zip(&self.packed) {
-                b_v[c] = *x;
+                b[positions + c] = *x;
             }
         }
-        self.y[positions..].copy_from_slice(b_v);
+        copy(moving.velocities(), &mut self.y, b);
         equations.position_rate(model, &self.y, &mut self.rate);
-        for (x, r) in b_q.iter_mut().zip(&self.rate) {
-            *x = (*x + r) / s;
-        }
+        add_scaled(moving.positions(), b, 1.0, &self.rate);
+        divide(moving.positions(), b, s);
     }
 
     /// As [`Self::solve`] with the complex shift, for `re` + i `im`.
@@ -397,14 +408,15 @@ impl Stiff {
         &mut self,
         re: &mut [f64],
         im: &mut [f64],
+        moving: &Moving,
         equations: &dyn Equations,
         model: &Model,
     ) {
-        let (n, positions) = (self.n, re.len() - self.n);
+        let positions = re.len() - self.n;
         let inverse = self.shift_pair.inv();
-        let (re_q, re_v) = re.split_at_mut(positions);
-        let (im_q, im_v) = im.split_at_mut(positions);
         if !self.empty {
+            let (re_q, re_v) = re.split_at(positions);
+            let (im_q, im_v) = im.split_at(positions);
             equations.velocities_of(model, &self.y, re_q, &mut self.scratch);
             equations.velocities_of(model, &self.y, im_q, &mut self.scratch_im);
             self.pair.clear();
@@ -421,24 +433,29 @@ impl Stiff {
             }
             self.lu_pair.solve(&mut self.pair);
         }
-        if self.empty || self.coordinates.len() < n {
-            for i in 0..n {
-                let x = inverse * Complex::new(re_v[i], im_v[i]);
-                (re_v[i], im_v[i]) = (x.re, x.im);
-            }
+        if self.empty || self.coordinates.len() < self.n {
+            multiply(moving.velocities(), re, im, inverse);
         }
         if !self.empty {
             for (&c, x) in self.coordinates.iter().zip(&self.pair) {
-                (re_v[c], im_v[c]) = (x.re, x.im);
+                (re[positions + c], im[positions + c]) = (x.re, x.im);
             }
         }
-        self.y[positions..].copy_from_slice(re_v);
-        equations.position_rate(model, &self.y, &mut self.rate);
-        self.y[positions..].copy_from_slice(im_v);
-        equations.position_rate(model, &self.y, &mut self.rate_im);
-        for i in 0..positions {
-            let x = inverse * Complex::new(re_q[i] + self.rate[i], im_q[i] + self.rate_im[i]);
-            (re_q[i], im_q[i]) = (x.re, x.im);
+        for (part, rate) in [(&mut *re, &mut self.rate), (&mut *im, &mut self.rate_im)] {
+            copy(moving.velocities(), &mut self.y, part);
+            equations.position_rate(model, &self.y, rate);
+            add_scaled(moving.positions(), part, 1.0, rate);
+        }
+        multiply(moving.positions(), re, im, inverse);
+    }
+}
+
+/// `by` (`re` + i `im`), in these `parts`.
+fn multiply(parts: &[Range<usize>], re: &mut [f64], im: &mut [f64], by: Complex<f64>) {
+    for part in parts {
+        for (re, im) in re[part.clone()].iter_mut().zip(&mut im[part.clone()]) {
+            let x = by * Complex::new(*re, *im);
+            (*re, *im) = (x.re, x.im);
         }
     }
 }

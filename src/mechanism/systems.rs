@@ -6,6 +6,7 @@ use super::implicit::TURNS;
 use super::kinematics::Wrench;
 use super::{Mechanism, Powers};
 use crate::integrate::{ContactSystem, FrictionSystem, Rosenbrock, StiffSystem, System};
+use std::ops::Range;
 
 /// The equations of motion, with what decides over a step which contacts carry a force.
 pub struct Evaluator<'a> {
@@ -122,6 +123,10 @@ impl System for Evaluator<'_> {
         *evaluated = Some(t);
     }
 
+    fn moving(&self) -> &[Range<usize>] {
+        self.mechanism.moving()
+    }
+
     fn position_rate(&mut self, _t: f64, y: &[f64], dy: &mut [f64]) {
         self.mechanism.position_rate(y, dy);
     }
@@ -150,7 +155,7 @@ impl StiffSystem for Evaluator<'_> {
             ..
         } = &mut *self.mechanism;
         if let Some(motion) = equations.prescribed_motion(model, t, &scratch) {
-            stiff.observe_drift(contacts, elements, motion);
+            stiff.observe_drift(contacts, elements, self.touching, motion);
         }
         self.derivative(t, y, &mut scratch);
         stiff.derivative = scratch;
@@ -178,10 +183,11 @@ impl StiffSystem for Evaluator<'_> {
             model,
             equations,
             stiff,
+            moving,
             ..
         } = &mut *self.mechanism;
         if let Some(stiff) = stiff {
-            stiff.solve(b, &**equations, model);
+            stiff.solve(b, moving, &**equations, model);
         }
     }
 
@@ -196,10 +202,11 @@ impl StiffSystem for Evaluator<'_> {
             model,
             equations,
             stiff,
+            moving,
             ..
         } = &mut *self.mechanism;
         if let Some(stiff) = stiff {
-            stiff.solve_pair(b_real, b_imaginary, &**equations, model);
+            stiff.solve_pair(b_real, b_imaginary, moving, &**equations, model);
         }
     }
 
@@ -232,6 +239,10 @@ impl System for FrictionAlone<'_, '_> {
 
     fn positions(&self) -> usize {
         self.0.positions()
+    }
+
+    fn moving(&self) -> &[Range<usize>] {
+        self.0.moving()
     }
 
     fn derivative(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
@@ -277,10 +288,11 @@ impl StiffSystem for FrictionAlone<'_, '_> {
             model,
             equations,
             friction,
+            moving,
             ..
         } = &mut *self.0.mechanism;
         if let Some(friction) = friction {
-            friction.solve(b, &**equations, model);
+            friction.solve(b, moving, &**equations, model);
         }
     }
 

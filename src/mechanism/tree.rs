@@ -3,7 +3,7 @@
 //! Mass matrix by the composite-rigid-body algorithm, bias by one outward and one inward pass (Featherstone 2008,
 //! chapters 5 and 6), in world axes with each body's own centroid as reference. Allocates nothing after `new`.
 
-use super::kinematics::{self, Driven, Kinematics, Wrench, part};
+use super::kinematics::{self, Driven, Kinematics, Wrench, part, spin_of};
 use super::model::{BodyIndex, Model, Motion};
 use super::path::Path;
 use crate::jet::Jet;
@@ -155,7 +155,7 @@ impl Tree {
         }
     }
 
-    /// Mass matrices, factored, and generalised forces (loads, gravity, bias) into `out`, those of sleeping bodies 0.
+    /// Mass matrices, factored, and generalised forces (loads, gravity, bias) into `out`; those of sleeping bodies stay.
     #[inline]
     pub fn assemble(&mut self, model: &Model, gravity: &Vec3, out: &mut [f64]) {
         let Self {
@@ -165,14 +165,8 @@ impl Tree {
             mass,
             mass_offset,
             awake,
-            asleep,
             ..
         } = self;
-        for &b in &*asleep {
-            if let Motion::Free { v, .. } = model.bodies[b].motion {
-                out[v..v + 6].fill(0.0);
-            }
-        }
         for &b in awake.iter().rev() {
             let body = &model.bodies[b];
             let m = &motion[b];
@@ -311,15 +305,10 @@ impl Tree {
         }
     }
 
-    /// dq/dt from the velocities in `y`; 0 for sleeping bodies.
+    /// dq/dt from the velocities in `y`; that of sleeping bodies stays.
     #[inline]
     pub fn position_rate(&self, model: &Model, y: &[f64], dq: &mut [f64]) {
         let (qs, vs) = y.split_at(model.nq);
-        for &b in &self.asleep {
-            if let Motion::Free { q, .. } = model.bodies[b].motion {
-                dq[q..q + 7].fill(0.0);
-            }
-        }
         for &b in &self.awake {
             match model.bodies[b].motion {
                 Motion::Free { q, v } => {
@@ -327,6 +316,21 @@ impl Tree {
                     dq[q..q + 7].copy_from_slice(&rate);
                 }
                 Motion::Revolute { q, v } | Motion::Prismatic { q, v } => dq[q] = vs[v],
+                Motion::Fixed | Motion::Driven { .. } => {}
+            }
+        }
+    }
+
+    /// Velocities that give the bodies that are awake the position rates `rate` at the positions in `y`.
+    pub fn velocities_of(&self, model: &Model, y: &[f64], rate: &[f64], out: &mut [f64]) {
+        for &b in &self.awake {
+            match model.bodies[b].motion {
+                Motion::Free { q, v } => {
+                    out[v..v + 3].copy_from_slice(&rate[q..q + 3]);
+                    out[v + 3..v + 6]
+                        .copy_from_slice(&spin_of(&y[q + 3..q + 7], &rate[q + 3..q + 7]));
+                }
+                Motion::Revolute { q, v } | Motion::Prismatic { q, v } => out[v] = rate[q],
                 Motion::Fixed | Motion::Driven { .. } => {}
             }
         }

@@ -32,7 +32,7 @@ use crate::mechanism::{Counts, Flight, Mechanism, MechanismError, Pull, Ramp, To
 use crate::scene::Scene;
 use automatic::{Choice, controller_of, prepare_implicit};
 use corners::Piece;
-use flights::put_flights;
+use flights::{clear_flights, put_flights};
 use ideal::{ProbeFault, Reference};
 
 /// Speed at which the clearance closes when a jump would put a ball inside its socket wall, m/s: an impact at this speed
@@ -336,7 +336,7 @@ impl Simulation {
         let touching = Touching::by(located, &now.memory);
         let mut evaluator = mechanism.evaluator(touching);
         evaluator.derivative(now.t, &now.y, &mut now.k);
-        mechanism.contacts.finish();
+        mechanism.complete_gaps(touching, &now.y);
         store_gaps(mechanism, &mut now.gaps);
         self.stepper.invalidate();
         // Forces jump here: a parabola across the jump would have a spurious peak.
@@ -493,7 +493,7 @@ impl Simulation {
         attempt.left_piece = evaluator.left_piece;
         attempt.counts += evaluator.counts;
         attempt.factorisations += stepper.factorisations();
-        attempt.stiffness = stepper.stiffness(h, &end.y, &end.k);
+        attempt.stiffness = stepper.stiffness(&evaluator, h, &end.y, &end.k);
         error
     }
 
@@ -518,6 +518,7 @@ impl Simulation {
         let touching = Touching::by(self.locates(), &self.state.now.memory);
         let end = &mut self.attempt.end;
         put_flights(&self.mechanism, &self.state.flights, t_end, &mut end.y);
+        clear_flights(&self.mechanism, &self.state.flights, &mut end.k);
         self.mechanism.complete_gaps(touching, &end.y);
         store_gaps(&self.mechanism, &mut end.gaps);
     }

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::integrate::{
     ContactSystem, DormandPrince, FrictionSystem, ImexEuler, Method, Polynomial, Radau, Rosenbrock,
-    RungeKutta4, SemiImplicitEuler, Stepper, StiffSystem, hermite,
+    RungeKutta4, SemiImplicitEuler, Stepper, StiffSystem, System, hermite,
 };
 use std::ops::Range;
 
@@ -117,14 +117,20 @@ impl AnyStepper {
     }
 
     /// Step size times the largest eigenvalue seen in the step just attempted by an explicit adaptive method.
-    pub(super) fn stiffness(&self, h: f64, y_end: &[f64], k_end: &[f64]) -> f64 {
+    pub(super) fn stiffness<S: System>(
+        &self,
+        system: &S,
+        h: f64,
+        y_end: &[f64],
+        k_end: &[f64],
+    ) -> f64 {
         match self {
             Self::DormandPrince(explicit)
             | Self::Automatic {
                 explicit,
                 member: Member::Explicit,
                 ..
-            } => explicit.stiffness(h, y_end, k_end),
+            } => explicit.stiffness(system.moving(), h, y_end, k_end),
             _ => 0.0,
         }
     }

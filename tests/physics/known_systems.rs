@@ -5,6 +5,7 @@ use jointplay::analysis::orbit::Orbit;
 use jointplay::analysis::regime::{Evidence, Regime, classify};
 use jointplay::analysis::section::{Schedule, SectionRun};
 use jointplay::integrate::{Controller, DormandPrince, RungeKutta4, Stepper, System};
+use std::ops::Range;
 
 /// A map of the line or the circle, x' = f(x).
 #[derive(Clone)]
@@ -56,6 +57,9 @@ impl<F: Fn(f64, f64, f64) -> f64> System for Force<F> {
     }
     fn positions(&self) -> usize {
         1
+    }
+    fn moving(&self) -> &[Range<usize>] {
+        std::slice::from_ref(&(0..2))
     }
     fn derivative(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
         dy[0] = y[1];

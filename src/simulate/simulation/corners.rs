@@ -257,10 +257,14 @@ impl Simulation {
     /// miss the corner by the tolerance, which is not small compared with the ramp, and slide back at once.
     pub(super) fn end_at(&mut self, theta: f64, t_end: f64, h: f64) {
         let (now, end, scratch) = (&self.state.now, &mut self.attempt.end, &mut self.scratch_y);
-        let all = 0..now.y.len();
-        self.stepper
-            .interpolate(all, theta, h, &now.y, &now.k, &end.y, &end.k, scratch);
-        end.y.copy_from_slice(scratch);
+        for part in self.mechanism.moving() {
+            let part = part.clone();
+            self.stepper
+                .interpolate(part, theta, h, &now.y, &now.k, &end.y, &end.k, scratch);
+        }
+        for part in self.mechanism.moving() {
+            end.y[part.clone()].copy_from_slice(&scratch[part.clone()]);
+        }
         self.stepper.truncate(theta);
         self.attempt.stiffness = 0.0;
         self.evaluate_end(t_end);

@@ -36,17 +36,13 @@ impl Simulation {
             let next = mechanism.flight(flyer, now.t, &now.y);
             *flight = next.lasts_until(until).then_some(next);
             let flies = flight.is_some();
-            if flies {
-                for part in flyer.parts() {
-                    now.k[part].fill(0.0);
-                }
-            }
             some_start |= flies && !flew;
             some_land |= flew && !flies;
         }
         if !some_land && !some_start {
             return;
         }
+        clear_flights(mechanism, &state.flights, &mut state.now.k);
         self.leave_out_flights();
         self.stepper.invalidate();
         if some_land {
@@ -92,6 +88,17 @@ impl Simulation {
     pub(super) fn end_flights(&mut self) {
         self.look_at_all();
         self.state.flights.fill(None);
+    }
+}
+
+/// Writes 0 to the components of bodies in flight.
+pub(super) fn clear_flights(mechanism: &Mechanism, flights: &[Option<Flight>], k: &mut [f64]) {
+    for (flyer, flight) in mechanism.flyers().iter().zip(flights) {
+        if flight.is_some() {
+            for part in flyer.parts() {
+                k[part].fill(0.0);
+            }
+        }
     }
 }
 

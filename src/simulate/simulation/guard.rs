@@ -58,11 +58,14 @@ impl Simulation {
                 });
             }
         }
+        // Where the others are is known from the motion.
         let end = &self.attempt.end;
-        if end.k.iter().chain(&end.y).any(|x| !x.is_finite()) {
-            return Some(StopFault::NotFinite);
-        }
-        None
+        let moving = self.mechanism.moving().iter();
+        let sane = moving.fold(true, |sane, part| {
+            let both = end.k[part.clone()].iter().zip(&end.y[part.clone()]);
+            both.fold(sane, |sane, (k, y)| sane & k.is_finite() & y.is_finite())
+        });
+        (!sane).then_some(StopFault::NotFinite)
     }
 
     /// If a fixed step carried a free ball so far into the wall that it stores more energy there than any approach could

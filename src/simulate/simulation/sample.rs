@@ -98,7 +98,9 @@ impl Simulation {
         if mechanism.is_kinematic() {
             hermite(theta, h, y0, k0, y, k, scratch_y);
         } else {
-            stepper.interpolate(0..y.len(), theta, h, y0, k0, y, k, scratch_y);
+            for part in mechanism.moving() {
+                stepper.interpolate(part.clone(), theta, h, y0, k0, y, k, scratch_y);
+            }
         }
     }
 }
