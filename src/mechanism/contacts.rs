@@ -96,6 +96,18 @@ impl Contacts {
         &self.joints[i]
     }
 
+    /// Whether joint `i` left the piece of its law held in the memory in an evaluation since [`Self::forget_left_pieces`].
+    pub fn has_left_piece(&self, i: usize) -> bool {
+        self.joints[i].left_piece
+    }
+
+    /// As if every joint had stayed on the pieces held in the memory.
+    pub fn forget_left_pieces(&mut self) {
+        for contact in &mut self.joints {
+            contact.left_piece = false;
+        }
+    }
+
     /// Gap of joint `i` at the latest evaluation.
     pub fn gap(&self, i: usize) -> &Gap {
         &self.joints[i].gap

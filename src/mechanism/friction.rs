@@ -349,6 +349,23 @@ impl Friction {
         (0..band.size()).map(row).fold(0.0, f64::max)
     }
 
+    /// Largest angular frequency, rad/s, at which a ball rings on its wall where friction was linearised, its neighbours' forces
+    /// constant: sqrt(n' H n dF_N/d(delta)) with dF_N/d(delta) = 3/2 F_N/delta (19). The method steps this explicitly.
+    pub fn ringing(&self) -> f64 {
+        let square = |(i, &slot): (usize, &usize)| {
+            let touch = &self.touches[slot];
+            let at = touch.law.separation(&touch.eccentricity, &touch.rate);
+            if at.penetration <= 0.0 {
+                return 0.0;
+            }
+            let force = touch.law.force(&touch.memory, &at, || touch.read);
+            let (stiffness, n) = (1.5 * force.normal / at.penetration, at.normal);
+            stiffness * n.dot(&(self.mobility[self.band.at(i, i)] * n))
+        };
+        let squares = self.active.iter().enumerate().map(square);
+        squares.fold(0.0, f64::max).sqrt()
+    }
+
     /// Solves (s I - J) x = b in place, for the components that move.
     pub fn solve(
         &mut self,
@@ -459,6 +476,38 @@ mod tests {
         let (plus, minus) = (at(1.0), at(-1.0));
         let of = |(plus, minus): (&f64, &f64)| (plus - minus) / (2.0 * width);
         plus.iter().zip(&minus).map(of).collect()
+    }
+
+    #[test]
+    fn a_hanging_chain_rings_as_its_links_are_pushed_back() {
+        let (scene, y) = resting().swap_remove(0);
+        let memory = Memory {
+            active: true,
+            approach_speed: 1e-3,
+            floored: true,
+            ..Memory::default()
+        };
+        let memory = vec![memory; scene.ball_joints.len()];
+        let mut mechanism = Mechanism::new(&scene).unwrap();
+        let positions = mechanism.positions();
+        mechanism.prepare_friction().unwrap();
+        let mut evaluator = mechanism.evaluator(Touching::Located(&memory));
+        evaluator.friction_alone().linearise(0.0, &y);
+        // Of the lowest link, whose neighbour would give way as easily.
+        let mut push = |by: f64| {
+            let (mut moved, mut out) = (y.clone(), vec![0.0; y.len()]);
+            moved[7 * 2 + 2] += by;
+            evaluator.derivative(0.0, &moved, &mut out);
+            out[positions + 6 * 2 + 2]
+        };
+        let width = 1e-11;
+        let stiffness_over_mass = (push(-width) - push(width)) / (2.0 * width);
+        let expected = (2.0 * stiffness_over_mass).sqrt();
+        let ringing = mechanism.friction_ringing();
+        assert!(
+            (ringing / expected - 1.0).abs() < 1e-3,
+            "{ringing} {expected}"
+        );
     }
 
     #[test]

@@ -705,6 +705,11 @@ impl Mechanism {
         self.friction.as_ref().map_or(0.0, |f| f.fastest())
     }
 
+    /// Largest angular frequency at which a ball rings on its wall, rad/s, by that linearisation.
+    pub fn friction_ringing(&self) -> f64 {
+        self.friction.as_ref().map_or(0.0, |f| f.ringing())
+    }
+
     /// Approximate cost of the latest implicit step's linear algebra, in evaluations.
     pub fn implicit_algebra(&self) -> f64 {
         let stiff = self.stiff.as_ref();

@@ -14,8 +14,6 @@ pub struct Evaluator<'a> {
     touching: Touching<'a>,
     /// Counts of the evaluations made through it.
     pub counts: Counts,
-    /// In one of them a sliding speed or penetration rate was beyond the piece of its law held in the memory.
-    pub left_piece: bool,
 }
 
 impl Mechanism {
@@ -25,7 +23,6 @@ impl Mechanism {
             mechanism: self,
             touching,
             counts: Counts::default(),
-            left_piece: false,
         }
     }
 }
@@ -70,13 +67,11 @@ impl Evaluator<'_> {
         let mut loads = Loads {
             wrench,
             counts: &mut self.counts,
-            left_piece: false,
         };
         contacts.load(&at, &mut loads);
         for element in elements {
             element.load(&at, &mut loads);
         }
-        self.left_piece |= loads.left_piece;
     }
 
     /// Powers at (t, y). `dy` holds the derivative there if the latest evaluation was at this instant, and is scratch

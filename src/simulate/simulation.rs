@@ -122,8 +122,6 @@ struct Attempt {
     corner: Option<(usize, Piece)>,
     /// Restarted on another piece.
     turned: bool,
-    /// A contact left the piece of a law that its memory holds.
-    left_piece: bool,
     /// It may hold the largest force of a contact.
     near_peak: bool,
     /// Largest normal force of each joint that was in contact over it, N, and at which fraction of it.
@@ -289,7 +287,6 @@ impl Simulation {
                 located: None,
                 corner: None,
                 turned: false,
-                left_piece: false,
                 near_peak: false,
                 strongest: vec![(0.0, 0.0); joints],
                 stiffness: 0.0,
@@ -477,6 +474,7 @@ impl Simulation {
         let StepEnd {
             t, y, k, memory, ..
         } = &state.now;
+        mechanism.contacts.forget_left_pieces();
         let mut evaluator = mechanism.evaluator(Touching::by(located, memory));
         let end = &mut attempt.end;
         let tolerance = running.solver.tolerance;
@@ -490,7 +488,6 @@ impl Simulation {
             &mut end.k,
             tolerance,
         );
-        attempt.left_piece = evaluator.left_piece;
         attempt.counts += evaluator.counts;
         attempt.factorisations += stepper.factorisations();
         attempt.stiffness = stepper.stiffness(&evaluator, h, &end.y, &end.k);

@@ -1,6 +1,7 @@
 //! A thousand simulated seconds, and a minute of parameters that change with every frame.
 
 use std::fmt::Write;
+use std::sync::Mutex;
 
 use crate::common::invariants::{fault, finite};
 use crate::common::{frame_now, scene};
@@ -355,7 +356,7 @@ fn a_thousand_settled_seconds_drift_nowhere() {
 }
 
 #[test]
-#[ignore = "an hour; writes the long runs to docs/extremes.md"]
+#[ignore = "half an hour on two cores; writes the long runs to docs/extremes.md"]
 fn write_a_thousand_seconds_of_every_kind() {
     let mut page = String::from(
         "\n## 1000 simulated seconds\n\n\
@@ -366,28 +367,51 @@ fn write_a_thousand_seconds_of_every_kind() {
          | Scene | Preset | Steps | Contacts begun later | Ideal joints open by, m | Orientations off by | Energy | Energy residual | Normal force |\n\
          |---|---|---|---|---|---|---|---|---|\n",
     );
-    for of in long_list() {
-        for preset in 0..of.presets {
-            let d = long_run(&of, preset, 1000.0);
-            let force = match of.scene {
-                "chain" | "pendulum" | "slider-crank" => "-".to_owned(),
-                _ => format!("{:.1e}", d.force),
-            };
-            let _ = writeln!(
-                page,
-                "| {}, {} | {} | {} | {} | {:.1e} | {:.1e} | {:.1e} | {:.1e} | {force} |",
-                of.scene,
-                of.what,
-                FAST[preset],
-                d.steps,
-                d.contacts,
-                d.open,
-                d.skew,
-                d.energy,
-                d.residual
-            );
-            holds(&of, preset, &d);
+    let list = long_list();
+    let runs = list
+        .iter()
+        .flat_map(|of| (0..of.presets).map(move |preset| (of, preset)));
+    let runs: Vec<(&Long, usize)> = runs.collect();
+    // The longest runs are the last.
+    let left = Mutex::new(runs.clone());
+    let done = Mutex::new(Vec::new());
+    std::thread::scope(|scope| {
+        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
+            scope.spawn(|| {
+                loop {
+                    let mut waiting = left.lock().unwrap();
+                    let (place, run) = (waiting.len(), waiting.pop());
+                    drop(waiting);
+                    let Some((of, preset)) = run else {
+                        break;
+                    };
+                    let drift = long_run(of, preset, 1000.0);
+                    done.lock().unwrap().push((place, drift));
+                }
+            });
         }
+    });
+    let mut done = done.into_inner().unwrap();
+    done.sort_by_key(|(place, _)| *place);
+    for ((of, preset), (_, d)) in runs.into_iter().zip(done) {
+        let force = match of.scene {
+            "chain" | "pendulum" | "slider-crank" => "-".to_owned(),
+            _ => format!("{:.1e}", d.force),
+        };
+        let _ = writeln!(
+            page,
+            "| {}, {} | {} | {} | {} | {:.1e} | {:.1e} | {:.1e} | {:.1e} | {force} |",
+            of.scene,
+            of.what,
+            FAST[preset],
+            d.steps,
+            d.contacts,
+            d.open,
+            d.skew,
+            d.energy,
+            d.residual
+        );
+        holds(of, preset, &d);
     }
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/extremes.md");
     let kept = std::fs::read_to_string(&path).unwrap();

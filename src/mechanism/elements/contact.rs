@@ -33,6 +33,8 @@ pub struct Contact {
     pub joint: BallJoint,
     pub law: Coefficients,
     pub gap: Gap,
+    /// In one of the latest evaluations its sliding speed or penetration rate was beyond the piece of its law held in the memory.
+    pub left_piece: bool,
 }
 
 impl Contact {
@@ -42,6 +44,7 @@ impl Contact {
             joint,
             law,
             gap: Gap::default(),
+            left_piece: false,
         }
     }
 
@@ -154,7 +157,7 @@ impl ForceElement for Contact {
             let (ball, socket) = (spin(&joint.ball), spin(&joint.socket));
             law.friction_reads(&separation.normal, &velocity, ball, socket)
         });
-        loads.left_piece |= law.leaves_piece(memory, &separation, &force);
+        self.left_piece |= law.leaves_piece(memory, &separation, &force);
         gap.normal_force = force.normal;
         gap.friction = force.friction;
         gap.slip_speed = force.slip_speed;

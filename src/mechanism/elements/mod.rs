@@ -92,8 +92,6 @@ pub(super) struct Loads<'a> {
     /// On the bodies, about their centroids; the last is the world's.
     pub wrench: &'a mut [Wrench],
     pub counts: &'a mut Counts,
-    /// A sliding speed or penetration rate was beyond the piece of its law held in the memory.
-    pub left_piece: bool,
 }
 
 /// How the force between two points depends on their relative motion.

@@ -14,47 +14,52 @@ const LIMITED_STEPS: u32 = 8;
 /// Steps that must be limited by stability before friction is tried as the cause.
 const LIMITED_BEFORE_FRICTION: u32 = 2;
 const SETTLED_STEPS: u32 = 60;
-/// Over this many implicit steps, or those until something strikes, the progress per cost must be this many times that of the
-/// explicit methods before; otherwise these get steps for this many times the cost of the trial, twice as many after each
-/// consecutive failed trial, at most so many times.
+/// Over a trial of a member its progress per cost must be this many times that of the steps before it; otherwise it has to wait
+/// for explicit steps that cost this many times as much as the trial, twice as many after each consecutive failed trial, at most
+/// so many times.
+const WORTH_IT: f64 = 0.7;
+const EXPLICIT_TURN: f64 = 2.5;
+const MOST_DOUBLINGS: u32 = 3;
+/// A trial of the implicit member lasts so many steps, or until something strikes.
 const TRIAL_STEPS: u32 = 24;
 /// The first of them, in which the step still grows, do not count once there are as many.
 const GROWING_STEPS: u32 = 4;
-const WORTH_IT: f64 = 0.7;
+/// One of friction's lasts so many, or until friction limits no more.
+const FRICTION_STEPS: u32 = 8;
+/// It is on trial at tolerances below this: its order is lower than the explicit one's, and its steps may be shorter there.
+const TRIED_BELOW: f64 = 2e-6;
+/// Longest of its steps, times the angular frequency at which a ball rings on its wall: that is explicit, and at loose tolerances
+/// longer steps keep it up.
+const RINGING: f64 = 1.5;
 /// How much of the progress and cost of the explicit methods counts a step later.
 const KEPT: f64 = 0.95;
-const EXPLICIT_TURN: f64 = 2.5;
-const MOST_DOUBLINGS: u32 = 3;
 /// Cost of a step beside evaluations and algebra (events, peaks, energies), and of an explicit step in all, in evaluations.
 const STEP_COST: f64 = 6.0;
 const EXPLICIT_COST: f64 = STEP_COST + 6.0;
 
-/// State of the automatic pair.
+/// A member's steps on trial, and what became of earlier trials.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct Choice {
-    /// Explicit steps since the latest contact began, and how many of them were limited by stability.
-    pub(super) since_contact: u32,
-    pub(super) limited: u32,
-    /// Explicit steps before the implicit method may be tried again.
-    pub(super) wait: u32,
-    /// Explicit step size at the latest switch to the implicit method, s.
-    pub(super) h_explicit: f64,
-    /// Time and cost, in evaluations, of the latest explicit steps.
-    pub(super) explicit_progress: f64,
-    pub(super) explicit_cost: f64,
-    /// Time and cost, in evaluations, of the implicit steps on trial.
-    pub(super) progress: f64,
-    pub(super) cost: f64,
-    pub(super) steps: u32,
+struct Trial {
+    /// Time, s, cost, in evaluations, and number of its steps.
+    progress: f64,
+    cost: f64,
+    steps: u32,
     /// Consecutive failed trials.
-    pub(super) failures: u32,
+    failures: u32,
+    /// Explicit steps before the next one.
+    wait: u32,
 }
 
-impl Choice {
-    /// Ends the trial of the implicit method; whether it failed.
-    fn judge(&mut self) -> bool {
-        let explicit = self.explicit_progress / self.explicit_cost;
-        let fails = self.progress < WORTH_IT * explicit * self.cost;
+impl Trial {
+    fn add(&mut self, h: f64, cost: f64) {
+        self.progress += h;
+        self.cost += cost;
+        self.steps += 1;
+    }
+
+    /// Ends it; whether it failed, beside steps with this progress per cost.
+    fn judge(&mut self, before: f64) -> bool {
+        let fails = self.progress < WORTH_IT * before * self.cost;
         if fails {
             let turn = EXPLICIT_TURN * self.cost / EXPLICIT_COST;
             self.wait = (turn as u32) << self.failures.min(MOST_DOUBLINGS);
@@ -62,8 +67,35 @@ impl Choice {
         } else {
             self.failures = 0;
         }
-        (self.progress, self.cost, self.steps) = (0.0, 0.0, 0);
+        self.restart();
         fails
+    }
+
+    fn restart(&mut self) {
+        (self.progress, self.cost, self.steps) = (0.0, 0.0, 0);
+    }
+}
+
+/// State of the automatic choice.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Choice {
+    /// Steps other than implicit ones since the latest contact began, and how many of them were limited by stability.
+    since_contact: u32,
+    limited: u32,
+    /// Explicit step size at the latest switch to the implicit method, s.
+    h_explicit: f64,
+    /// Time, s, and cost, in evaluations, of the latest steps other than implicit ones.
+    explicit_progress: f64,
+    explicit_cost: f64,
+    /// Of friction's member, and of the implicit one.
+    friction: Trial,
+    implicit: Trial,
+}
+
+impl Choice {
+    /// Progress per cost of the latest steps other than implicit ones.
+    fn explicit(&self) -> f64 {
+        self.explicit_progress / self.explicit_cost
     }
 }
 
@@ -71,6 +103,11 @@ impl Simulation {
     /// Which method of the automatic choice takes the next step, after one of size `h` that took so many evaluations.
     pub(super) fn choose_member(&mut self, h: f64, stiffness: f64, evaluations: f64) {
         let before = self.state.control.member;
+        if before == Member::Friction {
+            let longest = RINGING / self.mechanism.friction_ringing();
+            let control = &mut self.state.control;
+            control.h_next = control.h_next.min(longest);
+        }
         let member = self.next_member(h, stiffness, evaluations);
         if member != before {
             self.put_member(member);
@@ -90,6 +127,7 @@ impl Simulation {
         let touches = self.state.now.memory.iter().any(|m| m.active);
         let turns = self.running.solver.method == Method::Automatic
             && self.state.control.member == Member::Explicit
+            && self.state.control.choice.friction.wait == 0
             && touches
             && self.mechanism.has_friction_alone();
         if turns {
@@ -102,6 +140,7 @@ impl Simulation {
     fn next_member(&mut self, h: f64, stiffness: f64, evaluations: f64) -> Member {
         let velocities = self.state.now.y.len() - self.mechanism.positions();
         let factorisations = f64::from(self.attempt.factorisations);
+        let tries_friction = self.running.solver.tolerance < TRIED_BELOW;
         let state = &mut self.state;
         let member = state.control.member;
         let algebra = match member {
@@ -111,10 +150,11 @@ impl Simulation {
         };
         let cost = evaluations + algebra + STEP_COST;
         let choice = &mut state.control.choice;
-        if member == Member::Implicit {
-            choice.progress += h;
-            choice.cost += cost;
-            choice.steps += 1;
+        match member {
+            Member::Explicit => choice.friction.wait = choice.friction.wait.saturating_sub(1),
+            Member::Friction if tries_friction => choice.friction.add(h, cost),
+            Member::Friction => {}
+            Member::Implicit => choice.implicit.add(h, cost),
         }
         if state.control.contact_began {
             choice.since_contact = 0;
@@ -123,16 +163,18 @@ impl Simulation {
             let strikes = state.now.memory.iter().any(|m| m.active && !m.floored);
             let leaves = member == Member::Implicit && strikes;
             if leaves {
-                choice.judge();
+                choice.implicit.judge(choice.explicit());
             }
             (choice.explicit_progress, choice.explicit_cost) = (0.0, 0.0);
             return if leaves { Member::Explicit } else { member };
         }
         if member == Member::Implicit {
-            if choice.steps == GROWING_STEPS {
-                (choice.progress, choice.cost) = (0.0, 0.0);
+            let before = choice.explicit();
+            let trial = &mut choice.implicit;
+            if trial.steps == GROWING_STEPS {
+                (trial.progress, trial.cost) = (0.0, 0.0);
             }
-            if choice.steps >= TRIAL_STEPS && choice.judge() {
+            if trial.steps >= TRIAL_STEPS && trial.judge(before) {
                 // That step may have been cut at an event to next to nothing.
                 state.control.h_next = choice.h_explicit.max(shortest_step(state.now.t));
                 return Member::Explicit;
@@ -147,7 +189,11 @@ impl Simulation {
         if member == Member::Friction {
             // It costs more than an explicit step, which must be as much shorter.
             let dearer = 1.0 + algebra / EXPLICIT_COST;
-            if self.mechanism.friction_rate() * h < STABILITY_LIMIT * dearer {
+            let over = self.mechanism.friction_rate() * h < STABILITY_LIMIT * dearer;
+            let ends = over || choice.friction.steps >= FRICTION_STEPS;
+            let before = choice.explicit();
+            let fails = tries_friction && ends && choice.friction.judge(before);
+            if over || fails {
                 choice.limited = 0;
                 next = Member::Explicit;
             } else {
@@ -160,6 +206,7 @@ impl Simulation {
                 choice.limited.saturating_sub(1)
             };
             if touches
+                && choice.friction.wait == 0
                 && self.mechanism.has_friction_alone()
                 && choice.limited >= LIMITED_BEFORE_FRICTION
                 && choice.limited < LIMITED_STEPS
@@ -167,21 +214,18 @@ impl Simulation {
                 next = Member::Friction;
             }
         }
-        if choice.wait > 0 {
-            choice.wait -= 1;
+        if choice.implicit.wait > 0 {
+            choice.implicit.wait -= 1;
             return next;
         }
         let limited =
             choice.limited >= LIMITED_STEPS && (touches || self.mechanism.has_couplings());
         let settled = limited || (touches && choice.since_contact >= SETTLED_STEPS);
         if settled && velocities <= self.mechanism.largest_implicit() {
-            *choice = Choice {
-                h_explicit: h,
-                explicit_progress: choice.explicit_progress,
-                explicit_cost: choice.explicit_cost,
-                failures: choice.failures,
-                ..Choice::default()
-            };
+            (choice.since_contact, choice.limited) = (0, 0);
+            choice.h_explicit = h;
+            choice.implicit.restart();
+            choice.friction.restart();
             return Member::Implicit;
         }
         next
@@ -244,18 +288,52 @@ mod tests {
             simulation.state.control.choice = Choice {
                 explicit_progress: 1e-3,
                 explicit_cost: 1e3,
-                progress: ratio * 1e-2,
-                cost: 1e4,
-                steps: 7,
-                failures: 1,
+                implicit: Trial {
+                    progress: ratio * 1e-2,
+                    cost: 1e4,
+                    steps: 7,
+                    failures: 1,
+                    wait: 0,
+                },
                 ..Choice::default()
             };
             simulation.choose_member(1e-9, 0.0, 10.0);
             let control = &simulation.state.control;
             assert_eq!(control.member, Member::Explicit);
-            assert_eq!(control.choice.wait > 0, fails, "{ratio}");
-            assert_eq!(control.choice.failures, if fails { 2 } else { 0 });
-            assert_eq!(control.choice.steps, 0);
+            let trial = &control.choice.implicit;
+            assert_eq!(trial.wait > 0, fails, "{ratio}");
+            assert_eq!(trial.failures, if fails { 2 } else { 0 });
+            assert_eq!(trial.steps, 0);
+        }
+    }
+
+    #[test]
+    fn a_trial_of_friction_that_fails_has_explicit_steps_follow() {
+        for (tolerance, fails) in [("1e-6", true), ("1e-5", false)] {
+            let change = ("solver.tolerance".to_owned(), tolerance.to_owned());
+            let mut simulation =
+                Simulation::new(&Scene::load("spcmm", &[change]).unwrap()).unwrap();
+            simulation.advance_to(1.0).unwrap();
+            simulation.state.now.memory[0].active = true;
+            simulation.state.control.member = Member::Friction;
+            simulation.state.control.contact_began = false;
+            simulation.state.control.choice = Choice {
+                explicit_progress: 1.0,
+                explicit_cost: 1.0,
+                friction: Trial {
+                    progress: 1e-3,
+                    cost: 100.0,
+                    steps: FRICTION_STEPS - 1,
+                    ..Trial::default()
+                },
+                ..Choice::default()
+            };
+            simulation.choose_member(1e-9, 0.0, 10.0);
+            let trial = simulation.state.control.choice.friction;
+            assert_eq!(trial.wait > 0, fails, "{tolerance}");
+            assert_eq!(trial.failures, u32::from(fails));
+            simulation.state.control.member = Member::Explicit;
+            assert_eq!(simulation.turn_to_friction(), !fails, "{tolerance}");
         }
     }
 
@@ -268,7 +346,10 @@ mod tests {
             h_explicit: 1e-16,
             explicit_progress: 1.0,
             explicit_cost: 1e-3,
-            steps: TRIAL_STEPS - 1,
+            implicit: Trial {
+                steps: TRIAL_STEPS - 1,
+                ..Trial::default()
+            },
             ..Choice::default()
         };
         simulation.choose_member(1e-3, 0.0, 10.0);

@@ -106,11 +106,11 @@ impl Simulation {
 
     /// First corner of the laws inside the step just attempted.
     pub(super) fn first_corner(&mut self, h: f64) -> Option<Corner> {
-        if !self.attempt.left_piece {
-            return None;
-        }
         let mut first: Option<Corner> = None;
         for j in 0..self.state.now.memory.len() {
+            if !self.mechanism.contacts.has_left_piece(j) {
+                continue;
+            }
             let memory = self.state.now.memory[j];
             let mut take = |corner: Option<(f64, Piece)>| {
                 let earliest = first.as_ref().map_or(f64::INFINITY, |corner| corner.theta);
