@@ -546,7 +546,7 @@ mod tests {
         }
         fn solve_shifted(&mut self, b: &mut [f64]) {
             let x = self.real * Vector2::new(b[0], b[1]);
-            b.copy_from_slice(x.as_slice());
+            b[..2].copy_from_slice(x.as_slice());
         }
         fn factor_shifted_pair(&mut self, real: f64, imaginary: f64) {
             let shift = Matrix2::identity() * Complex::new(real, imaginary);
