@@ -227,6 +227,11 @@ fn a_state_that_does_not_belong_is_refused_in_words() {
     for at in digits.iter().step_by(digits.len() / 40) {
         let mut bytes = good.clone().into_bytes();
         bytes[*at] = if bytes[*at] == b'7' { b'8' } else { b'7' };
+        // A seventeenth digit may say the same number.
+        let parsed = |text: &[u8]| serde_json::from_slice::<Json>(text).ok();
+        if parsed(&bytes) == parsed(good.as_bytes()) {
+            continue;
+        }
         fs::write(&path, &bytes).unwrap();
         refused(same, 2, &["--from-state s: "]);
     }
