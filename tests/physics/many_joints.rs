@@ -95,7 +95,7 @@ fn a_long_chain_at_rest_in_its_sockets_is_stepped_implicitly() {
         for (j, (force, peak)) in found.iter().zip(&reference).enumerate() {
             let off = (force / peak - 1.0).abs();
             let joint = j + 1;
-            assert!(off < 2e-4, "J{joint}: {force} N instead of {peak} N");
+            assert!(off < 5e-4, "J{joint}: {force} N instead of {peak} N");
         }
         assert!(
             evaluations < most,
